@@ -106,7 +106,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             robot = robot.with_scenes(read_scenes(options.scenes, robot))
         if options.experiment != "all" and (reason := skipped(options.experiment, robot)):
             raise Refused(f"{options.experiment} does not apply to {robot.name}: {say(reason)}")
-        asked = known.asked_step(options.dt, options.integrator)
+        step = known.integrator_step(options.dt, options.integrator)
         before = made_by(options.out)
         with new_report(options.out) as folder:
             for line in compared.lines:
@@ -125,17 +125,17 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 reasons = {name: say(reason) for name in names if (reason := skipped(name, robot))}
                 origin = provenance.provenance(command, robot.mjcf, compared.file, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}
-                of_run |= {"alone": options.experiment != "all", "asked": asked}
+                of_run |= {"alone": options.experiment != "all", "step": step}
                 make = Setup.quick if options.quick else Setup
                 setup = make(robot, engines(mujoco, compared.own), **of_run)
                 for name, reason in reasons.items():
                     terminal.say(f"{name:<13} skipped: {reason}")
-                asked = [name for name in names if name not in reasons]
-                terminal.tell(partial(experiment.progress, workers.clock, asked))
-                sections, causes, needless = experiment.examine(asked, setup, folder, terminal, workers, workers.clock)
+                names = [name for name in names if name not in reasons]
+                terminal.tell(partial(experiment.progress, workers.clock, names))
+                sections, causes, needless = experiment.examine(names, setup, folder, terminal, workers, workers.clock)
             parts = Parts()
             outcome = sections, len(EXPERIMENTS) - len(needless), causes, compared.compared, robot.name
-            words = parts.made("the verdict", "No verdict.", verdict.verdict, *outcome)
+            words = parts.attempt("the verdict", "No verdict.", verdict.verdict, *outcome)
             reasons |= needless
             origin["seconds"] = round(time.perf_counter() - started, 1)
             origin |= provenance.durations(workers.clock)

@@ -5,12 +5,12 @@ from contextlib import contextmanager
 
 import pytest
 
-from compare.fleet.file_tasks import Here
+from compare.fleet.file_tasks import InProcess
 from compare.process import workers
 from compare.process.clock import Clock
 
 
-class Inside(Here):
+class Inside(InProcess):
     """Workers that compute and draw in this process, at once."""
 
     def __init__(self):

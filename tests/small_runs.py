@@ -13,7 +13,7 @@ from crane import crane
 
 from compare.engines.mujoco import load
 from compare.experiments import EXPERIMENTS, module, skipped
-from compare.fleet.file_tasks import Here
+from compare.fleet.file_tasks import InProcess
 from compare.report import files, verdict
 from compare.report.text import say
 from compare.robots.arm import ARM
@@ -41,7 +41,7 @@ def of_crane():
         setup = experiment.Setup.small(robot, experiment.engines(load(robot.mjcf, robot.tree)))
         reasons = {name: say(reason) for name in EXPERIMENTS if (reason := skipped(name, robot))}
         sections, causes, _ = experiment.examine(
-            [n for n in EXPERIMENTS if n not in reasons], setup, folder, lines, Here()
+            [n for n in EXPERIMENTS if n not in reasons], setup, folder, lines, InProcess()
         )
         words = verdict.verdict(sections, len(EXPERIMENTS), causes)
         report = verdict.Report(sections, robot, {"command": "c"}, words, causes, list(reasons.items()))

@@ -149,7 +149,7 @@ ARM7, MIXED, FREE = (str(PATHS[name]) for name in ("arm7", "mixed", "free_body")
 WRONG = {  # arguments, each with what is in its line
     # words
     "mas --version": "did you mean mass?", "help": "did you mean --help?", "xyz": f"{', '.join(EXPERIMENTS)} or all",
-    "mass -quick": "did you mean --quick?", "mass --xyz": " ".join(command_line.OPTIONS_OF_ALL), "mass gravity": "'gravity'",
+    "mass -quick": "did you mean --quick?", "mass --xyz": " ".join(command_line.OPTIONS), "mass gravity": "'gravity'",
     "--mjcf robot.xml": "all --mjcf robot.xml", "mass --reference modle": "did you mean model?",
     "--quick fleet x": "fleet must come first",
     "mass --reference my.py": "my.py:OBJECT", "mass --out": "--out: expected one argument",

@@ -14,7 +14,7 @@ from compare import __main__ as entry
 from compare.__main__ import main
 from compare.cli import command_line
 from compare.experiments import EXPERIMENTS, Experiment
-from compare.fleet.file_tasks import Here
+from compare.fleet.file_tasks import InProcess
 from compare.judge.check import Result
 from compare.report.terminal import Terminal
 from compare.report.text import environment
@@ -93,7 +93,7 @@ def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsy
 # what is drawn, and when
 
 
-class Writing(Here):
+class Writing(InProcess):
     """Draws in this process at once, and writes down when that is asked for."""
 
     def __init__(self, log):

@@ -13,7 +13,7 @@ from runs import ENVIRONMENT
 from shown import blocks, command_lines
 
 from compare.__main__ import main
-from compare.cli.command_line import LINE_WIDTH, OPTIONS_OF_ALL, help_of, request
+from compare.cli.command_line import LINE_WIDTH, OPTIONS, help_of, request
 from compare.experiments import EXPERIMENTS
 from compare.fleet.command import experiments_of, fleet_parser
 from compare.report import version
@@ -31,7 +31,7 @@ def answered(arguments, capsys):
 
 
 @pytest.mark.parametrize("arguments, expected", [
-    ([], EXPERIMENTS), (["all", "--help"], [f"  {name} " for name in (*EXPERIMENTS, *OPTIONS_OF_ALL, "--version")]),
+    ([], EXPERIMENTS), (["all", "--help"], [f"  {name} " for name in (*EXPERIMENTS, *OPTIONS, "--version")]),
 ])  # fmt: skip
 def test_help_has_every_experiment_and_option(arguments, expected, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")

@@ -11,7 +11,7 @@ import own_equations
 import pytest
 from in_process import runs_in_this_process as runs_in_this_process
 from models import PATHS
-from small_runs import Here, Lines
+from small_runs import InProcess, Lines
 
 from compare.__main__ import main
 from compare.engines.own.own_file import OwnFileError, own_object
@@ -106,7 +106,7 @@ def test_slow_equations_get_fewer_states_no_scenes_and_a_cause(folder):
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_equations_without_any_use_are_compared_to_the_end(folder):
-    run = examined(folder, "mine.py:infinite", ["acceleration", "trajectory", "diagnosis"], workers=Here())
+    run = examined(folder, "mine.py:infinite", ["acceleration", "trajectory", "diagnosis"], workers=InProcess())
     found = {check.quantity for check in run.failed}
     assert any(one.startswith("bias") for one in found) and "runs to its end" not in found
     assert not any(one.startswith("figure") for one in found)

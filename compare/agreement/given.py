@@ -18,9 +18,9 @@ from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..robots.coordinates import Coordinates
 from ..robots.file import robot_of
-from ..robots.given import is_number
 from ..robots.joint_map import JointMap, joint_map
 from ..robots.states import random
+from ..robots.validation import is_number
 
 SYMBOLS_OF = {"mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd"}  # quantities and their entries
 DEFAULT_STATES = 100

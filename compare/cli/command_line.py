@@ -75,7 +75,7 @@ class Option(NamedTuple):
     in_all: bool = False  # whether `all` takes it
 
 
-OPTIONS_OF_ALL = {
+OPTIONS = {
     "--out": Option(metavar="DIR", default="reports/latest", of_every=True),
     "--quick": Option(None, of_every=True),
     "--mjcf": Option(metavar="FILE", of_every=True),
@@ -101,7 +101,7 @@ def parser(experiment: str | None = None) -> Parser:
         made.add_argument("experiment", nargs="?", help=argparse.SUPPRESS)
         made.add_argument("--version", action="store_true", help=block(TEXT, "version"))
     made.add_argument("-h", "--help", action="store_true", help=block(TEXT, "help"))
-    for name, option in OPTIONS_OF_ALL.items():
+    for name, option in OPTIONS.items():
         if option.of_every or experiment is None or name in EXPERIMENTS[experiment].options:
             text = " ".join(block(TEXT, name.strip("-")).split())
             if option.type is None:
@@ -157,11 +157,11 @@ def with_minus(arguments: Sequence[str]) -> list[str]:
 def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence[str], given: str) -> None:
     """End with the first unknown word, or where there is no experiment. given: all words."""
     words = {name: name for name in (*EXPERIMENTS, "all")}
-    names = {name.strip("-"): name for name in OPTIONS_OF_ALL}
+    names = {name.strip("-"): name for name in OPTIONS}
     for word in unknown:
         if word.startswith("-"):
             whole.error(
-                f"{word!r} is not an option; {expected(word.strip('-').split('=')[0], names, ' '.join(OPTIONS_OF_ALL))}"
+                f"{word!r} is not an option; {expected(word.strip('-').split('=')[0], names, ' '.join(OPTIONS))}"
             )
     name, choices = options.experiment, f"{', '.join(EXPERIMENTS)} or all"
     if name is None and not (options.help or options.version):
@@ -184,7 +184,7 @@ def expected(word: str, known: dict[str, str], choices: str) -> str:
 def refuse_what_does_not_go_together(whole: Parser, options: argparse.Namespace) -> None:
     """End with the first option that the experiment does not take."""
     name, given = options.experiment, vars(options)
-    for option, rule in OPTIONS_OF_ALL.items():
+    for option, rule in OPTIONS.items():
         takers = [other for other, record in EXPERIMENTS.items() if option in record.options] + ["all"] * rule.in_all
         if given[option.strip("-")] and not rule.of_every and name not in takers:
             whole.error(f"{option} is an option of {', '.join(takers)}; {name} does not take it")

@@ -40,7 +40,7 @@ class Setup:
     background: dict = field(default_factory=dict)  # work under way, by name
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
     alone: bool = False  # whether the experiment runs by itself, and may take longer than in `all`
-    asked: tuple[float, str] | None = None  # stability: step, s, and integrator of MuJoCo to be checked
+    step: tuple[float, str] | None = None  # stability: step, s, and integrator of MuJoCo to be checked
     size: str = "full"  # "quick": some parts, in seconds; "small": all parts with few states and steps, for tests
 
     @property

@@ -181,10 +181,10 @@ def reported(
     }
     with tempfile.TemporaryDirectory(dir=Path.cwd()) as place_of_report:
         out, clock = Path(place_of_report), Clock()
-        sections, causes, needless = experiment.examine(names, setup, out, NoTerminal(), Here(), clock, have)
+        sections, causes, needless = experiment.examine(names, setup, out, NoTerminal(), InProcess(), clock, have)
         parts, count = Parts(), len(EXPERIMENTS) - len(needless)
         outcome = sections, count, causes, compared.reference.compared, compared.robot.name
-        words = parts.made("the verdict", "No verdict could be made.", verdict.verdict, *outcome)
+        words = parts.attempt("the verdict", "No verdict could be made.", verdict.verdict, *outcome)
         origin = provenance.provenance(options.command(shown), compared.robot.mjcf, shown, SEED)
         seconds += time.process_time() - began
         origin["seconds"] = round(seconds, 1)
@@ -202,7 +202,7 @@ class NoTerminal:
         pass
 
 
-class Here:
+class InProcess:
     """Runs functions at once, in this process; see process.workers."""
 
     def submit(self, function, /, *arguments, **named) -> Future:

@@ -40,7 +40,10 @@ class Document:
         self.file = "index.html" if self.page else "report.md"
         data = {"page": self.page, "embedded": self.embedded}
         self.template = environment().get_template("document.md.jinja").make_module(data)
-        self.rows, self.answers = MOST_ROWS, parts.made("the questions", None, answers, report.sections, report.robot)
+        self.rows, self.answers = (
+            MOST_ROWS,
+            parts.attempt("the questions", None, answers, report.sections, report.robot),
+        )
 
     def embedded(self, file: str) -> tuple[str, int, int]:
         return embedded(self.folder / "figures" / f"{file}.png")
@@ -59,20 +62,22 @@ class Document:
         report = self.report
         texts = [self.made("the first screen", self.first_screen)]
         if self.page:
-            texts.append(self.parts.made("the motion in index.html", "", motion_in_html, report.sections, report.robot))
+            texts.append(
+                self.parts.attempt("the motion in index.html", "", motion_in_html, report.sections, report.robot)
+            )
         texts.append(self.made("the introduction", self.introduction))
         if report.causes:
             texts.append(self.template.causes(table_of(of_causes(report.causes))))
         if self.answers is not None and len(self.answers):
             texts.append(self.template.questions(table_of(self.answers), bool(report.robot.questions)))
         for section in report.sections:
-            text = self.parts.made(f"{section.name} in {self.file}", None, self.section, section)
+            text = self.parts.attempt(f"{section.name} in {self.file}", None, self.section, section)
             texts.append(self.template.missing(section.name, section.title) if text is None else text)
         texts.append(self.template.skipped(report.skipped) if report.skipped else "")
         return [*texts, self.template.provenance(table_of(origins(report.origin)))]
 
     def made(self, name: str, make: Callable[[], str]) -> str:
-        return self.parts.made(f"{name} in {self.file}", "", make)
+        return self.parts.attempt(f"{name} in {self.file}", "", make)
 
     def text(self, body: Sequence[str]) -> str:
         """The whole document, with what could not be made of it."""
@@ -102,7 +107,7 @@ class Document:
     def first_screen(self) -> str:
         """A line for each experiment, the pictures; on the page also what explains that checks fail."""
         report, failing, more = self.report, None, 0
-        lines = [self.parts.made(f"the line of {one.name}", None, self.line, one) for one in report.sections]
+        lines = [self.parts.attempt(f"the line of {one.name}", None, self.line, one) for one in report.sections]
         failed = [check for kind in failures(report.sections) for check in kind]
         if report.causes:
             failing = table_of(of_causes(report.causes[:FIRST_CAUSES]).drop(columns="rank"))
@@ -114,7 +119,7 @@ class Document:
             more = len(failed) - FIRST_CAUSES
         if failing:
             failing["known"] = bool(report.causes)
-        pictures = self.parts.made("the pictures of the first screen", [], self.pictures)
+        pictures = self.parts.attempt("the pictures of the first screen", [], self.pictures)
         return self.template.first_screen(
             [line for line in lines if line], report.skipped, pictures, failing, max(more, 0)
         )

@@ -23,7 +23,7 @@ def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
     (folder / "tables").mkdir()
     for section in report.sections:
         for name, rows in section.tables.items():
-            text = parts.made(f"tables/{name}.csv", None, csv, rows)
+            text = parts.attempt(f"tables/{name}.csv", None, csv, rows)
             if text is not None:
                 save(folder / "tables" / f"{name}.csv", text)
     made = [check for section in report.sections for check in section.result.checks]
@@ -31,9 +31,9 @@ def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
     fields = ("rank", "place", "stated", "found", "text")
     causes = records(parts, "cause", [{name: cause[name] for name in fields} for cause in report.causes])
     markdown, page = Document(report, parts), Document(report, parts, folder)
-    bodies = {document: parts.made(document.file, [], document.body) for document in (markdown, page)}
+    bodies = {document: parts.attempt(document.file, [], document.body) for document in (markdown, page)}
     for document, body in bodies.items():
-        text = parts.made(f"the head of {document.file}", None, document.text, body)
+        text = parts.attempt(f"the head of {document.file}", None, document.text, body)
         if text is not None or document is markdown:
             save(folder / document.file, joined([*parts.lines, *body]) if text is None else text)
     images.clear_webp(folder / "figures")
@@ -55,7 +55,7 @@ def records(parts: Parts, name: str, found: Sequence[dict]) -> list[dict]:
     """Those of the records that can be written as JSON."""
     written = []
     for number, record in enumerate(found, start=1):
-        written += parts.made(f"{name} {number} in results.json", [], as_json, record)
+        written += parts.attempt(f"{name} {number} in results.json", [], as_json, record)
     return written
 
 

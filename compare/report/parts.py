@@ -8,7 +8,7 @@ from ..judge.finding import Finding
 from ..process.crash import described
 from .text import say
 
-Made = TypeVar("Made")
+Value = TypeVar("Value")
 
 
 class Parts:
@@ -17,7 +17,7 @@ class Parts:
     def __init__(self) -> None:
         self.broken: dict[str, str] = {}
 
-    def made(self, name: str, otherwise: Made, make: Callable[..., Made], *arguments: object) -> Made:
+    def attempt(self, name: str, otherwise: Value, make: Callable[..., Value], *arguments: object) -> Value:
         """make(*arguments); if it raises, `otherwise`, and the part is listed as broken."""
         try:
             return make(*arguments)

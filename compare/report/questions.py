@@ -13,7 +13,7 @@ from .verdict import Section
 def answers(sections: Sequence[Section], robot) -> pd.DataFrame:
     """For each part: its letter, the question, where it is answered, the answer; no letters where there is no assignment."""
     results = {section.name: section.result for section in sections}
-    rows = [(q.part, q.asked, q.answered_in, say(answer(results, *q.answer))) for q in robot.questions]
+    rows = [(q.part, q.question, q.answered_in, say(answer(results, *q.answer))) for q in robot.questions]
     choice = results["speed"].curves.get("choice") if "speed" in results else None
     rows += [("", "which integrator and which step", "speed", say(choice))] if choice else []
     table = pd.DataFrame(rows, columns=["part", "question", "answered in", "answer"])

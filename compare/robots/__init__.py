@@ -32,7 +32,7 @@ class Question(NamedTuple):
     """A question of the assignment, and where the report answers it."""
 
     part: str
-    asked: str
+    question: str
     answered_in: str
     answer: tuple  # of (kind, ...): ("figure", name), ("printed", items), ("largest", experiment, quantity, {column: value})
 

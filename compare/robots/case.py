@@ -17,7 +17,7 @@ from .coordinates import KINDS as KINDS
 from .coordinates import Coordinates
 from .coordinates import fastest_rates as fastest_rates
 from .coordinates import rates_at as rates_at
-from .given import WrongField, are_numbers, is_number, some
+from .validation import WrongField, are_numbers, is_number, some
 
 SEED = 10  # of every random number in a report
 MAX_STEPS = 10_000_000  # of a run

@@ -7,7 +7,7 @@ import numpy as np
 
 from . import Robot
 from .case import KINDS, TORQUES, Case, Scene
-from .given import WrongField, are_numbers, is_number, shorten, some
+from .validation import WrongField, are_numbers, is_number, shorten, some
 
 KEYS = ("name", "posture", "q", "speed", "torque", "targets", "gravity", "damping", "locked", "duration", "dt")
 UNITS = {

@@ -66,7 +66,7 @@ def examine(
         with clock.of(name):
             setup.progress(block(name, "summary"))
             result, crash = have.get(name) or found_by(name, experiment, setup, crashed[name])
-            words, without_words = attempt(name, partial(own_words, name, experiment), setup)
+            words, without_words = attempt(name, partial(texts, name, experiment), setup)
             if own:
                 add_problems(crash or result, own.equations.problems, reported)
             sections.append(Section(name, *(words or (name, "", "")), crash or result))
@@ -137,7 +137,7 @@ def asks_of_own(name: str) -> tuple[str, ...] | None:
     return EXPERIMENTS.get(name, Experiment(0)).asks_of_own
 
 
-def own_words(name: str, experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
+def texts(name: str, experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
     """The title, the claim and the tolerance of an experiment."""
     values = getattr(experiment, "claim_values", lambda robot: {})(setup.robot)
     claim, tolerance = (

@@ -20,8 +20,8 @@ from ..robots import Robot
 from ..robots.arm import ARM
 from ..robots.case import SEED
 from ..robots.file import robot_of, robot_of_solution
-from ..robots.given import some
 from ..robots.joint_map import JointsError, Unmatched, joint_map, matched_joints
+from ..robots.validation import some
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 SOLUTION = "solution"  # the kind of reference that is another file
@@ -43,7 +43,7 @@ class Reference(NamedTuple):
     file: str  # as it is given, in one line
     open_tree: tuple[str, ...] = ()  # equalities of the file, which are switched off
     warnings: tuple[str, ...] = ()  # of MuJoCo's compiler, one line each
-    asked: str = ""  # the solution, or the place of own equations, as given, in one line
+    source: str = ""  # the solution, or the place of own equations, as given, in one line
     own: Engine | None = None  # of these equations
     renamed: tuple[str, ...] = ()  # "wrist as hand": joints matched under other names
     why_itself: str = ""  # why it is compared with its own compiled model by default
@@ -51,7 +51,7 @@ class Reference(NamedTuple):
     @property
     def name(self) -> str:
         """The arm, the file, the solution, or the place of own equations."""
-        return "arm" if self.kind == "arm" else self.asked or self.file
+        return "arm" if self.kind == "arm" else self.source or self.file
 
     @property
     def compared(self) -> str:
@@ -66,7 +66,7 @@ class Reference(NamedTuple):
     @property
     def lines(self) -> tuple[str, ...]:
         """The first lines of the output and of the report."""
-        lines = [f"reference: {self.kind}; {self.file} compared with {REFERENCES.get(self.kind, self.asked)}"]
+        lines = [f"reference: {self.kind}; {self.file} compared with {REFERENCES.get(self.kind, self.source)}"]
         lines += [self.matched] * bool(self.renamed)
         if self.open_tree:
             lines.append(f"open tree: {len(self.open_tree)} equalities switched off: {', '.join(self.open_tree)}")
@@ -81,7 +81,7 @@ class Compared(NamedTuple):
     mujoco: Mujoco
     reading: Reading | None  # None: the robot's numbers are stated
 
-    def asked_step(self, dt: float | None, integrator: str | None) -> tuple[float, str] | None:
+    def integrator_step(self, dt: float | None, integrator: str | None) -> tuple[float, str] | None:
         """The step, s, and the integrator of --dt and --integrator, the file's where one is None; None: both are.
 
         ModelError, in one line: unknown integrator, or no servo.
@@ -99,7 +99,7 @@ class Compared(NamedTuple):
 
 
 def compared_with(
-    asked: str | None,
+    reference: str | None,
     path: str | None,
     joints: str | None = None,
     shown: str | None = None,
@@ -108,29 +108,29 @@ def compared_with(
     """A file (None: the arm's) and a reference (None: the arm, if the file has exactly its hinges, else the compiled model).
 
     joints: of own equations, separated by commas, see joint_map; shown: the name of the file, if not its path; solution: the
-    path of the solution, if not `asked`. ModelError, in one line, for a file that cannot be compared, JointsDiffer for
+    path of the solution, if not `reference`. ModelError, in one line, for a file that cannot be compared, JointsDiffer for
     different joints, OwnFileError for equations that cannot be used.
     """
     file, shown = path or ARM.mjcf, in_one_line(shown or path or OWN_FILE)
-    if asked == "arm" or (asked is None and (path is None or has_hinges(path, ARM.joints))):
+    if reference == "arm" or (reference is None and (path is None or has_hinges(path, ARM.joints))):
         return with_arm(file, shown)
     reading = read(Path(file))
     of_file = shown, reading.open_tree, reading.warnings
-    if is_solution(asked):
-        return with_solution(reading, of_file, in_one_line(asked), read(Path(solution or asked)))
+    if is_solution(reference):
+        return with_solution(reading, of_file, in_one_line(reference), read(Path(solution or reference)))
     robot = robot_of(reading, shown)
     mujoco = engine(reading)
-    if asked in (None, "model"):
-        why = "" if asked else f"joints {some(robot.joints)} are not the arm's {some(ARM.joints)}"
+    if reference in (None, "model"):
+        why = "" if reference else f"joints {some(robot.joints)} are not the arm's {some(ARM.joints)}"
         return Compared(Reference("model", *of_file, why_itself=why), robot, mujoco, reading)
-    own = own_engine(asked, robot, mujoco, joints)
+    own = own_engine(reference, robot, mujoco, joints)
     robot = dataclasses.replace(robot, own=tuple(own.equations.functions))
-    return Compared(Reference("own", *of_file, in_one_line(asked), own), robot, mujoco, reading)
+    return Compared(Reference("own", *of_file, in_one_line(reference), own), robot, mujoco, reading)
 
 
-def is_solution(asked: str | None) -> bool:
+def is_solution(reference: str | None) -> bool:
     """Whether a reference is another MJCF file."""
-    return (asked or "").lower().endswith((".xml", ".mjcf"))
+    return (reference or "").lower().endswith((".xml", ".mjcf"))
 
 
 def with_arm(file: str | Path, shown: str) -> Compared:
@@ -143,11 +143,13 @@ def with_arm(file: str | Path, shown: str) -> Compared:
     return Compared(Reference("arm", shown, warnings=mujoco.warnings, renamed=renamed), robot, mujoco, None)
 
 
-def with_solution(reading: Reading, of_file: tuple, asked: str, solution: Reading) -> Compared:
+def with_solution(reading: Reading, of_file: tuple, reference: str, solution: Reading) -> Compared:
     """A file and the numbers of a solution."""
-    names, renamed = joints_matched(solution, reading, of_file[0], asked)
-    robot, solution = robot_of_solution(reading, of_file[0], solution, asked, names)
-    return Compared(Reference(SOLUTION, *of_file, asked, renamed=renamed), robot, engine(reading, solution), reading)
+    names, renamed = joints_matched(solution, reading, of_file[0], reference)
+    robot, solution = robot_of_solution(reading, of_file[0], solution, reference, names)
+    return Compared(
+        Reference(SOLUTION, *of_file, reference, renamed=renamed), robot, engine(reading, solution), reading
+    )
 
 
 def joints_matched(
@@ -160,9 +162,9 @@ def joints_matched(
         raise JointsDiffer(shown, whose, str(error)) from None
 
 
-def own_engine(asked: str, robot: Robot, mujoco: Engine, joints: str | None) -> Own:
+def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None) -> Own:
     """The engine of the equations that FILE.py:OBJECT or MODULE:OBJECT names, called once. OwnFileError if that cannot be."""
-    source, coordinates, rng = own_object(asked), robot.coordinates, np.random.default_rng(SEED)
+    source, coordinates, rng = own_object(reference), robot.coordinates, np.random.default_rng(SEED)
     try:
         stated = joint_map(coordinates, joints.split(",")) if joints else None
     except JointsError as error:
@@ -173,5 +175,5 @@ def own_engine(asked: str, robot: Robot, mujoco: Engine, joints: str | None) -> 
             equations = OwnEquations(source, coordinates, stated, robot.tree)
             equations.try_at(q, *rng.uniform(-1.0, 1.0, (2, len(q), coordinates.nv)))
     except OwnError as error:
-        raise OwnFileError(f"{asked.rstrip(':')}: {error}") from None
+        raise OwnFileError(f"{reference.rstrip(':')}: {error}") from None
     return Own(equations, (method.scheme for method in mujoco.methods.values()))

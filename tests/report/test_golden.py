@@ -36,7 +36,7 @@ def report_of_arm(small, folder) -> str:
     sections = []
     for name in EXPERIMENTS:
         result = examine.with_headline(module(name), small(name))
-        section = verdict.Section(name, *examine.own_words(name, module(name), SimpleNamespace(robot=ARM)), result)
+        section = verdict.Section(name, *examine.texts(name, module(name), SimpleNamespace(robot=ARM)), result)
         sections.append(section)
         others = drawing.results_needed(name, list(EXPERIMENTS), sections)
         section.figures, lost = drawing.draw(name, section.result, ARM, folder, others)

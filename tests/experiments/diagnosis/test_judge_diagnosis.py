@@ -2,7 +2,7 @@
 
 import pytest
 from edited import XML, setup_of
-from small_runs import Here, Lines
+from small_runs import InProcess, Lines
 
 from compare.experiments import diagnosis
 from compare.run import examine as experiment
@@ -50,6 +50,6 @@ def test_damping_is_seen_in_accelerations_alone():
 def test_beside_others_it_is_made_where_one_fails(names, text, made, found, tmp_path, monkeypatch):
     monkeypatch.setattr(experiment, "find_causes", lambda setup: [])  # not by parameters, but in the values
     setup = setup_of(text, make=experiment.Setup, states=20, exact_states=1, size="small")
-    sections, causes, reasons = experiment.examine(names, setup, tmp_path, Lines(), Here())
+    sections, causes, reasons = experiment.examine(names, setup, tmp_path, Lines(), InProcess())
     assert [section.name for section in sections] == made and list(reasons) == [n for n in names if n not in made]
     assert [cause["place"] for cause in causes] == found

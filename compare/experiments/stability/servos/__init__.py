@@ -134,8 +134,8 @@ def add(result: Result, setup: Setup, work: dict) -> None:
         check_own_step(result, rows)
     result.tables["step_limits"] = rows
     findings.find_answer(result, rows, setup.robot, predictions)
-    if setup.asked:
-        dt, name = setup.asked
+    if setup.step:
+        dt, name = setup.step
         within = findings.with_limit(predictions, name)
         stable = [prediction for prediction in within if prediction.is_stable(prediction.base, name, dt)]
         errors = [error_at(prediction, prediction.base, name, dt, reading) for prediction in stable]
