@@ -10,11 +10,11 @@ from in_process import without_workers
 from models import PATHS
 from runs import ROOT, on_terminal, readable_lines, words
 
-from compare import __main__ as entry
 from compare.__main__ import main
 from compare.cli import command_line
 from compare.experiments import EXPERIMENTS, TIMED
 from compare.robots.arm import ARM
+from compare.run import command
 from compare.run import examine as experiment
 
 XML = ARM.mjcf.read_text(encoding="utf-8")
@@ -50,7 +50,7 @@ def report(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("static")
     with without_workers(), pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        for module in (entry, command_line, experiment):
+        for module in (command, command_line, experiment):
             patch.setattr(module, "EXPERIMENTS", {name: EXPERIMENTS[name] for name in STATIC})
         assert main(["all", "--quick"]) == 0
     assert [path.name for path in folder.iterdir()] == ["reports"]

@@ -10,7 +10,6 @@ import pandas as pd
 from jinja2 import ChoiceLoader, DictLoader
 from matplotlib.figure import Figure
 
-from compare import __main__ as entry
 from compare.__main__ import main
 from compare.cli import command_line
 from compare.experiments import EXPERIMENTS, Experiment
@@ -19,7 +18,7 @@ from compare.judge.check import Result
 from compare.report.terminal import Terminal
 from compare.report.text import environment
 from compare.robots.arm import ARM
-from compare.run import drawing
+from compare.run import command, drawing
 from compare.run import examine as experiment
 
 
@@ -35,7 +34,7 @@ def made(monkeypatch, name, **functions):
 
 def only(monkeypatch, *names):
     """These are all experiments that there are."""
-    for module in (entry, command_line, experiment):
+    for module in (command, command_line, experiment):
         monkeypatch.setattr(module, "EXPERIMENTS", {name: EXPERIMENTS.get(name, Experiment(0)) for name in names})
 
 

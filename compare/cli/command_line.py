@@ -9,10 +9,9 @@ from textwrap import fill
 from typing import NamedTuple
 
 from ..experiments import EXPERIMENTS
-from ..process.streams import in_one_line
+from ..process.streams import PROGRAM, in_one_line
 from ..report.text import block
 
-PROGRAM = "python -m compare"
 FLEET = "fleet"  # the command for many files
 LONGEST_STEP = 5.0  # s, for --dt
 LINE_WIDTH = 80

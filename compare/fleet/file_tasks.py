@@ -15,15 +15,14 @@ from typing import NamedTuple
 
 from ..engines.mujoco import ModelError, read
 from ..experiments import EXPERIMENTS, module, skipped
-from ..experiments.setup import Setup, engines
 from ..judge.check import ENDS, About, Result
 from ..judge.timing import vectors
 from ..process.clock import Clock
-from ..report import files, folder, provenance, verdict
-from ..report.parts import Parts
+from ..report import folder, provenance
 from ..report.text import block, say
 from ..robots.case import SEED
 from ..run import examine as experiment
+from ..run.command import write_report
 from ..run.drawing import quiet
 from ..run.reference import SOLUTION, Compared, JointsDiffer, compared_with
 from .models import unpacked
@@ -117,14 +116,9 @@ def as_given(text: str, shown: str, bundle: bytes) -> str:
     return text.replace(str(unpacked_at(bundle)), shown).replace(f"{unpacked_at(bundle).parent}/", "")
 
 
-def setup_of(compared: Compared, options: FleetOptions) -> Setup:
-    make = Setup.quick if options.is_quick else Setup
-    return make(compared.robot, engines(compared.mujoco), reading=compared.reading)
-
-
 def untimed_part(name: str, shown: str, options: FleetOptions, bundle: bytes) -> bytes:
     """The part of a timed experiment that measures no time, packed."""
-    setup = setup_of(compared_file(shown, options, bundle), options)
+    setup = experiment.setup_of(compared_file(shown, options, bundle), options.is_quick)
     with quiet(setup.robot):
         module(name).begin(setup)
         return zlib.compress(pickle.dumps(awaited(setup.background[name])), 1)
@@ -137,7 +131,7 @@ def awaited(work: object) -> object:
 
 def result_of(name: str, work: bytes | None, shown: str, options: FleetOptions, bundle: bytes) -> bytes:
     """The result of an experiment, or its exception: see examine.computed; packed. work: its `untimed_part`."""
-    setup = setup_of(compared_file(shown, options, bundle), options)
+    setup = experiment.setup_of(compared_file(shown, options, bundle), options.is_quick)
     if work:
         setup.background[name] = pickle.loads(zlib.decompress(work))
     results = experiment.computed(name, module(name), setup)
@@ -171,30 +165,24 @@ def reported(
     """
     began = time.process_time()
     compared = compared_file(shown, options, bundle)
-    setup, names = (
-        setup_of(compared, options),
-        [name for name in options.names if name in results or name == "diagnosis"],
-    )
+    setup = experiment.setup_of(compared, options.is_quick)
+    names = [name for name in options.names if name in results or name == "diagnosis"]
     have = {
         name: broken(name, value) if isinstance(value, str) else pickle.loads(zlib.decompress(value))
         for name, value in results.items()
     }
     with tempfile.TemporaryDirectory(dir=Path.cwd()) as place_of_report:
         out, clock = Path(place_of_report), Clock()
-        sections, causes, needless = experiment.examine(names, setup, out, NoTerminal(), InProcess(), clock, have)
-        parts, count = Parts(), len(EXPERIMENTS) - len(needless)
-        outcome = sections, count, causes, compared.reference.compared, compared.robot.name
-        words = parts.attempt("the verdict", "No verdict could be made.", verdict.verdict, *outcome)
+        outcome = experiment.examine(names, setup, out, NoTerminal(), InProcess(), clock, have)
         origin = provenance.provenance(options.command(shown), compared.robot.mjcf, shown, SEED)
         seconds += time.process_time() - began
         origin["seconds"] = round(seconds, 1)
-        skips = [*left_out, *needless.items()]
-        files.write(
-            out, verdict.Report(sections, compared.robot, origin, words, causes, skips, compared.reference), parts
-        )
+        report, parts = write_report(out, *outcome, left_out, origin, compared)
         written = {name: (out / name).read_bytes() for name in folder.files(out)}
         shutil.rmtree(out / "figures", ignore_errors=True)
-    return row_of_file(sections, causes, parts.lines, compared.reference) | {"seconds": round(seconds, 2)}, written
+    return row_of_file(report.sections, report.causes, parts.lines, compared.reference) | {
+        "seconds": round(seconds, 2)
+    }, written
 
 
 class NoTerminal:

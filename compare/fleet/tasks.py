@@ -5,13 +5,14 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 from ..process.child import Outcome
+from ..process.crash import Refused
 
 MAX_TRIES = 4  # of a task whose process ended: three repetitions
 DEFAULT_LIMIT = 600.0  # s
 POLLING = 0.5  # s after which Executor.next returns None
 
 
-class FleetError(ValueError):
+class FleetError(Refused):
     """A fleet cannot run, or cannot continue; the message is one line."""
 
 

@@ -7,6 +7,10 @@ ROOT = Path(__file__).resolve().parents[2]
 MAX_MESSAGE = 300  # characters of a message
 
 
+class Refused(ValueError):
+    """A request that cannot be carried out; the message is one line."""
+
+
 def described(error: BaseException, with_place: bool = True) -> str:
     """An exception in one line: "ValueError: message (compare/mass.py:12)"."""
     message = " ".join(str(error).split())

@@ -2,6 +2,9 @@
 
 import os
 import sys
+from contextlib import suppress
+
+PROGRAM = "python -m compare"
 
 
 class Stream:
@@ -48,6 +51,12 @@ def readable(text: str) -> str:
 def in_one_line(text: str) -> str:
     """Readable text in which control characters are escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in readable(text))
+
+
+def say_error(line: str) -> None:
+    """One line on stderr, if it can be written."""
+    with suppress(OSError, ValueError, AttributeError):
+        print(in_one_line(" ".join(f"{PROGRAM}: {line}".split())), file=sys.stderr, flush=True)
 
 
 def prepare() -> None:

@@ -7,8 +7,7 @@ from pathlib import Path
 from types import ModuleType
 
 from ..experiments import EXPERIMENTS, TIMED, Experiment, module
-from ..experiments.setup import Setup as Setup
-from ..experiments.setup import engines as engines
+from ..experiments.setup import Setup, engines
 from ..judge.check import ENDS, About, Result
 from ..judge.finding import Finding
 from ..process.clock import Clock
@@ -18,6 +17,7 @@ from ..report.terminal import Terminal
 from ..report.text import block, has, say
 from ..report.verdict import STATES_CAUSES, Section, explained, failures
 from .drawing import FIRST, HALVES, draw, quiet, results_needed
+from .reference import Compared
 
 START, END = "start", "figures"  # tasks of the clock: what comes before the first experiment and after the last
 Found = tuple[Result | None, Result | None]  # the result of an experiment, or a failed check where it broke off
@@ -29,6 +29,12 @@ IN_EQUATIONS = (
 )  # fmt: skip
 NOTHING_FAILED = "nothing failed"
 SHOWN, SHOWN_BESIDE_CAUSE = 5, 2  # lines on the terminal about an experiment that fails; where a cause explains some
+
+
+def setup_of(compared: Compared, is_quick: bool, **more: object) -> Setup:
+    """What the experiments need. more: further fields of Setup."""
+    make = Setup.quick if is_quick else Setup
+    return make(compared.robot, engines(compared.mujoco, compared.reference.own), reading=compared.reading, **more)
 
 
 def examine(

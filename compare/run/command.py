@@ -1,0 +1,140 @@
+"""One comparison of the command line: compute, draw, write the report, print the verdict."""
+
+import argparse
+import os
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tmt.compiled.store import cache_folder, size_of_cache
+
+from ..engines.mujoco import ModelError
+from ..engines.own.own_file import OwnFileError
+from ..experiments import EXPERIMENTS, skipped
+from ..process.crash import Refused
+from ..process.streams import say_error
+from ..process.workers import WorkerEnded, load_modules, start_workers
+from ..report.folder import FolderError, made_by, new_report
+from ..report.terminal import Terminal
+from ..report.text import block, say
+from ..robots.case import SEED
+from ..robots.scene_file import SceneError, read_scenes
+from .reference import Compared, compared_with
+
+if TYPE_CHECKING:
+    from ..report.parts import Parts
+    from ..report.verdict import Report, Section
+
+COMPUTING = ("compare.run.examine", "scipy.optimize", "tmt.compiled.machine")  # modules that take long to load
+DRAWING = ("compare.report.style", *COMPUTING)
+TEMPLATE = "command_line"
+CACHE_GROWTH = 1_000_000  # bytes, by which the cache folder may grow without a message
+
+
+def carry_out(options: argparse.Namespace, command: str) -> int:
+    """Compare the models and write the report; the exit status. Refused: the request cannot be carried out."""
+    started, cache_before, terminal = time.perf_counter(), size_of_cache(), Terminal()
+    try:
+        compared = comparison(options)
+        step = compared.integrator_step(options.dt, options.integrator)
+        before = made_by(options.out)
+        with new_report(options.out) as folder:
+            for line in compared.reference.lines:
+                terminal.say(line)
+            if options.experiment == "stability" and compared.reading and not compared.reading.drive.feeds_back:
+                terminal.say(block(TEMPLATE, "no_servo", robot=compared.robot.name))
+            report, parts = compute(options, command, compared, step, folder, terminal, started)
+    except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded) as error:
+        raise Refused(error) from None
+    from ..report.verdict import passed
+
+    good = passed(report.sections) and not parts.broken
+    terminal.say()
+    for number, line in enumerate([*report.verdict.split("\n"), *report.top]):
+        terminal.say(line, "" if number else "bold green" if good else "bold red")
+    for line in parts.lines:
+        say_error(line)
+    place = f" in place of that of `{before}`" if before not in (None, command) else ""
+    terminal.say(f"Report: {os.path.join(options.out, 'index.html')}{place} ({time.perf_counter() - started:.1f} s)")
+    if (size := size_of_cache()) > cache_before + CACHE_GROWTH:
+        terminal.say(block(TEMPLATE, "cache", folder=in_home(cache_folder()), megabytes=size / 1e6))
+    return 0 if good else 1
+
+
+def comparison(options: argparse.Namespace) -> Compared:
+    """The file and its reference, with the scenes of --scenes. Refused: the experiment does not apply to the robot."""
+    compared = compared_with(options.reference, options.mjcf, options.joints)
+    if options.scenes:
+        compared = compared._replace(robot=compared.robot.with_scenes(read_scenes(options.scenes, compared.robot)))
+    if options.experiment != "all" and (reason := skipped(options.experiment, compared.robot)):
+        raise Refused(f"{options.experiment} does not apply to {compared.robot.name}: {say(reason)}")
+    return compared
+
+
+def compute(
+    options: argparse.Namespace,
+    command: str,
+    compared: Compared,
+    step: tuple[float, str] | None,
+    folder: Path,
+    terminal: Terminal,
+    started: float,
+) -> tuple["Report", "Parts"]:
+    """Run the experiments and write the report to a folder."""
+    is_alone, robot = options.experiment != "all", compared.robot
+    names = [options.experiment] if is_alone else list(EXPERIMENTS)
+    with start_workers() as workers, terminal.progress("imports"):
+        for modules in (DRAWING, COMPUTING)[: len(names)]:  # in further processes at the same time
+            workers.submit(load_modules, *modules)
+        from ..report.provenance import durations, provenance
+        from . import examine
+
+        reasons = {name: say(reason) for name in names if (reason := skipped(name, robot))}
+        names = [name for name in names if name not in reasons]
+        origin = provenance(command, robot.mjcf, compared.reference.file, SEED)  # of the model as it was read
+        setup = examine.setup_of(
+            compared,
+            options.quick,
+            map=workers.map,
+            quiet=workers.quiet,
+            progress=terminal.show,
+            alone=is_alone,
+            step=step,
+        )
+        for name, reason in reasons.items():
+            terminal.say(f"{name:<13} skipped: {reason}")
+        terminal.tell(partial(examine.progress, workers.clock, names))
+        outcome = examine.examine(names, setup, folder, terminal, workers, workers.clock)
+    origin |= {"seconds": round(time.perf_counter() - started, 1)} | durations(workers.clock)
+    return write_report(folder, *outcome, list(reasons.items()), origin, compared)
+
+
+def write_report(
+    folder: Path,
+    sections: Sequence["Section"],
+    causes: Sequence[dict],
+    needless: Mapping[str, str],
+    skipped: Sequence[tuple[str, str]],
+    origin: dict,
+    compared: Compared,
+) -> tuple["Report", "Parts"]:
+    """Write a report with its verdict to a folder that has its figures. The arguments are those of examine and of Report."""
+    from ..report import files, verdict
+    from ..report.parts import Parts
+
+    parts, count = Parts(), len(EXPERIMENTS) - len(needless)
+    subject = compared.reference.compared, compared.robot.name
+    words = parts.attempt("the verdict", "No verdict.", verdict.verdict, sections, count, causes, *subject)
+    skipped = [*skipped, *needless.items()]
+    report = verdict.Report(sections, compared.robot, origin, words, causes, skipped, compared.reference)
+    return report, files.write(folder, report, parts)
+
+
+def in_home(path: Path) -> str:
+    """A path with ~ for the user's folder."""
+    with suppress(ValueError, RuntimeError):
+        return str("~" / path.relative_to(Path.home()))
+    return str(path)
