@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
 from textwrap import fill
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 from ..experiments import EXPERIMENTS
 from ..process.streams import PROGRAM, in_one_line
@@ -27,6 +27,19 @@ def in_lines(text: str, indent: str = "") -> str:
 class Parser(argparse.ArgumentParser):
     def error(self, message):
         self.exit(2, f"{self.prog}: {in_one_line(' '.join(message.split()))}\n")
+
+    def add_option(self, name: str, option: "Option", template: str) -> None:
+        """Add an option; its help is the macro of its name."""
+        text = " ".join(block(template, name.strip("-")).split())
+        if option.type is None:
+            self.add_argument(name, action="store_true", help=text)
+        else:
+            self.add_argument(name, type=option.type, metavar=option.metavar, default=option.default, help=text)
+
+    def refuse_option(self, word: str, options: Sequence[str]) -> NoReturn:
+        """End with an unknown option, and the nearest known one."""
+        names = {name.strip("-"): name for name in options}
+        self.error(f"{word!r} is not an option; {expected(word.strip('-').split('=')[0], names, ' '.join(options))}")
 
 
 def not_empty(text: str) -> str:
@@ -102,11 +115,7 @@ def parser(experiment: str | None = None) -> Parser:
     made.add_argument("-h", "--help", action="store_true", help=block(TEXT, "help"))
     for name, option in OPTIONS.items():
         if option.of_every or experiment is None or name in EXPERIMENTS[experiment].options:
-            text = " ".join(block(TEXT, name.strip("-")).split())
-            if option.type is None:
-                made.add_argument(name, action="store_true", help=text)
-            else:
-                made.add_argument(name, type=option.type, metavar=option.metavar, default=option.default, help=text)
+            made.add_option(name, option, TEXT)
     return made
 
 
@@ -156,12 +165,9 @@ def with_minus(arguments: Sequence[str]) -> list[str]:
 def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence[str], given: str) -> None:
     """End with the first unknown word, or where there is no experiment. given: all words."""
     words = {name: name for name in (*EXPERIMENTS, "all")}
-    names = {name.strip("-"): name for name in OPTIONS}
     for word in unknown:
         if word.startswith("-"):
-            whole.error(
-                f"{word!r} is not an option; {expected(word.strip('-').split('=')[0], names, ' '.join(OPTIONS))}"
-            )
+            whole.refuse_option(word, list(OPTIONS))
     name, choices = options.experiment, f"{', '.join(EXPERIMENTS)} or all"
     if name is None and not (options.help or options.version):
         whole.error(f"expected an experiment: {choices}, as in {PROGRAM} all {given}")

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 
 from tmt.compiled.cores import cores
 
-from ..cli.command_line import FLEET, PROGRAM, Parser, expected, not_empty, process_count
+from ..cli.command_line import FLEET, PROGRAM, Option, Parser, expected, not_empty, process_count
 from ..experiments import EXPERIMENTS
 from ..process.streams import in_one_line
-from ..report.remaining import in_words
 from ..report.terminal import Terminal
 from ..report.text import block
 from .tasks import DEFAULT_LIMIT, FleetError
@@ -45,15 +44,15 @@ def fleet_reference(text: str) -> str:
 
 
 FLEET_OPTIONS = {
-    "--out": {"type": not_empty, "default": f"reports/{FLEET}", "metavar": "DIR"},
-    "--full": {"action": "store_true"},
-    "--reference": {"type": fleet_reference, "metavar": "WHAT"},
-    "--only": {"type": not_empty, "metavar": "LIST"},
-    "--workers": {"type": process_count, "metavar": "N"},
-    "--dask": {"type": not_empty, "metavar": "ADDRESS"},
-    "--limit": {"type": duration, "default": DEFAULT_LIMIT, "metavar": "S"},
-    "--since": {"type": not_empty, "metavar": "DIR"},
-}  # their help is in fleet.md.jinja
+    "--out": Option(metavar="DIR", default=f"reports/{FLEET}"),
+    "--full": Option(None),
+    "--reference": Option(fleet_reference, "WHAT"),
+    "--only": Option(metavar="LIST"),
+    "--workers": Option(process_count, "N"),
+    "--dask": Option(metavar="ADDRESS"),
+    "--limit": Option(duration, "S", DEFAULT_LIMIT),
+    "--since": Option(metavar="DIR"),
+}
 
 
 def fleet_parser() -> Parser:
@@ -62,8 +61,8 @@ def fleet_parser() -> Parser:
         description=block("fleet", "help"), epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False,
     )  # fmt: skip
-    for name, settings in FLEET_OPTIONS.items():
-        made.add_argument(name, help=" ".join(block("fleet", f"option_{name[2:]}").split()), **settings)
+    for name, option in FLEET_OPTIONS.items():
+        made.add_option(name, option, "fleet")
     made.add_argument("paths", nargs="*", type=not_empty, metavar="PATH", help=argparse.SUPPRESS)
     made.add_argument("-h", "--help", action="store_true", help="this text")
     return made
@@ -87,10 +86,8 @@ def fleet_status(arguments: Sequence[str]) -> int:
     """Run the command; the exit status. SystemExit for help and wrong arguments. FleetError: see tasks."""
     made = fleet_parser()
     options, unknown = made.parse_known_intermixed_args(arguments)
-    for word in unknown:
-        name = word.split("=")[0]
-        known = {option.strip("-"): option for option in (*FLEET_OPTIONS, "--help")}
-        made.error(f"{word!r} is not an option; {expected(name.strip('-'), known, ' '.join(FLEET_OPTIONS))}")
+    if unknown:
+        made.refuse_option(unknown[0], [*FLEET_OPTIONS, "--help"])
     if options.help:
         made.print_help()
         raise SystemExit(0)
@@ -182,6 +179,13 @@ def progress_of(run: "Run") -> list[str]:
         *(f"{many} {verdict}" for verdict, many in sorted(run.verdicts().items())),
         *([f"about {in_words(seconds)} left"] if seconds else []),
     ]
+
+
+def in_words(seconds: float) -> str:
+    """A duration as rough as an estimate is."""
+    if seconds < 10.0:
+        return f"{max(round(seconds), 1)} s"
+    return f"{5 * round(seconds / 5)} s" if seconds < 117.5 else f"{round(seconds / 60)} min"
 
 
 def say_first(terminal: Terminal, lines: Sequence[str]) -> None:

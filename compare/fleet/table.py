@@ -175,7 +175,7 @@ def write_table(
         "mujoco": installed("mujoco"),
     }
     write_whole(out / "fleet.csv", csv_of_fleet(rows).encode("utf-8", "backslashreplace"))
-    text = fleet_page("A fleet compared with MuJoCo", summary, rows, left_out, changed, origin, picture_of_steps(rows))
+    text = fleet_page("A fleet compared with MuJoCo", summary, rows, left_out, changed, origin)
     write_whole(out / "index.html", text.encode("utf-8", "backslashreplace"))
     return summary
 
@@ -186,18 +186,6 @@ def with_why_itself(rows: Sequence[dict]) -> list[dict]:
         return list(rows)
     reasons = [row["why_itself"] and sentence("why_itself", reason=row["why_itself"]) for row in rows]
     return [row | {"reason": "; ".join(filter(None, (why, row["reason"])))} for row, why in zip(rows, reasons)]
-
-
-def picture_of_steps(rows: Sequence[dict]) -> dict | None:
-    """The figure of the page: source, caption, width, height; None: nothing to draw, or drawing failed."""
-    if not any(row["limit_s"] for row in rows):
-        return None
-    try:
-        from .figures_fleet import picture_of  # imports matplotlib
-
-        return picture_of(rows)
-    except Exception:
-        return None  # the table has the same numbers
 
 
 def summary_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: object) -> list[str]:
@@ -223,7 +211,6 @@ def fleet_page(
     left_out: Sequence[tuple[str, str]],
     changed: Sequence[str] | None,
     origin: dict,
-    picture: dict | None = None,
 ) -> str:
     """The page as HTML; the arguments are those of write_table."""
     environment = Environment(
@@ -232,7 +219,7 @@ def fleet_page(
     )  # fmt: skip
     return environment.get_template("fleet.html.jinja").render(
         title=title, summary=summary, rows=[shown_row(row) for row in rows], left_out=left_out, changed=changed,
-        origin=origin, picture=picture, heads=HEADS, is_bad=any(row["verdict"] in BAD_VERDICTS for row in rows),
+        origin=origin, heads=HEADS, is_bad=any(row["verdict"] in BAD_VERDICTS for row in rows),
     )  # fmt: skip
 
 

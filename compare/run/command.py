@@ -57,7 +57,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
         terminal.say(line, "" if number else "bold green" if good else "bold red")
     for line in parts.lines:
         say_error(line)
-    place = f" in place of that of `{before}`" if before not in (None, command) else ""
+    place = f" in place of that of `{before}`" if before not in (None, report.origin["command"]) else ""
     terminal.say(f"Report: {os.path.join(options.out, 'index.html')}{place} ({time.perf_counter() - started:.1f} s)")
     if (size := size_of_cache()) > cache_before + CACHE_GROWTH:
         terminal.say(block(TEMPLATE, "cache", folder=in_home(cache_folder()), megabytes=size / 1e6))

@@ -127,7 +127,7 @@ def test_a_verdict_a_step_or_a_limit_that_is_another_is_told(before, now, named,
 
 
 def page_of(rows, **more):
-    given = {"title": "A fleet", "summary": [], "left_out": (), "changed": None, "origin": {}, "picture": None}
+    given = {"title": "A fleet", "summary": [], "left_out": (), "changed": None, "origin": {}}
     return fleet_page(rows=rows, **given | more)
 
 
@@ -171,5 +171,5 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
     assert [row["file"] for row in found] == ["b.xml", "c.xml", "a b.xml"]
     assert tuple(found[0]) == FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
     text = (tmp_path / "index.html").read_text()
-    assert all(part in text for part in ("late.xml", "early.xml", "a, b", "the command", "data:image/png"))
+    assert all(part in text for part in ("late.xml", "early.xml", "a, b", "the command"))
     assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")
