@@ -126,7 +126,6 @@ def help_of_all() -> str:
 
 
 def help_of(experiment: str) -> str:
-    """The help of an experiment."""
     first, *rest = block(experiment, "help").split("\n")
     return "\n".join([in_lines(first), *rest])
 
@@ -163,7 +162,6 @@ def with_minus(arguments: Sequence[str]) -> list[str]:
 
 
 def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence[str], given: str) -> None:
-    """End with the first unknown word, or where there is no experiment. given: all words."""
     words = {name: name for name in (*EXPERIMENTS, "all")}
     for word in unknown:
         if word.startswith("-"):
@@ -187,7 +185,6 @@ def expected(word: str, known: dict[str, str], choices: str) -> str:
 
 
 def refuse_what_does_not_go_together(whole: Parser, options: argparse.Namespace) -> None:
-    """End with the first option that the experiment does not take."""
     name, given = options.experiment, vars(options)
     for option, rule in OPTIONS.items():
         takers = [other for other, record in EXPERIMENTS.items() if option in record.options] + ["all"] * rule.in_all

@@ -73,7 +73,6 @@ class Cache:
         write_whole(self.folder / key, hashlib.sha256(content).digest() + content)
 
     def remove_other_versions(self) -> None:
-        """Delete the results of other versions of the program."""
         for folder in (self.out / FOLDER).iterdir():
             if folder != self.folder:
                 shutil.rmtree(folder, ignore_errors=True)

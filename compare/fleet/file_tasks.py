@@ -32,8 +32,6 @@ MAX_UNPACKED = 4  # models whose files a process keeps
 
 
 class FleetOptions(NamedTuple):
-    """The options that apply to each file."""
-
     names: tuple[str, ...]  # of experiments
     is_quick: bool
     reference: str | None = (
@@ -75,7 +73,6 @@ places = {}  # by bundle: path of the model, temporary folder; the last used is 
 
 
 def unpacked_at(bundle: bytes) -> Path:
-    """The path of a model whose bundle is unpacked."""
     if bundle not in places:
         top = Path(tempfile.mkdtemp(dir=Path.cwd()))
         places[bundle] = unpacked(pickle.loads(bundle), top), top

@@ -62,14 +62,11 @@ class Model:
 
 
 class Models(NamedTuple):
-    """The models of a fleet, and the files that are left out, each with the reason."""
-
     models: list[Model]
     left_out: list[tuple[str, str]]
 
 
 def hash_of(contents: dict[str, bytes]) -> str:
-    """Hash of names and contents."""
     digest = hashlib.sha256()
     for name, content in sorted(contents.items()):
         digest.update(f"{name}\0{len(content)}\0".encode("utf-8", "surrogateescape") + content)
@@ -217,7 +214,6 @@ def needed_by(path: Path) -> tuple[Path, ...]:
 
 
 def existing(names: Iterable[str], folders: Iterable[Path], directories: Iterable[str]) -> Iterator[Path]:
-    """The files of these names in these directories of the folders."""
     paths = (folder / directory / name for name in names for folder in folders for directory in directories)
     return (path for path in paths if is_a_file(path))
 

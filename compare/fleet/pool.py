@@ -83,7 +83,6 @@ class Pool:
     # in the thread of a worker
 
     def work(self, number: int) -> None:
-        """Run tasks until the pool is closed."""
         group = ""
         while (task := self.take(number, group)) is not None:
             group = task.group

@@ -70,7 +70,6 @@ class Progress:
         self.new += rows
 
     def take_new(self) -> list[dict]:
-        """The rows since the last call."""
         new, self.new = self.new, []
         return new
 

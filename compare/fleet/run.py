@@ -23,7 +23,6 @@ MARK = ".fleet"  # file in a report with its cache key
 
 
 def files_of(models: Sequence[Model]) -> list[FileState]:
-    """The files to compute, each with its copies."""
     files, by_content = [], {}
     for model in models:
         same = [] if model.included_by or not model.sha256 else by_content.setdefault(model.sha256, [])

@@ -61,7 +61,6 @@ class Outcome(NamedTuple):
         return pickle.loads(self.value)
 
     def tried(self, times: int) -> "Outcome":
-        """The same outcome of the last of several tries."""
         return self._replace(ended=f"{self.ended}, {times} times") if self.ended and times > 1 else self
 
 
@@ -143,7 +142,6 @@ class Child:
         return f"exit status {status}" + (f", {last}" if last else "")
 
     def kill(self) -> None:
-        """Kill the process and its children."""
         self.killed = True
         with suppress(OSError):
             if os.name == "posix":

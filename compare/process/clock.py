@@ -17,7 +17,6 @@ class Clock:
 
     @property
     def elapsed(self) -> float:
-        """Wall time since the start, s."""
         return time.perf_counter() - self.started
 
     @contextmanager

@@ -19,8 +19,6 @@ turn = threading.RLock()  # held while a thread decides how the run ends
 
 
 class Now:
-    """The state of the run."""
-
     requested = False  # an interrupt has come
     held = 0  # number of `postponed` blocks of the main thread
     settled = False  # the exit status is decided
@@ -65,7 +63,6 @@ def stay(*_) -> None:
 
 
 def end_when_asked(receiver, _sender) -> None:
-    """Wait for an interrupt, in the other thread."""
     while True:
         number = receiver.recv(1)[0]
         with turn:

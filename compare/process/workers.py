@@ -106,7 +106,6 @@ def deaf() -> Iterator[None]:
 
 
 def load_modules(*modules: str) -> None:
-    """Import modules in advance."""
     for name in modules:
         importlib.import_module(name)
 
@@ -135,7 +134,6 @@ def serve(connection) -> None:
 
 
 def end_with_parent() -> None:
-    """End this process when the main process has ended."""
     parent_process().join()
     os._exit(1)
 

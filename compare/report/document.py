@@ -99,7 +99,6 @@ class Document:
         )
 
     def links(self) -> list[tuple[str, bool]]:
-        """The sections to which the page leads, and whether a check of them fails."""
         names = [("questions", False)] if self.answers is not None and len(self.answers) else []
         names += [(section.name, standing(section)[0] is False) for section in self.report.sections]
         return [*names, ("provenance", False)]
@@ -213,7 +212,6 @@ def title_of(robot) -> str:
 
 
 def kind(good: bool | None) -> str:
-    """The style of what passes, fails, or was not compared."""
     return "none" if good is None else "good" if good else "bad"
 
 
@@ -222,7 +220,6 @@ def table_of(table: pd.DataFrame) -> dict:
 
 
 def figures_of(section: Section) -> list[dict]:
-    """The figures of a section without the pictures of the first screen."""
     return [
         {"file": file, "path": file if moves(file) else f"{file}.png", "caption": caption, "moves": moves(file)}
         for file, caption in section.figures

@@ -60,12 +60,10 @@ def records(parts: Parts, name: str, found: Sequence[dict]) -> list[dict]:
 
 
 def as_json(record: dict) -> list[dict]:
-    """A record with what JSON knows, alone in a list. TypeError, ValueError if it has anything else."""
     return [json.loads(json.dumps(record, allow_nan=False))]
 
 
 def csv(rows: Sequence[dict]) -> str:
-    """A table as CSV."""
     return for_csv(pd.DataFrame(rows, dtype=object)).to_csv(index=False)
 
 

@@ -1,9 +1,8 @@
-"""The output folder: a new report takes the place of the old one only when it is complete, whatever ends the run.
+"""The output folder: a new report replaces the old one only when it is complete, however the run ends.
 
-While a run lasts, its files are in a folder `.new-` and eight letters inside the output folder, and it holds a lock on that
-folder; one that nobody holds is of a run that was killed. In it the report is made in `new`. The exchange moves the old report to
-`old`, renames `new` to `moving`, moves that report out, and renames `moving` to `done`: what is on disk says at every moment how
-to put the old report back.
+A run writes to a folder `.new-XXXXXXXX` inside the output folder, and locks it; an unlocked one is left from a run that was
+killed. The report is written to `new` in that folder. The exchange moves the old report to `old`, renames `new` to `moving`,
+moves the new report out, and renames `moving` to `done`. From these names the old report can be restored at any moment.
 """
 
 import json
@@ -34,9 +33,9 @@ class FolderError(ValueError):
 
 @contextmanager
 def new_report(out: str | Path) -> Iterator[Path]:
-    """A fresh folder inside `out`; what is in it takes the old report's place when the block ends well.
+    """An empty folder inside `out`; its files replace the old report at the end of the block.
 
-    Whatever else is in `out` stays. If the block raises, `out` is as it was. FolderError if `out` cannot be
+    All other files in `out` stay. If the block raises, `out` is unchanged. FolderError if `out` cannot be
     written, or has files under a report's names that are not the old report's.
     """
     work = Work(Path(out))
@@ -52,21 +51,19 @@ def new_report(out: str | Path) -> Iterator[Path]:
         if not path.is_relative_to(work.path / "new"):
             raise
         path = work.out / path.relative_to(work.path / "new")  # as the reader knows it
-        raise FolderError(f"cannot write {path}: {error.strerror}; a report that was there is unchanged") from None
+        raise FolderError(f"cannot write {path}: {error.strerror}; an earlier report is unchanged") from None
     finally:
         work.remove()
         interrupt.undo.remove(work.remove)
 
 
 class Work:
-    """The folder of one run, inside `out`."""
-
     def __init__(self, out):
         self.out, self.path, self.lock = out, None, None
         self.made = [path for path in (out, *out.parents) if not os.path.lexists(path)]  # the innermost first
 
     def make(self):
-        """Make the folder, hold its lock, clear away what killed runs have left."""
+        """Make and lock the folder; restore and delete what killed runs have left."""
         for attempt in range(TRIES):
             try:
                 self.out.mkdir(parents=True, exist_ok=True)
@@ -82,7 +79,7 @@ class Work:
                 # not found: another run has just taken away the folder that it had made
                 if not isinstance(error, FileNotFoundError) or attempt == TRIES - 1:
                     text = f"cannot write to {self.out}: {what_is_wrong(self.out, error)}"
-                    raise FolderError(f"{text}; a folder that can be written is expected") from None
+                    raise FolderError(f"{text}; expected a writable folder") from None
 
     def exchange(self):
         """Move the old report away and the new one in; on an error put everything back."""
@@ -105,7 +102,7 @@ class Work:
             interrupt.settle()
 
     def remove(self):
-        """Take away what this run has made, except for the report."""
+        """Delete the files of this run, except the report."""
         if self.path is not None:
             delete(self.path)
         if self.lock is not None:
@@ -119,14 +116,14 @@ class Work:
 
 
 def move(source: Path, target: Path) -> None:
-    """Move a report's files, as far as the target does not have them."""
+    """Move the files of a report that the target does not have."""
     for name in OWN:
         if os.path.lexists(source / name) and not os.path.lexists(target / name):
             (source / name).rename(target / name)
 
 
 def put_back(work: Path, out: Path) -> None:
-    """The old report as it was before an exchange that did not come to its end."""
+    """Restore the old report after an exchange that was cut off."""
     if (work / "moving").exists():
         move(out, work / "moving")  # what the new report lacks is what had been moved
         (work / "moving").rename(work / "new")
@@ -135,7 +132,7 @@ def put_back(work: Path, out: Path) -> None:
 
 
 def clear_away(out: Path) -> None:
-    """Put back and take away what killed runs have left; the folder of a run that is alive is locked, and stays."""
+    """Restore and delete what killed runs have left; the folder of a running process is locked, and stays."""
     for work in sorted(out.glob(".new-*")):
         if is_of_a_run(work):
             number = lock(work, wait=False)
@@ -146,7 +143,6 @@ def clear_away(out: Path) -> None:
 
 
 def is_of_a_run(path: Path) -> bool:
-    """Whether a folder was made by a run: by its name, and by the names in it."""
     if not re.fullmatch(r"\.new-[a-z0-9_]{8}", path.name) or path.is_symlink() or not path.is_dir():
         return False
     return {child.name for child in path.iterdir()} <= {*STAGES, *OWN}
@@ -166,7 +162,6 @@ def delete(work: Path) -> None:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """No other run is here at the same time."""
     number = lock(folder)
     try:
         yield
@@ -194,7 +189,7 @@ def lock(folder: Path, wait: bool = True) -> int | None:
 
 
 def what_is_wrong(out: Path, error: OSError) -> str:
-    """Why there is no such folder, in words: what stands in its place."""
+    """Why a folder cannot be made."""
     for path in (*reversed(out.parents), out):
         name = "it" if path == out else str(path)
         if os.path.islink(path) and not os.path.exists(path):
@@ -206,7 +201,7 @@ def what_is_wrong(out: Path, error: OSError) -> str:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """An error of the disk in this block names the file, which Python leaves out when it writes."""
+    """Errors of the disk in this block name the file; those of Python do not."""
     try:
         yield
     except OSError as error:
@@ -220,7 +215,7 @@ def save(path: Path, text: str) -> None:
 
 
 def files(folder: Path) -> list[str]:
-    """What lies in a folder under a report's names, relative to it."""
+    """The files of a report in a folder, as relative paths."""
     found = [path for name in OWN for path in [folder / name, *(folder / name).rglob("*")]]
     return sorted(str(path.relative_to(folder)) for path in found if path.is_file() or path.is_symlink())
 
@@ -233,13 +228,10 @@ def refuse_foreign(out: Path) -> None:
     except (OSError, ValueError, KeyError, TypeError):
         foreign = files(out)
     if foreign:
-        raise FolderError(
-            f"{out} has {foreign[0]}, which is not of an earlier report and would be replaced; another folder is expected"
-        )
+        raise FolderError(f"{out} has {foreign[0]}, which no earlier report has written; use another folder (--out)")
 
 
 def made_by(out: str | Path) -> str | None:
-    """The command that made the report in a folder; None if there is none."""
     try:
         return str(json.loads((Path(out) / "results.json").read_text(encoding="utf-8"))["provenance"]["command"])
     except (OSError, ValueError, KeyError, TypeError):

@@ -61,6 +61,5 @@ def moves(file: str) -> bool:
 
 
 def clear_webp(folder: Path) -> None:
-    """Take away the files that were for the page alone."""
     for path in folder.glob("*.webp"):
         path.unlink()

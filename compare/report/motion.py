@@ -65,7 +65,6 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
 
 
 def scenes_that_differ(section: Section) -> set[str]:
-    """The scenes of which a check of the two models fails."""
     names = [one.scene for one in section.result.curves["drawn"]]
     return {scene_of(check.scene, names) for check in failures([section]).differing} - {None}
 
@@ -130,5 +129,4 @@ def shorter(pictures: Sequence, others: Sequence) -> list:
 
 
 def outline(picture: Sequence[int], links: Sequence) -> str:
-    """The sticks of a picture as the outline of an SVG."""
     return "".join(f"M{picture[2 * i]} {picture[2 * i + 1]}L{picture[2 * j]} {picture[2 * j + 1]}" for i, j in links)

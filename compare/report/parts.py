@@ -27,12 +27,10 @@ class Parts:
 
     @property
     def lines(self) -> list[str]:
-        """A sentence for each broken part."""
         return [say(Finding("verdict", "incomplete", {"name": name, "why": why})) for name, why in self.broken.items()]
 
     @property
     def checks(self) -> list[Check]:
-        """A failed check for each broken part."""
         return [
             Check("report", "", f"{name} is complete", None, 0.0, "", why, rule="equal", about=About.PROGRAM)
             for name, why in self.broken.items()

@@ -46,7 +46,6 @@ def durations(clock: Clock) -> dict:
 
 
 def commit() -> str | None:
-    """The commit of the checkout that runs, if it is one."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return None

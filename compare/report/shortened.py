@@ -71,7 +71,6 @@ def badness(row: Mapping, size) -> float:
 
 
 def share(row: Mapping) -> float | None:
-    """How much of a tolerance is used."""
     found = next((row[name] for name in SHARES if name in row), None)
     return None if found is None else abs(found)
 

@@ -51,7 +51,6 @@ def file_name(*parts: str) -> str:
 
 
 def plain(text: str) -> str:
-    """A name as it is drawn: a dollar sign begins no formula."""
     return text.replace("$", r"\$")
 
 
@@ -144,23 +143,19 @@ def points_in(boxes: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def meet(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Whether boxes, (..., 4), overlap others."""
     return ((boxes[..., :2] < others[..., 2:]) & (others[..., :2] < boxes[..., 2:])).all(axis=-1)
 
 
 def inside(boxes: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    """Whether boxes, (..., 4), are within a frame."""
     return ((boxes[..., :2] >= frame[:2]) & (boxes[..., 2:] <= frame[2:])).all(axis=-1)
 
 
 def in_letters(colour: str) -> tuple[float, float, float]:
-    """A colour as letters on white have it: so dark that they are read."""
     rgb = np.array(to_rgb(colour))
     return tuple(rgb * BRIGHTEST_LETTERS / max(BRIGHTEST_LETTERS, float(rgb @ BRIGHTNESS)))
 
 
 def text_width(text: str, size: float) -> float:
-    """How wide a text is, points."""
     return TextPath((0, 0), text, size=size).get_extents().width * WIDER
 
 

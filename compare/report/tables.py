@@ -38,13 +38,11 @@ def shown(table: pd.DataFrame, columns: Sequence[str] | None = None) -> pd.DataF
 
 
 def of_causes(causes: Sequence[dict]) -> pd.DataFrame:
-    """The causes as text."""
     rows = [(cause["rank"], cause["place"], cause["stated"], cause["found"], cause["text"]) for cause in causes]
     return shown(pd.DataFrame(rows, columns=["rank", "place", "stated", "found", "cause"]))
 
 
 def records(checks: Sequence[Check]) -> pd.DataFrame:
-    """Checks as text, a row for each."""
     names = [field for field in Check.__annotations__ if field not in ("rounding", "about")]
     return shown(pd.DataFrame([check.record() for check in checks], columns=names))
 
@@ -58,16 +56,13 @@ def closest_checks(section: Section, most: int) -> pd.DataFrame:
 
 
 def heading(name: str) -> str:
-    """A table's name as words."""
     return {"what_should_i_use": "What should I use?"}.get(name, name.replace("_", " ").capitalize())
 
 
 def origins(origin: dict) -> pd.DataFrame:
-    """The provenance as text."""
     rows = [(IN_WORDS.get(name, name), in_one_cell(value)) for name, value in origin.items()]
     return pd.DataFrame(rows, columns=["what", "value"])
 
 
 def in_one_cell(value) -> str:
-    """A value of the provenance."""
     return ", ".join(f"{name} {part}" for name, part in value.items()) if isinstance(value, dict) else str(value)

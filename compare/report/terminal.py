@@ -45,7 +45,6 @@ class Terminal:
             self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
 
     def show(self, text: str) -> None:
-        """Show the current text of the progress."""
         self.text = text
 
     def tell(self, how_far: Callable[[], list[str]]) -> None:
@@ -94,7 +93,6 @@ class Terminal:
 
     @contextmanager
     def paused(self):
-        """Stop the animation during this block."""
         if self.status:
             self.status.stop()
         try:
@@ -105,8 +103,6 @@ class Terminal:
 
 
 class Moving:
-    """A line that is recomputed whenever it is drawn."""
-
     def __init__(self, terminal: Terminal):
         self.terminal = terminal
 
@@ -115,7 +111,6 @@ class Moving:
 
 
 def wipe() -> None:
-    """Remove the progress from the terminal, at an early end."""
     Stream.silent = True
     with suppress(OSError):
         os.write(2, (EMPTY_LINE + SHOW_CURSOR).encode())

@@ -94,5 +94,4 @@ def block(of: str, kind: str, **values) -> str:
 
 
 def has(of: str, kind: str) -> bool:
-    """Whether a template has this macro."""
     return hasattr(environment().get_template(f"{of}.md.jinja").module, kind)

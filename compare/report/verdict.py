@@ -22,8 +22,6 @@ DEPENDS_ON = {
 
 @dataclass
 class Section:
-    """One experiment in the report."""
-
     name: str
     title: str
     claim: str
@@ -33,7 +31,6 @@ class Section:
 
     @property
     def notes(self) -> list[str]:
-        """What was found, in sentences."""
         return [say(note) for note in self.result.notes]
 
     @property
@@ -96,12 +93,10 @@ def depends_on(experiment: str, quantity: str | None) -> bool:
 
 
 def unstable_in_words(unstable: Sequence[Check]) -> str:
-    """What step is not stable, at which postures."""
     return say(Finding("verdict", "unstable", {"checks": unstable}))
 
 
 def unconfirmed_in_words(unconfirmed: Sequence[Check]) -> str:
-    """How many predictions no run confirms, and the first."""
     return say(Finding("verdict", "unconfirmed", {"checks": unconfirmed}))
 
 

@@ -8,7 +8,6 @@ OURS = "arm-tmt-mujoco"
 
 
 def own_version() -> str | None:
-    """The version of the program that runs."""
     return of_checkout(Path(__file__).resolve().parents[2]) or installed(OURS)
 
 
@@ -22,7 +21,6 @@ def of_checkout(root: Path) -> str | None:
 
 
 def installed(package: str) -> str | None:
-    """The version of an installed package; None where it is not."""
     try:
         return version(package)
     except PackageNotFoundError:

@@ -63,11 +63,9 @@ class Actuator:
         return float(u)
 
     def force(self, u: float, length: float) -> float:
-        """The force at rest, without the force range."""
         return (self.gain[0] + self.gain[1] * length) * u + self.bias[0] + self.bias[1] * length
 
     def largest(self, u: float, length: float) -> float:
-        """The largest term of the force; rounding is relative to it."""
         return max(abs(self.gain[0] * u), abs(self.gain[1] * length * u), abs(self.bias[0]), abs(self.bias[1] * length))
 
     def stiffness(self, u: float) -> float:
@@ -109,7 +107,6 @@ class Tendon(NamedTuple):
         return self.stiffness * (min(self.high - length, 0.0) + max(self.low - length, 0.0))
 
     def largest(self, length: float) -> float:
-        """The largest term of the force."""
         return self.stiffness * max(abs(length), abs(self.low), abs(self.high)) if self.pulls(length) else 0.0
 
     def pulls(self, length: float) -> bool:
@@ -173,7 +170,6 @@ class Drive:
 
     @property
     def servos(self) -> tuple[Actuator, ...]:
-        """The actuators with a target."""
         return tuple(actuator for actuator in self.actuators if actuator.is_servo)
 
     @property

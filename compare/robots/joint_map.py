@@ -116,7 +116,6 @@ def within_a_turn(zero: float, slides: bool) -> float:
 
 
 def put(values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Values of the own order in that of the model."""
     return np.asarray(values)[..., np.argsort(at)]
 
 

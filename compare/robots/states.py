@@ -96,7 +96,6 @@ def seconds(robot: Robot) -> float:
 
 
 def affordable(robot: Robot) -> int:
-    """The number of exact states in SECONDS_OF_EXACT."""
     return int(SECONDS_OF_EXACT / seconds(robot))
 
 

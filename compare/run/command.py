@@ -134,7 +134,6 @@ def write_report(
 
 
 def in_home(path: Path) -> str:
-    """A path with ~ for the user's folder."""
     with suppress(ValueError, RuntimeError):
         return str("~" / path.relative_to(Path.home()))
     return str(path)

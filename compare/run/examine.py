@@ -202,7 +202,6 @@ def of_values(setup: Setup, known: Sequence[str]) -> list[dict]:
 
 
 def find_causes(setup: Setup) -> list[dict]:
-    """The numbers of the model that differ from the stated ones; the gravest first."""
     result, _ = attempt("parameters", module("parameters").rows, setup)
     return result.curves["causes"] if result else []
 

@@ -129,7 +129,6 @@ def compared_with(
 
 
 def is_solution(reference: str | None) -> bool:
-    """Whether a reference is another MJCF file."""
     return (reference or "").lower().endswith((".xml", ".mjcf"))
 
 
