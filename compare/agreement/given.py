@@ -16,6 +16,7 @@ from ..engines.own import ARGUMENTS, OwnEquations, is_function
 from ..judge.check import over
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
+from ..report.text import say
 from ..robots.coordinates import Coordinates
 from ..robots.file import robot_of
 from ..robots.joint_map import JointMap, joint_map
@@ -101,7 +102,7 @@ class Given:
         sample = random(self.robot, states, 0, seed)
         self.q, self.qd, self.tau = sample.q, sample.qd, sample.tau
         for note in sample.notes:
-            warnings.warn(note, stacklevel=4)
+            warnings.warn(say(note), stacklevel=4)
         self.own.try_at(self.q, self.qd, self.tau)
         count = self.own.affordable(len(self.q), OWN_SECONDS)
         if count < len(self.q):

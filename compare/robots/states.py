@@ -7,6 +7,7 @@ import numpy as np
 from tmt.equations.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
 from tmt.exact.values import exact
 
+from ..judge.finding import Finding
 from . import Robot
 from .case import SEED
 
@@ -18,7 +19,7 @@ MOST_NUMBERS = 2_000_000  # maximum size of T_b of all random states
 class Sample:
     """States q (states, nq) rad, qd rad/s and tau N m (states, nv), with exact values for the first `exact_states`.
 
-    states: their names, if they have any; notes: sentences about what is left out.
+    states: their names, if they have any; notes: findings about what is left out.
     """
 
     def __init__(self, tree, name, q, qd, tau, exact_states, states=(), notes=()):
@@ -69,8 +70,8 @@ def named(robot: Robot) -> Sample:
     speeds, torques = rng.uniform(-most, most, (2, len(q), robot.coordinates.nv))
     name = "named postures" if robot.postures or robot.positions else "a posture"
     exact_states = of_named(robot)
-    notes = (f"Exact values: {exact_states} of {len(q)} {name} ({seconds(robot):.1g} s each).",)
-    notes = notes if exact_states < len(q) else ()
+    values = {"count": exact_states, "sample": f"{len(q)} {name}", "seconds": seconds(robot)}
+    notes = (Finding("shared", "exact_values", values),) if exact_states < len(q) else ()
     return Sample(robot.tree, name, q, speeds, torques, exact_states, tuple(robot.poses), notes)
 
 
@@ -79,11 +80,10 @@ def random(robot: Robot, states: int, exact_states: int, seed: int = SEED) -> Sa
     rng, wanted, exact_wanted = np.random.default_rng(seed), states, exact_states
     states = min(wanted, max(1, MOST_NUMBERS // (3 * len(robot.tree.mass) * robot.coordinates.nv)))
     exact_states = min(exact_wanted, states, affordable(robot) - of_named(robot))
-    notes = [f"{states:,} random states in place of {wanted:,}: the robot is large."] * (states < wanted)
+    notes = [Finding("shared", "large_robot", {"count": states, "states": wanted})] * (states < wanted)
     if exact_states < min(exact_wanted, states):
-        notes.append(
-            f"Exact values: {exact_states} random states in place of {exact_wanted} ({seconds(robot):.1g} s each)."
-        )
+        values = {"count": exact_states, "sample": f"{exact_wanted} random states", "seconds": seconds(robot)}
+        notes.append(Finding("shared", "exact_values", values))
     q = robot.coordinates.random(rng, states, robot.ranges)
     most = largest_speeds_and_torques(robot)[:, None]
     speeds, torques = rng.uniform(-most, most, (2, states, robot.coordinates.nv))
