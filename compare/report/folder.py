@@ -82,7 +82,7 @@ class Work:
                 # not found: another run has just taken away the folder that it had made
                 if not isinstance(error, FileNotFoundError) or attempt == TRIES - 1:
                     text = f"cannot write to {self.out}: {what_is_wrong(self.out, error)}"
-                    raise FolderError(f"{text}; a folder that can be written is expected") from None
+                    raise FolderError(f"{text}; expected a writable folder") from None
 
     def exchange(self):
         """Move the old report away and the new one in; on an error put everything back."""
@@ -194,7 +194,7 @@ def lock(folder: Path, wait: bool = True) -> int | None:
 
 
 def what_is_wrong(out: Path, error: OSError) -> str:
-    """Why there is no such folder, in words: what stands in its place."""
+    """Why the folder cannot be written, in words."""
     for path in (*reversed(out.parents), out):
         name = "it" if path == out else str(path)
         if os.path.islink(path) and not os.path.exists(path):
@@ -234,7 +234,7 @@ def refuse_foreign(out: Path) -> None:
         foreign = files(out)
     if foreign:
         raise FolderError(
-            f"{out} has {foreign[0]}, which is not of an earlier report and would be replaced; another folder is expected"
+            f"{out} has {foreign[0]}, which belongs to no earlier report and would be replaced; expected another folder"
         )
 
 
