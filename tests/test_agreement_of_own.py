@@ -212,9 +212,9 @@ THREE = np.zeros((3, 2))
     ({}, "acceleration"), ({"bias": bias, "rtol": -1.0}, "rtol is -1.0"), ({"bias": bias, "states": 2.5}, "states is 2.5"),
     ({"bias": THREE}, "bias .* not q"), ({"bias": bias, "qd": 0.0}, "qd .* not q"), ({"bias": "h"}, "bias is 'h'"),
     ({"acceleration": acceleration, "q": THREE, "qd": 0.0}, "depends on tau"), ({"mjcf": 3, "bias": bias}, "int"),
-    ({"bias": bias, "q": THREE, "qd": np.eye(2)}, r"qd has shape \(2, 2\); \(3, 2\)"),
+    ({"bias": bias, "q": THREE, "qd": np.eye(2)}, r"qd has shape \(2, 2\); expected \(3, 2\)"),
     ({"bias": bias, "q": [[0, np.nan]], "qd": 0.0}, "finite"), ({"bias": bias, "q": [["a", "b"]], "qd": 0.0}, "q is "),
-    ({"bias": np.eye(3), "q": THREE, "qd": 0.0}, r"bias has shape \(3, 3\); \(3, 2\)"),
+    ({"bias": np.eye(3), "q": THREE, "qd": 0.0}, r"bias has shape \(3, 3\); expected \(3, 2\)"),
     ({"mjcf": "nowhere.xml", "bias": bias}, "nowhere.xml"), ({"bias": bias, "joints": ["hip", "foot"]}, "'foot'"),
     ({"mjcf": PATHS["pendulum_ball"], "mass_matrix": lambda q: np.eye(6), "q": TURNED}, "length 1"),
 ])  # fmt: skip

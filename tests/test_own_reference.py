@@ -146,7 +146,7 @@ BROKEN = "x = 1\ndef mass_matrix(q:\n"
 
 @pytest.mark.parametrize("asked, word", [
     ("nowhere/mine.py:Object", "nowhere/mine.py"), ("mne:Object", "mine"), ("no such:Object", "'no such'"),
-    (":Object", "':Object'"), ("./:Object", "folder"), ("mine.py:inside.alsso", "there is also"),
+    (":Object", "':Object'"), ("./:Object", "folder"), ("mine.py:inside.alsso", "known: also"),
     ("broken.py:", "broken.py, line 2: SyntaxError"), ("broken:", "broken, line 2: SyntaxError"),
     ("leaving.py:x", "leaving.py, line 2: SystemExit: 3"), ("mine.py:Needing", "takes mass"),
     ("mine.py:&--joints&-hip,ankle", "'ankle'"),

@@ -49,7 +49,9 @@ def test_its_figures_are_those_of_the_example():
     assert results["provenance"]["command"].endswith("-m compare all --out reports/example") and results["passed"]
     rows = [row for row in table("stability") if row["predicted_dt_s"] and row["observed_dt_s"]]
     off = [float(row["observed_dt_s"]) / float(row["predicted_dt_s"]) - 1.0 for row in rows]
-    worst = re.search(r"(\d+ %) of it", (EXAMPLE / "report.md").read_text(encoding="utf-8"))[1]
+    worst = re.search(
+        r"rounding tolerance(?:: | is .*?, )(\d+ %)", (EXAMPLE / "report.md").read_text(encoding="utf-8")
+    )[1]
     of_free = {"engine_integrator": "RK4", "dt_s": "0.078125", "unit": "rad", "level": "open loop"}
     free = [row for row in table("trajectory") if row["scene"].endswith(", free")]
     followed = {"engine": "mujoco", "method": "RK4", "dt_s": "0.078125", "scene": "ball catch, free"}

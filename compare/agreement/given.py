@@ -61,7 +61,7 @@ class Given:
         if not brought:
             raise ValueError(f"nothing to compare: expected {', '.join(SYMBOLS_OF)} or some of them")
         if not is_number(rtol) or rtol < 0.0:
-            raise ValueError(f"rtol is {shown(rtol)}; a number of at least 0 is expected")
+            raise ValueError(f"rtol is {shown(rtol)}; expected a number of at least 0")
         self.rtol, self.brought = float(rtol), brought
         self.read(mjcf)
         self.are_stated = joints is not None
@@ -69,13 +69,13 @@ class Given:
         functions = {name: value for name, value in brought.items() if is_function(value)}
         for name, value in brought.items():
             if q is None and name not in functions and real_numbers(value) is None:
-                raise ValueError(f"{name} is {shown(value)}; a function, or an array of its values at q, is expected")
+                raise ValueError(f"{name} is {shown(value)}; expected a function, or an array of its values at q")
         self.own = OwnEquations(functions, self.coordinates, self.joints, self.tree, ()) if functions else None
         if q is None:
             alone = [f"{name} is an array of values" for name in brought if name not in functions]
             alone += [f"{name} is given" for name, value in {"qd": qd, "tau": tau}.items() if value is not None]
             if alone:
-                raise ValueError(f"{alone[0]}, but not q; q of shape (states, {self.coordinates.nq}) is expected")
+                raise ValueError(f"{alone[0]}, but not q; expected q of shape (states, {self.coordinates.nq})")
             self.take_random(states, seed)
         else:
             self.take_states(q, qd, tau)
@@ -98,7 +98,7 @@ class Given:
         """Random states, fewer if one's own functions take long."""
         for name, value, least in (("states", states, 1), ("seed", seed, 0)):
             if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
-                raise ValueError(f"{name} is {shown(value)}; a whole number of at least {least} is expected")
+                raise ValueError(f"{name} is {shown(value)}; expected a whole number of at least {least}")
         sample = random(self.robot, states, 0, seed)
         self.q, self.qd, self.tau = sample.q, sample.qd, sample.tau
         for note in sample.notes:
@@ -118,14 +118,14 @@ class Given:
         for name, value in {"qd": qd, "tau": tau}.items():
             needed = [of for of in self.brought if name in ("q", "qd", "tau")[: ARGUMENTS[of]]]
             if value is None and needed:
-                raise ValueError(f"{needed[0]} depends on {name}; {name} of shape ({count}, {nv}) is expected, or 0.0")
+                raise ValueError(f"{needed[0]} depends on {name}; expected {name} of shape ({count}, {nv}), or 0.0")
             own[name] = np.zeros((count, nv)) if value is None else rows_given(name, value, nv, count)
         self.q = self.joints.positions(own["q"])
         self.qd, self.tau = self.joints.speeds(own["qd"]), self.joints.forces(own["tau"])
         for joint, name in zip(self.coordinates.places.joints, self.coordinates.names):
             off = np.abs(np.linalg.norm(self.q[:, joint.q], axis=1) - 1.0).max() if joint.kind == "ball" else 0.0
             if off > CLOSE_TO_ONE:
-                raise ValueError(f"q of {name} is not a quaternion of length 1 at every state; w, x, y, z is expected")
+                raise ValueError(f"q of {name} is not a quaternion of length 1 at every state; expected w, x, y, z")
 
     @cached_property
     def states(self) -> list[State]:
@@ -153,11 +153,11 @@ class Given:
         array = real_numbers(brought)
         shape = (count, nv, nv) if name == "mass_matrix" else (count, nv)
         if array is None:
-            raise ValueError(f"{name} is {shown(brought)}; real numbers of shape {shape} are expected, or a function")
+            raise ValueError(f"{name} is {shown(brought)}; expected real numbers of shape {shape}, or a function")
         accepted = [shape, (count, nv * nv)] if name == "mass_matrix" else [shape]
         accepted += [shape[1:]] * (count == 1) + [(count,)] * (nv == 1)
         if array.shape not in accepted:
-            raise ValueError(f"{name} has shape {array.shape}; {shape} is expected, its values at the given q")
+            raise ValueError(f"{name} has shape {array.shape}; expected {shape}, its values at the given q")
         return array.reshape(shape)
 
     @cached_property
@@ -207,13 +207,13 @@ def rows_given(name: str, values: object, size: int, count: int | None) -> np.nd
     array = real_numbers(values)
     expected = f"({'states' if count is None else count}, {size})"
     if array is None:
-        raise ValueError(f"{name} is {shown(values)}; real numbers of shape {expected} are expected")
+        raise ValueError(f"{name} is {shown(values)}; expected real numbers of shape {expected}")
     if array.ndim == 0 and count is not None:
         array = np.full((count, size), float(array))
     elif array.ndim == 1:
         array = array.reshape(-1, size) if array.shape == (size,) or size == 1 else array
     if array.ndim != 2 or array.shape[1] != size or (count is not None and len(array) != count) or not len(array):
-        raise ValueError(f"{name} has shape {np.shape(values)}; {expected} is expected")
+        raise ValueError(f"{name} has shape {np.shape(values)}; expected {expected}")
     if not np.isfinite(array).all():
-        raise ValueError(f"{name} has values that are not finite; finite numbers are expected")
+        raise ValueError(f"{name} has values that are not finite; expected finite numbers")
     return array

@@ -179,7 +179,7 @@ def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence
 
 
 def expected(word: str, known: dict[str, str], choices: str) -> str:
-    """A hint for an unknown word: the nearest known one, by what it stands for; or all choices."""
+    """A hint for an unknown word: the nearest known word, or all choices."""
     near = get_close_matches(word.casefold(), known, 1)
     return f"did you mean {known[near[0]]}?" if near else f"expected one of {choices}"
 

@@ -139,7 +139,7 @@ def of_length_1(coordinates: Coordinates, q: np.ndarray) -> np.ndarray:
 
 
 def as_far_as_it_goes(t: np.ndarray, found: np.ndarray, start: np.ndarray, why: str) -> tuple[np.ndarray, str | None]:
-    """q and v side by side at the times t, NaN from where a run is no longer finite; and when and why that is, or None.
+    """q and v in one array at the times t, NaN from where a run is no longer finite; and when and why that is, or None.
 
     found: (times reached, nq + nv), the states of a run that may have ended early; start: (nq + nv,), its first.
     """

@@ -8,7 +8,7 @@ kind of finding and caption. The module has
     figures(result, robot)                   yields calls that draw, each returning (file name, figure, caption)
     headline(result) -> Finding | None       its one number on the first screen
     overview(results, robot)                 draws its picture of the first screen (of a record with `overview`)
-    claim_values(robot) -> dict              what the macros claim and tolerance take beside the robot (optional)
+    claim_values(robot) -> dict              what the macros claim and tolerance take in addition to the robot (optional)
     skipped(robot) -> Finding | None         why it does not apply to a robot (optional)
     begin(setup)                             starts long work (optional)
 """
@@ -35,7 +35,7 @@ class Experiment:
     order: int  # of `all` and of the report
     serves_own: bool = True  # whether it applies to a user's own equations; if not, the macro not_of_own says why
     asks_of_own: tuple[str, ...] | None = None  # which of a user's own functions it calls; None: all
-    options: tuple[str, ...] = ()  # of the command line, beside those that every experiment takes
+    options: tuple[str, ...] = ()  # of the command line, in addition to those of every experiment
     timed: bool = False  # it measures times: it runs last, while nothing else does
     diagnosed: bool = False  # where it fails, `diagnosis` looks for the cause
     overview: str = ""  # the picture of the first screen that its result is part of

@@ -86,7 +86,11 @@ def draw_agreement(results: Mapping[str, Result]) -> tuple[str, Figure, Finding]
                         ha="right" if far else "left", color="black" if row["passed"] else RED)  # fmt: skip
     beyond_tolerance(ax, FACTOR, f"{FACTOR:g} eps")
     passed = [row["passed"] for row in quantities]
-    ax.set(xscale="log", xlim=(LEAST_EPS, 2e3 if all(passed) else MOST_EPS), xlabel="eps of the scale")
+    ax.set(
+        xscale="log",
+        xlim=(LEAST_EPS, 2e3 if all(passed) else MOST_EPS),
+        xlabel="difference, eps × scale of the quantity",
+    )
     named_rows(ax, [row["name"].replace(" ", "\n", len(row["name"]) > 12) for row in quantities], passed)
     fig.legend(loc="outside upper center", ncols=3, fontsize=7.5, handletextpad=0.1, columnspacing=0.8)
     caption = Finding("shared", "agreement_overview", {"quantities": quantities, "label": label})

@@ -28,7 +28,7 @@ MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the firs
 FIRST_CAUSES = 4  # on the first screen
 OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
 LINKED = ("_distances", "_limits")  # how the files of the figures to which they lead end
-MAIN_TABLES = ("what_should_i_use",)  # tables in report.md beside a section's own
+MAIN_TABLES = ("what_should_i_use",)  # further tables of report.md, in addition to a section's own
 
 
 class Document:
@@ -134,7 +134,7 @@ class Document:
     def pictures(self) -> list[dict]:
         """The pictures, those in which something fails first, each with the anchor of its figure.
 
-        If no picture is of what fails, a figure of the first failing experiment comes before them.
+        If none of them shows a failure, a figure of the first failing experiment comes first.
         """
         wrong = [section for section in self.report.sections if any(failures([section]))]
         pictures, shown = [], []

@@ -68,5 +68,5 @@ def csv(rows: Sequence[dict]) -> str:
 
 
 def for_csv(table: pd.DataFrame) -> pd.DataFrame:
-    """A table of objects for a CSV file: true and false in small letters, whole numbers beside empty cells."""
+    """A table of objects for a CSV file: true and false in lower case, integers also in columns with empty cells."""
     return table.map(lambda value: str(value).lower() if isinstance(value, bool | np.bool_) else value)

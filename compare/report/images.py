@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 PALETTE = 255  # colours, and white: a chart has fewer that the eye tells apart
-COARSE = 3.0  # of 255: by so much the colours of what is drawn may change on average
+COARSE = 3.0  # of 255: largest mean change of the colours
 MEDIA = {".png": "image/png", ".webp": "image/webp", ".gif": "image/gif"}
 
 
@@ -48,8 +48,8 @@ def embedded(path: Path) -> tuple[str, int, int]:
 
     OSError if there is no such figure.
     """
-    beside = path.with_suffix(".webp")
-    least = min([path, *([beside] if beside.exists() else [])], key=lambda file: file.stat().st_size)
+    webp = path.with_suffix(".webp")
+    least = min([path, *([webp] if webp.exists() else [])], key=lambda file: file.stat().st_size)
     with Image.open(path) as image:
         width, height = image.size
     return f"data:{MEDIA[least.suffix]};base64,{base64.b64encode(least.read_bytes()).decode()}", width, height

@@ -18,10 +18,10 @@ MOST_BYTES = 280_000  # of the motion in the page
 STICK_BYTES = 48  # of a stick in the picture without script
 LARGEST_STRIDE = 8  # every eighth picture of each scene is shown before scenes are left out
 DRAWN_IN = "trajectory"  # the experiment whose scenes are drawn
-WIDE, HIGH, BORDER = 1000, 480, 45  # of what is drawn, in its own units
+WIDE, HIGH, BORDER = 1000, 480, 45  # of the drawing, in its own units
 FEW_STICKS = 6  # up to which they are drawn wide
 SHOWN_FOR = 5.0  # s, at least about: a shorter scene is shown slower
-UNDER = 0.9  # of what is shown at its own speed
+UNDER = 0.9  # of motion shown at its own speed
 
 
 def motion_in_html(sections: Sequence[Section], robot: object) -> str:

@@ -55,14 +55,14 @@ def plain(text: str) -> str:
 
 
 def zero_at_the_end(axis: Axis, end: float, far: float, most: int) -> None:
-    """Powers of ten on a logarithmic axis, so many at most, from a small number, which stands for 0, to one far above."""
+    """Ticks at powers of ten on a logarithmic axis, at most `most`; the first is labelled 0."""
     first, last = round(np.log10(end)), int(np.ceil(np.log10(far)))
     powers = range(first, last + 1, max(1, -(-(last - first) // (most - 1))))
     axis.set_ticks([10.0**power for power in powers], ["0", *(f"$10^{{{power}}}$" for power in powers[1:])])
     axis.set_ticks([], minor=True)
 
 
-# labels beside what they name
+# labels next to their points
 
 BRIGHTNESS, BRIGHTEST_LETTERS = (
     np.array([0.3, 0.59, 0.11]),
@@ -73,7 +73,7 @@ HEIGHT_OF_TEXT = 1.3  # of its size
 FARTHEST_NAME, FAR_ENOUGH = (
     62.0,
     9.0,
-)  # points: the farthest that a name stands from its point, and from where on with a line
+)  # points: the largest distance of a name from its point, and the distance from which it has a line
 DIRECTIONS = (0, 20, -20, 45, -45, 70, -70, 90, -90, 110, -110, 135, -135, 160, -160, 180)  # deg, to a name
 OVER_A_LABEL, OVER_A_LINE, OUTSIDE, TO_THE_LEFT = (
     1e4,
@@ -105,9 +105,9 @@ def spread(values: Sequence[float], apart: float, low: float, high: float) -> np
 
 
 def name_ends(ax: Axes, ends: Sequence[tuple], size: float = 8.0) -> None:
-    """Write names beside points of a panel, where they cover neither lines nor each other: (x, y, name, colour).
+    """Write names next to points of a panel, where they cover neither lines nor each other: (x, y, name, colour).
 
-    The panel has its place on the paper already. A name that stands away from its point has a thin line to it.
+    The panel has its place on the paper already. A name far from its point has a thin line to it.
     """
     scale = ax.figure.dpi / 72.0  # pixels of a point
     ax.set(xlim=ax.get_xlim(), ylim=ax.get_ylim())  # which are found now, and stay

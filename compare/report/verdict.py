@@ -47,7 +47,7 @@ class Report(NamedTuple):
     robot: object  # a robots.Robot
     origin: dict  # see provenance
     verdict: str  # in words, a sentence in each line
-    causes: Sequence[dict] = ()  # of what fails, the gravest first
+    causes: Sequence[dict] = ()  # of the failures, lowest rank first
     skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
     reference: object | None = None  # a reference.Reference
 
@@ -67,7 +67,7 @@ class Failures(NamedTuple):
 
 
 def failures(sections: Sequence[Section]) -> Failures:
-    """The checks that fail: of the models, of what broke off, of the step, of predictions that no run confirms."""
+    """The failed checks: of the models, of broken experiments, of the step, of predictions that no run confirms."""
     failed = [check for section in sections for check in section.result.checks if not check.passed]
     kinds = About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION
     return Failures(*([check for check in failed if check.about == kind] for kind in kinds))

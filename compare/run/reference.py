@@ -69,7 +69,7 @@ class Reference(NamedTuple):
         lines = [f"reference: {self.kind}; {self.file} compared with {REFERENCES.get(self.kind, self.source)}"]
         lines += [self.matched] * bool(self.renamed)
         if self.open_tree:
-            lines.append(f"open tree: {len(self.open_tree)} equalities switched off: {', '.join(self.open_tree)}")
+            lines.append(f"equalities switched off ({len(self.open_tree)}): {', '.join(self.open_tree)}")
         return tuple(map(in_one_line, (*lines, *(f"MuJoCo warns: {line}" for line in self.warnings))))
 
 

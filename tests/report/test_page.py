@@ -113,7 +113,7 @@ def test_results_have_every_check_cause_and_digit(folder):
     assert pd.read_csv(folder / "tables" / "extra.csv")["names"].tolist() == [names]  # cut in the report
     html, text = (text_of(folder / name) for name in ("index.html", "report.md"))
     assert names not in text and CAUSE["text"] in html and CAUSE["text"] in text
-    assert html.count("<td>0.123</td>") == 3 and "1 check explained by the cause" in text
+    assert html.count("<td>0.123</td>") == 3 and "The cause explains 1 failing check" in text
     assert [path.name for path in (folder / "figures").iterdir()] == ["mass_distances.png"]  # WebP is in the page alone
 
 

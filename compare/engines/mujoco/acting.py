@@ -60,7 +60,7 @@ class Acting:
                 m.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_AFFINE
                 m.actuator_gainprm[i], m.actuator_biasprm[i] = 0.0, 0.0
                 m.actuator_biasprm[i, 0] = cut.forces.get(i, 0.0)
-                if m.actuator_plugin[i] >= 0:  # it has its own law, whatever stands here
+                if m.actuator_plugin[i] >= 0:  # it has its own law, whatever these fields say
                     m.actuator_gear[output_of(m, i)] = 0.0
             if (
                 one.refused

@@ -93,7 +93,7 @@ def part_of(module: ModuleType, place: str, name: str) -> object:
             names = [other for other in dir(value) if not other.startswith("_")]
             names = [other for other in names if not inspect.ismodule(getattr(value, other, None))]
             inside = f" in {path}" if path else ""
-            raise OwnFileError(f"{place}: there is no {part!r}{inside}{close_names(part, names)}") from None
+            raise OwnFileError(f"{place} has no {part!r}{inside}{close_names(part, names)}") from None
         path = f"{path}.{part}" if path else part
     return value
 
@@ -128,7 +128,7 @@ def close_names(name: str, known: Sequence[str]) -> str:
     close = difflib.get_close_matches(name, known, 3, 0.6)
     if not close and len(known) <= SHOWN_NAMES:
         close = list(known)
-    return f"; there is {listed(close)}" if close else ""
+    return f"; known: {listed(close)}" if close else ""
 
 
 @contextmanager

@@ -85,7 +85,7 @@ def changes(numbers: Sequence[tuple[Stated, str]]) -> list[dict]:
 
 
 def add_inventory(result: Result, features: Sequence) -> None:
-    """The table of what the file has, and what is modelled, switched off or opened."""
+    """The table of the features of the file: modelled, switched off or opened."""
     fields = ("feature", "count", "names", "treatment", "reason")
     result.tables["inventory"] = [
         {name: ";".join(feature.names) if name == "names" else getattr(feature, name) for name in fields}

@@ -51,7 +51,7 @@ def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> 
 
 
 def compare_features(result: Result, setup: Setup) -> list[dict]:
-    """Checks of what the equations do not have: the count of each feature, and its numbers; the causes where they differ."""
+    """Checks of features that the equations do not have: their count and numbers; the causes where they differ."""
     robot, causes = setup.robot, []
     ours, theirs = ({f.feature: f for f in features} for features in (robot.features, robot.features_stated))
     for name, feature in (theirs | ours).items():

@@ -127,6 +127,6 @@ def check_falling(
         with np.errstate(divide="ignore", invalid="ignore"):
             orders[engine, integrator] = float(np.log2(np.divide(values[clear - 2], values[clear - 1])))
         off = abs(orders[engine, integrator] - order)
-        name = f"order of the error against the elliptic function, from {order}"
+        name = f"deviation from order {order}: error from the elliptic function"
         result.check(where, name, off, ORDER_MARGIN, "", about=About.PREDICTION)
     return orders

@@ -120,7 +120,7 @@ def draw_times(result: Result, scene: str, beginning: str = "") -> tuple:
     widest, shading = draw_diverged(ax, by_method)
     ax.set(xscale="log", yscale="log", xlim=(widest, FINE_END / 30))
     ax.set(
-        xlabel=f"worst error, {unit} (finer to the right)",
+        xlabel=f"maximum error, {unit} (decreasing)",
         ylabel=f"time for {durations(runs_of(result, scene))} of motion, ms",
     )
     ax.minorticks_off()
@@ -190,7 +190,7 @@ def draw_evaluations(result: Result) -> tuple:
             axes_of_labels = ax, ends
     if labelled:
         name_ends(*axes_of_labels, size=7.5)
-    fig.supxlabel(f"worst error, {unit} (finer to the right)", fontsize=9)
+    fig.supxlabel(f"maximum error, {unit} (decreasing)", fontsize=9)
     fig.supylabel("evaluations of the equations of motion", fontsize=9)
     fig.legend(handles=legend_lines(engines), loc="upper center", ncols=4)
     fewest = {method: fewest_evaluations(result, regular, method) for method in ("rk4", "dopri8")}

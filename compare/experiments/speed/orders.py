@@ -72,7 +72,9 @@ def check_order(result: Result, where: str, order: int, measured: float) -> None
     """The measured order is the method's; of order 8 it is at least 7."""
     least = LEAST_ORDER.get(order)
     if least is None:
-        name, note = f"distance of the measured order from {order}", f"{measured:.2f}"
+        name, note = f"deviation from order {order}: error", f"{measured:.2f}"
         result.check(where, name, abs(measured - order), ORDER_MARGIN, "", note, about=About.PREDICTION)
     else:
-        result.check(where, f"measured order, of {order}", measured, least, "", rule="at least", about=About.PREDICTION)
+        result.check(
+            where, f"measured order, nominal {order}", measured, least, "", rule="at least", about=About.PREDICTION
+        )

@@ -100,7 +100,7 @@ def floor(case: Case, dynamics: Dynamics) -> float:
             growth_of = growth if case.coordinates.nv <= EACH_STEP else sampled_growth
             growths = growth_of(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_STEPS)
             return float(EPS * 10.0 ** growths.max() * max(1.0, np.abs(motion.q).max()))
-    raise ValueError(f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; a shorter one is expected")
+    raise ValueError(f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; expected a shorter scene")
 
 
 def sampled_growth(stepping, tree, q, qd, tau, dt, every) -> np.ndarray:

@@ -86,7 +86,7 @@ def pushes(at: Held) -> np.ndarray:
 
 
 def ulps(difference: np.ndarray, tau: np.ndarray) -> list[int | None]:
-    """A difference of torques counted in units of the last place of the torque; None if it is no number."""
+    """A difference of torques counted in units of the last place of the torque; None if it is not a number."""
     counts = [float(d / np.spacing(abs(t))) for d, t in zip(difference, tau)]
     return [round(count) if np.isfinite(count) else None for count in counts]
 

@@ -65,7 +65,7 @@ def decaying(at: Held) -> str | None:
 
 
 def rounding_of_step(at: Held, scheme: str, dt: float) -> float:
-    """The bound of what rounding adds in one step from a held posture: of movements or of speeds, whichever is more.
+    """The bound of the rounding error of one step from a held posture: of movements or of speeds, whichever is more.
 
     By the scale of the forces, which has the reach: where an anchor is far away, that is more than the last digits of the angles.
     """

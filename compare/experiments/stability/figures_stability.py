@@ -123,7 +123,7 @@ def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
         ax.minorticks_off()
     axes[0].set_ylabel(f"time until a movement of {LEFT:g} {unit}, s")
     axes[0].plot([], [], color="black", linewidth=1, label="predicted by the linear map")
-    axes[0].fill_between([], [], color=(GREY, 0.15), linewidth=0, label="an error of the torque")
+    axes[0].fill_between([], [], color=(GREY, 0.15), linewidth=0, label="perturbation by an error of the torque")
     fig.supxlabel(f"perturbation, {unit}", fontsize=9)
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=8)
     values = departure_values(rows) | {"posture": saddle, "noun": robot.noun, "unit": unit, "left": LEFT}
@@ -160,7 +160,9 @@ def draw_torques(ax: Axes, rows: list[dict], robot: Robot) -> None:
     pairs = {(row["push_rad_per_s2"] / factor, row["predicted_s"]) for row in rows if row["predicted_s"] is not None}
     ax.plot(*np.array(sorted(pairs)).reshape(-1, 2).T, color="black", linewidth=0.8, label="predicted")
     ax.axvline(0.0, color="black", linewidth=0.5)
-    ax.set(title=f"claim 1: {robot.claims.left}", xlabel=f"push on the unstable mode, {factor:.0e} rad/s2")
+    ax.set(
+        title=f"claim 1: {robot.claims.left}", xlabel=f"initial acceleration of the unstable mode, {factor:.0e} rad/s2"
+    )
     ax.set_ylabel(f"time until a movement of {LEFT:g} rad, s")
 
 

@@ -16,7 +16,7 @@ from .subjects import who
 LINEAR_DEVIATION = 1e-6  # rad, at the start
 GROWTH_STEPS = 2000  # of a run
 GROWTH_ALLOWED = 100.0  # fold, of the deviation
-FAR = 1e4  # fold, of what has left the reach of a linear motion
+FAR = 1e4  # growth beyond which a motion is not linear any more
 GROWTH_MARGIN = 1e-3  # relative: a mode that grows by less from the second to the last quarter of a run does not grow
 DECAYED = 1e-3  # of its share at the start: a mode below that has decayed, and rounding and its square are what is left
 CRITERION = "no mode grows from the second to the last quarter of a run"

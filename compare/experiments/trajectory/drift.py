@@ -95,7 +95,10 @@ def check_drifts(result: Result, drifts: dict, rounding: Mapping[tuple, float]) 
             for engine, values in engines.items():
                 where = f"{scene}, {method.name}, {LABELS[engine]}, {DRIFT_DURATION:g} s"
                 if has_order:
-                    order, off = f"order of the drift of {quantity}, from {method.order}", orders[engine] - method.order
+                    order, off = (
+                        f"deviation from order {method.order}: drift of {quantity}",
+                        orders[engine] - method.order,
+                    )
                     result.check(where, order, abs(off), ORDER_MARGIN, "", about=About.PREDICTION)
                 if method.scheme == "rk4" and not is_rounding(by_method[euler], allowed):
                     ratio = f"drift of {quantity} over that of Euler"

@@ -41,7 +41,7 @@ def draw_scenes(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     named_rows(left, [plain(scene.name) for scene in shown], [scene.passed for scene in shown])
     left.tick_params(axis="y", labelsize=8)
     right.grid(axis="y", visible=False)
-    bars = ((BLUE, "judged"), ((BLUE, 0.4), "at some dt"), ((GREY, 0.2), "not"))
+    bars = ((BLUE, "judged"), ((BLUE, 0.4), "judged at some dt"), ((GREY, 0.2), "not judged"))
     handles = [right.barh(-9, 1, color=colour, label=text) for colour, text in bars]
     if any(scene.diverged is not None for scene in shown):
         handles += right.plot([], [], "x", color=RED, markeredgewidth=1.5, label="diverges")

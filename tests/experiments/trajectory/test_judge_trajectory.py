@@ -129,7 +129,7 @@ def test_drift_falls_at_the_order_and_that_of_rk4_is_far_below_eulers(engine, la
     made[OF_MUJOCO["RK4"]][engine] = [256 * share, 16 * share, share]
     result = Result("trajectory")
     drift.check_drifts(result, {("bent, free", "energy", "J"): made}, {})
-    of_order = f"order of the drift of energy, from 1 bent, free, Euler, {label}, 1 s"
+    of_order = f"deviation from order 1: drift of energy bent, free, Euler, {label}, 1 s"
     of_share = f"drift of energy over that of Euler bent, free, RK4, {label}, 1 s"
     failed = {f"{check.quantity} {check.scene}" for check in result.checks if not check.passed}
     assert len(result.checks) == 6

@@ -19,7 +19,7 @@ CHECKS = (
     ("accuracy", "check_smallest_errors", "\"smallest error of MuJoCo's RK4, compared with tmt's rk4\""),
     ("orders", "orders", "name"),
     ("orders", "check_order", "name"),
-    ("orders", "check_order", 'f"measured order, of {_1}"'),
+    ("orders", "check_order", 'f"measured order, nominal {_1}"'),
     ("exact_motion", "check_function", "name"),
     ("exact_motion", "check_falling", "name"),
     ("needs", "check_smaller", '"smallest model to whole"'),

@@ -115,7 +115,7 @@ def full_at(prediction: Prediction, integrator: str, reading: Reading) -> dict:
 
 
 def add(result: Result, setup: Setup, work: dict) -> None:
-    """Rows, checks, curves, the answer at the top and the notes, of what `begin` has started."""
+    """Rows, checks, curves, the answer at the top and the notes of the computations that `begin` has started."""
     predictions, reading = work["predictions"], setup.reading
     rows = limit_rows(predictions, reading.dt, reading.integrator)
     by_place = {(row["posture"], row["base"], row["integrator"]): row for row in rows}

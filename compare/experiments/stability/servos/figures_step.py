@@ -34,13 +34,13 @@ def draw_step_response(result: Result, robot: Robot) -> tuple[str, Figure, Findi
         ax.loglog(*zip(*line), color=colour, linestyle=dash, linewidth=width, label=f"{name}, {ends}")
         if limit and limit <= 1.001 * line[-1][0]:
             ax.plot(*line[-1], marker=marker, color=colour, markersize=7, markeredgecolor="black", zorder=4)
-    ax.plot([], [], "s", color="white", markeredgecolor="black", label="filled: largest stable step")
+    ax.plot([], [], "s", color="white", markeredgecolor="black", label="filled marker: largest stable step")
     if own and own["step_response_error"]:
         ax.plot(
             own["file_dt_s"], own["step_response_error"], "*", color="black", markersize=13, zorder=5,
             label=f"the file's step: {seconds(own['file_dt_s'])}, {own['file_integrator']}",
         )  # fmt: skip
-    ax.set(xlabel="dt, s", ylabel="error of the step response, ratio")
+    ax.set(xlabel="dt, s", ylabel="relative error of the step response")
     ax.axvline(drawn["rows"][0]["file_dt_s"], color="black", linewidth=0.6, linestyle=":")
     fig.legend(loc="outside upper center", ncols=2, title=f"at {drawn['posture']}")
     errors = {
