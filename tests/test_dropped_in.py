@@ -20,7 +20,7 @@ ENGINE = '''"""TMT's RK4 under another name."""
 from ..engines import EngineRecord, Method
 from .tmt import Tmt
 
-ENGINE = EngineRecord(order=60, label="Twin", colour="#123456", marker="P", compared=True)
+ENGINE = EngineRecord(order=60, label="Twin", colour="#123456", marker="P", in_quick_runs=True)
 
 
 class Twin(Tmt):

@@ -12,7 +12,6 @@ q (..., nq), speeds v (..., nv) and torques tau (..., nv) in rad, rad/s and N m,
 order of the case; and Mbar a + bias = tau - D v.
 """
 
-import ast
 import importlib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
@@ -23,9 +22,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..judge.records import records_in
 from ..robots.case import Case, Coordinates
 
-FOLDER = Path(__file__).parent
 GRID = 64  # number of equal intervals at whose ends a prepared run is read
 
 
@@ -38,30 +37,18 @@ class EngineRecord:
     possessive: str = ""  # before what it has; by default the label with 's
     colour: str = "#666666"  # in charts
     marker: str = "v"  # in charts, by matplotlib's names
-    compared: bool = False  # one of the two engines that every experiment compares (except with a user's own equations)
+    in_quick_runs: bool = False  # a quick run measures its speed too, and a small run with more settings
     from_file: bool = False  # it is made of a user's file: of a model, or of the user's own equations
     package: str = ""  # that must be installed
     extra: str = ""  # of this project, which installs the package
 
 
-def records_in(folder: Path) -> dict[str, EngineRecord]:
-    """The records of the engines in a folder by the engines' names, in their order."""
-    records = {}
-    for file in (*folder.glob("*.py"), *folder.glob("*/__init__.py")):
-        text = file.read_text(encoding="utf-8")
-        for node in ast.parse(text).body if "\nENGINE = EngineRecord(" in text else ():
-            if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", None) == "ENGINE":
-                fields = {field.arg: ast.literal_eval(field.value) for field in node.value.keywords}
-                records[file.parent.name if file.stem == "__init__" else file.stem] = EngineRecord(**fields)
-    return dict(sorted(records.items(), key=lambda item: item[1].order))
-
-
-RECORDS = records_in(FOLDER)
+RECORDS = records_in(Path(__file__).parent, "ENGINE", EngineRecord)
 LABELS = {name: record.label for name, record in RECORDS.items()}
 WHOSE = {name: record.possessive or f"{record.label}'s" for name, record in RECORDS.items()}
 COLOURS = {name: record.colour for name, record in RECORDS.items()}
 MARKS = {name: record.marker for name, record in RECORDS.items()}
-COMPARED = tuple(name for name, record in RECORDS.items() if record.compared)
+IN_QUICK_RUNS = tuple(name for name, record in RECORDS.items() if record.in_quick_runs)
 
 
 def made(schemes: Collection[str], from_file: Mapping[str, "Engine"]) -> dict[str, "Engine"]:

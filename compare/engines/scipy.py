@@ -115,11 +115,11 @@ class ScipyDynamics(TmtDynamics):
             while isinstance(solution, NotFinite) and len(times) > 2:  # once more, as far as it goes
                 times = t[: max(2, min(len(times) - 1, np.searchsorted(t, solution.args[0]) + 1))]
                 solution = run(times)
-            found, evaluations, why = start[None], 1, "its slope is not finite"
+            states, evaluations, why = start[None], 1, "its slope is not finite"
             if not isinstance(solution, NotFinite):
-                found, evaluations = solution.y.T, int(solution.nfev)
+                states, evaluations = solution.y.T, int(solution.nfev)
                 why = why if solution.success else solution.message
-            path, ended = as_far_as_it_goes(t, found, start, why)
+            path, ended = as_far_as_it_goes(t, states, start, why)
             q, v = np.split(path, [self.coordinates.nq], axis=1)
             return Motion(t, of_length_1(self.coordinates, q), v, evaluations, ended)
 
@@ -138,13 +138,13 @@ def of_length_1(coordinates: Coordinates, q: np.ndarray) -> np.ndarray:
     return q
 
 
-def as_far_as_it_goes(t: np.ndarray, found: np.ndarray, start: np.ndarray, why: str) -> tuple[np.ndarray, str | None]:
-    """q and v in one array at the times t, NaN from where a run is no longer finite; and when and why that is, or None.
+def as_far_as_it_goes(t: np.ndarray, states: np.ndarray, start: np.ndarray, why: str) -> tuple[np.ndarray, str | None]:
+    """q and v side by side at the times t, NaN from where a run is no longer finite; and when and why that is, or None.
 
-    found: (times reached, nq + nv), the states of a run that may have ended early; start: (nq + nv,), its first.
+    states: (times reached, nq + nv), the states of a run that may have ended early; start: (nq + nv,), its first.
     """
     path = np.full((len(t), start.size), np.nan)
-    path[: len(found)], path[0] = found, start
+    path[: len(states)], path[0] = states, start
     finite = np.isfinite(path).all(axis=1)
     path[np.cumsum(~finite) > 0] = np.nan
     ended = None if finite.all() else f"at t = {t[int(np.argmin(finite)) - 1]:g} s: {' '.join(why.split())}"

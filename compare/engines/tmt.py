@@ -14,7 +14,7 @@ from tmt.simulation import reasons
 from ..robots.case import Case
 from . import GRID, EngineRecord, Method, Motion, Prepared, Setting
 
-ENGINE = EngineRecord(order=20, label="TMT", colour="#0072B2", marker="o", compared=True)
+ENGINE = EngineRecord(order=20, label="TMT", colour="#0072B2", marker="o", in_quick_runs=True)
 # schemes of MuJoCo that differ from others only for robots with balls, springs or a free body on its own
 FOR_SOME = ("rk4_mean_speed", "implicitfast", "discrete")
 QUANTITIES = (

@@ -13,7 +13,6 @@ kind of finding and caption. The module has
     begin(setup)                             starts long work (optional)
 """
 
-import ast
 import importlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,11 +20,10 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from ..judge.finding import Finding
+from ..judge.records import records_in
 
 if TYPE_CHECKING:  # for --help, the names are enough
     from ..robots import Robot
-
-FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True)
@@ -41,19 +39,7 @@ class Experiment:
     overview: str = ""  # the picture of the first screen that its result is part of
 
 
-def found_in(folder: Path) -> dict[str, Experiment]:
-    """The experiments of a folder by their names, in their order."""
-    found = {}
-    for file in (*folder.glob("*.py"), *folder.glob("*/__init__.py")):
-        text = file.read_text(encoding="utf-8")
-        for node in ast.parse(text).body if "\nEXPERIMENT = Experiment(" in text else ():
-            if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", None) == "EXPERIMENT":
-                fields = {field.arg: ast.literal_eval(field.value) for field in node.value.keywords}
-                found[file.parent.name if file.stem == "__init__" else file.stem] = Experiment(**fields)
-    return dict(sorted(found.items(), key=lambda item: item[1].order))
-
-
-EXPERIMENTS = found_in(FOLDER)
+EXPERIMENTS = records_in(Path(__file__).parent, "EXPERIMENT", Experiment)
 TIMED = tuple(name for name, record in EXPERIMENTS.items() if record.timed)
 
 

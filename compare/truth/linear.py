@@ -1,19 +1,19 @@
-"""The linearized equations of motion: small oscillations, modes of a held posture, and steps of a method there."""
+"""The linearized equations of motion at a held posture: its modes, and the steps of a method there."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy.linalg import eig, eigh
+from scipy.linalg import eig
 
 import tmt
 from tmt import METHODS, literal
 from tmt.equations import composite, method
 from tmt.equations.dual import seeded
 
-from ..robots.case import SEED, Case, Coordinates
+from ..robots.case import SEED, Case
 from .conserved import floats
-from .rest import holding, moving, slopes, stiffness
+from .rest import holding, moving, slopes
 from .steps import growth_of, is_runge_kutta, linear_step
 
 AS_IT_STANDS = 6  # speeds up to which the method is differentiated as written; beyond, composite inertias are faster
@@ -24,22 +24,6 @@ NEGLIGIBLE = 1e-6  # relative to the fastest mode: a rate below is zero
 SLOWEST = 1e-6  # 1/s: a rate below is zero
 PUSHED_ALONG = 3  # random directions without stiffness in which the second derivative of the torque is computed
 AT_ONE = (1e-7, 1e-3)  # least and largest distance from 1 of the growth of a mode without stiffness
-
-
-def modes(tree: tmt.Tree, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies, rad/s, and modes (columns) of small oscillations about a posture at rest, lowest first.
-
-    K u = frequency^2 Mbar u, modes with u' Mbar u = 1.
-    """
-    squares, shapes = eigh(stiffness(tree, q), literal.mass_matrix(q, tree))
-    return np.sqrt(squares), shapes
-
-
-def small_oscillation(t: np.ndarray, tree: tmt.Tree, q: np.ndarray, away: np.ndarray) -> np.ndarray:
-    """Positions, rad, (times, nq), of the linear modes about q, released at rest at the distance `away`, (nv,) rad."""
-    frequencies, shapes = modes(tree, q)
-    parts = shapes.T @ literal.mass_matrix(q, tree) @ away
-    return Coordinates(tree.hinge_names, tree.kind).move(q, np.cos(np.outer(t, frequencies)) * parts @ shapes.T)
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,7 @@
-"""One step of a method in a linear motion: of a deviation from a held posture, of a single mode."""
+"""One step of a method in a linear motion: a deviation from a held posture."""
 
 import numpy as np
 
-from tmt import METHODS
-from tmt.equations.dual import seeded
 from tmt.methods import RungeKutta, SemiImplicitEuler, amplification, by_speed
 from tmt.methods.implicit import ImplicitRungeKutta
 
@@ -57,25 +55,3 @@ def beyond_limit(at, name: str, dt: float) -> float:
     steps = dt * np.geomspace(1e-5, 1.0, 201)
     fast = at.growth(name, steps) > 1.1 * np.exp(max(at.modes[0].real.max(), 0.0) * steps)
     return float(dt / steps[max(int(np.argmax(fast)) - 1, 0)]) if fast.any() else 1.0
-
-
-def region(name: str, z: np.ndarray) -> np.ndarray:
-    """Growth in one step of a single hinge whose eigenvalues times dt are z and its conjugate, shape of z.
-
-    The step is taken on qdd = -|z|^2 q + 2 Re(z) qd with dt = 1; so it exists for partitioned methods too, whose growth
-    depends on the pair. At most 1: stable.
-    """
-    stepping = METHODS[name]
-    size, rate = np.abs(z) ** 2, 2.0 * z.real
-    inertia = 1.0 - rate if stepping.damps_implicitly else 1.0
-
-    def slope(q, qd):
-        return [(qd[0] * rate - q[0] * size) / inertia]
-
-    state = seeded([np.zeros_like(size), np.zeros_like(size)], np.eye(2).reshape(2, 2, *(1 for _ in z.shape)))
-    with np.errstate(all="ignore"):
-        q, qd = stepping.step(slope, state[:1], state[1:], 1.0)
-        J = np.array([np.broadcast_to(part[0].slope, (2, *z.shape)) for part in (q, qd)])
-        half, determinant = 0.5 * (J[0, 0] + J[1, 1]), J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
-        root = np.sqrt(half**2 - determinant + 0j)
-        return np.maximum(np.abs(half + root), np.abs(half - root))

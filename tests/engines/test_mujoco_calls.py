@@ -1,21 +1,19 @@
-"""MuJoCo's minimal calls in compiled loops, its batches, additions to a model, derivatives of steps: beside its own calls."""
+"""MuJoCo's minimal calls in compiled loops, its batches and derivatives of steps, compared with its own calls."""
 
 import numpy as np
 import pytest
-from files import PLAIN, case_of, mjcf
+from files import case_of
 from models import PATHS
 from trees import random_states
 
 from compare.engines.mujoco import calls, engine, read
-from compare.engines.mujoco.additions import MINIMAL, contacts, with_additions
 from compare.engines.mujoco.calls import TINY_STEP, BatchedCalls, MinimalCalls
 from compare.engines.mujoco.linear import differenced, transition
 from compare.robots.arm import ARM
 
 
 @pytest.mark.skipif(MinimalCalls.unavailable() is not None, reason="MuJoCo's library is not beside its package")
-def test_a_loop_does_all_of_it_at_the_state_that_is_there_as_often_as_it_is_told(mujoco, rng):
-    """Nothing is left of what was found at the state before."""
+def test_a_loop_repeats_its_calls_at_the_current_state(mujoco, rng):
     dynamics, nothing = mujoco.of(ARM.case()), np.zeros(3)
     minimal = MinimalCalls(dynamics)
     loops = {name: way[1] for name, way in minimal.loops(*rng.uniform(-2.0, 2.0, (3, 3))).items()}
@@ -73,22 +71,3 @@ def test_a_step_is_differenced_in_movements(reading, rng):
     if not MinimalCalls.unavailable():
         found, expected = (one.acceleration(q, v, tau) for one in (MinimalCalls(dynamics), dynamics))
         assert np.allclose(found, expected, rtol=1e-9, atol=1e-9)
-
-
-def test_additions_to_a_bare_model(reading, rng):
-    engines, case = with_additions(engine(reading), 0.02, -5.0, -50.0), case_of(reading.tree)
-    state = [x[0] for x in random_states(rng, reading.tree, 1)]
-    bare = engine(reading).of(case).run(*state, 1e-3, 5, "RK4").states
-    assert MINIMAL in engines and any("sensors" in name for name in engines)
-    for name, addition in engines.items():
-        dynamics = addition.of(case)
-        if "capsules" not in name:
-            assert np.allclose(dynamics.run(*state, 1e-3, 5, "RK4").states, bare, rtol=1e-12, atol=1e-12)
-            assert contacts(dynamics, *state, 1e-3, 5, "RK4") == (0.0, False)
-
-
-def test_default_flags_bring_back_no_force_that_the_file_disables():
-    joint = PLAIN.replace('name="j"', 'name="j" axis="0 1 0" damping="1" stiffness="3" springref="40"')
-    reading = read(mjcf(joint, '<option><flag gravity="disable" damper="disable" spring="disable"/></option>'))
-    for name, addition in with_additions(engine(reading), 0.02, -5.0, -9.0).items():
-        assert not addition.of(case_of(reading.tree)).acceleration([0.3], [0.5], [0.0]).any(), name

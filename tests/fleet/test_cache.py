@@ -54,7 +54,7 @@ def test_what_cannot_be_written_is_said(cache):
         cache.put("a", 1)
 
 
-SOURCES = ("compare/a.py", "compare/deep/page.html", "compare/page.js", "mjcf/arm.xml", "tmt/b.py")
+SOURCES = ("compare/a.py", "compare/a.jinja", "compare/deep/page.html", "compare/page.js", "mjcf/arm.xml", "tmt/b.py")
 
 
 def test_a_source_that_changes_or_moves_and_another_version_make_another_program(tmp_path, monkeypatch):

@@ -60,7 +60,7 @@ class Acting:
                 m.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_AFFINE
                 m.actuator_gainprm[i], m.actuator_biasprm[i] = 0.0, 0.0
                 m.actuator_biasprm[i, 0] = cut.forces.get(i, 0.0)
-                if m.actuator_plugin[i] >= 0:  # it has its own law, whatever these fields say
+                if m.actuator_plugin[i] >= 0:  # its own law overrides this one
                     m.actuator_gear[output_of(m, i)] = 0.0
             if (
                 one.refused
@@ -176,19 +176,19 @@ class Acting:
     def movements(self, positions: np.ndarray, q: np.ndarray) -> np.ndarray:
         """From q, (nq,) or (..., nq), to positions near it, (..., nq) -> (..., nv)."""
         m = self.model
-        found = np.zeros((*positions.shape[:-1], m.nv))
+        result = np.zeros((*positions.shape[:-1], m.nv))
         for j, (a, v) in enumerate(zip(m.jnt_qposadr, m.jnt_dofadr)):
             kind = kind_of(m, j)
             single = {"free": 3, "ball": 0}.get(kind, 1)
-            found[..., v : v + single] = positions[..., a : a + single] - q[..., a : a + single]
+            result[..., v : v + single] = positions[..., a : a + single] - q[..., a : a + single]
             if kind in ("free", "ball"):
                 # twice the vector of the quaternion from the one to the other: it is near the identity
                 a, v = a + single, v + single
                 w, x = q[..., a, None], q[..., a + 1 : a + 4]
                 w1, x1 = positions[..., a, None], positions[..., a + 1 : a + 4]
                 turn = w * x1 - w1 * x - np.cross(x, x1)
-                found[..., v : v + 3] = 2.0 * turn * np.sign(w * w1 + (x1 * x).sum(axis=-1, keepdims=True))
-        return found
+                result[..., v : v + 3] = 2.0 * turn * np.sign(w * w1 + (x1 * x).sum(axis=-1, keepdims=True))
+        return result
 
     def changed(
         self, damping: Mapping[int, float] | None = None, armature: Mapping[int, float] | None = None
@@ -251,9 +251,9 @@ def constraint_rows(model: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, d
 def jacobian(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     if not mujoco.mj_isSparse(model):
         return data.efc_J.reshape(data.nefc, model.nv).copy()
-    found = np.zeros((data.nefc, model.nv))
-    mujoco.mju_sparse2dense(found, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
-    return found
+    dense = np.zeros((data.nefc, model.nv))
+    mujoco.mju_sparse2dense(dense, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
+    return dense
 
 
 def limits_in_force(model: mujoco.MjModel) -> tuple[int, ...]:

@@ -173,7 +173,7 @@ def own_damping(m: mujoco.MjModel, count: int) -> tuple[float, ...]:
 
 def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
     """Joints and tendons whose springs or dampers are not linear, by name, and why they are left out."""
-    found = {}
+    reasons = {}
     for what, fields in (
         ("joint", ("jnt_stiffnesspoly", "dof_dampingpoly", "jnt_springyield")),
         ("tendon", ("tendon_stiffnesspoly", "tendon_dampingpoly", "tendon_springyield")),
@@ -183,8 +183,8 @@ def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
             for k in np.flatnonzero(values.reshape(len(values), -1).any(axis=1)) if len(values) else ():
                 k = int(m.dof_jntid[k]) if name.startswith("dof_") else int(k)
                 element = joint_name(m, k) if what == "joint" else own_name(m.tendon(k).name, "tendon", k)
-                found[f"{what} {element}"] = reason
-    return found
+                reasons[f"{what} {element}"] = reason
+    return reasons
 
 
 def stated_controls(m: mujoco.MjModel, source) -> dict[int, tuple]:
@@ -197,13 +197,13 @@ def stated_controls(m: mujoco.MjModel, source) -> dict[int, tuple]:
         with suppress(ValueError):
             spec = editable_again(source)
     keys = spec.keys if spec is not None and len(spec.keys) == m.nkey else None
-    found = {}
+    controls = {}
     for k in range(m.nkey):
         control = len(keys[k].ctrl) > 0 if keys else m.key_ctrl[k].any()
         activation = len(keys[k].act) > 0 if keys else m.key_act[k].any()
         if m.nu and (control or activation):
-            found[k] = tuple(stated_u(m, k, i, control, activation) for i in range(number_of_actuators(m)))
-    return found
+            controls[k] = tuple(stated_u(m, k, i, control, activation) for i in range(number_of_actuators(m)))
+    return controls
 
 
 def stated_u(m: mujoco.MjModel, k: int, i: int, control: bool, activation: bool) -> float | None:

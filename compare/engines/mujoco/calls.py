@@ -140,10 +140,10 @@ def functions(lib: ctypes.CDLL) -> dict[str, Callable]:
     more = {"mj_rne": (ctypes.c_int, ctypes.c_void_p), "mj_solveM": (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)}
     mass_matrix = "mj_makeM" if hasattr(lib, "mj_makeM") else "mj_crb"
     names = ("mj_forward", "mj_step", "mj_kinematics", "mj_comPos", "mj_comVel", "mj_factorM", "mj_rne", "mj_solveM")
-    found = {name: getattr(lib, name) for name in names} | {"mass matrix": getattr(lib, mass_matrix)}
-    for name, function in found.items():
+    by_name = {name: getattr(lib, name) for name in names} | {"mass matrix": getattr(lib, mass_matrix)}
+    for name, function in by_name.items():
         function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p, *more.get(name, ())], None
-    return found
+    return by_name
 
 
 @cache

@@ -120,24 +120,24 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
 
 def others(m: mujoco.MjModel, joints, speeds) -> list[str]:
     """Other settings that would change the motion and are switched off."""
-    found = [
+    settings = [
         f"flag {flag.lower()}"
         for flag in ENABLED
         if m.opt.enableflags & int(getattr(mujoco.mjtEnableBit, f"mjENBL_{flag}", 0))
     ]
     if not on(m, "EULERDAMP"):
-        found.append("flag eulerdamp")
+        settings.append("flag eulerdamp")
     if on(m, "DAMPER"):
-        found += [f"polynomial damping of {name}" for name in speeds(field(m, "dof_dampingpoly", m.nv))]
+        settings += [f"polynomial damping of {name}" for name in speeds(field(m, "dof_dampingpoly", m.nv))]
     if on(m, "SPRING"):
-        found += [
+        settings += [
             f"polynomial stiffness of {name}"
             for name in joints(lambda j: np.any(field(m, "jnt_stiffnesspoly", m.njnt)[j]))
         ]
-        found += [
+        settings += [
             f"spring yield of {name}" for name in joints(lambda j: np.any(field(m, "jnt_springyield", m.njnt)[j]))
         ]
-    return found
+    return settings
 
 
 ENABLED = ("SLEEP", "INVDISCRETE", "IPC", "SPECULATIVE")  # enable flags that can change a motion

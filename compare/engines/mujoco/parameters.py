@@ -30,7 +30,7 @@ TO_PRINCIPAL_AXES = 0.0 if FROM_4 else 1e-6
 def parameters(dynamics: MujocoDynamics) -> dict:
     """Numbers of the compiled model: arrays per hinge, per body, or one number of the file, in world axes.
 
-    Read in the file's own configuration (qpos0): there every frame lies as the file says, whatever a hinge's `ref` is.
+    Read in the file's own configuration (qpos0): there every frame lies as the file says, for any `ref` of a hinge.
     """
     m, d = dynamics.model, dynamics.data
     dynamics.forward(m.qpos0[dynamics.qpos])
@@ -74,11 +74,11 @@ def before(m: mujoco.MjModel, joint: int) -> int:
 
 def sorted_hinges(m: mujoco.MjModel, joints: np.ndarray) -> list[int]:
     """The hinges of a model in the order of the coordinates, except that each comes after its parent."""
-    found, left = [-1], list(map(int, joints))
+    order, left = [-1], list(map(int, joints))
     while left:
-        found.append(next(j for j in left if before(m, j) in found))
-        left.remove(found[-1])
-    return found[1:]
+        order.append(next(j for j in left if before(m, j) in order))
+        left.remove(order[-1])
+    return order[1:]
 
 
 def com_origin(dynamics: MujocoDynamics, anchors: np.ndarray, body: int) -> np.ndarray:
@@ -129,11 +129,11 @@ def stated_numbers(reading: Reading) -> list[Stated]:
         warnings.simplefilter("ignore")  # the reading has them
         without_geoms(numbered).compile()  # elements have their numbers in the model only once compiled
     rows = []
-    for body, known in zip(spec.bodies, numbered.bodies):
-        if known.id:
-            rows += of_body(spec, model, body, known.id)
-    for joint, known in zip(spec.joints, numbered.joints):
-        rows += of_joint(model, joint, known.id)
+    for body, copy in zip(spec.bodies, numbered.bodies):
+        if copy.id:
+            rows += of_body(spec, model, body, copy.id)
+    for joint, copy in zip(spec.joints, numbered.joints):
+        rows += of_joint(model, joint, copy.id)
     return rows
 
 
@@ -180,12 +180,12 @@ def of_joint(model: mujoco.MjModel, joint, number: int) -> list[Stated]:
             rows.append(Stated(name, "anchor", pos, model.jnt_pos[number].copy(), ""))
         if kind != "ball":
             rows.append(Stated(name, "axis", turn / np.linalg.norm(turn), model.jnt_axis[number].copy(), ""))
-    asked = "springdamper" if np.any(joint.springdamper) else ""
+    source = "springdamper" if np.any(joint.springdamper) else ""
     return [
         *rows,
         Stated(name, "armature", float(joint.armature), float(model.dof_armature[dof]), ""),
-        Stated(name, "damping", first(joint.damping), float(model.dof_damping[dof]), asked),
-        Stated(name, "stiffness", first(joint.stiffness), float(model.jnt_stiffness[number]), asked),
+        Stated(name, "damping", first(joint.damping), float(model.dof_damping[dof]), source),
+        Stated(name, "stiffness", first(joint.stiffness), float(model.jnt_stiffness[number]), source),
     ]
 
 

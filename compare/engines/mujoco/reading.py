@@ -213,12 +213,12 @@ def speed_axes(model: mujoco.MjModel, data: mujoco.MjData, place: Place) -> np.n
 
 
 def carriers(model: mujoco.MjModel, joints: Mapping) -> list[int]:
-    """Of each body the last joint of the Tree that moves it, -1: none."""
+    """The last joint of the Tree that moves each body, -1: none."""
     last = {int(model.jnt_bodyid[place.joint]): i for i, place in enumerate(joints.values())}
-    found = [-1]
+    joint_of_body = [-1]
     for body in range(1, model.nbody):
-        found.append(last.get(body, found[model.body_parentid[body]]))
-    return found
+        joint_of_body.append(last.get(body, joint_of_body[model.body_parentid[body]]))
+    return joint_of_body
 
 
 def keyframes(model: mujoco.MjModel) -> dict[str, np.ndarray]:

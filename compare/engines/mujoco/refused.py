@@ -49,7 +49,7 @@ def refuse(m: mujoco.MjModel) -> None:
         name = element_name(m, "tendon", tendon)
         raise ValueError(f"tendon {name!r} has armature, which couples joints; only armature at joints is compared")
     if unknown := unknown_part(m):
-        raise ValueError(f"it uses {unknown}, which this version of compare does not know")
+        raise ValueError(f"it uses {unknown}, which this version of compare does not support")
     refuse_values(m)
 
 
@@ -84,7 +84,7 @@ def element_name(m: mujoco.MjModel, kind: str, number: int) -> str:
 
 
 def unknown_part(m: mujoco.MjModel) -> str:
-    """The first flag, type of joint, count, option or field in use that is not listed below; "" if there is none.
+    """The first flag, joint type, count, option or field in use that is not listed below; "" if all are listed.
 
     A field that the compiler fills in for any model is not in use: one that is zero in a plain model and not in this one is.
     """

@@ -42,16 +42,16 @@ def functions_of(source: object, coordinates: Coordinates, required: Sequence[st
     """The functions of ARGUMENTS that a source has, by name; OwnError if a required one is missing."""
     if isinstance(source, tmt.Tree):
         return of_tree(source, coordinates)
-    found, symbols = {}, attribute(source, "symbols")
+    functions, symbols = {}, attribute(source, "symbols")
     for name in ARGUMENTS:
         value = attribute(source, name)
         if value is not None:
-            found[name] = function_of(name, value, symbols, coordinates)
-    if missing := [name for name in required if name not in found]:
+            functions[name] = function_of(name, value, symbols, coordinates)
+    if missing := [name for name in required if name not in functions]:
         raise OwnError(f"{source_name(source)} has no {missing[0]}; expected {' and '.join(map(call, required))}")
-    if not found:
+    if not functions:
         raise OwnError(f"{source_name(source)} has none of {', '.join(map(call, ARGUMENTS))}")
-    return found
+    return functions
 
 
 def call(name: str) -> str:

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from ...engines import COMPARED, GRID, LABELS, methods_in
+from ...engines import GRID, IN_QUICK_RUNS, LABELS, methods_in
 from ...judge import timing
 from ...judge.check import Result
 from ...judge.finding import Finding
@@ -66,7 +66,7 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.curves["doubles"] = [name for name, reference in references.items() if reference.why]
     # with the coarse steps of a quick run errors are regular in this scene only, and other engines have too few settings
     whole = setup.size == "full"
-    running = [method for method in methods_following(setup, cases, which) if whole or method.engine in COMPARED]
+    running = [method for method in methods_following(setup, cases, which) if whole or method.engine in IN_QUICK_RUNS]
     fixed = [method for method in running if not method.adaptive]
     # where servos act a fast mode decays first, and an order shows only with short steps
     falling = [case.name for case in cases if not case.controller] if whole else [regular.name]

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from tmt import Tree
 from tmt.methods import method_named
 
-from ...engines import COMPARED, GRID, Engine, Method, Setting, methods_in, one_of_each_scheme
+from ...engines import GRID, IN_QUICK_RUNS, Engine, Method, Setting, methods_in, one_of_each_scheme
 from ...robots import Robot
 from ...robots.case import Case
 from ..setup import Setup
@@ -53,7 +53,7 @@ def followed(robot: Robot, size: str) -> list[Case]:
 
 def taking_part(engines: Mapping[str, Engine], size: str) -> dict[str, Engine]:
     """The engines of a run of this size, unavailable ones too."""
-    return {name: engine for name, engine in engines.items() if size != "quick" or name in COMPARED}
+    return {name: engine for name, engine in engines.items() if size != "quick" or name in IN_QUICK_RUNS}
 
 
 def methods(
@@ -139,7 +139,7 @@ def settings_of(method: Method, case: Case, size: str = "full", which: str = "al
         settings = halvings(method, case, size)
     if which == "same schemes":
         return settings[SETTINGS_OF_SAME_SCHEMES] or settings[-1:]
-    few = FEW_SETTINGS if method.engine in COMPARED else dict.fromkeys(FEW_SETTINGS, FEW_OTHERS)
+    few = FEW_SETTINGS if method.engine in IN_QUICK_RUNS else dict.fromkeys(FEW_SETTINGS, FEW_OTHERS)
     return settings[: few.get(size)]
 
 

@@ -22,7 +22,7 @@ from compare.robots.arm import ARM
 from compare.robots.case import Scene
 from compare.robots.file import robot_of
 from compare.truth import reference
-from compare.truth.free_body import free_turning
+from tmt.exact.motion import trajectory
 
 OWN = Scene("my swing", (0, 0, 120), duration=2.0, dt=1 / 50, tags=("own",))
 MINE = dataclasses.replace(ARM, scenes=(*ARM.scenes, OWN))
@@ -186,16 +186,15 @@ MOMENTS, QUATERNION, END = (0.03, 0.05, 0.06), (0.5, 0.5, -0.5, 0.5), 2.0  # kg 
 
 @pytest.fixture(scope="module")
 def stone():
-    """A free asymmetric body on a ball joint, its exact quaternions at nine times, MuJoCo's engine of it."""
+    """A free asymmetric body on a ball joint, its true quaternions at nine times, MuJoCo's engine of it."""
     body = f'<inertial pos="0 0 0" mass="1" diaginertia="{" ".join(map(str, MOMENTS))}"/><joint type="ball"/>'
     reading = read(f'<mujoco><option gravity="0 0 0"/><worldbody><body>{body}</body></worldbody></mujoco>')
     case = robot_of(reading, "stone.xml").case("tumbling", posture=QUATERNION, speed=(480, 120, 360))
-    exact = free_turning(np.linspace(0.0, END, 9), MOMENTS, case.v, case.q)[1].astype(float)
+    exact = trajectory(case.tree, *case.start, case.tau, END / 8, 8).high[:, :4]
     return case, exact, engine(reading)
 
 
 def test_each_method_keeps_its_order_on_a_free_body(engines, stone):
-    """Against Jacobi's elliptic functions."""
     case, exact, theirs = stone
     for of_body in (engines["tmt"], theirs):
         for method in of_body.methods.values():
