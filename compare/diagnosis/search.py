@@ -10,18 +10,30 @@ import tmt
 
 from ..judge.scale import EPS, FACTOR
 from ..robots.coordinates import Coordinates
-from .cause import LEAST_STATES, Cause, Change, Diagnosis, cause_of, place_changed, tied, with_zeros
+from .cause import (
+    CLOSE,
+    FACTORS,
+    LEAST_STATES,
+    Cause,
+    Change,
+    Diagnosis,
+    cause_of,
+    place_changed,
+    tied,
+    value_of,
+    with_zeros,
+)
 from .coefficients import Compared
 from .fit import Fitted, OutOfTime, Search, nearest_changes
-from .model import Equations, packing
+from .model import BODY_TERMS, Equations, Path, packing
 from .places import EVERY_BODY, Place, all_places, entry_name
-from .possible import is_possible, is_telling
 from .slips import IN_MASS_ALONE, slips
 from .variants import Variant, both, conventions, program_options, values_of
 
 FEW = 2  # states at which many conventions are tried first
 NEAR = 0.5  # of the difference: a convention that leaves more together with a number is not looked at
 KEPT = 12  # explanations that are kept though they do not explain
+ROUNDED_INERTIA = 1e-9  # of an inertia, that the digits of a fit may take from it
 PROMISING = 6  # states at which it is estimated what a number together with a convention can do
 MOST_PAIRS = 6  # of numbers that explain: where more do, two numbers fit whatever differs
 MOST_VARIANTS = 4  # with which a number is fitted
@@ -237,3 +249,49 @@ def promises(search: Search, variants: Sequence[Variant], places: Sequence[Place
         values = [one[..., part, :][..., index] * sense for one in (up, inner.right, down)]
         found.append((promise(*values, few), len(found), variant))
     return found
+
+
+def is_possible(fitted: Fitted, search: Search, of_body: bool = True) -> bool:
+    """Whether no mass, armature, moment of inertia, damping or stiffness is below zero.
+
+    of_body: and no moment of inertia is larger than the two others together. A term of Mbar may have the other sign, by a slip;
+    other factors below zero mean a negative mass or inertia.
+    """
+    changed, seen = {}, set(search.seen)
+    of_mass = [BODY_TERMS.index(term) for term in ("translation", "rotation")]
+    for place, change in zip(fitted.places, fitted.changes):
+        value = value_of(place, change)
+        is_of_mass = any(path.field == "factor" and path.index[1] in of_mass for path, _ in place.moves)
+        if value < 0.0 and (place.kind == "force" or (is_of_mass and abs(value + 1.0) > CLOSE)):
+            return False
+        for path, coefficient in place.moves:
+            changed[path] = changed.get(path, 0.0) + coefficient * (value_of(place, change) - place.stated)
+    numbers = search.equations.stated
+    for path, more in changed.items():
+        if path.field in ("mass", "armature") and numbers[path.field][path.index] + more < 0.0:
+            return False
+    inertias = np.array(numbers["inertia"])
+    for path, more in changed.items():
+        if path.field == "inertia":
+            inertias[path.index] += more
+    return all(
+        is_inertia(inertias[b], [k for k in range(3) if Path("inertia", (b, k, k)) in seen], of_body)
+        for b in {path.index[0] for path in changed if path.field == "inertia"}
+    )
+
+
+def is_inertia(inertia: np.ndarray, seen: list[int], of_body: bool) -> bool:
+    """Whether a rigid body can have it. seen: the axes about which it enters Mbar or h; about others it may be anything."""
+    least = -ROUNDED_INERTIA * np.abs(inertia).max()
+    if len(seen) < 3 or not of_body:
+        return bool(np.linalg.eigvalsh(inertia[np.ix_(seen, seen)]).min(initial=0.0) >= least)
+    a, b, c = np.linalg.eigvalsh(inertia)
+    return bool(a >= least and a + b - c >= least)
+
+
+def is_telling(fitted: Fitted) -> bool:
+    """Whether a pair is informative: an arbitrary factor together with another number fits nearly everything."""
+    return all(
+        place.unit != "times" or any(abs(value_of(place, change) - factor) <= CLOSE for factor in FACTORS)
+        for place, change in zip(fitted.places, fitted.changes)
+    )
