@@ -55,18 +55,18 @@ def conditions(
     floors = FACTOR * EPS * np.abs(M).max(axis=(1, 2)) + SAFETY * noise(mass_matrix, coordinates, q)
     of_h = SAFETY * noise(lambda q: bias(q, qd), coordinates, q)
     names = coordinates.speeds
-    found = [symmetric(M, floors, names), definite(M, floors)]
-    found.append(gradient_at_rest(lambda q: bias(q, np.zeros((len(q), qd.shape[1]))), coordinates, q, of_h))
+    tested = [symmetric(M, floors, names), definite(M, floors)]
+    tested.append(gradient_at_rest(lambda q: bias(q, np.zeros((len(q), qd.shape[1]))), coordinates, q, of_h))
     weight, ahead, behind = (np.asarray(bias(q, rates)) for rates in (still, qd, -qd))
     doubled = (np.asarray(bias(q, 2.0 * qd)) + np.asarray(bias(q, -2.0 * qd))) / 2.0
     size = np.max([np.abs(part) for part in (weight, ahead, behind, doubled)], axis=(0, 2))
     size = FACTOR * EPS * size + of_h
-    found.append(even(ahead, behind, size, names))
+    tested.append(even(ahead, behind, size, names))
     of_rates = (ahead + behind) / 2.0 - weight
-    found.append(quadratic(of_rates, doubled - weight, size, names))
-    if found[0].is_met:
-        found.append(power_balance(mass_matrix, coordinates, q, qd, of_rates, floors, size))
-    return [condition for condition in found if condition is not None]
+    tested.append(quadratic(of_rates, doubled - weight, size, names))
+    if tested[0].is_met:
+        tested.append(power_balance(mass_matrix, coordinates, q, qd, of_rates, floors, size))
+    return [condition for condition in tested if condition is not None]
 
 
 def noise(function: Callable, coordinates: Coordinates, q: np.ndarray) -> float:
@@ -175,7 +175,7 @@ def power_balance(
 
 
 def derivative(function: Callable) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """df/dt at 0 to fourth order, its error as two steps tell it, and the size of f, all of the shape of f(t)."""
+    """df/dt at 0 to fourth order, its error estimated from two step sizes, and the size of f, all of the shape of f(t)."""
     values = {k: np.asarray(function(k * STEP)) for k in (-4, -2, -1, 1, 2, 4)}
     slope = (8.0 * (values[1] - values[-1]) - (values[2] - values[-2])) / (12.0 * STEP)
     coarse = (8.0 * (values[2] - values[-2]) - (values[4] - values[-4])) / (24.0 * STEP)

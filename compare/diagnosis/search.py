@@ -31,7 +31,7 @@ from .slips import IN_MASS_ALONE, slips
 from .variants import Variant, both, conventions, program_options, values_of
 
 FEW = 2  # states at which many conventions are tried first
-NEAR = 0.5  # of the difference: a convention that leaves more together with a number is not looked at
+NEAR = 0.5  # of the difference: a convention that leaves more together with a number is not searched
 KEPT = 12  # explanations that are kept though they do not explain
 ROUNDED_INERTIA = 1e-9  # of an inertia, that the digits of a fit may take from it
 PROMISING = 6  # states at which it is estimated what a number together with a convention can do
@@ -103,7 +103,7 @@ def diagnosis(equations: Equations, given, tolerance, seconds: float, bias: Call
 def ranks(
     search: Search, singles: Sequence[Fitted], pairs: bool, compared: Callable[[], Compared]
 ) -> Iterable[list[Cause]]:
-    """The explanations of each rank, found when they are asked for; pairs: whether there is time for the last.
+    """The explanations of each rank, computed when the previous ranks are empty; pairs: whether there is time for the last.
 
     Where joints may be otherwise, numbers and terms that explain as much are listed too: whoever states the joints so, and has a
     wrong number, agrees with a wrong model.
@@ -112,24 +112,24 @@ def ranks(
     coordinates = Coordinates(equations.tree.hinge_names, equations.tree.kind)
     of_joints = list(conventions(equations))
     options = list(program_options(equations))
-    first = [of_variant(*one) for one in explained(search, options) + explained_by_joints(search, of_joints)]
-    first += [of_fitted(one, 1, coordinates) for one in singles if one.places[0].rank == 1]
+    first = [of_variant(*variant) for variant in explained(search, options) + explained_by_joints(search, of_joints)]
+    first += [of_fitted(fit, 1, coordinates) for fit in singles if fit.places[0].rank == 1]
     if not all(cause.joints for cause in first):
         yield first
-    numbers = [one for one in singles if one.places[0].rank == 2]
-    second = [of_fitted(one, 2, coordinates) for one in numbers if is_possible(one, search)]
-    second += [of_variant(*one) for one in plainest(explained(search, slips(equations), bounded=not first))]
+    numbers = [fit for fit in singles if fit.places[0].rank == 2]
+    second = [of_fitted(fit, 2, coordinates) for fit in numbers if is_possible(fit, search)]
+    second += [of_variant(*variant) for variant in plainest(explained(search, slips(equations), bounded=not first))]
     if not second and (cause := compared().cause(1)):
         second = [cause]
     if not first and not second:  # a slip in a number need not leave a rigid body
-        second = [of_fitted(one, 2, coordinates)._replace(of_no_body=True) for one in numbers]
+        second = [of_fitted(fit, 2, coordinates)._replace(of_no_body=True) for fit in numbers]
     yield first + second
     if not pairs:
         return
-    third = [of_variant(*one) for one in explained(search, both(equations, search.given, search.weight))]
-    of_numbers = [one for one in search.pairs() if one.ratio <= 1.0 and is_telling(one) and is_possible(one, search)]
+    third = [of_variant(*variant) for variant in explained(search, both(equations, search.given, search.weight))]
+    of_numbers = [fit for fit in search.pairs() if fit.ratio <= 1.0 and is_telling(fit) and is_possible(fit, search)]
     if len(of_numbers) <= MOST_PAIRS:
-        third += [of_fitted(one, 3, coordinates) for one in of_numbers]
+        third += [of_fitted(fit, 3, coordinates) for fit in of_numbers]
     if cause := compared().cause(2):
         third.append(cause)
     try:
@@ -163,14 +163,14 @@ def of_fitted(fitted: Fitted, rank: int, coordinates: Coordinates, variant: Vari
 
 def explained(search: Search, variants: Iterable[Variant], bounded: bool = False) -> list[tuple[Variant, float]]:
     """The variants that leave nothing, and the share that they leave. bounded: within the time of the search."""
-    found = []
+    explaining = []
     for variant in variants:
         if bounded and time.monotonic() > search.end:
             raise OutOfTime
         left = search.weighted(variant.equations().values()[0])
         if np.abs(left).max() <= 1.0:
-            found.append((variant, float(np.linalg.norm(left)) / search.size))
-    return found
+            explaining.append((variant, float(np.linalg.norm(left)) / search.size))
+    return explaining
 
 
 def plainest(found: list[tuple[Variant, float]]) -> list[tuple[Variant, float]]:
@@ -199,18 +199,18 @@ def explained_by_joints(search: Search, variants: Sequence[Variant]) -> list[tup
 
 
 def with_a_number(search: Search, variants: Sequence[Variant], coordinates: Coordinates) -> list[Cause]:
-    """One option or convention together with one number or term, of the few that promise most."""
+    """One option or convention together with one number or term, of the few with the smallest estimated remainder."""
     places = [place for place in search.places if place.column is None]
-    found = []
+    causes = []
     for left, _, variant in sorted(promises(search, variants, places), key=lambda one: one[:2])[:MOST_VARIANTS]:
         if left < NEAR:
             inner = Search(variant.equations(), places, search.given, search.tolerance, search.end)
-            found += [
+            causes += [
                 of_fitted(one, 3, coordinates, variant)
                 for one in inner.singles()
                 if one.ratio <= 1.0 and is_telling(one) and is_possible(one, search)
             ]
-    return found
+    return causes
 
 
 def promises(search: Search, variants: Sequence[Variant], places: Sequence[Place]) -> list[tuple[float, int, Variant]]:
@@ -231,13 +231,13 @@ def promises(search: Search, variants: Sequence[Variant], places: Sequence[Place
         total = np.linalg.norm(search.off[:states])
         return min((left for left, _ in near), default=0.0) / total if total else 0.0
 
-    found = []
+    shares = []
     for variant in of_options:  # which may change more than the values at states
         inner = Search(variant.equations(), places, search.given, search.tolerance, search.end)
         up, down = (inner.values(which, sign * size) for sign in (1.0, -1.0))
-        found.append((promise(up, inner.right, down, len(all_given)), len(found), variant))
+        shares.append((promise(up, inner.right, down, len(all_given)), len(shares), variant))
     if not of_joints:
-        return found
+        return shares
     maps = [variant.joints for variant in of_joints]
     q = np.concatenate([one.positions(equations.q[:few]) for one in maps])
     together = Equations(equations.tree, q, np.concatenate([one.speeds(equations.qd[:few]) for one in maps]))
@@ -247,8 +247,8 @@ def promises(search: Search, variants: Sequence[Variant], places: Sequence[Place
     for k, variant in enumerate(of_joints):
         part, (index, sense) = slice(k * few, (k + 1) * few), packing(variant.joints, equations)
         values = [one[..., part, :][..., index] * sense for one in (up, inner.right, down)]
-        found.append((promise(*values, few), len(found), variant))
-    return found
+        shares.append((promise(*values, few), len(shares), variant))
+    return shares
 
 
 def is_possible(fitted: Fitted, search: Search, of_body: bool = True) -> bool:

@@ -1,4 +1,4 @@
-"""What explains a difference in Mbar, h and accelerations: of a robot's file and its reference, or of one's own equations."""
+"""What explains a difference in Mbar, h and accelerations: of a file's robot and its reference, or of the user's equations."""
 
 from collections.abc import Iterator
 from functools import partial
