@@ -1,4 +1,4 @@
-"""Equations of one's own compared with MuJoCo, entry by entry, for tests of one's own.
+"""Comparison of your equations with MuJoCo, entry by entry, for use in your tests.
 
 The tolerance of an entry is (64 eps + rtol) x its scale. The scale is the sum of the absolute values of its terms, see
 judge/entries.py, not the entry itself: that may be a small difference of large terms, and a rounded constant changes it by
@@ -27,11 +27,11 @@ Names = Sequence[str] | None
 
 
 class Difference(NamedTuple):
-    """One entry at one state, in joints of one's own.
+    """One entry at one state, in your joints.
 
     quantity: "mass_matrix", "bias", "gravity" or "acceleration".
     entry: such as "M[hip][knee]" or "h[hip]".
-    state: number, q, qd and tau, in the joints of one's own equations.
+    state: number, q, qd and tau, in the joints of your equations.
     yours, mujoco: both values: kg m2 (M), N m (h, gravity), rad/s2 (acceleration), of slides kg, N and m/s2.
     difference: yours - mujoco.
     tolerance: (64 eps + rtol) times the scale of the entry.
@@ -105,13 +105,18 @@ def differences(
     """
     given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
     cause = cause_of(given).text if given.fails else ""
-    found = []
-    for name, one in given.compared.items():
+    rows = []
+    for name, comparison in given.compared.items():
         entries = given.entries(name)
-        places = list(np.ndindex(one.own.shape))
-        values = zip(*(part.reshape(-1).tolist() for part in (one.own, one.right, one.tolerance, one.ratio)))
+        places = list(np.ndindex(comparison.own.shape))
+        values = zip(
+            *(
+                part.reshape(-1).tolist()
+                for part in (comparison.own, comparison.right, comparison.tolerance, comparison.ratio)
+            )
+        )
         for (at, *entry), (own, right, tolerance, ratio) in zip(places, values):
             why = cause if ratio > 1.0 else ""
             state = given.states[at]
-            found.append(Difference(name, entries[tuple(entry)], state, own, right, own - right, tolerance, ratio, why))
-    return sorted(found, key=lambda one: -one.ratio)
+            rows.append(Difference(name, entries[tuple(entry)], state, own, right, own - right, tolerance, ratio, why))
+    return sorted(rows, key=lambda comparison: -comparison.ratio)

@@ -1,4 +1,4 @@
-"""The arguments of assert_agrees, validated: the model, the states, each quantity in one's own equations and in MuJoCo."""
+"""The arguments of assert_agrees, validated: the model, the states, each quantity of the user and of MuJoCo."""
 
 import warnings
 from collections.abc import Mapping
@@ -25,11 +25,11 @@ from ..robots.validation import is_number
 
 SYMBOLS_OF = {"mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd"}  # quantities and their entries
 DEFAULT_STATES = 100
-OWN_SECONDS = 20.0  # s of one's own functions at random states
+OWN_SECONDS = 20.0  # s for the user's functions at random states
 
 
 class State(NamedTuple):
-    """A state in joints of one's own."""
+    """A state in the user's joints."""
 
     number: int
     q: tuple[float, ...]
@@ -38,7 +38,7 @@ class State(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """One quantity at all states, (states, ...), in joints of one's own."""
+    """One quantity at all states, (states, ...), in the user's joints."""
 
     own: np.ndarray
     right: np.ndarray  # MuJoCo's
@@ -47,7 +47,7 @@ class Compared(NamedTuple):
 
     @property
     def ratio(self) -> np.ndarray:
-        """Of the difference to the tolerance; 0 where both are 0, inf where one's own is not a finite number."""
+        """Of the difference to the tolerance; 0 where both are 0, inf where the user's value is not finite."""
         off = np.abs(self.own - self.right)
         return over(np.where(np.isfinite(off), off, np.inf), self.tolerance)
 
@@ -95,7 +95,7 @@ class Given:
         self.tree, self.coordinates = reading.tree, Coordinates(reading.tree.hinge_names, reading.tree.kind)
 
     def take_random(self, states: int, seed: int) -> None:
-        """Random states, fewer if one's own functions take long."""
+        """Random states, fewer if the user's functions are slow."""
         for name, value, least in (("states", states, 1), ("seed", seed, 0)):
             if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
                 raise ValueError(f"{name} is {shown(value)}; expected a whole number of at least {least}")
@@ -111,7 +111,7 @@ class Given:
             self.q, self.qd, self.tau = self.q[:count], self.qd[:count], self.tau[:count]
 
     def take_states(self, q, qd, tau) -> None:
-        """The given states, in joints of one's own."""
+        """The given states, in the user's joints."""
         nq, nv = self.coordinates.nq, self.coordinates.nv
         own = {"q": rows_given("q", q, nq, None)}
         count = len(own["q"])
@@ -129,18 +129,18 @@ class Given:
 
     @cached_property
     def states(self) -> list[State]:
-        """The states, in joints of one's own."""
+        """The states, in the user's joints."""
         of = self.joints
         own = of.own_positions(self.q), of.own_speeds(self.qd), of.own_forces(self.tau)
         return [State(i, *map(tuple, state)) for i, state in enumerate(zip(*(part.tolist() for part in own)))]
 
     @cached_property
     def values(self) -> dict[str, np.ndarray]:
-        """One's own values of each quantity, in the model's joints."""
+        """The user's values of each quantity, in the model's joints."""
         return {name: self.value(name, brought) for name, brought in self.brought.items()}
 
     def value(self, name: str, brought: object) -> np.ndarray:
-        """One's own values of one quantity, in the model's joints, (states, ...)."""
+        """The user's values of one quantity, in the model's joints, (states, ...)."""
         if self.own is not None and self.own.has(name):
             function = getattr(self.own, {"gravity": "gravity_balance"}.get(name, name))
             return function(*(self.q, self.qd, self.tau)[: ARGUMENTS[name]])
@@ -148,7 +148,7 @@ class Given:
         return self.joints.mass_matrix(values) if name == "mass_matrix" else self.joints.forces(values)
 
     def table(self, name: str, brought: object) -> np.ndarray:
-        """An array of values, (states, ...), in one's own joints; a row may have the rows of Mbar one after the other."""
+        """An array of values, (states, ...), in the user's joints; a row may hold Mbar flattened by rows."""
         count, nv = len(self.q), self.coordinates.nv
         array = real_numbers(brought)
         shape = (count, nv, nv) if name == "mass_matrix" else (count, nv)
@@ -162,9 +162,9 @@ class Given:
 
     @cached_property
     def compared(self) -> Mapping[str, Compared]:
-        """Each quantity in one's own equations and in MuJoCo."""
+        """Each quantity of the user and of MuJoCo."""
         scale = Entries(self.tree, self.q, self.qd)
-        found = {}
+        comparisons = {}
         for name, own in self.values.items():
             state = (self.q, self.qd, self.tau)[: ARGUMENTS[name]]
             right = getattr(self.mujoco, {"gravity": "gravity_balance"}.get(name, name))(*state)
@@ -181,8 +181,8 @@ class Given:
                 ) from None
             turned = self.joints.own_mass_matrix if name == "mass_matrix" else self.joints.own_forces
             size = np.abs(turned(np.broadcast_to(size, right.shape)))
-            found[name] = Compared(turned(own), turned(right), size, (FACTOR * EPS + self.rtol) * size)
-        return found
+            comparisons[name] = Compared(turned(own), turned(right), size, (FACTOR * EPS + self.rtol) * size)
+        return comparisons
 
     def entries(self, name: str) -> dict[tuple, str]:
         """The names of the entries of a quantity, by their place."""
@@ -194,11 +194,11 @@ class Given:
 
     @property
     def fails(self) -> bool:
-        return any((one.ratio > 1.0).any() for one in self.compared.values())
+        return any((comparison.ratio > 1.0).any() for comparison in self.compared.values())
 
     @property
     def problems(self) -> list[str]:
-        """Other errors of one's own functions, a line each."""
+        """Other errors of the user's functions, a line each."""
         return [problem.text for problem in self.own.problems] if self.own is not None else []
 
 

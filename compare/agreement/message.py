@@ -14,7 +14,11 @@ MOST_LISTED = 8  # joints
 
 def message(given: Given, why: Why) -> str:
     """Which entries of which quantity are off, the worst of them, the probable cause, and what can be stated."""
-    quantities = [worst_of(given, name, one) for name, one in given.compared.items() if (one.ratio > 1.0).any()]
+    quantities = [
+        worst_of(given, name, comparison)
+        for name, comparison in given.compared.items()
+        if (comparison.ratio > 1.0).any()
+    ]
     joints, kinds = given.joints.joints, dict(zip(given.coordinates.names, given.coordinates.all_kinds))
     straight = [joint for joint in joints if kinds[joint.name] != "ball"]
     text = block(
@@ -31,9 +35,9 @@ def message(given: Given, why: Why) -> str:
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())
 
 
-def worst_of(given: Given, name: str, one: Compared) -> dict:
+def worst_of(given: Given, name: str, comparison: Compared) -> dict:
     """How many entries of one quantity are off, and the worst of them."""
-    ratio = one.ratio
+    ratio = comparison.ratio
     count, worst = int((ratio > 1.0).sum()), np.unravel_index(int(np.argmax(ratio)), ratio.shape)
     state = given.states[worst[0]]
     return {
@@ -44,10 +48,10 @@ def worst_of(given: Given, name: str, one: Compared) -> dict:
         "entry": given.entries(name)[tuple(map(int, worst[1:]))],
         "state": state.number,
         "at": state_in_words(list(map(np.array, state[1 : 1 + ARGUMENTS[name]]))),
-        "yours": float(one.own[worst]),
-        "right": float(one.right[worst]),
+        "yours": float(comparison.own[worst]),
+        "right": float(comparison.right[worst]),
         "ratio": float(ratio[worst]),
-        "tolerance": float(one.tolerance[worst]),
+        "tolerance": float(comparison.tolerance[worst]),
     }
 
 
@@ -57,9 +61,11 @@ def rounded(given: Given) -> tuple[int, float] | None:
     None where a quantity is off by more than that of its own largest entry: terms far from the origin are large, and a slip is
     small compared with them.
     """
-    off = {name: np.abs(one.own - one.right) for name, one in given.compared.items()}
-    worst = max(float(over(off[name], one.scale).max()) for name, one in given.compared.items())
-    of_largest = max(float(over(off[name].max(), np.abs(one.right).max())) for name, one in given.compared.items())
+    off = {name: np.abs(comparison.own - comparison.right) for name, comparison in given.compared.items()}
+    worst = max(float(over(off[name], comparison.scale).max()) for name, comparison in given.compared.items())
+    of_largest = max(
+        float(over(off[name].max(), np.abs(comparison.right).max())) for name, comparison in given.compared.items()
+    )
     if not 0.0 < worst <= 10.0**-LEAST_DIGITS or not of_largest <= 10.0**-LEAST_DIGITS:
         return None
     exponent = int(np.floor(np.log10(worst)))

@@ -43,7 +43,7 @@ def cause_of(given: Given) -> Why:
     which = some_states(given)
     if len(which) < min(LEAST_STATES, len(given.q)):
         return Why()  # too few of them are numbers
-    failing = [name for name, one in given.compared.items() if (one.ratio > 1.0).any()]
+    failing = [name for name, comparison in given.compared.items() if (comparison.ratio > 1.0).any()]
     if failing == ["acceleration"]:
         if acting := of_forces(given, which):
             return Why("forces", forces=acting, may_be_rounded=True)
@@ -70,22 +70,24 @@ def diagnosed(given: Given, values: Values) -> Why:
 
     is_quick = own is not None and own.seconds <= QUICK
     of_speeds = bias if is_quick and own.has("bias") and "bias" in given.compared else None
-    found = diagnose_stated(given.tree, given.joints, values, SECONDS_OF_CAUSE, of_speeds)
-    if not found.differs:
+    diagnosis = diagnose_stated(given.tree, given.joints, values, SECONDS_OF_CAUSE, of_speeds)
+    if not diagnosis.differs:
         return Why(may_be_rounded=True)
-    restated = given.are_stated and any(cause.joints and not cause.joints.is_same for cause in found.causes)
+    restated = given.are_stated and any(cause.joints and not cause.joints.is_same for cause in diagnosis.causes)
     condition, are_finite = None, all(np.isfinite(part).all() for part in (M, values.bias) if part is not None)
-    if not found.causes and is_quick and are_finite and own.has("mass_matrix") and own.has("bias"):
+    if not diagnosis.causes and is_quick and are_finite and own.has("mass_matrix") and own.has("bias"):
         every = conditions(own.mass_matrix, own.bias, given.coordinates, values.q, given.qd[: len(values.q)])
         condition = next((one for one in every if not one.is_met), None)
-    is_of_numbers = not found.causes or any("number" in cause.kind for cause in found.causes)
+    is_of_numbers = not diagnosis.causes or any("number" in cause.kind for cause in diagnosis.causes)
     instead = joints_stated(given.joints) if restated else None
-    return Why("diagnosis", condition, found, instead=instead, may_be_rounded=found.is_small and is_of_numbers)
+    return Why("diagnosis", condition, diagnosis, instead=instead, may_be_rounded=diagnosis.is_small and is_of_numbers)
 
 
 def some_states(given: Given) -> np.ndarray:
     """The numbers of as many states as a diagnosis takes: of those with finite values the first, and the worst."""
-    worst = np.max([one.ratio.reshape(len(given.q), -1).max(axis=1) for one in given.compared.values()], axis=0)
+    worst = np.max(
+        [comparison.ratio.reshape(len(given.q), -1).max(axis=1) for comparison in given.compared.values()], axis=0
+    )
     finite = np.flatnonzero(np.isfinite(worst))
     if not len(finite):
         return finite

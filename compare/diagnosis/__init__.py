@@ -40,7 +40,7 @@ class Values(NamedTuple):
         return diagnose(tree, self.q, self.qd, given, allowed, seconds, bias)
 
     def in_joints(self, joints: JointMap) -> "Values":
-        """The same in joints of one's own."""
+        """The same in the user's joints."""
         of_M, of_h = joints.own_mass_matrix, joints.own_forces
         M = None if self.mass_matrix is None else of_M(self.mass_matrix)
         h = None if self.bias is None else of_h(self.bias)

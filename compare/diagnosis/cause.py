@@ -1,4 +1,4 @@
-"""Causes: what explains a difference. All searches give them in this form; their sentences stand in causes.md.jinja."""
+"""Causes: explanations of a difference, the results of all searches. Their text is in causes.md.jinja."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

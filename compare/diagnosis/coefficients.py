@@ -67,24 +67,26 @@ class Compared:
 
     def __init__(self, equations: Equations, given: np.ndarray, tolerance: np.ndarray, bias: Callable | None):
         self.equations, self.coefficients = equations, coefficients_of(equations, given, tolerance, bias)
-        self.differing = [one for one in self.coefficients if (one.off > one.tolerance).any()]
+        self.differing = [
+            coefficient for coefficient in self.coefficients if (coefficient.off > coefficient.tolerance).any()
+        ]
         self.is_complete = self.explains_bias(given, tolerance)
         right = equations.values()[0]
         off, largest = np.abs(given - right), np.abs(right).max(axis=0)
         of_entries = np.nan_to_num(off).max(axis=0) <= SMALL_SHARE * largest + tolerance.max(axis=0)
         every = (off > tolerance).any(axis=0) | np.isnan(off).all(axis=0) | (largest == 0.0)
         self.is_small = bool(of_entries.all()) and (
-            bool(every.all()) or (bool(self.differing) and all(one.is_small for one in self.differing))
+            bool(every.all()) or (bool(self.differing) and all(coefficient.is_small for coefficient in self.differing))
         )
 
     def explains_bias(self, given: np.ndarray, tolerance: np.ndarray) -> bool:
         """Whether the coefficients that differ make up all that differs in h: nothing is linear or cubic in the speeds."""
         nv, qd = self.equations.nv, self.equations.qd
         h = self.equations.values()[0][:, -nv:].copy()
-        for one in self.differing:
-            kind, i, *pair = one.place
+        for coefficient in self.differing:
+            kind, i, *pair = coefficient.place
             if kind != "M":
-                h[:, i] += (one.yours - one.right) * np.prod(qd[:, pair], axis=1)
+                h[:, i] += (coefficient.yours - coefficient.right) * np.prod(qd[:, pair], axis=1)
         size = tolerance[:, -nv:] * (1.0 + np.abs(qd).max(axis=1, keepdims=True) ** 2)
         off = np.abs(given[:, -nv:] - h)
         return bool(((off <= ROUNDING * size) | ~np.isfinite(off)).all())
@@ -96,7 +98,7 @@ class Compared:
         reference, rng = np.array(tree.reference), np.random.default_rng(0)
         x = rng.uniform(-3.0, 3.0, (STATES_PER_TERM * 5 ** len(tree.kind), len(tree.kind)))
         known = right_values(Equations(tree, x + reference, np.zeros_like(x)))
-        return right_terms(names, tree.kind, x, np.array([known[one.place] for one in self.differing]))
+        return right_terms(names, tree.kind, x, np.array([known[coefficient.place] for coefficient in self.differing]))
 
     @cached_property
     def tried_terms(self):
@@ -107,24 +109,28 @@ class Compared:
         """What differs in each coefficient, in a few terms; None where that is not found, or with many joints or balls."""
         tree = self.equations.tree
         is_known = "ball" not in tree.kind and len(tree.kind) <= JOINTS_OF_TERMS
-        for k, one in enumerate(self.differing):
+        for k, coefficient in enumerate(self.differing):
             if not is_known:
                 yield None
                 continue
             right = self.right_terms[k]
-            off = few_terms(self.tried_terms, right, one.yours - one.right, one.tolerance)
-            yield off and slip_of(one.name, right, off)
+            off = few_terms(self.tried_terms, right, coefficient.yours - coefficient.right, coefficient.tolerance)
+            yield off and slip_of(coefficient.name, right, off)
 
     def details(self) -> dict:
         """Which parts of the equations differ, and which coefficients: `parts`, `details` and `more` of a Diagnosis."""
         differ, every = (
-            list(dict.fromkeys(one.place[0] for one in some)) for some in (self.differing, self.coefficients)
+            list(dict.fromkeys(coefficient.place[0] for coefficient in some))
+            for some in (self.differing, self.coefficients)
         )
         agree = [part for part in every if part not in differ]
         slips = list(islice(self.slips(), SHOWN))
         if self.is_small and not all(slips):
             return {"parts": (differ, agree)}
-        details = [slip.values if slip else one.at_worst(self.equations) for one, slip in zip(self.differing, slips)]
+        details = [
+            slip.values if slip else coefficient.at_worst(self.equations)
+            for coefficient, slip in zip(self.differing, slips)
+        ]
         return {"parts": (differ, agree), "details": tuple(details), "more": len(self.differing) - len(details)}
 
     def cause(self, most: int) -> Cause | None:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..judge.check import closest
 from ..judge.finding import Finding
 from ..judge.scale import EPS, FACTOR
 from ..report.text import say
@@ -54,18 +55,18 @@ def conditions(
     floors = FACTOR * EPS * np.abs(M).max(axis=(1, 2)) + SAFETY * noise(mass_matrix, coordinates, q)
     of_h = SAFETY * noise(lambda q: bias(q, qd), coordinates, q)
     names = coordinates.speeds
-    found = [symmetric(M, floors, names), definite(M, floors)]
-    found.append(gradient_at_rest(lambda q: bias(q, np.zeros((len(q), qd.shape[1]))), coordinates, q, of_h))
+    tested = [symmetric(M, floors, names), definite(M, floors)]
+    tested.append(gradient_at_rest(lambda q: bias(q, np.zeros((len(q), qd.shape[1]))), coordinates, q, of_h))
     weight, ahead, behind = (np.asarray(bias(q, rates)) for rates in (still, qd, -qd))
     doubled = (np.asarray(bias(q, 2.0 * qd)) + np.asarray(bias(q, -2.0 * qd))) / 2.0
     size = np.max([np.abs(part) for part in (weight, ahead, behind, doubled)], axis=(0, 2))
     size = FACTOR * EPS * size + of_h
-    found.append(even(ahead, behind, size, names))
+    tested.append(even(ahead, behind, size, names))
     of_rates = (ahead + behind) / 2.0 - weight
-    found.append(quadratic(of_rates, doubled - weight, size, names))
-    if found[0].is_met:
-        found.append(power_balance(mass_matrix, coordinates, q, qd, of_rates, floors, size))
-    return [condition for condition in found if condition is not None]
+    tested.append(quadratic(of_rates, doubled - weight, size, names))
+    if tested[0].is_met:
+        tested.append(power_balance(mass_matrix, coordinates, q, qd, of_rates, floors, size))
+    return [condition for condition in tested if condition is not None]
 
 
 def noise(function: Callable, coordinates: Coordinates, q: np.ndarray) -> float:
@@ -81,7 +82,7 @@ def noise(function: Callable, coordinates: Coordinates, q: np.ndarray) -> float:
 
 def symmetric(M: np.ndarray, allowed: np.ndarray, names: Sequence[str]) -> Condition:
     skew = np.abs(M - np.swapaxes(M, 1, 2))
-    s = int(np.argmax(ratios(skew.max(axis=(1, 2)), allowed)))
+    (s,) = closest(skew.max(axis=(1, 2)), allowed)
     i, j = np.unravel_index(np.argmax(skew[s]), skew[s].shape)
     wrong = Finding(TEMPLATE, "symmetric", {"names": (names[i], names[j]), "values": (M[s, i, j], M[s, j, i])})
     return Condition("M is symmetric", float(skew[s].max()), float(allowed[s]), "kg m2", wrong)
@@ -116,7 +117,7 @@ def gradient_at_rest(weight: Callable, coordinates: Coordinates, q: np.ndarray, 
     curl = np.abs(slopes - np.swapaxes(slopes, 1, 2))
     rounding = (FACTOR * EPS * np.max(sizes, axis=(0, 2)) + floor) / STEP
     allowed = SAFETY * (errors + np.swapaxes(errors, 1, 2)) + rounding[:, None, None]
-    s, a, b = map(int, np.unravel_index(np.argmax(ratios(curl, allowed)), curl.shape))
+    s, a, b = closest(curl, allowed)
     one, other = coordinates.speeds[straight[a]], coordinates.speeds[straight[b]]
     wrong = Finding(TEMPLATE, "gradient", {"names": (one, other), "values": (slopes[s, a, b], slopes[s, b, a])})
     return Condition("h at rest is a gradient", float(curl[s, a, b]), float(allowed[s, a, b]), "N m/rad", wrong)
@@ -125,7 +126,7 @@ def gradient_at_rest(weight: Callable, coordinates: Coordinates, q: np.ndarray, 
 def even(ahead: np.ndarray, behind: np.ndarray, allowed: np.ndarray, names: Sequence[str]) -> Condition:
     """h(q, qd) = h(q, -qd)."""
     odd = np.abs(ahead - behind) / 2.0
-    s = int(np.argmax(ratios(odd.max(axis=1), allowed)))
+    (s,) = closest(odd.max(axis=1), allowed)
     i = int(np.argmax(odd[s]))
     wrong = Finding(TEMPLATE, "even", {"name": names[i], "value": odd[s, i]})
     return Condition("h is even in the rates", float(odd[s, i]), float(allowed[s]), "N m", wrong)
@@ -135,7 +136,7 @@ def quadratic(of_rates: np.ndarray, doubled: np.ndarray, floor: np.ndarray, name
     """At twice the speed the velocity terms are four times as large."""
     off = np.abs(doubled - 4.0 * of_rates)
     allowed = 4.0 * floor
-    s = int(np.argmax(ratios(off.max(axis=1), allowed)))
+    (s,) = closest(off.max(axis=1), allowed)
     i = int(np.argmax(off[s]))
     factor = doubled[s, i] / of_rates[s, i] if of_rates[s, i] else np.inf
     wrong = Finding(TEMPLATE, "quadratic", {"name": names[i], "factor": factor})
@@ -166,7 +167,7 @@ def power_balance(
     off = np.abs(given - slope)
     total = sizes.sum(axis=1)
     allowed = SAFETY * error + total**2 * floor_M / STEP + 2.0 * total * floor_h / squared
-    s = int(np.argmax(ratios(off, allowed)))
+    (s,) = closest(off, allowed)
     watts = largest[s, 0] ** 3
     wrong = Finding(TEMPLATE, "power", {"yours": given[s] * watts, "right": slope[s] * watts})
     name = "h belongs to M: qd'(h - h at rest) = qd' Mdot qd / 2"
@@ -174,15 +175,9 @@ def power_balance(
 
 
 def derivative(function: Callable) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """df/dt at 0 to fourth order, its error as two steps tell it, and the size of f, all of the shape of f(t)."""
+    """df/dt at 0 to fourth order, its error estimated from two step sizes, and the size of f, all of the shape of f(t)."""
     values = {k: np.asarray(function(k * STEP)) for k in (-4, -2, -1, 1, 2, 4)}
     slope = (8.0 * (values[1] - values[-1]) - (values[2] - values[-2])) / (12.0 * STEP)
     coarse = (8.0 * (values[2] - values[-2]) - (values[4] - values[-4])) / (24.0 * STEP)
     # a sixteenth of the difference would do where it is smooth; with noise it is as large as the difference
     return slope, np.abs(slope - coarse), np.max([np.abs(value) for value in values.values()], axis=0)
-
-
-def ratios(value: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-    """What is used of a tolerance; nothing of none is 0, and what is no number comes first."""
-    used = np.divide(value, allowed, out=np.where(value == 0.0, 0.0, np.inf), where=allowed > 0.0)
-    return np.where(np.isfinite(value), used, np.inf)

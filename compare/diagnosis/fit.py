@@ -238,7 +238,7 @@ def nearest_changes(first: np.ndarray, second: np.ndarray, off: np.ndarray) -> l
 
     first, second: (places, states, entries), off: (states, entries), in tolerances.
     """
-    (first, second), r, found = (part.reshape(len(part), -1) for part in (first, second)), off.ravel(), []
+    (first, second), r, nearest = (part.reshape(len(part), -1) for part in (first, second)), off.ravel(), []
     rr, ra, rb = r @ r, first @ r, second @ r
     aa, ab, bb = (np.einsum("kn,kn->k", *pair) for pair in ((first, first), (first, second), (second, second)))
     for k in range(len(first)):
@@ -250,5 +250,5 @@ def nearest_changes(first: np.ndarray, second: np.ndarray, off: np.ndarray) -> l
             for x in roots
         }
         best = min(left, key=left.get, default=0.0)
-        found.append((float(np.sqrt(max(0.0, left.get(best, rr)))), float(best)))
-    return found
+        nearest.append((float(np.sqrt(max(0.0, left.get(best, rr)))), float(best)))
+    return nearest

@@ -40,7 +40,7 @@ class Equations:
     """Mbar and h of a tree at states q (states, nq), qd (states, nv).
 
     One array of numbers for each state: the lower triangle of Mbar by rows, then h; see `entries`. With `joints` the states,
-    Mbar and h are in joints of one's own, see joint_map.py.
+    Mbar and h are in the user's joints, see joint_map.py.
     """
 
     def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, joints: JointMap | None = None):
@@ -115,7 +115,7 @@ class Equations:
 
 
 def packing(joints: JointMap, equations: Equations) -> tuple[list[int], np.ndarray]:
-    """The index and sign, in the model's joints, of each entry in joints of one's own."""
+    """The index and sign, in the model's joints, of each entry in the user's joints."""
     v, sense, (i, j) = joints.v, joints.sense, equations.triangle
     high, low = np.maximum(v[i], v[j]), np.minimum(v[i], v[j])
     index = np.concatenate([high * (high + 1) // 2 + low, len(i) + v])

@@ -59,11 +59,11 @@ def all_places(equations: Equations) -> list[Place]:
 
 def forces_in_bias(equations: Equations) -> list[Place]:
     """Damping and springs of joints that were added to h."""
-    tree, nv, found = equations.tree, equations.nv, []
+    tree, nv, places = equations.tree, equations.nv, []
     first = len(equations.entries) - nv
 
     def add(name, unit, entry, column):
-        found.append(Place(2, "force", f"{name} in h", 0.0, unit, 1.0, entry=entry, column=column))
+        places.append(Place(2, "force", f"{name} in h", 0.0, unit, 1.0, entry=entry, column=column))
 
     for i, (joint, (kind, at, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
         of_speed, of_length = ("N s/m", "N/m") if kind == "slide" else ("N m s/rad", "N m/rad")
@@ -75,18 +75,18 @@ def forces_in_bias(equations: Equations) -> list[Place]:
             add(f"stiffness of {joint}", of_length, first + by.start, stretched)
     if nv > 1:
         add("the same damping of every joint", "N m s/rad", slice(first, first + nv), equations.qd)
-    return found
+    return places
 
 
 def numbers(equations: Equations) -> list[Place]:
     """Every number of the tree. "anchor": the joint moves, all that it carries stays in place."""
     tree, stated = equations.tree, equations.stated
     length = max(1e-3, float(np.abs(stated["offset"]).max()), float(np.abs(stated["com"]).max()))
-    found = []
+    places = []
 
     def add(kind, name, field, index, unit, size, *more, rank=2):
         moves = ((Path(field, index), 1.0), *more)
-        found.append(Place(rank, kind, name, float(stated[field][index]), unit, float(size), moves))
+        places.append(Place(rank, kind, name, float(stated[field][index]), unit, float(size), moves))
 
     for b, body in enumerate(tree.body_names):
         heavy = stated["mass"][b] or stated["mass"].max()
@@ -118,7 +118,7 @@ def numbers(equations: Equations) -> list[Place]:
             add("number", f"armature of {name}", "armature", (speed,), rotor, size)
     for k, axis in enumerate(XYZ):
         add("number", f"gravity {axis}", "gravity", (k,), "m/s2", 9.81)
-    return found
+    return places
 
 
 def terms(equations: Equations) -> list[Place]:
@@ -128,12 +128,12 @@ def terms(equations: Equations) -> list[Place]:
     if len(bodies) > 1:
         groups[EVERY_BODY] = list(range(len(bodies)))
     called = {name: (term,) for term, name in OF_TERM.items()} | TOGETHER
-    found = []
+    places = []
     for name, together in called.items():
         for body, which in groups.items():
             moves = tuple((Path("factor", (b, BODY_TERMS.index(term))), 1.0) for b in which for term in together)
-            found.append(Place(2, "term", name.format(body), 1.0, "times", 1.0, moves))
-    return found
+            places.append(Place(2, "term", name.format(body), 1.0, "times", 1.0, moves))
+    return places
 
 
 def entry_name(entry: tuple, names: Sequence[str]) -> str:
@@ -152,10 +152,10 @@ def coefficients(equations: Equations) -> list[Place]:
     nv, states, names = equations.nv, len(equations.q), equations.names
     values = dict(zip(equations.entries, equations.values()[0].T))
     at = {entry: k for k, entry in enumerate(equations.entries)}
-    found = []
+    places = []
 
     def add(name, entry, column, stated=1.0):
-        found.append(Place(2, "coefficient", name, stated, "times", 1.0, entry=entry, column=column))
+        places.append(Place(2, "coefficient", name, stated, "times", 1.0, entry=entry, column=column))
 
     for i, j in zip(*map(np.ndarray.tolist, equations.triangle)):
         add(entry_name(("M", i, j), names), at["M", i, j], values["M", i, j])
@@ -173,8 +173,8 @@ def coefficients(equations: Equations) -> list[Place]:
         for (j, k), column in of_rates.items():
             name = f"{row}, coefficient of {rates_name(j, k, names)}"
             add(name, entry, column[:, i] * equations.qd[:, j] * equations.qd[:, k])
-    found += terms_of_rows(equations) if nv <= MOST_SPEEDS else []
-    return [place for place in found if np.abs(place.column).max() > 0.0 and len(place.column) == states]
+    places += terms_of_rows(equations) if nv <= MOST_SPEEDS else []
+    return [place for place in places if np.abs(place.column).max() > 0.0 and len(place.column) == states]
 
 
 def terms_of_rows(equations: Equations) -> list[Place]:
@@ -184,14 +184,14 @@ def terms_of_rows(equations: Equations) -> list[Place]:
     indices = [(b, BODY_TERMS.index(name)) for b in range(len(equations.tree.mass)) for name in names]
     changes = {Path("factor", index): row for index, row in zip(indices, np.eye(len(indices)))}
     added = equations.values(changes) - right  # of each term doubled, (terms, states, entries)
-    found = []
+    places = []
     for (b, term), column in zip(indices, added[..., -nv:]):
         for i in range(nv):
             of = OF_TERM[BODY_TERMS[term]].format(equations.tree.body_names[b])
             name = f"{of} in {entry_name(('h', i), equations.names)}"
             at = right.shape[1] - nv + i
-            found.append(Place(2, "term", name, 1.0, "times", 1.0, entry=at, column=column[:, i]))
-    return found
+            places.append(Place(2, "term", name, 1.0, "times", 1.0, entry=at, column=column[:, i]))
+    return places
 
 
 def bias_at_rest(equations: Equations) -> np.ndarray:

@@ -10,18 +10,30 @@ import tmt
 
 from ..judge.scale import EPS, FACTOR
 from ..robots.coordinates import Coordinates
-from .cause import LEAST_STATES, Cause, Change, Diagnosis, cause_of, place_changed, tied, with_zeros
+from .cause import (
+    CLOSE,
+    FACTORS,
+    LEAST_STATES,
+    Cause,
+    Change,
+    Diagnosis,
+    cause_of,
+    place_changed,
+    tied,
+    value_of,
+    with_zeros,
+)
 from .coefficients import Compared
 from .fit import Fitted, OutOfTime, Search, nearest_changes
-from .model import Equations, packing
+from .model import BODY_TERMS, Equations, Path, packing
 from .places import EVERY_BODY, Place, all_places, entry_name
-from .possible import is_possible, is_telling
 from .slips import IN_MASS_ALONE, slips
 from .variants import Variant, both, conventions, program_options, values_of
 
 FEW = 2  # states at which many conventions are tried first
-NEAR = 0.5  # of the difference: a convention that leaves more together with a number is not looked at
+NEAR = 0.5  # of the difference: a convention that leaves more together with a number is not searched
 KEPT = 12  # explanations that are kept though they do not explain
+ROUNDED_INERTIA = 1e-9  # of an inertia, that the digits of a fit may take from it
 PROMISING = 6  # states at which it is estimated what a number together with a convention can do
 MOST_PAIRS = 6  # of numbers that explain: where more do, two numbers fit whatever differs
 MOST_VARIANTS = 4  # with which a number is fitted
@@ -91,7 +103,7 @@ def diagnosis(equations: Equations, given, tolerance, seconds: float, bias: Call
 def ranks(
     search: Search, singles: Sequence[Fitted], pairs: bool, compared: Callable[[], Compared]
 ) -> Iterable[list[Cause]]:
-    """The explanations of each rank, found when they are asked for; pairs: whether there is time for the last.
+    """The explanations of each rank, computed when the previous ranks are empty; pairs: whether there is time for the last.
 
     Where joints may be otherwise, numbers and terms that explain as much are listed too: whoever states the joints so, and has a
     wrong number, agrees with a wrong model.
@@ -100,24 +112,24 @@ def ranks(
     coordinates = Coordinates(equations.tree.hinge_names, equations.tree.kind)
     of_joints = list(conventions(equations))
     options = list(program_options(equations))
-    first = [of_variant(*one) for one in explained(search, options) + explained_by_joints(search, of_joints)]
-    first += [of_fitted(one, 1, coordinates) for one in singles if one.places[0].rank == 1]
+    first = [of_variant(*variant) for variant in explained(search, options) + explained_by_joints(search, of_joints)]
+    first += [of_fitted(fit, 1, coordinates) for fit in singles if fit.places[0].rank == 1]
     if not all(cause.joints for cause in first):
         yield first
-    numbers = [one for one in singles if one.places[0].rank == 2]
-    second = [of_fitted(one, 2, coordinates) for one in numbers if is_possible(one, search)]
-    second += [of_variant(*one) for one in plainest(explained(search, slips(equations), bounded=not first))]
+    numbers = [fit for fit in singles if fit.places[0].rank == 2]
+    second = [of_fitted(fit, 2, coordinates) for fit in numbers if is_possible(fit, search)]
+    second += [of_variant(*variant) for variant in plainest(explained(search, slips(equations), bounded=not first))]
     if not second and (cause := compared().cause(1)):
         second = [cause]
     if not first and not second:  # a slip in a number need not leave a rigid body
-        second = [of_fitted(one, 2, coordinates)._replace(of_no_body=True) for one in numbers]
+        second = [of_fitted(fit, 2, coordinates)._replace(of_no_body=True) for fit in numbers]
     yield first + second
     if not pairs:
         return
-    third = [of_variant(*one) for one in explained(search, both(equations, search.given, search.weight))]
-    of_numbers = [one for one in search.pairs() if one.ratio <= 1.0 and is_telling(one) and is_possible(one, search)]
+    third = [of_variant(*variant) for variant in explained(search, both(equations, search.given, search.weight))]
+    of_numbers = [fit for fit in search.pairs() if fit.ratio <= 1.0 and is_telling(fit) and is_possible(fit, search)]
     if len(of_numbers) <= MOST_PAIRS:
-        third += [of_fitted(one, 3, coordinates) for one in of_numbers]
+        third += [of_fitted(fit, 3, coordinates) for fit in of_numbers]
     if cause := compared().cause(2):
         third.append(cause)
     try:
@@ -151,14 +163,14 @@ def of_fitted(fitted: Fitted, rank: int, coordinates: Coordinates, variant: Vari
 
 def explained(search: Search, variants: Iterable[Variant], bounded: bool = False) -> list[tuple[Variant, float]]:
     """The variants that leave nothing, and the share that they leave. bounded: within the time of the search."""
-    found = []
+    explaining = []
     for variant in variants:
         if bounded and time.monotonic() > search.end:
             raise OutOfTime
         left = search.weighted(variant.equations().values()[0])
         if np.abs(left).max() <= 1.0:
-            found.append((variant, float(np.linalg.norm(left)) / search.size))
-    return found
+            explaining.append((variant, float(np.linalg.norm(left)) / search.size))
+    return explaining
 
 
 def plainest(found: list[tuple[Variant, float]]) -> list[tuple[Variant, float]]:
@@ -187,18 +199,18 @@ def explained_by_joints(search: Search, variants: Sequence[Variant]) -> list[tup
 
 
 def with_a_number(search: Search, variants: Sequence[Variant], coordinates: Coordinates) -> list[Cause]:
-    """One option or convention together with one number or term, of the few that promise most."""
+    """One option or convention together with one number or term, of the few with the smallest estimated remainder."""
     places = [place for place in search.places if place.column is None]
-    found = []
+    causes = []
     for left, _, variant in sorted(promises(search, variants, places), key=lambda one: one[:2])[:MOST_VARIANTS]:
         if left < NEAR:
             inner = Search(variant.equations(), places, search.given, search.tolerance, search.end)
-            found += [
+            causes += [
                 of_fitted(one, 3, coordinates, variant)
                 for one in inner.singles()
                 if one.ratio <= 1.0 and is_telling(one) and is_possible(one, search)
             ]
-    return found
+    return causes
 
 
 def promises(search: Search, variants: Sequence[Variant], places: Sequence[Place]) -> list[tuple[float, int, Variant]]:
@@ -219,13 +231,13 @@ def promises(search: Search, variants: Sequence[Variant], places: Sequence[Place
         total = np.linalg.norm(search.off[:states])
         return min((left for left, _ in near), default=0.0) / total if total else 0.0
 
-    found = []
+    shares = []
     for variant in of_options:  # which may change more than the values at states
         inner = Search(variant.equations(), places, search.given, search.tolerance, search.end)
         up, down = (inner.values(which, sign * size) for sign in (1.0, -1.0))
-        found.append((promise(up, inner.right, down, len(all_given)), len(found), variant))
+        shares.append((promise(up, inner.right, down, len(all_given)), len(shares), variant))
     if not of_joints:
-        return found
+        return shares
     maps = [variant.joints for variant in of_joints]
     q = np.concatenate([one.positions(equations.q[:few]) for one in maps])
     together = Equations(equations.tree, q, np.concatenate([one.speeds(equations.qd[:few]) for one in maps]))
@@ -235,5 +247,51 @@ def promises(search: Search, variants: Sequence[Variant], places: Sequence[Place
     for k, variant in enumerate(of_joints):
         part, (index, sense) = slice(k * few, (k + 1) * few), packing(variant.joints, equations)
         values = [one[..., part, :][..., index] * sense for one in (up, inner.right, down)]
-        found.append((promise(*values, few), len(found), variant))
-    return found
+        shares.append((promise(*values, few), len(shares), variant))
+    return shares
+
+
+def is_possible(fitted: Fitted, search: Search, of_body: bool = True) -> bool:
+    """Whether no mass, armature, moment of inertia, damping or stiffness is below zero.
+
+    of_body: and no moment of inertia is larger than the two others together. A term of Mbar may have the other sign, by a slip;
+    other factors below zero mean a negative mass or inertia.
+    """
+    changed, seen = {}, set(search.seen)
+    of_mass = [BODY_TERMS.index(term) for term in ("translation", "rotation")]
+    for place, change in zip(fitted.places, fitted.changes):
+        value = value_of(place, change)
+        is_of_mass = any(path.field == "factor" and path.index[1] in of_mass for path, _ in place.moves)
+        if value < 0.0 and (place.kind == "force" or (is_of_mass and abs(value + 1.0) > CLOSE)):
+            return False
+        for path, coefficient in place.moves:
+            changed[path] = changed.get(path, 0.0) + coefficient * (value_of(place, change) - place.stated)
+    numbers = search.equations.stated
+    for path, more in changed.items():
+        if path.field in ("mass", "armature") and numbers[path.field][path.index] + more < 0.0:
+            return False
+    inertias = np.array(numbers["inertia"])
+    for path, more in changed.items():
+        if path.field == "inertia":
+            inertias[path.index] += more
+    return all(
+        is_inertia(inertias[b], [k for k in range(3) if Path("inertia", (b, k, k)) in seen], of_body)
+        for b in {path.index[0] for path in changed if path.field == "inertia"}
+    )
+
+
+def is_inertia(inertia: np.ndarray, seen: list[int], of_body: bool) -> bool:
+    """Whether a rigid body can have it. seen: the axes about which it enters Mbar or h; about others it may be anything."""
+    least = -ROUNDED_INERTIA * np.abs(inertia).max()
+    if len(seen) < 3 or not of_body:
+        return bool(np.linalg.eigvalsh(inertia[np.ix_(seen, seen)]).min(initial=0.0) >= least)
+    a, b, c = np.linalg.eigvalsh(inertia)
+    return bool(a >= least and a + b - c >= least)
+
+
+def is_telling(fitted: Fitted) -> bool:
+    """Whether a pair is informative: an arbitrary factor together with another number fits nearly everything."""
+    return all(
+        place.unit != "times" or any(abs(value_of(place, change) - factor) <= CLOSE for factor in FACTORS)
+        for place, change in zip(fitted.places, fitted.changes)
+    )

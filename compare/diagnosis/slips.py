@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from functools import cache, partial
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -155,14 +156,11 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
 
 
 def slip(name: str, values: Callable[[], np.ndarray], stated: str = "no", explains: str = "yes") -> Variant:
-    return Variant(2, "slip", name, stated, explains, lambda: Fixed(values()), is_simple=False)
+    def made() -> SimpleNamespace:
+        changed = values()
+        return SimpleNamespace(values=lambda changes=None: changed)
 
-
-class Fixed:
-    """Values in place of equations."""
-
-    def __init__(self, values: np.ndarray):
-        self.values = lambda changes=None: values
+    return Variant(2, "slip", name, stated, explains, made, is_simple=False)
 
 
 def plain_numbers(equations: Equations) -> Iterator[Variant]:

@@ -31,9 +31,9 @@ class Terms(NamedTuple):
 
 def tried_terms(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> Terms:
     """Terms of both forms, the simplest first, and wrong functions of an angle."""
-    found = dict(sums_of_angles(names, kinds, x))
-    found |= dict(products_of_angles(names, kinds, x, with_squares=True)) | dict(wrong_angles(names, kinds, x))
-    return Terms(list(found), np.array(list(found.values())))
+    terms = dict(sums_of_angles(names, kinds, x))
+    terms |= dict(products_of_angles(names, kinds, x, with_squares=True)) | dict(wrong_angles(names, kinds, x))
+    return Terms(list(terms), np.array(list(terms.values())))
 
 
 def products_of_angles(names, kinds, x: np.ndarray, with_squares: bool = False) -> Iterator[tuple[str, np.ndarray]]:
@@ -106,7 +106,7 @@ def wrong_angles(names, kinds, x: np.ndarray) -> Iterator[tuple[str, np.ndarray]
 
 def right_terms(names, kinds, x: np.ndarray, right: np.ndarray) -> list[dict[str, float]]:
     """Expressions, (expressions, states), as sums of terms, each in the form that has fewer; {} where there is none."""
-    found: list[dict[str, float]] = []
+    sums: list[dict[str, float]] = []
     forms = []
     for form in (sums_of_angles, products_of_angles):
         known = dict(form(names, kinds, x))
@@ -119,8 +119,8 @@ def right_terms(names, kinds, x: np.ndarray, right: np.ndarray) -> list[dict[str
             large = np.flatnonzero(np.abs(coefficients[:, k]) > LEFT_BY_FIT * size)
             if off[k] <= LEFT_BY_FIT * size and (not best or len(large) < len(best)):
                 best = {called[i]: float(coefficients[i, k]) for i in large}
-        found.append(best)
-    return found
+        sums.append(best)
+    return sums
 
 
 def few_terms(known: Terms, right: dict[str, float], off: np.ndarray, tolerance: np.ndarray) -> dict[str, float] | None:

@@ -1,16 +1,18 @@
-"""Figures of the experiments at single states: differences, condition number, holding torques.
+"""Figures of the experiments at single states: differences, condition number, holding torques, corrections.
 
 Each function returns (file name, figure, caption).
 """
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from ..engines import LABELS
 from ..judge.check import Result
 from ..judge.entries import unit
-from ..judge.scale import FACTOR
-from ..report.style import BLUE, LINES, ORANGE, RED, WIDTH, plain, zero_at_the_end
+from ..judge.finding import Finding
+from ..judge.scale import EPS, FACTOR
+from ..report.style import BLUE, GREEN, GREY, LINES, ORANGE, RED, WIDTH, plain, zero_at_the_end
 from ..robots import Robot
 
 ZERO_AT = 1e-3  # eps: where differences of exactly zero are drawn
@@ -23,7 +25,7 @@ SHOWN_POSTURES = 8  # in one figure
 HATCHES = (None, "///", "...", "xxx", "\\\\\\", "+++")  # of joints, for who prints in grey
 
 
-def draw_distances(result: Result, sample: str, quantities: list[str] | None = None) -> tuple[str, Figure, str]:
+def draw_distances(result: Result, sample: str, quantities: list[str] | None = None) -> tuple[str, Figure, Finding]:
     """Cumulative distributions of the differences between the engines, and of each from the exact value."""
     curves = result.curves[sample]
     label = result.label
@@ -74,7 +76,7 @@ def largest_of(curve: np.ndarray) -> float:
     return float(curve[-1]) if np.isfinite(curve[-1]) else np.inf
 
 
-def draw_condition(result: Result, robot: Robot) -> tuple[str, Figure, str]:
+def draw_condition(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     """Condition number of Mbar over the two joints of the robot's `conditioning`."""
     *angles, values = result.curves["condition"]
     first, second = np.degrees(angles)
@@ -96,7 +98,7 @@ def draw_condition(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     return "mass_condition", fig, result.finding("condition", joints=[x, y], zero=zero, maxima=maxima)
 
 
-def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str]:
+def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     """Holding torques of at most six joints, those with the largest, at the first eight named postures."""
     torques, speeds = result.curves["postures"], robot.coordinates.speeds
     postures = dict(list(torques.items())[:SHOWN_POSTURES])
@@ -131,3 +133,19 @@ def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str
         "unit": unit(robot.tree, "N m", "N"),
     }
     return "gravity_postures", fig, result.finding("postures", **caption)
+
+
+def draw_nearest(result: Result) -> tuple[str, Figure, Finding]:
+    """The share of the difference that remains after each of the best single corrections."""
+    names, left = zip(*result.curves["nearest"])
+    left = np.maximum(left, EPS)
+    fig = Figure(figsize=(WIDTH, 0.9 + 0.25 * len(names)), layout="constrained")
+    ax = fig.subplots()
+    explaining = {row["place"] for row in result.rows}
+    ax.barh(range(len(names)), left, color=[GREEN if name in explaining else GREY for name in names])
+    ax.set(xscale="log", xlim=(EPS / 3.0, 1.5), xlabel="remaining share of the difference", yticks=range(len(names)))
+    ax.set_yticklabels(map(plain, names))
+    ax.invert_yaxis()
+    looks = ((GREEN, "explains the difference down to rounding"), (GREY, "does not explain it"))
+    fig.legend(handles=[Patch(color=colour, label=name) for colour, name in looks], loc="outside upper center", ncols=2)
+    return "diagnosis_nearest", fig, result.finding("nearest", names=names[:2], left=left[:2].tolist())

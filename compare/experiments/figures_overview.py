@@ -47,15 +47,15 @@ def beyond_tolerance(ax: Axes, tolerance: float, text: str) -> None:
 
 def agreements(results: Mapping[str, Result]) -> list[dict]:
     """The largest differences of Mbar, h and accelerations over all states, eps, as far as they were compared."""
-    found = []
+    quantities = []
     for quantity, name in QUANTITIES.items():
         rows = [row for result in results.values() for row in result.rows if row.get("quantity") == quantity]
         label = next(iter(results.values())).label.lower()
         columns = {"apart": "difference_eps", "ours": f"{label}_from_exact_eps", "theirs": "mujoco_from_exact_eps"}
         if rows:
             largest = {key: largest_known([row.get(column) for row in rows]) for key, column in columns.items()}
-            found.append({"name": name, **largest, "passed": all(row["passed"] for row in rows)})
-    return found
+            quantities.append({"name": name, **largest, "passed": all(row["passed"] for row in rows)})
+    return quantities
 
 
 def pictures_of_agreement(results: Mapping[str, Result]) -> list[partial]:

@@ -14,11 +14,6 @@ def scene_begins(name: str, robot) -> str:
     return f"Scene {name}" if is_own else capital(name)
 
 
-def posture_begins(name: str, robot) -> str:
-    """A posture's name at the beginning of a sentence; the name of a file's keyframe stays as it is."""
-    return f"Posture {name}" if name in robot.positions else capital(name)
-
-
 def listed(words: Sequence[str]) -> str:
     """a, b and c."""
     return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))

@@ -1,4 +1,4 @@
-"""What explains a difference in Mbar, h and accelerations: of a robot's file and its reference, or of one's own equations."""
+"""What explains a difference in Mbar, h and accelerations: of a file's robot and its reference, or of the user's equations."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -9,19 +9,19 @@ import numpy as np
 import tmt
 from tmt import literal
 
-from ...diagnosis import STATES_ASKED, Diagnosis, Values, diagnose_stated, packed
-from ...diagnosis.cause import Cause
-from ...diagnosis.consistency import Condition, conditions
-from ...diagnosis.forces import causes_of_forces, force_left_over
-from ...engines.own import QUICK, OwnDynamics
-from ...judge.check import Result, over
-from ...judge.entries import Entries
-from ...judge.finding import Finding
-from ...judge.scale import EPS, FACTOR
-from ...report.text import say
-from ...robots import Robot
-from .. import Experiment
-from ..setup import Setup
+from ..diagnosis import STATES_ASKED, Diagnosis, Values, diagnose_stated, packed
+from ..diagnosis.cause import Cause
+from ..diagnosis.consistency import Condition, conditions
+from ..diagnosis.forces import causes_of_forces, force_left_over
+from ..engines.own import QUICK, OwnDynamics
+from ..judge.check import Result, over
+from ..judge.entries import Entries
+from ..judge.finding import Finding
+from ..judge.scale import EPS, FACTOR
+from ..report.text import say
+from ..robots import Robot
+from . import Experiment
+from .setup import Setup
 
 EXPERIMENT = Experiment(order=80, options=("--joints",))
 SECONDS = 8.0  # of a search
@@ -167,6 +167,6 @@ def headline(result: Result) -> Finding | None:
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     if result.curves["nearest"]:
-        from .figures_nearest import draw_nearest  # matplotlib is for the process that draws
+        from .figures import draw_nearest  # matplotlib is for the process that draws
 
         yield partial(draw_nearest, result)
