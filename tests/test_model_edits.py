@@ -43,7 +43,7 @@ NO_FORCE = "kinematics"  # no masses nor forces in positions, speeds and Jacobia
 NO_WEIGHT = "kinematics gravity"  # no inertia in the torque that holds
 NO_MASS = "kinematics mass"  # it is no part of M
 NOT_AT_REST = "kinematics mass published gravity"
-NOT_AT_ZERO = "kinematics mass published"  # where springs and servos are at rest
+NOT_AT_ZERO = "kinematics mass published reduction"  # where springs and servos are at rest, or joints are locked
 STANDS_STILL = OFF = f"kinematics {MOTION}"  # beside the arm; the file switches the constraint stage off
 MIRROR = MOTION  # M, torques and runs are those of the arm turned about beta the other way
 NO_PLACE = MOTION.replace("acceleration ", "")  # the equations do not depend on where the shoulder is
@@ -62,7 +62,7 @@ EDITS = {  # by quantity: what is replaced by what; the causes: rank, place, sta
     "anchor of all": ('name="upper_arm" pos="0 0 0"', 'name="upper_arm" pos="0 0 0.01"',
                       [(2, f"anchor z of {of}", at, at + 0.01) for of, at in (("alpha", 0), ("beta", 0), ("gamma", -0.3))],
                       NO_PLACE),
-    "damping": (BETA, f'{BETA} damping="0.1"', [(2, "damping of beta", 0, 0.1)], NOT_AT_REST),
+    "damping": (BETA, f'{BETA} damping="0.1"', [(2, "damping of beta", 0, 0.1)], f"{NOT_AT_REST} reduction"),
     "armature": (ALPHA, f'{ALPHA} armature="0.1"', [(2, "armature of alpha", 0, 0.1)], NO_WEIGHT),
     "frictionloss": (BETA, f'{BETA} frictionloss="0.2"', [(2, "frictionloss of beta", 0, 0.2)], OFF),
     "stiffness": (BETA, f'{BETA} stiffness="1"', [(2, "stiffness of beta", 0, 1)], NOT_AT_ZERO),
