@@ -125,7 +125,7 @@ def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     axes[0].plot([], [], color="black", linewidth=1, label="predicted by the linear map")
     axes[0].fill_between([], [], color=(GREY, 0.15), linewidth=0, label="perturbation by an error of the torque")
     fig.supxlabel(f"perturbation, {unit}", fontsize=9)
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=8)
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=8)
     values = departure_values(rows) | {"posture": saddle, "noun": robot.noun, "unit": unit, "left": LEFT}
     values |= {"rate": result.curves["rate at saddle"], "tolerance": DEPARTURE_TOLERANCE}
     return "stability_departure", fig, result.finding("figure_departure", **values)
