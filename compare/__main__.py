@@ -29,10 +29,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return answered("fleet.command", "fleet_status", arguments[1:])
     options = request(arguments)
     if options.version:
-        from .report.version import OURS, own_version  # what is imported takes its time
+        from .report.provenance import OURS, installed  # what is imported takes its time
 
         with suppress(OSError, ValueError, AttributeError):  # nobody may be there to read it
-            print(OURS, own_version(), flush=True)
+            print(OURS, installed(OURS), flush=True)
         return 0
     return answered("run.command", "carry_out", options, shlex.join(["python", "-m", "compare", *arguments]))
 

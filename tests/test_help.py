@@ -16,7 +16,7 @@ from compare.__main__ import main
 from compare.cli.command_line import LINE_WIDTH, OPTIONS, help_of, request
 from compare.experiments import EXPERIMENTS
 from compare.fleet.command import experiments_of, fleet_parser
-from compare.report import version
+from compare.report.provenance import OURS, installed
 from compare.robots.arm import ARM
 from compare.robots.scene_file import read_scenes
 
@@ -49,8 +49,8 @@ def test_the_help_of_an_experiment_has_its_parts_and_its_options(name, capsys):
 
 def test_the_version_is_that_of_a_report(capsys):
     assert main(["all", "--version"]) == 0
-    assert tuple(capsys.readouterr()) == (f"{version.OURS} {version.own_version()}\n", "")
-    assert re.fullmatch(r"\d+(\.\d+)+", version.own_version())
+    assert tuple(capsys.readouterr()) == (f"{OURS} {installed(OURS)}\n", "")
+    assert re.fullmatch(r"\d+(\.\d+)+", installed(OURS))
 
 
 @pytest.mark.parametrize("program, modules", [

@@ -107,13 +107,6 @@ def test_there_is_no_circle():
     TopologicalSorter({dotted(path): modules_imported(path) for path in FILES}).prepare()
 
 
-def test_the_package_list_has_every_folder():
-    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    listed = set(re.findall(r'"([\w.]+)"', re.search(r"packages = \[([^\]]*)\]", text)[1]))
-    folders = {dotted(file) for top in ("compare", "tmt") for file in (ROOT / top).rglob("__init__.py")}
-    assert listed == folders | {"mjcf"}
-
-
 def test_ci_runs_the_commands_of_the_readme():
     readme, script = ((ROOT / name).read_text(encoding="utf-8") for name in ("README.md", ".ci/run"))
     main_job, tests = re.findall(r"^(?:python3 -m venv|\.venv/bin/python).*$", readme, re.MULTILINE)[:2]

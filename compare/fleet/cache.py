@@ -12,7 +12,7 @@ from pathlib import Path
 from ..process import interrupt
 from ..process.crash import ROOT
 from ..report.folder import lock, what_is_wrong
-from ..report.version import installed
+from ..report.provenance import installed
 from .tasks import FleetError
 
 FOLDER = "cache"

@@ -14,10 +14,9 @@ from ..judge.check import ENDS, About, Check
 from ..judge.finding import Finding
 from ..judge.timing import vectors
 from ..process.streams import in_one_line
-from ..report.provenance import commit
+from ..report.provenance import OURS, commit, installed
 from ..report.text import say
 from ..report.verdict import Section, failures, unconfirmed_in_words, unstable_in_words, worst
-from ..report.version import OURS, installed, own_version
 from ..run.reference import SOLUTION, Reference
 from .cache import write_whole
 from .models import place_of_report
@@ -171,7 +170,7 @@ def write_table(
         "this machine": f"{platform.node()}, {vectors()}",
         "machines of the workers": ", ".join(sorted(run.machines)) or "none",
         "commit": commit(),
-        OURS: own_version(),
+        OURS: installed(OURS),
         "mujoco": installed("mujoco"),
     }
     write_whole(out / "fleet.csv", csv_of_fleet(rows).encode("utf-8", "backslashreplace"))

@@ -13,12 +13,10 @@ from markdown_it import MarkdownIt
 from ..experiments import EXPERIMENTS, Experiment
 from .images import embedded, moves
 from .motion import motion_in_html
-from .parts import Parts
 from .questions import answers
-from .shortened import shortened
-from .tables import closest_checks, heading, of_causes, origins, records, shown
+from .tables import closest_checks, heading, of_causes, origins, records, shortened, shown
 from .text import block, count, environment, sentence
-from .verdict import Report, Section, explained, failures, headline, outcome, passed, standing
+from .verdict import Parts, Report, Section, explained, failures, headline, outcome, passed, standing
 
 MOST_LINES = 300  # of report.md
 SIZES = 40, 16, 12, 8, 4, 2, 0  # rows of each table in report.md: the first with which it has so few lines

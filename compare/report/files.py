@@ -7,11 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from . import images
 from .document import Document, joined
 from .folder import files, save
-from .parts import Parts
-from .verdict import Report, passed
+from .verdict import Parts, Report, passed
 
 
 def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
@@ -36,7 +34,6 @@ def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
         text = parts.attempt(f"the head of {document.file}", None, document.text, body)
         if text is not None or document is markdown:
             save(folder / document.file, joined([*parts.lines, *body]) if text is None else text)
-    images.clear_webp(folder / "figures")
     reference = report.reference
     results = {
         "passed": passed(report.sections) and not parts.broken,

@@ -5,13 +5,14 @@ import os
 import platform
 import subprocess
 from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ..judge.timing import vectors
 from ..process.clock import Clock
 from ..process.streams import readable
-from .version import OURS, installed, own_version
 
+OURS = "arm-tmt-mujoco"
 PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka")
 PROGRAM_FILES = (":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml")  # changes elsewhere do not change the program
 
@@ -33,7 +34,7 @@ def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict:
         "cores": os.cpu_count(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
-        OURS: own_version(),
+        OURS: installed(OURS),
     } | {package: installed(package) for package in PACKAGES}
 
 
@@ -57,3 +58,11 @@ def commit() -> str | None:
     except (OSError, ValueError, subprocess.CalledProcessError):
         return None
     return head + (" with uncommitted changes" if changed else "")
+
+
+def installed(package: str) -> str | None:
+    """The version of an installed package, or None."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

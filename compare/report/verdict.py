@@ -1,13 +1,16 @@
-"""The outcome of a report: its sections, which checks fail, and what explains that."""
+"""The outcome of a report: its sections, which checks fail, what explains that, and which parts could not be made."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from ..experiments import EXPERIMENTS, Experiment
 from ..judge.check import ENDS, About, Check, Result
 from ..judge.finding import Finding
+from ..process.crash import described
 from .text import block, say
+
+Value = TypeVar("Value")
 
 SEEKS_CAUSES = "diagnosis"  # it compares nothing of its own: it says why others fail
 STATES_CAUSES = "parameters", SEEKS_CAUSES  # experiments whose failing checks are the causes
@@ -177,3 +180,29 @@ def headline(section: Section) -> str:
     shares = [check.over_tolerance for check in checks if check.over_tolerance is not None and check.passed]
     numbers = {"passed": sum(check.passed for check in checks), "checks": len(checks)}
     return say(Finding("verdict", "checks_passed", {**numbers, "share": max(shares, default=None)})) if checks else ""
+
+
+class Parts:
+    """The parts of a report that raised, by name, each with its error in one line."""
+
+    def __init__(self) -> None:
+        self.broken: dict[str, str] = {}
+
+    def attempt(self, name: str, otherwise: Value, make: Callable[..., Value], *arguments: object) -> Value:
+        """make(*arguments); if it raises, `otherwise`, and the part is listed as broken."""
+        try:
+            return make(*arguments)
+        except Exception as error:
+            self.broken.setdefault(name, described(error))
+            return otherwise
+
+    @property
+    def lines(self) -> list[str]:
+        return [say(Finding("verdict", "incomplete", {"name": name, "why": why})) for name, why in self.broken.items()]
+
+    @property
+    def checks(self) -> list[Check]:
+        return [
+            Check("report", "", f"{name} is complete", None, 0.0, "", why, rule="equal", about=About.PROGRAM)
+            for name, why in self.broken.items()
+        ]

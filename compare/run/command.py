@@ -25,8 +25,7 @@ from ..robots.scene_file import SceneError, read_scenes
 from .reference import Compared, compared_with
 
 if TYPE_CHECKING:
-    from ..report.parts import Parts
-    from ..report.verdict import Report, Section
+    from ..report.verdict import Parts, Report, Section
 
 COMPUTING = ("compare.run.examine", "scipy.optimize", "tmt.compiled.machine")  # modules that take long to load
 DRAWING = ("compare.report.style", *COMPUTING)
@@ -123,9 +122,8 @@ def write_report(
 ) -> tuple["Report", "Parts"]:
     """Write a report with its verdict to a folder that has its figures. The arguments are those of examine and of Report."""
     from ..report import files, verdict
-    from ..report.parts import Parts
 
-    parts, count = Parts(), len(EXPERIMENTS) - len(needless)
+    parts, count = verdict.Parts(), len(EXPERIMENTS) - len(needless)
     subject = compared.reference.compared, compared.robot.name
     words = parts.attempt("the verdict", "No verdict.", verdict.verdict, sections, count, causes, *subject)
     skipped = [*skipped, *needless.items()]

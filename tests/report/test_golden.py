@@ -12,7 +12,6 @@ from types import SimpleNamespace
 from compare.experiments import EXPERIMENTS, module
 from compare.report import images, verdict
 from compare.report.document import Document
-from compare.report.parts import Parts
 from compare.robots.arm import ARM
 from compare.run import drawing, examine
 
@@ -42,7 +41,7 @@ def report_of_arm(small, folder) -> str:
         section.figures, lost = drawing.draw(name, section.result, ARM, folder, others)
         assert lost == []
     report = verdict.Report(sections, ARM, {"command": "a small run"}, verdict.verdict(sections, len(EXPERIMENTS)))
-    document = Document(report, Parts())
+    document = Document(report, verdict.Parts())
     return document.text(document.body())
 
 

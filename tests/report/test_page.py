@@ -12,8 +12,7 @@ from sections import BAD, GOOD, section
 from compare.report import images
 from compare.report.document import OVERVIEW, Document
 from compare.report.files import write
-from compare.report.parts import Parts
-from compare.report.verdict import Report, verdict
+from compare.report.verdict import Parts, Report, verdict
 from compare.robots import Question
 from compare.robots.arm import ARM
 

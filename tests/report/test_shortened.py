@@ -4,9 +4,8 @@ from sections import BAD, GOOD, section
 
 from compare.experiments import EXPERIMENTS
 from compare.report.document import Document
-from compare.report.parts import Parts
-from compare.report.shortened import shortened
-from compare.report.verdict import Report
+from compare.report.tables import shortened
+from compare.report.verdict import Parts, Report
 from compare.robots.arm import ARM
 
 

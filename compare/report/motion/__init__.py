@@ -10,9 +10,9 @@ from string import Template
 
 import numpy as np
 
-from ..judge.words import scene_of
-from .text import block, say
-from .verdict import Section, failures
+from ...judge.words import scene_of
+from ..text import block, say
+from ..verdict import Section, failures
 
 MOST_BYTES = 280_000  # of the motion in the page
 STICK_BYTES = 48  # of a stick in the picture without script
