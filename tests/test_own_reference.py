@@ -148,7 +148,7 @@ BROKEN = "x = 1\ndef mass_matrix(q:\n"
     ("nowhere/mine.py:Object", "nowhere/mine.py"), ("mne:Object", "mine"), ("no such:Object", "'no such'"),
     (":Object", "':Object'"), ("./:Object", "folder"), ("mine.py:inside.alsso", "known: also"),
     ("broken.py:", "broken.py, line 2: SyntaxError"), ("broken:", "broken, line 2: SyntaxError"),
-    ("leaving.py:x", "leaving.py, line 2: SystemExit: 3"), ("mine.py:Needing", "takes mass"),
+    ("leaving.py:x", "leaving.py, line 2: SystemExit: 3"), ("mine.py:Needing", "'mass'"),
     ("mine.py:&--joints&-hip,ankle", "'ankle'"),
 ])  # fmt: skip
 def test_a_bad_reference_gets_one_line_and_status_2(folder, capsys, asked, word):

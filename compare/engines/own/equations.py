@@ -30,8 +30,6 @@ from .functions import (
 
 SKEW = 1e-9  # of the largest entry: a mass matrix with a larger asymmetry is reported as not symmetric
 DIVERGED = 2.0**49  # rad etc.: beyond it a run has diverged, and errors are not those of the equations
-AT_ONCE = 1.5  # times the time of one state: where two or three at once take no more, many do not either
-TIMED, SLOW = 64, 0.01  # states of a batch that is timed, unless two or three states take as long as SLOW, s
 
 
 class OwnEquations:
@@ -58,7 +56,7 @@ class OwnEquations:
             self.joints = joints or joint_map(coordinates, names_of(source))
         except JointsError as error:
             raise OwnError(f"joint_names: {error}") from None
-        # of each function that was called: whether it takes batches; the time of one state and of one more, s; its shape
+        # of each function that was called: whether it takes batches; the time of one state, alone and in a batch, s; its shape
         self.takes_batches: dict[str, bool] = {}
         self.times, self.shapes = {}, {}
         self.errors: dict[tuple[str, str], list] = {}  # (quantity, error): [first state, text, number of states]
@@ -188,7 +186,7 @@ class OwnEquations:
     def first(self, name: str, given: list[np.ndarray]) -> None:
         """Call a function at one state (OwnError if it fails), then find out whether it takes batches."""
         count = 3 if self.coordinates.nv == 2 else 2  # not as many as there are joints
-        singles, took = [], []
+        singles, times = [], []
         for i in range(min(count, len(given[0]))):
             state = [part[i] for part in given]
             started = time.perf_counter()
@@ -198,32 +196,27 @@ class OwnEquations:
                 if i:  # it will be raised again, and noted
                     break
                 raise OwnError(f"{error}, at {state_in_words(state)}") from error
-            took.append(time.perf_counter() - started)
+            times.append(time.perf_counter() - started)
             self.shapes[name] = singles[0].shape
-        single = more = min(took)
+        self.times[name] = min(times), min(times)
         if len(singles) == count:
-            together, seconds = self.tried_together(name, [part[:count] for part in given])
+            started = time.perf_counter()
+            together = self.tried_together(name, [part[:count] for part in given])
             if together is not None and same(together, np.array(singles)):
                 self.takes_batches[name] = True
-                more = 0.0 if seconds <= AT_ONCE * single else seconds / count
-                if seconds < SLOW:
-                    many = [part[:TIMED] for part in given]
-                    more = self.tried_together(name, many)[1] / len(many[0])
+                self.times[name] = min(times), (time.perf_counter() - started) / count
         if len(given[0]) > 1:  # else another time
             self.takes_batches.setdefault(name, False)
-        self.times[name] = single, more
 
-    def tried_together(self, name: str, given: list[np.ndarray]) -> tuple[np.ndarray | None, float]:
-        """Values of several states at once, None if it does not take batches; and the time, s."""
+    def tried_together(self, name: str, given: list[np.ndarray]) -> np.ndarray | None:
+        """Values of several states at once; None if it does not take batches."""
         before = {key: list(value) for key, value in self.errors.items()}
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore")
-                started = time.perf_counter()
-                values = self.called(name, given, len(given[0]))
-                return values, time.perf_counter() - started
+                return self.called(name, given, len(given[0]))
         except OwnError:
-            return None, 0.0
+            return None
         finally:
             self.errors = before  # it need not take batches
 
