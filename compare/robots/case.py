@@ -110,33 +110,34 @@ class Case:
 
     def __post_init__(self):
         names, scene, whole = self.robot.joints, self.scene, self.robot.coordinates
-        kinds = list(dict.fromkeys(whole.all_kinds))
-        units = ", ".join({"ball": "a quaternion"}.get(kind, KINDS[kind].position_given) for kind in kinds)
 
-        def require_each(name: str, count: int, each: tuple, unit: str, or_none: bool = False) -> None:
-            value = getattr(scene, name)
-            accepted = f"{count} numbers, one per joint ({some(each)}), in {unit}"
-            scene.require(name, len(value) == count or (or_none and value == ()), accepted)
+        def numbers(each: tuple, unit: str) -> str:
+            units = ", ".join(dict.fromkeys(unit.format(KINDS[kind]) for kind in whole.all_kinds))
+            return f"{len(each)} numbers, one per joint ({some(each)}), in {units}"
 
+        count = numbers(whole.positions, "{0.position_given}")
         if isinstance(scene.posture, str):
-            count = f"{whole.nq} numbers, one per joint ({some(whole.positions)}), in {units}"
             named = self.robot.postures or self.robot.positions
             postures = [name for name, q in self.robot.poses.items() if len(q) == whole.nq and named]
-            accepted = f"{', '.join(postures)} or {count}" if postures else count
-            scene.require("posture", scene.posture in postures, accepted)
-        else:
-            require_each("posture", whole.nq, whole.positions, units, or_none=True)
-            for joint in whole.places.balls if scene.posture else ():
+            scene.require(
+                "posture", scene.posture in postures, " or ".join([*filter(None, [", ".join(postures)]), count])
+            )
+        elif scene.posture:
+            scene.require("posture", len(scene.posture) == whole.nq, count)
+            for joint in whole.places.balls:
                 is_unit = abs(np.linalg.norm(scene.posture[joint.q]) - 1.0) <= CLOSE_TO_ONE
                 scene.require("posture", is_unit, "a quaternion w, x, y, z of length 1 for each ball")
-        if not isinstance(scene.torque, str):
-            require_each("torque", whole.nv, whole.speeds, "N m")
-        require_each("speed", whole.nv, whole.speeds, "deg/s", or_none=True)
-        if isinstance(scene.damping, tuple):
-            require_each("damping", whole.nv, whole.speeds, "N m s/rad")
-        if isinstance(scene.targets, tuple) or (scene.targets and len({*kinds} - {"ball"}) > 1):
-            is_right = isinstance(scene.targets, tuple) and len(scene.targets) == whole.nv
-            scene.require("targets", is_right, f"{whole.nv} numbers, one per joint ({some(whole.speeds)}), in {units}")
+        for name, unit in (
+            ("torque", "{0.force}"),
+            ("speed", "{0.speed_given}"),
+            ("damping", "{0.force} s/{0.unit}"),
+            ("targets", "{0.movement_given}"),
+        ):
+            value = getattr(scene, name)
+            is_each = isinstance(value, tuple) and (value or name != "speed")
+            scene.require(name, not is_each or len(value) == whole.nv, numbers(whole.speeds, unit))
+        mixed = len({*whole.all_kinds} - {"ball"}) > 1 and isinstance(scene.targets, float) and scene.targets
+        scene.require("targets", not mixed, numbers(whole.speeds, "{0.movement_given}"))
         if scene.torque == "servos":
             acts = any(u is not None for u in self.controller.controls)
             scene.require("torque", acts, "free, hold or numbers: this robot has no actuator that takes part")

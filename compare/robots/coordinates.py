@@ -12,9 +12,8 @@ from tmt.model import coordinates
 
 
 class Kind(NamedTuple):
-    """A kind of joint: its nouns and units."""
+    """A kind of joint: its units."""
 
-    plural: str
     speeds: int  # number of speeds
     unit: str  # of a movement; speeds: per s
     force: str  # unit
@@ -24,9 +23,9 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "hinge": Kind("hinges", 1, "rad", "N m", "deg", "deg/s", "deg"),
-    "slide": Kind("slides", 1, "m", "N", "m", "m/s", "m"),
-    "ball": Kind("balls", 3, "rad", "N m", "quaternions", "deg/s", "deg"),
+    "hinge": Kind(1, "rad", "N m", "deg", "deg/s", "deg"),
+    "slide": Kind(1, "m", "N", "m", "m/s", "m"),
+    "ball": Kind(3, "rad", "N m", "quaternions", "deg/s", "deg"),
 }
 
 

@@ -6,16 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from . import Robot
-from .case import KINDS, TORQUES, Case, Scene
-from .validation import WrongField, are_numbers, is_number, shorten, some
+from .case import Case, Scene
+from .validation import WrongField, are_numbers, is_number, shorten
 
 KEYS = ("name", "posture", "q", "speed", "torque", "targets", "gravity", "damping", "locked", "duration", "dt")
-UNITS = {
-    "q": "position_given",
-    "speed": "speed_given",
-    "torque": "force",
-    "targets": "movement_given",
-}  # fields of a Kind
 STEPS = 64  # of a scene without dt
 NEARLY_ONE = 1e-3  # accepted deviation of the length of a quaternion from 1, for few digits
 
@@ -73,16 +67,10 @@ def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
         raise SceneError(f"{where}: both posture and q are given; expected one of them")
     if not isinstance(entry.get("posture", ""), str):
         raise refuse("posture", f"one of {', '.join(robot.poses)}; numbers are given as q")
-    for key in values.keys() & UNITS.keys():
-        value, each = values[key], robot.coordinates.positions if key == "q" else robot.coordinates.speeds
-        is_word = key == "torque" and value in TORQUES
-        if is_word or (key == "targets" and is_number(value)) or (are_numbers(value) and len(value) == len(each)):
-            continue
-        units = ", ".join(dict.fromkeys(getattr(KINDS[kind], UNITS[key]) for kind in robot.tree.kind))
-        count = f"{len(each)} numbers, one per joint ({some(each)}), in {units}"
-        raise refuse(key, f"free, hold, servos, or {count}" if key == "torque" else count)
+    if isinstance(entry.get("q"), str):
+        raise refuse("q", f"{robot.coordinates.nq} numbers, one per joint")
     if "q" in values:
-        values["posture"] = with_unit_quaternions(where, entry["q"], values.pop("q"), robot)
+        values["posture"] = with_unit_quaternions(where, values.pop("q"), robot)
     if "duration" in values and "dt" not in values:
         if not is_number(values["duration"]):
             raise refuse("duration", "a time in s above 0")
@@ -97,18 +85,18 @@ def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
         raise SceneError(f"{where}: {' '.join(str(error).split())}") from None
 
 
-def with_unit_quaternions(where: str, given: list, q: tuple, robot: Robot) -> tuple:
+def with_unit_quaternions(where: str, q: object, robot: Robot) -> object:
     """A position with normalized quaternions; SceneError if the length of one is not nearly 1."""
-    q = np.array(q, dtype=float)
+    if not are_numbers(q) or len(q) != robot.coordinates.nq:
+        return q
+    position = np.array(q, dtype=float)
     for name, (kind, at, _) in zip(robot.joints, robot.coordinates.places.joints):
-        if kind == "ball":
-            length = float(np.linalg.norm(q[at]))
-            if not abs(length - 1.0) <= NEARLY_ONE:
-                raise SceneError(
-                    f"{where}: q is {in_toml(given)}; the quaternion of {name} has length {length:.6g}, expected 1"
-                )
-            q[at] /= length
-    return tuple(map(float, q))
+        length = float(np.linalg.norm(position[at])) if kind == "ball" else 1.0
+        if not abs(length - 1.0) <= NEARLY_ONE:
+            text = f"q is {in_toml(q)}; the quaternion of {name} has length {length:.6g}, expected 1"
+            raise SceneError(f"{where}: {text}")
+        position[at] /= length
+    return tuple(map(float, position))
 
 
 def in_toml(value: object) -> str:
