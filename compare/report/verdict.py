@@ -77,16 +77,18 @@ def failures(sections: Sequence[Section]) -> Failures:
 
 
 def explained(section: Section, causes: Sequence[dict]) -> list[Check]:
-    """The failing checks that a known cause explains: comparisons of the models, in and after the experiment that shows it.
+    """The failing checks that a known cause explains, in and after the experiment that shows it.
 
-    A cause explains an experiment if it is one option, convention or number (rank 1 or 2) on which the experiment depends. It
-    explains nothing that broke off, no unstable step and no prediction.
+    They are comparisons of the models, and predictions, which are computed for the stated numbers. A cause explains an experiment
+    if it is one option, convention or number (rank 1 or 2) on which the experiment depends. It explains nothing that broke off,
+    and no unstable step.
     """
     order = EXPERIMENTS.get(section.name, Experiment(0)).order
     for cause in causes if section.name not in STATES_CAUSES else ():
         is_earlier = EXPERIMENTS.get(cause.get("experiment"), Experiment(0)).order <= order
         if cause.get("rank", 3) <= 2 and is_earlier and depends_on(section.name, cause.get("quantity")):
-            return failures([section]).differing
+            failed = failures([section])
+            return failed.differing + failed.unconfirmed
     return []
 
 
@@ -126,7 +128,9 @@ def verdict(
     experiments: how many there are in all; compared: what agrees or differs; robot: its name.
     """
     checked = [section for section in sections if section.result.checks]
+    consequences = [check for section in sections for check in explained(section, causes)]
     also = failures(checked)
+    also = also._replace(unconfirmed=[check for check in also.unconfirmed if check not in consequences])
     checks = [check for section in checked for check in section.result.checks]
     top = worst(checked)
     named = {check.experiment for check in also.differing} - {SEEKS_CAUSES}
@@ -144,7 +148,7 @@ def verdict(
         also=also,
         top=top if top and top.value and not any(also) else None,
         causes=causes,
-        consequences=sum(len(explained(section, causes)) for section in sections),
+        consequences=len(consequences),
         first=also.differing[0] if also.differing else None,
     )
     return "\n".join(filter(None, map(str.strip, lines.split("\n"))))

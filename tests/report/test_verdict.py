@@ -75,8 +75,8 @@ def test_a_cause_explains_comparisons_that_depend_on_it_from_its_experiment_on_a
     of = section(
         name, GOOD, BAD, *(("what", 2.0, 1.0, "at most", False, about) for about in About if about != About.MODELS)
     )
-    assert [check.about for check in explained(of, [found])] == [About.MODELS] * count
-    assert explained(of, []) == [] and len(explained(of, [cause(3), found])) == count
+    assert [check.about for check in explained(of, [found])] == [About.MODELS, About.PREDICTION] * count
+    assert explained(of, []) == [] and len(explained(of, [cause(3), found])) == 2 * count
 
 
 def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagree():
@@ -101,7 +101,7 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
     say_outcome(said, section("mass", *[BAD] * 7, GOOD), 1.0, [{"text": "mass of forearm: stated 1"}])
     assert said[1].split()[1:5] == ["7", "FAILED", "8", "checks"] and said[2] == "  CAUSE mass of forearm: stated 1"
     assert [line.startswith("  FAIL mass: Mbar, zero: 2 kg m2") for line in said[3:]] == [True] * 4 + [False]
-    wrong = ("what", 2.0, 1.0, "at most", False, About.PREDICTION)
+    wrong = ("what", 2.0, 1.0, "at most", False, About.PROGRAM)
     del said[:]
     say_outcome(said, section("mass", *[BAD] * 7, wrong), 1.0, [], [cause()])
     assert [line.startswith("  FAIL mass: what") for line in said] == [False, True] and " 7 explained" in said[0]

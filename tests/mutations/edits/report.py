@@ -13,7 +13,7 @@ EDITS = (
     Edit("verdict", "outcome", "sum(map(len, of_kinds))", "0", "a section whose checks fail passes"),
     Edit("verdict", "explained", "_1.order <= order", "True", "a cause explains what failed before it was found"),
     Edit("verdict", "explained", "cause.get('rank', 3) <= 2", "True", "a cause of two numbers explains a failing check"),
-    Edit("verdict", "explained", "failures([section]).differing", "[c for c in section.result.checks if not c.passed]",
+    Edit("verdict", "explained", "failed.differing + failed.unconfirmed", "[c for c in section.result.checks if not c.passed]",
          "a cause explains a prediction that no run confirms"),
     Edit("verdict", "depends_on", "quantity in DEPENDS_ON.get(*_1)", "True", "a mass explains that bodies move differently"),
     Edit("questions", "largest", "max(rows, key=_1)", "min(rows, key=_1)", "the smallest difference is the answer"),
