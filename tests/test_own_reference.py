@@ -92,7 +92,7 @@ def test_trajectories_are_those_of_rk4(folder):
     run = examined(folder, "mine.py:Object", ["trajectory"])
     assert run.sections[0].result.checks and not run.failed
     found = {(row["engine_integrator"], row["level"]) for row in run.sections[0].result.rows}
-    assert found == {("RK4", level) for level in ("derivative", "one step", "open loop")}
+    assert found == {("RK4", level) for level in ("one step", "open loop")}
 
 
 def test_slow_equations_get_fewer_states_no_scenes_and_a_cause(folder):

@@ -1,22 +1,28 @@
 """Motion by the same scheme on both sides: a method of tmt for every integrator of MuJoCo."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
-from ...engines import LABELS, Engine, methods_in
+import numpy as np
+
+from ...engines import LABELS, Engine
 from ...engines.mujoco.names import INTEGRATORS
-from ...judge.check import Result
+from ...judge.check import Result, largest_known
+from ...judge.finding import Finding
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES, leaves_no_digits, movement_unit
 from ...robots import Robot
+from ...robots.case import Case
+from ...truth.reference import reference
 from .. import Experiment
 from ..setup import Setup
-from . import many_digits, motion, true_motion
-from .first_screen import headline as headline
-from .plan import begin
-from .rules import compare_derivatives
+from . import energy, motion, true_motion
+from .runs import follow, recorded
 
 EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=True, overview="scenes")
+SECONDS_OF_OWN = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all runs of a user's own equations together, about
+OVERHEAD_OF_OWN = 1e-4  # s of an evaluation in a run, about, beyond the equations themselves
+STAGES_OF_RK4 = 4  # evaluations in a step of RK4
 
 
 def claim_values(robot: Robot) -> dict:
@@ -28,8 +34,45 @@ def skipped(robot: Robot) -> str | None:
     return leaves_no_digits(robot)
 
 
+def begin(setup: Setup) -> None:
+    """Start the long work, in parallel, while other experiments compute. A quick run takes fewer scenes."""
+    robot, engines = setup.robot, setup.engines
+    cases = [case for case in robot.cases if not (setup.is_quick and "full only" in case.scene.tags)]
+    spread, finer, left_out = setup.map, setup.finer, []
+    if robot.own:  # whose equations stay in this process
+        spread, finer = map, setup.finer[:1]
+        cases, left_out = within_time(setup, cases)
+    true = [case for case in cases if true_motion.has_reference(case)]
+    steps = setup.of(energy.STEPS, energy.FEW_STEPS, energy.FEW_STEPS)
+    setup.background["trajectory"] = {
+        "runs": spread(partial(follow, engines=engines, finer=finer), cases),
+        "energy": spread(partial(energy.measure_energy, engines=engines, steps=steps), [robot]),
+        "true": ([case.name for case in true], spread(reference, true)),
+        "left_out": left_out,
+    }
+
+
+def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], list[Finding]]:
+    """The scenes that a user's own equations have and can follow in time, and a finding about the others."""
+    equations, seconds = setup.engines["own"].equations, SECONDS_OF_OWN[setup.size]
+    parts = ("acceleration",) if equations.has("acceleration") else ("mass_matrix", "bias")
+    each = OVERHEAD_OF_OWN + sum(equations.times[part][0] for part in parts)
+    able, unlike, slow, left = [], [], [], seconds
+    for case in cases:
+        if case.controller or not case.scene.gravity:
+            unlike.append(case.name)
+            continue
+        left -= each * STAGES_OF_RK4 * (case.steps + recorded(case))
+        if left >= 0.0:
+            able.append(case)
+        else:
+            slow.append(case.name)
+    values = {"unlike": unlike, "slow": slow, "seconds": seconds}
+    return able, [Finding("trajectory", "own_left_out", values)] if unlike or slow else []
+
+
 def rows(setup: Setup) -> Result:
-    """Each scene, integrator and step: three levels of agreement; then drift, errors, many digits."""
+    """Each scene, integrator and step: single steps and open loop; then departures, errors and the drift of the energy."""
     robot = setup.robot
     result = Result("trajectory", label=LABELS[robot.compared[0]], shown=[
         "scene", "engine_integrator", "dt_s", "level", "largest_difference", "unit", "difference_over_band",
@@ -38,66 +81,57 @@ def rows(setup: Setup) -> Result:
     if "trajectory" not in setup.background:
         begin(setup)
     work = setup.background.pop("trajectory")
-    if not robot.own:
-        compare_derivatives(result, robot, setup.engines)
-    (drifts,) = work["drift"]
-    result.checks, result.notes = [*result.checks, *drifts.checks], [*result.notes, *drifts.notes]
-    result.curves |= drifts.curves | {"runs": {}, "drawn": []}
-    for part, drawn in work["runs"]:
+    (drifts,) = work["energy"]
+    result.checks, result.tables["energy"] = drifts.checks, drifts.tables["energy"]
+    runs = result.curves["runs"] = {}
+    for part in work["runs"]:
         result.rows += part.rows
         result.checks += part.checks
-        result.notes += part.notes
-        result.curves["runs"] |= part.curves
-        result.curves["drawn"] += [drawn] if drawn else []
-    result.curves["drawn"] = motion.in_order(result.curves["drawn"], robot)
-    motion.tabulate_motion(result, robot)
-    many_digits.many_digits(result, *work["exact"])
-    others, result.notes = result.notes, []
+        runs |= part.curves
+    with np.errstate(over="ignore", invalid="ignore"):  # in runs that diverge
+        drawn = [motion.drawn_motion(case, runs) for case in robot.cases]
+    result.curves["drawn"] = motion.in_order([each for each in drawn if each], robot)
     true_motion.find_departures(result, robot, setup.engines)
     true_motion.find_errors(result, robot, dict(zip(*work["true"])))
     find_schemes(result, robot, setup.engines["mujoco"])
-    result.notes += work["left_out"] + others
+    result.notes += work["left_out"]
     return result
 
 
 def find_schemes(result: Result, robot: Robot, mujoco: Engine) -> None:
-    """Which integrators are which scheme, also where a robot's own actuators act, and which have none."""
+    """Which integrators are which scheme, which have none, and which of a robot's own actuators are left out."""
+    schemes = {}
+    for method in mujoco.methods.values():
+        schemes.setdefault(method.scheme, []).append(method.name)
     missing = [] if robot.own else [name for name in INTEGRATORS if name not in mujoco.methods]
-    result.find("schemes", own=robot.own, schemes=names_by_scheme(mujoco.methods), missing=missing, noun=robot.noun)
+    result.find("schemes", own=robot.own, schemes=schemes, missing=missing, noun=robot.noun)
     ran = {scene for scene, *_ in result.curves["runs"]}
     driven = [case for case in robot.cases if case.controller and case.name in ran]
     if driven:
-        schemes, left_out = names_by_scheme(methods_in(mujoco, driven[0])), driven[0].controller.left_out
-        scenes = [case.name for case in driven]
-        result.find("servos", noun=robot.noun, scenes=scenes, schemes=schemes, left_out=dict(left_out))
+        scenes, left_out = [case.name for case in driven], dict(driven[0].controller.left_out)
+        result.find("servos", noun=robot.noun, scenes=scenes, left_out=left_out)
 
 
-def names_by_scheme(methods: dict) -> dict[str, list[str]]:
-    """The integrators of each scheme."""
-    names = {}
-    for method in methods.values():
-        names.setdefault(method.scheme, []).append(method.name)
-    return names
+def headline(result: Result) -> Finding | None:
+    """The largest share of the band of rounding, and the number of scenes."""
+    share = largest_known([row["difference_over_band"] for row in result.rows])
+    scenes = len({row["scene"] for row in result.rows})
+    return None if share is None else result.finding("headline", scenes=scenes, share=share)
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    """Those of the assignment that show a held posture, one for each scene, drift, and the motion."""
+    """The assignment's figures of held postures, one figure for each scene, and the motion."""
     from . import figures_motion_gif, figures_runs  # matplotlib is for the process that draws
 
-    most = {}  # steps of a scene's runs
-    for scene, _, steps in result.curves["runs"]:
-        most[scene] = max(steps, most.get(scene, 0))
-    cases = [case for case in robot.cases if case.name in most]
+    ran = {scene for scene, *_ in result.curves["runs"]}
+    cases = [case for case in robot.cases if case.name in ran]
     numbers = robot.claims.figures if robot.claims else {}
-    numbered = [case for case in cases if case.is_held and case.name in numbers]
-    for case in numbered:
-        yield partial(figures_runs.draw_held, result, case, numbers[case.name])
     for case in cases:
-        if case not in numbered or most[case.name] > case.steps:  # a quick run has nothing more to show of those
-            yield partial(figures_runs.draw_run, result, case)
-    if result.curves["drift"]["drifts"]:
-        yield partial(figures_runs.draw_drift, result)
-    if result.curves.get("drawn"):
+        if case.is_held and case.name in numbers:
+            yield partial(figures_runs.draw_held, result, case, numbers[case.name])
+    for case in cases:
+        yield partial(figures_runs.draw_run, result, case)
+    if result.curves["drawn"]:
         yield partial(figures_motion_gif.draw_motion, result)
 
 

@@ -1,15 +1,47 @@
-"""The picture of trajectory on the first screen."""
+"""The picture of trajectory on the first screen: its scenes."""
+
+from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from ...judge.check import Result
+from ...judge.check import About, Result, largest_known
 from ...judge.finding import Finding
+from ...judge.words import scene_of
 from ...report.style import BLUE, GREY, ORANGE, RED, plain
 from ...robots import Robot
 from ..figures_overview import MOST_ROWS, beyond_tolerance, chart, named_rows
-from .first_screen import caption, scene_runs
 
 LEAST_SHARE, MOST_SHARE = 1e-4, 1e3  # of a band
+
+
+class SceneRun(NamedTuple):
+    """One scene: the runs of all integrators and steps together."""
+
+    name: str
+    share: float | None  # the largest difference over its band of rounding; None: no number
+    judged: tuple[float, float]  # s, the shortest and the longest time to which a run is judged
+    duration: float  # s
+    diverged: float | None  # s, the earliest time at which a run of MuJoCo diverges
+    left: tuple[float | None, ...]  # s, when each engine leaves a held posture; (): not held
+    passed: bool
+
+
+def scene_runs(result: Result, robot: Robot) -> list[SceneRun]:
+    """The scenes in their order."""
+    names = {row["scene"] for row in result.rows}
+    failing = [check.scene for check in result.checks if not check.passed and check.about == About.MODELS]
+    scenes = []
+    for case in (case for case in robot.cases if case.name in names):
+        rows = [row for row in result.rows if row["scene"] == case.name]
+        until = [row["judged_until_s"] for row in rows]
+        diverged = [row["diverged_at_s"] for row in rows if row["diverged_at_s"] is not None]
+        curve = result.curves["runs"].get((case.name, "rk4", case.steps))
+        left = tuple(curve["left"].values()) if curve and case.is_held else ()
+        passed = not any(scene_of(where, [*names]) == case.name for where in failing)
+        share = largest_known([row["difference_over_band"] for row in rows])
+        judged, first = (min(until), max(until)), min(diverged, default=None)
+        scenes.append(SceneRun(case.name, share, judged, case.duration, first, left, passed))
+    return scenes
 
 
 def draw_scenes(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
@@ -19,6 +51,7 @@ def draw_scenes(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     shown = [scene for scene in scenes if scene in wrong_first]
     fig, (left, right) = chart(2, sharey=True, width_ratios=(1.15, 1))
     most = 10.0 if all(scene.passed for scene in scenes) else MOST_SHARE
+    marks = {}  # what ends a run: a mark, by its label
     for place, scene in enumerate(shown):
         colour = "black" if scene.passed else RED
         if scene.share is not None:
@@ -28,11 +61,13 @@ def draw_scenes(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
         right.barh(place, scene.duration, height=0.5, color=(GREY, 0.2))
         right.barh(place, scene.judged[1], height=0.5, color=(BLUE, 0.4))
         right.barh(place, scene.judged[0], height=0.5, color=BLUE)
-        if scene.diverged is not None:
-            right.plot(scene.diverged, place, "x", color=RED, markersize=5, markeredgewidth=1.5)
-        for mark, colour, time in zip("os", ("white", ORANGE), scene.left or (None, None)):
+        ends = {"diverges": ("X", RED, scene.diverged)}
+        for name, mark, colour, time in zip((result.label, "MuJoCo"), "os", ("white", ORANGE), scene.left):
+            ends[f"{name} leaves"] = mark, colour, time
+        for label, (mark, colour, time) in ends.items():
             if time is not None:
-                right.plot(time, place, mark, color=colour, markersize=4.5, markeredgecolor="black")
+                look = {"color": colour, "markersize": 4.5, "markeredgecolor": "black", "linestyle": "none"}
+                (marks[label],) = right.plot(time, place, mark, label=label, **look)
     beyond_tolerance(left, 1.0, "1")
     left.set(xscale="log", xlim=(LEAST_SHARE, most), xlabel="difference / band")
     left.set_xticks([1e-4, 1e-2, 1.0])
@@ -43,13 +78,12 @@ def draw_scenes(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     right.grid(axis="y", visible=False)
     bars = ((BLUE, "judged"), ((BLUE, 0.4), "judged at some dt"), ((GREY, 0.2), "not judged"))
     handles = [right.barh(-9, 1, color=colour, label=text) for colour, text in bars]
-    if any(scene.diverged is not None for scene in shown):
-        handles += right.plot([], [], "x", color=RED, markeredgewidth=1.5, label="diverges")
-    for k, (mark, colour, name) in enumerate((("o", "white", result.label), ("s", ORANGE, "MuJoCo"))):
-        if any(scene.left and scene.left[k] is not None for scene in shown):
-            look = {"color": colour, "markersize": 4.5, "markeredgecolor": "black", "linestyle": "none"}
-            handles += right.plot([], [], mark, label=f"{name} leaves", **look)
     left.set_ylim(len(shown) - 0.4, -0.6)
-    fig.legend(handles=handles, loc="outside upper center", ncols=5, fontsize=7, handletextpad=0.3, columnspacing=0.7,
-               handlelength=1.0)  # fmt: skip
-    return "overview_scenes", fig, caption(result, scenes)
+    look = {"ncols": 5, "fontsize": 7, "handletextpad": 0.3, "columnspacing": 0.7, "handlelength": 1.0}
+    fig.legend(handles=[*handles, *marks.values()], loc="outside upper center", **look)
+    share = largest_known([scene.share for scene in scenes])
+    failing = [scene.name for scene in scenes if not scene.passed]
+    times = [time for scene in scenes for time in scene.judged]
+    values = {"label": result.label, "share": share, "scenes": len(scenes), "failing": failing}
+    caption = result.finding("overview_caption", **values, shortest=min(times), longest=max(times))
+    return "overview_scenes", fig, caption

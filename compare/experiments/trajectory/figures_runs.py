@@ -1,7 +1,6 @@
-"""Figures of runs: positions and speeds against time, the engines' difference and its band; drift against the step."""
+"""Figures of runs: positions and speeds against time, the engines' difference and its band."""
 
 from collections.abc import Sequence
-from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,14 +9,12 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from ...engines import LABELS
-from ...judge.check import Result
+from ...judge.check import Result, largest_known
 from ...judge.finding import Finding
 from ...judge.run import LEFT, moved_from, movement_unit, step_in_words
-from ...judge.scale import EPS
 from ...judge.words import scene_begins
-from ...report.style import BLUE, GREY, LINES, ORANGE, WIDTH, file_name, plain, zero_at_the_end
+from ...report.style import GREY, LINES, ORANGE, WIDTH, file_name, plain, zero_at_the_end
 from ...robots.case import Case
-from .drift import DRIFT_DURATION, drift_order
 from .true_motion import difference_while_judged
 
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
@@ -26,7 +23,6 @@ LONG = 14  # letters of a joint's name
 NOT_JUDGED = {"color": (GREY, 0.2), "linewidth": 0}
 MOST_LINES = len(LINES)  # of joints in a panel
 LEVEL = 1e-6  # of a position: a smaller change is not seen in a panel
-SCHEME_LINES = dict(zip(("semi_implicit_euler", "implicit", "rk4"), LINES))  # colour and dash
 
 
 def draw_held(result: Result, case: Case, number: int) -> tuple[str, Figure, Finding]:
@@ -71,7 +67,7 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, Finding]:
         draw_difference(column[2], c, case, result.label)
     values = np.concatenate([line.get_ydata() for ax in axes[2] for line in ax.lines])
     values = values[np.isfinite(values)]
-    if zeros := bool((values <= DRAWN_ZERO).any()):
+    if (values <= DRAWN_ZERO).any():
         zero_at_the_end(axes[2, 0].yaxis, DRAWN_ZERO, values.max(), most=6)
     place, speed = ("angle", "rate") if unit == "rad" and not case.coordinates.has_balls else ("position", "speed")
     label_axis(axes[0, 0], place, unit)
@@ -79,27 +75,21 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, Finding]:
     axes[2, 0].set_ylabel(f"{place}: difference, {unit}" if unit == "rad" else f"difference, {unit}")
     fig.align_ylabels(axes[:, 0])
     add_legend(fig, axes, any(len(case.coordinates.speeds[i]) > LONG for i in shown))
-    return file_name("trajectory", case.name), fig, run_caption(result, case, columns, len(shown), zeros)
+    return file_name("trajectory", case.name), fig, run_caption(result, case, columns, len(shown))
 
 
 def draw_difference(ax: Axes, c: dict, case: Case, label: str) -> None:
-    """The engines' difference in a run, its band, and the difference that a start off by eps makes."""
+    """The engines' difference in a run, and its band."""
     ours, theirs = (until_diverged(c, name, c[name][0]) for name in case.robot.compared)
     difference = moved_from(ours, theirs, case.coordinates).max(axis=1)
-    from_perturbed = moved_from(ours, c["perturbed"], case.coordinates).max(axis=1)
     band = np.where(c["band"] < 1e3, c["band"], np.nan)
-    for values, look, name in (
-        (from_perturbed, {"color": BLUE, "linewidth": 0.9}, f"{label} to itself, start off by {EPS:.0e}"),
-        (difference, {"color": "black", "linewidth": 1}, f"{label} to MuJoCo"),
-    ):
-        ax.semilogy(c["t"][1:], np.maximum(values[1:], DRAWN_ZERO), **look, label=name)
+    shown = np.maximum(difference[1:], DRAWN_ZERO)
+    ax.semilogy(c["t"][1:], shown, color="black", linewidth=1, label=f"{label} to MuJoCo")
     ax.semilogy(c["t"][:: c["every"]][1:], band[1:], "--", color=ORANGE, label="band of rounding")
     if c["judged_until_s"] < case.duration:
         ax.axvspan(c["judged_until_s"], case.duration, **NOT_JUDGED)
     ax.set(xlabel="time, s", xlim=(0, case.duration))
-    if len(f"{case.duration:g}") > 2 or case.duration < 2.0:  # its last number would overlap the next column's first
-        few = 3 if ax.get_subplotspec().get_gridspec().ncols > 3 and case.duration < 1.0 else 5
-        ax.xaxis.set_major_locator(MaxNLocator(few, prune="upper"))
+    ax.xaxis.set_major_locator(MaxNLocator(3, prune="upper"))  # its last number would overlap the next column's first
 
 
 def add_legend(fig: Figure, axes: np.ndarray, long: bool) -> None:
@@ -114,32 +104,20 @@ def add_legend(fig: Figure, axes: np.ndarray, long: bool) -> None:
     fig.subplots_adjust(left=0.105, right=0.985, bottom=0.075, top=top, hspace=0.12, wspace=0.08)
 
 
-def run_caption(result: Result, case: Case, columns: Sequence[dict], shown: int, zeros: bool) -> Finding:
-    """The engines' difference in a scene, their errors, which runs diverge.
-
-    columns: the curves that are drawn; shown: the number of positions; zeros: whether a difference of 0 is drawn.
-    """
+def run_caption(result: Result, case: Case, columns: Sequence[dict], shown: int) -> Finding:
+    """The engines' difference in a scene, until when it is judged, and their errors. shown: the number of positions."""
     rows = [row for row in result.rows if row["scene"] == case.name and row["level"] == "open loop"]
-    diverged = {
-        f"{row['engine_integrator']} at dt = {row['dt_s']:.3g} s" for row in rows if row["diverged_at_s"] is not None
-    }
-    used = [row["difference_over_band"] for row in rows if row["difference_over_band"] is not None]
     errors = result.curves["errors"].get(case.name)
     return result.finding(
         "figure_run",
         scene=scene_begins(case.name, case.robot),
         judged=[(c["integrator"], c["judged_until_s"]) for c in columns],
-        to_the_end=all(c["judged_until_s"] >= case.duration for c in columns),
-        share=max(used) if used else None,
+        share=largest_known([row["difference_over_band"] for row in rows]),
         errors=errors and dict(zip((result.label, "MuJoCo"), errors)),
-        steps=case.steps,
         unit=movement_unit(case.coordinates),
-        diverged=sorted(diverged),
         positions=case.coordinates.nv,
         shown=shown,
         balls=case.coordinates.has_balls,
-        zero_at=DRAWN_ZERO if zeros else None,
-        ended=any(at is not None for c in columns for at in c["ended"].values()),
     )
 
 
@@ -209,50 +187,3 @@ def differing_most(case: Case, columns: Sequence[dict]) -> list[int]:
         off = moved_from(*(c[name][0][judged] for name in case.robot.compared), case.coordinates)
         largest = np.fmax(largest, off.max(axis=0))
     return sorted(np.argsort(-largest, kind="stable")[:MOST_LINES].tolist())
-
-
-def draw_drift(result: Result) -> tuple[str, Figure, Finding]:
-    """Drift of energy and momentum against the step size, both engines."""
-    drifts, steps = (result.curves["drift"][key] for key in ("drifts", "steps"))
-    lines = -(-len(drifts) // 3)
-    fig = Figure(figsize=(WIDTH, 0.8 + 2.0 * lines), layout="constrained")
-    axes = fig.subplots(lines, 3, sharex=True, sharey=True, squeeze=False)
-    for ax in axes.flat[len(drifts) :]:
-        ax.set_visible(False)
-    for ax, ((scene, quantity, unit), by_method) in zip(axes.flat, drifts.items()):
-        for mark, (method, engines) in zip(cycle("osD"), by_method.items()):
-            colour, dash = SCHEME_LINES[method.scheme]
-            dt = DRIFT_DURATION / np.array(steps[method])
-            ax.loglog(dt, engines["tmt"], linestyle=dash, color=colour, label=f"{method.name}, TMT")
-            ax.loglog(dt, engines["mujoco"], mark, mfc="none", color=colour)
-        ax.plot([], [], "o", mfc="none", color="black", label="marks: MuJoCo")
-        ax.set_title(f"{plain(scene)}\n{quantity}, {unit}")
-        ax.set_xticks([2e-4, 1e-3, 4e-3], ["2e-4", "1e-3", "4e-3"])
-        ax.minorticks_off()
-    fig.supylabel(f"largest drift in {DRIFT_DURATION:g} s", fontsize=9)
-    fig.supxlabel("dt, s", fontsize=9)
-    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    return "trajectory_drift", fig, drift_caption(result, drifts, steps)
-
-
-def drift_caption(result: Result, drifts: dict, steps: dict) -> Finding:
-    """The orders at which the drift falls, the largest drift of the energy, and MuJoCo's drift over TMT's."""
-    methods = []
-    for method in dict.fromkeys(method for by_method in drifts.values() for method in by_method):
-        engines = []
-        for name in ("tmt", "mujoco"):
-            values = {key: by_method[method][name] for key, by_method in drifts.items()}
-            energy = max(drift[-1] for (_, quantity, _), drift in values.items() if quantity == "energy")
-            orders = finite_range([drift_order(drift) for drift in values.values()])
-            engines.append({"label": LABELS[name], "orders": orders, "energy": float(energy)})
-        methods.append({"name": method.name, "dt": DRIFT_DURATION / steps[method][-1], "engines": engines})
-    by_engine = [engines for by_method in drifts.values() for engines in by_method.values()]
-    pairs = [pair for engines in by_engine for pair in zip(engines["tmt"], engines["mujoco"])]
-    ratios = finite_range([theirs / ours if ours else np.nan for ours, theirs in pairs])
-    return result.finding("figure_drift", methods=methods, ratios=ratios)
-
-
-def finite_range(values: Sequence[float]) -> tuple[float, float] | None:
-    """The least and the largest of the finite numbers; None: there is none."""
-    values = [value for value in values if np.isfinite(value)]
-    return (min(values), max(values)) if values else None

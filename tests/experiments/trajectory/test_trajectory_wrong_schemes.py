@@ -12,7 +12,7 @@ from trajectory_curves import CASES
 from compare.engines.mujoco import reading
 from compare.engines.own import Own
 from compare.experiments.setup import engines as engines_of
-from compare.experiments.trajectory.plan import within_time
+from compare.experiments.trajectory import within_time
 from compare.experiments.trajectory.runs import follow
 from compare.judge.scale import EPS
 from compare.robots.case import Case, Scene
@@ -30,7 +30,7 @@ def failing(case, engines, *integrators) -> set:
     mujoco.methods_in = lambda _: {name: known[name] for name in integrators or known}
     checks = follow(case, engines | {"mujoco": mujoco}, (1,)).checks
     checks = [check for check in checks if "to MuJoCo" in check.quantity]
-    assert {check.quantity.split(",")[0] for check in checks} == {"derivative"} | STEPS
+    assert {check.quantity.split(",")[0] for check in checks} == STEPS
     return {(check.scene.split(", ")[-2], check.quantity.split(",")[0]) for check in checks if not check.passed}
 
 
@@ -112,6 +112,6 @@ def test_wrong_gains_leave_the_band(of, name, wrong, integrator, gripper, monkey
 
 def test_equations_of_ones_own_have_no_servos(gripper):
     own, cases = Own(SimpleNamespace(has=lambda name: True, times={"acceleration": (1e-6,)})), gripper[0].cases
-    able, _, said = within_time(SimpleNamespace(engines={"own": own}, size="full", finer=(1,)), cases, 1_000_000)
+    able, said = within_time(SimpleNamespace(engines={"own": own}, size="full"), cases)
     assert [case.name for case in able] == ["open, held", "open, let go", "open, let go, damped"] and len(said) == 1
     assert own.methods_in(cases[-1]) == {} and own.methods_in(able[0])

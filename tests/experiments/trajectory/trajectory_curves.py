@@ -14,6 +14,6 @@ def run_of(case, ours=0.0, theirs=0.0, until=5.0, left=(None, None)) -> dict:
     ramp = np.linspace(0.0, 1.0, 65)[:, None] * np.ones(len(case.joints))
     return {
         "integrator": "RK4", "t": t, "every": 1, "tmt": [case.q + ours * ramp, 10.0 + ours * ramp],
-        "mujoco": [case.q + theirs * ramp, 20.0 + theirs * ramp], "band": np.full(65, 1e-9), "perturbed": case.q + 0.0 * ramp,
+        "mujoco": [case.q + theirs * ramp, 20.0 + theirs * ramp], "band": np.full(65, 1e-9),
         "judged_until_s": until, "ended": {"tmt": None, "mujoco": None}, "left": dict(zip(("tmt", "mujoco"), left)),
     }  # fmt: skip
