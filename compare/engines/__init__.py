@@ -63,9 +63,7 @@ def not_installed(name: str) -> str | None:
     package, extra = RECORDS[name].package, RECORDS[name].extra
     if not package or find_spec(package):
         return None
-    return (
-        f"{package} is not installed; `pip install .[{extra}]` installs it" if extra else f"{package} is not installed"
-    )
+    return f"{package} is not installed" + (f"; `pip install .[{extra}]` installs it" if extra else "")
 
 
 class Method(NamedTuple):
@@ -140,21 +138,23 @@ class Dynamics(Protocol):
         """
 
 
-class Engine(Protocol):
-    """One engine with its methods of integration."""
+class Engine:
+    """One engine with its methods of integration, by their names. Engines may be of this shape without this class."""
 
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def methods(self) -> Mapping[str, Method]:
-        """By their names."""
+    name: str
+    methods: Mapping[str, Method]
 
     def unavailable(self) -> str | None:
         """Why it cannot take part here, or None."""
+        return not_installed(self.name) if self.name in RECORDS else None
+
+    def methods_in(self, case: Case) -> Mapping[str, Method]:
+        """The methods in a case: where a robot's own actuators act, others may be the same scheme."""
+        return self.methods
 
     def of(self, case: Case) -> Dynamics:
         """The dynamics of a case."""
+        raise NotImplementedError
 
 
 def compared(engines: Mapping[str, Engine], case: Case) -> dict[str, Dynamics]:
@@ -163,7 +163,6 @@ def compared(engines: Mapping[str, Engine], case: Case) -> dict[str, Dynamics]:
 
 
 def methods_in(engine: Engine, case: Case) -> Mapping[str, Method]:
-    """An engine's methods in a case: where a robot's own actuators act, others may be the same scheme."""
     return engine.methods_in(case) if hasattr(engine, "methods_in") else engine.methods
 
 

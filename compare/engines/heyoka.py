@@ -1,6 +1,6 @@
 """heyoka's Taylor method on the same equations of motion; only where heyoka is installed (the extra `taylor`)."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import ClassVar
 
@@ -13,7 +13,7 @@ from tmt.equations.method import acceleration
 from tmt.equations.vectors import arctan, cos, sin, sqrt
 
 from ..robots.case import Case
-from . import EngineRecord, Method, Motion, Prepared, not_installed, rows_of_states
+from . import Engine, EngineRecord, Method, Motion, Prepared
 from .scipy import ScipyDynamics, as_far_as_it_goes, of_length_1
 
 ENGINE = EngineRecord(order=40, label="heyoka", colour="#CC79A7", marker="D", package="heyoka", extra="taylor")
@@ -25,17 +25,11 @@ MOST_OPERATIONS = 600
 MOST_JOINTS = 12  # for more the operations are not counted
 
 
-class Heyoka:
-    """The engine of heyoka's Taylor method, which chooses its own steps."""
-
+class Heyoka(Engine):
     name = "heyoka"
-    methods: ClassVar[Mapping[str, Method]] = {"Taylor": Method("heyoka", "Taylor", None, "Taylor", adaptive=True)}
-
-    def unavailable(self) -> str | None:
-        return not_installed(self.name)
+    methods: ClassVar = {"Taylor": Method("heyoka", "Taylor", None, "Taylor", adaptive=True)}
 
     def too_long(self, tree: Tree) -> str | None:
-        """Why the compilation for a Tree would take minutes, or None."""
         many = f"with {len(tree.axis)} speeds its compilation would take minutes"
         if len(tree.axis) > MOST_JOINTS:
             return many
@@ -51,29 +45,9 @@ def engine(schemes: Iterable[str]) -> Heyoka:
 
 
 class HeyokaDynamics(ScipyDynamics):
-    """The equations of a case as heyoka's expressions."""
-
-    def mass_matrix(self, q) -> np.ndarray:
-        n = self.coordinates.nv
-        return self.evaluated(q)[..., : n * n].reshape(*np.shape(q)[:-1], n, n)
-
-    def bias(self, q, v) -> np.ndarray:
-        n = self.coordinates.nv
-        return self.evaluated(q, v)[..., n * n : n * n + n]
-
-    def acceleration(self, q, v, tau) -> np.ndarray:
-        return self.evaluated(q, v, tau)[..., -self.coordinates.nv :]
-
-    def evaluated(self, q, v=None, tau=None) -> np.ndarray:
-        """Mbar by rows, h and the acceleration at each state, (..., n (n + 2))."""
-        none = np.zeros(self.coordinates.nv)
-        batch, states = rows_of_states(q, none if v is None else v, none if tau is None else tau)
-        return dynamics(self.tree)(np.concatenate(states, axis=1).T.copy()).T.reshape(*batch, -1)
-
     def prepared(self, q, v, tau, t, method, tolerance) -> Prepared:
-        stepper = integrator(
-            self.tree, tuple(np.asarray(tau, float).tolist()), FULL if tolerance is None else tolerance
-        )
+        torque = tuple(np.asarray(tau, float).tolist())
+        stepper = integrator(self.tree, torque, FULL if tolerance is None else tolerance)
         start = np.concatenate([q, v])
 
         def run():
@@ -91,7 +65,6 @@ class HeyokaDynamics(ScipyDynamics):
 
 @lru_cache(maxsize=32)
 def integrator(tree: Tree, tau: tuple[float, ...], tolerance: float):
-    """heyoka's integrator of a Tree: the composite form traced on its expressions, compiled for this tolerance."""
     import heyoka
 
     q, qd = variables(tree, "q", "qd")
@@ -100,26 +73,9 @@ def integrator(tree: Tree, tau: tuple[float, ...], tolerance: float):
     return heyoka.taylor_adaptive([*zip(q, rates), *zip(qd, qdd)], [0.0] * (len(q) + len(qd)), tol=tolerance)
 
 
-@lru_cache(maxsize=32)
-def dynamics(tree: Tree):
-    """Mbar by rows, h and the acceleration as one function that heyoka compiles, of q, qd and tau one after the other."""
-    import heyoka
-
-    q, qd, tau = variables(tree, "q", "qd", "tau")
-    M, h = composite.mass_matrix_and_bias(tree, q, qd)
-    n = len(qd)
-    rows = [M[min(i, j)][max(i, j)] for i in range(n) for j in range(n)]
-    qdd = acceleration(tree, q, qd, tau, composite.mass_matrix_and_bias)
-    values = [heyoka.expression(value) if isinstance(value, float) else value for value in (*rows, *h, *qdd)]
-    return heyoka.cfunc(values, vars=[*q, *qd, *tau])
-
-
 @lru_cache(maxsize=8)
 def compiled_accelerations(tree: Tree, fastest: bool = False):
-    """heyoka's compiled function of many states, f(states, outputs=qdd): states (nq + 2 nv, N), of q, qd, tau; qdd (nv, N).
-
-    Compiled with heyoka's defaults, or with FASTEST.
-    """
+    """heyoka's compiled function of many states, f(states, outputs=qdd): states (nq + 2 nv, N), of q, qd, tau; qdd (nv, N)."""
     import heyoka
 
     q, qd, tau = variables(tree, "q", "qd", "tau")
@@ -128,7 +84,6 @@ def compiled_accelerations(tree: Tree, fastest: bool = False):
 
 
 def variables(tree: Tree, *names: str) -> list:
-    """heyoka's variables for a state: one list for each name."""
     import heyoka
 
     for function, own in ((sin, heyoka.sin), (cos, heyoka.cos), (sqrt, heyoka.sqrt), (arctan, heyoka.atan)):

@@ -42,39 +42,13 @@ class PinocchioCalls:
             return "its model is built only for trees of hinges and slides without a controller"
         return None
 
-    def mass_matrix(self, q) -> np.ndarray:
-        """Mbar, kg m2, (..., nv, nv): crba, which fills its upper triangle."""
-        import pinocchio
-
-        def filled(q):
-            upper = np.triu(pinocchio.crba(self.model, self.data, q))
-            return upper + np.triu(upper, 1).T
-
-        return self.each(filled, q - np.array(self.tree.reference))
-
-    def bias(self, q, v) -> np.ndarray:
-        """h, N m, (..., nv): nonLinearEffects."""
-        import pinocchio
-
-        return self.each(
-            lambda q, v: pinocchio.nonLinearEffects(self.model, self.data, q, v).copy(),
-            q - np.array(self.tree.reference),
-            v,
-        )
-
     def acceleration(self, q, v, tau) -> np.ndarray:
         """rad/s2, (..., nv): aba."""
         import pinocchio
 
-        return self.each(
-            lambda q, v, tau: pinocchio.aba(self.model, self.data, q, v, tau).copy(), *self.given(q, v, tau)
-        )
-
-    def each(self, quantity: Callable, *given) -> np.ndarray:
-        """A quantity at each state."""
-        batch, states = rows_of_states(*given)
-        values = np.array([quantity(*state) for state in zip(*states)])
-        return values.reshape(*batch, *values.shape[1:])
+        batch, states = rows_of_states(*self.given(q, v, tau))
+        values = [pinocchio.aba(self.model, self.data, *state).copy() for state in zip(*states)]
+        return np.reshape(values, (*batch, -1))
 
     def given(self, q, v, tau) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The state as Pinocchio takes it."""
@@ -123,12 +97,11 @@ def joint(kind: str, axis: np.ndarray):
     return along[k]() if axis[k] == 1.0 else any_axis(*axis)
 
 
-def aba_again(model, data, q, v, tau) -> Callable[[int], object]:
-    """run(count) of calls of aba from Python."""
+def aba_again(*arguments) -> Callable[[int], object]:
     from pinocchio import aba
 
     def run(count):
         for _ in range(count):
-            aba(model, data, q, v, tau)
+            aba(*arguments)
 
     return run

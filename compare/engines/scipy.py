@@ -1,6 +1,6 @@
 """SciPy's solve_ivp with tmt's compiled equations."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import ClassVar
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from tmt.compiled import evaluator
 
 from ..robots.case import Case, Coordinates
-from . import GRID, EngineRecord, Method, Motion, Prepared, Setting, rows_of_states
+from . import GRID, Engine, EngineRecord, Method, Motion, Prepared, Setting, rows_of_states
 from .tmt import TmtDynamics
 
 ENGINE = EngineRecord(order=30, label="SciPy", colour="#009E73", marker="^")
@@ -16,16 +16,11 @@ DEFAULT = 1e-9  # tolerance
 LEAST_RELATIVE = 2.3e-14  # that solve_ivp takes
 
 
-class Scipy:
-    """The engine of SciPy's methods, all of which choose their own steps."""
-
+class Scipy(Engine):
     name = "scipy"
-    methods: ClassVar[Mapping[str, Method]] = {
+    methods: ClassVar = {
         name: Method("scipy", name, None, name, adaptive=True) for name in ("RK45", "DOP853", "Radau", "LSODA")
     }
-
-    def unavailable(self) -> str | None:
-        return None
 
     def of(self, case: Case) -> "ScipyDynamics":
         return ScipyDynamics(case)
@@ -36,22 +31,7 @@ def engine(schemes: Iterable[str]) -> Scipy:
 
 
 class ScipyDynamics(TmtDynamics):
-    """The compiled equations of a case: what SciPy integrates."""
-
-    def mass_matrix(self, q) -> np.ndarray:
-        n = self.coordinates.nv
-        rows, columns = np.triu_indices(n)
-        upper = self.evaluated("mass_matrix_and_bias", rows.size + n, q)[..., : rows.size]
-        M = np.empty((*np.shape(q)[:-1], n, n))
-        M[..., rows, columns] = M[..., columns, rows] = upper
-        return M
-
-    def bias(self, q, v) -> np.ndarray:
-        n = self.coordinates.nv
-        return self.evaluated("mass_matrix_and_bias", n * (n + 3) // 2, q, v)[..., -n:]
-
-    def acceleration(self, q, v, tau) -> np.ndarray:
-        return self.evaluated("acceleration", self.coordinates.nv, q, v, tau)
+    """tmt's quantities; runs by SciPy."""
 
     def rate(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         """rate(y, tau): dy/dt of y = (q, v), (nq + nv,)."""
@@ -68,16 +48,7 @@ class ScipyDynamics(TmtDynamics):
 
         return rate
 
-    def evaluated(self, quantity, size, q, v=None, tau=None) -> np.ndarray:
-        """A compiled quantity at each state, (..., size)."""
-        none = np.zeros(self.coordinates.nv)
-        batch, states = rows_of_states(q, none if v is None else v, none if tau is None else tau)
-        result = np.empty((len(states[0]), size))
-        evaluator(self.tree, quantity).each(*states, result)
-        return result.reshape(*batch, size)
-
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        """One run after the other."""
         batch, states = rows_of_states(q, v, tau)
         t, motions = np.linspace(0.0, dt * steps, steps + 1), []
         for state in zip(*states):

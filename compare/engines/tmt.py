@@ -8,30 +8,19 @@ import numpy as np
 import tmt
 from tmt import literal
 from tmt.compiled import prepared
+from tmt.equations.quantities import QUANTITIES
 from tmt.methods import method_named
 from tmt.simulation import reasons
 
 from ..robots.case import Case
-from . import GRID, EngineRecord, Method, Motion, Prepared, Setting
+from . import GRID, Engine, EngineRecord, Method, Motion, Prepared, Setting
 
 ENGINE = EngineRecord(order=20, label="TMT", colour="#0072B2", marker="o", in_quick_runs=True)
 # schemes of MuJoCo that differ from others only for robots with balls, springs or a free body on its own
 FOR_SOME = ("rk4_mean_speed", "implicitfast", "discrete")
-QUANTITIES = (
-    "com_positions",
-    "angular_velocities",
-    "jacobians",
-    "convective_terms",
-    "mass_matrix",
-    "bias",
-    "gravity_balance",
-    "acceleration",
-    "potential_energy",
-    "energy",
-)
 
 
-class Tmt:
+class Tmt(Engine):
     """The engine of the stated equations. schemes: those of MuJoCo's integrators for this robot."""
 
     name = "tmt"
@@ -48,11 +37,7 @@ class Tmt:
         }
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
-        """The methods in a case: where actuators act MuJoCo's integrators are different schemes."""
         return Tmt({*FOR_SOME[1:], *self.methods}).methods if case.controller else self.methods
-
-    def unavailable(self) -> str | None:
-        return None
 
     def of(self, case: Case) -> "TmtDynamics":
         return TmtDynamics(case)

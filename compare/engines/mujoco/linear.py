@@ -10,29 +10,14 @@ from .actuators import control_of
 from .dynamics import MujocoDynamics
 from .names import INTEGRATORS, bit
 
-NUDGE = 1e-6  # of mjd_transitionFD and of the central differences, rad and rad/s
+NUDGE = 1e-6  # of central differences, rad and rad/s
 
 
 def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str) -> np.ndarray:
-    """d(q, qd)+/d(q, qd) of one step of MuJoCo at rest, positions as movements, (2nv, 2nv).
+    """d(q, qd)+/d(q, qd) of one step of MuJoCo at rest, positions as movements, (2nv, 2nv), by central differences.
 
-    q: (nq,) rad, m; tau: (nv,) N m. By mjd_transitionFD, central differences of 1e-6; where it refuses (RK4, delays), by central
-    differences of runs.
+    q: (nq,) rad, m; tau: (nv,) N m.
     """
-    if integrator == "RK4":
-        return differenced(dynamics, q, tau, dt, integrator)
-    model, data = dynamics.own_copy(dt, integrator, q, 0.0, tau)
-    size = 2 * model.nv + model.na  # activations come last
-    A = np.zeros((size, size))
-    try:
-        mujoco.mjd_transitionFD(model, data, NUDGE, True, A, None, None, None)
-    except mujoco.FatalError:
-        return differenced(dynamics, q, tau, dt, integrator)
-    order = np.concatenate([dynamics.dofs, model.nv + dynamics.dofs])
-    return A[np.ix_(order, order)]
-
-
-def differenced(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str) -> np.ndarray:
     n, ends, coordinates = len(dynamics.dofs), [], dynamics.coordinates
     for sign in (1.0, -1.0):
         nudges = sign * NUDGE * np.eye(2 * n)
