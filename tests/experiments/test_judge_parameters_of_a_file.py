@@ -28,7 +28,7 @@ def result_of(source, as_it_is=False):
     reading = read(source)
     robot, mujoco = robot_of(reading, "robot.xml"), engine(reading)
     if as_it_is:
-        mujoco.bare, mujoco.model = False, reading.full_model
+        mujoco.bare, mujoco.model = False, reading.model
     return parameters.rows(Setup.small(robot, engines(mujoco), reading=reading))
 
 

@@ -3,8 +3,7 @@
     q, v, a <-> qpos, qvel, qacc      h <-> qfrc_bias      tau <-> qfrc_applied
     M a + h = tau - D v
 
-MuJoCo's derived fields belong to the state of the last mj_forward, not to that of the last step: every
-quantity here is evaluated with mj_forward at the given state.
+MuJoCo's derived fields belong to the last mj_forward, not to the last step: every quantity is evaluated with mj_forward.
 """
 
 from collections.abc import Callable
@@ -45,8 +44,6 @@ class MujocoDynamics:
         self.left_out = np.setdiff1d(np.flatnonzero(~moving(model)), self.bodies) if bare else []
         self.zero_axes = self.turns(self.data.xmat)
 
-    # quantities at states
-
     def com_positions(self, q) -> np.ndarray:
         """CoM positions in the world, m, (..., m, 3): xipos."""
         return self._each(lambda d: d.xipos[self.bodies], q)
@@ -57,27 +54,18 @@ class MujocoDynamics:
 
     def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
         """T_b and B_b, (..., m, 3, nv): mj_jacBodyCom, its rotational part turned into body axes."""
-
-        def both(d):
-            jacobians = np.zeros((2, len(self.bodies), 3, self.model.nv))
-            for T, B, body in zip(*jacobians, self.bodies):
-                mujoco.mj_jacBodyCom(self.model, d, T, B, body)
-            return self._reduced(jacobians)
-
-        result = self._each(both, q)
-        return result[..., 0, :, :, :], result[..., 1, :, :, :]
+        pairs = self._each(lambda d: self._of_bodies(lambda T, B, b: mujoco.mj_jacBodyCom(self.model, d, T, B, b)), q)
+        return pairs[..., 0, :, :, :], pairs[..., 1, :, :, :]
 
     def convective_terms(self, q, v) -> tuple[np.ndarray, np.ndarray]:
         """v_conv, world, and w_conv, body axes, (..., m, 3): mj_jacDot times qvel."""
 
-        def both(d):
-            rates = np.zeros((2, len(self.bodies), 3, self.model.nv))
-            for T, B, body in zip(*rates, self.bodies):
-                mujoco.mj_jacDot(self.model, d, T, B, d.xipos[body], body)
-            return self._reduced(rates) @ d.qvel[self.dofs]
+        def terms(d):
+            rates = self._of_bodies(lambda T, B, body: mujoco.mj_jacDot(self.model, d, T, B, d.xipos[body], body))
+            return rates @ d.qvel[self.dofs]
 
-        result = self._each(both, q, v)
-        return result[..., 0, :, :], result[..., 1, :, :]
+        pairs = self._each(terms, q, v)
+        return pairs[..., 0, :, :], pairs[..., 1, :, :]
 
     def mass_matrix(self, q) -> np.ndarray:
         """M, kg m2, (..., nv, nv): mj_fullM."""
@@ -129,8 +117,6 @@ class MujocoDynamics:
         """Potential and kinetic energy together, J, (...): mj_energyPos and mj_energyVel."""
         return self._each(lambda d: self._energies(d).sum(), q, v)
 
-    # motion
-
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
         """Motion under constant torque: q (..., steps + 1, nq), v (..., steps + 1, nv), NaN from where a run diverges."""
         refuse_tolerance(tolerance, method)
@@ -167,10 +153,7 @@ class MujocoDynamics:
         return states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs], ended
 
     def runner(self, q, v, tau, dt, steps, method) -> tuple[np.ndarray, Callable]:
-        """The first states, and a call that follows the motion from them in MuJoCo's C loop, again and again.
-
-        States are MuJoCo's, time first; the call returns those after each step, (runs, steps, ...), without a copy.
-        """
+        """The first states, time first, and a call that runs MuJoCo's C loop from them; it returns (runs, steps, ...)."""
         model, data = self.own_copy(dt, method)
         model.opt.disableflags |= bit("AUTORESET")  # a reset would hide the divergence
         rows, spec = rows_of_states(q, v, self.applied(tau))[1], mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -201,14 +184,12 @@ class MujocoDynamics:
         return model, data
 
     def applied(self, tau):
-        """The part of the torques of a case that its actuators do not exert."""
+        """The part of torques that actuators do not exert."""
         return tau
 
     def control(self) -> tuple[int, np.ndarray]:
         """The part of MuJoCo's state that a rollout sets at each step, and its numbers before the torque."""
         return int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), np.zeros(0)
-
-    # how the fields are read
 
     def _each(self, read, q, v=0.0, tau=0.0) -> np.ndarray:
         """read(data) after mj_forward at each state, stacked to the batch shape of the states."""
@@ -217,7 +198,6 @@ class MujocoDynamics:
         return np.array(values).reshape((*batch, *values[0].shape))
 
     def forward(self, q, v=0.0, tau=0.0) -> mujoco.MjData:
-        """The data after mj_forward at one state."""
         d = self.data
         d.qpos[self.qpos], d.qvel[self.dofs], d.qfrc_applied[self.dofs] = q, v, tau
         mujoco.mj_forward(self.model, d)
@@ -240,8 +220,11 @@ class MujocoDynamics:
         turns = self.turns(self.data.xmat) @ self.zero_axes.transpose(0, 2, 1)
         return np.einsum("bji,bj...->bi...", turns, vectors)
 
-    def _reduced(self, pair):
-        """(translation, rotation) rows of Jacobians: joints in our order, rotation in body axes."""
+    def _of_bodies(self, fill: Callable) -> np.ndarray:
+        """(translation, rotation) rows that fill(T, B, body) gives, (2, m, 3, nv): our joints, rotation in body axes."""
+        pair = np.zeros((2, len(self.bodies), 3, self.model.nv))
+        for T, B, body in zip(*pair, self.bodies):
+            fill(T, B, body)
         T, B = pair[..., self.dofs]
         return np.stack([T, self._to_body(B)])
 
@@ -256,18 +239,17 @@ def convective_accelerations(dynamics: MujocoDynamics, q: np.ndarray, v: np.ndar
 
     By mj_objectAcceleration, not mj_jacDot as MujocoDynamics.convective_terms. q (states, nq), v (states, nv).
     """
-    model, weight = dynamics.model, dynamics.model.opt.gravity.copy()
-    terms, both = np.zeros((2, len(q), len(dynamics.bodies), 3)), np.zeros(6)
+    model, gravity = dynamics.model, dynamics.model.opt.gravity.copy()
+
+    def terms(d):
+        both = np.zeros((len(dynamics.bodies), 6))
+        d.qacc[:] = 0.0
+        mujoco.mj_rnePostConstraint(model, d)
+        for row, body in zip(both, dynamics.bodies):
+            mujoco.mj_objectAcceleration(model, d, mujoco.mjtObj.mjOBJ_BODY, body, row, 0)
+        return both[:, 3:], dynamics._to_body(both[:, :3])
+
     model.opt.gravity[:] = 0.0
-    try:
-        for state, (position, speed) in enumerate(zip(q, v)):
-            d = dynamics.forward(position, speed)
-            d.qacc[:] = 0.0
-            mujoco.mj_rnePostConstraint(model, d)
-            turns = dynamics.turns(d.xmat) @ dynamics.zero_axes.transpose(0, 2, 1)
-            for k, body in enumerate(dynamics.bodies):
-                mujoco.mj_objectAcceleration(model, d, mujoco.mjtObj.mjOBJ_BODY, body, both, 0)
-                terms[0, state, k], terms[1, state, k] = both[3:], turns[k].T @ both[:3]
-    finally:
-        model.opt.gravity[:] = weight
-    return terms[0], terms[1]
+    v_conv, w_conv = np.moveaxis(dynamics._each(terms, q, v), -3, 0)
+    model.opt.gravity[:] = gravity
+    return v_conv, w_conv

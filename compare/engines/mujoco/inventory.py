@@ -1,11 +1,13 @@
-"""The inventory of a file: its features, and which of them the equations model or the comparison switches off."""
+"""The features of a file: modelled by the equations, switched off by the comparison, or a reason to refuse the file."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from .names import bit, joint_name, kind_of, number_of_actuators, on, own_name
+from .actuators import control_of
+from .names import bit, element_name, kind_of, number_of_actuators, on
 
 MODELLED, OFF, OPEN = "modelled", "switched_off", "open_tree"
 
@@ -43,15 +45,23 @@ REASONS = {
 }
 
 
-def features(model: mujoco.MjModel) -> tuple[Feature, ...]:
+FIELDS_OF_FEATURES = {
+    "gravcomp": ("body_gravcomp",),
+    "frictionloss": ("dof_frictionloss", "tendon_frictionloss"),
+    "tendon": ("tendon_stiffness", "tendon_damping", "tendon_lengthspring", "wrap_prm"),
+    "other": ("dof_dampingpoly", "jnt_stiffnesspoly", "jnt_springyield"),
+}
+OF_COORDINATES = int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON)
+ENABLED = ("SLEEP", "INVDISCRETE", "IPC", "SPECULATIVE")  # enable flags that can change a motion
+
+
+def features(m: mujoco.MjModel) -> tuple[Feature, ...]:
     """The features of a compiled model, always in the same order."""
-    names = names_of_features(model)
+    names = names_of_features(m)
+    rows = [(feature, names[feature]) for feature in REASONS if names[feature]]
     return tuple(
-        Feature(
-            feature, len(names[feature]), tuple(names[feature]), *REASONS[feature], numbers_of_feature(model, feature)
-        )
-        for feature in REASONS
-        if names[feature]
+        Feature(feature, len(own), tuple(own), *REASONS[feature], numbers_of_feature(m, feature))
+        for feature, own in rows
     )
 
 
@@ -65,89 +75,67 @@ def numbers_of_feature(m: mujoco.MjModel, feature: str) -> tuple[float, ...]:
     return tuple(sorted(float(x) for field in fields for x in field if x))
 
 
-FIELDS_OF_FEATURES = {
-    "gravcomp": ("body_gravcomp",),
-    "frictionloss": ("dof_frictionloss", "tendon_frictionloss"),
-    "tendon": ("tendon_stiffness", "tendon_damping", "tendon_lengthspring", "wrap_prm"),
-    "other": ("dof_dampingpoly", "jnt_stiffnesspoly", "jnt_springyield"),
-}
-OF_COORDINATES = int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON)
-
-
 def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
     """The elements with each feature, by name."""
-    actuators, tendons = number_of_actuators(m), range(m.ntendon)
 
-    def joints(chosen) -> list[str]:
-        return [joint_name(m, j) for j in range(m.njnt) if chosen(j)]
+    def named(kind: str, numbers) -> list[str]:
+        return [element_name(m, kind, number) for number in numbers]
 
-    def speeds(values) -> list[str]:
-        return joints(lambda j: np.any(values[m.dof_jntid == j]))
+    def having(*fields: str) -> list[str]:
+        """The elements of which one of the fields is not zero."""
+        return [name for field in fields for name in names_where(m, field, np.any)]
 
-    def named(what: str, numbers) -> list[str]:
-        return [own_name(getattr(m, what)(int(i)).name, what, int(i)) for i in numbers]
-
-    clamped = m.actuator_ctrllimited.astype(bool)  # of each input, of which an actuator may have several
-    if hasattr(m, "actuator_ctrlnum"):
-        clamped = np.array([clamped[a : a + n].any() for a, n in zip(m.actuator_ctrladr, m.actuator_ctrlnum)], bool)
-    clamped = (
-        clamped | per_actuator(m.actuator_forcelimited, actuators) | per_actuator(m.actuator_actlimited, actuators)
-    )
-    constrained = on(m, "CONSTRAINT")
-    rotor = np.flatnonzero(getattr(m, "actuator_armature", np.zeros(0)))
-    limited = constrained and on(m, "LIMIT")
-    rubbed = constrained and on(m, "FRICTIONLOSS")
+    actuators, inputs = range(number_of_actuators(m)), m.actuator_ctrllimited
+    controls = [inputs[place : place + count].any() for place, count in (control_of(m, i) for i in actuators)]
+    clamped = [i for i in actuators if controls[i] or m.actuator_forcelimited[i] or m.actuator_actlimited[i]]
+    constrained, damped, sprung = on(m, "CONSTRAINT"), on(m, "DAMPER"), on(m, "SPRING")
+    others = [f"flag {flag.lower()}" for flag in ENABLED if m.opt.enableflags & enabling(flag)]
+    others += ["flag eulerdamp"] * (not on(m, "EULERDAMP"))
+    for what, field, is_on in (
+        ("polynomial damping", "dof_dampingpoly", damped),
+        ("polynomial stiffness", "jnt_stiffnesspoly", sprung),
+        ("spring yield", "jnt_springyield", sprung),
+    ):
+        others += [f"{what} of {name}" for name in having(field) if is_on]
+    kinds = ("hinge", "slide", "ball", "free")
     return {
-        **{kind: joints(lambda j, kind=kind: kind_of(m, j) == kind) for kind in ("hinge", "slide", "ball", "free")},
-        "armature": speeds(m.dof_armature) + named("actuator", rotor),
-        "damping": speeds(m.dof_damping) if on(m, "DAMPER") else [],
-        "spring": joints(lambda j: m.jnt_stiffness[j]) if on(m, "SPRING") else [],
-        "contact": named("geom", touching(m)) if constrained and on(m, "CONTACT") else [],
-        "limit": (joints(lambda j: m.jnt_limited[j]) + named("tendon", np.flatnonzero(m.tendon_limited))) * limited,
-        "frictionloss": (speeds(m.dof_frictionloss) + named("tendon", np.flatnonzero(m.tendon_frictionloss))) * rubbed,
-        "clamp": named("actuator", np.flatnonzero(clamped))
-        + joints(lambda j: m.jnt_actfrclimited[j])
-        + named("tendon", np.flatnonzero(m.tendon_actfrclimited)),
+        **{kind: named("joint", [j for j in range(m.njnt) if kind_of(m, j) == kind]) for kind in kinds},
+        "armature": having("dof_armature", "actuator_armature"),
+        "damping": having("dof_damping") if damped else [],
+        "spring": having("jnt_stiffness") if sprung else [],
+        "contact": named("geom", np.unique(contact_pairs(m))) if constrained and on(m, "CONTACT") else [],
+        "limit": having("jnt_limited", "tendon_limited") if constrained and on(m, "LIMIT") else [],
+        "frictionloss": having(*FIELDS_OF_FEATURES["frictionloss"]) if constrained and on(m, "FRICTIONLOSS") else [],
+        "clamp": named("actuator", clamped) + having("jnt_actfrclimited", "tendon_actfrclimited"),
         "fluid": [name for name in ("density", "viscosity") if getattr(m.opt, name)],
-        "gravcomp": named("body", np.flatnonzero(m.body_gravcomp)),
-        "actuator": named("actuator", range(actuators)),
+        "gravcomp": having("body_gravcomp"),
+        "actuator": named("actuator", actuators),
         "equality": list(open_equalities(m)),
-        "tendon": named("tendon", tendons),
+        "tendon": named("tendon", range(m.ntendon)),
         "keyframe": named("key", range(m.nkey)),
-        "other": others(m, joints, speeds),
+        "other": others,
     }
 
 
-def others(m: mujoco.MjModel, joints, speeds) -> list[str]:
-    """Other settings that would change the motion and are switched off."""
-    settings = [
-        f"flag {flag.lower()}"
-        for flag in ENABLED
-        if m.opt.enableflags & int(getattr(mujoco.mjtEnableBit, f"mjENBL_{flag}", 0))
-    ]
-    if not on(m, "EULERDAMP"):
-        settings.append("flag eulerdamp")
-    if on(m, "DAMPER"):
-        settings += [f"polynomial damping of {name}" for name in speeds(field(m, "dof_dampingpoly", m.nv))]
-    if on(m, "SPRING"):
-        settings += [
-            f"polynomial stiffness of {name}"
-            for name in joints(lambda j: np.any(field(m, "jnt_stiffnesspoly", m.njnt)[j]))
-        ]
-        settings += [
-            f"spring yield of {name}" for name in joints(lambda j: np.any(field(m, "jnt_springyield", m.njnt)[j]))
-        ]
-    return settings
+def names_where(m: mujoco.MjModel, field: str, holds: Callable) -> list[str]:
+    """The names of the elements (of speeds: the joints) for whose row of a field something holds."""
+    values, prefix = np.asarray(getattr(m, field, ())), field.partition("_")[0]
+    rows = [i for i, row in enumerate(values) if holds(row)]
+    if prefix == "dof":
+        rows = np.unique(m.dof_jntid[rows])
+    return [element_name(m, {"dof": "joint", "jnt": "joint"}.get(prefix, prefix), row) for row in rows]
 
 
-ENABLED = ("SLEEP", "INVDISCRETE", "IPC", "SPECULATIVE")  # enable flags that can change a motion
+def enabling(flag: str) -> int:
+    """The bit of an enable flag; 0 for one that the installed MuJoCo does not have."""
+    return int(getattr(mujoco.mjtEnableBit, f"mjENBL_{flag}", 0))
 
 
 def open_equalities(m: mujoco.MjModel) -> tuple[str, ...]:
     """The names of the equalities that the file has in force; the comparison switches them off."""
     if not (on(m, "CONSTRAINT") and on(m, "EQUALITY")):
         return ()
-    return tuple(own_name(m.equality(int(i)).name, "equality", int(i)) for i in np.flatnonzero(m.eq_active0))
+    return tuple(element_name(m, "equality", i) for i in np.flatnonzero(m.eq_active0))
 
 
 def switch_off(m: mujoco.MjModel) -> None:
@@ -178,44 +166,14 @@ def take_away(m: mujoco.MjModel) -> None:
 
 
 NOT_HAD_FIELDS = (
-    "body_gravcomp",
-    "dof_dampingpoly",
-    "jnt_stiffnesspoly",
-    "jnt_springyield",
-    "actuator_damping",
-    "actuator_dampingpoly",
-    "tendon_stiffness",
-    "tendon_stiffnesspoly",
-    "tendon_springyield",
-    "tendon_damping",
-    "tendon_dampingpoly",
-    "dof_frictionloss",
-    "tendon_frictionloss",
-)
+    "body_gravcomp", "dof_dampingpoly", "jnt_stiffnesspoly", "jnt_springyield", "actuator_damping", "actuator_dampingpoly",
+    "tendon_stiffness", "tendon_stiffnesspoly", "tendon_springyield", "tendon_damping", "tendon_dampingpoly",
+    "dof_frictionloss", "tendon_frictionloss",
+)  # fmt: skip
 
 
-def field(m: mujoco.MjModel, name: str, rows: int) -> np.ndarray:
-    """A field of the model; zeros where the installed MuJoCo does not have it."""
-    return getattr(m, name, np.zeros(rows))
-
-
-def per_actuator(values, actuators: int) -> np.ndarray:
-    return np.asarray(values, bool).reshape(-1)[:actuators]
-
-
-def contact_pairs(m: mujoco.MjModel) -> int:
-    """The number of pairs of geoms that may touch: those that MuJoCo chooses, and those that the file names."""
-    return m.npair + len(chosen_pairs(m))
-
-
-def touching(m: mujoco.MjModel) -> list[int]:
-    """The geoms of these pairs, each once."""
-    named = np.column_stack([m.pair_geom1, m.pair_geom2]) if m.npair else np.zeros((0, 2), int)
-    return np.unique(np.concatenate([chosen_pairs(m), named])).astype(int).tolist()
-
-
-def chosen_pairs(m: mujoco.MjModel) -> np.ndarray:
-    """The pairs of geoms that MuJoCo chooses, (pairs, 2): of two bodies that move against each other."""
+def contact_pairs(m: mujoco.MjModel) -> np.ndarray:
+    """The pairs of geoms that may touch, (pairs, 2): those that the file names, and those of bodies that move relatively."""
     i, j = np.triu_indices(m.ngeom, 1)
     one, other = np.sort([m.geom_bodyid[i], m.geom_bodyid[j]], axis=0)
     a, b = m.body_weldid[one], m.body_weldid[other]
@@ -223,4 +181,37 @@ def chosen_pairs(m: mujoco.MjModel) -> np.ndarray:
     related = (a > 0) & (b > 0) & ((a == over_b) | (b == over_a)) & on(m, "FILTERPARENT")
     wanted = (m.geom_contype[i] & m.geom_conaffinity[j]) | (m.geom_contype[j] & m.geom_conaffinity[i])
     excluded = np.isin((one.astype(np.int64) << 16) + other, m.exclude_signature)
-    return np.column_stack([i, j])[(a != b) & (wanted != 0) & ~related & ~excluded]
+    chosen = np.column_stack([i, j])[(a != b) & (wanted != 0) & ~related & ~excluded]
+    return np.concatenate([chosen, np.column_stack([m.pair_geom1, m.pair_geom2])]).astype(int)
+
+
+FINITE = (
+    "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat", "jnt_pos", "jnt_axis", "jnt_stiffness",
+    "dof_armature", "dof_damping", "actuator_gainprm", "actuator_biasprm", "actuator_gear", "tendon_stiffness",
+    "tendon_damping", "key_qpos", "key_ctrl",
+)  # fmt: skip
+NOT_NEGATIVE = ("jnt_stiffness", "dof_armature", "dof_damping")
+
+
+def refuse(m: mujoco.MjModel) -> None:
+    """ValueError, in one line, for a model that has forces, elements or numbers that cannot be compared."""
+    for name in dir(mujoco):
+        if name.startswith("get_mjcb_") and getattr(mujoco, name)() is not None:
+            raise ValueError(f"the callback {name.removeprefix('get_')} is set; its forces are unknown")
+    if not m.njnt:
+        raise ValueError("it has no joint")
+    if m.nflex:
+        name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, 0)
+        raise ValueError(f"flex {name!r} is deformable; only rigid bodies are compared")
+    for body in np.flatnonzero(m.body_plugin >= 0):
+        raise ValueError(f"a plugin acts on body {element_name(m, 'body', body)!r}; its forces are unknown")
+    for tendon in np.flatnonzero(m.tendon_armature):
+        name = element_name(m, "tendon", tendon)
+        raise ValueError(f"tendon {name!r} has armature, which couples joints; only that of joints is compared")
+    for field in FINITE:
+        least = 0.0 if field in NOT_NEGATIVE else -np.inf
+        for name in names_where(m, field, lambda row, least=least: not (np.isfinite(row) & (row >= least)).all()):
+            raise ValueError(f"{field} of {name!r} is not finite" + " or is negative" * (least == 0.0))
+    for word, values in (("gravity", m.opt.gravity), ("qpos0", m.qpos0), ("qpos_spring", m.qpos_spring)):
+        if not np.isfinite(values).all():
+            raise ValueError(f"{word} is not finite")

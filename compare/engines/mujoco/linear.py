@@ -30,20 +30,14 @@ def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: flo
 def left_to_itself(
     dynamics: MujocoDynamics, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, steps: int, integrator: str
 ) -> dict:
-    """A run with MuJoCo's defaults, automatic reset included, and its warnings.
-
-    q: (steps + 1, nq); qd: (steps + 1, nv); time: (steps + 1,) s, of MuJoCo's own clock; warnings: their number at the end.
-    """
+    """A run with MuJoCo's automatic reset: time (steps + 1,) s, of its own clock, q, qd; warnings: their number at the end."""
     model, data = dynamics.own_copy(dt, integrator, q, qd, tau)
     model.opt.disableflags &= ~bit("AUTORESET")
-    states = []
-    for k in range(steps + 1):
-        states.append([data.time, *data.qpos[dynamics.qpos], *data.qvel[dynamics.dofs]])
-        if k < steps:
-            mujoco.mj_step(model, data)
-    time, q, qd = np.split(np.array(states), [1, 1 + len(dynamics.qpos)], axis=1)
-    warnings = sum(int(warning.number) for warning in data.warning)
-    return {"time": time[:, 0], "q": q, "qd": qd, "warnings": warnings}
+    path = [(0.0, q, qd)]
+    for _ in range(steps):
+        mujoco.mj_step(model, data)
+        path.append((data.time, data.qpos[dynamics.qpos], data.qvel[dynamics.dofs]))
+    return dict(zip(("time", "q", "qd"), map(np.array, zip(*path)))) | {"warnings": int(data.warning.number.sum())}
 
 
 def implicit_derivative(dynamics: MujocoDynamics, q: np.ndarray, qd: np.ndarray, dt: float = 1e-3) -> np.ndarray:
@@ -75,13 +69,12 @@ def whole_run(
     last: float,
     speed: np.ndarray | float = 0.0,
 ) -> WholeRun:
-    """A run from q, by default at rest, under constant u of each actuator, with contacts, limits, friction and force ranges.
+    """A run from q under constant u of each actuator, with contacts, limits, friction and force ranges.
 
     lasts: its duration, s; last: the duration of the part at its end that is judged, s. After a reset by MuJoCo the controls and
     the speed are set again.
     """
-    m = model
-    own = m.opt.timestep, m.opt.integrator
+    m = mujoco.MjModel.__copy__(model)
     m.opt.timestep, m.opt.integrator = dt, INTEGRATORS[integrator]
     data, controls = mujoco.MjData(m), np.zeros(m.nu)
     data.qpos[:], data.qvel[:] = q, speed
@@ -104,5 +97,4 @@ def whole_run(
         warnings, counted = warnings + number - counted, number
         if step >= judged:
             squares.append(data.qvel @ data.qvel / m.nv)
-    m.opt.timestep, m.opt.integrator = own
     return WholeRun(float(np.sqrt(np.mean(squares))), warnings, resets)

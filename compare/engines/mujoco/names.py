@@ -4,7 +4,6 @@ A free joint is four joints of a Tree: slides along the world's x, y and z axes,
 """
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 from typing import NamedTuple
 
 import mujoco
@@ -28,15 +27,10 @@ FREE_PARTS = ("x", "y", "z", "turn")
 
 def integrator_by_name(name: str) -> str:
     """An integrator of the installed MuJoCo by its name; ValueError, in one line, for another name."""
-    if name in INTEGRATORS:
-        return name
-    expected = f"expected one of {', '.join(INTEGRATORS)}"
-    if name in NAMES:
-        raise ValueError(f"MuJoCo {mujoco.__version__} has no integrator {name}; {expected}")
-    by_small_letters = {known.casefold(): known for known in INTEGRATORS}
-    close = get_close_matches(name.casefold(), by_small_letters, 1)
-    hint = f"; did you mean {by_small_letters[close[0]]}?" if close else ";"
-    raise ValueError(f"MuJoCo has no integrator {name!r}{hint} {expected}")
+    if name not in INTEGRATORS:
+        expected = f"expected one of {', '.join(INTEGRATORS)}"
+        raise ValueError(f"MuJoCo {mujoco.__version__} has no integrator {name!r}; {expected}")
+    return name
 
 
 def bit(*flags: str) -> int:
@@ -67,6 +61,13 @@ def unique_name(name: str, what: str, number: int, names: Iterable[str]) -> str:
 def joint_name(m: mujoco.MjModel, number: int) -> str:
     """The unique name of a joint."""
     return unique_name(m.joint(number).name, "joint", number, (m.joint(j).name for j in range(m.njnt)))
+
+
+def element_name(m: mujoco.MjModel, kind: str, number: int) -> str:
+    """The name of an element of a kind, by mujoco.MjModel's names of kinds, in a line."""
+    if kind == "joint":
+        return joint_name(m, int(number))
+    return own_name(getattr(m, kind)(int(number)).name, kind, int(number))
 
 
 def kind_of(m: mujoco.MjModel, number: int) -> str:
@@ -101,10 +102,9 @@ def joint_places(m: mujoco.MjModel) -> dict[str, Place]:
             q, v = q + nq, v + nv
     coordinates = Coordinates(tuple(name for name, _ in places), tuple(place.kind for _, place in places))
     for columns in (coordinates.names, coordinates.positions, coordinates.speeds):
-        if len(set(columns)) < len(columns):
-            twice = next(name for name in columns if columns.count(name) > 1)
+        if twice := sorted({name for name in columns if columns.count(name) > 1}):
             parts = "a ball w has the speeds w x, w y, w z, and a free joint the parts w x, w y, w z, w turn"
-            raise ValueError(f"two of its joints are called {twice!r}; {parts}")
+            raise ValueError(f"two of its joints are called {twice[0]!r}; {parts}")
     return dict(places)
 
 
@@ -143,10 +143,8 @@ def rotors(m: mujoco.MjModel) -> np.ndarray:
     diagonal = np.zeros(m.nv)
     for i in map(int, np.flatnonzero(getattr(m, "actuator_armature", np.zeros(0)))):
         if mujoco.mjtTrn(m.actuator_trntype[i]) not in OF_A_JOINT:
-            name = own_name(m.actuator(i).name, "actuator", i)
-            raise ValueError(
-                f"actuator {name!r} has armature and acts on no joint; only armature at joints is compared"
-            )
+            name = element_name(m, "actuator", i)
+            raise ValueError(f"actuator {name!r} has armature and acts on no joint; only that of joints is compared")
         added = m.actuator_armature[i] * m.actuator_gear[output_of(m, i), 0] ** 2
         diagonal[m.dof_jntid == m.actuator_trnid[i, 0]] += added
     return diagonal

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import mujoco
@@ -13,10 +12,9 @@ import tmt
 from ...robots.actuators import Drive
 from .actuators import drive_of
 from .engine import Mujoco, methods_for
-from .inventory import Feature, features, open_equalities, take_away
-from .names import NAMES, Place, joint_name, joint_places, kind_of, moving, own_name, rotors, unique_name
-from .refused import refuse
-from .source import ModelError, compiled, editable, moves_the_same, name_of, without_geoms, without_visuals
+from .inventory import Feature, features, open_equalities, refuse, take_away
+from .names import NAMES, Place, element_name, joint_name, joint_places, kind_of, moving, rotors, unique_name
+from .source import ModelError, compiled, editable, name_of, without_visuals
 
 
 @dataclass(frozen=True)
@@ -37,15 +35,7 @@ class Reading:
     dt: float  # s, of the file
     bodies: tuple[int, ...]  # the numbers of the Tree's bodies in the model
     drive: Drive  # actuators, tendons, gravity compensation; controls by the names of `keyframes`
-    model: mujoco.MjModel = field(repr=False, compare=False)  # without what only contacts and pictures need
-
-    @cached_property
-    def full_model(self) -> mujoco.MjModel:
-        """The model with its contacts, compiled at the first use."""
-        return self.model if self.source is None else compiled_whole(self.source)[0]
-
-    def __getstate__(self):
-        return {name: value for name, value in self.__dict__.items() if name != "full_model"}
+    model: mujoco.MjModel = field(repr=False, compare=False)  # without what is only drawn
 
 
 def read(source: Path | str | mujoco.MjModel) -> Reading:
@@ -53,53 +43,117 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
 
     ModelError, in one line, where it cannot be compared.
     """
+    if isinstance(source, mujoco.MjModel):
+        model, warnings, source = mujoco.MjModel.__copy__(source), (), None
+    elif isinstance(source, Path | str):
+        model, warnings = compiled_from(source)
+    else:
+        raise ModelError(f"cannot read a {type(source).__name__}; expected a path, MJCF text or an MjModel")
     try:
-        if isinstance(source, mujoco.MjModel):
-            model, warnings, source = mujoco.MjModel.__copy__(source), (), None
-        elif isinstance(source, Path | str):
-            model, warnings = compiled_whole(source)
-        else:
-            raise ModelError(f"cannot read a {type(source).__name__}; expected a path, MJCF text or an MjModel")
         refuse(model)
         joints = joint_places(model)
-        bodies = moving_bodies(model)
+        massive = (model.body_mass > 0.0) | (model.body_inertia > 0.0).any(axis=1)
+        bodies = np.flatnonzero(massive & moving(model)).tolist()
         tree = tree_of(model, joints, bodies)
-    except ModelError:
-        raise
     except ValueError as error:
         raise ModelError(f"cannot compare {name_of(source)}: {error}") from None
+    name = bytes(model.names).partition(b"\0")[0].decode("utf-8", "replace").strip()
+    keys = keyframes(model)
     return Reading(
         source=source,
-        name=own_model_name(model),
+        name=name if name.isprintable() and name != "MuJoCo Model" else "",  # MuJoCo's own for none
         tree=tree,
         features=features(model),
         open_tree=open_equalities(model),
-        keyframes=keyframes(model),
+        keyframes=keys,
         qpos0=model.qpos0.copy(),
-        ranges=tuple(limits(model, place) for place in joints.values()),
+        ranges=tuple(
+            tuple(model.jnt_range[place.joint].tolist()) if model.jnt_limited[place.joint] else None
+            for place in joints.values()
+        ),
         warnings=warnings,
-        integrator=integrator_name(model),
+        integrator=integrator_name(model.opt.integrator),
         dt=float(model.opt.timestep),
         bodies=tuple(bodies),
-        drive=drive_of(model, source, bodies, list(keyframes(model))),
-        model=light_model(source, model),
+        drive=drive_of(model, source, bodies, list(keys)),
+        model=model,
     )
 
 
-def compiled_whole(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+def compiled_from(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     """The model without what is only drawn, and the compiler's warnings."""
     return compiled(source, lambda: without_visuals(editable(source)).compile())
 
 
-def light_model(source: Path | str | None, whole: mujoco.MjModel) -> mujoco.MjModel:
-    """The model without geoms if it moves the same, else the whole one (and of a compiled model)."""
-    if source is None:
-        return whole
-    try:
-        model, _ = compiled(source, lambda: without_geoms(editable(source)).compile())
-    except ModelError:
-        return whole
-    return model if moves_the_same(whole, model) else whole
+def integrator_name(number: int) -> str:
+    member = mujoco.mjtIntegrator(number).name.removeprefix("mjINT_")
+    return next((name for name, known in NAMES.items() if known == member), member)
+
+
+def keyframes(model: mujoco.MjModel) -> dict[str, np.ndarray]:
+    """The positions of the keyframes by their names, or `key 0`; the compiler has given quaternions length 1."""
+    own = [model.key(number).name for number in range(model.nkey)]
+    return {unique_name(name, "key", k, own): model.key_qpos[k].copy() for k, name in enumerate(own)}
+
+
+def tree_of(whole: mujoco.MjModel, joints: Mapping[str, Place], bodies: list[int]) -> tmt.Tree:
+    """The Tree of a compiled model.
+
+    Frames are read where mj_kinematics puts them at the reference position: that honours `sameframe`. There all of the
+    Tree's frames are parallel to the world's, so that everything is in world axes.
+    """
+    model = mujoco.MjModel.__copy__(whole)
+    take_away(model)  # what a flag of the file disables is zero
+    data, carrier = mujoco.MjData(model), carriers(model, joints)
+    data.qpos[:] = model.qpos0
+    free = {place.joint for place in joints.values() if kind_of(model, place.joint) == "free"}
+    for start in model.jnt_qposadr[list(free)]:  # at the origin and not turned
+        data.qpos[start : start + 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    mujoco.mj_kinematics(model, data)
+    parents, anchors, axes = [], [], []
+    for i, place in enumerate(joints.values()):
+        body, is_ball, is_free = model.jnt_bodyid[place.joint], place.kind == "ball", place.joint in free
+        first = model.body_dofadr[body] == place.dofs.start
+        parents.append(carrier[model.body_parentid[body]] if first else i - 1)
+        anchors.append(np.zeros(3) if is_free else data.xanchor[place.joint])
+        if is_free:
+            axes += [*np.eye(3)] if is_ball else [np.eye(3)[place.dofs.start - model.jnt_dofadr[place.joint]]]
+        else:  # a ball's are the axes of its body
+            axes += [*data.xmat[body].reshape(3, 3).T] if is_ball else [data.xaxis[place.joint]]
+    hangs = [carrier[body] for body in bodies]
+    turns = data.ximat[bodies].reshape(-1, 3, 3)
+    inertia = [R @ np.diag(moments) @ R.T for R, moments in zip(turns, model.body_inertia[bodies])]
+    speeds = [i for place in joints.values() for i in place.dofs]
+    return tmt.Tree(
+        hinge_names=list(joints),
+        parent=parents,
+        offset=[anchor - (anchors[before] if before >= 0 else 0.0) for anchor, before in zip(anchors, parents)],
+        axis=axes,
+        damping=model.dof_damping[speeds],
+        body_names=[element_name(model, "body", body) for body in bodies],
+        body_hinge=hangs,
+        mass=model.body_mass[bodies],
+        com=[data.xipos[body] - anchors[joint] for body, joint in zip(bodies, hangs)],
+        inertia=[(tensor + tensor.T) / 2.0 for tensor in inertia],
+        gravity=model.opt.gravity,
+        kind=[place.kind for place in joints.values()],
+        armature=(model.dof_armature + rotors(model))[speeds],
+        stiffness=[model.jnt_stiffness[place.joint] for place in joints.values()],
+        rest=[model.qpos_spring[i] for place in joints.values() for i in place.qpos],
+        reference=[
+            0.0 if place.kind == "ball" or place.joint in free else model.qpos0[place.qpos.start]
+            for place in joints.values()
+        ],
+    )
+
+
+def carriers(model: mujoco.MjModel, joints: Mapping) -> list[int]:
+    """The last joint of the Tree that moves each body, -1: none."""
+    last = {int(model.jnt_bodyid[place.joint]): i for i, place in enumerate(joints.values())}
+    joint_of_body = [-1]
+    for body in range(1, model.nbody):
+        joint_of_body.append(last.get(body, joint_of_body[model.body_parentid[body]]))
+    return joint_of_body
 
 
 def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
@@ -109,15 +163,9 @@ def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
     not move as many bodies there.
     """
     tree = (solution or reading).tree
-    return Mujoco(
-        reading.model,
-        tree.hinge_names,
-        bodies_as_in(solution, reading) if solution else reading.bodies,
-        reading.source,
-        bare=True,
-        warnings=reading.warnings,
-        methods=methods_for(tree),
-    )
+    bodies = bodies_as_in(solution, reading) if solution else reading.bodies
+    model, source, methods = reading.model, reading.source, methods_for(tree)
+    return Mujoco(model, tree.hinge_names, bodies, source, bare=True, warnings=reading.warnings, methods=methods)
 
 
 def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
@@ -137,158 +185,43 @@ def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
 
 def moved_by(reading: Reading, places: Iterable[Place]) -> list[list[int]]:
     """Of each joint the bodies with mass that are fixed to the body that it moves, by number."""
-    fixed_to = reading.model.body_weldid
-    carriers = [reading.model.jnt_bodyid[place.joint] for place in places]
-    return [[body for body in reading.bodies if fixed_to[body] == carrier] for carrier in carriers]
-
-
-def moving_bodies(model: mujoco.MjModel) -> list[int]:
-    """The numbers of the bodies that move and have mass or inertia."""
-    massive = (model.body_mass > 0.0) | (model.body_inertia > 0.0).any(axis=1)
-    return [int(body) for body in np.flatnonzero(massive & moving(model))]
-
-
-def tree_of(whole: mujoco.MjModel, joints: Mapping[str, Place], bodies: list[int]) -> tmt.Tree:
-    """The Tree of a compiled model.
-
-    Frames are read where mj_kinematics puts them at the reference position: that honours `sameframe`. There all of the
-    Tree's frames are parallel to the world's, so that everything is in world axes.
-    """
-    model = mujoco.MjModel.__copy__(whole)
-    take_away(model)  # what a flag of the file disables is zero
-    data = mujoco.MjData(model)
-    data.qpos[:] = model.qpos0
-    for number in range(model.njnt):
-        if kind_of(model, number) == "free":  # at the origin and not turned
-            start = model.jnt_qposadr[number]
-            data.qpos[start : start + 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-    mujoco.mj_kinematics(model, data)
-    places, carrier = list(joints.values()), carriers(model, joints)
-    anchors = [np.zeros(3) if is_free(model, place) else data.xanchor[place.joint] for place in places]
-    parents = [parent(model, i, place, carrier) for i, place in enumerate(places)]
-    hangs = [carrier[body] for body in bodies]
-    turns = data.ximat[bodies].reshape(-1, 3, 3)
-    inertia = [R @ np.diag(moments) @ R.T for R, moments in zip(turns, model.body_inertia[bodies])]
-    speeds = [i for place in places for i in place.dofs]
-    single = [place.kind != "ball" and not is_free(model, place) for place in places]
-    return tmt.Tree(
-        hinge_names=list(joints),
-        parent=parents,
-        offset=[anchor - (anchors[before] if before >= 0 else 0.0) for anchor, before in zip(anchors, parents)],
-        axis=[axis for place in places for axis in speed_axes(model, data, place)],
-        damping=model.dof_damping[speeds],
-        body_names=[own_name(model.body(body).name, "body", body) for body in bodies],
-        body_hinge=hangs,
-        mass=model.body_mass[bodies],
-        com=[data.xipos[body] - anchors[joint] for body, joint in zip(bodies, hangs)],
-        inertia=[(tensor + tensor.T) / 2.0 for tensor in inertia],
-        gravity=model.opt.gravity,
-        kind=[place.kind for place in places],
-        armature=(model.dof_armature + rotors(model))[speeds],
-        stiffness=[model.jnt_stiffness[place.joint] for place in places],
-        rest=[model.qpos_spring[i] for place in places for i in place.qpos],
-        reference=[model.qpos0[place.qpos.start] if one else 0.0 for place, one in zip(places, single)],
-    )
-
-
-def is_free(model: mujoco.MjModel, place: Place) -> bool:
-    """Whether a joint of the Tree is part of a free joint."""
-    return kind_of(model, place.joint) == "free"
-
-
-def parent(model: mujoco.MjModel, number: int, place: Place, carrier: list[int]) -> int:
-    """The joint of the Tree before one: in the same body, or the last that moves the body before."""
-    body = int(model.jnt_bodyid[place.joint])
-    first = model.body_dofadr[body] == place.dofs.start
-    return carrier[model.body_parentid[body]] if first else number - 1
-
-
-def speed_axes(model: mujoco.MjModel, data: mujoco.MjData, place: Place) -> np.ndarray:
-    """The directions of a joint's speeds at the reference position: a ball's are the axes of its body."""
-    if is_free(model, place):
-        return np.eye(3) if place.kind == "ball" else np.eye(3)[[place.dofs.start - model.jnt_dofadr[place.joint]]]
-    if place.kind == "ball":
-        return data.xmat[model.jnt_bodyid[place.joint]].reshape(3, 3).T
-    return data.xaxis[[place.joint]]
-
-
-def carriers(model: mujoco.MjModel, joints: Mapping) -> list[int]:
-    """The last joint of the Tree that moves each body, -1: none."""
-    last = {int(model.jnt_bodyid[place.joint]): i for i, place in enumerate(joints.values())}
-    joint_of_body = [-1]
-    for body in range(1, model.nbody):
-        joint_of_body.append(last.get(body, joint_of_body[model.body_parentid[body]]))
-    return joint_of_body
-
-
-def keyframes(model: mujoco.MjModel) -> dict[str, np.ndarray]:
-    """The positions of the keyframes by their names, or `key 0`; the compiler has given quaternions length 1."""
-    own = [model.key(number).name for number in range(model.nkey)]
-    names = [unique_name(name, "key", number, own) for number, name in enumerate(own)]
-    return {name: qpos.copy() for name, qpos in zip(names, model.key_qpos)}
-
-
-def own_model_name(model: mujoco.MjModel) -> str:
-    """The name of the model; "" if it has none that can be printed in a line."""
-    name = bytes(model.names).partition(b"\0")[0].decode("utf-8", "replace").strip()
-    return name if name.isprintable() and name != "MuJoCo Model" else ""  # MuJoCo's own for none
-
-
-def limits(model: mujoco.MjModel, place: Place) -> tuple[float, float] | None:
-    """The range of a joint, if the file gives it one."""
-    low, high = map(float, model.jnt_range[place.joint])
-    return (low, high) if model.jnt_limited[place.joint] else None
-
-
-def integrator_name(model: mujoco.MjModel) -> str:
-    """MuJoCo's name of the integrator of the file."""
-    member = mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_")
-    return next((name for name, known in NAMES.items() if known == member), member)
+    fixed_to, carrier = reading.model.body_weldid, reading.model.jnt_bodyid
+    return [[body for body in reading.bodies if fixed_to[body] == carrier[place.joint]] for place in places]
 
 
 def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
     """The engine for an MJCF file; ModelError if it cannot be read or does not have exactly the hinges of the Tree."""
-    path = Path(path)
-    model, warned = compiled(path, lambda: without_visuals(editable(path)).compile())
-    return with_hinges(model, path, tree, warned)
-
-
-def has_hinges(path: str | Path, names: Sequence[str]) -> bool:
-    """Whether a file has exactly the hinges of these names, in any order; ModelError if it cannot be read."""
-    path = Path(path)
-    spec, _ = compiled(path, lambda: editable(path))
-    hinges = [joint.name for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_HINGE]
-    return len(hinges) == len(spec.joints) and sorted(hinges) == sorted(names)
+    return with_hinges(Path(path), tree)
 
 
 def parse(text: str, tree: tmt.Tree) -> Mujoco:
     """The engine for MJCF text."""
-    return with_hinges(mujoco.MjModel.from_xml_string(text), text, tree)
+    return with_hinges(text, tree)
 
 
-def with_hinges(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree, warned: tuple = ()) -> Mujoco:
-    """The engine, if the model has exactly the hinges of the Tree; source: a Path or MJCF text."""
-    hinges = tree.hinge_names
-    names = [joint_name(model, j) for j in range(model.njnt)]
-    kinds = [kind_of(model, j) for j in range(model.njnt)]
+def has_hinges(path: str | Path, names: Sequence[str]) -> bool:
+    """Whether a file has exactly the hinges of these names, in any order; ModelError if it cannot be read."""
+    spec, _ = compiled(Path(path), lambda: editable(Path(path)))
+    hinges = [joint.name for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_HINGE]
+    return len(hinges) == len(spec.joints) and sorted(hinges) == sorted(names)
+
+
+def with_hinges(source: Path | str, tree: tmt.Tree) -> Mujoco:
+    """The engine, if the model has exactly the hinges of the Tree; source: a Path or MJCF text.
+
+    The body that a hinge moves is known by the hinge; one of several on a hinge, or fixed to the world, by its name.
+    """
+    (model, warnings), hinges, bodies = compiled_from(source), tree.hinge_names, []
+    names = {joint_name(model, j): j for j in range(model.njnt)}
+    kinds = [kind_of(model, j) for j in names.values()]
     if sorted(names) != sorted(hinges) or set(kinds) != {"hinge"}:
         joints = ", ".join(f"{name} ({kind})" for name, kind in zip(names, kinds)) or "none"
         raise ModelError(f"{name_of(source)} has the joints {joints}; expected exactly the hinges {', '.join(hinges)}")
-    return Mujoco(model, hinges, bodies_of_hinges(model, source, tree), source, warnings=warned)
-
-
-def bodies_of_hinges(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> list[int]:
-    """The numbers of the Tree's bodies in the model: the body that a hinge moves, whatever its name.
-
-    A body that is fixed to the world, or one of several on a hinge, is found by name; ModelError if there is none of that name.
-    """
-    numbers = []
     for name, hinge in zip(tree.body_names, tree.body_hinge):
         if hinge >= 0 and tree.body_hinge.count(hinge) == 1:
-            numbers.append(int(model.jnt_bodyid[joint_places(model)[tree.hinge_names[hinge]].joint]))
-            continue
-        number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-        if number < 0:
+            bodies.append(int(model.jnt_bodyid[names[hinges[hinge]]]))
+        elif (number := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)) >= 0:
+            bodies.append(number)
+        else:
             raise ModelError(f"{name_of(source)} has no body {name!r}, and no hinge identifies it")
-        numbers.append(number)
-    return numbers
+    return Mujoco(model, hinges, bodies, source, warnings=warnings)

@@ -37,5 +37,4 @@ EDITS = (
     Edit("engines.scipy", "as_far_as_it_goes", "t[int(np.argmin(finite)) - 1]", "t[0]", "every run ends at its start"),
     Edit("engines.tmt", "TmtDynamics.prepare", "path[0, ::every].copy()", "path[0, -65:].copy()",
          "a timed run is read at its last steps"),
-    Edit("calls", "MinimalCalls.acceleration", "self.model.dof_damping * d.qvel", "0 * d.qvel", "no damping in minimal calls"),
 )  # fmt: skip

@@ -108,7 +108,7 @@ def lifts_at(prediction: Prediction, integrator: str, reading: Reading) -> list[
 
 
 def full_at(prediction: Prediction, integrator: str, reading: Reading) -> dict:
-    return observed.full_model(reading.full_model, prediction.at, reading.dt, integrator)
+    return observed.full_model(reading.model, prediction.at, reading.dt, integrator)
 
 
 # in the main process
