@@ -162,7 +162,7 @@ WRONG = {  # arguments, each with what is in its line
     "speed --scenes my.toml": "my.toml", "mass --mjcf missing.xml": "missing.xml", f"mass --mjcf {ROOT}": "directory",
     f"mass --out {ROOT / 'pyproject.toml'}": "pyproject.toml", f"mass --reference arm --mjcf {ARM7}": "joint3 (hinge)",
     f"published --mjcf {ARM7}": "arm7", "stability --dt 0.1": "arm", f"stability --integrator Euler --mjcf {FREE}": "free_body",
-    f"stability --integrator euler --mjcf {ARM7}": "did you mean Euler?",
+    f"stability --integrator euler --mjcf {ARM7}": "expected one of Euler",
     f"trajectory --mjcf {MIXED} --scenes wrong.toml": "17",
     # files
     "gravity --mjcf cut.xml": "cut.xml", "gravity --mjcf empty.xml": "empty", "gravity --mjcf mesh.xml": "none.stl",

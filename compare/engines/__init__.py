@@ -58,14 +58,6 @@ def made(schemes: Collection[str], from_file: Mapping[str, "Engine"]) -> dict[st
             for name in RECORDS if name in modules or name in from_file}  # fmt: skip
 
 
-def not_installed(name: str) -> str | None:
-    """Why an engine is unavailable, if the package that it needs is not installed; else None."""
-    package, extra = RECORDS[name].package, RECORDS[name].extra
-    if not package or find_spec(package):
-        return None
-    return f"{package} is not installed" + (f"; `pip install .[{extra}]` installs it" if extra else "")
-
-
 class Method(NamedTuple):
     """A method of integration of one engine."""
 
@@ -146,7 +138,10 @@ class Engine:
 
     def unavailable(self) -> str | None:
         """Why it cannot take part here, or None."""
-        return not_installed(self.name) if self.name in RECORDS else None
+        package, extra = RECORDS[self.name].package, RECORDS[self.name].extra
+        if not package or find_spec(package):
+            return None
+        return f"{package} is not installed" + (f"; `pip install .[{extra}]` installs it" if extra else "")
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         """The methods in a case: where a robot's own actuators act, others may be the same scheme."""

@@ -138,11 +138,11 @@ def test_what_else_changes_a_motion_is_switched_off_by_name(name, rng):
     assert np.array_equal(*paths)
 
 
-def test_what_has_no_name_is_called_as_nothing_else():
-    body = '<body><joint name="joint 1" type="ball"/><joint type="slide"/><geom size="0.1" pos="0.1 0 0"/></body>'
-    found = read(mjcf(body, after='<keyframe><key name="key 1" qpos="0 0 2 0 0"/><key qpos="2 0 0 0 0"/></keyframe>'))
-    assert found.tree.hinge_names == ("joint 1", "unnamed joint 1")
-    keys = {"key 1": [0.0, 0.0, 1.0, 0.0, 0.0], "unnamed key 1": [1.0, 0.0, 0.0, 0.0, 0.0]}  # quaternions of length 1
+def test_what_has_no_name_is_called_by_its_kind_and_number():
+    body = '<body><joint name="w" type="ball"/><joint type="slide"/><geom size="0.1" pos="0.1 0 0"/></body>'
+    found = read(mjcf(body, after='<keyframe><key name="k" qpos="0 0 2 0 0"/><key qpos="2 0 0 0 0"/></keyframe>'))
+    assert found.tree.hinge_names == ("w", "joint 1")
+    keys = {"k": [0.0, 0.0, 1.0, 0.0, 0.0], "key 1": [1.0, 0.0, 0.0, 0.0, 0.0]}  # quaternions of length 1
     assert {name: q.tolist() for name, q in found.keyframes.items()} == keys
 
 

@@ -26,14 +26,18 @@ class MujocoDynamics:
 
     Columns follow the names of the coordinates, whatever the order in the file; a free joint of the model is four of them.
     bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the position zero, (nq,).
-    bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move.
+    bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move. ctrl, act: constant
+    controls and activations of its actuators; of a given torque only the part beyond their constant part is applied.
     """
 
-    def __init__(self, model, coordinates, bodies, zero, bare=False):
+    def __init__(self, model, coordinates, bodies, zero, bare=False, ctrl=0.0, act=0.0, constant=0.0):
         # where states are evaluated the file's integrator must not matter, as `discrete` does
         model.opt.integrator = INTEGRATORS["RK4"]
         model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)
+        if bare:  # their height would count in the energy
+            model.body_mass[np.setdiff1d(np.flatnonzero(~moving(model)), bodies)] = 0.0
         self.model, self.data = model, mujoco.MjData(model)
+        self.data.ctrl[:], self.data.act[:], self.constant = ctrl, act, constant
         self.coordinates, self.bodies, self.bare = coordinates, list(bodies), bare
         by_name = joint_places(model)
         joints = [by_name[name] for name in coordinates.names]
@@ -41,7 +45,6 @@ class MujocoDynamics:
         self.qpos = np.array([i for place in joints for i in place.qpos])
         self.dofs = np.array([i for place in joints for i in place.dofs])
         self.forward(zero)
-        self.left_out = np.setdiff1d(np.flatnonzero(~moving(model)), self.bodies) if bare else []
         self.zero_axes = self.turns(self.data.xmat)
 
     def com_positions(self, q) -> np.ndarray:
@@ -111,26 +114,35 @@ class MujocoDynamics:
 
     def potential_energy(self, q) -> np.ndarray:
         """V, J, (...): mj_energyPos."""
-        return self._each(lambda d: self._energies(d)[0], q)
+
+        def energy(d):
+            mujoco.mj_energyPos(self.model, d)
+            return d.energy[0]
+
+        return self._each(energy, q)
 
     def energy(self, q, v) -> np.ndarray:
         """Potential and kinetic energy together, J, (...): mj_energyPos and mj_energyVel."""
-        return self._each(lambda d: self._energies(d).sum(), q, v)
+
+        def energy(d):
+            mujoco.mj_energyPos(self.model, d)
+            mujoco.mj_energyVel(self.model, d)
+            return d.energy.sum()
+
+        return self._each(energy, q, v)
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
         """Motion under constant torque: q (..., steps + 1, nq), v (..., steps + 1, nv), NaN from where a run diverges."""
-        refuse_tolerance(tolerance, method)
         batch = np.broadcast_shapes(*(np.shape(value)[:-1] for value in (q, v, tau)))
-        starts, follow = self.runner(q, v, tau, dt, steps, method)
+        starts, follow = self.runner(q, v, tau, dt, steps, method, tolerance)
         *paths, ended = self.path(starts, follow(), dt)
         q, v = (path.reshape(*batch, steps + 1, path.shape[-1]) for path in paths)
         evaluations, ended = len(starts) * steps * EVALUATIONS[method], ended.reshape(batch)[()]
         return Motion(dt * np.arange(steps + 1), q, v, evaluations, ended, steps)
 
     def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
-        refuse_tolerance(setting.tolerance, method)
         every, dt = setting.every, setting.duration / setting.steps
-        starts, run = self.runner(q, v, tau, dt, setting.steps, method)
+        starts, run = self.runner(q, v, tau, dt, setting.steps, method, setting.tolerance)
         t = np.linspace(0.0, setting.duration, GRID + 1)
 
         def read(states):
@@ -152,23 +164,25 @@ class MujocoDynamics:
         states[np.cumsum(~ran, axis=1) > 0] = np.nan
         return states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs], ended
 
-    def runner(self, q, v, tau, dt, steps, method) -> tuple[np.ndarray, Callable]:
+    def runner(self, q, v, tau, dt, steps, method, tolerance) -> tuple[np.ndarray, Callable]:
         """The first states, time first, and a call that runs MuJoCo's C loop from them; it returns (runs, steps, ...)."""
+        if tolerance is not None:
+            raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
         model, data = self.own_copy(dt, method)
         model.opt.disableflags |= bit("AUTORESET")  # a reset would hide the divergence
         rows, spec = rows_of_states(q, v, self.applied(tau))[1], mujoco.mjtState.mjSTATE_FULLPHYSICS
         runs = len(rows[0])
         starts = np.zeros((runs, mujoco.mj_stateSize(model, spec)))
         # rollout zeroes qfrc_applied unless it is the control, and leaves out the initial state
-        control_spec, controls = self.control()
-        torques = np.zeros((runs, steps, len(controls) + model.nv))
-        torques[:, :, : len(controls)] = controls
+        torques = np.zeros((runs, steps, model.nu + model.nv))  # after the controls
+        torques[:, :, : model.nu] = data.ctrl
         for start, torque, *state in zip(starts, torques, *rows):
-            data.qpos[self.qpos], data.qvel[self.dofs], torque[:, len(controls) + self.dofs] = state
+            data.qpos[self.qpos], data.qvel[self.dofs], torque[:, model.nu + self.dofs] = state
             mujoco.mj_getState(model, data, start, spec)
         # filled, so that the first run does not have to fetch the memory
         states, sensors = np.full((runs, steps, starts.shape[1]), np.nan), np.zeros((runs, steps, model.nsensordata))
-        options = {"control_spec": control_spec, "nstep": steps, "state": states, "sensordata": sensors}
+        controls = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+        options = {"control_spec": controls, "nstep": steps, "state": states, "sensordata": sensors}
 
         def run():
             rollout([model] * runs, [data], starts, torques, skip_checks=True, **options)
@@ -181,15 +195,12 @@ class MujocoDynamics:
         model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
         model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
         data.qpos[self.qpos], data.qvel[self.dofs], data.qfrc_applied[self.dofs] = q, v, self.applied(tau)
+        data.ctrl[:], data.act[:] = self.data.ctrl, self.data.act
         return model, data
 
     def applied(self, tau):
         """The part of torques that actuators do not exert."""
-        return tau
-
-    def control(self) -> tuple[int, np.ndarray]:
-        """The part of MuJoCo's state that a rollout sets at each step, and its numbers before the torque."""
-        return int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), np.zeros(0)
+        return tau - self.constant
 
     def _each(self, read, q, v=0.0, tau=0.0) -> np.ndarray:
         """read(data) after mj_forward at each state, stacked to the batch shape of the states."""
@@ -202,14 +213,6 @@ class MujocoDynamics:
         d.qpos[self.qpos], d.qvel[self.dofs], d.qfrc_applied[self.dofs] = q, v, tau
         mujoco.mj_forward(self.model, d)
         return d
-
-    def _energies(self, d):
-        mass, out = self.model.body_mass, self.left_out
-        weighed, mass[out] = mass[out], 0.0
-        mujoco.mj_energyPos(self.model, d)
-        mass[out] = weighed
-        mujoco.mj_energyVel(self.model, d)
-        return d.energy
 
     def turns(self, xmat) -> np.ndarray:
         """The orientations of the bodies, (m, 3, 3), of xmat or ximat."""
@@ -227,11 +230,6 @@ class MujocoDynamics:
             fill(T, B, body)
         T, B = pair[..., self.dofs]
         return np.stack([T, self._to_body(B)])
-
-
-def refuse_tolerance(tolerance: float | None, method: str) -> None:
-    if tolerance is not None:
-        raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
 
 
 def convective_accelerations(dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,7 +11,7 @@ from tmt.methods import lone_speeds
 
 from ...robots.actuators import Controller
 from ...robots.case import Case
-from .. import Method
+from .. import Engine, Method
 from .actuators import control_of
 from .dynamics import MujocoDynamics
 from .inventory import switch_off
@@ -56,7 +55,7 @@ def methods_for(tree: tmt.Tree | None = None) -> dict[str, Method]:
 
 
 METHODS = methods_for()
-MODELS, BYTES = 64, 1e8  # limits of the cache of the models of cases, for each engine
+MODELS = 16  # most models of cases that an engine keeps
 
 UNLIMITED = (
     "actuator_ctrllimited", "actuator_forcelimited", "actuator_actlimited", "jnt_actfrclimited", "tendon_actfrclimited",
@@ -65,7 +64,7 @@ SOLVED, MOST_ITERATIONS = 1e-15, 100
 ACTING, IDLE = 0, 1  # groups of actuators
 
 
-class Mujoco:
+class Mujoco(Engine):
     """MuJoCo with one compiled model of given joints.
 
     bodies: their numbers in the model. source: what the model was read from, a Path or MJCF text; None if the model was changed
@@ -74,7 +73,7 @@ class Mujoco:
     """
 
     name = "mujoco"
-    methods: Mapping[str, Method] = METHODS
+    methods = METHODS
 
     def __init__(
         self,
@@ -94,11 +93,7 @@ class Mujoco:
     def __getstate__(self):
         return self.__dict__ | {"cache": {}}
 
-    def unavailable(self) -> str | None:
-        return None
-
     def methods_in(self, case: Case) -> Mapping[str, Method]:
-        """The integrators in a case: where actuators act some are other schemes."""
         return methods_for(case.tree) if case.controller else self.methods
 
     def of(self, case: Case) -> MujocoDynamics:
@@ -110,7 +105,7 @@ class Mujoco:
         changes += (case.controller.controls,) if case.controller else ()
         dynamics = self.cache.pop(changes, None) or self.dynamics(case)
         self.cache[changes] = dynamics
-        if len(self.cache) > max(1.0, min(MODELS, BYTES / mujoco.mj_sizeModel(self.model))):
+        if len(self.cache) > MODELS:
             del self.cache[next(iter(self.cache))]
         return dynamics
 
@@ -122,22 +117,14 @@ class Mujoco:
             switch_off(model)
         if not case.scene.gravity:
             model.opt.gravity[:] = 0.0
-        parts = model, case.coordinates, self.bodies, case.tree.zero, self.bare
-        dynamics = DrivenDynamics(*parts, case.controller) if case.controller else MujocoDynamics(*parts)
+        controls = engaged(model, case.controller) if case.controller else ()
+        dynamics = MujocoDynamics(model, case.coordinates, self.bodies, case.tree.zero, self.bare, *controls)
         dynamics.model.dof_damping[dynamics.dofs] += case.added_damping
         return dynamics
 
 
-class Driven(NamedTuple):
-    """Constant controls of the actuators of a model."""
-
-    ctrl: np.ndarray  # (nu,)
-    act: np.ndarray  # (na,): activations, constant under these controls
-    torque: np.ndarray  # (nv,) N m or N: the part of their torque at no position and no speed, by the law in compare
-
-
-def engaged(model: mujoco.MjModel, controller: Controller) -> Driven:
-    """Switch on the actuators of a model that take part, without any range.
+def engaged(model: mujoco.MjModel, controller: Controller) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Switch on the actuators of a model that take part, without any range; their controls, activations and constant torque.
 
     `discrete` solves by iteration where a tendon couples branches: here to rounding and by Newton's method (with PGS it is
     Euler's scheme). Activations are constant: the control of a filter equals its activation, that of an integrator is 0.
@@ -158,25 +145,4 @@ def engaged(model: mujoco.MjModel, controller: Controller) -> Driven:
             if model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
                 act[model.actuator_actadr[i]] = u
     model.opt.disableactuator = 1 << IDLE
-    return Driven(ctrl, act, controller.torque)
-
-
-class DrivenDynamics(MujocoDynamics):
-    """A model whose actuators act; of a given torque only the part beyond their constant part is applied."""
-
-    def __init__(self, model, coordinates, bodies, zero, bare, controller):
-        self.driven = engaged(model, controller)
-        super().__init__(model, coordinates, bodies, zero, bare)
-        self.data.ctrl[:], self.data.act[:] = self.driven.ctrl, self.driven.act
-
-    def own_copy(self, dt, integrator, q=0.0, v=0.0, tau=0.0):
-        model, data = super().own_copy(dt, integrator, q, v, tau)
-        data.ctrl[:], data.act[:] = self.driven.ctrl, self.driven.act
-        return model, data
-
-    def applied(self, tau):
-        return tau - self.driven.torque
-
-    def control(self):
-        torque, _ = super().control()
-        return torque | int(mujoco.mjtState.mjSTATE_CTRL), self.driven.ctrl  # which comes first
+    return ctrl, act, controller.torque

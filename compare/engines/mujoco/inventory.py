@@ -141,7 +141,7 @@ def open_equalities(m: mujoco.MjModel) -> tuple[str, ...]:
 def switch_off(m: mujoco.MjModel) -> None:
     """Switch off in a compiled model all that a Tree does not have."""
     take_away(m)
-    for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "ACTUATION"):
+    for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "ACTUATION", "SENSOR"):
         m.opt.disableflags |= bit(flag)
     m.opt.enableflags = 0
 

@@ -3,7 +3,6 @@
 A free joint is four joints of a Tree: slides along the world's x, y and z axes, read at the origin, and a ball.
 """
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import mujoco
@@ -48,26 +47,13 @@ def own_name(name: str, what: str, number: int) -> str:
     return name if name.strip() and name.isprintable() else f"{what} {number}"
 
 
-def unique_name(name: str, what: str, number: int, names: Iterable[str]) -> str:
-    """own_name; one that is made up differs from the names of the others."""
-    unique = own_name(name, what, number)
-    if unique != name:
-        taken = set(names)
-        while unique in taken:
-            unique = f"unnamed {unique}"
-    return unique
+def element_name(m: mujoco.MjModel, kind: str, number: int) -> str:
+    """own_name of an element of a kind, by mujoco.MjModel's names of kinds."""
+    return own_name(getattr(m, kind)(int(number)).name, kind, int(number))
 
 
 def joint_name(m: mujoco.MjModel, number: int) -> str:
-    """The unique name of a joint."""
-    return unique_name(m.joint(number).name, "joint", number, (m.joint(j).name for j in range(m.njnt)))
-
-
-def element_name(m: mujoco.MjModel, kind: str, number: int) -> str:
-    """The name of an element of a kind, by mujoco.MjModel's names of kinds, in a line."""
-    if kind == "joint":
-        return joint_name(m, int(number))
-    return own_name(getattr(m, kind)(int(number)).name, kind, int(number))
+    return element_name(m, "joint", number)
 
 
 def kind_of(m: mujoco.MjModel, number: int) -> str:

@@ -1,6 +1,6 @@
 """A file read as a Tree: the model as MuJoCo compiled it; all that the Tree does not have is listed and switched off."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,8 +13,8 @@ from ...robots.actuators import Drive
 from .actuators import drive_of
 from .engine import Mujoco, methods_for
 from .inventory import Feature, features, open_equalities, refuse, take_away
-from .names import NAMES, Place, element_name, joint_name, joint_places, kind_of, moving, rotors, unique_name
-from .source import ModelError, compiled, editable, name_of, without_visuals
+from .names import NAMES, Place, element_name, joint_name, joint_places, kind_of, moving, rotors
+from .source import ModelError, compiled, name_of
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
     if isinstance(source, mujoco.MjModel):
         model, warnings, source = mujoco.MjModel.__copy__(source), (), None
     elif isinstance(source, Path | str):
-        model, warnings = compiled_from(source)
+        model, warnings = compiled(source)
     else:
         raise ModelError(f"cannot read a {type(source).__name__}; expected a path, MJCF text or an MjModel")
     try:
@@ -80,11 +80,6 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
     )
 
 
-def compiled_from(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
-    """The model without what is only drawn, and the compiler's warnings."""
-    return compiled(source, lambda: without_visuals(editable(source)).compile())
-
-
 def integrator_name(number: int) -> str:
     member = mujoco.mjtIntegrator(number).name.removeprefix("mjINT_")
     return next((name for name, known in NAMES.items() if known == member), member)
@@ -92,8 +87,7 @@ def integrator_name(number: int) -> str:
 
 def keyframes(model: mujoco.MjModel) -> dict[str, np.ndarray]:
     """The positions of the keyframes by their names, or `key 0`; the compiler has given quaternions length 1."""
-    own = [model.key(number).name for number in range(model.nkey)]
-    return {unique_name(name, "key", k, own): model.key_qpos[k].copy() for k, name in enumerate(own)}
+    return {element_name(model, "key", k): model.key_qpos[k].copy() for k in range(model.nkey)}
 
 
 def tree_of(whole: mujoco.MjModel, joints: Mapping[str, Place], bodies: list[int]) -> tmt.Tree:
@@ -170,23 +164,22 @@ def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
 
 def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
     """The numbers of the bodies of a file in the order of those of a solution: on the same joint, by name or by their order."""
-    names, places, numbers = solution.tree.hinge_names, joint_places(reading.model), {}
-    ours = moved_by(reading, [places[name] for name in names])
-    theirs = moved_by(solution, joint_places(solution.model).values())
-    for joint, bodies, stated in zip(names, ours, theirs, strict=True):
+    numbers = {}
+    for joint in solution.tree.hinge_names:
+        bodies, stated = moved_by(reading, joint), moved_by(solution, joint)
         if len(bodies) != len(stated):
             counts = f"joint {joint} moves {len(bodies)} bodies with mass, in the solution {len(stated)}"
             raise ModelError(f"cannot compare the bodies of {name_of(reading.source)}: {counts}")
-        called = {reading.model.body(body).name: body for body in bodies}
-        wanted = [solution.model.body(body).name for body in stated]
-        numbers |= zip(stated, [called[name] for name in wanted] if set(wanted) == set(called) else bodies)
+        order = stated if stated.keys() == bodies.keys() else bodies
+        numbers |= zip(stated.values(), [bodies[name] for name in order])
     return [numbers[body] for body in solution.bodies]
 
 
-def moved_by(reading: Reading, places: Iterable[Place]) -> list[list[int]]:
-    """Of each joint the bodies with mass that are fixed to the body that it moves, by number."""
-    fixed_to, carrier = reading.model.body_weldid, reading.model.jnt_bodyid
-    return [[body for body in reading.bodies if fixed_to[body] == carrier[place.joint]] for place in places]
+def moved_by(reading: Reading, joint: str) -> dict[str, int]:
+    """The bodies that a joint of the Tree carries: their numbers by name."""
+    tree = reading.tree
+    bodies = zip(tree.body_names, reading.bodies, tree.body_hinge)
+    return {name: body for name, body, hinge in bodies if tree.hinge_names[hinge] == joint}
 
 
 def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
@@ -201,9 +194,9 @@ def parse(text: str, tree: tmt.Tree) -> Mujoco:
 
 def has_hinges(path: str | Path, names: Sequence[str]) -> bool:
     """Whether a file has exactly the hinges of these names, in any order; ModelError if it cannot be read."""
-    spec, _ = compiled(Path(path), lambda: editable(Path(path)))
-    hinges = [joint.name for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_HINGE]
-    return len(hinges) == len(spec.joints) and sorted(hinges) == sorted(names)
+    model, _ = compiled(Path(path))
+    is_hinge = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE).all()
+    return bool(is_hinge) and sorted(joint_name(model, j) for j in range(model.njnt)) == sorted(names)
 
 
 def with_hinges(source: Path | str, tree: tmt.Tree) -> Mujoco:
@@ -211,7 +204,7 @@ def with_hinges(source: Path | str, tree: tmt.Tree) -> Mujoco:
 
     The body that a hinge moves is known by the hinge; one of several on a hinge, or fixed to the world, by its name.
     """
-    (model, warnings), hinges, bodies = compiled_from(source), tree.hinge_names, []
+    (model, warnings), hinges, bodies = compiled(source), tree.hinge_names, []
     names = {joint_name(model, j): j for j in range(model.njnt)}
     kinds = [kind_of(model, j) for j in names.values()]
     if sorted(names) != sorted(hinges) or set(kinds) != {"hinge"}:

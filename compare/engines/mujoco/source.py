@@ -7,7 +7,7 @@ printed as XML (which has seven digits).
 
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import mujoco
@@ -45,8 +45,8 @@ def editable_again(source: Path | str) -> mujoco.MjSpec:
         return editable(source)
 
 
-def compiled(source: Path | str, compiling: Callable[[], mujoco.MjModel]) -> tuple[mujoco.MjModel, tuple[str, ...]]:
-    """What `compiling` returns and the warnings of MuJoCo's compiler, one line each; ModelError if it fails."""
+def compiled(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+    """The model without what is only drawn, and the warnings of MuJoCo's compiler, one line each; ModelError if it fails."""
     text = text_of(source) if isinstance(source, Path) else source
     if not text.strip():
         raise ModelError(f"{name_of(source)} is empty; expected MJCF")
@@ -55,11 +55,10 @@ def compiled(source: Path | str, compiling: Callable[[], mujoco.MjModel]) -> tup
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            model = compiling()
+            model = without_visuals(editable(source)).compile()
     except ValueError as error:
-        if "<mujoco" not in text:
-            raise ModelError(f"{name_of(source)} is not MJCF: {error}") from None
-        raise ModelError(f"MuJoCo cannot compile {name_of(source)}: {error}") from None
+        problem = f"MuJoCo cannot compile {name_of(source)}" if "<mujoco" in text else f"{name_of(source)} is not MJCF"
+        raise ModelError(f"{problem}: {error}") from None
     finally:
         mujoco.set_mju_user_warning(before)
     lines += [warning.message for warning in caught]
@@ -67,8 +66,7 @@ def compiled(source: Path | str, compiling: Callable[[], mujoco.MjModel]) -> tup
 
 
 def text_of(path: Path) -> str:
-    """The text of a file; ModelError if it cannot be read twice."""
-    if path.exists() and not (path.is_file() or path.is_dir()):
+    if path.exists() and not (path.is_file() or path.is_dir()):  # a pipe cannot be read twice
         raise ModelError(f"{path} is not a regular file; expected an MJCF file")
     try:
         return path.read_text(encoding="utf-8", errors="replace")

@@ -22,7 +22,7 @@ EDITS = (
     Edit("controller", "controller", "np.abs(moment) @ moved", "moment @ moved", "a tendon's target is moved by a difference"),
     Edit("controller", "reason", "actuator.stiffness(u) < 0.0", "False", "what pushes away takes part, as another scheme"),
     Edit("engine", "methods_for", "lone or tree.has_gains", "lone", "velocity gains are thought explicit in implicitfast"),
-    Edit("mujoco.servos", "DrivenDynamics.applied", "tau - self.driven.torque", "tau", "the torque of servos acts twice"),
+    Edit("mujoco.dynamics", "MujocoDynamics.applied", "tau - self.constant", "tau", "the torque of servos acts twice"),
     Edit("run", "LEFT", "0.1", "0.13", "an arm has left when it is 0.13 rad away"),
     Edit("run", "departure", "t[away][0]", "t[away][-1]", "the last time away is that of leaving"),
     Edit("run", "exchanged", "2.0 * gravity_scale(_1, _2)", "6.0 * gravity_scale(_1, _2)", "the bound of the energy x 3"),
