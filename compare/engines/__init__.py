@@ -172,6 +172,19 @@ def rows_of_states(*values: ArrayLike) -> tuple[tuple[int, ...], list[np.ndarray
     return batch, [np.array(row, order="C").reshape(-1, row.shape[-1]) for row in rows]
 
 
+def as_far_as_it_goes(t: np.ndarray, states: np.ndarray, start: np.ndarray, why: str) -> tuple[np.ndarray, str | None]:
+    """The states of one run at the times t, NaN from where they are no longer finite; and when and why that is, or None.
+
+    states: (times reached, n); start: (n,), the first.
+    """
+    path = np.full((len(t), start.size), np.nan)
+    path[: len(states)], path[0] = states, start
+    finite = np.isfinite(path).all(axis=1)
+    path[np.cumsum(~finite) > 0] = np.nan
+    ended = None if finite.all() else f"at t = {t[int(np.argmin(finite)) - 1]:g} s: {' '.join(why.split())}"
+    return path, ended
+
+
 def same_scheme(engines: Mapping[str, Engine], method: Method, engine: str) -> Method:
     """The first method of an engine that is the same scheme as a given one."""
     return next(m for m in engines[engine].methods.values() if m.scheme == method.scheme)

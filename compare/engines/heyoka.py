@@ -13,8 +13,8 @@ from tmt.equations.method import acceleration
 from tmt.equations.vectors import arctan, cos, sin, sqrt
 
 from ..robots.case import Case
-from . import Engine, EngineRecord, Method, Motion, Prepared
-from .scipy import ScipyDynamics, as_far_as_it_goes, of_length_1
+from . import Engine, EngineRecord, Method, Motion, Prepared, as_far_as_it_goes
+from .scipy import ScipyDynamics, of_length_1
 
 ENGINE = EngineRecord(order=40, label="heyoka", colour="#CC79A7", marker="D", package="heyoka", extra="taylor")
 # options of a compiled function: sums in any order, a less exact sine, and the fastest number of states in a loop's turn

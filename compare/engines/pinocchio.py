@@ -87,14 +87,13 @@ class PinocchioCalls:
 
 def joint(kind: str, axis: np.ndarray):
     """Pinocchio's joint, which is a faster one where the axis is one of the coordinates'."""
-    import pinocchio as pin
+    import pinocchio
 
-    along, any_axis = {
-        "hinge": ((pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ), pin.JointModelRevoluteUnaligned),
-        "slide": ((pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ), pin.JointModelPrismaticUnaligned),
-    }[kind]
+    letter, name = {"hinge": ("R", "Revolute"), "slide": ("P", "Prismatic")}[kind]
     k = int(np.argmax(axis))
-    return along[k]() if axis[k] == 1.0 else any_axis(*axis)
+    if axis[k] == 1.0:
+        return getattr(pinocchio, f"JointModel{letter}{'XYZ'[k]}")()
+    return getattr(pinocchio, f"JointModel{name}Unaligned")(*axis)
 
 
 def aba_again(*arguments) -> Callable[[int], object]:

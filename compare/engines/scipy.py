@@ -8,7 +8,7 @@ import numpy as np
 from tmt.compiled import evaluator
 
 from ..robots.case import Case, Coordinates
-from . import GRID, Engine, EngineRecord, Method, Motion, Prepared, Setting, rows_of_states
+from . import GRID, Engine, EngineRecord, Method, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
 from .tmt import TmtDynamics
 
 ENGINE = EngineRecord(order=30, label="SciPy", colour="#009E73", marker="^")
@@ -107,16 +107,3 @@ def of_length_1(coordinates: Coordinates, q: np.ndarray) -> np.ndarray:
     for joint in coordinates.places.balls:
         q[:, joint.q] /= np.linalg.norm(q[:, joint.q], axis=1, keepdims=True)
     return q
-
-
-def as_far_as_it_goes(t: np.ndarray, states: np.ndarray, start: np.ndarray, why: str) -> tuple[np.ndarray, str | None]:
-    """q and v side by side at the times t, NaN from where a run is no longer finite; and when and why that is, or None.
-
-    states: (times reached, nq + nv), the states of a run that may have ended early; start: (nq + nv,), its first.
-    """
-    path = np.full((len(t), start.size), np.nan)
-    path[: len(states)], path[0] = states, start
-    finite = np.isfinite(path).all(axis=1)
-    path[np.cumsum(~finite) > 0] = np.nan
-    ended = None if finite.all() else f"at t = {t[int(np.argmin(finite)) - 1]:g} s: {' '.join(why.split())}"
-    return path, ended

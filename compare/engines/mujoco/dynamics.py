@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from mujoco.rollout import rollout
 
-from .. import GRID, Motion, Prepared, Setting, rows_of_states
+from .. import GRID, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
 from .names import EVALUATIONS, INTEGRATORS, bit, joint_places, moving
 
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
@@ -154,14 +154,10 @@ class MujocoDynamics:
     def path(self, starts, states, dt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q and v of runs (runs, steps + 1, ...), NaN from where one diverges, and why it does, or None."""
         states = np.concatenate([starts[:, None], states], axis=1)
-        advanced = np.diff(states[:, :, 0], axis=1, prepend=-dt) > 0.0
-        ran = np.isfinite(states).all(axis=2) & advanced
-        ended = np.full(len(states), None, dtype=object)
-        for k in np.flatnonzero(~ran.all(axis=1)):
-            last = int(np.argmin(ran[k]))
-            why = "MuJoCo's clock stopped" if not advanced[k, last] else "a number is not finite"
-            ended[k] = f"at t = {dt * (last - 1):g} s: {why}"
-        states[np.cumsum(~ran, axis=1) > 0] = np.nan
+        states[np.diff(states[:, :, 0], axis=1, prepend=-dt) <= 0.0] = np.nan  # MuJoCo does not step from there
+        t, ended = dt * np.arange(states.shape[1]), np.full(len(states), None, dtype=object)
+        for k, run in enumerate(states):
+            states[k], ended[k] = as_far_as_it_goes(t, run, run[0], "a number is not finite")
         return states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs], ended
 
     def runner(self, q, v, tau, dt, steps, method, tolerance) -> tuple[np.ndarray, Callable]:

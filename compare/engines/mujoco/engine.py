@@ -85,10 +85,8 @@ class Mujoco(Engine):
         warnings: tuple[str, ...] = (),
         methods: Mapping[str, Method] = METHODS,
     ):
-        self.methods = methods
-        self.integrator, self.bare = model.opt.integrator, bare  # of the file
         self.model, self.source, self.joints, self.bodies = model, source, tuple(joints), list(bodies)
-        self.cache, self.warnings = {}, warnings
+        self.methods, self.bare, self.warnings, self.cache = methods, bare, warnings, {}
 
     def __getstate__(self):
         return self.__dict__ | {"cache": {}}

@@ -89,7 +89,8 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
     controls = [inputs[place : place + count].any() for place, count in (control_of(m, i) for i in actuators)]
     clamped = [i for i in actuators if controls[i] or m.actuator_forcelimited[i] or m.actuator_actlimited[i]]
     constrained, damped, sprung = on(m, "CONSTRAINT"), on(m, "DAMPER"), on(m, "SPRING")
-    others = [f"flag {flag.lower()}" for flag in ENABLED if m.opt.enableflags & enabling(flag)]
+    bits = {flag: int(getattr(mujoco.mjtEnableBit, f"mjENBL_{flag}", 0)) for flag in ENABLED}
+    others = [f"flag {flag.lower()}" for flag in ENABLED if m.opt.enableflags & bits[flag]]
     others += ["flag eulerdamp"] * (not on(m, "EULERDAMP"))
     for what, field, is_on in (
         ("polynomial damping", "dof_dampingpoly", damped),
@@ -124,11 +125,6 @@ def names_where(m: mujoco.MjModel, field: str, holds: Callable) -> list[str]:
     if prefix == "dof":
         rows = np.unique(m.dof_jntid[rows])
     return [element_name(m, {"dof": "joint", "jnt": "joint"}.get(prefix, prefix), row) for row in rows]
-
-
-def enabling(flag: str) -> int:
-    """The bit of an enable flag; 0 for one that the installed MuJoCo does not have."""
-    return int(getattr(mujoco.mjtEnableBit, f"mjENBL_{flag}", 0))
 
 
 def open_equalities(m: mujoco.MjModel) -> tuple[str, ...]:

@@ -45,8 +45,7 @@ def implicit_derivative(dynamics: MujocoDynamics, q: np.ndarray, qd: np.ndarray,
     model, data = dynamics.own_copy(dt, "implicit", q, qd)
     mujoco.mj_step(model, data)
     dense = np.zeros((model.nv, model.nv))
-    for row, (start, count) in enumerate(zip(model.D_rowadr, model.D_rownnz)):
-        dense[row, model.D_colind[start : start + count]] = data.qDeriv[start : start + count]
+    mujoco.mju_sparse2dense(dense, data.qDeriv, model.D_rownnz, model.D_rowadr, model.D_colind)
     return dense[np.ix_(dynamics.dofs, dynamics.dofs)]
 
 

@@ -12,18 +12,18 @@ import numpy as np
 
 from ...judge.scale import EPS, FACTOR
 from .dynamics import MujocoDynamics
-from .engine import FROM_4, Mujoco
+from .engine import FROM_4
 from .inventory import contact_pairs
 from .names import aligns, joint_name, kind_of, on, own_name
 from .reading import Reading
-from .source import editable_again, without_visuals
+from .source import FROM_GEOMS, editable_again, without_visuals
 
-STATED_FLAGS = {
-    "flag gravity": "GRAVITY",
-    "flag damper": "DAMPER",
-    "flag eulerdamp": "EULERDAMP",
-}  # of the equations of motion
-FROM_GEOMS = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
+# of the equations of motion
+STATED_FLAGS = {"flag gravity": "GRAVITY", "flag damper": "DAMPER", "flag eulerdamp": "EULERDAMP"}
+ABSENT = {  # in the equations, and forces at random states need not show them
+    "damping beyond linear": "dof_dampingpoly", "stiffness beyond linear": "jnt_stiffnesspoly",
+    "actuator damping": "actuator_damping", "actuator armature": "actuator_armature", "tendon armature": "tendon_armature",
+}  # fmt: skip
 # relative error of the principal axes of a `fullinertia`: up to 5e-7 was seen before 4.0, 1.4e-14 since
 TO_PRINCIPAL_AXES = 0.0 if FROM_4 else 1e-6
 
@@ -33,41 +33,35 @@ def parameters(dynamics: MujocoDynamics) -> dict:
 
     Read in the file's own configuration (qpos0): there every frame lies as the file says, for any `ref` of a hinge.
     """
-    m, d = dynamics.model, dynamics.data
+    m, d, bodies = dynamics.model, dynamics.data, dynamics.bodies
     dynamics.forward(m.qpos0[dynamics.qpos])
-    anchors, turns = d.xanchor[dynamics.joints].copy(), dynamics.turns(d.ximat)
-    places, origins = sorted_hinges(m, dynamics.joints), dict(zip(dynamics.joints, anchors)) | {-1: np.zeros(3)}
+    joints, turns, in_force = (
+        dynamics.joints.tolist(),
+        dynamics.turns(d.ximat),
+        on(m, "CONTACT") and on(m, "CONSTRAINT"),
+    )
+    parent = {j: j - 1 if j > m.body_jntadr[body] else last_hinge(m, m.body_parentid[body])
+              for j, body in zip(joints, m.jnt_bodyid[joints])}  # fmt: skip
+    is_order = all(parent[j] in (-1, *joints[:i]) for i, j in enumerate(joints))
+    places = joints if is_order else sorted(joints)  # each after its parent
+    origins = dict(zip(joints, d.xanchor[joints])) | {-1: np.zeros(3)}
     return {
         **{name: float(on(m, flag)) for name, flag in STATED_FLAGS.items()},
-        **absent(m),
-        "parent": [float(places.index(hinge)) if hinge >= 0 else -1.0 for hinge in (before(m, j) for j in places)],
-        "order": [float(places.index(j)) for j in dynamics.joints],
+        **{name: float(np.abs(getattr(m, field, np.zeros(1))).sum()) for name, field in ABSENT.items()},
+        **{name: getattr(m, f"dof_{name}")[dynamics.dofs] for name in ("damping", "armature", "frictionloss")},
+        **{name: getattr(m, f"jnt_{name}")[joints].astype(float) for name in ("stiffness", "limited")},
+        **{name: getattr(m, f"body_{name}")[bodies] for name in ("mass", "gravcomp")},
+        **{name: getattr(m.opt, name) for name in ("gravity", "density", "viscosity")},
+        "contact pairs": float(len(contact_pairs(m)) * in_force),
+        "parent": [float(places.index(parent[j])) if parent[j] >= 0 else -1.0 for j in places],
+        "order": [float(places.index(j)) for j in joints],
         "ref": m.qpos0[dynamics.qpos],
-        "axis": d.xaxis[dynamics.joints].copy(),
-        "anchor": anchors,
-        "damping": m.dof_damping[dynamics.dofs],
-        "armature": m.dof_armature[dynamics.dofs],
-        "frictionloss": m.dof_frictionloss[dynamics.dofs],
-        "stiffness": m.jnt_stiffness[dynamics.joints],
-        "limited": m.jnt_limited[dynamics.joints].astype(float),
-        "mass": m.body_mass[dynamics.bodies],
-        "com": d.xipos[dynamics.bodies] - [origins[last_hinge(m, body)] for body in dynamics.bodies],
-        "inertia": np.array([R @ np.diag(i) @ R.T for R, i in zip(turns, m.body_inertia[dynamics.bodies])]),
-        "gravcomp": m.body_gravcomp[dynamics.bodies],
-        "gravity": m.opt.gravity.copy(),
-        "tendon armature": m.tendon_armature.sum(),
-        "other mass": np.delete(m.body_mass, dynamics.bodies).sum(),
-        "density": m.opt.density,
-        "viscosity": m.opt.viscosity,
+        "axis": d.xaxis[joints],
+        "anchor": d.xanchor[joints],
+        "com": d.xipos[bodies] - [origins[last_hinge(m, body)] for body in bodies],
+        "inertia": np.array([R @ np.diag(i) @ R.T for R, i in zip(turns, m.body_inertia[bodies])]),
+        "other mass": np.delete(m.body_mass, bodies).sum(),
     }
-
-
-def before(m: mujoco.MjModel, joint: int) -> int:
-    """The parent hinge of a hinge, -1: the world; both by their numbers in the model."""
-    body = m.jnt_bodyid[joint]
-    if joint > m.body_jntadr[body]:
-        return joint - 1
-    return last_hinge(m, m.body_parentid[body])
 
 
 def last_hinge(m: mujoco.MjModel, body: int) -> int:
@@ -75,36 +69,6 @@ def last_hinge(m: mujoco.MjModel, body: int) -> int:
     while body and not m.body_jntnum[body]:
         body = m.body_parentid[body]
     return int(m.body_jntadr[body] + m.body_jntnum[body] - 1) if body else -1
-
-
-def sorted_hinges(m: mujoco.MjModel, joints: np.ndarray) -> list[int]:
-    """The hinges of a model in the order of the coordinates, except that each comes after its parent."""
-    order, left = [-1], list(map(int, joints))
-    while left:
-        order.append(next(j for j in left if before(m, j) in order))
-        left.remove(order[-1])
-    return order[1:]
-
-
-def absent(m: mujoco.MjModel) -> dict:
-    """Sums of parameters that the equations do not have, and that forces at random states need not show."""
-    names = {"damping beyond linear": "dof_dampingpoly", "stiffness beyond linear": "jnt_stiffnesspoly",
-             "actuator damping": "actuator_damping", "actuator armature": "actuator_armature"}  # fmt: skip
-    sums = {name: float(np.abs(getattr(m, field, np.zeros(1))).sum()) for name, field in names.items()}
-    in_force = on(m, "CONTACT") and on(m, "CONSTRAINT")
-    return sums | {"contact pairs": float(len(contact_pairs(m)) * in_force)}
-
-
-def options(engine: Mujoco, dynamics: MujocoDynamics) -> dict:
-    """Other flags, integrator and counts of the file."""
-    m = dynamics.model
-    flags = {
-        f"flag {name}": "enable" if on(m, name.upper()) else "disable"
-        for name in ("contact", "constraint", "autoreset")
-    }
-    counts = ("ngeom", "nu", "nsensor", "neq", "ntendon")
-    integrator = mujoco.mjtIntegrator(engine.integrator).name.removeprefix("mjINT_")
-    return flags | {"integrator": integrator} | {name: str(getattr(m, name)) for name in counts}
 
 
 class Stated(NamedTuple):

@@ -15,7 +15,7 @@ import numpy as np
 
 from .names import aligns, joint_name, joint_places, kind_of, parts_of, rotors
 
-BY_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+FROM_GEOMS = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
 KINDS_OF_PARTS = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]  # of a free joint
 
 
@@ -77,17 +77,11 @@ def text_of(path: Path) -> str:
 def without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     """The spec without what is only drawn; when compiled it has every body of the file.
 
-    A medium pushes geoms that touch nothing: there they stay.
+    A medium pushes geoms that touch nothing, and they may have the mass: there they stay.
     """
-    for body in spec.bodies[1:]:
-        if mujoco.mjtInertiaFromGeom(body.compiler.inertiafromgeom) == BY_GEOMS and body.geoms:
-            # the inertia is that of its geoms, whatever the file states
-            body.explicitinertial, body.ipos, body.mass = False, np.full(3, np.nan), 0.0
-    for compiler in (spec.compiler, *(body.compiler for body in spec.bodies)):
-        if mujoco.mjtInertiaFromGeom(compiler.inertiafromgeom) == BY_GEOMS:
-            compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO  # discardvisual demands it
+    has_mass = any(body.compiler.inertiafromgeom == FROM_GEOMS for body in spec.bodies)
     spec.compiler.fusestatic = False  # fused bodies would only be renumbered
-    spec.compiler.discardvisual = not (spec.option.density or spec.option.viscosity)
+    spec.compiler.discardvisual = not (spec.option.density or spec.option.viscosity or has_mass)
     return spec
 
 
@@ -173,7 +167,8 @@ def clear(spec: mujoco.MjSpec, gone: set[str], bare: bool) -> None:
     elements += [a for a in spec.actuators if a.target in gone or (bare and not a.armature)]
     if bare:
         elements += [*spec.tendons, *spec.tuples, *spec.pairs]
-        elements += [geom for body in spec.bodies if body.explicitinertial for geom in body.geoms]
+        stated = [body for body in spec.bodies if body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS]
+        elements += [geom for body in stated for geom in body.geoms]
     for element in (*elements, *[joint for joint in spec.joints if joint.name in gone]):
         spec.delete(element)
     used = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}

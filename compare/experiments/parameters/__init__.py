@@ -7,7 +7,7 @@ import numpy as np
 
 import tmt
 
-from ...engines.mujoco.parameters import STATED_FLAGS, options, parameters
+from ...engines.mujoco.parameters import STATED_FLAGS, parameters
 from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
@@ -87,8 +87,6 @@ def rows(setup: Setup) -> Result:
         file.add_inventory(result, robot.features)
     else:
         causes += check_forces(result, setup, causes)
-    for option, value in options(setup.engines["mujoco"], dynamics).items():
-        result.rows.append({"of": "file", "quantity": option, "component": "", "compiled": value, "unit": ""})
     result.curves["causes"] = sorted(causes, key=lambda c: (c["rank"], c["quantity"] in AT_TIMES, -c["size"]))
     return result
 

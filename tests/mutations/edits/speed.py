@@ -34,7 +34,7 @@ EDITS = (
          "np.isfinite([least['RK4'], least['rk4']]).all()", "a MuJoCo that diverges where tmt does not is not compared"),
     Edit("accuracy", "error", "row['diverged']", "False", "a run that diverged has an error"),
     # engines
-    Edit("engines.scipy", "as_far_as_it_goes", "t[int(np.argmin(finite)) - 1]", "t[0]", "every run ends at its start"),
+    Edit("engines", "as_far_as_it_goes", "t[int(np.argmin(finite)) - 1]", "t[0]", "every run ends at its start"),
     Edit("engines.tmt", "TmtDynamics.prepare", "path[0, ::every].copy()", "path[0, -65:].copy()",
          "a timed run is read at its last steps"),
 )  # fmt: skip
