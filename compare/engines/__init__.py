@@ -124,10 +124,7 @@ class Dynamics(Protocol):
         """Motion under constant torque from q, v, recorded at every multiple of dt."""
 
     def prepare(self, q, v, tau, setting: Setting, method: str) -> Prepared:
-        """run() follows one motion once more and does nothing else; read(what it returned) is what is judged of it.
-
-        q, v, tau: (n,). read gives the motion at 64 equal times and the start.
-        """
+        """run() follows one motion once more; read(what it returned) is the motion at the start and at 64 equal times."""
 
 
 class Engine:

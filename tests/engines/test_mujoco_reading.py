@@ -116,8 +116,8 @@ def test_a_feature_is_listed_and_modelled_or_switched_off(feature, rng):
 
 
 OTHERS = {  # what is listed as other: a joint and an option of the file, and the joint of a file without
-    "polynomial damping of j": ('damping="1 2 3"', "", 'damping="1"'),
-    "spring yield of j": ('stiffness="10" springyield="0.1"', "", 'stiffness="10"'),
+    "dof_dampingpoly of j": ('damping="1 2 3"', "", 'damping="1"'),
+    "jnt_springyield of j": ('stiffness="10" springyield="0.1"', "", 'stiffness="10"'),
     "flag eulerdamp": ('damping="1"', '<option><flag eulerdamp="disable"/></option>', 'damping="1"'),
     "flag invdiscrete": ("", '<option><flag invdiscrete="enable" energy="enable"/></option>', ""),
 }

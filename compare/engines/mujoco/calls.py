@@ -117,9 +117,7 @@ class BatchedCalls:
     @staticmethod
     def unavailable() -> str | None:
         """Why it cannot take part here, or None."""
-        if find_spec("mujoco.batch") is None:
-            return f"MuJoCo {mujoco.__version__} has no mujoco.batch; it needs 4.0"
-        return None
+        return None if find_spec("mujoco.batch") else f"MuJoCo {mujoco.__version__} has no mujoco.batch; it needs 4.0"
 
     def forward(self) -> np.ndarray:
         """rad/s2, (N, nv): mj_forward of each state."""

@@ -22,9 +22,8 @@ _log.set()
 
 
 class MujocoDynamics:
-    """MuJoCo with one model of given joints; quantities at any states q (..., nq), v and tau (..., nv).
+    """MuJoCo with one model; quantities at any states q (..., nq), v and tau (..., nv), joints in the order of the coordinates.
 
-    Columns follow the names of the coordinates, whatever the order in the file; a free joint of the model is four of them.
     bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the position zero, (nq,).
     bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move. ctrl, act: constant
     controls and activations of its actuators; of a given torque only the part beyond their constant part is applied.
@@ -85,7 +84,7 @@ class MujocoDynamics:
         return self._each(lambda d: d.qfrc_bias[self.dofs], q, v)
 
     def gravity_balance(self, q) -> np.ndarray:
-        """The torque that holds the model against its weight, N m, (..., nv): qfrc_bias at rest."""
+        """N m, (..., nv): qfrc_bias at rest."""
         return self.bias(q, 0.0)
 
     def acceleration(self, q, v, tau) -> np.ndarray:

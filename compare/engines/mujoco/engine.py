@@ -1,7 +1,6 @@
 """MuJoCo as an engine: a compiled model, what a case changes in it, and its actuators under constant controls."""
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -75,16 +74,7 @@ class Mujoco(Engine):
     name = "mujoco"
     methods = METHODS
 
-    def __init__(
-        self,
-        model: mujoco.MjModel,
-        joints: Sequence[str],
-        bodies: Sequence[int],
-        source: Path | str | None,
-        bare: bool = False,
-        warnings: tuple[str, ...] = (),
-        methods: Mapping[str, Method] = METHODS,
-    ):
+    def __init__(self, model, joints, bodies, source, bare=False, warnings=(), methods=METHODS):
         self.model, self.source, self.joints, self.bodies = model, source, tuple(joints), list(bodies)
         self.methods, self.bare, self.warnings, self.cache = methods, bare, warnings, {}
 

@@ -92,12 +92,8 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
     bits = {flag: int(getattr(mujoco.mjtEnableBit, f"mjENBL_{flag}", 0)) for flag in ENABLED}
     others = [f"flag {flag.lower()}" for flag in ENABLED if m.opt.enableflags & bits[flag]]
     others += ["flag eulerdamp"] * (not on(m, "EULERDAMP"))
-    for what, field, is_on in (
-        ("polynomial damping", "dof_dampingpoly", damped),
-        ("polynomial stiffness", "jnt_stiffnesspoly", sprung),
-        ("spring yield", "jnt_springyield", sprung),
-    ):
-        others += [f"{what} of {name}" for name in having(field) if is_on]
+    for field, is_on in (("dof_dampingpoly", damped), ("jnt_stiffnesspoly", sprung), ("jnt_springyield", sprung)):
+        others += [f"{field} of {name}" for name in having(field) if is_on]
     kinds = ("hinge", "slide", "ball", "free")
     return {
         **{kind: named("joint", [j for j in range(m.njnt) if kind_of(m, j) == kind]) for kind in kinds},
@@ -191,9 +187,6 @@ NOT_NEGATIVE = ("jnt_stiffness", "dof_armature", "dof_damping")
 
 def refuse(m: mujoco.MjModel) -> None:
     """ValueError, in one line, for a model that has forces, elements or numbers that cannot be compared."""
-    for name in dir(mujoco):
-        if name.startswith("get_mjcb_") and getattr(mujoco, name)() is not None:
-            raise ValueError(f"the callback {name.removeprefix('get_')} is set; its forces are unknown")
     if not m.njnt:
         raise ValueError("it has no joint")
     if m.nflex:

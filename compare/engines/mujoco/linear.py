@@ -27,9 +27,7 @@ def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: flo
     return np.concatenate([coordinates.difference(q1, q0), v1 - v0], axis=1).T / (2.0 * NUDGE)
 
 
-def left_to_itself(
-    dynamics: MujocoDynamics, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, steps: int, integrator: str
-) -> dict:
+def left_to_itself(dynamics: MujocoDynamics, q, qd, tau, dt: float, steps: int, integrator: str) -> dict:
     """A run with MuJoCo's automatic reset: time (steps + 1,) s, of its own clock, q, qd; warnings: their number at the end."""
     model, data = dynamics.own_copy(dt, integrator, q, qd, tau)
     model.opt.disableflags &= ~bit("AUTORESET")
@@ -57,17 +55,7 @@ class WholeRun(NamedTuple):
     resets: int  # to the reference position, by MuJoCo itself
 
 
-def whole_run(
-    model: mujoco.MjModel,
-    drive: Drive,
-    q: np.ndarray,
-    u: np.ndarray,
-    dt: float,
-    integrator: str,
-    lasts: float,
-    last: float,
-    speed: np.ndarray | float = 0.0,
-) -> WholeRun:
+def whole_run(model: mujoco.MjModel, drive: Drive, q, u, dt, integrator: str, lasts, last, speed=0.0) -> WholeRun:
     """A run from q under constant u of each actuator, with contacts, limits, friction and force ranges.
 
     lasts: its duration, s; last: the duration of the part at its end that is judged, s. After a reset by MuJoCo the controls and

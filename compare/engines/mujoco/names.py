@@ -104,11 +104,10 @@ def moving(m: mujoco.MjModel) -> np.ndarray:
 
 def aligns(joint: mujoco.MjsJoint) -> bool:
     """Whether the compiler turns the frame of a free joint's body into its inertial frame."""
-    if mujoco.mjtJoint(joint.type) != mujoco.mjtJoint.mjJNT_FREE:
-        return False
-    align = mujoco.mjtAlignFree(joint.align)
-    by_compiler = align == mujoco.mjtAlignFree.mjALIGNFREE_AUTO and bool(joint.compiler.alignfree)
-    return by_compiler or align == mujoco.mjtAlignFree.mjALIGNFREE_TRUE
+    asked = mujoco.mjtAlignFree.mjALIGNFREE_TRUE
+    if joint.compiler.alignfree and joint.align == mujoco.mjtAlignFree.mjALIGNFREE_AUTO:
+        asked = mujoco.mjtAlignFree.mjALIGNFREE_AUTO
+    return bool(joint.type == mujoco.mjtJoint.mjJNT_FREE and joint.align == asked)
 
 
 def number_of_actuators(m: mujoco.MjModel) -> int:

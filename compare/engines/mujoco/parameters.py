@@ -170,7 +170,7 @@ def orientation(quat, other, options) -> np.ndarray:
 
 
 def stated_inertial(spec, body, com: np.ndarray, inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Centre of mass, (3,) m, and tensor, (3, 3) kg m2, that a body's inertial states, in the axes of the body.
+    """CoM, (3,) m, and tensor, (3, 3) kg m2, that a body's inertial states, in the axes of the body.
 
     A spec does not say in which of the body's frames the inertial is: in the one that comes closest to the compiled model.
     """

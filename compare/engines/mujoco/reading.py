@@ -58,7 +58,8 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
     except ValueError as error:
         raise ModelError(f"cannot compare {name_of(source)}: {error}") from None
     name = bytes(model.names).partition(b"\0")[0].decode("utf-8", "replace").strip()
-    keys = keyframes(model)
+    keys = {element_name(model, "key", k): model.key_qpos[k].copy() for k in range(model.nkey)}
+    integrator = mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_")
     return Reading(
         source=source,
         name=name if name.isprintable() and name != "MuJoCo Model" else "",  # MuJoCo's own for none
@@ -72,22 +73,12 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
             for place in joints.values()
         ),
         warnings=warnings,
-        integrator=integrator_name(model.opt.integrator),
+        integrator={member: name for name, member in NAMES.items()}.get(integrator, integrator),
         dt=float(model.opt.timestep),
         bodies=tuple(bodies),
         drive=drive_of(model, source, bodies, list(keys)),
         model=model,
     )
-
-
-def integrator_name(number: int) -> str:
-    member = mujoco.mjtIntegrator(number).name.removeprefix("mjINT_")
-    return next((name for name, known in NAMES.items() if known == member), member)
-
-
-def keyframes(model: mujoco.MjModel) -> dict[str, np.ndarray]:
-    """The positions of the keyframes by their names, or `key 0`; the compiler has given quaternions length 1."""
-    return {element_name(model, "key", k): model.key_qpos[k].copy() for k in range(model.nkey)}
 
 
 def tree_of(whole: mujoco.MjModel, joints: Mapping[str, Place], bodies: list[int]) -> tmt.Tree:
@@ -104,12 +95,13 @@ def tree_of(whole: mujoco.MjModel, joints: Mapping[str, Place], bodies: list[int
     for start in model.jnt_qposadr[list(free)]:  # at the origin and not turned
         data.qpos[start : start + 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
     mujoco.mj_kinematics(model, data)
-    parents, anchors, axes = [], [], []
+    parents, anchors, axes, reference = [], [], [], []
     for i, place in enumerate(joints.values()):
         body, is_ball, is_free = model.jnt_bodyid[place.joint], place.kind == "ball", place.joint in free
         first = model.body_dofadr[body] == place.dofs.start
         parents.append(carrier[model.body_parentid[body]] if first else i - 1)
         anchors.append(np.zeros(3) if is_free else data.xanchor[place.joint])
+        reference.append(0.0 if is_ball or is_free else model.qpos0[place.qpos.start])
         if is_free:
             axes += [*np.eye(3)] if is_ball else [np.eye(3)[place.dofs.start - model.jnt_dofadr[place.joint]]]
         else:  # a ball's are the axes of its body
@@ -134,10 +126,7 @@ def tree_of(whole: mujoco.MjModel, joints: Mapping[str, Place], bodies: list[int
         armature=(model.dof_armature + rotors(model))[speeds],
         stiffness=[model.jnt_stiffness[place.joint] for place in joints.values()],
         rest=[model.qpos_spring[i] for place in joints.values() for i in place.qpos],
-        reference=[
-            0.0 if place.kind == "ball" or place.joint in free else model.qpos0[place.qpos.start]
-            for place in joints.values()
-        ],
+        reference=reference,
     )
 
 
@@ -182,16 +171,6 @@ def moved_by(reading: Reading, joint: str) -> dict[str, int]:
     return {name: body for name, body, hinge in bodies if tree.hinge_names[hinge] == joint}
 
 
-def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
-    """The engine for an MJCF file; ModelError if it cannot be read or does not have exactly the hinges of the Tree."""
-    return with_hinges(Path(path), tree)
-
-
-def parse(text: str, tree: tmt.Tree) -> Mujoco:
-    """The engine for MJCF text."""
-    return with_hinges(text, tree)
-
-
 def has_hinges(path: str | Path, names: Sequence[str]) -> bool:
     """Whether a file has exactly the hinges of these names, in any order; ModelError if it cannot be read."""
     model, _ = compiled(Path(path))
@@ -199,8 +178,12 @@ def has_hinges(path: str | Path, names: Sequence[str]) -> bool:
     return bool(is_hinge) and sorted(joint_name(model, j) for j in range(model.njnt)) == sorted(names)
 
 
-def with_hinges(source: Path | str, tree: tmt.Tree) -> Mujoco:
-    """The engine, if the model has exactly the hinges of the Tree; source: a Path or MJCF text.
+def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
+    return parse(Path(path), tree)
+
+
+def parse(source: Path | str, tree: tmt.Tree) -> Mujoco:
+    """The engine for a file (a Path) or MJCF text; ModelError if it does not have exactly the hinges of the Tree.
 
     The body that a hinge moves is known by the hinge; one of several on a hinge, or fixed to the world, by its name.
     """

@@ -120,7 +120,11 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
     }  # a free joint is replaced by the parts that stay
     for body, number in [(body, body.id) for body in spec.bodies if {joint.name for joint in body.joints} & gone]:
         axes = data.xmat[number].reshape(3, 3)
-        place_body(body, number, whole, data)
+        parent, quat = whole.body_parentid[number], np.zeros(4)
+        mujoco.mju_mulQuat(quat, data.xquat[parent] * [1.0, -1.0, -1.0, -1.0], data.xquat[number])
+        body.set_frame(body.parent.add_frame())
+        body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+        body.pos, body.quat = (data.xpos[number] - data.xpos[parent]) @ data.xmat[parent].reshape(3, 3), quat
         for joint in list(body.joints):
             i = numbers[joint.name]
             if joint.name not in gone:
@@ -136,16 +140,6 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
         model.dof_damping[place.dofs] = whole.dof_damping[before.dofs]
         model.jnt_stiffness[place.joint] = whole.jnt_stiffness[before.joint]
     return model
-
-
-def place_body(body: mujoco.MjsBody, number: int, whole: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Give a body its present frame in that of its parent."""
-    parent, back, quat = whole.body_parentid[number], np.zeros(4), np.zeros(4)
-    mujoco.mju_negQuat(back, data.xquat[parent])
-    mujoco.mju_mulQuat(quat, back, data.xquat[number])
-    body.set_frame(body.parent.add_frame())
-    body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-    body.pos, body.quat = (data.xpos[number] - data.xpos[parent]) @ data.xmat[parent].reshape(3, 3), quat
 
 
 def add_parts(body: mujoco.MjsBody, free, whole: mujoco.MjModel, dof: int, names: set[str], axes: np.ndarray) -> None:
