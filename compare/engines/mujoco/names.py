@@ -96,10 +96,7 @@ def joint_places(m: mujoco.MjModel) -> dict[str, Place]:
 
 def moving(m: mujoco.MjModel) -> np.ndarray:
     """Of each body whether a joint moves it, (nbody,)."""
-    moves = np.zeros(m.nbody, bool)
-    for body in range(1, m.nbody):
-        moves[body] = moves[m.body_parentid[body]] or m.body_jntnum[body] > 0
-    return moves
+    return m.body_dofnum[m.body_weldid] > 0
 
 
 def aligns(joint: mujoco.MjsJoint) -> bool:

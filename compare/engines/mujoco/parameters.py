@@ -14,7 +14,7 @@ from ...judge.scale import EPS, FACTOR
 from .dynamics import MujocoDynamics
 from .engine import FROM_4
 from .inventory import contact_pairs
-from .names import aligns, joint_name, kind_of, on, own_name
+from .names import aligns, element_name, joint_name, kind_of, on
 from .reading import Reading
 from .source import FROM_GEOMS, editable_again, without_visuals
 
@@ -88,13 +88,9 @@ def stated_numbers(reading: Reading) -> list[Stated]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the reading has them
         without_visuals(numbered).compile()  # elements have their numbers in the model only once compiled
-    rows = []
-    for body, copy in zip(spec.bodies, numbered.bodies):
-        if copy.id:
-            rows += of_body(spec, model, body, copy.id)
-    for joint, copy in zip(spec.joints, numbered.joints):
-        rows += of_joint(model, joint, copy.id)
-    return rows
+    bodies, joints = zip(spec.bodies[1:], numbered.bodies[1:]), zip(spec.joints, numbered.joints)
+    rows = [row for body, copy in bodies for row in of_body(spec, model, body, copy.id)]
+    return rows + [row for joint, copy in joints for row in of_joint(model, joint, copy.id)]
 
 
 def row_of(place: str, quantity: str, stated, compiled, options: dict[str, bool], precision: float = 0.0) -> Stated:
@@ -107,11 +103,11 @@ def row_of(place: str, quantity: str, stated, compiled, options: dict[str, bool]
 
 def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body, number: int) -> list[Stated]:
     """Position, mass, centre of mass and tensor of a body."""
-    place, options = own_name(body.name, "body", number), body.compiler
+    place, options = element_name(model, "body", number), body.compiler
     total = {"settotalmass": spec.compiler.settotalmass > 0.0}
     from_geoms = {"inertiafromgeom": bool(body.geoms) and options.inertiafromgeom == FROM_GEOMS}
     aligned = {"alignfree": any(map(aligns, body.joints))}
-    bounds = {name: getattr(options, name) > 0 for name in ("boundmass", "boundinertia", "balanceinertia")}
+    bounds = {"boundinertia": options.boundinertia > 0.0, "balanceinertia": bool(options.balanceinertia)}
     mass, com = float(model.body_mass[number]), model.body_ipos[number].copy()
     inertia = tensor(model.body_iquat[number], model.body_inertia[number])
     pos = in_frames(body.pos, body.frame)[0]
@@ -119,18 +115,20 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body, number: int) -> li
     if not body.explicitinertial:
         low, high = options.inertiagrouprange
         masses = [geom.mass for geom in body.geoms if low <= geom.group <= high]
-        unknown = [("mass", mass), ("com", com), ("inertia", inertia)]
+        numbers = {"mass": mass, "com": com, "inertia": inertia}
+        unknown = [Stated(place, name, None, compiled, "inertia from geoms") for name, compiled in numbers.items()]
         if masses and np.isfinite(masses).all():
-            rows.append(row_of(place, *unknown.pop(0)[:1], float(np.sum(masses)), mass, total | bounds))
-        return rows + [Stated(place, name, None, compiled, "inertia from geoms") for name, compiled in unknown]
+            stated = float(np.sum(masses))
+            unknown[0] = row_of(place, "mass", stated, mass, total | {"boundmass": stated < options.boundmass})
+        return rows + unknown
     stated_com, stated_inertia = stated_inertial(spec, body, com, inertia)
     precision = TO_PRINCIPAL_AXES if np.isfinite(body.fullinertia[0]) else 0.0
-    changing = from_geoms | aligned | total | bounds
+    bounded = {"boundmass": body.mass < options.boundmass}
     return [
         *rows,
-        row_of(place, "mass", float(body.mass), mass, from_geoms | total | bounds),
+        row_of(place, "mass", float(body.mass), mass, from_geoms | total | bounded),
         row_of(place, "com", stated_com, com, from_geoms | aligned),
-        row_of(place, "inertia", stated_inertia, inertia, changing, precision),
+        row_of(place, "inertia", stated_inertia, inertia, from_geoms | aligned | total | bounds, precision),
     ]
 
 
@@ -142,11 +140,8 @@ def of_joint(model: mujoco.MjModel, joint, number: int) -> list[Stated]:
     axis = turn @ joint.axis / np.linalg.norm(joint.axis)
     rows = [row_of(name, "anchor", pos, model.jnt_pos[number].copy(), {})] if kind in ("hinge", "ball") else []
     rows += [row_of(name, "axis", axis, model.jnt_axis[number].copy(), {})] if kind in ("hinge", "slide") else []
-    for quantity, compiled in (
-        ("armature", model.dof_armature[dof]),
-        ("damping", model.dof_damping[dof]),
-        ("stiffness", model.jnt_stiffness[number]),
-    ):
+    fields = {"armature": model.dof_armature[dof], "damping": model.dof_damping[dof]}
+    for quantity, compiled in (fields | {"stiffness": model.jnt_stiffness[number]}).items():
         stated = float(np.ravel(getattr(joint, quantity))[0])  # the linear coefficient
         rows.append(row_of(name, quantity, stated, float(compiled), chosen if quantity != "armature" else {}))
     return rows
