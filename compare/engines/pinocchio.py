@@ -32,12 +32,10 @@ class PinocchioCalls:
 
     @staticmethod
     def unavailable() -> str | None:
-        """Why it cannot take part here, or None."""
         return None if find_spec("pinocchio") else "Pinocchio is not installed; `pip install .[peers]` installs it"
 
     @staticmethod
     def unfit(tree: Tree) -> str | None:
-        """Why a Tree is not converted, or None."""
         if "ball" in tree.kind or tree.has_gains:
             return "its model is built only for trees of hinges and slides without a controller"
         return None

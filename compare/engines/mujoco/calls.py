@@ -37,7 +37,6 @@ class MinimalCalls:
 
     @staticmethod
     def unavailable() -> str | None:
-        """Why it cannot take part here, or None."""
         return None if library() else "MuJoCo's library was not found in its package"
 
     def loops(self, q, v, tau) -> dict[str, tuple[str, Callable]]:
@@ -116,7 +115,6 @@ class BatchedCalls:
 
     @staticmethod
     def unavailable() -> str | None:
-        """Why it cannot take part here, or None."""
         return None if find_spec("mujoco.batch") else f"MuJoCo {mujoco.__version__} has no mujoco.batch; it needs 4.0"
 
     def forward(self) -> np.ndarray:

@@ -55,7 +55,6 @@ def methods_for(tree: tmt.Tree | None = None) -> dict[str, Method]:
 
 METHODS = methods_for()
 MODELS = 16  # most models of cases that an engine keeps
-
 UNLIMITED = (
     "actuator_ctrllimited", "actuator_forcelimited", "actuator_actlimited", "jnt_actfrclimited", "tendon_actfrclimited",
 )  # fmt: skip

@@ -43,8 +43,6 @@ REASONS = {
     "keyframe": (MODELLED, "postures of the comparison"),
     "other": (OFF, "it changes the motion; the equations do not have it"),
 }
-
-
 FIELDS_OF_FEATURES = {
     "gravcomp": ("body_gravcomp",),
     "frictionloss": ("dof_frictionloss", "tendon_frictionloss"),
