@@ -9,6 +9,7 @@ import numpy as np
 from .actuators import control_of
 from .names import bit, element_name, kind_of, number_of_actuators, on
 
+KINDS = ("hinge", "slide", "ball", "free")
 MODELLED, OFF, OPEN = "modelled", "switched_off", "open_tree"
 
 
@@ -50,7 +51,7 @@ FIELDS_OF_FEATURES = {
     "other": ("dof_dampingpoly", "jnt_stiffnesspoly", "jnt_springyield"),
 }
 OF_COORDINATES = int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON)
-ENABLED = ("SLEEP", "INVDISCRETE", "IPC", "SPECULATIVE")  # enable flags that can change a motion
+QUIET = ("OVERRIDE", "ENERGY", "FWDINV", "DIAGEXACT")  # enable flags that cannot change a motion without contacts
 
 
 def features(m: mujoco.MjModel) -> tuple[Feature, ...]:
@@ -87,14 +88,13 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
     controls = [inputs[place : place + count].any() for place, count in (control_of(m, i) for i in actuators)]
     clamped = [i for i in actuators if controls[i] or m.actuator_forcelimited[i] or m.actuator_actlimited[i]]
     constrained, damped, sprung = on(m, "CONSTRAINT"), on(m, "DAMPER"), on(m, "SPRING")
-    bits = {flag: int(getattr(mujoco.mjtEnableBit, f"mjENBL_{flag}", 0)) for flag in ENABLED}
-    others = [f"flag {flag.lower()}" for flag in ENABLED if m.opt.enableflags & bits[flag]]
+    flags = {name[7:]: int(bit) for name, bit in mujoco.mjtEnableBit.__members__.items() if name.startswith("mjENBL_")}
+    others = [f"flag {name.lower()}" for name in flags if m.opt.enableflags & flags[name] and name not in QUIET]
     others += ["flag eulerdamp"] * (not on(m, "EULERDAMP"))
     for field, is_on in (("dof_dampingpoly", damped), ("jnt_stiffnesspoly", sprung), ("jnt_springyield", sprung)):
         others += [f"{field} of {name}" for name in having(field) if is_on]
-    kinds = ("hinge", "slide", "ball", "free")
     return {
-        **{kind: named("joint", [j for j in range(m.njnt) if kind_of(m, j) == kind]) for kind in kinds},
+        **{kind: named("joint", [j for j in range(m.njnt) if kind_of(m, j) == kind]) for kind in KINDS},
         "armature": having("dof_armature", "actuator_armature"),
         "damping": having("dof_damping") if damped else [],
         "spring": having("jnt_stiffness") if sprung else [],
@@ -187,6 +187,11 @@ def refuse(m: mujoco.MjModel) -> None:
     """ValueError, in one line, for a model that has forces, elements or numbers that cannot be compared."""
     if not m.njnt:
         raise ValueError("it has no joint")
+    for number in range(m.njnt):
+        if (kind := kind_of(m, number)) not in KINDS:
+            raise ValueError(
+                f"joint {element_name(m, 'joint', number)!r} is of type {kind}; known are {', '.join(KINDS)}"
+            )
     if m.nflex:
         name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, 0)
         raise ValueError(f"flex {name!r} is deformable; only rigid bodies are compared")

@@ -33,9 +33,9 @@ def name_of(source: Path | str | None) -> str:
 
 def editable(source: Path | str) -> mujoco.MjSpec:
     """The MjSpec of a file (a Path) or of MJCF text."""
-    return (
-        mujoco.MjSpec.from_file(os.fsencode(source)) if isinstance(source, Path) else mujoco.MjSpec.from_string(source)
-    )
+    if isinstance(source, Path):
+        return mujoco.MjSpec.from_file(os.fsencode(source))
+    return mujoco.MjSpec.from_string(source)
 
 
 def editable_again(source: Path | str) -> mujoco.MjSpec:
@@ -115,9 +115,8 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
     for joint in spec.joints:
         joint.name = joint_name(whole, joint.id)
     numbers = {joint.name: joint.id for joint in spec.joints}  # a change of the spec takes them away
-    gone = {
-        joint_name(whole, places[name].joint) for name in positions
-    }  # a free joint is replaced by the parts that stay
+    # a free joint goes as a whole, and the parts that stay are added
+    gone = {joint_name(whole, places[name].joint) for name in positions}
     for body, number in [(body, body.id) for body in spec.bodies if {joint.name for joint in body.joints} & gone]:
         axes = data.xmat[number].reshape(3, 3)
         parent, quat = whole.body_parentid[number], np.zeros(4)
