@@ -20,7 +20,6 @@ CHECKS = (
     ("orders", "orders", "name"),
     ("orders", "check_order", "name"),
     ("orders", "check_order", 'f"measured order, nominal {_1}"'),
-    ("exact_motion", "check_function", "name"),
     ("exact_motion", "check_falling", "name"),
     ("needs", "check_smaller", '"smallest model to whole"'),
     ("needs", "check_smaller", '"time judged"'),

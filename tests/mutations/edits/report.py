@@ -68,6 +68,6 @@ EDITS = (
     Edit("figures_runs", "over_time", "ours[:, i]", "theirs[:, i]", "MuJoCo's run is drawn as TMT's"),
     Edit("figures_speed", "fewest_evaluations", "min(good, default=None)", "max(good, default=None)",
          "the most evaluations are told as fewest"),
-    Edit("figures_reduction", "largest_gain", "max(smaller, key=_1, default=None)", "min(smaller, key=_1, default=None)",
+    Edit("reduction.times", "largest_gain", "max(smaller, key=_1, default=None)", "min(smaller, key=_1, default=None)",
          "the least gain is told as the best"),
 )  # fmt: skip
