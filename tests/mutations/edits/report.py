@@ -19,7 +19,7 @@ EDITS = (
     Edit("questions", "largest", "max(rows, key=_1)", "min(rows, key=_1)", "the smallest difference is the answer"),
     Edit("questions", "largest", "row['largest_difference'] is None", "False", "a diverged run is an answer"),
     Edit("questions", "printed", "row[name]", "row['mujoco']", "the answers name MuJoCo's numbers TMT's"),
-    Edit("speed.first_screen", "choice", "line[f'{engine}_ms']", "line['tmt_ms']", "the advice gives MuJoCo tmt's time"),
+    Edit("speed.first_screen", "choice", "line[f'{name}_ms']", "line['tmt_ms']", "the advice gives MuJoCo tmt's time"),
     Edit("speed.first_screen", "choice", "line['scene'] == regular", "line['scene'] != regular",
          "the advice is for another scene"),
     Edit("speed.first_screen", "cheapest", "min(reached, key=_1)", "max(reached, key=_1)", "the dearest is the cheapest"),
@@ -66,8 +66,6 @@ EDITS = (
     Edit("figures_runs", "draw_held", "ours, theirs = _1", "theirs, ours = _1", "the caption exchanges the engines"),
     Edit("figures_runs", "run_caption", "largest_known(_1)", "min(_1)", "the least use of the band is told as the most"),
     Edit("figures_runs", "over_time", "ours[:, i]", "theirs[:, i]", "MuJoCo's run is drawn as TMT's"),
-    Edit("figures_speed", "fewest_evaluations", "min(good, default=None)", "max(good, default=None)",
-         "the most evaluations are told as fewest"),
     Edit("reduction.times", "largest_gain", "max(smaller, key=_1, default=None)", "min(smaller, key=_1, default=None)",
          "the least gain is told as the best"),
 )  # fmt: skip
