@@ -50,11 +50,8 @@ def draw_needs(result: Result, robot: Robot) -> tuple:
         for model, more in (("whole model", {"mfc": "none"}), ("smallest model", {"markersize": 3.5}))
     ]
     right.legend(handles=handles, ncols=2, **ABOVE)
-    resting = [name for name, need in scenes.items() if not need["locked"] and len(need["stays"]) == len(joints)]
-    fewer = [name for name, need in scenes.items() if need["stays"] and name not in resting]
-    nv = robot.coordinates.nv
-    values = {"resting": resting, "fewer": fewer, "best": largest_gain(result.rows, nv), "nv": nv}
-    return "reduction_needs", fig, result.finding("needs", robot=robot.name, **values)
+    best, nv = largest_gain(result.rows, robot.coordinates.nv), robot.coordinates.nv
+    return "reduction_needs", fig, result.finding("needs", robot=robot.name, best=best, nv=nv)
 
 
 def look_of(engine: str) -> dict:

@@ -22,7 +22,7 @@ MOST_IN_A_BAND = 12  # nv up to which runs are compared within the band of round
 def of_case(result: Result, case: Case, setup: Setup) -> list[tuple]:
     """Findings and checks of what the case needs; the models to be timed, (name, Case), None if it needs no model."""
     slow = not case.is_held and seconds(case.robot) > SECONDS_OF_STATE
-    need = not_decided(case) if slow else needed(case)
+    need = Needed((), {}, case.joints) if slow else needed(case)
     smaller, rests = reduced(case, need), len(need.stays) == len(case.joints)
     models = [(case.name, case.changed(locked=()))]
     if smaller or case.locked or rests:
@@ -38,16 +38,6 @@ def of_case(result: Result, case: Case, setup: Setup) -> list[tuple]:
     if (smaller or rests) and not (case.robot.is_read and case.coordinates.nv > MOST_IN_A_BAND):
         compare_smaller(result, case, smaller, setup)
     return models
-
-
-def not_decided(case: Case) -> Needed:
-    """Where an evaluation with 50 digits takes too long: only the joints that move at the start are decided."""
-    moves = {
-        name: f"{name} has a speed at the start"
-        for name, joint in zip(case.joints, case.coordinates.places.joints)
-        if any(case.v[joint.qd])
-    }
-    return Needed((), moves, tuple(name for name in case.joints if name not in moves))
 
 
 def joint_word(coordinates: Coordinates) -> str:

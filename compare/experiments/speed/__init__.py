@@ -3,8 +3,6 @@
 from collections.abc import Iterator, Mapping
 from functools import partial
 
-import numpy as np
-
 from ...engines import GRID, IN_QUICK_RUNS, LABELS, methods_in
 from ...judge import timing
 from ...judge.check import Result
@@ -14,7 +12,7 @@ from ...judge.scale import EPS, FACTOR
 from ...judge.units import renamed
 from ...judge.words import scene_begins
 from ...robots import Robot
-from ...truth.reference import DOUBLES, LOST, has_no_reference
+from ...truth.reference import LOST, has_no_reference
 from .. import Experiment
 from ..setup import Setup
 from . import accuracy, advice, evaluations
@@ -29,8 +27,7 @@ COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "evaluatio
 
 def claim_values(robot: Robot) -> dict:
     """Values of the macros claim and tolerance."""
-    values = {"unit": movement_unit(robot.coordinates), "times": GRID + 1, "eps": FACTOR, "lost": LOST}
-    return values | {"doubles": DOUBLES}
+    return {"unit": movement_unit(robot.coordinates), "times": GRID + 1, "eps": FACTOR, "lost": LOST}
 
 
 def skipped(robot: Robot) -> Finding | str | None:
@@ -61,7 +58,6 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.rows += [row for of_scene in rows_of.values() for row in of_scene]
     unit = movement_unit(setup.robot.coordinates)
     result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "of_file": setup.robot.is_read}
-    result.curves["doubles"] = [name for name, reference in references.items() if reference.why]
     # with the coarse steps of a quick run errors are regular in this scene only, and other engines have too few settings
     whole, mujoco = setup.size == "full", setup.engines["mujoco"]
     ran = {(row["engine"], row["method"]): row["run"][1] for row in result.rows}
@@ -92,19 +88,17 @@ def add_times(result: Result, setup: Setup, rows_of: Mapping[str, list[dict]]) -
     compiled = evaluations.compiled_evaluations(setup)
     runs = [prepared(of_scene, setup) for of_scene in rows_of.values()]
     setup.quiet()  # nothing else may run while times are taken
-    spread = []
     for (name, of_scene), its_runs in zip(rows_of.items(), runs):
         setup.progress(f"speed: timing {name}")
-        spread += take_times(of_scene, its_runs, setup)
+        take_times(of_scene, its_runs, setup)
     if settings := cheapest(best_curves(result)):
         result.headline = result.finding("headline", settings=settings, **target(result))
     table = advice.advice(result.rows, list(result.curves["floors"]))
     result.tables["what_should_i_use"] = renamed(table, result.curves.get("unit", "rad"))
     result.find("columns")
     setup.progress("speed: one evaluation")
-    result.tables["evaluations"] = evaluations.costs(result, setup, compiled)
-    share = [float(np.quantile(spread, q)) - 1.0 for q in (0.5, 0.9)] if spread else None
-    result.find("timing", spread=share, once=timing.ONCE, first_steps=FIRST_STEPS)
+    result.tables["evaluations"] = evaluations.costs(setup, compiled)
+    result.find("timing", once=timing.ONCE, first_steps=FIRST_STEPS)
 
 
 def add_absent(result: Result, setup: Setup) -> None:

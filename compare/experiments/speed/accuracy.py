@@ -47,11 +47,7 @@ def order_between(coarse: dict, fine: dict) -> float:
 
 
 def has_settled(rows: Sequence[dict]) -> bool:
-    """Whether the last two measured orders of these rows, from coarse to fine, differ by at most ORDER_MARGIN.
-
-    An error C dt^p (1 + c dt) gives a measured order that differs from p by c dt / ln 4, half as much with half the step: the
-    last change of the order is its distance from p.
-    """
+    """Whether the last two measured orders of these rows, from coarse to fine, differ by at most ORDER_MARGIN."""
     return len(rows) > 2 and abs(order_between(*rows[-3:-1]) - order_between(*rows[-2:])) <= ORDER_MARGIN
 
 

@@ -1,7 +1,6 @@
 """What one evaluation of the dynamics costs: MuJoCo's calls, the ways of tmt, and other engines."""
 
-from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,25 +8,22 @@ import numpy as np
 import tmt
 from tmt.compiled import evaluator, runner
 from tmt.compiled.cores import cores
-from tmt.equations import method
 
 from ...engines.heyoka import Heyoka, compiled_accelerations
 from ...engines.pinocchio import PinocchioCalls
 from ...judge import timing
-from ...judge.check import Result
-from ...robots.case import SEED, Coordinates
+from ...robots.case import SEED
 from ..setup import Setup
 
 FEW, MANY = 1000, 1_000_000  # states of one call
 MOST_OF_MANY = 3  # nv up to which MANY states fit into memory
 MOST_CALLS = 100_000  # repetitions in a timed call
 MOST_NUMBERS = 10_000_000  # of a path of many steps
-IN_PYTHON = 12  # nv up to which the literal form is timed
-FORWARD, MASS_MATRIX, RK4_STEP = "forward_dynamics", "mass_matrix", "rk4_step"
+FORWARD, RK4_STEP = "forward_dynamics", "rk4_step"
 NAMES_IN_TMT = {FORWARD: "acceleration", "mass_matrix_and_bias": "mass_matrix_and_bias"}  # of tmt.compiled
-CALLED, MASS_CALLED = "tmt.acceleration, called from Python", "tmt.mass_matrix, called from Python"
+CALLED = "tmt.acceleration, called from Python"
 WAITING, EACH, IN_LANES = "compiled, each waits for the last", "compiled", "compiled, side by side"
-WHOLE, EQUAL, MJ_STEP, BATCH = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_step", "MuJoCo, batch"
+WHOLE, BATCH = "MuJoCo, mj_forward", "MuJoCo, batch"
 HEYOKA, ABA = "heyoka, compiled function", "Pinocchio, aba called from Python"
 COLUMNS = ["quantity", "implementation", "states", "threads", "ns_per_state", "operations", "operations_per_ns",
            "why_not"]  # fmt: skip
@@ -47,7 +43,8 @@ def compiled_evaluations(setup: Setup) -> Evaluations:
 
     tree, coordinates = setup.robot.tree, setup.robot.coordinates
     many = setup.of(MANY if coordinates.nv <= MOST_OF_MANY else 10 * FEW, FEW, FEW)
-    states = states_of(coordinates, np.random.default_rng([SEED, 2]), many)
+    rng = np.random.default_rng([SEED, 2])
+    states = [coordinates.random(rng, many), *rng.uniform(-3.0, 3.0, (2, many, coordinates.nv))]
     first, few = [np.ascontiguousarray(a[0]) for a in states], [a[:FEW] for a in states]
     made = Evaluations(of_one_state(tree, first), of_many_states(tree, few) | of_many_states(tree, states), {})
     if missing := MinimalCalls.unavailable():
@@ -68,6 +65,7 @@ def compiled_evaluations(setup: Setup) -> Evaluations:
 def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> dict[tuple, Callable]:
     """Loops of tmt at one state."""
     (q, qd, tau), n = state, len(tree.axis)
+    tmt.prepare(tree)
     run, most = runner(tree, "rk4"), min(MOST_CALLS, MOST_NUMBERS // n)
     paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
     paths[0][0, 0], paths[1][0, 0] = q, qd
@@ -75,29 +73,15 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> dict[tuple, Callabl
     def steps(count):
         run(*(path[:, : min(count, most) + 1].copy() for path in paths), tau[None], 1e-4)
 
-    tmt.prepare(tree)
-    loops = {
-        (FORWARD, CALLED, 1, 1): calling(tmt.acceleration, q, qd, tau, tree),
-        (MASS_MATRIX, MASS_CALLED, 1, 1): calling(tmt.mass_matrix, q, tree),
-        (RK4_STEP, EACH, 1, 1): steps,
-    }
-    if n <= IN_PYTHON:
-        floats = calling(method.acceleration, tree, *(a.tolist() for a in state))
-        loops[FORWARD, "literal, Python floats", 1, 1] = floats
+    def called(count):
+        for _ in range(count):
+            tmt.acceleration(q, qd, tau, tree)
+
+    loops = {(FORWARD, CALLED, 1, 1): called, (RK4_STEP, EACH, 1, 1): steps}
     for quantity, name in NAMES_IN_TMT.items():
         chain = evaluator(tree, name).chain
         loops[quantity, WAITING, 1, 1] = lambda count, chain=chain: chain(q, qd, tau, count)
     return loops
-
-
-def calling(function: Callable, *arguments) -> Callable:
-    """loop(count): the function called count times from Python."""
-
-    def loop(count):
-        for _ in range(count):
-            function(*arguments)
-
-    return loop
 
 
 def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray]) -> dict[tuple, Callable]:
@@ -139,18 +123,22 @@ def add_peers(made: Evaluations, setup: Setup, state: list[np.ndarray], states: 
         made.of_many[RK4_STEP, BATCH, FEW, 1] = calls.step
 
 
-def costs(result: Result, setup: Setup, made: Evaluations) -> list[dict]:
-    """The rows of evaluations.csv, and a finding about them."""
+def costs(setup: Setup, made: Evaluations) -> list[dict]:
+    """The rows of evaluations.csv, by quantity, the slowest first, then what is not timed."""
     calls = {key: counted(loop) for key, loop in made.loops.items()}
     for key, call in made.of_many.items():  # repeated, so that caches are as warm as in use
         times = max(1, 10 * FEW // key[2])
         calls[key] = (lambda call=call, times=times: [call() for _ in range(times)]), times * key[2]
     times = timing.in_turns([call for call, _ in calls.values()], rounds=setup.of(12, 5, 2))
     ns = per_state({key: count for key, (_, count) in calls.items()}, times)
-    find_ratios(result, ns, setup.robot.name)
     operations = {quantity: evaluator(setup.robot.tree, name).operations for quantity, name in NAMES_IN_TMT.items()}
     of_compiled = {(q, name): count for q, count in operations.items() for name in (IN_LANES, EACH, WAITING)}
-    return evaluation_rows(ns, of_compiled, made.absent)
+    rows = []
+    for key, value in sorted(ns.items(), key=lambda item: (item[0][0], -item[1])):
+        count = of_compiled.get(key[:2])
+        rows.append((*key, value, count, count / value if count else None, None))
+    rows += [(*key, *[None] * 5, reason) for key, reason in made.absent.items()]
+    return [dict(zip(COLUMNS, row)) for row in rows]
 
 
 def counted(loop: Callable[[int], object]) -> tuple[Callable, int]:
@@ -161,40 +149,6 @@ def counted(loop: Callable[[int], object]) -> tuple[Callable, int]:
     return lambda: loop(count), count
 
 
-def find_ratios(result: Result, ns: Mapping[tuple, float], name: str) -> None:
-    """MuJoCo's times of an evaluation and of a step over tmt's. ns: nanoseconds of a state by key."""
-    if (FORWARD, WHOLE, 1, 1) not in ns:
-        return
-    lanes = {key[2]: value for key, value in ns.items() if key[:2] == (FORWARD, IN_LANES)}
-    best = min(lanes, key=lanes.get)
-    ours = {"waiting": ns[FORWARD, WAITING, 1, 1], "independent": ns[FORWARD, EACH, FEW, 1], "lanes": lanes[best]}
-    result.find(
-        "evaluation_costs", robot=name, processor=timing.vectors(), whole=ns[FORWARD, WHOLE, 1, 1],
-        equal=ns[FORWARD, EQUAL, 1, 1], ours=ours, states=best, mj_step=ns[RK4_STEP, MJ_STEP, 1, 1],
-        rk4=ns[RK4_STEP, EACH, 1, 1],
-    )  # fmt: skip
-
-
-def states_of(coordinates: Coordinates, rng: np.random.Generator, count: int) -> list[np.ndarray]:
-    """Random positions (count, nq), speeds and torques (count, nv)."""
-    return [coordinates.random(rng, count), *rng.uniform(-3.0, 3.0, (2, count, coordinates.nv))]
-
-
 def per_state(counts: dict, times: list[list[float]]) -> dict:
     """Nanoseconds of one state for each key of `counts`, {key: states in a call}, from the seconds of its calls."""
     return {key: 1e9 * min(of_call) / count for (key, count), of_call in zip(counts.items(), times)}
-
-
-def evaluation_rows(
-    ns: Mapping, operations: Mapping = MappingProxyType({}), absent: Mapping = MappingProxyType({})
-) -> list:
-    """The rows of evaluations.csv, by quantity, the slowest first, then what is not timed.
-
-    operations: of one state, absent: the reason, both by (quantity, implementation).
-    """
-    rows = []
-    for key, value in sorted(ns.items(), key=lambda item: (item[0][0], -item[1])):
-        count = operations.get(key[:2])
-        rows.append((*key, value, count, count / value if count else None, None))
-    rows += [(*key, *[None] * 5, reason) for key, reason in absent.items()]
-    return [dict(zip(COLUMNS, row)) for row in rows]

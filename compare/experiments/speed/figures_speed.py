@@ -32,19 +32,15 @@ def draw_times(result: Result, scene: str, beginning: str = "") -> tuple:
         k = int(np.argmin(errors))
         ends.append((errors[k], times[k], method, look["color"]))
     ax.plot(*drawn(front(good)), "ko", markersize=9, markerfacecolor="none", label="Pareto front")
-    limit = "accuracy of the reference" if scene in result.curves.get("doubles", ()) else "rounding: eps × growth"
-    ax.axvline(result.curves["floors"][scene], color=GREY, linestyle=":", label=limit)
+    ax.axvline(
+        result.curves["floors"][scene], color=GREY, linestyle=":", label="rounding, or accuracy of the reference"
+    )
     ax.set(xscale="log", yscale="log", xlim=(2.0 * COARSE_END, FINE_END / 30), ylabel="time of the run, ms")
     ax.set(xlabel=f"maximum error, {unit} (decreasing)", xticks=[10.0**k for k in range(0, -17, -2)])
     ax.minorticks_off()
     name_ends(ax, ends)
     fig.legend(loc="upper center", ncols=4, fontsize=8)
-    ratios = [
-        {"target": value(line, "target"), "ratio": line["ratio"]}
-        for line in result.tables["what_should_i_use"]
-        if line["scene"] == scene and line["ratio"]
-    ]
-    values = {"ratios": ratios, "diverged": sum(row["diverged"] for row in ran), "missing": len(ran) - len(good)}
+    values = {"diverged": sum(row["diverged"] for row in ran), "missing": len(ran) - len(good)}
     caption = result.finding("times", begins=beginning or scene, unit=unit, end=COARSE_END, **values)
     return file_name("speed", scene), fig, caption
 

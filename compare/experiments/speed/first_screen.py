@@ -76,17 +76,10 @@ def cheapest(curves: Sequence[Curve]) -> list[Cheapest]:
 
 
 def choice(result: Result) -> Finding | None:
-    """The answer to: which integrator, which step? A line of the table what_should_i_use, of the regular scene if it is there."""
-    lines = result.tables.get("what_should_i_use", [])
-    named = [line for line in lines if units.value(line, "target") == TARGET and line["mujoco"] and line["tmt"]]
-    if not named:
+    """The answer to: which integrator, which step? The cheapest settings of MuJoCo and of tmt; None if one has none."""
+    scene, reached = result.curves.get("regular"), {curve.engine: curve.cheapest for curve in best_curves(result)}
+    settings = [reached.get(engine) for engine in ("mujoco", "tmt")]
+    if not all(settings):
         return None
-    regular = result.curves.get("regular")
-    line = next((line for line in named if line["scene"] == regular), named[0])
-    durations = (row["dt_s"] * row["steps"] for row in result.rows if row["scene"] == line["scene"] and row["dt_s"])
-    settings = [
-        {"setting": line[name].replace("mujoco", "MuJoCo", 1), "dt": line.get(f"{name}_dt_s"), "ms": line[f"{name}_ms"]}
-        for name in ("mujoco", "tmt")
-    ]
-    duration, unit = next(durations), line.get("unit", "rad")
-    return result.finding("choice", target=TARGET, unit=unit, scene=line["scene"], duration=duration, settings=settings)
+    duration = next(row["dt_s"] * row["steps"] for row in result.rows if row["scene"] == scene and row.get("dt_s"))
+    return result.finding("choice", settings=settings, duration=duration, **target(result))

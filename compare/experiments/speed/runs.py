@@ -65,7 +65,7 @@ def row_of_run(
     setting: Setting,
     reference: Reference,
     energy: np.ndarray,
-    left: float = 0.0,
+    left=0.0,
 ) -> dict:
     """The row of one run.
 
@@ -129,12 +129,8 @@ def prepared(rows: list[dict], setup: Setup) -> list[tuple]:
     return runs
 
 
-def take_times(rows: Sequence[dict], runs: Sequence[tuple], setup: Setup) -> list[float]:
-    """Set the seconds of the rows of one scene to the least of their times; median / least of those with several times.
-
-    runs: see `prepared`; they alternate.
-    """
+def take_times(rows: Sequence[dict], runs: Sequence[tuple], setup: Setup) -> None:
+    """Set the seconds of the rows of one scene to the least of their times; runs: see `prepared`, timed in turns."""
     times = timing.in_turns([run for run, _ in runs], rounds=setup.of(5, 2, 2))
     for row, (_, factor), of_row in zip(rows, runs, times):
         row["seconds"] = factor * min(of_row)
-    return [float(np.median(of_row)) / min(of_row) for of_row in times if len(of_row) > 1]

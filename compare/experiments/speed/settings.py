@@ -15,7 +15,6 @@ FINEST_OTHERS = 2**15  # of other engines, and of methods that solve their stage
 EXPONENTS = {  # k of the coarsest and of the finest tolerance, 10^-k
     "dopri8_adaptive": (2, 14), "RK45": (2, 12), "DOP853": (2, 13), "Radau": (2, 6), "LSODA": (2, 12), "Taylor": (4, 16),
 }  # fmt: skip
-OTHER_EXPONENTS = (2, 12)
 FEW_SETTINGS = {"quick": 5, "small": 7}  # of a run that is not full: the coarsest settings
 FEW_OTHERS = 2  # the same for engines other than MuJoCo and tmt
 SETTINGS_OF_SAME_SCHEMES = slice(3, 7)  # coarse, yet near the reference where the motion is regular
@@ -115,7 +114,7 @@ def estimated(method: Method, tree: Tree) -> float:
 def settings_of(method: Method, case: Case, size: str = "full", which: str = "all") -> tuple[Setting, ...]:
     """The settings of a method in a scene, from coarse to fine: steps halved, or tolerances divided by ten."""
     if method.adaptive:
-        first, last = EXPONENTS.get(method.name, OTHER_EXPONENTS)
+        first, last = EXPONENTS.get(method.name, (2, 12))
         settings = tuple(Setting(case.duration, tolerance=10.0**-k) for k in range(first, last + 1))
     else:
         settings = halvings(method, case, size)

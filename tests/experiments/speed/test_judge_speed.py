@@ -8,8 +8,7 @@ import pytest
 
 from compare.engines import Method, Setting
 from compare.experiments import speed
-from compare.experiments.speed import accuracy, advice, evaluations, figures_speed, runs
-from compare.experiments.speed.evaluations import FORWARD, MJ_STEP, RK4_STEP, WHOLE
+from compare.experiments.speed import accuracy, advice, evaluations, runs
 from compare.judge.check import Result
 
 RK4 = Method("tmt", "rk4", 4, "rk4")
@@ -140,7 +139,7 @@ def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
 def test_a_row_gets_the_least_of_its_times(setup, monkeypatch):
     rows = [row("tmt", "rk4", 1.0), row("mujoco", "RK4", 1.0)]
     monkeypatch.setattr(runs.timing, "in_turns", lambda calls, rounds: [[3e-3, 2e-3, 5e-3], [0.2]])
-    assert runs.take_times(rows, [(None, 1.0), (None, 2.0)], setup) == [pytest.approx(1.5)]
+    runs.take_times(rows, [(None, 1.0), (None, 2.0)], setup)
     assert [r["seconds"] for r in rows] == [2e-3, 0.4]
 
 
@@ -158,8 +157,8 @@ def test_what_is_timed_in_part_counts_as_the_whole(setup, monkeypatch):
 
 
 def test_nanoseconds_of_a_state():
-    found = evaluations.per_state({(FORWARD, WHOLE, 1, 1): 100, (RK4_STEP, MJ_STEP, 1, 1): 10}, [[3e-4, 2e-4], [1e-4]])
-    assert found == {(FORWARD, WHOLE, 1, 1): pytest.approx(2000.0), (RK4_STEP, MJ_STEP, 1, 1): pytest.approx(10_000.0)}
+    found = evaluations.per_state({"forward": 100, "step": 10}, [[3e-4, 2e-4], [1e-4]])
+    assert found == {"forward": pytest.approx(2000.0), "step": pytest.approx(10_000.0)}
 
 
 def test_nothing_is_timed_before_all_else_has_ended(setup, monkeypatch):
@@ -169,13 +168,3 @@ def test_nothing_is_timed_before_all_else_has_ended(setup, monkeypatch):
     monkeypatch.setattr(speed.evaluations, "costs", lambda *_: [])
     speed.add_times(Result("speed", curves={"floors": {}, "unit": "rad"}), setup, {"a": []})
     assert log == ["made", "quiet", "timed"]
-
-
-def test_the_caption_has_the_ratios_of_times():
-    result = Result("speed", rows=known_rows(), curves={"floors": {"bent, free": 1e-15}, "regular": "bent, free"})
-    result.tables["what_should_i_use"] = advice.advice(result.rows, ["bent, free"])
-    *_, caption = figures_speed.draw_times(result, "bent, free")
-    ratios = {line["target"]: line["ratio"] for line in caption.values["ratios"]}
-    assert (ratios[1e-2], ratios[1e-3]) == pytest.approx((20.0, 40.0)) and caption.values["diverged"] == caption.values[
-        "missing"
-    ] == 1
