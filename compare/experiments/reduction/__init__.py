@@ -8,7 +8,6 @@ from tmt.exact.values import DIGITS
 
 from ...engines.mujoco import ModelError
 from ...judge.check import About, Result
-from ...judge.entries import has_own_scales
 from ...judge.rounding import NARROW
 from ...judge.run import movement_unit
 from ...judge.scale import FACTOR
@@ -16,9 +15,10 @@ from ...robots import Robot
 from ...robots.case import Case
 from .. import Experiment
 from ..setup import Setup, nothing
-from . import exact_motion, sub_blocks
-from .needs import MOST_IN_A_BAND, joint_word, of_case
-from .times import TWO_INTEGRATORS, time_models
+from .exact_motion import compare_swing, pendulums
+from .needs import joint_word, of_case
+from .sub_blocks import compare_blocks
+from .times import largest_gain, time_models
 
 EXPERIMENT = Experiment(order=110, serves_own=False, options=("--scenes",), timed=True)
 NO_GAIN = 1.05  # a smaller speedup is within the accuracy of the times
@@ -26,17 +26,12 @@ NO_GAIN = 1.05  # a smaller speedup is within the accuracy of the times
 
 def claim_values(robot: Robot) -> dict:
     """Values of the macros claim and tolerance."""
-    pendulums = exact_motion.pendulums(robot.cases_of_torque)
     return {
         "joint": joint_word(robot.coordinates),
         "digits": DIGITS,
         "eps": FACTOR,
         "narrow": NARROW,
         "unit": movement_unit(robot.coordinates),
-        "own_scales": has_own_scales(robot.tree, robot.is_read),
-        "runs": not robot.is_read or robot.coordinates.nv <= MOST_IN_A_BAND,
-        "held": any(case.is_held for case in robot.cases),
-        "swings": any(exact_motion.not_compared(case, exact_motion.elliptic(case)) is None for case in pendulums),
     }
 
 
@@ -47,7 +42,7 @@ def begin(setup: Setup) -> None:
 
 
 def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) -> Result:
-    """Sub-blocks for every subset of locked joints; what each case needs, its runs and times; exact solutions.
+    """Sub-blocks with joints locked; what each case needs, its runs and times; exact solutions.
 
     cases: None for the robot's. timed=False: one choice of angles, the scenes with fewer joints, and the exact solutions: a
     few tenths of a second, enough to see a wrong model.
@@ -57,8 +52,8 @@ def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) 
     if timed and models is not None:
         setup.quiet()
         time_models(result, models, setup, rounds=setup.of(160, 16, 2))
-        best = max(result.rows, key=lambda row: row["speedup"] or 0.0, default={"speedup": None})
-        if (best["speedup"] or 0.0) >= NO_GAIN:
+        best = largest_gain(result.rows, setup.robot.coordinates.nv)
+        if best and best["speedup"] >= NO_GAIN:
             values = {"speedup": best["speedup"], "joints": best["hinges"].split(), "scene": best["scene"]}
             result.headline = result.finding("headline", **values)
     return result
@@ -70,12 +65,11 @@ def untimed(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = Tru
     if driven := [case.name for case in robot.cases if case.controller]:
         result.find("driven", scenes=driven)
     cases = cases or [case for case in robot.cases_of_torque if timed or "fewer joints" in case.scene.tags]
-    angles = setup.of(10, 1 if robot.is_read else 3, 1) if timed else 1
-    integrators = TWO_INTEGRATORS if timed else TWO_INTEGRATORS[-1:]
     try:
-        sub_blocks.compare_blocks(result, setup, angles)
-        models = [model for case in cases for model in of_case(result, case, setup, integrators)]
-        exact_motion.swings(result, setup, cases)
+        compare_blocks(result, setup, setup.of(10, 1 if robot.is_read else 3, 1) if timed else 1)
+        models = [model for case in cases for model in of_case(result, case, setup)]
+        for case in pendulums(cases):
+            compare_swing(result, setup, case)
     except ModelError as error:
         add_not_lockable(result, robot, error)
         return result, None

@@ -1,7 +1,5 @@
 """Which joints a case needs, and its motion with the smallest model compared with the whole one."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 import tmt
@@ -13,93 +11,51 @@ from ...judge.rounding import NARROW, band
 from ...judge.run import check_movement, deviation, required_time, step_in_words
 from ...robots.case import Case, Coordinates
 from ...robots.states import seconds
-from ...truth.smallest import MOST_FOLDED, Needed, needed, reduced
+from ...truth.smallest import Needed, needed, reduced
 from ..setup import Setup
-from .times import TWO_INTEGRATORS, finer, method_of
+from .times import finer, rk4_of
 
-# of a robot from a file
-BOTH_INTEGRATORS = 6  # nv up to which runs by both integrators are compared; above, by the last
 SECONDS_OF_STATE = 2.0  # that an evaluation with 50 digits may take
 MOST_IN_A_BAND = 12  # nv up to which runs are compared within the band of rounding
 
 
-def of_case(result: Result, case: Case, setup: Setup, integrators: Sequence[str] = TWO_INTEGRATORS) -> list:
+def of_case(result: Result, case: Case, setup: Setup) -> list[tuple]:
     """Findings and checks of what the case needs; the models to be timed, (name, Case), None if it needs no model."""
-    need = needed(case) if case.is_held or seconds(case.robot) <= SECONDS_OF_STATE else not_decided(case)
+    slow = not case.is_held and seconds(case.robot) > SECONDS_OF_STATE
+    need = Needed((), {}, case.joints) if slow else needed(case)
     smaller, rests = reduced(case, need), len(need.stays) == len(case.joints)
     models = [(case.name, case.changed(locked=()))]
     if smaller or case.locked or rests:
         models.append((case.name, None if rests else smaller or case))
     locked = case.scene.locked
     result.curves["needs"][case.name] = {"locked": locked, "stays": need.stays, "undecided": need.undecided}
-    if case.robot.is_read:
-        result.tables.setdefault("reduction_joints", []).extend(joint_rows(case, need))
+    slow_digits = f"one evaluation with {DIGITS} digits takes about {seconds(case.robot):.0f} s" if slow else ""
     result.find(
         "need", scene=case.name, joint=joint_word(case.robot.coordinates), locked=list(locked), stays=list(need.stays),
         left=[name for name in case.joints if name not in need.stays], reasons=list(need.moves.values()),
-        undecided=list(need.undecided), why_not=why_not_decided(case) if need.undecided else "",
-        holding=case.scene.torque == "hold",
+        undecided=list(need.undecided), why_not=slow_digits or "the traced expression does not fold to 0",
     )  # fmt: skip
-    if not (smaller or rests):
-        return models
-    if case.robot.is_read and case.coordinates.nv > MOST_IN_A_BAND:
-        result.find("runs_not_compared", scene=case.name, nv=case.coordinates.nv)
-        return models
-    few = case.robot.is_read and case.coordinates.nv > BOTH_INTEGRATORS
-    for integrator in integrators[-1:] if few else integrators:
-        compare_smaller(result, case, smaller, setup, integrator)
+    if (smaller or rests) and not (case.robot.is_read and case.coordinates.nv > MOST_IN_A_BAND):
+        compare_smaller(result, case, smaller, setup)
     return models
-
-
-def not_decided(case: Case) -> Needed:
-    """Where an evaluation with 50 digits takes too long: only the joints that move at the start are decided."""
-    moves = {
-        name: f"{name} has a speed at the start"
-        for name, joint in zip(case.joints, case.coordinates.places.joints)
-        if any(case.v[joint.qd])
-    }
-    return Needed((), moves, tuple(name for name in case.joints if name not in moves))
-
-
-def joint_rows(case: Case, need: Needed) -> list[dict]:
-    """A row for each joint of the robot: whether the case needs it, and why."""
-    rows = []
-    for name in case.robot.joints:
-        status, why = "needed", need.moves.get(name, "")
-        if name in case.scene.locked:
-            status = "declared locked"
-        elif name in need.stays:
-            status = "never moves"
-        elif name in need.undecided:
-            status, why = "not decided", why_not_decided(case)
-        rows.append({"scene": case.name, "joint": name, "found": status, "why": why})
-    return rows
-
-
-def why_not_decided(case: Case) -> str:
-    if not case.is_held and seconds(case.robot) > SECONDS_OF_STATE:
-        return f"one evaluation with {DIGITS} digits takes about {seconds(case.robot):.0f} s"
-    if case.coordinates.nv > MOST_FOLDED:
-        return f"the acceleration is 0 with {DIGITS} digits; above {MOST_FOLDED} speeds expressions are not traced"
-    return "the acceleration does not fold to 0"
 
 
 def joint_word(coordinates: Coordinates) -> str:
     return "hinge" if set(coordinates.all_kinds) == {"hinge"} else "joint"
 
 
-def compare_smaller(result: Result, case: Case, smaller: Case | None, setup: Setup, integrator: str) -> None:
-    """Runs of the case and of the smaller one (None: rest) by the same method, within the band of rounding."""
-    scheme, every = setup.engines["mujoco"].methods[integrator].scheme, finer(case)
+def compare_smaller(result: Result, case: Case, smaller: Case | None, setup: Setup) -> None:
+    """RK4 runs of the case and of the smaller one (None: rest), within the band of rounding."""
+    scheme, every = setup.engines["mujoco"].methods["RK4"].scheme, finer(case)
     steps, coordinates = every * case.steps, case.coordinates
     dt, nq, nv = case.duration / steps, coordinates.nq, coordinates.nv
-    paths = states_of_run(case, setup, integrator)
-    references = states_of_run(smaller, setup, integrator) if smaller else {}
+    paths = states_of_run(case, setup)
+    references = states_of_run(smaller, setup) if smaller else {}
     of_tmt = paths["tmt"][:, :nq], paths["tmt"][:, nq:]
     width = band(tmt.METHODS[scheme], case.tree, *of_tmt, case.tau, dt, every)
     t = dt * every * np.arange(len(width))
     for engine, path in paths.items():
-        where = f"{case.name}, {LABELS[engine]}, {integrator}, {step_in_words(case, steps)}"
+        where = f"{case.name}, {LABELS[engine]}, RK4, {step_in_words(case, steps)}"
         reference = np.tile(np.concatenate(case.start), (steps + 1, 1))
         if smaller:
             reference[:, free_places(case, smaller)] = references[engine]
@@ -108,16 +64,15 @@ def compare_smaller(result: Result, case: Case, smaller: Case | None, setup: Set
         movements = coordinates.difference(path[:, :nq], reference[:, :nq])
         apart = np.abs(np.concatenate([movements, path[:, nq:] - reference[:, nq:]], axis=1))[::every]
         until = check_smaller(result, where, coordinates, t, apart, width, required_time(case, scheme, dt))
-        result.curves["apart"][case.name, engine, integrator] = float(apart[t <= until, :nv].max())
+        result.curves["apart"][case.name, engine] = float(apart[t <= until, :nv].max())
 
 
 def free_places(case: Case, smaller: Case) -> list[int]:
     """The columns of the smaller case's positions and speeds among those of the whole one."""
     whole, nq = dict(zip(case.joints, case.coordinates.places.joints)), case.coordinates.nq
     joints = [whole[name] for name in smaller.joints]
-    return [i for joint in joints for i in range(joint.q.start, joint.q.stop)] + [
-        nq + i for joint in joints for i in range(joint.qd.start, joint.qd.stop)
-    ]
+    positions = [i for joint in joints for i in range(joint.q.start, joint.q.stop)]
+    return positions + [nq + i for joint in joints for i in range(joint.qd.start, joint.qd.stop)]
 
 
 def check_smaller(
@@ -144,10 +99,10 @@ def check_smaller(
     return until
 
 
-def states_of_run(case: Case, setup: Setup, integrator: str) -> dict[str, np.ndarray]:
+def states_of_run(case: Case, setup: Setup) -> dict[str, np.ndarray]:
     """Positions and speeds of the case's joints by engine, each (steps + 1, nq + nv)."""
     steps, paths = finer(case) * case.steps, {}
     for engine, dynamics in setup.compared(case).items():
-        method = method_of(setup.engines, integrator, engine)
+        method = rk4_of(setup.engines, engine).name
         paths[engine] = dynamics.run(*case.start, case.tau, case.duration / steps, steps, method).states
     return paths

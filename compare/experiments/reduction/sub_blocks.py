@@ -12,30 +12,24 @@ from ...robots.case import SEED, Case, Coordinates
 from ...robots.states import seconds
 from ..setup import Setup
 
-STATES_OF_SUBSET = 20  # of the free joints, for each choice of the locked angles
-ALL_SUBSETS = 6  # joints up to which all subsets are locked; above, each joint alone
-RANDOM_SUBSETS = 20  # and this number of random subsets
+ALL_SUBSETS = 6  # joints up to which all subsets are locked; above, some joints, each alone
 MOST_TO_LOCK = 2.0  # s that an exact state may take
-LARGE = 12  # nv above which there are fewer states, and fewer subsets in a run that is not full
-UNITS = {"Mbar": "kg m2", "bias": "N m"}
-UNITS_WITH_SLIDES = {"Mbar": "kg m2, kg m or kg", "bias": "N m or N"}
 
 
 def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
     """A check and a row of a table for each subset, quantity and pair of models, over random angles and states."""
     result.tables["reduction_subsets"] = []
     robot, rng = setup.robot, np.random.default_rng(SEED)
-    coordinates, many = robot.coordinates, len(robot.joints) > ALL_SUBSETS
+    coordinates = robot.coordinates
     if robot.is_read and seconds(robot) > MOST_TO_LOCK:
         result.find("no_subsets", bodies=len(robot.tree.mass))
         return
-    sets, states = subsets(robot.joints), STATES_OF_SUBSET
-    if many:
-        large = coordinates.nv > LARGE
-        angles, states = 1, setup.of(4 if large else STATES_OF_SUBSET, 2 if large else 4, 2)
-        every = setup.of(1, 6 if large else 3, 6)
-        sets = sets[::every]
-        result.find("some_subsets", joints=len(robot.joints), random=RANDOM_SUBSETS, count=len(sets), every=every)
+    sets, states = subsets(robot.joints, setup.of(12, 6, 4)), 20
+    if len(robot.joints) > ALL_SUBSETS:
+        angles, states = 1, setup.of(4, 2, 2)
+    unit_of_mass, unit_of_force = (
+        ("kg m2, kg m or kg", "N m or N") if "slide" in coordinates.all_kinds else ("kg m2", "N m")
+    )
     for locked in sets:
         pairs = {}  # (quantity, pair): differences and scales, a pair of arrays for each choice of angles
         for _ in range(angles):
@@ -44,20 +38,16 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
             case = robot.case(scene_name(locked), posture=posture_of(coordinates, q[0]), locked=locked)
             for quantity, pair, apart, scale in sub_block_differences(setup, case, q, v):
                 pairs.setdefault((quantity, pair), []).append((apart, scale))
-        units = UNITS_WITH_SLIDES if "slide" in coordinates.all_kinds else UNITS
         for (quantity, pair), arrays in pairs.items():
-            check_blocks(result, locked, quantity, pair, *np.concatenate(arrays, axis=1), units[quantity])
+            unit = unit_of_mass if quantity == "Mbar" else unit_of_force
+            check_blocks(result, locked, quantity, pair, *np.concatenate(arrays, axis=1), unit)
 
 
-def subsets(joints: Sequence[str]) -> list[tuple[str, ...]]:
-    """The proper subsets of the joints, small ones first; of many joints each alone and 20 at random."""
+def subsets(joints: Sequence[str], most: int) -> list[tuple[str, ...]]:
+    """The proper subsets of the joints, small ones first; of many joints at most `most`, each alone."""
     if len(joints) <= ALL_SUBSETS:
         return [names for count in range(1, len(joints)) for names in combinations(joints, count)]
-    rng, chosen = np.random.default_rng(SEED), {(name,): None for name in joints}
-    while len(chosen) < len(joints) + RANDOM_SUBSETS:
-        places = rng.choice(len(joints), rng.integers(2, len(joints)), replace=False)
-        chosen[tuple(joints[i] for i in sorted(places))] = None
-    return sorted(chosen, key=len)
+    return [(name,) for name in joints[:: -(-len(joints) // most)]]
 
 
 def posture_of(coordinates: Coordinates, q: np.ndarray) -> tuple[float, ...]:
@@ -74,13 +64,7 @@ def scene_name(locked: Sequence[str]) -> str:
 
 
 def check_blocks(
-    result: Result,
-    locked: Sequence[str],
-    quantity: str,
-    pair: str,
-    apart: np.ndarray,
-    scale: np.ndarray,
-    unit: str,
+    result: Result, locked: Sequence[str], quantity: str, pair: str, apart: np.ndarray, scale: np.ndarray, unit: str
 ) -> None:
     """A check of the state that comes closest to its tolerance, 64 eps x scale, and a row. apart, scale: (states,)."""
     tolerance = FACTOR * EPS * scale

@@ -3,8 +3,6 @@
 from collections.abc import Iterator, Mapping
 from functools import partial
 
-import numpy as np
-
 from ...engines import GRID, IN_QUICK_RUNS, LABELS, methods_in
 from ...judge import timing
 from ...judge.check import Result
@@ -14,25 +12,22 @@ from ...judge.scale import EPS, FACTOR
 from ...judge.units import renamed
 from ...judge.words import scene_begins
 from ...robots import Robot
-from ...truth.reference import DOUBLES, LOST, Reference, has_no_reference
+from ...truth.reference import LOST, has_no_reference
 from .. import Experiment
 from ..setup import Setup
-from . import accuracy, advice, evaluations, orders
-from .first_screen import best_curves, choice
-from .runs import FIRST_STEPS, fill_in, measured, prepared, take_times
-from .settings import followed, left_out, methods_following, regular_of, scenes_of
+from . import accuracy, advice, evaluations
+from .first_screen import best_curves, cheapest, choice, target
+from .runs import FIRST_STEPS, measured, prepared, take_times
+from .settings import followed, left_out, regular_of, scenes_of
 
 EXPERIMENT = Experiment(order=90, serves_own=False, options=("--scenes",), timed=True, overview="times")
 COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "evaluations", "seconds", "error_rad", "worst_error_rad",
            "energy_error_J", "diverged", "why_not"]  # fmt: skip
-HEADLINE_ERROR = 1e-6  # rad or m
-ORDER_OF_RK4 = 4
 
 
 def claim_values(robot: Robot) -> dict:
     """Values of the macros claim and tolerance."""
-    values = {"unit": movement_unit(robot.coordinates), "times": GRID + 1, "eps": FACTOR, "lost": LOST}
-    return values | {"doubles": DOUBLES}
+    return {"unit": movement_unit(robot.coordinates), "times": GRID + 1, "eps": FACTOR, "lost": LOST}
 
 
 def skipped(robot: Robot) -> Finding | str | None:
@@ -63,22 +58,22 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.rows += [row for of_scene in rows_of.values() for row in of_scene]
     unit = movement_unit(setup.robot.coordinates)
     result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "of_file": setup.robot.is_read}
-    result.curves["doubles"] = [name for name, reference in references.items() if reference.why]
     # with the coarse steps of a quick run errors are regular in this scene only, and other engines have too few settings
-    whole = setup.size == "full"
-    running = [method for method in methods_following(setup, cases, which) if whole or method.engine in IN_QUICK_RUNS]
-    fixed = [method for method in running if not method.adaptive]
+    whole, mujoco = setup.size == "full", setup.engines["mujoco"]
+    ran = {(row["engine"], row["method"]): row["run"][1] for row in result.rows}
+    fixed = [m for m in ran.values() if not m.adaptive and (whole or m.engine in IN_QUICK_RUNS)]
     # where servos act a fast mode decays first, and an order shows only with short steps
     falling = [case.name for case in cases if not case.controller] if whole else [regular.name]
-    complete = (whole or not timed) and not setup.robot.is_read
-    result.tables["speed_orders"] = orders.orders(result, falling, fixed, complete)
-    mujoco = setup.engines["mujoco"]
-    if timed and mujoco.methods["RK4"].order < ORDER_OF_RK4:  # with ball joints
-        result.find("lower_order", order=mujoco.methods["RK4"].order)
+    result.tables["speed_orders"] = accuracy.check_orders(result, falling, fixed)
     schemes = {c.name: {m.name: m.scheme for m in methods_in(mujoco, c).values()} for c in cases}
     accuracy.check_same_schemes(result, floors, schemes, unit)
     accuracy.check_smallest_errors(result, floors, unit)
-    find_references(result, references, floors, unit)
+    runs = [
+        {"scene": scene, "floor": floors[scene], "expected": LOST * floors[scene] / EPS}
+        | {"apart": reference.apart, "steps": reference.steps, "why": reference.why}
+        for scene, reference in references.items()
+    ]
+    result.find("references", runs=runs, unit=unit)
     if timed:
         add_times(result, setup, rows_of)
         add_absent(result, setup)
@@ -88,38 +83,22 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     return result
 
 
-def find_references(result: Result, references: Mapping[str, Reference], floors: accuracy.Floors, unit: str) -> None:
-    """How accurate the reference of each scene is, and the error that rounding leaves in it."""
-    for kind, in_doubles in (("references", False), ("references_in_doubles", True)):
-        runs = [
-            {"scene": scene, "floor": floors[scene], "expected": LOST * floors[scene] / EPS}
-            | {"apart": reference.apart, "steps": reference.steps, "why": reference.why}
-            for scene, reference in references.items()
-            if bool(reference.why) is in_doubles
-        ]
-        if runs:
-            result.find(kind, runs=runs, unit=unit)
-
-
 def add_times(result: Result, setup: Setup, rows_of: Mapping[str, list[dict]]) -> None:
     """The seconds of all rows, the cheapest settings, and the cost of one evaluation."""
     compiled = evaluations.compiled_evaluations(setup)
     runs = [prepared(of_scene, setup) for of_scene in rows_of.values()]
     setup.quiet()  # nothing else may run while times are taken
-    spread = []
     for (name, of_scene), its_runs in zip(rows_of.items(), runs):
         setup.progress(f"speed: timing {name}")
-        spread += fill_in(of_scene, take_times(its_runs, setup))
-    floors, regular = result.curves["floors"], result.curves.get("regular")
-    table = advice.advice(result.rows, list(floors), floors)
-    if values := advice.headline_values(table, regular, HEADLINE_ERROR):
-        result.headline = result.finding("headline", unit=result.curves["unit"], **values)
+        take_times(of_scene, its_runs, setup)
+    if settings := cheapest(best_curves(result)):
+        result.headline = result.finding("headline", settings=settings, **target(result))
+    table = advice.advice(result.rows, list(result.curves["floors"]))
     result.tables["what_should_i_use"] = renamed(table, result.curves.get("unit", "rad"))
     result.find("columns")
     setup.progress("speed: one evaluation")
-    result.tables["evaluations"] = evaluations.costs(result, setup, compiled)
-    share = [float(np.quantile(spread, q)) - 1.0 for q in (0.5, 0.9)] if spread else None
-    result.find("timing", spread=share, once=timing.ONCE, first_steps=FIRST_STEPS)
+    result.tables["evaluations"] = evaluations.costs(setup, compiled)
+    result.find("timing", once=timing.ONCE, first_steps=FIRST_STEPS)
 
 
 def add_absent(result: Result, setup: Setup) -> None:
@@ -142,11 +121,10 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
         return
     for scene in result.curves["floors"]:
         yield partial(figures_speed.draw_times, result, scene, beginning=scene_begins(scene, robot))
-    yield partial(figures_speed.draw_evaluations, result)
 
 
 def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
-    from .figures_overview import draw_times  # matplotlib is for the process that draws
+    from .figures_speed import draw_overview  # matplotlib is for the process that draws
 
     if best_curves(results["speed"]):
-        yield partial(draw_times, results["speed"])
+        yield partial(draw_overview, results["speed"])

@@ -1,16 +1,65 @@
-"""Checks of the errors of the runs: MuJoCo against the same scheme in tmt, and against rounding."""
+"""Checks of the errors of the runs: the order of each method, MuJoCo against the same scheme in tmt, rounding."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...judge.check import Result
+from ...engines import Method
+from ...judge.check import About, Result
+from ...judge.run import ORDER_MARGIN
 from ...judge.scale import FACTOR
 
 Floors = Mapping[str, float]  # {scene: error that rounding leaves, rad}
 
 NEAR_ROUNDING = 30  # a smaller multiple of the error of rounding counts as rounding
 SMALL_ERROR = 0.1  # rad: rounding changes a smaller error by no more than the growth of a small difference predicts
+EARLY = 1.0  # s: until then chaos has not grown, and errors fall regularly
+REGULAR, CLEAR = 3e-2, 2e-12  # rad: an error up to EARLY between these falls with its order, far above rounding
+LEAST_ORDER = {8: 7.0}  # a bound only: with order 8 rounding comes before the measured order settles
+
+
+def check_orders(result: Result, scenes: Sequence[str], methods: Sequence[Method]) -> list[dict]:
+    """Rows and checks: the stated and the measured order of each method of fixed step.
+
+    For a robot from a file only an order that has settled is checked.
+    """
+    table, of_file = [], result.curves.get("of_file")
+    for scene in scenes:
+        # the error of rounding, or of a reference in doubles, differs from robot to robot
+        clear = max(CLEAR, NEAR_ROUNDING * result.curves["floors"][scene]) if of_file else CLEAR
+        for method in methods:
+            runs = rows_of_method(result.rows, scene, method.engine, method.name)
+            regular = [row for row in runs if clear < row["early"] < REGULAR]
+            settled = not of_file or method.order in LEAST_ORDER or has_settled(regular)
+            if len(regular) < 2 or not settled:
+                continue
+            coarse, fine = regular[-2:]  # theory applies best to the finest
+            order = order_between(coarse, fine)
+            check_order(result, f"{scene}, {method.engine} {method.name}", method.order, order)
+            row = {"scene": scene, "engine": method.engine, "method": method.name, "order": method.order}
+            table.append(row | {"measured_order": order, "from_dt_s": coarse["dt_s"], "to_dt_s": fine["dt_s"]})
+    return table
+
+
+def order_between(coarse: dict, fine: dict) -> float:
+    """The order by which the error falls from one row to a finer one."""
+    return float(np.log(coarse["early"] / fine["early"]) / np.log(coarse["dt_s"] / fine["dt_s"]))
+
+
+def has_settled(rows: Sequence[dict]) -> bool:
+    """Whether the last two measured orders of these rows, from coarse to fine, differ by at most ORDER_MARGIN."""
+    return len(rows) > 2 and abs(order_between(*rows[-3:-1]) - order_between(*rows[-2:])) <= ORDER_MARGIN
+
+
+def check_order(result: Result, where: str, order: int, measured: float) -> None:
+    """The measured order is the method's; of order 8 it is at least 7."""
+    if least := LEAST_ORDER.get(order):
+        result.check(
+            where, f"measured order, nominal {order}", measured, least, "", rule="at least", about=About.PREDICTION
+        )
+    else:
+        name, note = f"deviation from order {order}: error", f"{measured:.2f}"
+        result.check(where, name, abs(measured - order), ORDER_MARGIN, "", note, about=About.PREDICTION)
 
 
 def check_same_schemes(
@@ -33,25 +82,23 @@ def check_same_schemes(
 
 
 def check_smallest_errors(result: Result, floors: Floors, unit: str = "rad") -> None:
-    """The smallest error of MuJoCo's RK4 is that of tmt's; where errors stop falling, they are of the size of rounding.
-
-    If MuJoCo's errors still fall at its finest step, tmt's runs with finer steps are left out. If both diverge at all steps,
-    as with a stiff robot, or tmt has no run with such a step, nothing is compared.
-    """
+    """Where errors stop falling they are of the size of rounding; MuJoCo's RK4 is as exact as tmt's with the same steps."""
     for scene, left in floors.items():
-        least, finest = {}, finest_while_falling(result.rows, scene) or 0.0
+        by_method = {}
         for engine, method in (("mujoco", "RK4"), ("tmt", "rk4"), ("tmt", "dopri8")):
-            errors = errors_of(result.rows, scene, engine, method)
-            least[method] = min(errors, default=np.inf)
-            if stopped(errors):
+            runs = rows_of_method(result.rows, scene, engine, method)
+            by_method[method] = {row["dt_s"]: error(row) for row in runs}
+            errors = list(by_method[method].values())
+            least = min(errors, default=np.inf)
+            if np.isfinite(least) and errors.index(least) < len(errors) - 1:
                 quantity = f"smallest error of {engine}'s {method}, where smaller steps gain nothing"
-                result.check(scene, quantity, least[method], FACTOR * left, unit, rounding=True)
-        comparable = errors_of(result.rows, scene, "tmt", "rk4", finest)
-        least["rk4"] = min(comparable, default=np.inf)
-        if not comparable or not np.isfinite([least["RK4"], least["rk4"]]).any():
-            continue
-        tolerance = FACTOR * left + (2.0 * least["rk4"] if np.isfinite(least["rk4"]) else 0.0)
-        result.check(scene, "smallest error of MuJoCo's RK4, compared with tmt's rk4", least["RK4"], tolerance, unit)
+                result.check(scene, quantity, least, FACTOR * left, unit, rounding=True)
+        theirs = min(by_method["RK4"].values(), default=np.inf)
+        finest = min(by_method["RK4"], default=np.inf)
+        ours = min((error for dt, error in by_method["rk4"].items() if dt >= finest), default=np.inf)
+        if np.isfinite([theirs, ours]).any() and by_method["rk4"]:
+            tolerance = FACTOR * left + (2.0 * ours if np.isfinite(ours) else 0.0)
+            result.check(scene, "smallest error of MuJoCo's RK4, compared with tmt's rk4", theirs, tolerance, unit)
 
 
 def gained_nothing(error: float, work: int, best: float, last: int, left: float) -> bool:
@@ -64,23 +111,6 @@ def error(row: dict) -> float:
     return np.inf if row["diverged"] else row["worst_error_rad"]
 
 
-def errors_of(rows: list[dict], scene: str, engine: str, method: str, finest: float = 0.0) -> list[float]:
-    """The errors of a method in a scene, rad, in the order of its settings, except of steps shorter than `finest`, s."""
-    return [error(row) for row in rows_of_method(rows, scene, engine, method) if not (row["dt_s"] or np.inf) < finest]
-
-
 def rows_of_method(rows: list[dict], scene: str, engine: str, method: str) -> list[dict]:
     """The rows of a method in a scene, from coarse to fine."""
     return [row for row in rows if (row["scene"], row["engine"], row["method"]) == (scene, engine, method)]
-
-
-def finest_while_falling(rows: list[dict], scene: str) -> float | None:
-    """The finest step of MuJoCo's RK4, s, if its errors fall until there; None if finer steps gain nothing."""
-    runs = rows_of_method(rows, scene, "mujoco", "RK4")
-    falls = runs and not stopped([error(row) for row in runs])
-    return min(row["dt_s"] for row in runs) if falls else None
-
-
-def stopped(errors: list[float]) -> bool:
-    """Whether the least of these errors is not the last: smaller steps gained nothing."""
-    return bool(errors) and np.isfinite(min(errors)) and errors.index(min(errors)) < len(errors) - 1

@@ -1,27 +1,30 @@
 """What one evaluation of the dynamics costs: MuJoCo's calls, the ways of tmt, and other engines."""
 
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 import tmt
-from tmt.compiled import evaluator
+from tmt.compiled import evaluator, runner
+from tmt.compiled.cores import cores
 
+from ...engines.heyoka import Heyoka, compiled_accelerations
+from ...engines.pinocchio import PinocchioCalls
 from ...judge import timing
-from ...judge.check import Result
-from ...robots.case import SEED, Coordinates
+from ...robots.case import SEED
 from ..setup import Setup
-from .implementations import EACH, FORWARD, IN_LANES, NAMES_IN_TMT, RK4_STEP, WAITING, of_many_states, of_one_state
-from .peers import Peers
 
-STATES = (1, 1000, 1_000_000)
-CALLS = 10_000  # states that a timed call evaluates at least
-CALL_SECONDS = 1e-3  # a timed call repeats the evaluation for about so long
+FEW, MANY = 1000, 1_000_000  # states of one call
+MOST_OF_MANY = 3  # nv up to which MANY states fit into memory
 MOST_CALLS = 100_000  # repetitions in a timed call
-MOST_RESULTS = 10_000_000  # numbers that the results of many states may have
-WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_step"
+MOST_NUMBERS = 10_000_000  # of a path of many steps
+FORWARD, RK4_STEP = "forward_dynamics", "rk4_step"
+NAMES_IN_TMT = {FORWARD: "acceleration", "mass_matrix_and_bias": "mass_matrix_and_bias"}  # of tmt.compiled
+CALLED = "tmt.acceleration, called from Python"
+WAITING, EACH, IN_LANES = "compiled, each waits for the last", "compiled", "compiled, side by side"
+WHOLE, BATCH = "MuJoCo, mj_forward", "MuJoCo, batch"
+HEYOKA, ABA = "heyoka, compiled function", "Pinocchio, aba called from Python"
 COLUMNS = ["quantity", "implementation", "states", "threads", "ns_per_state", "operations", "operations_per_ns",
            "why_not"]  # fmt: skip
 
@@ -29,111 +32,123 @@ COLUMNS = ["quantity", "implementation", "states", "threads", "ns_per_state", "o
 class Evaluations(NamedTuple):
     """All evaluations, compiled and not yet timed. Keys: (quantity, implementation, states, threads)."""
 
-    loops: Mapping[tuple, Callable]  # {key: loop(count)} of one state
-    of_many: Mapping[tuple, tuple[Callable, int]]  # {key: (call, states in it)}
-    absent: Mapping[tuple, str]  # {(quantity, implementation): why it is not timed}
+    loops: dict[tuple, Callable]  # {key: loop(count)} of one state
+    of_many: dict[tuple, Callable]  # {key: call} of all its states
+    absent: dict[tuple, str]  # {(quantity, implementation): why it is not timed}
 
 
 def compiled_evaluations(setup: Setup) -> Evaluations:
     """Everything that `costs` times."""
     from ...engines.mujoco.calls import MinimalCalls  # here, since importing MuJoCo takes long
 
-    rng, tree = np.random.default_rng([SEED, 2]), setup.robot.tree
-    numbers = list(STATES[: setup.of(3, 2, 2)])
-    numbers[-1] = min(setup.of(max(STATES), 1000, 1000), most_states(tree))
-    states = states_of(setup.robot.coordinates, rng, setup.of(max(numbers), 10_000, 1000))
-    first = [np.ascontiguousarray(a[0]) for a in states]
-    peers = None if setup.is_quick else Peers(setup, states)
-    absent, loops = dict(peers.absent) if peers else {}, {}
+    tree, coordinates = setup.robot.tree, setup.robot.coordinates
+    many = setup.of(MANY if coordinates.nv <= MOST_OF_MANY else 10 * FEW, FEW, FEW)
+    rng = np.random.default_rng([SEED, 2])
+    states = [coordinates.random(rng, many), *rng.uniform(-3.0, 3.0, (2, many, coordinates.nv))]
+    first, few = [np.ascontiguousarray(a[0]) for a in states], [a[:FEW] for a in states]
+    made = Evaluations(of_one_state(tree, first), of_many_states(tree, few) | of_many_states(tree, states), {})
     if missing := MinimalCalls.unavailable():
-        absent[FORWARD, WHOLE] = missing
+        made.absent[FORWARD, WHOLE] = missing
     else:
         minimal = MinimalCalls(setup.engines["mujoco"].of(setup.robot.case()))
-        loops = {(quantity, name, 1, 1): loop for name, (quantity, loop) in minimal.loops(*first).items()}
-    for implementations in (of_one_state(tree, first), peers.of_one_state(first) if peers else ()):
-        loops |= {(quantity, name, 1, 1): loop for quantity, name, loop in implementations}
-    for loop in loops.values():
-        loop(1)  # warm up
-    of_many = {}
-    for count in numbers:
-        for key, call in of_many_states(tree, [a[:count] for a in states]).items():
-            if count == STATES[1]:
-                call()  # its code is compiled, or loaded, on the first call
-            of_many[key] = repeated(call, CALLS // count, count)
-    for key, call in (peers.of_many_states(states) if peers else {}).items():
-        of_many[key] = repeated(call, key[2] // 1000, key[2])
-    return Evaluations(loops, of_many, absent)
+        made.loops.update({(quantity, name, 1, 1): loop for name, (quantity, loop) in minimal.loops(*first).items()})
+    if not setup.is_quick:
+        add_peers(made, setup, first, few)
+    for loop in made.loops.values():
+        loop(1)  # its code is compiled, or loaded, on the first call
+    for (_, _, count, _), call in made.of_many.items():
+        if count == FEW:
+            call()
+    return made
 
 
-def costs(result: Result, setup: Setup, made: Evaluations) -> list[dict]:
-    """The rows of evaluations.csv, and findings about them."""
-    calls = {key: counted(loop) for key, loop in made.loops.items()} | made.of_many
+def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> dict[tuple, Callable]:
+    """Loops of tmt at one state."""
+    (q, qd, tau), n = state, len(tree.axis)
+    tmt.prepare(tree)
+    run, most = runner(tree, "rk4"), min(MOST_CALLS, MOST_NUMBERS // n)
+    paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
+    paths[0][0, 0], paths[1][0, 0] = q, qd
+
+    def steps(count):
+        run(*(path[:, : min(count, most) + 1].copy() for path in paths), tau[None], 1e-4)
+
+    def called(count):
+        for _ in range(count):
+            tmt.acceleration(q, qd, tau, tree)
+
+    loops = {(FORWARD, CALLED, 1, 1): called, (RK4_STEP, EACH, 1, 1): steps}
+    for quantity, name in NAMES_IN_TMT.items():
+        chain = evaluator(tree, name).chain
+        loops[quantity, WAITING, 1, 1] = lambda count, chain=chain: chain(q, qd, tau, count)
+    return loops
+
+
+def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray]) -> dict[tuple, Callable]:
+    """Calls of tmt for many states, (N, nq and nv)."""
+    q, qd, tau = (np.ascontiguousarray(a) for a in states)
+    count, calls, run = len(qd), {}, runner(tree, "rk4")
+    for quantity, name in NAMES_IN_TMT.items():
+        compiled = evaluator(tree, name)
+        out = np.ones((count, compiled.size))
+        wide = [np.ascontiguousarray(a.T) for a in (q, qd, tau, out)]
+        calls[quantity, EACH, count, 1] = lambda compiled=compiled, out=out: compiled.each(q, qd, tau, out)
+        calls[quantity, IN_LANES, count, 1] = lambda compiled=compiled, wide=wide: compiled.lanes(*wide)
+    calls[FORWARD, CALLED, count, cores()] = lambda: tmt.acceleration(q, qd, tau, tree)
+    paths = [np.stack([part, part], axis=1) for part in (q, qd)]
+    calls[RK4_STEP, IN_LANES, count, cores()] = lambda: run(*paths, tau, 1e-3)
+    return calls
+
+
+def add_peers(made: Evaluations, setup: Setup, state: list[np.ndarray], states: list[np.ndarray]) -> None:
+    """Other engines where they are installed: heyoka's function, Pinocchio's aba, MuJoCo's batches."""
+    from ...engines.mujoco.calls import BatchedCalls  # here, since importing MuJoCo takes long
+
+    tree, heyoka = setup.robot.tree, Heyoka()
+    reasons = {
+        HEYOKA: heyoka.unavailable() or heyoka.too_long(tree),
+        ABA: PinocchioCalls.unavailable() or PinocchioCalls.unfit(tree),
+        BATCH: BatchedCalls.unavailable(),
+    }
+    made.absent.update({(FORWARD, name): reason for name, reason in reasons.items() if reason})
+    if not reasons[HEYOKA]:
+        function, inputs = compiled_accelerations(tree), np.ascontiguousarray(np.concatenate(states, axis=1).T)
+        out = np.empty(states[1].T.shape)
+        made.of_many[FORWARD, HEYOKA, FEW, 1] = lambda: function(inputs, outputs=out)
+    if not reasons[ABA]:
+        made.loops[FORWARD, ABA, 1, 1] = PinocchioCalls(tree).aba_loop(*state)
+    if not reasons[BATCH]:
+        calls = BatchedCalls(setup.engines["mujoco"].of(setup.robot.case()), *states)
+        made.of_many[FORWARD, BATCH, FEW, 1] = calls.forward
+        made.of_many[RK4_STEP, BATCH, FEW, 1] = calls.step
+
+
+def costs(setup: Setup, made: Evaluations) -> list[dict]:
+    """The rows of evaluations.csv, by quantity, the slowest first, then what is not timed."""
+    calls = {key: counted(loop) for key, loop in made.loops.items()}
+    for key, call in made.of_many.items():  # repeated, so that caches are as warm as in use
+        times = max(1, 10 * FEW // key[2])
+        calls[key] = (lambda call=call, times=times: [call() for _ in range(times)]), times * key[2]
     times = timing.in_turns([call for call, _ in calls.values()], rounds=setup.of(12, 5, 2))
     ns = per_state({key: count for key, (_, count) in calls.items()}, times)
-    find_ratios(result, ns, setup.robot.name)
     operations = {quantity: evaluator(setup.robot.tree, name).operations for quantity, name in NAMES_IN_TMT.items()}
     of_compiled = {(q, name): count for q, count in operations.items() for name in (IN_LANES, EACH, WAITING)}
-    return evaluation_rows(ns, of_compiled, made.absent)
-
-
-def find_ratios(result: Result, ns: Mapping[tuple, float], name: str) -> None:
-    """MuJoCo's times of an evaluation and of a step over tmt's. ns: nanoseconds of a state by key."""
-    if (FORWARD, WHOLE, 1, 1) not in ns:
-        return
-    lanes = {
-        key[2]: value for key, value in ns.items() if key[:2] == (FORWARD, IN_LANES) and key[2] > 1 and key[3] == 1
-    }
-    best = min(lanes, key=lanes.get)
-    ours = {"waiting": ns[FORWARD, WAITING, 1, 1], "independent": ns[FORWARD, EACH, 1000, 1], "lanes": lanes[best]}
-    result.find(
-        "evaluation_costs", robot=name, processor=timing.vectors(), whole=ns[FORWARD, WHOLE, 1, 1],
-        equal=ns[FORWARD, EQUAL, 1, 1], ours=ours, states=best, mj_step=ns[RK4_STEP, MJ_STEP, 1, 1],
-        rk4=ns[RK4_STEP, EACH, 1, 1],
-    )  # fmt: skip
-
-
-def states_of(coordinates: Coordinates, rng: np.random.Generator, count: int) -> list[np.ndarray]:
-    """Random positions (count, nq), speeds and torques (count, nv)."""
-    if set(coordinates.all_kinds) == {"hinge"}:
-        return list(rng.uniform(-3.0, 3.0, (3, count, coordinates.nv)))
-    return [coordinates.random(rng, count), *rng.uniform(-3.0, 3.0, (2, count, coordinates.nv))]
-
-
-def most_states(tree: tmt.Tree) -> int:
-    """A power of ten whose results fit into MOST_RESULTS numbers."""
-    n = len(tree.axis)
-    return int(10.0 ** np.floor(np.log10(MOST_RESULTS / (n * (n + 3) // 2))))
-
-
-def per_state(counts: dict, times: list[list[float]]) -> dict:
-    """Nanoseconds of one state for each key of `counts`, {key: states in a call}, from the seconds of its calls."""
-    return {key: 1e9 * min(of_call) / count for (key, count), of_call in zip(counts.items(), times)}
-
-
-def evaluation_rows(
-    ns: Mapping, operations: Mapping = MappingProxyType({}), absent: Mapping = MappingProxyType({})
-) -> list:
-    """The rows of evaluations.csv, by quantity, the slowest first, then what is not timed.
-
-    operations: of one state, absent: the reason, both by (quantity, implementation).
-    """
     rows = []
     for key, value in sorted(ns.items(), key=lambda item: (item[0][0], -item[1])):
-        count = operations.get(key[:2])
+        count = of_compiled.get(key[:2])
         rows.append((*key, value, count, count / value if count else None, None))
-    rows += [(*key, *[None] * 5, reason) for key, reason in absent.items()]
+    rows += [(*key, *[None] * 5, reason) for key, reason in made.absent.items()]
     return [dict(zip(COLUMNS, row)) for row in rows]
-
-
-def repeated(call: Callable, times: int, count: int) -> tuple[Callable, int]:
-    """The call repeated, so that caches are as warm as in use, and the states in it; count: of one call."""
-    times = max(1, times)
-    return (lambda: [call() for _ in range(times)]), times * count
 
 
 def counted(loop: Callable[[int], object]) -> tuple[Callable, int]:
     """A call that repeats a loop for about a millisecond, and how often it does."""
     loop(1)
     (once,) = timing.in_turns([lambda: loop(4)], 5)
-    count = min(max(1, int(CALL_SECONDS / (min(once) / 4))), MOST_CALLS)
+    count = min(max(1, int(1e-3 / (min(once) / 4))), MOST_CALLS)
     return lambda: loop(count), count
+
+
+def per_state(counts: dict, times: list[list[float]]) -> dict:
+    """Nanoseconds of one state for each key of `counts`, {key: states in a call}, from the seconds of its calls."""
+    return {key: 1e9 * min(of_call) / count for (key, count), of_call in zip(counts.items(), times)}

@@ -36,29 +36,31 @@ def target(result: Result) -> dict:
     return {"target": TARGET, "unit": result.curves.get("unit", "rad"), "scene": result.curves.get("regular")}
 
 
+def front(rows: Sequence[dict]) -> list[dict]:
+    """The rows than which no other is both faster and more exact, from the fastest to the most exact."""
+    best, least = [], NOT_SOLVED
+    error = partial(units.value, name="worst_error")
+    for row in sorted(rows, key=lambda row: (row["seconds"], error(row))):
+        if error(row) < least:
+            best.append(row)
+            least = error(row)
+    return best
+
+
 def best_curves(result: Result) -> list[Curve]:
     """A curve for each engine that computed the scene in which errors are regular."""
     scene, error = result.curves.get("regular"), partial(units.value, name="worst_error")
-    rows = [
-        row
-        for row in result.rows
-        if row["scene"] == scene and row["why_not"] is None and row["seconds"] and not row["diverged"]
-    ]
+    rows = [row for row in result.rows if row["scene"] == scene and row["seconds"] and not row["diverged"]]
     curves = []
     for engine in dict.fromkeys(row["engine"] for row in rows):
-        front, least = [], NOT_SOLVED
-        own = [row for row in rows if row["engine"] == engine and error(row) is not None]
-        for row in sorted(own, key=lambda row: (row["seconds"], error(row))):
-            if error(row) < least:
-                front.append(row)
-                least = error(row)
-        if front:
-            within = [
-                Cheapest(engine, row["method"], 1e3 * row["seconds"], row.get("steps"), row.get("dt_s"), row.get("tolerance"))
-                for row in front
-                if error(row) <= TARGET
-            ]  # fmt: skip
-            errors, times = [float(error(row)) for row in front], [1e3 * row["seconds"] for row in front]
+        best = front([row for row in rows if row["engine"] == engine])
+        within = [
+            Cheapest(engine, row["method"], 1e3 * row["seconds"], row.get("steps"), row.get("dt_s"), row.get("tolerance"))
+            for row in best
+            if error(row) <= TARGET
+        ]  # fmt: skip
+        if best:
+            errors, times = [float(error(row)) for row in best], [1e3 * row["seconds"] for row in best]
             curves.append(Curve(engine, errors, times, within[0] if within else None))
     return curves
 
@@ -74,21 +76,10 @@ def cheapest(curves: Sequence[Curve]) -> list[Cheapest]:
 
 
 def choice(result: Result) -> Finding | None:
-    """The answer to: which integrator, which step? A line of the table what_should_i_use, of the regular scene if it is there."""
-    lines = result.tables.get("what_should_i_use", [])
-    named = [line for line in lines if units.value(line, "target") == TARGET and line["mujoco"] and line["tmt"]]
-    if not named:
+    """The answer to: which integrator, which step? The cheapest settings of MuJoCo and of tmt; None if one has none."""
+    scene, reached = result.curves.get("regular"), {curve.engine: curve.cheapest for curve in best_curves(result)}
+    settings = [reached.get(engine) for engine in ("mujoco", "tmt")]
+    if not all(settings):
         return None
-    regular = result.curves.get("regular")
-    line = next((line for line in named if line["scene"] == regular), named[0])
-    durations = (row["dt_s"] * row["steps"] for row in result.rows if row["scene"] == line["scene"] and row["dt_s"])
-    settings = [
-        {
-            "setting": line[engine].replace("mujoco", "MuJoCo", 1),
-            "dt": line.get(f"{engine}_dt_s"),
-            "ms": line[f"{engine}_ms"],
-        }
-        for engine in ("mujoco", "tmt")
-    ]
-    duration, unit = next(durations), line.get("unit", "rad")
-    return result.finding("choice", target=TARGET, unit=unit, scene=line["scene"], duration=duration, settings=settings)
+    duration = next(row["dt_s"] * row["steps"] for row in result.rows if row["scene"] == scene and row.get("dt_s"))
+    return result.finding("choice", settings=settings, duration=duration, **target(result))

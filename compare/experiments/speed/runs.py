@@ -17,8 +17,7 @@ from ...robots.case import Case
 from ...truth.reference import Reference, references
 from ..setup import Setup
 from . import accuracy
-from .orders import EARLY
-from .settings import coarsest_steps, methods, settings_of, too_long_next
+from .settings import MOST_SECONDS, coarsest_steps, estimated, methods, settings_of
 
 GROWTH_STEPS = 16  # of the run whose growth is computed, between two recorded times
 EACH_STEP = 12  # nv up to which the growth takes the Jacobian of every step; above, that of one in GROWTH_STEPS
@@ -50,7 +49,10 @@ def rows_of_scene(
         for setting in settings_of(method, case, size, which):
             rows.append(row_of_run(case, engines, method, setting, reference, energy, left))
             error, work = accuracy.error(rows[-1]), rows[-1]["evaluations"] or rows[-1]["steps"]
-            if accuracy.gained_nothing(error, work, best, last, left) or too_long_next(method, case, work, size):
+            too_long = (
+                case.robot.is_read and method.adaptive and work * estimated(method, case.tree) > MOST_SECONDS[size] / 2
+            )
+            if too_long or accuracy.gained_nothing(error, work, best, last, left):
                 break
             best, last = min(best, error), work
     return rows, left
@@ -63,7 +65,7 @@ def row_of_run(
     setting: Setting,
     reference: Reference,
     energy: np.ndarray,
-    left: float = 0.0,
+    left=0.0,
 ) -> dict:
     """The row of one run.
 
@@ -83,7 +85,7 @@ def row_of_run(
         "steps": motion.steps, "evaluations": motion.evaluations, "seconds": None,
         "error_rad": None if ended else float(error[-1]), "worst_error_rad": None if ended else float(error.max()),
         "energy_error_J": None if ended else float(off), "diverged": ended,
-        "early": float(error[reference.t <= EARLY].max()), "run": (case, method, setting),
+        "early": float(error[reference.t <= accuracy.EARLY].max()), "run": (case, method, setting),
     }  # fmt: skip
 
 
@@ -127,14 +129,8 @@ def prepared(rows: list[dict], setup: Setup) -> list[tuple]:
     return runs
 
 
-def take_times(runs: Sequence[tuple], setup: Setup) -> list[list[float]]:
-    """Seconds of the runs of one scene, see `prepared`, in turns."""
+def take_times(rows: Sequence[dict], runs: Sequence[tuple], setup: Setup) -> None:
+    """Set the seconds of the rows of one scene to the least of their times; runs: see `prepared`, timed in turns."""
     times = timing.in_turns([run for run, _ in runs], rounds=setup.of(5, 2, 2))
-    return [[factor * seconds for seconds in of_run] for (_, factor), of_run in zip(runs, times)]
-
-
-def fill_in(rows: list[dict], times: Sequence[Sequence[float]]) -> list[float]:
-    """Set the seconds of each row to the least of its times; return median / least of rows with several times."""
-    for row, of_row in zip(rows, times):
-        row["seconds"] = min(of_row)
-    return [float(np.median(of_row)) / min(of_row) for of_row in times if len(of_row) > 1]
+    for row, (_, factor), of_row in zip(rows, runs, times):
+        row["seconds"] = factor * min(of_row)

@@ -1,6 +1,6 @@
 """What is run: the scenes, the methods of the available engines, and the steps or tolerances of each method."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from tmt import Tree
 from tmt.methods import method_named
@@ -8,19 +8,18 @@ from tmt.methods import method_named
 from ...engines import GRID, IN_QUICK_RUNS, Engine, Method, Setting, methods_in, one_of_each_scheme
 from ...robots import Robot
 from ...robots.case import Case
-from ..setup import Setup
 
-FINEST = {"mujoco": 2**16, "tmt": 2**18}  # steps; more would take too long to be timed repeatedly
-FINEST_RK4, FINEST_IMPLICIT = 2**17, 2**15  # of MuJoCo's RK4; of methods that solve their stages and of other engines
+# steps; more would take too long to be timed repeatedly
+FINEST = {"mujoco": 2**16, ("mujoco", "RK4"): 2**17, "tmt": 2**18}
+FINEST_OTHERS = 2**15  # of other engines, and of methods that solve their stages
 EXPONENTS = {  # k of the coarsest and of the finest tolerance, 10^-k
     "dopri8_adaptive": (2, 14), "RK45": (2, 12), "DOP853": (2, 13), "Radau": (2, 6), "LSODA": (2, 12), "Taylor": (4, 16),
 }  # fmt: skip
-OTHER_EXPONENTS = (2, 12)
 FEW_SETTINGS = {"quick": 5, "small": 7}  # of a run that is not full: the coarsest settings
 FEW_OTHERS = 2  # the same for engines other than MuJoCo and tmt
 SETTINGS_OF_SAME_SCHEMES = slice(3, 7)  # coarse, yet near the reference where the motion is regular
 # A robot from a file may have any number of joints. Seconds of one evaluation are about a constant times nv^1.5:
-CALL_SECONDS, COMPILED_SECONDS, MUJOCO_SECONDS = 4e-7, 5e-8, 2e-7  # called from Python, tmt's compiled code, MuJoCo
+SECONDS, CALL_SECONDS = {"mujoco": 2e-7, "tmt": 5e-8}, 4e-7  # of others, which are called from Python
 ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
 MOST_SECONDS = {"full": 0.6, "quick": 0.1, "small": 0.1}  # estimated, of the finest run of a method
 LEAST_SETTINGS = {"full": 3, "quick": 2, "small": 2}  # of a method, whatever they take
@@ -51,17 +50,8 @@ def followed(robot: Robot, size: str) -> list[Case]:
     return [case for k, case in enumerate(cases) if size == "full" or k == 0 or case.name == regular]
 
 
-def taking_part(engines: Mapping[str, Engine], size: str) -> dict[str, Engine]:
-    """The engines of a run of this size, unavailable ones too."""
-    return {name: engine for name, engine in engines.items() if size != "quick" or name in IN_QUICK_RUNS}
-
-
 def methods(
-    engines: Mapping[str, Engine],
-    size: str,
-    which: str = "all",
-    robot: Robot | None = None,
-    case: Case | None = None,
+    engines: Mapping[str, Engine], size: str, which: str = "all", robot: Robot | None = None, case: Case | None = None
 ) -> list[Method]:
     """The methods of the available engines; which = "same schemes": one of MuJoCo for each scheme, and the same of tmt.
 
@@ -74,25 +64,18 @@ def methods(
     excluded = left_out(engines, size, robot)
     return [
         method
-        for engine in taking_part(engines, size).values()
+        for engine in engines.values()
         for method in (methods_in(engine, case) if case else engine.methods).values()
-        if (engine.name, method.name) not in excluded
+        if (size != "quick" or engine.name in IN_QUICK_RUNS) and (engine.name, method.name) not in excluded
     ]
-
-
-def methods_following(setup: Setup, cases: Sequence[Case], which: str) -> list[Method]:
-    """The methods that run at least one of the cases, each once."""
-    by_name = {}
-    for case in cases:
-        of_case = methods(setup.engines, setup.size, which, setup.robot, case)
-        by_name = {(method.engine, method.name): method for method in of_case} | by_name
-    return list(by_name.values())
 
 
 def left_out(engines: Mapping[str, Engine], size: str, robot: Robot | None) -> dict[tuple[str, str], str]:
     """{(engine, method): reason} of methods that are not run: the engine is unavailable, or takes too long for this robot."""
     reasons = {}
-    for engine in taking_part(engines, size).values():
+    for engine in engines.values():
+        if size == "quick" and engine.name not in IN_QUICK_RUNS:
+            continue
         too_long = getattr(engine, "too_long", lambda tree: None)
         of_engine = engine.unavailable() or (robot and too_long(robot.tree))
         for method in engine.methods.values():
@@ -117,14 +100,12 @@ def too_slow(method: Method, robot: Robot, size: str) -> str | None:
 def estimated(method: Method, tree: Tree) -> float:
     """Approximate seconds of a step, or of an evaluation of a method with adaptive steps."""
     n = tree.coordinates.nv
+    evaluation = SECONDS.get(method.engine, CALL_SECONDS) * n**1.5
     if method.engine == "mujoco":
-        return MUJOCO_SECONDS * n**1.5 * (4 if method.name == "RK4" else 1)
-    if method.engine != "tmt":
-        return CALL_SECONDS * n**1.5
-    stepping = method_named(method.name)
-    evaluation = COMPILED_SECONDS * n**1.5
-    if method.adaptive:
+        return evaluation * (4 if method.name == "RK4" else 1)
+    if method.engine != "tmt" or method.adaptive:
         return evaluation
+    stepping = method_named(method.name)
     if stepping.solves_stages:
         return evaluation * stepping.stages**2 * n * ITERATIONS
     return evaluation * stepping.stages * (n if getattr(stepping, "implicit_bias", False) else 1)
@@ -133,7 +114,7 @@ def estimated(method: Method, tree: Tree) -> float:
 def settings_of(method: Method, case: Case, size: str = "full", which: str = "all") -> tuple[Setting, ...]:
     """The settings of a method in a scene, from coarse to fine: steps halved, or tolerances divided by ten."""
     if method.adaptive:
-        first, last = EXPONENTS.get(method.name, OTHER_EXPONENTS)
+        first, last = EXPONENTS.get(method.name, (2, 12))
         settings = tuple(Setting(case.duration, tolerance=10.0**-k) for k in range(first, last + 1))
     else:
         settings = halvings(method, case, size)
@@ -146,17 +127,14 @@ def settings_of(method: Method, case: Case, size: str = "full", which: str = "al
 def halvings(method: Method, case: Case, size: str = "full") -> tuple[Setting, ...]:
     """The scene's own step, halved repeatedly."""
     count = coarsest_steps(case)
-    if (method.engine, method.name) == ("mujoco", "RK4"):
-        finest = FINEST_RK4
-    elif method.engine == "tmt" and method_named(method.name).solves_stages:
-        finest = FINEST_IMPLICIT
-    else:
-        finest = FINEST.get(method.engine, FINEST_IMPLICIT)
+    solves = method.engine == "tmt" and method_named(method.name).solves_stages
+    finest = (
+        FINEST_OTHERS if solves else FINEST.get((method.engine, method.name), FINEST.get(method.engine, FINEST_OTHERS))
+    )
     if case.robot.is_read:
         affordable = int(MOST_SECONDS[size] / estimated(method, case.tree))
         finest = max(min(finest, affordable), count << (LEAST_SETTINGS[size] - 1))
-    doublings = max(1, (finest // count).bit_length())
-    return tuple(Setting(case.duration, steps=count << k) for k in range(doublings))
+    return tuple(Setting(case.duration, steps=count << k) for k in range(max(1, (finest // count).bit_length())))
 
 
 def coarsest_steps(case: Case) -> int:
@@ -165,8 +143,3 @@ def coarsest_steps(case: Case) -> int:
     With servos a scene's own steps are short for the sake of methods that are explicit in the speeds.
     """
     return GRID if case.controller else -(-case.steps // GRID) * GRID
-
-
-def too_long_next(method: Method, case: Case, work: int, size: str) -> bool:
-    """Whether the next tolerance of an adaptive method would take too long with a file's robot; work: evaluations so far."""
-    return case.robot.is_read and method.adaptive and work * estimated(method, case.tree) > MOST_SECONDS[size] / 2.0
