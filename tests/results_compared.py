@@ -21,7 +21,7 @@ WITHOUT = {  # regular expression for the checks of before, or "after: " and one
     "stability .* near sqrt 3": "the resonance at sqrt 3 was deleted",
     "stability .* runs whose energy": "drift of energy is in trajectory",
     "stability .* implicit, .* time from a silent": "trajectory shows the drift of energy; only a reset gives no sign at all",
-    "stability .* torque four decimals": "the torque that is one ulp off answers the same question",
+    "stability .* (torque four decimals|printed torque)": "the torque that is one ulp off answers the same question",
     "stability .* numbers of steps .* with which it leaves|stability .* angle from .* free": "claim 3 stands without them",
     "stability .* gauss_legendre_4, dt .* departure": "departures are by the same few methods in every run",
     "after: stability .* implicit.*": "a quick run has implicit too",

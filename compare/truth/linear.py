@@ -57,16 +57,12 @@ class Held:
 
     @property
     def sizes(self) -> np.ndarray:
-        """The numbers whose last digit limits the accuracy of movements, (nv,): angles, lengths, and 1 for a quaternion."""
-        if not self.tree.coordinates.balls:
-            return self.q
-        return np.concatenate(
-            [self.q[q] if kind != "ball" else np.ones(3) for kind, q, _ in self.tree.coordinates.joints]
-        )
+        """The numbers whose last digit limits the accuracy of movements, (nv,): angles and lengths; 1 with quaternions."""
+        return np.ones(self.nv) if self.tree.coordinates.balls else self.q
 
     @cached_property
     def known(self) -> dict:
-        """Results of `step` by method and dt, and of `limit` by method."""
+        """Results of `limit` by method."""
         return {}
 
     @cached_property
@@ -145,10 +141,7 @@ class Held:
 
     def step(self, name: str, dt: float) -> np.ndarray:
         """The amplification matrix of a step of a method of tmt, (2nv, 2nv)."""
-        key = METHODS[name], float(dt)
-        if key not in self.known:  # many perturbations need the same step
-            self.known[key] = linear_step(self, METHODS[name], np.array([dt]))[0]
-        return self.known[key]
+        return linear_step(self, METHODS[name], np.array([dt], float))[0]
 
     def growth(self, name, dt) -> np.ndarray:
         """The spectral radius of `step`, (...) for dt (...). The growth of a mode without stiffness is 1."""

@@ -54,29 +54,20 @@ def begin(setup: Setup) -> None:
     if setup.size != "full":
         centres, saddles = centres[:1], saddles[:1]
     at = [held(robot, *place) for place in (*product(centres, dampings), *product(saddles, (0.0,)))]
-    claimed = [robot] if robot.claims else []
-    free = [reset_case(subjects)] if reset_case(subjects) else []
+    saddle = held(robot, saddles[0]) if saddles else None
+    claimed, free = [robot] if robot.claims else [], [reset_case(subjects)] if reset_case(subjects) else []
+    slow = [] if setup.is_quick else claimed
 
     def start(function, items, **more):
         return setup.map(partial(function, engines=engines, **more), items)
 
-    def start_claim(function, items=claimed, **more):
-        return setup.map(partial(function, engines, **more), items)
-
     setup.background["stability"] = {
         "servos": servos.begin(setup),
         "limits": start(limits.limit_rows, at, methods=methods, steps=steps),
-        "departure": start(
-            departure.departures, dts if saddles else (), at=saddles and held(robot, saddles[0]), methods=few
-        ),
-        "torques": start_claim(claims.holding_torques),
-        "finer": start_claim(
-            claims.finer_steps,
-            () if setup.is_quick else claimed,
-            counts=of(claims.STEP_COUNTS, (), (32, 64, 128, 4096)),
-        ),
-        "printed": start_claim(claims.printed_torque, counts=claims.PRINTED_COUNTS[: of(4, 4, 2)]),
-        "kept": start_claim(claims.kept, () if setup.is_quick else claimed),
+        "departure": start(departure.departures, dts if saddles else (), at=saddle, methods=few),
+        "torques": start(claims.holding_torques, claimed),
+        "finer": start(claims.finer_steps, slow, counts=of(claims.STEP_COUNTS, (), (32, 64, 128, 4096))),
+        "kept": start(claims.kept, slow),
         "reset": start(failure.own_reset, free),
     }
 
@@ -93,12 +84,11 @@ def rows(setup: Setup) -> Result:
     if work["servos"]:
         servos.add(result, setup, work["servos"])
     limits.check_limits(result, [row for part in work["limits"] for row in part])
-    check_equilibria(result, setup, robot)
+    check_equilibria(result, setup)
     departure.check_departures(result, [row for part in work["departure"] for row in part])
     for name, check in (
         ("torques", claims.check_torques),
         ("finer", claims.check_finer_steps),
-        ("printed", claims.check_printed_torque),
         ("kept", claims.check_kept),
     ):
         for runs in work[name]:

@@ -1,6 +1,6 @@
 """How long a held posture is kept: departure from a saddle after a small push or a small torque, in runs and predicted."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from itertools import product
 
 import numpy as np
@@ -20,31 +20,22 @@ DEPARTURE_TOLERANCE = 0.03  # s, or one step: how near the prediction an observe
 INSTANT = 1e-6  # s
 
 
-def predicted(
-    at: Held,
-    scheme: str,
-    dt: float,
-    moved: np.ndarray,
-    off: np.ndarray,
-    longest: float = LONGEST_DEPARTURE,
-    rounded: bool = True,
-) -> list[float | None]:
-    """When the method's own linear map has a joint 0.1 rad or m away, s, for each of many starts; None: not within `longest`.
+def predicted(at: Held, scheme: str, dt: float, moved: np.ndarray, off: np.ndarray) -> list[float | None]:
+    """When the method's own linear map has a joint 0.1 rad or m away, s, for each of many starts; None: not within 12 s.
 
     moved: angles at the start from the posture, (k, n) rad; off: torques beyond the one that holds, (k, n) N m. The map
-    carries all modes of the state about the equilibrium that this torque moves. rounded: each new angle is rounded to a
-    double, as in a run, so that what a step adds may be lost; the rates are too small for that to matter.
+    carries all modes of the state about the equilibrium that this torque moves. Each new angle is rounded to a double, as in a
+    run, so that what a step adds may be lost; the rates are too small for that to matter.
     """
     n = at.nv
     change = (at.step(scheme, dt) - np.eye(2 * n)).T
-    base = at.sizes if rounded else np.zeros(n)
     # a torque along a mode without stiffness has no equilibrium, and is too small to matter
     compliance = np.linalg.pinv(at.matrix[n:, :n], rcond=NEGLIGIBLE**2)
-    start, aside = base + np.asarray(moved), (compliance @ np.linalg.solve(at.mass_matrix, off.T)).T
+    start, aside = at.sizes + moved, (compliance @ np.linalg.solve(at.mass_matrix, off.T)).T
     q, qd = start.copy(), np.zeros_like(start)
     times = [None] * len(start)
-    for k in range(1, round(longest / dt) + 1):
-        added = np.concatenate([q - base + aside, qd], axis=1) @ change
+    for k in range(1, round(LONGEST_DEPARTURE / dt) + 1):
+        added = np.concatenate([q - at.sizes + aside, qd], axis=1) @ change
         q, qd = q + added[:, :n], qd + added[:, n:]
         gone = ~(np.abs(q - start).max(axis=1) <= LEFT)
         times = [k * dt if time is None and out else time for time, out in zip(times, gone)]
@@ -142,12 +133,6 @@ def departure_values(rows: list[dict]) -> dict:
     off = [abs(late(row)) for row in rows if None not in (row["observed_s"], row["predicted_s"])]
     close = sum(late(row) is not None and abs(late(row)) <= near(row) for row in rows)
     return {"count": len(rows), "close": close, "worst": max(off, default=None)}
-
-
-def span(times: Iterable[float | None]) -> tuple[float, float] | None:
-    """The first and the last of some times; None: there is none. A time of None: never."""
-    times = [time for time in times if time is not None]
-    return (min(times), max(times)) if times else None
 
 
 # torques that hold

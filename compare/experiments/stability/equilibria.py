@@ -11,20 +11,20 @@ from ...engines.mujoco.linear import NUDGE, transition
 from ...judge.check import Result
 from ...judge.rounding import step_rounding
 from ...judge.scale import EPS, FACTOR
-from ...robots import Robot
 from ...truth.linear import held, posture_names
 from ...truth.steps import is_runge_kutta
 from ..setup import Setup
-from .subjects import DAMPINGS, coarsest_case
+from .subjects import DAMPINGS, coarsest_case, subjects_of
 
 FINE_STEP, FINE_DAMPED_STEP = 1e-2, 5e-4  # s, of steps whose amplification is compared; the second with much damping
 MOST_OF_A_STEP = 100.0  # fold: later stages are too far away for a difference quotient
 SLOW = 1e-3  # 1/s: slower rates are not reported
 
 
-def check_equilibria(result: Result, setup: Setup, robot: Robot) -> None:
+def check_equilibria(result: Result, setup: Setup) -> None:
     """The kind of each held posture; TMT's amplification of a step compared with MuJoCo's."""
-    mujoco, usual = setup.engines["mujoco"], (FINE_STEP, coarsest_case(robot).scene.dt)
+    mujoco, robot = setup.engines["mujoco"], subjects_of(setup.robot).robot
+    usual = (FINE_STEP, coarsest_case(robot).scene.dt)
     dampings = DAMPINGS[:1] if robot.is_read else DAMPINGS
     for name in posture_names(robot):
         at = held(robot, name)

@@ -11,7 +11,7 @@ from ...judge.run import LEFT, number_or_nan
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...robots import Robot
 from ..figures_overview import MOST_ROWS, chart, named_rows
-from .claims import VARIANT, ulps_of
+from .claims import VARIANT
 from .departure import departure_values, perturbation
 from .limits import LINEAR_DEVIATION, summary
 from .subjects import fraction, unit_of_movements
@@ -56,11 +56,8 @@ def limits_in(ax: Axes, rows: list[dict], known: dict, most: int | None = None) 
             some = f"no limit at {count} of {len(mine)}" if count else "fails at every step"
             text = "no limit" if count == len(mine) else some
             ax.text(low * 1.15, place, text, va="center", fontsize=8, color=GREY)
-    named_rows(
-        ax,
-        [look(name)[2] for name in of_scheme],
-        [all(r["passed"] is not False for r in mine) for mine in of_scheme.values()],
-    )
+    passed = [all(row["passed"] is not False for row in mine) for mine in of_scheme.values()]
+    named_rows(ax, [look(name)[2] for name in of_scheme], passed)
     ax.tick_params(axis="y", labelsize=8)
     ax.set(xscale="log", xlim=(low, high))
     ticks = [m * 10.0**k for k in range(-5, 4) for m in ((1, 2, 5) if high / low < 100 else (1,))]
@@ -165,19 +162,27 @@ def draw_torques(ax: Axes, rows: list[dict], robot: Robot) -> None:
             mine = [row for row in rows if (row["engine"], row["direction"]) == (engine, side)]
             pushes, times = ([row[key] for row in mine] for key in ("push_rad_per_s2", "observed_s"))
             label = f"{LABELS[engine]}, to {word} {symbol}"
-            ax.plot(pushes, times, mark, color=ENGINE_COLOURS[engine], fillstyle=fill, markersize=5, label=label)
-    predicted = sorted((row["push_rad_per_s2"], number_or_nan(row["predicted_s"])) for row in rows)
+            ax.plot(
+                np.array(pushes) * 1e14,
+                times,
+                mark,
+                color=ENGINE_COLOURS[engine],
+                fillstyle=fill,
+                markersize=5,
+                label=label,
+            )
+    predicted = sorted((row["push_rad_per_s2"] * 1e14, number_or_nan(row["predicted_s"])) for row in rows)
     ax.plot(*np.array(predicted).reshape(-1, 2).T, color="black", linewidth=0.8, label="predicted")
     ax.axvline(0.0, color="black", linewidth=0.5)
-    ax.set(title=f"claim 1: {robot.claims.left}", xlabel="initial acceleration of the unstable mode, rad/s2")
+    ax.set(title=f"claim 1: {robot.claims.left}", xlabel="initial acceleration of the unstable mode, 1e-14 rad/s2")
     ax.set_ylabel(f"time until a movement of {LEFT:g} rad, s")
 
 
 def draw_finer_steps(ax: Axes, rows: list[dict], robot: Robot) -> None:
     """Claim 2: when and to which side the posture is left against the number of steps, the torque one ulp off."""
-    column, duration = ulps_of(robot)[0], robot.claims.duration
-    for engine, sign in dict.fromkeys((row["engine"], row[column]) for row in rows):
-        mine = [row for row in rows if (row["engine"], row[column]) == (engine, sign)]
+    duration = robot.claims.duration
+    for engine, sign in dict.fromkeys((row["engine"], row["ulps"]) for row in rows):
+        mine = [row for row in rows if (row["engine"], row["ulps"]) == (engine, sign)]
         counts, times = [duration / row["dt_s"] for row in mine], [number_or_nan(row["observed_s"]) for row in mine]
         fill = "full" if engine == "tmt" else "none"
         ax.plot(counts, times, "-" if sign > 0 else "--", color=ENGINE_COLOURS[engine])

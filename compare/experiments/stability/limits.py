@@ -35,14 +35,13 @@ def limit_rows(
     rows, fastest, is_read = [], np.abs(at.modes[0]).max(), at.case.robot.is_read
     for method in methods:
         kind, predicted = at.limit(method.scheme)
-        rate, tolerance, duration = fastest, LIMIT_TOLERANCE, np.inf
+        rate, tolerance, duration, tried = fastest, LIMIT_TOLERANCE, np.inf, TRIED_OF_FASTEST / fastest
         if kind != "never_fails":  # just above the limit its mode grows fastest
             rate = at.growing_rate(method.scheme, 1.001 * predicted if predicted else 1e-2)
         if predicted:
             tolerance = limit_tolerance(at, method.scheme, predicted, steps)
-            duration = predicted * quarter_of(at, predicted, steps)
-        about = predicted * TRIED_ABOUT if predicted else TRIED_OF_FASTEST / fastest
-        tried = about if is_read else TRIED_STEPS
+            duration, tried = predicted * quarter_of(at, predicted, steps), predicted * TRIED_ABOUT
+        tried = tried if is_read else TRIED_STEPS
         seen, observed = None, None
         if not is_read or is_shown(at, tolerance, duration, rate):
             seen, observed = observed_limit(method, engines, at, steps, tried)
@@ -57,11 +56,7 @@ def limit_rows(
 
 
 def observed_limit(
-    method: Method,
-    engines: Mapping[str, Engine],
-    at: Held,
-    steps: int = GROWTH_STEPS,
-    tried: Sequence[float] = TRIED_STEPS,
+    method: Method, engines: Mapping[str, Engine], at: Held, steps: int, tried: Sequence[float]
 ) -> tuple[str, float | None]:
     """The largest dt at which no mode of the equations of motion grows in a run, found without the prediction.
 
