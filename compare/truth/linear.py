@@ -57,8 +57,11 @@ class Held:
 
     @property
     def sizes(self) -> np.ndarray:
-        """The numbers whose last digit limits the accuracy of movements, (nv,): angles and lengths; 1 with quaternions."""
-        return np.ones(self.nv) if self.tree.coordinates.balls else self.q
+        """The numbers whose last digit limits the accuracy of movements, (nv,): angles, lengths, and 1 for a quaternion."""
+        if not self.tree.coordinates.balls:
+            return self.q
+        joints = self.tree.coordinates.joints
+        return np.concatenate([np.ones(3) if kind == "ball" else self.q[q] for kind, q, _ in joints])
 
     @cached_property
     def known(self) -> dict:
