@@ -48,10 +48,3 @@ def stability_function(stepping, Z: np.ndarray) -> np.ndarray:
 def growth_of(stepping, z: np.ndarray) -> np.ndarray:
     """The stability function of a Runge-Kutta method at z = lambda dt, of any shape."""
     return stability_function(stepping, np.asarray(z)[..., None, None])[..., 0, 0]
-
-
-def beyond_limit(at, name: str, dt: float) -> float:
-    """A step, s, over the largest one at which a mode of a held posture grows by at most a tenth more than it should."""
-    steps = dt * np.geomspace(1e-5, 1.0, 201)
-    fast = at.growth(name, steps) > 1.1 * np.exp(max(at.modes[0].real.max(), 0.0) * steps)
-    return float(dt / steps[max(int(np.argmax(fast)) - 1, 0)]) if fast.any() else 1.0
