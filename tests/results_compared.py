@@ -24,7 +24,7 @@ WITHOUT = {  # regular expression for the checks of before, or "after: " and one
     "stability .* (torque four decimals|printed torque)": "the torque that is one ulp off answers the same question",
     "stability .* numbers of steps .* with which it leaves|stability .* angle from .* free": "claim 3 stands without them",
     "stability .* gauss_legendre_4, dt .* departure": "departures are by the same few methods in every run",
-    "after: stability .* implicit.*": "a quick run has implicit too",
+    "new: stability .* implicit": "a quick run has implicit too",
     "reduction .* (the same bits|another motion) with": "the cost of additions in MuJoCo was deleted",
     "reduction .* linear modes": "stability compares modes with runs",
     "trajectory .* derivative, ": "acceleration compares qdd, and one step is compared from the same states",
