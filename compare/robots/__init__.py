@@ -46,7 +46,6 @@ class Claims(NamedTuple):
     left_after: float  # s, about
     kept: str  # posture that it keeps
     end: str  # claimed last posture of a run from `kept`
-    printed_torque: str  # item of the printed torque at `left`
     of_scenes: Mapping[str, str]  # the claim in words, by scene
     figures: Mapping[str, int]  # number of the printed figure, by scene
 

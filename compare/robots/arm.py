@@ -59,7 +59,6 @@ CLAIMS = Claims(
     left_after=4.5,
     kept="bent",
     end="hanging",
-    printed_torque="h",
     of_scenes={
         "ball catch, held": "held at ball catch with dt = 5/64 s, the arm leaves the unstable posture after about 4.5 s, "
         "because of rounding",

@@ -22,7 +22,6 @@ SCANNED = 281  # steps in this range, 40 for each power of ten
 NEUTRAL = 1e-9  # growth per step that can be rounding
 NEGLIGIBLE = 1e-6  # relative to the fastest mode: a rate below is zero
 SLOWEST = 1e-6  # 1/s: a rate below is zero
-PUSHED_ALONG = 3  # random directions without stiffness in which the second derivative of the torque is computed
 AT_ONE = (1e-7, 1e-3)  # least and largest distance from 1 of the growth of a mode without stiffness
 
 
@@ -34,7 +33,6 @@ class Held:
 
     @property
     def name(self) -> str:
-        """The name of the posture."""
         return self.case.scene.posture
 
     @property
@@ -51,12 +49,7 @@ class Held:
 
     @property
     def tau(self) -> np.ndarray:
-        """(nv,) N m"""
         return self.case.tau
-
-    def away(self, q: np.ndarray) -> np.ndarray:
-        """Positions (..., nq) as movements from the posture, rad, (..., nv)."""
-        return self.case.coordinates.difference(q, self.q)
 
     def moved(self, by: np.ndarray) -> np.ndarray:
         """The positions after movements from the posture, (..., nv) -> (..., nq)."""
@@ -67,23 +60,16 @@ class Held:
         """The numbers whose last digit limits the accuracy of movements, (nv,): angles, lengths, and 1 for a quaternion."""
         if not self.tree.coordinates.balls:
             return self.q
-        return np.concatenate(
-            [self.q[q] if kind != "ball" else np.ones(3) for kind, q, _ in self.tree.coordinates.joints]
-        )
+        joints = self.tree.coordinates.joints
+        return np.concatenate([np.ones(3) if kind == "ball" else self.q[q] for kind, q, _ in joints])
 
     @cached_property
-    def steps(self) -> dict:
-        """Results of `step` by method and dt."""
-        return {}
-
-    @cached_property
-    def limits(self) -> dict:
+    def known(self) -> dict:
         """Results of `limit` by method."""
         return {}
 
     @cached_property
     def mass_matrix(self) -> np.ndarray:
-        """Mbar, kg m2, (nv, nv)."""
         return literal.mass_matrix(self.q, self.tree)
 
     @cached_property
@@ -111,7 +97,7 @@ class Held:
 
     @property
     def without_stiffness(self) -> np.ndarray:
-        """Which of the eigenvalues are zero, (2nv,)."""
+        """Which eigenvalues are zero, (2nv,)."""
         return np.abs(self.modes[0]) <= self.small
 
     @cached_property
@@ -138,12 +124,6 @@ class Held:
             return "saddle"
         return "marginal" if np.abs(values).min() <= small else "centre"
 
-    @cached_property
-    def soft(self) -> np.ndarray:
-        """Movements without stiffness, (nv, k), each of length 1."""
-        _, sizes, rows = np.linalg.svd(self.matrix[self.nv :, : self.nv])
-        return rows[sizes <= max(NEGLIGIBLE**2 * sizes.max(), SLOWEST**2)].T
-
     def curvature(self, direction) -> np.ndarray:
         """The second derivative of the holding torque along a movement (nv,), N m, (nv,): by nested dual numbers."""
         inner = moving(self.tree, self.q, direction)
@@ -153,24 +133,18 @@ class Held:
 
     @cached_property
     def stays(self) -> bool:
-        """Whether a small deviation stays small: no mode grows, and no torque acts along those without stiffness."""
+        """Whether a small deviation stays small: no mode grows, and no torque acts along movements without stiffness."""
         if self.kind != "marginal":
             return self.kind == "centre"
-        rng, stiff = np.random.default_rng(SEED), self.mass_matrix @ self.matrix[self.nv :, : self.nv]
-        pushes = [self.curvature(self.soft @ rng.normal(size=self.soft.shape[1])) for _ in range(PUSHED_ALONG)]
-        return bool(np.abs(pushes @ self.soft).max(initial=0.0) <= NEGLIGIBLE * np.abs(stiff).max())
+        by_movement = self.matrix[self.nv :, : self.nv]
+        _, sizes, rows = np.linalg.svd(by_movement)
+        soft = rows[sizes <= max(NEGLIGIBLE**2 * sizes.max(), SLOWEST**2)].T
+        push = self.curvature(soft @ np.random.default_rng(SEED).normal(size=soft.shape[1])) @ soft
+        return bool(np.abs(push).max(initial=0.0) <= NEGLIGIBLE * np.abs(self.mass_matrix @ by_movement).max())
 
-    def step(self, name, dt) -> np.ndarray:
-        """The amplification matrix of a step of a method of tmt, (..., 2nv, 2nv) for dt of shape (...).
-
-        For tmt's own methods a step of the linearized equations, which is the same; for others the derivative of a step.
-        """
-        if np.ndim(dt):
-            return linear_step(self, METHODS[name], np.asarray(dt, float))
-        dt = float(dt)
-        if (METHODS[name], dt) not in self.steps:  # many perturbations need the same step
-            self.steps[METHODS[name], dt] = self.step(name, np.array([dt]))[0]
-        return self.steps[METHODS[name], dt]
+    def step(self, name: str, dt: float) -> np.ndarray:
+        """The amplification matrix of a step of a method of tmt, (2nv, 2nv)."""
+        return linear_step(self, METHODS[name], np.array([dt], float))[0]
 
     def growth(self, name, dt) -> np.ndarray:
         """The spectral radius of `step`, (...) for dt (...). The growth of a mode without stiffness is 1."""
@@ -179,7 +153,7 @@ class Held:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             if is_runge_kutta(stepping):
                 return np.abs(growth_of(stepping, dt[..., None] * np.where(idle, 0.0, self.modes[0]))).max(axis=-1)
-            factors = np.linalg.eigvals(self.step(name, dt))
+            factors = np.linalg.eigvals(linear_step(self, stepping, np.atleast_1d(dt))).reshape(*dt.shape, -1)
             if idle.any():
                 near = np.clip(self.small * dt, *AT_ONE)[..., None]
                 factors = np.where(np.abs(factors - 1.0) <= near, 1.0, factors)
@@ -188,46 +162,35 @@ class Held:
     def limit(self, name) -> tuple[str, float | None]:
         """("finite", dt in s), ("never_fails", None) or ("always_fails", None): the largest step at which no mode grows.
 
-        The first unstable step of 40 for each power of ten, then refined; cached by method.
+        The first unstable step of 40 for each power of ten, then refined.
         """
-        if METHODS[name] not in self.limits:
-            self.limits[METHODS[name]] = self.first_failing(name)
-        return self.limits[METHODS[name]]
+        if METHODS[name] not in self.known:
+            self.known[METHODS[name]] = self.first_failing(name)
+        return self.known[METHODS[name]]
 
     def first_failing(self, name) -> tuple[str, float | None]:
         low, high = min(SHORTEST_STEP, 1.0 / max(np.abs(self.modes[0]).max(), SLOWEST)), LONGEST_STEP
         for _ in range(4):
             steps = np.geomspace(low, high, SCANNED)
             fails = self.growth(name, steps) > 1.0 + NEUTRAL
-            if not fails.any():
-                return "never_fails", None
             first = int(np.argmax(fails))
-            if first == 0:
-                return "always_fails", None
+            if not fails.any() or first == 0:
+                return ("always_fails" if fails.any() else "never_fails"), None
             low, high = steps[first - 1], steps[first]
         return "finite", float(low)
 
-    def fastest_growing(self, name, dt) -> tuple[float, np.ndarray, np.ndarray]:
-        """The fastest growing mode of a step of a method: growth per step, state (2n,), and measure (2n,).
-
-        The largest angle of the state is 1 rad; measure @ deviation is the share of the mode in a deviation.
-        """
-        values, left, vectors = eig(self.step(name, dt), left=True)
-        k = int(np.argmax(np.abs(values)))
-        vector = vectors[:, k]
-        measure = left[:, k].conj() / (left[:, k].conj() @ vector)
-        top = vector[np.argmax(np.abs(vector[: self.nv]))]
-        return float(np.abs(values[k])), vector / top, measure * top
-
-    def rate(self, shape) -> float:
-        """The rate |lambda|, 1/s, of the mode of the equations of motion with the nearest state (2n,)."""
+    def growing_rate(self, name, dt) -> float:
+        """The rate |lambda|, 1/s, of the mode of the equations of motion nearest to the one that a step lets grow fastest."""
+        factors, growing = np.linalg.eig(self.step(name, dt))
+        shape = growing[: self.nv, np.argmax(np.abs(factors))]
         values, vectors = self.modes
-        n = self.nv
-        shape = shape[:n] / np.linalg.norm(shape[:n])
-        angles = vectors[:n] / np.linalg.norm(vectors[:n], axis=0)
-        overlap = np.abs(angles.conj().T @ shape)
-        near = np.abs(values[overlap > overlap.max() - 1e-6])
-        return float(near.max())
+        angles = vectors[: self.nv] / np.linalg.norm(vectors[: self.nv], axis=0)
+        overlap = np.abs(angles.conj().T @ shape) / np.linalg.norm(shape)
+        return float(np.abs(values[overlap > overlap.max() - 1e-6]).max())
+
+
+def posture_names(robot) -> tuple[str, ...]:
+    return (*robot.postures, *robot.positions)
 
 
 @lru_cache(maxsize=64)

@@ -8,7 +8,6 @@ from models import PATHS
 
 import tmt
 from compare.engines.mujoco import reading
-from compare.engines.mujoco.linear import left_to_itself
 from compare.experiments import stability
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
@@ -16,11 +15,10 @@ from compare.experiments.stability import departure, failure, limits, subjects
 from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
-from compare.truth.linear import held
-from compare.truth.postures import posture_names
+from compare.truth.linear import held, posture_names
 
 BENT, BALL = held(ARM, "bent"), held(ARM, "ball catch")
-FREE = subjects.free_motion(ARM)
+FREE = ARM.case("bent, free", posture="bent")
 SWING = """<mujoco><worldbody><body><joint name="swing" axis="0 1 0"/>
   <geom type="sphere" size="0.1" pos="0 0 0.5" mass="2"/></body></worldbody>{keys}</mujoco>"""
 CART_POLE = """<mujoco><worldbody><body><joint name="rail" type="slide" axis="1 0 0" damping="1"/>
@@ -61,8 +59,8 @@ def read(source):
 def test_of_many_keyframes_the_first_are_looked_at():
     keys = "".join(f'<key name="k{i}" qpos="{0.3 * i}"/>' for i in range(9))
     seen = subjects_of(read(SWING.format(keys=f"<keyframe>{keys}</keyframe>"))[0])
-    assert posture_names(seen.robot) == (*(f"k{i}" for i in range(MOST_POSTURES)), "at rest") and seen.left_out
-    assert seen.centres[-1] == "at rest" and np.abs(held(seen.robot, "at rest").tau).max() < 1e-6
+    assert posture_names(seen.robot) == (*(f"k{i}" for i in range(MOST_POSTURES)), "at rest")
+    assert np.abs(held(seen.robot, "at rest").tau).max() < 1e-6
     body = read(PATHS["free_body"])[0]
     assert not subjects_of(body).centres and held(body, "qpos0").sizes[3:].tolist() == [1.0, 1.0, 1.0]
 
@@ -71,10 +69,8 @@ def test_a_limit_is_sought_about_the_predicted_one_and_found_again():
     robot, mujoco = read(SWING.format(keys=""))
     at, known = held(subjects_of(robot).robot, "at rest"), engines_of(mujoco)
     predicted, rk4 = at.limit("rk4")[1], known["mujoco"].methods["RK4"]
-    seen, observed = limits.observed_limit(rk4, known, at, 1000, limits.tried_at(at, predicted))
+    seen, observed = limits.observed_limit(rk4, known, at, 1000, predicted * limits.TRIED_ABOUT)
     assert seen == "finite" and observed == pytest.approx(predicted, rel=1e-3)
-    assert departure.not_lost(held(robot, "qpos0"), 1e-9)
-    assert not departure.not_lost(held(robot, "qpos0"), 1e-18)  # which rounding swamps
 
 
 def test_a_cart_with_a_pole_leaves_as_predicted_and_its_column_names_both_units(result):
@@ -83,9 +79,9 @@ def test_a_cart_with_a_pole_leaves_as_predicted_and_its_column_names_both_units(
     rows = departure.departures(1 / 512, held(robot, "qpos0"), known, (known["mujoco"].methods["RK4"],))
     assert "perturbation_m_or_rad" in rows[0] and "perturbation_rad" not in rows[0]
     departure.check_departures(result, rows)
-    assert len(result.checks) > 5 and all(check.passed for check in result.checks)
+    assert len(result.checks) == 3 and all(check.passed for check in result.checks)
     # methods that solve their stages are not run for a file
-    names = {method.name for method in subjects.explicit(subjects.all_methods(known))}
+    names = {method.name for method in subjects.methods_of(known, robot)}
     assert {"rk4", "RK4", "implicit"} <= names and not {"gauss_legendre_4", "implicit_midpoint"} & names
 
 
@@ -126,14 +122,11 @@ def test_own_bias_holds_for_ever(engines, method):
     assert np.abs(left).max() <= np.spacing(np.abs(BALL.tau).max())
 
 
-def test_silent_failures_are_caught(mujoco, engines):
+def test_a_reset_is_caught(engines):
     reset = failure.own_reset(FREE, engines)
-    assert reset["finite"] and reset["resets"] >= 1 and reset["caught_in_it_s"] <= reset["first_reset_s"]
-    gain = failure.silent_gain(FREE, engines)
-    assert gain["gain"] > 5.0 * gain["reach"] and gain["caught_in_it_s"] == gain["since_s"]
-    assert gain["definite"][64] < 0.0 < gain["definite"][128] and gain["loses"]
-    calm = left_to_itself(mujoco.of(FREE), *FREE.start, np.zeros(3), 1e-3, 100, "RK4")
-    assert failure.caught(FREE, 1e-3 * np.arange(101), calm) is None and calm["warnings"] == 0
+    assert reset["finite"] and reset["resets"] >= 1 and reset["caught_s"] <= reset["first_reset_s"]
+    calm = ARM.case("hanging, free", posture="hanging")
+    assert failure.own_reset(calm, engines)["resets"] == 0
 
 
 @pytest.mark.slow
@@ -145,12 +138,13 @@ def test_a_small_run_fills_every_table(small):
     assert any("silent" in check.quantity for check in small.checks)
 
 
-@pytest.mark.parametrize("posture, left_out, drawn", [
-    ("upright", "no_centre", ["stability_departure"]), ("hanging", "no_saddle", ["stability_limits"]),
+@pytest.mark.parametrize("posture, without, drawn", [
+    ("upright", "centres", ["stability_departure"]), ("hanging", "saddles", ["stability_limits"]),
 ])  # fmt: skip
-def test_what_a_robot_lacks_is_left_out_with_a_reason(engines, posture, left_out, drawn):
+def test_what_a_robot_lacks_is_left_out_with_a_reason(engines, posture, without, drawn):
     robot = dataclasses.replace(ARM, claims=None, kinds={}, scenes=(), postures={"one": ARM.postures[posture]})
     result = stability.rows(Setup.quick(robot, engines))
     assert result.checks and all(check.passed for check in result.checks)
-    assert [note.kind for note in result.notes if note.kind.startswith("no_")] == [left_out]
+    (examined,) = (note.values for note in result.notes if note.kind == "examined")
+    assert not examined[without]
     assert [figure()[0] for figure in stability.figures(result, robot)] == drawn

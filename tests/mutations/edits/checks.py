@@ -32,11 +32,11 @@ CHECKS = (
     ("stability.limits", "check_limits", '"limit, observed / predicted - 1"'),
     ("stability.limits", "check_limits", "quantity"),
     ("departure", "check_row", "quantity"),
-    ("claims_checks", "check_torques", "text"),
-    ("claims_checks", "check_torques", "quantity"),
-    ("claims_checks", "check_finer_steps", "quantity"),
-    ("claims_checks", "check_kept", "what"),
-    ("failure", "check_silent", "quantity"),
+    ("claims", "check_torques", "text"),
+    ("claims", "check_torques", "quantity"),
+    ("claims", "check_finer_steps", "quantity"),
+    ("claims", "check_kept", "what"),
+    ("failure", "check_reset", "quantity"),
     ("equilibria", "check_amplification", "quantity"),
 )
 # module, function, the two that are compared, as written in the call of `agree`

@@ -50,7 +50,7 @@ EDITS = (
     Edit("judge.check", "agreement_headline", "max(finite, *_1)", "min(finite, *_1)", "its line has the best difference"),
     Edit("published", "headline", "all(_1)", "any(_1)", "a printed number that one engine meets is met by both"),
     Edit("judge.check", "largest_known", "max(known)", "min(known)", "the picture has the least distance"),
-    Edit("stability.first_screen", "summary", "max(_1, default=0.0)", "min(_1, default=0.0)",
+    Edit("stability.limits", "summary", "max(_1, default=0.0)", "min(_1, default=0.0)",
          "the nearest limit is told as the farthest"),
     Edit("report.tables", "shortened", "size.groupby(_1, sort=False).idxmax()", "size.groupby(_1, sort=False).idxmin()",
          "the best row of each group is shown"),

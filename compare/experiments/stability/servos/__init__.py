@@ -6,7 +6,7 @@ from functools import partial
 from ....engines.mujoco import Reading
 from ....engines.mujoco.names import INTEGRATORS
 from ....judge.check import AT_OWN_STEP, About, Result
-from ....truth.postures import posture_names
+from ....truth.linear import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from ...setup import Setup
 from . import findings, lifting, observed, response
