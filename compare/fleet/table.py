@@ -13,6 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from ..judge.check import ENDS, About, Check
 from ..judge.finding import Finding
 from ..judge.timing import vectors
+from ..process.crash import Refused
 from ..process.streams import in_one_line
 from ..report.provenance import OURS, commit, installed
 from ..report.text import say
@@ -20,7 +21,6 @@ from ..report.verdict import Section, failures, unconfirmed_in_words, unstable_i
 from ..run.reference import SOLUTION, Reference
 from .cache import write_whole
 from .models import place_of_report
-from .tasks import FleetError
 
 FLEET_COLUMNS = (
     "file", "sha256", "verdict", "reason", "joints", "worst_ratio",
@@ -35,6 +35,10 @@ HEADS = {
     "file": "file", "verdict": "verdict", "reason": "reason or cause", "reference": "compared with", "joints": "joints",
     "worst_ratio": "share of tolerance", "file_integrator": "integrator", "file_dt_s": "step, ms",
     "stable_at_file_dt": "stable", "limit_s": "limit, ms", "seconds": "processor, s",
+}  # fmt: skip
+EMPTY_ROW = {
+    "reason": "", "joints": None, "reference": "", "why_itself": "", "file_integrator": None, "file_dt_s": None,
+    "worst_ratio": None, "stable_at_file_dt": None, "limit_s": None, "seconds": 0.0, "has_report": False,
 }  # fmt: skip
 REFERENCES = {"arm": "stated numbers", SOLUTION: "the solution", "model": "itself"}
 ROW_KINDS = dict.fromkeys(BAD_VERDICTS, "bad") | {REFUSED: "none", ITSELF: "none"}
@@ -98,7 +102,7 @@ def csv_of_fleet(rows: Sequence[dict]) -> str:
 
 
 def earlier(folder: str) -> dict[str, dict]:
-    """The rows of an earlier fleet by file name, `limit_s` a number or None. FleetError if they cannot be read."""
+    """The rows of an earlier fleet by file name, `limit_s` a number or None. Refused if they cannot be read."""
     path = Path(folder) / "fleet.csv"
     shown = in_one_line(str(path))
     try:
@@ -106,13 +110,13 @@ def earlier(folder: str) -> dict[str, dict]:
             table = csv.DictReader(file)
             rows = list(table)
             if not set(FLEET_COLUMNS) <= set(table.fieldnames or ()):
-                raise FleetError(f"{shown} is not a table of a fleet: expected the columns {', '.join(FLEET_COLUMNS)}")
+                raise Refused(f"{shown} is not a table of a fleet: expected the columns {', '.join(FLEET_COLUMNS)}")
             return {row["file"]: row | {"limit_s": float(row["limit_s"]) if row["limit_s"] else None} for row in rows}
-    except FleetError:
+    except Refused:
         raise
     except (OSError, ValueError, csv.Error) as error:
         why = getattr(error, "strerror", None) or "not a table of a fleet"
-        raise FleetError(f"cannot read {shown}: {why}; expected the folder of an earlier fleet") from None
+        raise Refused(f"cannot read {shown}: {why}; expected the folder of an earlier fleet") from None
 
 
 def changes(before: Mapping[str, dict], rows: Sequence[dict]) -> list[str]:
@@ -166,9 +170,8 @@ def write_table(
         "command": command,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "seconds": round(took, 1),
-        "workers": run.workers,
+        "workers": run.executor.workers,
         "this machine": f"{platform.node()}, {vectors()}",
-        "machines of the workers": ", ".join(sorted(run.machines)) or "none",
         "commit": commit(),
         OURS: installed(OURS),
         "mujoco": installed("mujoco"),
@@ -188,18 +191,18 @@ def with_why_itself(rows: Sequence[dict]) -> list[dict]:
 
 
 def summary_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: object) -> list[str]:
-    numbers = run.verdicts()
+    numbers = run.verdicts
     lines = [sentence("verdicts", files=len(rows), numbers={v: numbers[v] for v in VERDICTS if numbers[v]})]
     if unstable := [row["file"] for row in rows if row["stable_at_file_dt"] is False]:
         lines.append(sentence("unstable", names=unstable))
     if left_out:
         lines.append(sentence("left_out", files=len(left_out)))
-    if run.no_timing:
-        lines.append(sentence("no_timing", reason=run.no_timing))
     if numbers[ITSELF]:
         lines.append(sentence("self_consistent"))
-    if run.files_cached or run.tasks_cached:
-        lines.append(sentence("cached", files=run.files_cached, tasks=run.tasks_cached))
+    if copies := sum(map(len, run.copies.values())):
+        lines.append(sentence("copies", files=copies))
+    if run.cached:
+        lines.append(sentence("cached", files=run.cached))
     return lines
 
 
