@@ -99,7 +99,7 @@ class Writing(InProcess):
         self.log = log
 
     def submit(self, function, /, name, *more):
-        self.log.append(("figures", name, *more[4:]))
+        self.log.append(("figures", name))
         return super().submit(function, name, *more)
 
 
@@ -128,8 +128,8 @@ def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, m
     setup = SimpleNamespace(engines={}, robot=ARM, progress=lambda text: None, is_quick=False, alone=True)
     sections, causes, skipped = experiment.examine(names, setup, tmp_path, Terminal(), Writing(log))
     assert log == [
-        ("rows", "mass"), ("figures", "mass", None), ("rows", "stability"), ("figures", "stability", None), ("rows", "speed"),
-        ("rows", "reduction"), *[("figures", name, part) for name in ("speed", "reduction") for part in drawing.HALVES],
+        ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"), ("rows", "speed"),
+        ("rows", "reduction"), ("figures", "speed"), ("figures", "reduction"),
     ]  # fmt: skip
     assert [section.name for section in sections] == names and (causes, skipped) == ([], {})
     of_each = [sorted(file for file, _ in one.figures) for one in sections]

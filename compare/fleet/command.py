@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING
 
 from tmt.compiled.cores import cores
 
-from ..cli.command_line import FLEET, PROGRAM, Option, Parser, expected, not_empty, process_count, stated_reference
+from ..cli.command_line import (
+    FLEET,
+    PROGRAM,
+    Option,
+    Parser,
+    expected,
+    not_empty,
+    process_count,
+    seconds,
+    stated_reference,
+)
 from ..experiments import EXPERIMENTS, TIMED
 from ..process.crash import Refused
 from ..process.streams import in_one_line
@@ -23,16 +33,6 @@ if TYPE_CHECKING:
 MAX_LINES = 20  # of one kind, on the terminal
 SENT = "reference of the fleet"  # folder of the solution in a bundle
 EPILOG = block("fleet", "examples") + "\n"
-
-
-def duration(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a time; expected seconds above 0")
-    return value
 
 
 def fleet_reference(text: str) -> str:
@@ -49,7 +49,7 @@ FLEET_OPTIONS = {
     "--only": Option(metavar="LIST"),
     "--workers": Option(process_count, "N"),
     "--dask": Option(metavar="ADDRESS"),
-    "--limit": Option(duration, "S", 1800.0),
+    "--limit": Option(seconds(1e6), "S", 1800.0),
     "--since": Option(metavar="DIR"),
 }
 

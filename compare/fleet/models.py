@@ -83,7 +83,7 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
     Refused: a path without files.
     """
     paths, left_out = {}, []
-    for path, named in paths_of(words, left_out):
+    for path, named in paths_of(words):
         first, before = paths.get(os.path.abspath(path), (path, False))
         paths[os.path.abspath(path)] = first, named or before
     files, models, parts = {}, [], []
@@ -112,15 +112,12 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
     return sorted(models, key=lambda model: model.shown), sorted(left_out)
 
 
-def paths_of(words: Iterable[str], left_out: list) -> Iterator[tuple[Path, bool]]:
-    """The files of paths, each with True if the path is that of the file, not of a folder or a pattern.
-
-    left_out: receives folders that cannot be read.
-    """
+def paths_of(words: Iterable[str]) -> Iterator[tuple[Path, bool]]:
+    """The files of paths, each with True if the path is that of the file, not of a folder or a pattern."""
     for word in words:
         path = Path(word)
         if word.startswith("@"):
-            yield from paths_of(lines_of(word[1:]), left_out)
+            yield from paths_of(lines_of(word[1:]))
         elif is_a_file(path):
             yield path, True
         else:
@@ -130,7 +127,7 @@ def paths_of(words: Iterable[str], left_out: list) -> Iterator[tuple[Path, bool]
             if not matches:
                 raise Refused(f"no such file: {in_one_line(word)}; expected a file, a folder, a pattern or @LIST")
             for match in matches:
-                files = files_in(match, left_out) if match.is_dir() else [match] * is_a_file(match)
+                files = files_in(match) if match.is_dir() else [match] * is_a_file(match)
                 yield from ((file, False) for file in files)
 
 
@@ -141,13 +138,9 @@ def is_a_file(path: Path) -> bool:
         return False
 
 
-def files_in(folder: Path, left_out: list) -> Iterator[Path]:
+def files_in(folder: Path) -> Iterator[Path]:
     """The .xml and .mjcf files of a folder at any depth, without hidden files and folders."""
-
-    def cannot_be_read(error):
-        left_out.append((in_one_line(os.fspath(error.filename)), f"not readable: {error.strerror}"))
-
-    for place, folders, names in os.walk(folder, onerror=cannot_be_read):
+    for place, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(names):
             if name.lower().endswith(SUFFIXES) and not name.startswith(".") and is_a_file(Path(place, name)):

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from ..judge.check import ENDS, About, Check
+from ..judge.check import About
 from ..judge.finding import Finding
 from ..judge.timing import vectors
 from ..process.crash import Refused
@@ -37,7 +37,7 @@ HEADS = {
     "stable_at_file_dt": "stable", "limit_s": "limit, ms", "seconds": "processor, s",
 }  # fmt: skip
 EMPTY_ROW = {
-    "reason": "", "joints": None, "reference": "", "why_itself": "", "file_integrator": None, "file_dt_s": None,
+    "reason": "", "joints": None, "reference": "", "file_integrator": None, "file_dt_s": None,
     "worst_ratio": None, "stable_at_file_dt": None, "limit_s": None, "seconds": 0.0, "has_report": False,
 }  # fmt: skip
 REFERENCES = {"arm": "stated numbers", SOLUTION: "the solution", "model": "itself"}
@@ -57,7 +57,7 @@ def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Seque
         if causes:
             reason = causes[0]["text"] + (f", and {len(causes) - 1} more" if len(causes) > 1 else "")
     elif broke or lost:
-        outcome, reason = BROKE, exception_of(broke[0]) if broke else lost[0]
+        outcome, reason = BROKE, f"{broke[0].experiment}: {broke[0].note}" if broke else lost[0]
     elif not any(check.about == About.MODELS for section in sections for check in section.result.checks):
         outcome, reason = REFUSED, "no comparison was possible"
     else:
@@ -69,11 +69,6 @@ def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Seque
         "verdict": outcome, "reason": "; ".join(filter(None, (reason, reference.matched))),
         "worst_ratio": None if top is None else top.over_tolerance, "stable_at_file_dt": stable, "limit_s": limit,
     }  # fmt: skip
-
-
-def exception_of(check: Check) -> str:
-    quantity = "" if check.quantity == ENDS else f": {check.quantity}:"
-    return f"{check.experiment}{quantity} {check.note}"
 
 
 def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
@@ -104,18 +99,15 @@ def csv_of_fleet(rows: Sequence[dict]) -> str:
 def earlier(folder: str) -> dict[str, dict]:
     """The rows of an earlier fleet by file name, `limit_s` a number or None. Refused if they cannot be read."""
     path = Path(folder) / "fleet.csv"
-    shown = in_one_line(str(path))
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            table = csv.DictReader(file)
-            rows = list(table)
-            if not set(FLEET_COLUMNS) <= set(table.fieldnames or ()):
-                raise Refused(f"{shown} is not a table of a fleet: expected the columns {', '.join(FLEET_COLUMNS)}")
-            return {row["file"]: row | {"limit_s": float(row["limit_s"]) if row["limit_s"] else None} for row in rows}
-    except Refused:
-        raise
-    except (OSError, ValueError, csv.Error) as error:
+            rows = [
+                row | {"limit_s": float(row["limit_s"]) if row["limit_s"] else None} for row in csv.DictReader(file)
+            ]
+        return {row["file"]: {name: row[name] for name in FLEET_COLUMNS} for row in rows}
+    except (OSError, ValueError, KeyError, csv.Error) as error:
         why = getattr(error, "strerror", None) or "not a table of a fleet"
+        shown = in_one_line(str(path))
         raise Refused(f"cannot read {shown}: {why}; expected the folder of an earlier fleet") from None
 
 
@@ -164,7 +156,7 @@ def write_table(
     took: float,
 ) -> list[str]:
     """Write fleet.csv and index.html; the lines of the summary. run: a run.Run; changed: lines of --since, None: without it."""
-    rows, left_out = sorted(with_why_itself(run.rows), key=order), [*left_out, *run.parts]
+    rows, left_out = sorted(run.rows, key=order), [*left_out, *run.parts]
     summary = summary_of(rows, left_out, run)
     origin = {
         "command": command,
@@ -177,17 +169,11 @@ def write_table(
         "mujoco": installed("mujoco"),
     }
     write_whole(out / "fleet.csv", csv_of_fleet(rows).encode("utf-8", "backslashreplace"))
-    text = fleet_page("A fleet compared with MuJoCo", summary, rows, left_out, changed, origin)
+    text = fleet_page(
+        rows, title="A fleet compared with MuJoCo", summary=summary, left_out=left_out, changed=changed, origin=origin
+    )
     write_whole(out / "index.html", text.encode("utf-8", "backslashreplace"))
     return summary
-
-
-def with_why_itself(rows: Sequence[dict]) -> list[dict]:
-    """The rows; if some files are compared with stated numbers, with the reason why others are not."""
-    if not any(row["reference"] in ("arm", SOLUTION) for row in rows):
-        return list(rows)
-    reasons = [row["why_itself"] and sentence("why_itself", reason=row["why_itself"]) for row in rows]
-    return [row | {"reason": "; ".join(filter(None, (why, row["reason"])))} for row, why in zip(rows, reasons)]
 
 
 def summary_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: object) -> list[str]:
@@ -206,23 +192,15 @@ def summary_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: o
     return lines
 
 
-def fleet_page(
-    title: str,
-    summary: Sequence[str],
-    rows: Sequence[dict],
-    left_out: Sequence[tuple[str, str]],
-    changed: Sequence[str] | None,
-    origin: dict,
-) -> str:
-    """The page as HTML; the arguments are those of write_table."""
+def fleet_page(rows: Sequence[dict], **values: object) -> str:
+    """The page as HTML. values: title, summary, left_out, changed and origin, as in write_table."""
     environment = Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined,
         loader=FileSystemLoader(Path(__file__).parent),
     )  # fmt: skip
-    return environment.get_template("fleet.html.jinja").render(
-        title=title, summary=summary, rows=[shown_row(row) for row in rows], left_out=left_out, changed=changed,
-        origin=origin, heads=HEADS, is_bad=any(row["verdict"] in BAD_VERDICTS for row in rows),
-    )  # fmt: skip
+    is_bad = any(row["verdict"] in BAD_VERDICTS for row in rows)
+    page = environment.get_template("fleet.html.jinja")
+    return page.render(rows=list(map(shown_row, rows)), heads=HEADS, is_bad=is_bad, **values)
 
 
 def shown_row(row: dict) -> dict:

@@ -64,7 +64,7 @@ def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) ->
     left_out = [*reasons.items(), *options.left_out]
     row = {
         "joints": len(compared.robot.joints), "file_integrator": reading.integrator, "file_dt_s": reading.dt,
-        "reference": compared.reference.kind, "why_itself": compared.reference.why_itself,
+        "reference": compared.reference.kind,
     }  # fmt: skip
     if not names:
         return row | {"verdict": REFUSED, "reason": f"no experiment applies: {'; '.join(map(': '.join, left_out))}"}, {}

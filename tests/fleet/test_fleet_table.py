@@ -106,7 +106,7 @@ def test_what_needs_a_look_comes_first():
 ROW = {
     "file": "a b.xml", "sha256": "1", "verdict": AGREE, "reason": "", "joints": 3, "worst_ratio": 0.123456,
     "file_integrator": "Euler", "file_dt_s": 0.002, "stable_at_file_dt": True, "limit_s": 0.01, "seconds": 1.26,
-    "has_report": True, "report_of": "a b.xml", "reference": "arm", "why_itself": "",
+    "has_report": True, "report_of": "a b.xml", "reference": "arm",
 }  # fmt: skip
 
 
