@@ -150,6 +150,6 @@ def test_a_figure_that_raises_leaves_the_others_alone(tmp_path, monkeypatch):
     made(monkeypatch, "broken", figures=some_raise)
     drawn, failed = drawing.draw("broken", None, None, tmp_path)
     assert [name for name, _ in drawn] == ["first", "First_"]  # one file where capitals do not count
-    assert [name for name, _ in failed] == ["plot", "half third", "number 5"]
+    assert [name for name, _ in failed] == ["number 2", "number 3", "number 5"]
     assert [line.split(":")[0] for _, line in failed] == ["TypeError", "AttributeError", "ValueError"]
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["First_.png", "first.png"]

@@ -123,12 +123,7 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
         try:
             run = Run(models, file_options, executor, out, sent)
             say_first(terminal, [f"left out: {name}, {why}" for name, why in left_out])
-            terminal.tell(
-                lambda: [
-                    f"{len(run.rows)} of {len(models) - len(run.parts)} files",
-                    *(f"{many} {verdict}" for verdict, many in sorted(run.verdicts.items())),
-                ]
-            )
+            terminal.tell(run.progress)
             with terminal.progress(""):
                 run.carry_out(lambda rows: say_rows(terminal, rows))
             say_first(terminal, [f"left out: {name}, {why}" for name, why in run.parts])

@@ -91,6 +91,11 @@ class Run:
             reason = ": ".join(filter(None, (f"copy of {model.shown}", row["reason"])))
             self.rows.append(row | {"file": copy.shown, "sha256": copy.sha256, "reason": reason, "seconds": 0.0})
 
+    def progress(self) -> list[str]:
+        """How far the fleet is: "3 of 12 files", "1 differ", "2 agree"."""
+        verdicts = [f"{many} {verdict}" for verdict, many in sorted(self.verdicts.items())]
+        return [f"{len(self.rows)} of {len(self.models) - len(self.parts)} files", *verdicts]
+
     @property
     def verdicts(self) -> Counter:
         return Counter(row["verdict"] for row in self.rows)

@@ -34,14 +34,9 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     started, terminal = time.perf_counter(), Terminal()
     try:
         compared = comparison(options)
-        step = compared.integrator_step(options.dt, options.integrator)
         before = made_by(options.out)
         with new_report(options.out) as folder:
-            for line in compared.reference.lines:
-                terminal.say(line)
-            if options.experiment == "stability" and compared.reading and not compared.reading.drive.feeds_back:
-                terminal.say(block(TEMPLATE, "no_servo", robot=compared.robot.name))
-            report, parts = compute(options, command, compared, step, folder, terminal, started)
+            report, parts = compute(options, command, compared, folder, terminal, started)
     except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     from ..report.verdict import passed
@@ -68,16 +63,15 @@ def comparison(options: argparse.Namespace) -> Compared:
 
 
 def compute(
-    options: argparse.Namespace,
-    command: str,
-    compared: Compared,
-    step: tuple[float, str] | None,
-    folder: Path,
-    terminal: Terminal,
-    started: float,
+    options: argparse.Namespace, command: str, compared: Compared, folder: Path, terminal: Terminal, started: float
 ) -> tuple["Report", "Parts"]:
     """Run the experiments and write the report to a folder."""
     is_alone, robot = options.experiment != "all", compared.robot
+    step = compared.integrator_step(options.dt, options.integrator)
+    for line in compared.reference.lines:
+        terminal.say(line)
+    if options.experiment == "stability" and compared.reading and not compared.reading.drive.feeds_back:
+        terminal.say(block(TEMPLATE, "no_servo", robot=robot.name))
     names = [options.experiment] if is_alone else list(EXPERIMENTS)
     with start_workers() as workers, terminal.progress("imports"):
         for modules in (DRAWING, COMPUTING)[: len(names)]:  # in further processes at the same time

@@ -1,6 +1,6 @@
 """Figures on disk, drawn in another process than the one that computes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from itertools import chain, islice
 from pathlib import Path
@@ -50,7 +50,7 @@ def draw(
             except Exception as error:
                 if path:
                     path.unlink(missing_ok=True)
-                failed.append((name_of(call), described(error)))
+                failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
     except OSError:
         raise
     except Exception as error:
@@ -69,14 +69,6 @@ def results_needed(experiment: str, names: Sequence[str], sections: Sequence[Sec
         return {}
     results = [section.result for section in sections if section.name in needed]
     return {of.experiment: Result(of.experiment, rows=of.rows, label=of.label) for of in results}
-
-
-def name_of(call: Callable) -> str:
-    """The name of a figure before it is drawn: its function and what it draws of the result."""
-    more = [getattr(value, "name", value) for value in getattr(call, "args", ())]
-    more = [value for value in more if isinstance(value, str)]
-    name = getattr(getattr(call, "func", call), "__name__", "without a name")
-    return " ".join([name.removeprefix("draw_"), *more])
 
 
 def quiet(robot: Robot) -> AbstractContextManager:

@@ -151,26 +151,26 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict])
     return of_values(setup, [cause["place"] for cause in known]) + of_numbers
 
 
+def diagnosed(setup: Setup) -> object | None:
+    return attempt("diagnosis", module("diagnosis").diagnosed, setup)[0]
+
+
 def in_one(setup: Setup, of_numbers: Sequence[dict]) -> list[dict]:
     """The causes; one option, convention, number or error of two replaces several numbers of Mbar and h if it explains them."""
-    replaced = {cause["quantity"] for cause in of_numbers if cause["quantity"] in IN_EQUATIONS}
-    if sum(cause["quantity"] in IN_EQUATIONS for cause in of_numbers) < 2:
-        return list(of_numbers)
-    diagnosis = module("diagnosis")
-    found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)
-    explaining = [diagnosis.record(cause) for cause in found.diagnosis.causes if cause.rank < 3] if found else []
+    replaced = [cause["quantity"] for cause in of_numbers if cause["quantity"] in IN_EQUATIONS]
+    found = diagnosed(setup) if len(replaced) > 1 else None
+    explaining = [cause for cause in found.diagnosis.causes if cause.rank < 3] if found else []
     if not explaining:
         return list(of_numbers)
-    first = explaining[0] | {"quantity": min(replaced, key=IN_EQUATIONS.index)}
+    first = module("diagnosis").record(explaining[0]) | {"quantity": min(replaced, key=IN_EQUATIONS.index)}
     return [first, *(cause for cause in of_numbers if cause["quantity"] not in IN_EQUATIONS)]
 
 
 def of_values(setup: Setup, known: Sequence[str]) -> list[dict]:
     """The causes of differences of Mbar, h and accelerations, except for places that are known as causes."""
-    diagnosis = module("diagnosis")
-    found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)
+    found = diagnosed(setup)
     causes = [cause for cause in found.causes if cause.place not in known] if found else []
-    return [diagnosis.record(cause, bool(setup.robot.own)) for cause in causes]
+    return [module("diagnosis").record(cause, bool(setup.robot.own)) for cause in causes]
 
 
 def find_causes(setup: Setup) -> list[dict]:
@@ -198,9 +198,7 @@ def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
         section.figures = [*section.figures, *figures]
     except OSError:
         raise
-    except WorkerEnded:  # the result is not lost
-        failed = [("number 1", "the drawing process was killed")]
-    except Exception as error:  # the result cannot be sent to where it is drawn
+    except Exception as error:  # the drawing process was killed, or the result cannot be sent there
         failed = [("number 1", described(error))]
     for name, line in failed:
         quantity = f"figure {name} is drawn"
