@@ -164,8 +164,8 @@ class Cluster:
 
     def outcome(self, future) -> tuple[object, str]:
         if future.status == "finished":
-            with suppress(Exception):  # its worker is lost
-                return future.result(timeout=CONNECTING)
+            with suppress(Exception):  # if its worker is lost now, the call is made again
+                return future.result(timeout=self.limit)
         if future.status != "error":
             raise Refused(f"lost the connection to the scheduler {self.address}; {RESUME}")
         error = future.exception(timeout=CONNECTING)
@@ -176,9 +176,12 @@ class Cluster:
         return None, described(error)
 
     def check(self) -> None:
-        if self.client.status != "running":
+        able = None
+        with suppress(Exception):
+            able = self.able() if self.client.status == "running" else None
+        if able is None:
             raise Refused(f"lost the connection to the scheduler {self.address}; {RESUME}")
-        if self.able():
+        if able:
             self.seen = time.monotonic()
         if time.monotonic() - self.seen > ALONE:
             raise Refused(f"the scheduler {self.address} has no worker any more; {RESUME}")
