@@ -7,10 +7,11 @@ from .process import interrupt, streams
 
 if __name__ == "__main__":
     streams.prepare()
-    interrupt.listen()  # before anything that takes its time
+    os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")  # it clears up after an interrupt
     os.environ.setdefault("MUJOCO_GL", "disabled")  # nothing is rendered: no further process looks for a display
     # the matrices are small, and other processes compute too: threads of a product would only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    interrupt.listen()  # before anything that takes its time
 
 import shlex
 import sys
@@ -62,6 +63,7 @@ def run_and_leave() -> None:
     except SystemExit as stop:  # --help, or a wrong word
         status = stop.code
     interrupt.settle()
+    interrupt.clear_up()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):
             stream.flush()

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from compare.fleet.file_tasks import InProcess
+from compare.fleet.task import InProcess
 from compare.process import workers
 from compare.process.clock import Clock
 

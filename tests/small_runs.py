@@ -13,7 +13,7 @@ from crane import crane
 
 from compare.engines.mujoco import load
 from compare.experiments import EXPERIMENTS, module, skipped
-from compare.fleet.file_tasks import InProcess
+from compare.fleet.task import InProcess
 from compare.report import files, verdict
 from compare.report.text import say
 from compare.robots.arm import ARM

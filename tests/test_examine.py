@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from compare.__main__ import main
 from compare.cli import command_line
 from compare.experiments import EXPERIMENTS, Experiment
-from compare.fleet.file_tasks import InProcess
+from compare.fleet.task import InProcess
 from compare.judge.check import Result
 from compare.report.terminal import Terminal
 from compare.report.text import environment
@@ -99,7 +99,7 @@ class Writing(InProcess):
         self.log = log
 
     def submit(self, function, /, name, *more):
-        self.log.append(("figures", name, *more[4:]))
+        self.log.append(("figures", name))
         return super().submit(function, name, *more)
 
 
@@ -128,8 +128,8 @@ def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, m
     setup = SimpleNamespace(engines={}, robot=ARM, progress=lambda text: None, is_quick=False, alone=True)
     sections, causes, skipped = experiment.examine(names, setup, tmp_path, Terminal(), Writing(log))
     assert log == [
-        ("rows", "mass"), ("figures", "mass", None), ("rows", "stability"), ("figures", "stability", None), ("rows", "speed"),
-        ("rows", "reduction"), *[("figures", name, part) for name in ("speed", "reduction") for part in drawing.HALVES],
+        ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"), ("rows", "speed"),
+        ("rows", "reduction"), ("figures", "speed"), ("figures", "reduction"),
     ]  # fmt: skip
     assert [section.name for section in sections] == names and (causes, skipped) == ([], {})
     of_each = [sorted(file for file, _ in one.figures) for one in sections]
@@ -150,6 +150,6 @@ def test_a_figure_that_raises_leaves_the_others_alone(tmp_path, monkeypatch):
     made(monkeypatch, "broken", figures=some_raise)
     drawn, failed = drawing.draw("broken", None, None, tmp_path)
     assert [name for name, _ in drawn] == ["first", "First_"]  # one file where capitals do not count
-    assert [name for name, _ in failed] == ["plot", "half third", "number 5"]
+    assert [name for name, _ in failed] == ["number 2", "number 3", "number 5"]
     assert [line.split(":")[0] for _, line in failed] == ["TypeError", "AttributeError", "ValueError"]
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["First_.png", "first.png"]

@@ -131,7 +131,7 @@ def test_a_report_has_what_can_be_compared_and_the_rest_gets_status_2(inside, fo
     assert main(["speed", *asked]) == 2
     out, err = capsys.readouterr()
     assert out == "" and "speed does not apply to double" in err.splitlines()[-1]
-    assert main(["gravity", "--joints", "-hip,knee", *asked]) == 1
+    assert main(["gravity", "--joints=-hip,knee", *asked]) == 1
     out, err = capsys.readouterr()
     assert out.startswith("reference: own; double.xml ") and err == "a user's file may print\n"
     results = json.loads((folder / "out" / "results.json").read_text(encoding="utf-8"))
@@ -149,7 +149,7 @@ BROKEN = "x = 1\ndef mass_matrix(q:\n"
     (":Object", "':Object'"), ("./:Object", "folder"), ("mine.py:inside.alsso", "known: also"),
     ("broken.py:", "broken.py, line 2: SyntaxError"), ("broken:", "broken, line 2: SyntaxError"),
     ("leaving.py:x", "leaving.py, line 2: SystemExit: 3"), ("mine.py:Needing", "'mass'"),
-    ("mine.py:&--joints&-hip,ankle", "'ankle'"),
+    ("mine.py:&--joints=-hip,ankle", "'ankle'"),
 ])  # fmt: skip
 def test_a_bad_reference_gets_one_line_and_status_2(folder, capsys, asked, word):
     (folder / "broken.py").write_text(BROKEN)

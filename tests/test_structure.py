@@ -35,7 +35,7 @@ LIBRARIES = {
     "pandas": ("compare.report",),
     "matplotlib": ("compare.report.style",),
     "PIL": ("compare.report.images",),
-    "distributed": ("compare.fleet.cluster",),
+    "distributed": ("compare.fleet.executors",),
     "rich": ("compare.report.terminal",),
 }
 DRAWING = ("matplotlib", "PIL")  # for modules whose name begins with figures, too

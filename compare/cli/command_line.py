@@ -3,7 +3,6 @@
 import argparse
 import shlex
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from difflib import get_close_matches
 from textwrap import fill
 from typing import NamedTuple, NoReturn
@@ -48,16 +47,19 @@ def not_empty(text: str) -> str:
     return text
 
 
-def step_in_seconds(text: str) -> float:
-    try:
-        dt = float(text)
-    except ValueError:
-        dt = 0.0
-    if not 0.0 < dt <= LONGEST_STEP:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a step: expected seconds, above 0 and at most {LONGEST_STEP:g}"
-        )
-    return dt
+def seconds(most: float) -> Callable[[str], float]:
+    """A type of options: seconds, above 0 and at most so many."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = 0.0
+        if not 0.0 < value <= most:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a time: expected seconds, above 0 and at most {most:g}")
+        return value
+
+    return read
 
 
 def process_count(text: str) -> int:
@@ -94,7 +96,7 @@ OPTIONS = {
     "--reference": Option(stated_reference, "WHAT", of_every=True),
     "--joints": Option(metavar="LIST", in_all=True),
     "--scenes": Option(metavar="FILE", in_all=True),
-    "--dt": Option(step_in_seconds, "S"),
+    "--dt": Option(seconds(LONGEST_STEP), "S"),
     "--integrator": Option(metavar="NAME"),
 }
 
@@ -104,7 +106,7 @@ def parser(experiment: str | None = None) -> Parser:
     made = Parser(
         prog=PROGRAM,
         usage=f"{PROGRAM} {experiment or 'EXPERIMENT|all'} [options]",
-        description=help_of_all() if experiment is None else help_of(experiment),
+        description=help_of(experiment) if experiment else help_of_all(),
         epilog=None if experiment else EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         add_help=False,
@@ -130,19 +132,10 @@ def help_of(experiment: str) -> str:
     return "\n".join([in_lines(first), *rest])
 
 
-def what_can_be_asked() -> str:
-    """The ten lines that are shown where no words are given."""
-    return f"{block(TEXT, 'short')}\n\n" + in_lines(f"Experiments: {', '.join(EXPERIMENTS)}.")
-
-
 def request(arguments: Sequence[str]) -> argparse.Namespace:
     """The parsed request. SystemExit: with 0 after help, with 2 and one line for what is mistyped."""
     whole = parser()
-    if not arguments:
-        with suppress(OSError, ValueError, AttributeError):  # nobody may be there to read it
-            print(what_can_be_asked(), flush=True)
-        raise SystemExit(0)
-    options, unknown = whole.parse_known_args(with_minus(arguments))
+    options, unknown = whole.parse_known_args(arguments or ["--help"])
     refuse_unknown(whole, options, unknown, shlex.join(arguments))
     if options.help:
         (whole if options.experiment in (None, "all") else parser(options.experiment)).print_help()
@@ -150,15 +143,6 @@ def request(arguments: Sequence[str]) -> argparse.Namespace:
     if not options.version:
         refuse_what_does_not_go_together(whole, options)
     return options
-
-
-def with_minus(arguments: Sequence[str]) -> list[str]:
-    """The arguments, with a list of joints that begins with a minus joined to its option: argparse would take it for one."""
-    given = list(arguments)
-    for k in range(len(given) - 1, 0, -1):
-        if given[k - 1] == "--joints" and given[k].startswith("-") and not given[k].startswith("--"):
-            given[k - 1 : k + 1] = [f"--joints={given[k]}"]
-    return given
 
 
 def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence[str], given: str) -> None:

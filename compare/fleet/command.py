@@ -10,47 +10,46 @@ from typing import TYPE_CHECKING
 
 from tmt.compiled.cores import cores
 
-from ..cli.command_line import FLEET, PROGRAM, Option, Parser, expected, not_empty, process_count
-from ..experiments import EXPERIMENTS
+from ..cli.command_line import (
+    FLEET,
+    PROGRAM,
+    Option,
+    Parser,
+    expected,
+    not_empty,
+    process_count,
+    seconds,
+    stated_reference,
+)
+from ..experiments import EXPERIMENTS, TIMED
+from ..process.crash import Refused
 from ..process.streams import in_one_line
 from ..report.terminal import Terminal
 from ..report.text import block
-from .tasks import DEFAULT_LIMIT, FleetError
 
 if TYPE_CHECKING:
-    from .file_tasks import FleetOptions
-    from .run import Run
+    from .task import FleetOptions
 
 MAX_LINES = 20  # of one kind, on the terminal
 SENT = "reference of the fleet"  # folder of the solution in a bundle
-REFRESH = 0.3  # s between two lines of progress
 EPILOG = block("fleet", "examples") + "\n"
 
 
-def duration(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a time; expected seconds above 0")
-    return value
-
-
 def fleet_reference(text: str) -> str:
-    if text in ("arm", "model") or text.lower().endswith((".xml", ".mjcf")):
-        return text
-    raise argparse.ArgumentTypeError(f"{text!r} is not a reference of a fleet; expected arm, model or FILE.xml")
+    if ":" in text:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a reference of a fleet; expected arm, model or FILE.xml")
+    return stated_reference(text)
 
 
 FLEET_OPTIONS = {
     "--out": Option(metavar="DIR", default=f"reports/{FLEET}"),
     "--full": Option(None),
+    "--timing": Option(None),
     "--reference": Option(fleet_reference, "WHAT"),
     "--only": Option(metavar="LIST"),
     "--workers": Option(process_count, "N"),
     "--dask": Option(metavar="ADDRESS"),
-    "--limit": Option(duration, "S", DEFAULT_LIMIT),
+    "--limit": Option(seconds(1e6), "S", 1800.0),
     "--since": Option(metavar="DIR"),
 }
 
@@ -68,22 +67,24 @@ def fleet_parser() -> Parser:
     return made
 
 
-def experiments_of(made: Parser, only: str | None) -> tuple[str, ...]:
-    """The experiments of --only, in their order; None: all."""
+def experiments_of(made: Parser, only: str | None, timing: bool = False) -> tuple[str, ...]:
+    """The experiments of --only, in their order; None: all that may run."""
     if only is None:
-        return tuple(EXPERIMENTS)
+        return tuple(name for name in EXPERIMENTS if timing or name not in TIMED)
     names = [name.strip() for name in only.split(",") if name.strip()]
     for name in names:
         if name not in EXPERIMENTS:
             near = expected(name, {known: known for known in EXPERIMENTS}, ", ".join(EXPERIMENTS))
             made.error(f"--only: {name!r} is not an experiment; {near}")
+        if name in TIMED and not timing:
+            made.error(f"--only: {name} measures time; add --timing")
     if not names:
         made.error("--only names no experiment")
     return tuple(name for name in EXPERIMENTS if name in names)
 
 
 def fleet_status(arguments: Sequence[str]) -> int:
-    """Run the command; the exit status. SystemExit for help and wrong arguments. FleetError: see tasks."""
+    """Run the command; the exit status. SystemExit for help and wrong arguments. Refused: it cannot be carried out."""
     made = fleet_parser()
     options, unknown = made.parse_known_intermixed_args(arguments)
     if unknown:
@@ -93,54 +94,44 @@ def fleet_status(arguments: Sequence[str]) -> int:
         raise SystemExit(0)
     if not options.paths:
         made.error(f"no PATH given; expected a file, a folder, a pattern or @LIST: {PROGRAM} {FLEET} models")
-    if options.dask and options.workers:
-        made.error("--workers cannot be combined with --dask")
-    names = experiments_of(made, options.only)
+    if options.workers and (options.dask or options.timing):
+        made.error(f"--workers cannot be combined with {'--dask' if options.dask else '--timing'}")
+    names = experiments_of(made, options.only, options.timing)
     return run_fleet(options, names, shlex.join(["python", "-m", "compare", FLEET, *arguments]))
 
 
 def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str) -> int:
     """Compare all files and write the table; the exit status."""
     started = time.perf_counter()
-    from .cache import Cache  # imports are slow
-    from .cluster import Cluster
-    from .file_tasks import FleetOptions
+    from .cache import locked  # imports are slow
+    from .executors import Cluster, Pool
     from .models import found_models
-    from .pool import Pool
     from .run import Run
     from .table import changes, earlier, write_table
+    from .task import FleetOptions
 
     terminal, out = Terminal(), Path(options.out)
     before = earlier(options.since) if options.since else None
     models, left_out = found_models(options.paths)
-    file_options, sent = with_reference(FleetOptions(names, not options.full), options.reference)
-    cache = Cache(out)
-    try:
-        executor = (
-            Cluster(options.dask, options.limit) if options.dask else Pool(options.workers or cores(), options.limit)
-        )
+    untimed = () if options.timing or options.only else tuple((name, "it measures time: --timing") for name in TIMED)
+    file_options, sent = with_reference(FleetOptions(names, untimed, not options.full), options.reference)
+    with locked(out):
+        if options.dask:
+            executor = Cluster(options.dask, options.limit, options.timing)
+        else:
+            executor = Pool(1 if options.timing else options.workers or cores(), options.limit)
         try:
-            run, words, shown_at = Run(models, file_options, executor, cache, out, sent), [], 0.0
+            run = Run(models, file_options, executor, out, sent)
             say_first(terminal, [f"left out: {name}, {why}" for name, why in left_out])
-            terminal.tell(lambda: words)
-
-            def progress() -> None:
-                nonlocal shown_at
-                say_rows(terminal, run.take_new())
-                if time.perf_counter() - shown_at > REFRESH:
-                    words[:], shown_at = progress_of(run), time.perf_counter()
-
+            terminal.tell(run.progress)
             with terminal.progress(""):
-                run.carry_out(progress)
+                run.carry_out(lambda rows: say_rows(terminal, rows))
             say_first(terminal, [f"left out: {name}, {why}" for name, why in run.parts])
         finally:
             executor.close()
         changed = None if before is None else changes(before, sorted(run.rows, key=lambda row: row["file"]))
         took = time.perf_counter() - started
         summary = write_table(out, run, left_out, changed, command, took)
-        cache.remove_other_versions()
-    finally:
-        cache.close()
     terminal.say()
     terminal.say(summary[0], "bold green" if run.is_good else "bold red")
     for line in summary[1:]:
@@ -153,7 +144,7 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
 
 
 def with_reference(options: "FleetOptions", reference: str | None) -> tuple["FleetOptions", dict[str, bytes]]:
-    """The options with a reference, and the files of a solution. FleetError if they cannot be read."""
+    """The options with a reference, and the files of a solution. Refused if they cannot be read."""
     from ..engines.mujoco import ModelError, read  # imports are slow
     from ..run.reference import is_solution
     from .models import Model, bundle, needed_by
@@ -162,30 +153,11 @@ def with_reference(options: "FleetOptions", reference: str | None) -> tuple["Fle
         return options._replace(reference=reference), {}
     try:
         read(Path(reference))
-        model = Model(Path(reference), needed_by(Path(reference)))
-        files = {f"{SENT}/{name}": content for name, content in bundle(model).items()}
     except ModelError as error:
-        raise FleetError(f"--reference: {error}") from None
+        raise Refused(f"--reference: {error}") from None
+    model = Model(Path(reference), needed_by(Path(reference)))
+    files = {f"{SENT}/{name}": content for name, content in bundle(model).items()}
     return options._replace(reference=reference, solution=next(iter(files)), solution_hash=model.hash), files
-
-
-def progress_of(run: "Run") -> list[str]:
-    """The numbers of files, tasks and verdicts, and the time left, for one line on the terminal."""
-    left = run.tasks_left()
-    seconds = run.seconds_left(left, run.workers, run.executor.times_alone)
-    return [
-        f"{run.files_done} of {run.files_in_all} files",
-        f"{run.tasks_done} of {run.tasks_done + sum(left.values())} tasks",
-        *(f"{many} {verdict}" for verdict, many in sorted(run.verdicts().items())),
-        *([f"about {in_words(seconds)} left"] if seconds else []),
-    ]
-
-
-def in_words(seconds: float) -> str:
-    """A duration as rough as an estimate is."""
-    if seconds < 10.0:
-        return f"{max(round(seconds), 1)} s"
-    return f"{5 * round(seconds / 5)} s" if seconds < 117.5 else f"{round(seconds / 60)} min"
 
 
 def say_first(terminal: Terminal, lines: Sequence[str]) -> None:

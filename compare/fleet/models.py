@@ -7,14 +7,15 @@ mju_getXMLDependencies of MuJoCo 4.0.0 searches for height fields and stripped p
 import hashlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 from glob import glob, has_magic
 from pathlib import Path
-from typing import NamedTuple
 from xml.etree import ElementTree
 
+from ..process.crash import Refused
 from ..process.streams import in_one_line, readable
-from .tasks import FleetError
 
 MODEL_ELEMENT, PART_ELEMENT = "mujoco", "mujocoinclude"  # root elements of MJCF
 SUFFIXES = (".xml", ".mjcf")
@@ -23,11 +24,13 @@ WITH_MODELS = ("include", "model")  # elements that refer to further MJCF
 DIRECTORIES = ("assetdir", "meshdir", "texturedir")
 
 
+@dataclass(eq=False)
 class Model:
-    """One file. parts: the file itself and the files that it includes or loads; included_by: another model of the fleet."""
+    """One file."""
 
-    def __init__(self, path: Path, parts: Sequence[Path], included_by: str = ""):
-        self.path, self.parts, self.included_by = path, parts, included_by
+    path: Path
+    parts: Sequence[Path]  # the file itself and the files that it includes or loads
+    included_by: str = ""  # another model of the fleet
 
     @property
     def shown(self) -> str:
@@ -37,102 +40,94 @@ class Model:
     @cached_property
     def sha256(self) -> str:
         """Hash of the file alone; "" if it cannot be read."""
-        try:
+        with suppress(OSError):
             return hashlib.sha256(self.path.read_bytes()).hexdigest()
-        except OSError:
-            return ""
+        return ""
 
     @cached_property
     def hash(self) -> str:
-        """Hash of the file and all files that it includes and loads, with their relative paths. OSError: not readable."""
-        return hash_of(self.contents())
-
-    def is_copy_of(self, other: "Model") -> bool:
-        """Whether both files have the same content, and load files of the same content. OSError: not readable."""
-
-        def needs(model: Model) -> dict[str, bytes]:
-            return {name: content for name, content in model.contents().items() if name != os.path.basename(model.path)}
-
-        return self.sha256 == other.sha256 and needs(self) == needs(other)
-
-    def contents(self) -> dict[str, bytes]:
-        """Content of the file and of the files that it needs, by paths relative to its folder."""
-        folder = os.path.dirname(os.path.abspath(self.path))
-        return {os.path.relpath(os.path.abspath(part), folder): part.read_bytes() for part in self.parts}
+        """Hash of the file without its name, and of all files that it needs; "" if one cannot be read."""
+        with suppress(OSError):
+            return hash_of(bundle(self))
+        return ""
 
 
-class Models(NamedTuple):
-    models: list[Model]
-    left_out: list[tuple[str, str]]
+def bundle(model: Model) -> dict[str, bytes]:
+    """The files of a model for another machine: {path below a common folder: content}, the model first."""
+    parts = [Path(os.path.abspath(part)) for part in model.parts]
+    top = os.path.commonpath([part.parent for part in parts])
+    return {os.path.relpath(part, top): part.read_bytes() for part in parts}
 
 
-def hash_of(contents: dict[str, bytes]) -> str:
+def hash_of(files: dict[str, bytes]) -> str:
+    """Hash of a bundle, without the name of the model."""
     digest = hashlib.sha256()
-    for name, content in sorted(contents.items()):
-        digest.update(f"{name}\0{len(content)}\0".encode("utf-8", "surrogateescape") + content)
+    for k, (name, content) in enumerate(files.items()):
+        digest.update(
+            f"{name if k else os.path.dirname(name)}\0{len(content)}\0".encode("utf-8", "surrogateescape") + content
+        )
     return digest.hexdigest()
 
 
-def found_models(words: Sequence[str]) -> Models:
-    """The models of paths: folders, patterns, files, @list.txt. FleetError for a path without files."""
+def unpacked(files: dict[str, bytes], folder: Path) -> Path:
+    """Write the files of a bundle to a folder; the path of the model."""
+    for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    return folder / next(iter(files))
+
+
+def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str]]]:
+    """The models of paths (folders, patterns, files, @list.txt), and files that are left out, with the reason.
+
+    Refused: a path without files.
+    """
     paths, left_out = {}, []
-    for path, named in paths_of(words, left_out):
-        first, before = paths.setdefault(os.path.abspath(path), (path, named))
+    for path, named in paths_of(words):
+        first, before = paths.get(os.path.abspath(path), (path, False))
         paths[os.path.abspath(path)] = first, named or before
-    files, models, parts = {}, {}, []
-    for path, named in sorted(paths.values(), key=lambda pair: (os.path.islink(pair[0]), os.fspath(pair[0]))):
+    files, models, parts = {}, [], []
+    for path, named in sorted(paths.values(), key=lambda pair: (pair[0].is_symlink(), os.fspath(pair[0]))):
         shown = in_one_line(os.fspath(path))
         same = files.setdefault(os.path.realpath(path), shown)
-        kind = MODEL_ELEMENT if named or same != shown else root_element(path)
+        kind = MODEL_ELEMENT if named else root_element(path)
         if same != shown:
             left_out.append((shown, f"same file as {same}"))
-        elif shown in models:
-            left_out.append((shown, "another file has the same printable name"))
         elif kind == PART_ELEMENT:
             parts.append(path)
         elif kind == MODEL_ELEMENT:
-            models[shown] = Model(path, needed_by(path))
+            models.append(Model(path, needed_by(path)))
         else:
             left_out.append((shown, f"not MJCF: {f'root element <{in_one_line(kind)}>' if kind else 'not XML'}"))
-    needed = {model.shown: {os.path.realpath(part) for part in model.parts[1:]} for model in models.values()}
-    including = {}  # the models that include a file
-    for model in models.values():
-        for part in needed[model.shown]:
-            including.setdefault(part, []).append(model)
-    for model in models.values():  # if two files include each other, neither is a part
-        others = [other.shown for other in including.get(os.path.realpath(model.path), ())
-                  if os.path.realpath(other.path) not in needed[model.shown]]  # fmt: skip
-        model.included_by = others[0] if others else ""
-    for path in parts:
-        others = including.get(os.path.realpath(path))
-        why = f"included by {others[0].shown}" if others else "a part of a model"
-        left_out.append((in_one_line(os.fspath(path)), why))
     if not models:
-        raise FleetError(f"no MJCF file in {', '.join(map(in_one_line, words))}")
-    return Models(sorted(models.values(), key=lambda model: model.shown), sorted(left_out))
+        raise Refused(f"no MJCF file in {', '.join(map(in_one_line, words))}")
+    needed = {model.shown: {os.path.realpath(part) for part in model.parts[1:]} for model in models}
+    for model in models:  # if two files include each other, neither is a part
+        others = [other.shown for other in models if os.path.realpath(model.path) in needed[other.shown]
+                  and os.path.realpath(other.path) not in needed[model.shown]]  # fmt: skip
+        model.included_by = next(iter(others), "")
+    for path in parts:
+        others = [shown for shown, files in needed.items() if os.path.realpath(path) in files]
+        left_out.append((in_one_line(os.fspath(path)), f"included by {others[0]}" if others else "a part of a model"))
+    return sorted(models, key=lambda model: model.shown), sorted(left_out)
 
 
-def paths_of(words: Iterable[str], left_out: list, lists: tuple[str, ...] = ()) -> Iterator[tuple[Path, bool]]:
-    """The files of paths, each with True if the path is that of the file, not of a folder or a pattern.
-
-    left_out: receives folders that cannot be read; lists: the @LIST files that led here.
-    """
+def paths_of(words: Iterable[str]) -> Iterator[tuple[Path, bool]]:
+    """The files of paths, each with True if the path is that of the file, not of a folder or a pattern."""
     for word in words:
         path = Path(word)
         if word.startswith("@"):
-            name = os.path.realpath(word[1:])
-            if name not in lists:  # a list may contain itself
-                yield from paths_of(lines_of(word[1:]), left_out, (*lists, name))
+            yield from paths_of(lines_of(word[1:]))
         elif is_a_file(path):
             yield path, True
-        elif os.path.isdir(path):
-            yield from ((file, False) for file in files_in(path, left_out))
         else:
-            matches = sorted(glob(word, recursive=True)) if has_magic(word) and "\0" not in word else []
+            matches = [path] if os.path.isdir(path) else []
+            if not matches and has_magic(word) and "\0" not in word:
+                matches = [Path(match) for match in sorted(glob(word, recursive=True))]
             if not matches:
-                raise FleetError(f"no such file: {in_one_line(word)}; expected a file, a folder, a pattern or @LIST")
-            for match in map(Path, matches):
-                files = files_in(match, left_out) if match.is_dir() else [match] * is_a_file(match)
+                raise Refused(f"no such file: {in_one_line(word)}; expected a file, a folder, a pattern or @LIST")
+            for match in matches:
+                files = files_in(match) if match.is_dir() else [match] * is_a_file(match)
                 yield from ((file, False) for file in files)
 
 
@@ -143,13 +138,9 @@ def is_a_file(path: Path) -> bool:
         return False
 
 
-def files_in(folder: Path, left_out: list) -> Iterator[Path]:
+def files_in(folder: Path) -> Iterator[Path]:
     """The .xml and .mjcf files of a folder at any depth, without hidden files and folders."""
-
-    def cannot_be_read(error):
-        left_out.append((in_one_line(os.fspath(error.filename)), f"not readable: {error.strerror}"))
-
-    for place, folders, names in os.walk(folder, onerror=cannot_be_read):
+    for place, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(names):
             if name.lower().endswith(SUFFIXES) and not name.startswith(".") and is_a_file(Path(place, name)):
@@ -157,36 +148,24 @@ def files_in(folder: Path, left_out: list) -> Iterator[Path]:
 
 
 def lines_of(name: str) -> list[str]:
-    """The paths in a list, one a line; empty lines and lines that begin with # are ignored."""
+    """The paths in a list, one a line; empty lines and lines that begin with # or @ are ignored."""
     try:
         lines = Path(name).read_text(encoding="utf-8-sig", errors="surrogateescape").split("\n")
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
-        raise FleetError(f"cannot read the list {in_one_line(name)}: {why}") from None
-    return [line.strip() for line in lines if line.strip() and not line.lstrip().startswith("#")]
+        raise Refused(f"cannot read the list {in_one_line(name)}: {why}") from None
+    return [line.strip() for line in lines if line.strip() and line.lstrip()[0] not in "#@"]
 
 
 def root_element(path: Path) -> str:
-    """The name of the root element; "" if the file is not XML.
+    """The name of the root element; "" for other formats.
 
     A file that is empty, broken or not readable counts as a model, so that the table shows it with the reason.
     """
     try:
-        for _, element in ElementTree.iterparse(path, events=("start",)):
-            return element.tag
-        return ""
-    except PermissionError:
+        return next(element.tag for _, element in ElementTree.iterparse(path, events=("start",)))
+    except (StopIteration, ElementTree.ParseError, LookupError, OSError, ValueError):
         return MODEL_ELEMENT
-    except (ElementTree.ParseError, LookupError, OSError, ValueError):
-        pass
-    try:
-        with path.open("rb") as file:
-            text = file.read(4096)
-    except OSError:
-        return MODEL_ELEMENT
-    is_text = b"\0" not in text
-    is_model = b"<mujoco" in text and b"<mujocoinclude" not in text
-    return MODEL_ELEMENT if is_text and (is_model or b"<" not in text) else ""
 
 
 def needed_by(path: Path) -> tuple[Path, ...]:
@@ -225,28 +204,6 @@ def elements_of(path: Path) -> Iterator[ElementTree.Element]:
             yield element
     except (ElementTree.ParseError, LookupError, OSError, ValueError):
         return
-
-
-def bundle(model: Model) -> dict[str, bytes]:
-    """The files of a model for another machine: {path below a common folder: content}, the model first.
-
-    OSError: a file is gone or has changed.
-    """
-    contents = model.contents()
-    if hash_of(contents) != model.hash:
-        raise OSError(0, "the file, or a file that it needs, changed while the fleet was running")
-    names = [os.path.basename(model.path), *(name for name in contents if name != os.path.basename(model.path))]
-    up = max(name.split(os.sep).count(os.pardir) for name in names)
-    below = os.path.join(*(f"up{k}" for k in range(up)), "") if up else ""
-    return {os.path.normpath(below + name): contents[name] for name in names}
-
-
-def unpacked(files: dict[str, bytes], folder: Path) -> Path:
-    """Write the files of a bundle to an empty folder; the path of the model."""
-    for name, content in files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
-    return folder / next(iter(files))
 
 
 def place_of_report(shown: str) -> str:

@@ -10,9 +10,10 @@ from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from ..judge.check import ENDS, About, Check
+from ..judge.check import About
 from ..judge.finding import Finding
 from ..judge.timing import vectors
+from ..process.crash import Refused
 from ..process.streams import in_one_line
 from ..report.provenance import OURS, commit, installed
 from ..report.text import say
@@ -20,7 +21,6 @@ from ..report.verdict import Section, failures, unconfirmed_in_words, unstable_i
 from ..run.reference import SOLUTION, Reference
 from .cache import write_whole
 from .models import place_of_report
-from .tasks import FleetError
 
 FLEET_COLUMNS = (
     "file", "sha256", "verdict", "reason", "joints", "worst_ratio",
@@ -35,6 +35,10 @@ HEADS = {
     "file": "file", "verdict": "verdict", "reason": "reason or cause", "reference": "compared with", "joints": "joints",
     "worst_ratio": "share of tolerance", "file_integrator": "integrator", "file_dt_s": "step, ms",
     "stable_at_file_dt": "stable", "limit_s": "limit, ms", "seconds": "processor, s",
+}  # fmt: skip
+EMPTY_ROW = {
+    "reason": "", "joints": None, "reference": "", "file_integrator": None, "file_dt_s": None,
+    "worst_ratio": None, "stable_at_file_dt": None, "limit_s": None, "seconds": 0.0, "has_report": False,
 }  # fmt: skip
 REFERENCES = {"arm": "stated numbers", SOLUTION: "the solution", "model": "itself"}
 ROW_KINDS = dict.fromkeys(BAD_VERDICTS, "bad") | {REFUSED: "none", ITSELF: "none"}
@@ -53,7 +57,7 @@ def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Seque
         if causes:
             reason = causes[0]["text"] + (f", and {len(causes) - 1} more" if len(causes) > 1 else "")
     elif broke or lost:
-        outcome, reason = BROKE, exception_of(broke[0]) if broke else lost[0]
+        outcome, reason = BROKE, f"{broke[0].experiment}: {broke[0].note}" if broke else lost[0]
     elif not any(check.about == About.MODELS for section in sections for check in section.result.checks):
         outcome, reason = REFUSED, "no comparison was possible"
     else:
@@ -65,11 +69,6 @@ def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Seque
         "verdict": outcome, "reason": "; ".join(filter(None, (reason, reference.matched))),
         "worst_ratio": None if top is None else top.over_tolerance, "stable_at_file_dt": stable, "limit_s": limit,
     }  # fmt: skip
-
-
-def exception_of(check: Check) -> str:
-    quantity = "" if check.quantity == ENDS else f": {check.quantity}:"
-    return f"{check.experiment}{quantity} {check.note}"
 
 
 def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
@@ -98,21 +97,18 @@ def csv_of_fleet(rows: Sequence[dict]) -> str:
 
 
 def earlier(folder: str) -> dict[str, dict]:
-    """The rows of an earlier fleet by file name, `limit_s` a number or None. FleetError if they cannot be read."""
+    """The rows of an earlier fleet by file name, `limit_s` a number or None. Refused if they cannot be read."""
     path = Path(folder) / "fleet.csv"
-    shown = in_one_line(str(path))
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            table = csv.DictReader(file)
-            rows = list(table)
-            if not set(FLEET_COLUMNS) <= set(table.fieldnames or ()):
-                raise FleetError(f"{shown} is not a table of a fleet: expected the columns {', '.join(FLEET_COLUMNS)}")
-            return {row["file"]: row | {"limit_s": float(row["limit_s"]) if row["limit_s"] else None} for row in rows}
-    except FleetError:
-        raise
-    except (OSError, ValueError, csv.Error) as error:
+            rows = [
+                row | {"limit_s": float(row["limit_s"]) if row["limit_s"] else None} for row in csv.DictReader(file)
+            ]
+        return {row["file"]: {name: row[name] for name in FLEET_COLUMNS} for row in rows}
+    except (OSError, ValueError, KeyError, csv.Error) as error:
         why = getattr(error, "strerror", None) or "not a table of a fleet"
-        raise FleetError(f"cannot read {shown}: {why}; expected the folder of an earlier fleet") from None
+        shown = in_one_line(str(path))
+        raise Refused(f"cannot read {shown}: {why}; expected the folder of an earlier fleet") from None
 
 
 def changes(before: Mapping[str, dict], rows: Sequence[dict]) -> list[str]:
@@ -160,66 +156,51 @@ def write_table(
     took: float,
 ) -> list[str]:
     """Write fleet.csv and index.html; the lines of the summary. run: a run.Run; changed: lines of --since, None: without it."""
-    rows, left_out = sorted(with_why_itself(run.rows), key=order), [*left_out, *run.parts]
+    rows, left_out = sorted(run.rows, key=order), [*left_out, *run.parts]
     summary = summary_of(rows, left_out, run)
     origin = {
         "command": command,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "seconds": round(took, 1),
-        "workers": run.workers,
+        "workers": run.executor.workers,
         "this machine": f"{platform.node()}, {vectors()}",
-        "machines of the workers": ", ".join(sorted(run.machines)) or "none",
         "commit": commit(),
         OURS: installed(OURS),
         "mujoco": installed("mujoco"),
     }
     write_whole(out / "fleet.csv", csv_of_fleet(rows).encode("utf-8", "backslashreplace"))
-    text = fleet_page("A fleet compared with MuJoCo", summary, rows, left_out, changed, origin)
+    text = fleet_page(
+        rows, title="A fleet compared with MuJoCo", summary=summary, left_out=left_out, changed=changed, origin=origin
+    )
     write_whole(out / "index.html", text.encode("utf-8", "backslashreplace"))
     return summary
 
 
-def with_why_itself(rows: Sequence[dict]) -> list[dict]:
-    """The rows; if some files are compared with stated numbers, with the reason why others are not."""
-    if not any(row["reference"] in ("arm", SOLUTION) for row in rows):
-        return list(rows)
-    reasons = [row["why_itself"] and sentence("why_itself", reason=row["why_itself"]) for row in rows]
-    return [row | {"reason": "; ".join(filter(None, (why, row["reason"])))} for row, why in zip(rows, reasons)]
-
-
 def summary_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: object) -> list[str]:
-    numbers = run.verdicts()
+    numbers = run.verdicts
     lines = [sentence("verdicts", files=len(rows), numbers={v: numbers[v] for v in VERDICTS if numbers[v]})]
     if unstable := [row["file"] for row in rows if row["stable_at_file_dt"] is False]:
         lines.append(sentence("unstable", names=unstable))
     if left_out:
         lines.append(sentence("left_out", files=len(left_out)))
-    if run.no_timing:
-        lines.append(sentence("no_timing", reason=run.no_timing))
     if numbers[ITSELF]:
         lines.append(sentence("self_consistent"))
-    if run.files_cached or run.tasks_cached:
-        lines.append(sentence("cached", files=run.files_cached, tasks=run.tasks_cached))
+    if copies := sum(map(len, run.copies.values())):
+        lines.append(sentence("copies", files=copies))
+    if run.cached:
+        lines.append(sentence("cached", files=run.cached))
     return lines
 
 
-def fleet_page(
-    title: str,
-    summary: Sequence[str],
-    rows: Sequence[dict],
-    left_out: Sequence[tuple[str, str]],
-    changed: Sequence[str] | None,
-    origin: dict,
-) -> str:
-    """The page as HTML; the arguments are those of write_table."""
+def fleet_page(rows: Sequence[dict], **values: object) -> str:
+    """The page as HTML. values: title, summary, left_out, changed and origin, as in write_table."""
     environment = Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined,
         loader=FileSystemLoader(Path(__file__).parent),
     )  # fmt: skip
-    return environment.get_template("fleet.html.jinja").render(
-        title=title, summary=summary, rows=[shown_row(row) for row in rows], left_out=left_out, changed=changed,
-        origin=origin, heads=HEADS, is_bad=any(row["verdict"] in BAD_VERDICTS for row in rows),
-    )  # fmt: skip
+    is_bad = any(row["verdict"] in BAD_VERDICTS for row in rows)
+    page = environment.get_template("fleet.html.jinja")
+    return page.render(rows=list(map(shown_row, rows)), heads=HEADS, is_bad=is_bad, **values)
 
 
 def shown_row(row: dict) -> dict:

@@ -15,10 +15,6 @@ class Clock:
         self.ended = {}  # s from the start, of each task that has ended
         self.taken = []  # (task, processor time)
 
-    @property
-    def elapsed(self) -> float:
-        return time.perf_counter() - self.started
-
     @contextmanager
     def of(self, task: str) -> Iterator[None]:
         """Assign the processor time of this block, and of calls of workers in it, to a task."""
@@ -33,12 +29,9 @@ class Clock:
     def add(self, task: str, seconds: float) -> None:
         self.taken.append((task, seconds))
 
-    def begins(self, task: str) -> None:
-        self.under_way = task
-
     def ends(self, task: str) -> None:
         self.under_way = ""
-        self.ended[task] = self.elapsed
+        self.ended[task] = time.perf_counter() - self.started
 
     def seconds_of(self, task: str) -> float:
         """The processor time of a task so far, s."""

@@ -1,80 +1,64 @@
 """Ctrl-C, SIGTERM and SIGHUP end a run with status 2 within a second.
 
-A Python signal handler waits until C code returns, for seconds in a compilation or a run in MuJoCo. So the wakeup fd of the
-signal module is a socket, and a thread that reads from it ends the process. Only `python -m compare` uses this.
+A Python signal handler waits until C code returns, for seconds in a compilation or a run in MuJoCo. So the signals are blocked,
+in worker processes too, and a thread waits for them. Only `python -m compare` uses this.
 """
 
 import os
 import signal
-import socket
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 
-NUMBERS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-
-undo = []  # functions to call before an interrupt ends the process, last first
+undo = []  # functions to call before the process ends, last first
 turn = threading.RLock()  # held while a thread decides how the run ends
 
 
 class Now:
-    requested = False  # an interrupt has come
-    held = 0  # number of `postponed` blocks of the main thread
     settled = False  # the exit status is decided
     line = "interrupted; the earlier report is unchanged"
 
 
 def listen() -> None:
     """From now on an interrupt ends the process. Ignored signals (nohup, background of a script) stay ignored."""
-    receiver, sender = socket.socketpair()
-    sender.setblocking(False)
-    signal.set_wakeup_fd(sender.fileno(), warn_on_full_buffer=False)
-    threading.Thread(target=end_when_asked, args=(receiver, sender), daemon=True).start()
-    for number in NUMBERS:
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, stay)
+    numbers = [number for name in ("SIGINT", "SIGTERM", "SIGHUP") if (number := getattr(signal, name, None))]
+    numbers = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+    if numbers and hasattr(signal, "pthread_sigmask"):  # not on Windows
+        resource_tracker.ensure_running()  # unblocks signals where it starts
+        signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
+        threading.Thread(target=end_when_asked, args=(numbers,), daemon=True).start()
 
 
 @contextmanager
 def postponed() -> Iterator[None]:
     """An interrupt in this block takes effect at its end."""
-    Now.held += 1
-    try:
-        with turn:
-            yield
-    finally:
-        Now.held -= 1
-        if Now.requested:
-            stay()
+    with turn:
+        yield
 
 
 def settle() -> None:
     """From now on an interrupt does not change the exit status."""
-    with postponed():
+    with turn:
         Now.settled = True
 
 
-def stay(*_) -> None:
-    """Suspend the main thread while the other thread ends the process."""
-    Now.requested = True
-    while not (Now.held or Now.settled):
-        time.sleep(1)
+def end_when_asked(numbers: list[int]) -> None:
+    signal.sigwait(numbers)
+    with turn:
+        if not Now.settled:
+            end()
 
 
-def end_when_asked(receiver, _sender) -> None:
-    while True:
-        number = receiver.recv(1)[0]
-        with turn:
-            if number in NUMBERS and not Now.settled:
-                end()
+def clear_up() -> None:
+    for act in reversed(undo):
+        with suppress(Exception):
+            act()
 
 
 def end() -> None:
     """End the process, whatever the main thread does."""
-    for act in reversed(undo):
-        with suppress(Exception):
-            act()
+    clear_up()
     with suppress(OSError):
         os.write(2, ("\r" * os.isatty(2) + Now.line + "\n").encode())  # overwrites ^C on a terminal
     os._exit(2)

@@ -4,12 +4,9 @@ import argparse
 import os
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-from tmt.compiled.store import cache_folder, size_of_cache
 
 from ..engines.mujoco import ModelError
 from ..engines.own.own_file import OwnFileError
@@ -30,22 +27,16 @@ if TYPE_CHECKING:
 COMPUTING = ("compare.run.examine", "scipy.optimize", "tmt.compiled.machine")  # modules that take long to load
 DRAWING = ("compare.report.style", *COMPUTING)
 TEMPLATE = "command_line"
-CACHE_GROWTH = 1_000_000  # bytes, by which the cache folder may grow without a message
 
 
 def carry_out(options: argparse.Namespace, command: str) -> int:
     """Compare the models and write the report; the exit status. Refused: the request cannot be carried out."""
-    started, cache_before, terminal = time.perf_counter(), size_of_cache(), Terminal()
+    started, terminal = time.perf_counter(), Terminal()
     try:
         compared = comparison(options)
-        step = compared.integrator_step(options.dt, options.integrator)
         before = made_by(options.out)
         with new_report(options.out) as folder:
-            for line in compared.reference.lines:
-                terminal.say(line)
-            if options.experiment == "stability" and compared.reading and not compared.reading.drive.feeds_back:
-                terminal.say(block(TEMPLATE, "no_servo", robot=compared.robot.name))
-            report, parts = compute(options, command, compared, step, folder, terminal, started)
+            report, parts = compute(options, command, compared, folder, terminal, started)
     except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     from ..report.verdict import passed
@@ -58,8 +49,6 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
         say_error(line)
     place = f" in place of that of `{before}`" if before not in (None, report.origin["command"]) else ""
     terminal.say(f"Report: {os.path.join(options.out, 'index.html')}{place} ({time.perf_counter() - started:.1f} s)")
-    if (size := size_of_cache()) > cache_before + CACHE_GROWTH:
-        terminal.say(block(TEMPLATE, "cache", folder=in_home(cache_folder()), megabytes=size / 1e6))
     return 0 if good else 1
 
 
@@ -74,16 +63,15 @@ def comparison(options: argparse.Namespace) -> Compared:
 
 
 def compute(
-    options: argparse.Namespace,
-    command: str,
-    compared: Compared,
-    step: tuple[float, str] | None,
-    folder: Path,
-    terminal: Terminal,
-    started: float,
+    options: argparse.Namespace, command: str, compared: Compared, folder: Path, terminal: Terminal, started: float
 ) -> tuple["Report", "Parts"]:
     """Run the experiments and write the report to a folder."""
     is_alone, robot = options.experiment != "all", compared.robot
+    step = compared.integrator_step(options.dt, options.integrator)
+    for line in compared.reference.lines:
+        terminal.say(line)
+    if options.experiment == "stability" and compared.reading and not compared.reading.drive.feeds_back:
+        terminal.say(block(TEMPLATE, "no_servo", robot=robot.name))
     names = [options.experiment] if is_alone else list(EXPERIMENTS)
     with start_workers() as workers, terminal.progress("imports"):
         for modules in (DRAWING, COMPUTING)[: len(names)]:  # in further processes at the same time
@@ -94,15 +82,8 @@ def compute(
         reasons = {name: say(reason) for name in names if (reason := skipped(name, robot))}
         names = [name for name in names if name not in reasons]
         origin = provenance(command, robot.mjcf, compared.reference.file, SEED)  # of the model as it was read
-        setup = examine.setup_of(
-            compared,
-            options.quick,
-            map=workers.map,
-            quiet=workers.quiet,
-            progress=terminal.show,
-            alone=is_alone,
-            step=step,
-        )
+        more = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
+        setup = examine.setup_of(compared, options.quick, alone=is_alone, step=step, **more)
         for name, reason in reasons.items():
             terminal.say(f"{name:<13} skipped: {reason}")
         terminal.tell(partial(examine.progress, workers.clock, names))
@@ -129,9 +110,3 @@ def write_report(
     skipped = [*skipped, *needless.items()]
     report = verdict.Report(sections, compared.robot, origin, words, causes, skipped, compared.reference)
     return report, files.write(folder, report, parts)
-
-
-def in_home(path: Path) -> str:
-    with suppress(ValueError, RuntimeError):
-        return str("~" / path.relative_to(Path.home()))
-    return str(path)

@@ -1,6 +1,6 @@
 """Figures on disk, drawn in another process than the one that computes."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from itertools import chain, islice
 from pathlib import Path
@@ -16,9 +16,6 @@ from ..report.text import say
 from ..report.verdict import Section
 from ..robots import Robot
 
-FIRST = "the first"  # of the figures of an experiment
-HALVES = ("like the first", "others")  # drawn side by side
-
 
 def draw(
     experiment: str,
@@ -26,35 +23,34 @@ def draw(
     robot: Robot,
     folder: Path,
     others: Mapping[str, Result] | None = None,
-    part: str | None = None,
+    first: bool = False,
 ) -> tuple[list, list]:
     """The figures of an experiment on disk: names (without .png) and captions; of those that failed: names and why.
 
     A call of `figures(result, robot)` that raises leaves the later ones alone; an error of the disk is raised. others: the
-    results for the picture of the first screen, see `results_needed`. part: FIRST, one of HALVES, or all.
+    results for the picture of the first screen, see `results_needed`. first: only the first figure, and this picture.
     """
     drawn, failed = [], []
     try:
-        own = islice(module(experiment).figures(result, robot), 1 if part == FIRST else None)
+        own = islice(module(experiment).figures(result, robot), 1 if first else None)
         pictures = getattr(module(experiment), "overview", None) if others else None
-        overview = pictures({**others, experiment: result}, robot) if pictures else ()
-        for call in half_of(chain(own, overview), part) if part in HALVES else chain(own, overview):
-            name, path = name_of(call), None
+        for call in chain(own, pictures({**others, experiment: result}, robot) if pictures else ()):
+            path = None
             try:
                 with quiet(robot):
                     file, figure, caption = call()
-                while file.casefold() in {other.casefold() for other, _ in drawn}:
-                    file += "_"  # names that differ in signs alone may give one file
-                path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
-                with writing(path), quiet(robot):
-                    images.save_figure(figure, path)
+                    while file.casefold() in {other.casefold() for other, _ in drawn}:
+                        file += "_"  # names that differ in signs alone may give one file
+                    path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
+                    with writing(path):
+                        images.save_figure(figure, path)
                 drawn.append((path.name.removesuffix(".png"), say(caption)))
             except OSError:
                 raise
             except Exception as error:
                 if path:
                     path.unlink(missing_ok=True)
-                failed.append((name, described(error)))
+                failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
     except OSError:
         raise
     except Exception as error:
@@ -63,35 +59,16 @@ def draw(
 
 
 def results_needed(experiment: str, names: Sequence[str], sections: Sequence[Section]) -> dict[str, Result]:
-    """The results, rows alone, for the picture of the first screen, if it can be drawn once this experiment is done.
+    """The results, rows alone, for the picture of the first screen, if this is the last of its experiments.
 
-    names: of the experiments that run, in their order; sections: of those that are done. A picture of two experiments is drawn
-    with the later one.
+    names: of the experiments that run, in their order; sections: of those that are done.
     """
     picture = EXPERIMENTS[experiment].overview if experiment in EXPERIMENTS else ""
     needed = [name for name in names if picture and EXPERIMENTS[name].overview == picture]
     if needed[-1:] != [experiment]:
         return {}
-    results = {section.name: section.result for section in sections if section.name in needed}
-    return {name: Result(name, rows=result.rows, label=result.label) for name, result in results.items()}
-
-
-def half_of(figures: Iterable[Callable], half: str) -> Iterator[Callable]:
-    """The calls that draw by the same function as the first one, or the others: only the former may have equal names."""
-    first = None
-    for call in figures:
-        function = getattr(call, "func", call)
-        first = first or function
-        if (function is first) == (half == HALVES[0]):
-            yield call
-
-
-def name_of(call: Callable) -> str:
-    """The name of a figure before it is drawn: its function and what it draws of the result."""
-    more = [getattr(value, "name", value) for value in getattr(call, "args", ())]
-    more = [value for value in more if isinstance(value, str)]
-    name = getattr(getattr(call, "func", call), "__name__", "without a name")
-    return " ".join([name.removeprefix("draw_"), *more])
+    results = [section.result for section in sections if section.name in needed]
+    return {of.experiment: Result(of.experiment, rows=of.rows, label=of.label) for of in results}
 
 
 def quiet(robot: Robot) -> AbstractContextManager:

@@ -1,6 +1,6 @@
 """Runs the experiments one after the other; long work and drawing go to other processes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
@@ -16,11 +16,10 @@ from ..process.workers import WorkerEnded, Workers
 from ..report.terminal import Terminal
 from ..report.text import block, has, say
 from ..report.verdict import STATES_CAUSES, Section, explained, failures
-from .drawing import FIRST, HALVES, draw, quiet, results_needed
+from .drawing import draw, quiet, results_needed
 from .reference import Compared
 
 START, END = "start", "figures"  # tasks of the clock: what comes before the first experiment and after the last
-Found = tuple[Result | None, Result | None]  # the result of an experiment, or a failed check where it broke off
 
 DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers on which Mbar and h depend, by their names in `parameters`
@@ -38,26 +37,22 @@ def setup_of(compared: Compared, is_quick: bool, **more: object) -> Setup:
 
 
 def examine(
-    names: Sequence[str],
-    setup: Setup,
-    folder: Path,
-    terminal: Terminal,
-    workers: Workers,
-    clock: Clock | None = None,
-    have: Mapping[str, Found] | None = None,
+    names: Sequence[str], setup: Setup, folder: Path, terminal: Terminal, workers: Workers, clock: Clock | None = None
 ) -> tuple[list[Section], list[dict], dict[str, str]]:
     """The section of each experiment with its figures, the causes of failing checks, and the skipped experiments with reasons.
 
     An experiment that raises is one failed check; the others go on. Among other experiments the diagnosis runs only if one of
-    them fails. clock: of the workers, it measures each experiment; have: results that are known already.
+    them fails. clock: of the workers, it measures each experiment.
     """
-    clock, have = clock or Clock(), have or {}
+    clock = clock or Clock()
     (folder / "figures").mkdir()
     sections, drawings, waiting, causes, reasons = [], [], [], [], {}
     own, reported = setup.engines.get("own"), set()
-    modules = {name: module(name) for name in names}
-    begin = {name: experiment for name, experiment in modules.items() if name not in have}
-    crashed = {name: begun(name, experiment, setup, clock) for name, experiment in begin.items()}
+    modules, crashed = {name: module(name) for name in names}, {}
+    for name, experiment in modules.items():
+        if hasattr(experiment, "begin"):
+            with clock.of(name):
+                _, crashed[name] = attempt(name, experiment.begin, setup)
     clock.ends(START)
     order = sorted(modules, key=TIMED.__contains__)
     for name in order:
@@ -68,10 +63,12 @@ def examine(
             terminal.say(f"{name:<13} skipped: {NOTHING_FAILED}")
             clock.ends(name)
             continue
-        clock.begins(name)
+        clock.under_way = name
         with clock.of(name):
             setup.progress(block(name, "summary"))
-            result, crash = have.get(name) or found_by(name, experiment, setup, crashed[name])
+            result, crash = None, crashed.get(name)
+            if not crash:
+                result, crash = attempt(name, partial(result_of, experiment), setup)
             words, without_words = attempt(name, partial(texts, name, experiment), setup)
             if own:
                 add_problems(crash or result, own.equations.problems, reported)
@@ -83,12 +80,12 @@ def examine(
         with clock.of(END):
             others = results_needed(name, order, sections)
             drawing = partial(workers.submit, draw, name, result, setup.robot, folder / "figures", others)
-            parts = [] if crash else parts_drawn(name, sections[-1], setup)
-            jobs = [(sections[-1], partial(drawing, part)) for part in parts]
-            if name in TIMED:  # no drawing delays a timing
-                waiting += jobs
-            else:
-                drawings += [(section, job()) for section, job in jobs]
+            # all figures; in a quick run of several experiments the first one, unless a check fails
+            drawing = partial(drawing, setup.is_quick and not setup.alone and not any(failures(sections[-1:])))
+            if name in TIMED and not crash:  # no drawing delays a timing
+                waiting.append((sections[-1], drawing))
+            elif not crash:
+                drawings.append((sections[-1], drawing()))
         say_outcome(terminal, sections[-1], clock.seconds_of(name), new, causes)
     with clock.of(END):
         setup.progress("figures")
@@ -99,16 +96,8 @@ def examine(
     return sorted(sections, key=lambda section: names.index(section.name)), causes, reasons
 
 
-def computed(name: str, experiment: ModuleType, setup: Setup) -> Found:
-    """The result of an experiment that runs alone."""
-    return found_by(name, experiment, setup, begun(name, experiment, setup, Clock()))
-
-
-def found_by(name: str, experiment: ModuleType, setup: Setup, crashed: Result | None) -> Found:
-    """The result of an experiment. crashed: its failed check, if `begin` raised."""
-    if crashed:
-        return None, crashed
-    return attempt(name, lambda setup: with_headline(experiment, experiment.rows(setup)), setup)
+def result_of(experiment: ModuleType, setup: Setup) -> Result:
+    return with_headline(experiment, experiment.rows(setup))
 
 
 def with_headline(experiment: ModuleType, result: Result) -> Result:
@@ -117,30 +106,18 @@ def with_headline(experiment: ModuleType, result: Result) -> Result:
     return result
 
 
-def begun(name: str, experiment: ModuleType, setup: Setup, clock: Clock) -> Result | None:
-    """Start an experiment's long work, if it is not under way; a failed check if that raises."""
-    if not hasattr(experiment, "begin") or name in setup.background:
-        return None
-    with clock.of(name):
-        return attempt(name, experiment.begin, setup)[1]
-
-
 def add_problems(result: Result, problems: Sequence, reported: set) -> None:
     """Add a failed check for each problem of the user's own equations that an experiment calls, before its other checks.
 
     problems: with quantity and text, see engines.own; reported: their numbers, so that each is reported once.
     """
     others, result.checks = result.checks, []
+    asked = EXPERIMENTS.get(result.experiment, Experiment(0)).asks_of_own
     for k, problem in enumerate(problems):
-        if k not in reported and problem.quantity in (asks_of_own(result.experiment) or (problem.quantity,)):
+        if k not in reported and (asked is None or problem.quantity in asked):
             reported.add(k)
             result.check("", f"{problem.quantity} returns valid values", None, 0.0, "", problem.text, rule="equal")
     result.checks += others
-
-
-def asks_of_own(name: str) -> tuple[str, ...] | None:
-    """Which of a user's own functions an experiment calls; None: all."""
-    return EXPERIMENTS.get(name, Experiment(0)).asks_of_own
 
 
 def texts(name: str, experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
@@ -174,31 +151,26 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict])
     return of_values(setup, [cause["place"] for cause in known]) + of_numbers
 
 
+def diagnosed(setup: Setup) -> object | None:
+    return attempt("diagnosis", module("diagnosis").diagnosed, setup)[0]
+
+
 def in_one(setup: Setup, of_numbers: Sequence[dict]) -> list[dict]:
     """The causes; one option, convention, number or error of two replaces several numbers of Mbar and h if it explains them."""
-    if sum(cause["quantity"] in IN_EQUATIONS for cause in of_numbers) < 2:
-        return list(of_numbers)
-    diagnosis = module("diagnosis")
-    found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)
-    explaining = [diagnosis.record(cause) for cause in found.diagnosis.causes if cause.rank < 3] if found else []
+    replaced = [cause["quantity"] for cause in of_numbers if cause["quantity"] in IN_EQUATIONS]
+    found = diagnosed(setup) if len(replaced) > 1 else None
+    explaining = [cause for cause in found.diagnosis.causes if cause.rank < 3] if found else []
     if not explaining:
         return list(of_numbers)
-    replaced = [quantity for quantity in IN_EQUATIONS if quantity in {cause["quantity"] for cause in of_numbers}]
-    return [
-        explaining[0] | {"quantity": replaced[0]},
-        *(cause for cause in of_numbers if cause["quantity"] not in IN_EQUATIONS),
-    ]
+    first = module("diagnosis").record(explaining[0]) | {"quantity": min(replaced, key=IN_EQUATIONS.index)}
+    return [first, *(cause for cause in of_numbers if cause["quantity"] not in IN_EQUATIONS)]
 
 
 def of_values(setup: Setup, known: Sequence[str]) -> list[dict]:
     """The causes of differences of Mbar, h and accelerations, except for places that are known as causes."""
-    diagnosis = module("diagnosis")
-    found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)
-    return (
-        [diagnosis.record(cause, bool(setup.robot.own)) for cause in found.causes if cause.place not in known]
-        if found
-        else []
-    )
+    found = diagnosed(setup)
+    causes = [cause for cause in found.causes if cause.place not in known] if found else []
+    return [module("diagnosis").record(cause, bool(setup.robot.own)) for cause in causes]
 
 
 def find_causes(setup: Setup) -> list[dict]:
@@ -219,13 +191,6 @@ def attempt(name: str, act: Callable, setup: Setup) -> tuple:
         return None, result
 
 
-def parts_drawn(name: str, section: Section, setup: Setup) -> Sequence[str | None]:
-    """The parts of the figures to draw: all; in a quick run of several experiments the first figure, unless a check fails."""
-    if setup.is_quick and not setup.alone and not any(failures([section])):
-        return (FIRST,)
-    return HALVES if name in TIMED else (None,)
-
-
 def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
     """Wait for a section's figures. One that raised is a failed check; an error of the disk is raised."""
     try:
@@ -233,9 +198,7 @@ def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
         section.figures = [*section.figures, *figures]
     except OSError:
         raise
-    except WorkerEnded:  # the result is not lost
-        failed = [("number 1", "the drawing process was killed")]
-    except Exception as error:  # the result cannot be sent to where it is drawn
+    except Exception as error:  # the drawing process was killed, or the result cannot be sent there
         failed = [("number 1", described(error))]
     for name, line in failed:
         quantity = f"figure {name} is drawn"

@@ -21,7 +21,6 @@ from ..robots.arm import ARM
 from ..robots.case import SEED
 from ..robots.file import robot_of, robot_of_solution
 from ..robots.joint_map import JointsError, Unmatched, joint_map, matched_joints
-from ..robots.validation import some
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 SOLUTION = "solution"  # the kind of reference that is another file
@@ -46,7 +45,6 @@ class Reference(NamedTuple):
     source: str = ""  # the solution, or the place of own equations, as given, in one line
     own: Engine | None = None  # of these equations
     renamed: tuple[str, ...] = ()  # "wrist as hand": joints matched under other names
-    why_itself: str = ""  # why it is compared with its own compiled model by default
 
     @property
     def name(self) -> str:
@@ -121,8 +119,7 @@ def compared_with(
     robot = robot_of(reading, shown)
     mujoco = engine(reading)
     if reference in (None, "model"):
-        why = "" if reference else f"joints {some(robot.joints)} are not the arm's {some(ARM.joints)}"
-        return Compared(Reference("model", *of_file, why_itself=why), robot, mujoco, reading)
+        return Compared(Reference("model", *of_file), robot, mujoco, reading)
     own = own_engine(reference, robot, mujoco, joints)
     robot = dataclasses.replace(robot, own=tuple(own.equations.functions))
     return Compared(Reference("own", *of_file, in_one_line(reference), own), robot, mujoco, reading)
@@ -151,10 +148,8 @@ def with_solution(reading: Reading, of_file: tuple, reference: str, solution: Re
     )
 
 
-def joints_matched(
-    stated: Robot | Reading, reading: Reading, shown: str, whose: str
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The file's joints in the order of the stated ones, and those matched under other names; JointsDiffer if any is left."""
+def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose: str) -> tuple[tuple, tuple]:
+    """The file's joints in the order of the stated ones, and those matched under other names. JointsDiffer if any is left."""
     try:
         return matched_joints(stated.tree, reading.tree, whose)
     except Unmatched as error:

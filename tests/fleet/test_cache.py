@@ -1,57 +1,21 @@
-"""Results of a fleet on disk: whole or not at all, and only for the same version of the program."""
-
-import shutil
+"""The folder of a fleet: for one fleet at a time, whole or not at all; and what makes another version of the program."""
 
 import pytest
 
 from compare.fleet import cache as module
-from compare.fleet.cache import Cache
-from compare.fleet.tasks import FleetError
+from compare.fleet.cache import locked, write_whole
+from compare.process.crash import Refused
 
 
-@pytest.fixture
-def cache(tmp_path):
-    made = Cache(tmp_path / "fleet")
-    yield made
-    made.close()
-
-
-def test_a_value_is_there_again_for_the_same_program_alone(cache, monkeypatch):
-    key = cache.key("file", 1)
-    assert cache.get(key) is None
-    cache.put(key, {"a": [1.0]})
-    (cache.out / "cache" / "older").mkdir()
-    cache.remove_other_versions()
-    with pytest.raises(FleetError, match="another"):  # fleet is in that folder
-        Cache(cache.out)
-    cache.close()
-    again = Cache(cache.out)
-    assert again.get(key) == {"a": [1.0]} and again.key("file", 1) == key != again.key("file", 2)
-    assert list((cache.out / "cache").iterdir()) == [cache.folder]
-    again.close()
-    monkeypatch.setattr(module, "program", lambda: "0" * 64)
-    other = Cache(cache.out)
-    assert other.get(other.key("file", 1)) is None is other.get(key) and other.key("file", 1) != key
-    other.close()
-
-
-@pytest.mark.parametrize("damaged", [
-    lambda content: b"", lambda content: content[:-500] + b"x" + content[-499:],
-])  # fmt: skip
-def test_what_is_damaged_is_not_there(cache, damaged):
-    key = cache.key("file")
-    cache.put(key, bytes(1000))
-    path = cache.folder / key
-    path.write_bytes(damaged(path.read_bytes()))
-    assert cache.get(key) is None
-    cache.put(key, "anew")
-    assert cache.get(key) == "anew"
-
-
-def test_what_cannot_be_written_is_said(cache):
-    shutil.rmtree(cache.folder)
-    with pytest.raises(FleetError, match=f"{cache.folder / 'a'}: "):
-        cache.put("a", 1)
+def test_a_folder_is_for_one_fleet_at_a_time_and_what_cannot_be_written_is_said(tmp_path):
+    with locked(tmp_path / "out"), pytest.raises(Refused, match="another"), locked(tmp_path / "out"):
+        pass
+    with locked(tmp_path / "out"):
+        write_whole(tmp_path / "out" / "a", {"b/c": b"1"})
+        write_whole(tmp_path / "out" / "a", {"d": b"2"})
+    assert [path.name for path in (tmp_path / "out" / "a").iterdir()] == ["d"]
+    with pytest.raises(Refused, match=f"{tmp_path / 'none' / 'a'}: "):
+        write_whole(tmp_path / "none" / "a", b"1")
 
 
 SOURCES = ("compare/a.py", "compare/a.jinja", "compare/deep/page.html", "compare/page.js", "mjcf/arm.xml", "tmt/b.py")

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 import runs
-from toy_tasks import soon
+from toy import soon
 
 from compare.__main__ import main
 from compare.fleet.table import FLEET_COLUMNS
-from compare.fleet.tasks import FleetError
+from compare.process.crash import Refused
 
 NAME = "a b#ü.xml" if sys.getfilesystemencoding() == "utf-8" else "a b#u.xml"  # of a file that agrees
 MODELS = runs.ROOT / "tests" / "models"
@@ -69,8 +69,8 @@ def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_
     said = []
 
     def carry_out(self, progress):
-        for file in self.files:
-            self.end_file(file, said[-1], "no reason")
+        for model in self.models:
+            self.end(model, {"verdict": said[-1], "reason": "no reason"})
 
     monkeypatch.setattr("compare.fleet.run.Run.carry_out", carry_out)
     statuses = {"agree": 0, "self-consistent": 0, "refused": 0, "unconfirmed": 1, "broke": 1, "differ": 1}
@@ -85,7 +85,8 @@ def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_
 
 @pytest.mark.parametrize("arguments, word", [
     (["fleet", "m", "--onyl=mass"], "did you mean --only?"), (["fleet", "m", "--reference", "my.py:"], "FILE.xml"),
-    (["fleet", "m", "--limit", "nan"], "--limit: 'nan'"), (["fleet", "m", "--dask", "x", "--workers", "2"], "--workers"),
+    (["fleet", "m", "--limit", "nan"], "--limit: 'nan'"), (["fleet", "m", "--only", "speed"], "--timing"),
+    (["fleet", "m", "--dask", "x", "--workers", "2"], "--workers"),
     (["fleet", "m", "--since", "nowhere"], "nowhere/fleet.csv"), (["fleet", "m", "--out", "m/part.xml"], "m/part.xml"),
 ])  # fmt: skip
 def test_what_is_mistyped_or_cannot_be_carried_out_gets_status_2_and_one_line(arguments, word, folder, capsys):
@@ -99,7 +100,7 @@ def test_what_is_mistyped_or_cannot_be_carried_out_gets_status_2_and_one_line(ar
 
 @pytest.mark.parametrize("words, asked", [
     (["--workers", "3", "--limit", "7"], ("Pool", 3, 7.0, True)),
-    (["--dask", "tcp://x:1", "--full"], ("Cluster", "tcp://x:1", 600.0, False)),
+    (["--dask", "tcp://x:1", "--full"], ("Cluster", "tcp://x:1", 1800.0, False, False)),
 ])  # fmt: skip
 def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, capsys):
     seen = []
@@ -107,11 +108,11 @@ def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, cap
     def run(models, given, *_):
         seen.append(given.is_quick)
         assert given.names == ("mass", "gravity")
-        raise FleetError("seen")
+        raise Refused("seen")
 
     for name in ("Pool", "Cluster"):
         made = {"__init__": lambda self, *given: seen.extend((type(self).__name__, *given)), "close": lambda self: None}
-        monkeypatch.setattr(f"compare.fleet.{name.lower()}.{name}", type(name, (), made))
+        monkeypatch.setattr(f"compare.fleet.executors.{name}", type(name, (), made))
     monkeypatch.setattr("compare.fleet.run.Run", run)
     assert main(["fleet", "m", "--only", "gravity,mass", "--out", "asked", *words]) == 2
     assert tuple(seen) == asked and "seen" in capsys.readouterr().err
@@ -151,7 +152,7 @@ def test_the_key_ctrl_c(temporary, tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_a_signal_and_the_same_command_again(temporary, tmp_path, number):
     def cached():
-        return {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "cache").glob("*/[!.]*")}
+        return {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "files").rglob(".fleet")}
 
     run = runs.started(*runs.command(*WORDS), cwd=tmp_path)
     assert soon(cached)
@@ -162,4 +163,4 @@ def test_a_signal_and_the_same_command_again(temporary, tmp_path, number):
     run = runs.compare(*WORDS, cwd=tmp_path)  # nobody has the lock
     assert (run.returncode, run.stderr) == (0, ""), run.stdout
     assert {path: when for path, when in cached().items() if path in known} == known  # not computed again
-    assert len(cached()) == 6 > len(known)  # of each file: what was read, an experiment, the report
+    assert len(cached()) == 2 > len(known)

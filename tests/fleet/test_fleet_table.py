@@ -106,7 +106,7 @@ def test_what_needs_a_look_comes_first():
 ROW = {
     "file": "a b.xml", "sha256": "1", "verdict": AGREE, "reason": "", "joints": 3, "worst_ratio": 0.123456,
     "file_integrator": "Euler", "file_dt_s": 0.002, "stable_at_file_dt": True, "limit_s": 0.01, "seconds": 1.26,
-    "has_report": True, "report_of": "a b.xml", "reference": "arm", "why_itself": "",
+    "has_report": True, "report_of": "a b.xml", "reference": "arm",
 }  # fmt: skip
 
 
@@ -162,8 +162,8 @@ def test_a_row_is_marked_by_its_verdict_and_nothing_that_is_said_is_taken_for_ht
 def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
     rows = [ROW, ROW | {"file": "b.xml", "verdict": DIFFER}, ROW | {"file": "c.xml", "stable_at_file_dt": False}]
     run = SimpleNamespace(
-        rows=rows, parts=[("late.xml", "why")], workers=2, machines={"b", "a"}, no_timing=None, files_cached=0,
-        tasks_cached=0, verdicts=lambda: Counter(row["verdict"] for row in rows),
+        rows=rows, parts=[("late.xml", "why")], executor=SimpleNamespace(workers=2), cached=0, copies={},
+        verdicts=Counter(row["verdict"] for row in rows),
     )  # fmt: skip
     write_table(tmp_path, run, [("early.xml", "because")], None, "the command", 10.0)
     with (tmp_path / "fleet.csv").open(newline="") as file:
@@ -171,5 +171,5 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
     assert [row["file"] for row in found] == ["b.xml", "c.xml", "a b.xml"]
     assert tuple(found[0]) == FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
     text = (tmp_path / "index.html").read_text()
-    assert all(part in text for part in ("late.xml", "early.xml", "a, b", "the command"))
+    assert all(part in text for part in ("late.xml", "early.xml", "the command"))
     assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")

@@ -11,7 +11,7 @@ from mujoco import MjModel
 from PIL import Image
 
 from compare.fleet.models import bundle, found_models, place_of_report, unpacked
-from compare.fleet.tasks import FleetError
+from compare.process.crash import Refused
 
 MODEL = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
 
@@ -30,11 +30,11 @@ def here(tmp_path, monkeypatch):
 
 
 def names(*asked):
-    return [model.shown for model in found_models(asked).models]
+    return [model.shown for model in found_models(asked)[0]]
 
 
 def left_out(*asked):
-    return dict(found_models(asked).left_out)
+    return dict(found_models(asked)[1])
 
 
 def test_a_folder_gives_its_mjcf_at_any_depth_and_nothing_else(here):
@@ -53,9 +53,8 @@ def test_patterns_and_lists(here):
     assert names("m/*.xml") == ["m/a.xml", "m/b c.xml"]
     assert names("m/**/*.xml") == ["m/a.xml", "m/b c.xml", "m/b/c.xml", "m/b/d/e.xml"] == names("m/**")
     assert names("n/a[1].xml") == ["n/a[1].xml"]  # a file of that name comes before the pattern
-    here("list.txt", "\ufeff# what is released\r\n\r\n  m/b c.xml  \r\n@list.txt\r\n@more/list.txt\r\n")
-    here("more/list.txt", "n/a[1].xml\n@list.txt\n")
-    assert names("@list.txt") == ["m/b c.xml", "n/a[1].xml"] == names("@more/list.txt")
+    here("list.txt", "\ufeff# what is released\r\n\r\n  m/b c.xml  \r\nn/a[1].xml\r\n")
+    assert names("@list.txt") == ["m/b c.xml", "n/a[1].xml"]
 
 
 @pytest.mark.parametrize("asked, says", [
@@ -64,7 +63,7 @@ def test_patterns_and_lists(here):
 def test_a_word_that_names_nothing_is_refused_in_one_line(asked, says, here):
     here("m/a.xml")
     here("bad.txt", "m/c.xml\n")
-    with pytest.raises(FleetError, match=says) as refused:
+    with pytest.raises(Refused, match=says) as refused:
         found_models(asked)
     assert len(str(refused.value).splitlines()) == 1
 
@@ -81,11 +80,11 @@ def test_parts_are_left_out_unless_they_are_named(here):
     here("m/scene.xml", "<mujoco><include file='robot.xml'/><include file='settings.xml'/></mujoco>")
     here("m/robot.xml")
     here(["m/settings.xml", "m/lonely.xml"], "<mujocoinclude><option timestep='0.001'/></mujocoinclude>")
-    found = found_models(["m"])
-    assert [(model.shown, model.included_by) for model in found.models] == [
+    models, left = found_models(["m"])
+    assert [(model.shown, model.included_by) for model in models] == [
         ("m/robot.xml", "m/scene.xml"), ("m/scene.xml", ""),
     ]  # fmt: skip
-    assert [name for name, _ in found.left_out] == ["m/lonely.xml", "m/settings.xml"]
+    assert [name for name, _ in left] == ["m/lonely.xml", "m/settings.xml"]
     assert "m/scene.xml" in left_out("m")["m/settings.xml"] and "m/lonely.xml" in names("m", "m/lonely.xml")
 
 
@@ -138,7 +137,7 @@ def collection(here):
 
 def test_a_change_of_a_part_changes_the_hash_and_everything_is_sent_and_compiles_elsewhere(collection, here, tmp_path):
     def found():
-        return found_models(["robots/r/r.xml"]).models[0]
+        return found_models(["robots/r/r.xml"])[0][0]
 
     known = found()
     here("robots/r/assets/unused.obj", "")
@@ -160,14 +159,14 @@ def test_paths_that_are_absolute_stripped_missing_or_in_a_circle(here, tmp_path)
     here(["assets/s.obj", "far/s.obj"], TETRAHEDRON.format(1))
     strip = "<compiler assetdir='assets' strippath='true'/>"
     here("stripped.xml", robot(MESH.format("C:\\far\\away/s.obj"), more=strip))
-    (model,) = found_models(["stripped.xml"]).models
+    (model,) = found_models(["stripped.xml"])[0]
     assert MjModel.from_xml_path(str(unpacked(bundle(model), tmp_path / "elsewhere"))).nmesh == 1
     here("absolute.xml", robot(MESH.format(f"{tmp_path}/far/s.obj")))
-    before = found_models(["absolute.xml"]).models[0].hash
+    before = found_models(["absolute.xml"])[0][0].hash
     here("far/s.obj", TETRAHEDRON.format(2))
-    assert found_models(["absolute.xml"]).models[0].hash != before
+    assert found_models(["absolute.xml"])[0][0].hash != before
     here("missing.xml", robot(MESH.format("x" * 5000) + "<mesh file='/dev/zero'/>"))
-    assert list(found_models(["missing.xml"]).models[0].parts) == [Path("missing.xml")]
+    assert list(found_models(["missing.xml"])[0][0].parts) == [Path("missing.xml")]
     here("a.xml", "<mujoco><compiler meshdir='far'/><include file='b.xml'/><include file='a.xml'/></mujoco>")
     here("b.xml", "<mujoco><include file='a.xml'/><mesh file='s.obj'/></mujoco>")
-    assert sorted(map(str, found_models(["a.xml"]).models[0].parts)) == ["a.xml", "b.xml", "far/s.obj"]
+    assert sorted(map(str, found_models(["a.xml"])[0][0].parts)) == ["a.xml", "b.xml", "far/s.obj"]

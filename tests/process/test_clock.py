@@ -33,7 +33,7 @@ def test_waiting_is_nobodys_and_work_is_whose_it_is():
     busy(LONG)  # for nobody
     # the processor's time is that of all threads, and one of another test may be at its end
     assert clock.seconds_of("waits") < 2 * LONG and LONG <= clock.seconds_of("works") < 3 * LONG
-    assert 5 * LONG <= clock.ended["works"] < clock.elapsed
+    assert clock.ended["works"] >= 5 * LONG
 
 
 def test_what_a_worker_does_is_for_the_task_that_asked():

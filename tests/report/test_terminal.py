@@ -70,5 +70,5 @@ def test_progress_is_the_number_and_the_name_of_the_experiment_under_way():
     clock.ends("start")
     clock.ends("mass")
     assert progress(clock, ["mass", "gravity"]) == []
-    clock.begins("gravity")
+    clock.under_way = "gravity"
     assert progress(clock, ["mass", "gravity"]) == ["2 of 2", "gravity"]

@@ -1,0 +1,201 @@
+"""Who runs the calls of a fleet: threads of this machine, or the workers of a Dask cluster.
+
+Each call runs in a process of its own: if that crashes, hangs, exits or needs too much memory, this is the outcome of the call.
+"""
+
+import logging
+import multiprocessing
+import os
+import shutil
+import signal
+import tempfile
+import time
+import warnings
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
+from multiprocessing.util import get_temp_dir
+from pathlib import Path
+
+from pebble import ProcessExpired, ProcessPool
+
+from ..process import interrupt
+from ..process.crash import Refused, described
+from ..process.workers import end_with_parent
+from .cache import RESUME, program
+
+try:
+    import resource
+except ImportError:  # Windows: no memory limit
+    resource = None
+
+MAX_TRIES = 4  # of a call whose process ended: three repetitions
+SHARE = 0.9  # of the machine's memory, for all its processes together
+CONNECTING = 10.0  # s, time limit for the scheduler and its first worker to answer
+ALONE = 60.0  # s without a worker after which a fleet ends
+TIMING = "timing"  # resource of a worker with one thread that runs timed calls
+LOGGERS = ("distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio")
+
+
+class OtherVersion(RuntimeError):
+    """A worker runs a different version of compare or MuJoCo."""
+
+
+def guarded(function: Callable, arguments: tuple, limit: float, memory: int) -> tuple[object, str]:
+    """The value of a call and "", or None and why there is none. limit: s; memory: bytes."""
+    multiprocessing.current_process().daemon = False  # else a worker of Dask may not start a process
+    os.environ |= {"MUJOCO_GL": "disabled", "OPENBLAS_NUM_THREADS": "1"}
+    context = multiprocessing.get_context("forkserver" if hasattr(os, "fork") else "spawn")
+    if hasattr(os, "fork"):
+        context.set_forkserver_preload([__name__, function.__module__])
+    for _ in range(MAX_TRIES):
+        with tempfile.TemporaryDirectory(dir=get_temp_dir(), ignore_cleanup_errors=True) as folder:
+            pool = ProcessPool(1, max_tasks=1, context=context)
+            try:
+                return pool.schedule(alone, (function, arguments, folder, memory), timeout=limit).result()
+            except TimeoutError:
+                return None, f"time limit of {limit:g} s exceeded"
+            except ProcessExpired as error:
+                why = ended(error.exitcode)
+            except Exception as error:  # the value cannot be sent
+                return None, described(error)
+            finally:
+                pool.stop()
+                pool.join()
+    return None, f"{why}, {MAX_TRIES} times"
+
+
+def ended(status: int) -> str:
+    if status >= 0:
+        return f"exit status {status}"
+    with suppress(ValueError):
+        return f"killed by {signal.Signals(-status).name}"
+    return f"killed by signal {-status}"
+
+
+def alone(function: Callable, arguments: tuple, folder: str, memory: int) -> tuple[object, str]:
+    """Make a call in this process, in a folder of its own."""
+    end_with_parent(os.path.dirname(folder))
+    os.chdir(folder)
+    for number in (1, 2):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), number)
+    if resource:
+        with suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    try:
+        return function(*arguments), ""
+    except MemoryError:
+        return None, f"out of memory: limit {memory / 1e9:.2g} GB"
+    except BaseException as error:  # SystemExit too
+        return None, described(error)
+
+
+def memory_of_machine() -> int:
+    """Memory of the machine or its container, bytes."""
+    sizes = [2**33]
+    with suppress(OSError, ValueError, AttributeError):
+        sizes = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
+    with suppress(OSError, ValueError):
+        sizes.append(int(Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii")))
+    return min(sizes)
+
+
+class Pool:
+    """This machine. limit: s for each call."""
+
+    def __init__(self, workers: int, limit: float):
+        self.workers, self.limit = workers, limit
+        self.memory = int(SHARE * memory_of_machine() / workers)
+        self.threads = ThreadPoolExecutor(workers)
+        interrupt.undo.append(partial(shutil.rmtree, get_temp_dir(), ignore_errors=True))
+
+    def submit(self, function: Callable, *arguments: object):
+        """A future with `add_done_callback`."""
+        return self.threads.submit(guarded, function, arguments, self.limit, self.memory)
+
+    def outcome(self, future) -> tuple[object, str]:
+        """The value of a call that is done and "", or None and why there is none."""
+        return future.result()
+
+    def check(self) -> None:
+        """Refused if there is nobody left to answer."""
+
+    def close(self) -> None:
+        self.threads.shutdown(wait=False, cancel_futures=True)
+
+
+class Cluster:
+    """The workers of a Dask scheduler; the methods are those of Pool. Refused: no scheduler, or no worker."""
+
+    def __init__(self, address: str, limit: float, timing: bool = False):
+        try:
+            import distributed
+        except ImportError:
+            raise Refused("a cluster needs the extra `fleet`: python -m pip install -e '.[fleet]'") from None
+        for name in LOGGERS:
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are reported here, in one line
+        warnings.filterwarnings("ignore", module="distributed")
+        self.address, self.limit, self.resources = address, limit, {TIMING: 1} if timing else None
+        self.seen = time.monotonic()
+        try:
+            self.client = distributed.Client(address, timeout=CONNECTING, set_as_default=False, name="fleet")
+        except Exception as error:
+            why = " ".join(str(error).split()) or type(error).__name__
+            raise Refused(f"no answer from the scheduler {address}: {why}") from None
+        with suppress(TimeoutError):
+            self.client.wait_for_workers(1, timeout=CONNECTING)
+        able = self.able()
+        self.workers = sum(worker["nthreads"] for worker in able)
+        if not able:
+            self.close()
+            kind = f"worker with --nthreads 1 --resources '{TIMING}=1'" if timing else "worker"
+            raise Refused(f"the scheduler {address} has no {kind}")
+
+    def able(self) -> list[dict]:
+        """The workers that may run the calls."""
+        workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
+        timing = [worker for worker in workers if worker["resources"].get(TIMING) and worker["nthreads"] == 1]
+        return timing if self.resources else list(workers)
+
+    def submit(self, function: Callable, *arguments: object):
+        call = function, arguments, self.limit, program()
+        return self.client.submit(on_worker, *call, pure=False, resources=self.resources)
+
+    def outcome(self, future) -> tuple[object, str]:
+        if future.status == "finished":
+            with suppress(Exception):  # if its worker is lost now, the call is made again
+                return future.result(timeout=self.limit)
+        if future.status != "error":
+            raise Refused(f"lost the connection to the scheduler {self.address}; {RESUME}")
+        error = future.exception(timeout=CONNECTING)
+        if type(error).__name__ == "KilledWorker":
+            return None, f"{MAX_TRIES} workers lost, the last one {error.last_worker.address}"
+        if isinstance(error, OtherVersion | ImportError | AttributeError):
+            raise Refused(f"a worker runs a different version of compare or MuJoCo: {error}; {RESUME}")
+        return None, described(error)
+
+    def check(self) -> None:
+        able = None
+        with suppress(Exception):
+            able = self.able() if self.client.status == "running" else None
+        if able is None:
+            raise Refused(f"lost the connection to the scheduler {self.address}; {RESUME}")
+        if able:
+            self.seen = time.monotonic()
+        if time.monotonic() - self.seen > ALONE:
+            raise Refused(f"the scheduler {self.address} has no worker any more; {RESUME}")
+
+    def close(self) -> None:
+        with suppress(Exception):
+            self.client.close(timeout=1)
+
+
+def on_worker(function: Callable, arguments: tuple, limit: float, expected: str) -> tuple[object, str]:
+    from distributed import get_worker
+
+    worker = get_worker()
+    if program() != expected:
+        raise OtherVersion(f"worker {worker.address}; all workers need the version of this machine")
+    memory = worker.memory_manager.memory_limit or memory_of_machine()
+    return guarded(function, arguments, limit, int(SHARE * memory / worker.state.nthreads))
