@@ -15,8 +15,3 @@ def renamed(rows: Sequence[dict], unit: str) -> list[dict]:
 def value(row: dict, name: str) -> object:
     """The value of a column, with or without the suffix _rad."""
     return row[name + RAD] if name + RAD in row else row[name]
-
-
-def said(text: str, unit: str) -> str:
-    """A text with the unit rad replaced."""
-    return text if unit == "rad" else text.replace(" rad", f" {unit}").replace(RAD, "")

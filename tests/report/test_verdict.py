@@ -12,7 +12,7 @@ from compare.experiments.speed import first_screen as of_speed
 from compare.experiments.speed.first_screen import Cheapest, Curve
 from compare.experiments.stability import first_screen as of_stability
 from compare.experiments.stability.first_screen import Limit
-from compare.judge.check import About, Result, agreement_headline
+from compare.judge.check import About, Result
 from compare.judge.units import renamed
 from compare.report.questions import answers
 from compare.report.style import BLUE, ORANGE, RED
@@ -168,8 +168,6 @@ PRINTED = {"published": 1.0, "tmt": 1.1, "mujoco": 0.9, "tolerance": 0.11}
 
 
 def headline_of(name, of):
-    if name == "gravity":
-        of.result.headline = agreement_headline(of.result)
     with_headline(module(name), of.result)
     return headline(of)
 

@@ -8,7 +8,6 @@ from tmt.exact.values import DIGITS
 
 from ...engines.mujoco import ModelError
 from ...judge.check import About, Result
-from ...judge.entries import has_own_scales
 from ...judge.rounding import NARROW
 from ...judge.run import movement_unit
 from ...judge.scale import FACTOR
@@ -33,7 +32,6 @@ def claim_values(robot: Robot) -> dict:
         "eps": FACTOR,
         "narrow": NARROW,
         "unit": movement_unit(robot.coordinates),
-        "own_scales": has_own_scales(robot.tree, robot.is_read),
         "runs": not robot.is_read or robot.coordinates.nv <= MOST_IN_A_BAND,
         "held": any(case.is_held for case in robot.cases),
         "swings": any(exact_motion.not_compared(case, exact_motion.elliptic(case)) is None for case in pendulums),
