@@ -14,6 +14,8 @@ FIELDS = ("experiment", "scene", "quantity", "rule")
 RENAMED = [  # (field, regular expression, replacement): a name of before, and what it is now
     ("quantity", "^smallest error of MuJoCo's RK4, beside that of tmt's rk4$",
      "smallest error of MuJoCo's RK4, compared with tmt's rk4"),
+    ("quantity", "Mbar - Mbar' over its largest entry$", "Mbar - Mbar' over the scale of the entry"),
+    ("quantity", "least eigenvalue of Mbar over", "least eigenvalue of Mbar in units of its diagonal over"),
 ]  # fmt: skip
 WITHOUT = {  # regular expression for the checks of before, or "after: " and one for those of after, without partner: the reason
     r"stability .* growth in \d+ steps": "the growth per step is covered by limits and times of departure",
@@ -31,7 +33,7 @@ WITHOUT = {  # regular expression for the checks of before, or "after: " and one
     "trajectory .* dh/dqd": "one step of implicit depends on it",
     "trajectory .* the same bits as": "each integrator is compared with the scheme",
     "trajectory .* many digits": "the band bounds the rounding of both; errors are taken from the true motion",
-    "trajectory .* of [^ ]*-momentum": "acceleration compares its rate",
+    "trajectory .* of [^ ]*-momentum": "drift of energy, and accelerations compared with exact values",
     "trajectory .* over that of Euler": "energy.csv has the drift of each method",
     "trajectory .* locked, RK4": "reduction compares the smaller model with the whole",
     "trajectory .* drift of energy": "now the order is at least the nominal one",
@@ -39,9 +41,14 @@ WITHOUT = {  # regular expression for the checks of before, or "after: " and one
     "reduction .* Euler.* (smallest model|time judged|movement|deviation from order)": "the smaller model runs by RK4 only",
     "reduction .* elliptic function, scipy": "tests of truth compare it with 50 digits",
     "diagnosis .* one step of": "trajectory compares each integrator with its scheme",
+    r"(mass|gravity) \| (?!random states)": "named postures are one sample, as in kinematics and acceleration",
+    r"mass .* worst posture": "the tolerance of an acceleration has |Mbar^-1| of its state",
+    r"gravity .* torque - dV/dq|gravity .* qdd of MuJoCo": "acceleration compares dE/dt with the power, and qdd",
+    r"acceleration .* d(p_\w+|linear momentum|angular momentum)/dt": "accelerations are compared with exact values",
 }
 OTHER_VALUES = {  # regular expression for the checks whose values changed by more: the reason
     r"parameters \| .* \| inertia": "stated tensors are turned by matrices: the last bit",
+    r"^(mass|kinematics|gravity|acceleration) \||reduction .*(Mbar|bias), ": "each entry has its own scale for the arm too",
     r"reduction \| .* locked \| (Mbar|bias), ": "random locked angles are now in degrees: the last bit",
     "stability .* automatic reset on": "the time counts from the reset, and energy shows the failure before it",
 }

@@ -17,7 +17,7 @@ def test_the_states_are_spread_and_the_same_in_every_run(engines):
     assert np.ptp(first.qd, axis=0).min() > 19.0 and np.ptp(first.tau, axis=0).min() > 19.0
     named = Setup(ARM, engines).named
     assert named.exact_states == len(named.q) == 5 and np.abs(named.qd).min() > 0.0
-    assert [named.describe(k) for k in range(5)] == list(ARM.postures) == [single.name for single in named.each()]
+    assert [named.describe(k) for k in range(5)] == list(ARM.postures)
 
 
 def larger(joints):
@@ -52,4 +52,3 @@ def test_the_first_states_of_a_sample_are_a_sample():
     first = sample.first(2)
     assert first.q.tolist() == sample.q[:2].tolist() and first.qd.tolist() == sample.qd[:2].tolist()
     assert first.describe(1) == "b" and sample.first(3) is sample
-    assert [single.exact_states for single in sample.each()] == [1, 1, 0]

@@ -43,7 +43,9 @@ NO_FORCE = "kinematics"  # no masses nor forces in positions, speeds and Jacobia
 NO_WEIGHT = "kinematics gravity"  # no inertia in the torque that holds
 NO_MASS = "kinematics mass"  # it is no part of M
 NOT_AT_REST = "kinematics mass published gravity"
-NOT_AT_ZERO = "kinematics mass published reduction"  # where springs and servos are at rest, or joints are locked
+NOT_AT_ZERO = (
+    "kinematics mass gravity published reduction"  # where springs and servos are at rest, or joints are locked
+)
 STANDS_STILL = OFF = f"kinematics {MOTION}"  # beside the arm; the file switches the constraint stage off
 MIRROR = MOTION  # M, torques and runs are those of the arm turned about beta the other way
 NO_PLACE = MOTION.replace("acceleration ", "")  # the equations do not depend on where the shoulder is
@@ -70,7 +72,8 @@ EDITS = {  # by quantity: what is replaced by what; the causes: rank, place, sta
     "mass": ('mass="1.5"', 'mass="1.515"', [(2, "mass of forearm", 1.5, 1.515)], NO_FORCE),
     "com": ('pos="0.15 0 0"', 'pos="0.151 0 0"', [(2, "com x of forearm", 0.15, 0.151)], SEEN),
     "inertia": ("0.001 0.019 0.019", "0.001 0.01919 0.019", [(2, "inertia yy of forearm", 0.019, 0.01919)], NO_WEIGHT),
-    "gravcomp": ('<body name="forearm"', '<body name="forearm" gravcomp="1"', [(2, "gravcomp of forearm", 0, 1)], NO_MASS),
+    "gravcomp": ('<body name="forearm"', '<body name="forearm" gravcomp="1"', [(2, "gravcomp of forearm", 0, 1)],
+                 f"{NO_MASS} gravity"),
     "gravity": ("-9.81", "-9.80665", [(2, "gravity z", -9.81, -9.80665)], NO_MASS),
     "density": ("<option", '<option density="100"', [(1, "density", 0, 100)], NOT_AT_REST),
     "viscosity": ("<option", '<option viscosity="1"', [(1, "viscosity", 0, 1)], NOT_AT_REST),

@@ -1,8 +1,7 @@
 """The experiments, one file or folder for each word of the command line; this module finds them by looking into its folder.
 
-An experiment is a module with a record, `EXPERIMENT = Experiment(order=..., ...)`, whose fields are literals: they are read
-without importing the module. Beside it is its text, NAME.md.jinja: a macro for its help, title, claim, tolerance, and for each
-kind of finding and caption. The module has
+An experiment is a module with a record, `EXPERIMENT = Experiment(order=..., ...)`, whose fields are literals, and a text,
+NAME.md.jinja: a macro for its help, title, claim, tolerance, and for each kind of finding and caption. The module has
 
     rows(setup) -> Result                    numbers: tables, checks, findings
     figures(result, robot)                   yields calls that draw, each returning (file name, figure, caption)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -58,11 +57,6 @@ def agreements(results: Mapping[str, Result]) -> list[dict]:
     return quantities
 
 
-def pictures_of_agreement(results: Mapping[str, Result]) -> list[partial]:
-    """The call that draws M, h and accelerations, where one of them was compared."""
-    return [partial(draw_agreement, results)] if agreements(results) else []
-
-
 def draw_agreement(results: Mapping[str, Result]) -> tuple[str, Figure, Finding]:
     """M, h and accelerations: the largest difference of the engines, and the distance of each from exact, in eps."""
     quantities, label = agreements(results), next(iter(results.values())).label
@@ -86,11 +80,8 @@ def draw_agreement(results: Mapping[str, Result]) -> tuple[str, Figure, Finding]
                         ha="right" if far else "left", color="black" if row["passed"] else RED)  # fmt: skip
     beyond_tolerance(ax, FACTOR, f"{FACTOR:g} eps")
     passed = [row["passed"] for row in quantities]
-    ax.set(
-        xscale="log",
-        xlim=(LEAST_EPS, 2e3 if all(passed) else MOST_EPS),
-        xlabel="difference, eps × scale of the quantity",
-    )
+    farthest = 2e3 if all(passed) else MOST_EPS
+    ax.set(xscale="log", xlim=(LEAST_EPS, farthest), xlabel="difference, eps × scale of the quantity")
     named_rows(ax, [row["name"].replace(" ", "\n", len(row["name"]) > 12) for row in quantities], passed)
     fig.legend(loc="outside upper center", ncols=3, fontsize=7.5, handletextpad=0.1, columnspacing=0.8)
     caption = Finding("shared", "agreement_overview", {"quantities": quantities, "label": label})

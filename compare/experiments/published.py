@@ -24,12 +24,8 @@ def skipped(robot: Robot) -> Finding | None:
 
 
 def claim_values(robot: Robot) -> dict:
-    return {"weight": gravity_scale(robot.tree), "rounding": [item.item for item in robot.printed if is_noise(item)]}
-
-
-def is_noise(item: Printed) -> bool:
-    """Whether the printed value is not zero although the exact one is zero except for rounding."""
-    return item.is_rounding and bool(np.any(item.values))
+    noise = [item.item for item in robot.printed if item.is_rounding and any(item.values)]  # printed, but truly zero
+    return {"weight": gravity_scale(robot.tree), "rounding": noise}
 
 
 class Answer(NamedTuple):
@@ -57,40 +53,29 @@ def answer(item: Printed, robot: Robot, dynamics: Mapping[str, Dynamics]) -> Ans
     if item.torque != "none":
         held = next(other for other in robot.printed if other.item == item.torque)
         tau = dynamics["tmt"].gravity_balance(robot.posture(held.posture))
-    truth = exact(tree, q, rest, tau)
-    engines = dynamics["tmt"], dynamics["mujoco"]
-    if item.quantity == "Mbar":
-        return Answer(truth.mass_matrix, *(d.mass_matrix(q) for d in engines), mass_scale(tree, q[None])[0])
-    if item.quantity == "qdd":
-        scale = acceleration_scale(tree, q[None], gravity_scale(tree))[0]
-        return Answer(truth.acceleration, *(d.acceleration(q, rest, tau) for d in engines), scale)
-    return Answer(truth.gravity_balance, *(d.gravity_balance(q) for d in engines), gravity_scale(tree))
+    function, arguments, scale = {
+        "Mbar": ("mass_matrix", (q,), mass_scale(tree, q[None])[0]),
+        "qdd": ("acceleration", (q, rest, tau), acceleration_scale(tree, q[None], gravity_scale(tree))[0]),
+        "holding torque": ("gravity_balance", (q,), gravity_scale(tree)),
+    }[item.quantity]
+    engines = (getattr(dynamics[name], function)(*arguments) for name in ("tmt", "mujoco"))
+    return Answer(getattr(exact(tree, q, rest, tau), function), *engines, scale)
 
 
 def rows(setup: Setup) -> Result:
     """One row for each printed component, one check for each item and engine."""
     result = Result("published", shown=["item", "quantity", "component", "published", "exact", "tmt", "mujoco", "unit"])
     robot, dynamics = setup.robot, setup.compared()
-    answers = {}
+    answers = {item.item: answer(item, robot, dynamics) for item in robot.printed}
     for item in robot.printed:
-        of = answers[item.item] = answer(item, robot, dynamics)
+        of, printed = answers[item.item], np.array(item.values)
         check_answer(result, item, of, robot.joints)
-        printed = np.array(item.values)
         for index in np.ndindex(printed.shape):
-            result.rows.append(
-                {
-                    "item": item.item,
-                    "posture": item.posture,
-                    "quantity": item.quantity,
-                    "component": " ".join(robot.joints[i] for i in index),
-                    "unit": item.unit,
-                    "published": printed[index],
-                    "exact": of.nearest[index],
-                    "tmt": of.tmt[index],
-                    "mujoco": of.mujoco[index],
-                    "tolerance": of.rounding + (0.0 if item.is_rounding else item.half_digit),
-                }
-            )
+            component = " ".join(robot.joints[i] for i in index)
+            row = {"item": item.item, "posture": item.posture, "quantity": item.quantity, "component": component}
+            row |= {"unit": item.unit, "published": printed[index], "exact": of.nearest[index], "tmt": of.tmt[index]}
+            tolerance = of.rounding + (0.0 if item.is_rounding else item.half_digit)
+            result.rows.append(row | {"mujoco": of.mujoco[index], "tolerance": tolerance})
     if robot.remarks:
         result.notes += robot.remarks(answers, dynamics)
     return result

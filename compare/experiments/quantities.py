@@ -1,12 +1,21 @@
-"""The quantities that both engines give at a state, one row of a table each, and their comparison over a sample of states."""
+"""The quantities that both engines give at a state, one row of a table each, and their comparison over samples of states.
 
+The experiments at single states share their figures, headline and first screen too: those of this module.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from ..engines import LABELS
+from ..engines.mujoco.dynamics import convective_accelerations
 from ..engines.tmt import Compiled
-from ..judge.check import Result, agreement_headline
-from ..judge.entries import scales, unit
+from ..judge.check import Result
+from ..judge.entries import Entries, unit
+from ..judge.finding import Finding
+from ..robots import Robot
 from ..robots.states import Sample
 from .setup import Setup
 
@@ -46,17 +55,19 @@ class Comparison:
         self.engines = list(setup.compared().values())  # MuJoCo is the second
         if sample is setup.random and not self.robot.own:
             self.engines.append(Compiled(self.robot.tree))
-        self.scale = scales(self.robot.tree, self.robot.is_read, sample.q, sample.qd)
+        self.scale = Entries(self.robot.tree, sample.q, sample.qd)
         self.returned = {}
 
     def values(self, name: str) -> list:
         """A quantity by each engine, (states, ...)."""
-        quantity = QUANTITIES[name]
-        if quantity.function not in self.returned:
-            states = [getattr(self.sample, argument) for argument in quantity.arguments]
-            self.returned[quantity.function] = [getattr(engine, quantity.function)(*states) for engine in self.engines]
-        returned = self.returned[quantity.function]
-        return returned if quantity.part is None else [values[quantity.part] for values in returned]
+        function, part = QUANTITIES[name].function, QUANTITIES[name].part
+        if function not in self.returned:
+            states = [getattr(self.sample, argument) for argument in QUANTITIES[name].arguments]
+            returned = self.returned[function] = [getattr(engine, function)(*states) for engine in self.engines]
+            if function == "convective_terms" and self.robot.coordinates.has_balls:
+                # mj_jacDot of MuJoCo 4.0 leaves out what a ball does to a slide after it in the same body
+                returned[1] = convective_accelerations(self.engines[1], *states)
+        return [values if part is None else values[part] for values in self.returned[function]]
 
     def acceleration_size(self) -> np.ndarray:
         """The accelerations that scales are taken from: a user's own may be NaN."""
@@ -75,9 +86,38 @@ class Comparison:
                 result.agree(self.sample, f"{name}, compiled", named, values, theirs, size)
 
 
-def add_notes(result: Result, setup: Setup) -> None:
-    """Add the notes of the samples, the note on compiled rows, and the headline."""
-    result.notes += [*setup.named.notes, *setup.random.notes]
+def compared(setup: Setup, experiment: str, *names: str) -> tuple[Result, list[Comparison]]:
+    """The result of an experiment that compares these quantities at the named postures and at random states."""
+    result = Result(experiment, label=LABELS[setup.robot.compared[0]])
+    comparisons = [Comparison(setup, sample) for sample in (setup.named, setup.random)]
+    for comparison in comparisons:
+        comparison.agree(result, *names)
+        result.notes += comparison.sample.notes
     if not setup.robot.own:
         result.find("rows_compiled", of="shared")
-    result.headline = agreement_headline(result)
+    return result, comparisons
+
+
+def headline(result: Result) -> Finding | None:
+    """The difference with the largest share of its tolerance; one that is not a number comes first."""
+    rows = [row for row in result.rows if row["worst_difference"] is None or row["difference_over_bar"] is not None]
+    if not rows:
+        return None
+    top = max(rows, key=lambda row: np.inf if row["worst_difference"] is None else row["difference_over_bar"])
+    values = {"difference": top["worst_difference"], "unit": top["unit"], "share": top["difference_over_bar"]}
+    return Finding("shared", "agreement_headline", {"quantity": top["quantity"], **values})
+
+
+def figures(result: Result, robot: Robot) -> Iterator[partial]:
+    from .figures import draw_distances  # matplotlib is for the process that draws
+
+    drawn = [name for name in QUANTITIES if name in result.curves["random states"]]
+    yield partial(draw_distances, result, drawn)
+
+
+def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
+    """The picture of M, h and accelerations on the first screen, where one of them was compared."""
+    from .figures_overview import agreements, draw_agreement
+
+    if agreements(results):
+        yield partial(draw_agreement, results)

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TypeVar
 
 from ..engines import Dynamics, Engine, compared, made
 from ..judge.finding import Finding
@@ -11,7 +10,6 @@ from ..robots import Robot
 from ..robots import states as samples
 from ..robots.case import Case
 
-T = TypeVar("T")
 SECONDS_OF_OWN = 5.0  # of a user's own equations at all random states together
 
 
@@ -47,7 +45,7 @@ class Setup:
     def is_quick(self) -> bool:
         return self.size == "quick"
 
-    def of(self, full: T, quick: T, small: T) -> T:
+    def of(self, full, quick, small):
         """The value for this size of the run."""
         return {"full": full, "quick": quick, "small": small}[self.size]
 

@@ -1,6 +1,6 @@
 """Checks and their rules, and the result of an experiment: rows, checks, curves and findings."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -66,14 +66,12 @@ class Check:
         return {name: getattr(self, name) for name in names}
 
     def __str__(self):
-        value = "no number" if self.value is None else f"{self.value:.3g} {self.unit}".rstrip()
-        tolerance = f"{self.tolerance:.3g} {self.unit}".rstrip()
-        where = f", {self.scene}" if self.scene else ""
+        where = f"{self.experiment}: {self.quantity}" + (f", {self.scene}" if self.scene else "")
         if self.rule == "equal" and self.value is None and self.note:  # only the reason matters
-            return f"{self.experiment}: {self.quantity}{where}: no, {self.note}"
-        note = f" ({self.note})" if self.note else ""
-        rule = self.rule.replace("equal", "equal to")
-        return f"{self.experiment}: {self.quantity}{where}: {value}, must be {rule} {tolerance}{note}"
+            return f"{where}: no, {self.note}"
+        value = "no number" if self.value is None else f"{self.value:.3g} {self.unit}".rstrip()
+        rule, note = self.rule.replace("equal", "equal to"), f" ({self.note})" if self.note else ""
+        return f"{where}: {value}, must be {rule} {f'{self.tolerance:.3g} {self.unit}'.rstrip()}{note}"
 
 
 @dataclass
@@ -116,13 +114,11 @@ class Result:
         scale of each entry; the tolerance is 64 eps x scale. truth: a field of tmt.exact.values.Truth; with it, one more check
         for each engine of its distance from the exact values.
         """
-        between = f"{self.label} to MuJoCo"
+        between, exact = f"{self.label} to MuJoCo", sample.truth(truth) if truth else ()
         differences = {between: np.abs(np.subtract(values, mujoco_values))}
-        exact = sample.truth(truth) if truth else ()
-        if len(exact):
-            for engine, computed in ((self.label, values), ("MuJoCo", mujoco_values)):
-                with np.errstate(invalid="ignore"):  # a user's own equations may give NaN
-                    differences[f"{engine} to exact"] = distance(computed[: len(exact)], exact)
+        for engine, computed in ((self.label, values), ("MuJoCo", mujoco_values)) if len(exact) else ():
+            with np.errstate(invalid="ignore"):  # a user's own equations may give NaN
+                differences[f"{engine} to exact"] = distance(computed[: len(exact)], exact)
         worst_of_states = {name: worst_of_each(values, scale) for name, values in differences.items()}
         in_eps = {name: over(d, EPS * s) for name, (d, s) in worst_of_states.items()}
         difference, scale = worst_of_states[between]
@@ -151,26 +147,12 @@ class Result:
             "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if len(exact) else None,
             "exact_states": len(exact) if truth else None,
             "worst_state": check.note,
-            "worst_q": all_digits(sample.q[worst]),
-            "worst_qd": all_digits(sample.qd[worst]),
-            "worst_tau": all_digits(sample.tau[worst]),
-            "passed": check.passed,
         }
-        self.rows.append(row)
-        curves = {name: np.sort(values) for name, values in in_eps.items()}
-        self.curves.setdefault(sample.name, {})[quantity] = curves
+        for name in ("q", "qd", "tau"):
+            row[f"worst_{name}"] = " ".join(repr(float(number)) for number in getattr(sample, name)[worst])
+        self.rows.append(row | {"passed": check.passed})
+        self.curves.setdefault(sample.name, {})[quantity] = {name: np.sort(values) for name, values in in_eps.items()}
         self.shown = [*list(row)[:SHOWN], *(f"{engine.lower()}_from_exact_eps" for engine in (self.label, "MuJoCo"))]
-
-
-def agreement_headline(result: Result) -> Finding | None:
-    """The difference with the largest share of its tolerance."""
-    missing = [row for row in result.rows if row["worst_difference"] is None]
-    finite = [row for row in result.rows if row["difference_over_bar"] is not None]
-    if not missing and not finite:
-        return None
-    top = missing[0] if missing else max(finite, key=lambda row: row["difference_over_bar"])
-    values = {"difference": top["worst_difference"], "unit": top["unit"], "share": top["difference_over_bar"]}
-    return Finding("shared", "agreement_headline", {"quantity": top["quantity"], **values})
 
 
 def largest_known(values: Sequence[float | None]) -> float | None:
@@ -194,28 +176,17 @@ def over(difference: np.ndarray, scale: np.ndarray) -> np.ndarray:
     return np.divide(difference, scale, out=np.where(difference == 0.0, 0.0, np.inf), where=scale > 0.0)
 
 
-def all_digits(values: Iterable[float]) -> str:
-    """Numbers with all their digits."""
-    return " ".join(repr(float(v)) for v in values)
-
-
 def worst_of_each(differences: np.ndarray, scale: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """For each state the difference with the largest share of its scale, and that scale, (states,) each.
 
     differences: (states, ...). scale: a number or (states,), or with as many dimensions as the differences; it may have more
     states.
     """
-    states = len(differences)
-    if np.ndim(scale) < 2:
-        return largest(differences), np.broadcast_to(scale, max(states, np.size(scale)))[:states]
-    scale = scale[:states] if len(scale) > 1 else scale
+    states, scale = len(differences), np.asarray(scale, dtype=float)
+    scale = scale[:states] if scale.ndim and len(scale) > 1 else scale
+    if scale.ndim == 1:
+        scale = scale.reshape(-1, *[1] * (np.ndim(differences) - 1))
     differences, scale = (a.reshape(states, -1) for a in np.broadcast_arrays(np.abs(differences), scale))
     share = np.where(np.isfinite(differences), over(differences, scale), np.inf)
     entry = np.arange(states), share.argmax(axis=1)
     return differences[entry], scale[entry]
-
-
-def largest(values: ArrayLike) -> np.ndarray:
-    """Largest absolute value of each state, (states, ...) -> (states,)."""
-    values = np.abs(np.asarray(values, dtype=float))
-    return values.reshape(len(values), -1).max(axis=1)

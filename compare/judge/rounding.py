@@ -10,9 +10,8 @@ from .scale import EPS, FACTOR, bias_scale, gain_scale, spring_scale
 
 SAMPLED = 16  # states of a block at which the bound of a step is computed
 NARROW = 1e-3  # rad, m: a run is judged while the band of its positions is narrower
-# Rounding of a ball's turn in a step. The new quaternion is a product of the old one and that of the movement, scaled to length
-# 1. Errors: cosine and sine 1.5 eps; four sums of four products 2 eps each, 4 eps together; division by the length 0.5 eps. That
-# is 6 eps of the quaternion, 12 of the turn, 24 for two runs. The difference of two quaternions is another product: 8 eps
+# Rounding of a ball's turn in a step, a product of quaternions scaled to length 1: cosine and sine 1.5 eps, four sums of four
+# products 4 eps, division 0.5 eps: 6 eps of the quaternion, 12 of the turn, 24 for two runs; the difference of the runs 8 eps
 OF_A_BALL = 32 * EPS
 
 
@@ -64,8 +63,6 @@ def step_rounding(
 
 def of_positions(tree: Tree, q: np.ndarray) -> np.ndarray:
     """The sizes of which the sum of a position and its change has 8 eps of rounding, (states, nv)."""
-    if not tree.coordinates.balls:
-        return np.abs(q)
     sizes = np.full((len(q), tree.coordinates.nv), OF_A_BALL / (8 * EPS))
     for kind, at, by in tree.coordinates.joints:
         if kind != "ball":

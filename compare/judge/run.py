@@ -1,15 +1,13 @@
 """Properties of one run: how far it moved, when it left its start, when it diverged."""
 
-from functools import lru_cache
-
 import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.equations.composite import mass_matrix_and_bias  # faster than the sum over bodies for tens of joints
 
 from ..robots.case import Case, Coordinates, rates_at
 from .check import About, Result
+from .entries import Entries
 from .rounding import NARROW
 from .scale import EPS, FACTOR, gravity_scale
 
@@ -68,14 +66,11 @@ def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> flo
     Energy minus the work of the constant torque cannot grow. The bound on its gain is the energy that the motion can exchange.
     """
     finite = np.isfinite(np.concatenate([q, qd], axis=1)).all(axis=1)
-    good = (
-        np.where(finite[:, None], q, case.q if case.coordinates.has_balls else 0.0),
-        np.where(finite[:, None], qd, 0.0),
-    )
+    q, qd = np.where(finite[:, None], q, case.q), np.where(finite[:, None], qd, 0.0)
     with np.errstate(over="ignore", invalid="ignore"):  # in a run that is about to diverge
-        done = work(case, good[0])
-        energy = literal.energy(*good, case.tree) - done
-        bad = ~finite | ~(energy - energy[0] <= exchanged(case, good[0], done))
+        done = work(case, q)
+        energy = literal.energy(q, qd, case.tree) - done
+        bad = ~finite | ~(energy - energy[0] <= exchanged(case, q, done))
     return float(t[bad][0]) if bad.any() else None
 
 
@@ -90,8 +85,6 @@ def work(case: Case, q: np.ndarray) -> np.ndarray:
         return np.sum(case.coordinates.difference(q, q[0]) * mean, axis=1)
     if not case.coordinates.has_balls:
         return (q - q[0]) @ case.tau
-    if not case.tau.any():
-        return np.zeros(len(q))
     return np.append(0.0, np.cumsum(case.coordinates.difference(q[1:], q[:-1]) @ case.tau))
 
 
@@ -117,22 +110,14 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
         exchange = exchange + pull @ give @ pull / 2.0
         done = coordinates.difference(q, q[0]) @ (case.tau - gain @ give @ case.tau)
     if tree.has_springs:
-        exchange = (
-            exchange + literal.spring_torque(q[0], tree) @ coordinates.difference(q[0], np.array(tree.rest)) / 2.0
-        )
+        stretch = coordinates.difference(q[0], np.array(tree.rest))
+        exchange = exchange + literal.spring_torque(q[0], tree) @ stretch / 2.0
     slides = [i for kind, _, by in coordinates.places.joints if kind == "slide" for i in range(by.start, by.stop)]
     weight = np.linalg.norm(tree.gravity) * np.sum(tree.mass)
     lifted = weight * np.abs(coordinates.difference(q, q[0])[:, slides]).sum(axis=1)
     stiff = np.sum(tree.stiffness) + (np.trace(tree.position_gain) if tree.position_gain else 0.0)
-    rounding = FACTOR * EPS * (sum_of_inertias(tree, tuple(q[0].tolist())) + stiff)
+    rounding = FACTOR * EPS * (np.trace(Entries(tree, q[:1]).mass_matrix[0]) + stiff)
     return np.maximum(exchange, np.maximum.accumulate(np.abs(done) + lifted)) + rounding
-
-
-@lru_cache(maxsize=64)
-def sum_of_inertias(tree: tmt.Tree, q: tuple[float, ...]) -> float:
-    """The trace of Mbar at positions (nq,), kg m2 and kg; cached, since many runs start at the same ones."""
-    inertia, _ = mass_matrix_and_bias(tree, list(q), [0.0] * tree.coordinates.nv)
-    return float(np.trace(np.array(inertia, dtype=float)))
 
 
 def number_or_none(number: float | None) -> float | None:

@@ -58,11 +58,6 @@ def mass_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     return np.abs(literal.mass_matrix(q, tree)).max(axis=(1, 2))
 
 
-def condition(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
-    """Condition number of Mbar in the 2-norm, (states,)."""
-    return np.linalg.cond(literal.mass_matrix(q, tree))
-
-
 def acceleration_scale(tree: tmt.Tree, q: np.ndarray, force: ArrayLike, size: ArrayLike | None = None) -> np.ndarray:
     """|Mbar^-1| (|Mbar| |qdd| + force), rad/s2, (states,): the effect of errors of eps in Mbar and in the force on qdd.
 

@@ -30,21 +30,13 @@ def fastest(runs: dict[object, Callable], rounds: int) -> dict[object, float]:
     return {name: min(taken) for name, taken in zip(runs, in_turns(list(runs.values()), rounds))}
 
 
-def cpu() -> str:
-    """The processor's name."""
-    return first_line("model name") or platform.processor() or "unknown"
-
-
 def vectors() -> str:
     """The processor's name and its widest vectors, where the system reports them."""
-    flags = (first_line("flags") or first_line("Features")).split()
-    return f"{cpu()}, {next((name for flag, name in WIDTHS if flag in flags), 'vector width unknown')}"
-
-
-def first_line(name: str) -> str:
-    """The first value of this name in /proc/cpuinfo; "" on other systems."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
-        return ""
-    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith(name)), "")
+        lines = []
+    fields = {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in lines)}
+    flags = fields.get("flags", fields.get("Features", "")).split()
+    width = next((name for flag, name in WIDTHS if flag in flags), "vector width unknown")
+    return f"{fields.get('model name') or platform.processor() or 'unknown'}, {width}"

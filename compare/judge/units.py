@@ -2,21 +2,14 @@
 
 from collections.abc import Sequence
 
-RAD = "_rad"
-
 
 def renamed(rows: Sequence[dict], unit: str) -> list[dict]:
     """Rows with the suffix _rad of columns replaced by a column `unit`, unless the unit is rad."""
     if unit == "rad":
         return list(rows)
-    return [{name.removesuffix(RAD): value for name, value in row.items()} | {"unit": unit} for row in rows]
+    return [{name.removesuffix("_rad"): value for name, value in row.items()} | {"unit": unit} for row in rows]
 
 
 def value(row: dict, name: str) -> object:
     """The value of a column, with or without the suffix _rad."""
-    return row[name + RAD] if name + RAD in row else row[name]
-
-
-def said(text: str, unit: str) -> str:
-    """A text with the unit rad replaced."""
-    return text if unit == "rad" else text.replace(" rad", f" {unit}").replace(RAD, "")
+    return row[name + "_rad"] if name + "_rad" in row else row[name]

@@ -50,13 +50,6 @@ class Claims(NamedTuple):
     figures: Mapping[str, int]  # number of the printed figure, by scene
 
 
-class Conditioning(NamedTuple):
-    """The claimed maximum of the condition number of Mbar: two joints and their angles, deg; all others are 0."""
-
-    joints: tuple
-    worst: tuple  # also with the opposite sign of the first
-
-
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A robot: a file for MuJoCo, the numbers that are compared with it, and scenes.
@@ -83,7 +76,6 @@ class Robot:
     axes: tuple[str, str, str] = ("x", "y", "z")  # labels of the inertial frame
     printed: tuple[Printed, ...] = ()
     claims: Claims | None = None
-    conditioning: Conditioning | None = None
     questions: tuple[Question, ...] = ()
     remarks: Callable | None = None  # (answers by item, dynamics by engine) -> Findings about the printed results
     features: tuple = ()  # of a file, see engines.mujoco.inventory; its numbers are those that MuJoCo compiled
@@ -162,7 +154,6 @@ class Robot:
             scenes=tuple(replace(scene, locked=renamed(scene.locked)) for scene in self.scenes),
             symbols={called[joint]: symbol for joint, symbol in self.symbols.items()},
             printed=tuple(item._replace(sizes=renamed(item.sizes)) for item in self.printed),
-            conditioning=self.conditioning and self.conditioning._replace(joints=renamed(self.conditioning.joints)),
         )
 
     def symbol(self, joint: str) -> str:

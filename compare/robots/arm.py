@@ -8,7 +8,7 @@ import numpy as np
 import tmt
 
 from ..judge.finding import Finding
-from . import Claims, Conditioning, Printed, Question, Robot
+from . import Claims, Printed, Question, Robot
 from .case import Scene
 
 POSTURES = {  # deg, (alpha, beta, gamma); the assignment's named postures
@@ -108,7 +108,6 @@ ARM = Robot(
     axes=("x north", "y west", "z up"),
     printed=PRINTED,
     claims=CLAIMS,
-    conditioning=Conditioning(("beta", "gamma"), (90.0, 90.0)),
     questions=QUESTIONS,
     remarks=remarks,
 )

@@ -51,17 +51,6 @@ class Sample:
             return self
         return Sample(self.tree, self.name, *(a[:count] for a in (self.q, self.qd, self.tau)), 0, self.states[:count])
 
-    def each(self) -> list["Sample"]:
-        """A sample for each named state."""
-        singles = []
-        for i, name in enumerate(self.states):
-            exact_states = int(i < self.exact_states)
-            values = (a[i : i + 1] for a in (self.q, self.qd, self.tau))
-            single = Sample(self.tree, name, *values, exact_states, (name,))
-            single.truths = self.truths[i : i + 1]
-            singles.append(single)
-        return singles
-
 
 def named(robot: Robot) -> Sample:
     """The named postures, or all joints at zero, with random speeds and torques."""
@@ -80,7 +69,9 @@ def random(robot: Robot, states: int, exact_states: int, seed: int = SEED) -> Sa
     rng, wanted, exact_wanted = np.random.default_rng(seed), states, exact_states
     states = min(wanted, max(1, MOST_NUMBERS // (3 * len(robot.tree.mass) * robot.coordinates.nv)))
     exact_states = min(exact_wanted, states, affordable(robot) - of_named(robot))
-    notes = [Finding("shared", "large_robot", {"count": states, "states": wanted})] * (states < wanted)
+    notes = [Finding("shared", "fewer_states", {"count": states, "states": wanted, "seconds": None})] * (
+        states < wanted
+    )
     if exact_states < min(exact_wanted, states):
         values = {"count": exact_states, "sample": f"{exact_wanted} random states", "seconds": seconds(robot)}
         notes.append(Finding("shared", "exact_values", values))

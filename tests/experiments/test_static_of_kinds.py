@@ -5,11 +5,9 @@ import pytest
 from edited import CART, STONE, setup_between
 from models import random_tree
 
-from compare.engines.mujoco.dynamics import convective_accelerations
 from compare.experiments import acceleration, figures_sketch, gravity, kinematics, mass
 from compare.experiments import figures as draw
 from compare.judge.check import Result
-from compare.judge.entries import scales
 from compare.report.text import say
 
 MODULES = (kinematics, mass, gravity, acceleration)
@@ -21,7 +19,8 @@ ROBOTS = {
     "nothing acts at rest": f'<mujoco><option gravity="0 0 0"/><worldbody><body><joint axis="0 0 1"/>{BODY}',
     "slides alone": '<mujoco><worldbody><body><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 1"/>'
     + BODY,
-    "no exact gradient": f'<mujoco><worldbody><body><joint type="ball" stiffness="3"/>{BODY}',
+    "a ball with a spring": f'<mujoco><worldbody><body><joint type="ball" stiffness="3"/>{BODY}',
+    "a slide after a ball": f'<mujoco><worldbody><body><joint type="ball"/><joint type="slide" axis="1 0 0"/>{BODY}',
 }
 
 
@@ -31,11 +30,11 @@ SEEDED = {  # an error in a file: the checks that must fail
     "the armature of a ball": (CART, 'armature="0.01"', 'armature="0.01000001"', ["mass Mbar", "acceleration qdd"]),
     "where a slide's spring rests": (
         CART, 'springref="0.1"', 'springref="0.100001"',
-        ["gravity holding torque, springs", "gravity qdd", "acceleration qdd", "acceleration potential"]),
+        ["gravity holding torque, springs", "acceleration qdd", "acceleration potential"]),
     "a ball's centre": (CART, 'pos="0 0.01 0"', 'pos="0 0.010001 0"', ["kinematics T_b", "acceleration bias"]),
     "a free body's centre of mass": (
         STONE, "0.03 -0.02 0.05", "0.030001 -0.02 0.05",
-        ["kinematics x_b", "acceleration dlinear momentum", "acceleration dangular momentum"]),
+        ["kinematics x_b", "acceleration bias"]),
 }  # fmt: skip
 
 
@@ -74,28 +73,12 @@ def test_an_error_of_a_number_fails_the_checks_that_depend_on_it(text, old, new,
     assert all(any(name.startswith(named) for name in failed) for named in expected)
 
 
-def test_a_wrong_rate_of_mujocos_jacobian_is_named_and_decides_nothing():
-    """mj_jacDot of MuJoCo 4.0 leaves out what a ball does to a slide after it: found by central differences."""
-    model = f'<mujoco><worldbody><body><joint type="ball"/><joint type="slide" axis="1 0 0"/>{BODY}'
-    setup = setup_between(model, states=10)
-    result, sample, tree = kinematics.rows(setup), setup.random, setup.robot.tree
-    assert failing(result) == []
-    dynamics, scale = setup.compared()["mujoco"], scales(tree, True, sample.q, sample.qd).v_conv
-    by_rates, _ = dynamics.convective_terms(sample.q, sample.qd)
-    by_accelerations, _ = convective_accelerations(dynamics, sample.q, sample.qd)
-    wrong, right = (kinematics.wrong_rates(setup, sample, found, scale) for found in (by_rates, by_accelerations))
-    is_wrong = np.abs(by_rates - by_accelerations).max() > 1e-3
-    assert bool(wrong) == is_wrong == any(note.kind == "wrong_rates" for note in result.notes)
-    by_hand = kinematics.wrong_rates(setup, sample, by_accelerations + 0.1, scale)
-    assert right is None and by_hand["by_rates"] == pytest.approx(0.1, abs=1e-3) and by_hand["by_accelerations"] < 1e-4
-
-
 def test_the_caption_of_distances_says_who_is_how_far_from_what():
     curves = {"TMT to MuJoCo": [1.0, 5.0], "TMT to exact": [1.5, 2.0], "MuJoCo to exact": [2.5, 3.0]}
     of_bias = {name: np.array([0.5, 0.7]) for name in curves}
     of_mass = {name: np.array(values) for name, values in curves.items()}
     result = Result("mass", curves={"random states": {"Mbar": of_mass, "bias": of_bias}})
-    *_, caption = draw.draw_distances(result, "random states")
-    expected = {"worst": 5.0, "of_worst": "Mbar", "exact": {"states": 2, "ours": 2.0, "theirs": 3.0}}
+    *_, caption = draw.draw_distances(result, ["Mbar", "bias"])
+    expected = {"worst": 5.0, "of_worst": "Mbar", "exact": True}
     assert caption.kind == "distances" and {name: caption.values[name] for name in expected} == expected
-    assert all(number in say(caption) for number in ("5 eps", "2 eps", "3 eps"))
+    assert "5 eps" in say(caption)

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from compare.judge.check import Result, closest, largest, worst_of_each
+from compare.judge.check import Result, closest, worst_of_each
 from compare.robots.arm import ARM
 from compare.robots.states import Sample
 
@@ -130,4 +130,4 @@ def test_every_component_of_a_state_is_compared():
     for place in ((0, 0), (1, 2), (2, 2)):
         values = np.zeros((4, 3, 3))
         values[(2, *place)] = -3.0
-        assert largest(values).tolist() == [0.0, 0.0, 3.0, 0.0]
+        assert worst_of_each(values, 1.0)[0].tolist() == [0.0, 0.0, 3.0, 0.0]

@@ -10,7 +10,7 @@ from small_runs import Lines
 from compare.experiments import figures_overview, module, stability
 from compare.experiments.speed import first_screen as of_speed
 from compare.experiments.speed.first_screen import Cheapest, Curve
-from compare.judge.check import About, Result, agreement_headline
+from compare.judge.check import About, Result
 from compare.report.questions import answers
 from compare.report.style import BLUE, ORANGE, RED
 from compare.report.text import say
@@ -145,8 +145,6 @@ PRINTED = {"published": 1.0, "tmt": 1.1, "mujoco": 0.9, "tolerance": 0.11}
 
 
 def headline_of(name, of):
-    if name == "gravity":
-        of.result.headline = agreement_headline(of.result)
     with_headline(module(name), of.result)
     return headline(of)
 

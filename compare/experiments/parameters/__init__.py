@@ -1,22 +1,23 @@
-"""The compiled model compared with the stated numbers."""
+"""The compiled model compared with the stated numbers, or with those of a solution as MuJoCo compiled it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
 
 import tmt
 
+from ...engines.mujoco.inventory import MODELLED
 from ...engines.mujoco.parameters import STATED_FLAGS, parameters
 from ...judge.check import Result
+from ...judge.finding import Finding
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...robots.case import Coordinates
 from .. import Experiment
 from ..setup import Setup
-from . import file, solution
-from .first_screen import headline as headline
-from .numbers import ABSENT, check_forces, compare_number, rows_of
+from . import file
+from .numbers import ABSENT, cause, check_forces, compare_number, rows_of
 
 EXPERIMENT = Experiment(order=10, serves_own=False)
 # numbers of the whole file, and those of bodies; the others are of joints
@@ -27,16 +28,35 @@ UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gra
     "mass": "kg", "com": "m", "inertia": "kg m2", "rest": "rad", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
     "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
-UNITS_OF_SLIDES = {
-    "ref": "m",
-    "rest": "m",
-    "damping": "N s/m",
-    "armature": "kg",
-    "stiffness": "N/m",
-    "frictionloss": "N",
-}
+OF_SLIDES = {"rad": "m", "N m s/rad": "N s/m", "kg m2": "kg", "N m/rad": "N/m", "N m": "N"}  # units
 WHOLE_NUMBERS = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")
 AT_TIMES = ("limited", "contact pairs")  # these act at some states only: causes come after those that always act
+MAY_DIFFER = "contact", "limit", "clamp", "actuator"  # the equations of motion without them do not depend on these
+
+
+def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict:
+    """The numbers of a Tree by quantity: arrays per joint, speed, position or body, or one. joints, bodies: in this order."""
+    anchors = []
+    for parent, offset in zip(tree.parent, tree.offset):
+        anchors.append(np.array(offset) + (anchors[parent] if parent >= 0 else 0.0))
+    places = [tree.coordinates.joints[j] for j in joints]
+    positions, speeds = ([i for place in places for i in range(place[k].start, place[k].stop)] for k in (1, 2))
+    numbers = {-1: -1} | {j: i for i, j in enumerate(joints)}
+    is_sprung = np.repeat([tree.stiffness[j] > 0.0 for j in joints], [at.stop - at.start for _, at, _ in places])
+    return {
+        "parent": np.array([numbers[tree.parent[j]] for j in joints]),
+        "axis": np.array(tree.axis)[speeds],
+        "anchor": np.array(anchors)[joints],
+        "ref": np.array(tree.reference)[joints],
+        "damping": np.array(tree.damping)[speeds],
+        "armature": np.array(tree.armature)[speeds],
+        "stiffness": np.array(tree.stiffness)[joints],
+        "rest": np.array(tree.rest)[positions] * is_sprung,
+        "mass": np.array(tree.mass)[bodies],
+        "com": np.array(tree.com)[bodies],
+        "inertia": np.array(tree.inertia)[bodies],
+        "gravity": np.array(tree.gravity),
+    }
 
 
 def stated(tree: tmt.Tree) -> dict:
@@ -44,7 +64,7 @@ def stated(tree: tmt.Tree) -> dict:
     n, m = len(tree.hinge_names), len(tree.body_names)
     absent = {"frictionloss": n, "limited": n, "gravcomp": m}
     absent |= dict.fromkeys(("density", "viscosity", "other mass", "tendon armature", *ABSENT), 1)
-    numbers = solution.numbers_of(tree, range(n), range(m))
+    numbers = numbers_of(tree, range(n), range(m))
     del numbers["rest"]
     zeros = {name: np.zeros(count) for name, count in absent.items()}
     return zeros | dict.fromkeys(STATED_FLAGS, 1.0) | {"order": range(n)} | numbers
@@ -62,27 +82,33 @@ def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
 
 def rows(setup: Setup) -> Result:
     """One row for each number; one check for each quantity of each joint or body; the causes that follow."""
-    robot = setup.robot
+    robot, reading = setup.robot, setup.reading
     if not robot.is_stated:
         return file.rows_of_file(setup)
     result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit"])
     tree, dynamics, causes = robot.tree, setup.compared()["mujoco"], []
-    if robot.stated_in:
-        stated_numbers, compiled = solution.compared_numbers(setup)
+    if robot.stated_in:  # a solution: its joints and bodies are looked up in the file
+        joints = [reading.tree.hinge_names.index(name) for name in tree.hinge_names]
+        bodies = [reading.bodies.index(body) for body in setup.engines["mujoco"].bodies]
+        numbers_stated = numbers_of(tree, range(len(joints)), range(len(bodies)))
+        compiled = numbers_of(reading.tree, joints, bodies)
     else:
-        stated_numbers, compiled = stated(tree), parameters(dynamics)
-    for quantity in (name for name in UNITS if name in stated_numbers):
-        numbers = np.asarray(stated_numbers[quantity], dtype=float)
+        numbers_stated, compiled = stated(tree), parameters(dynamics)
+    slides = {joint for joint, kind in zip(tree.hinge_names, tree.kind) if kind == "slide"}
+    for quantity in (name for name in UNITS if name in numbers_stated):
+        numbers = np.asarray(numbers_stated[quantity], dtype=float)
         values = np.asarray(compiled[quantity], dtype=float)
         names = owners(tree, quantity)
-        is_whole = quantity in WHOLE_NUMBERS and not (quantity == "ref" and robot.stated_in)
+        is_whole = quantity in WHOLE_NUMBERS
         for owner, a, b in zip(names, numbers.reshape(len(names), -1), values.reshape(len(names), -1)):
-            size, unit = np.abs(numbers if robot.stated_in else a).max(), unit_of(tree, owner, quantity)
-            words, tolerance = words_of_numbers(tree, quantity), FACTOR * EPS * size
+            unit, tolerance = UNITS[quantity], FACTOR * EPS * np.abs(numbers if robot.stated_in else a).max()
+            if owner in slides and quantity not in (*OF_BODIES, "anchor"):
+                unit = OF_SLIDES.get(unit, unit)
+            words = dict(enumerate(("the world", *tree.hinge_names), start=-1)) if quantity == "parent" else {}
             causes += compare_number(result, owner, quantity, a, b, unit, tolerance, is_whole, words)
             result.rows += rows_of(owner, quantity, a, b, unit)
     if robot.stated_in:
-        causes += solution.compare_features(result, setup)
+        causes += compare_features(result, robot)
         check_forces(result, setup)
         file.add_inventory(result, robot.features)
     else:
@@ -91,16 +117,35 @@ def rows(setup: Setup) -> Result:
     return result
 
 
-def unit_of(tree: tmt.Tree, owner: str, quantity: str) -> str:
-    is_slide = dict(zip(tree.hinge_names, tree.kind)).get(owner) == "slide" and quantity not in OF_BODIES
-    return UNITS_OF_SLIDES.get(quantity, UNITS[quantity]) if is_slide else UNITS[quantity]
+def compare_features(result: Result, robot: Robot) -> list[dict]:
+    """Checks that features without a term in the equations are as many as in the solution; the causes where they are not."""
+    causes, (ours, theirs) = (
+        [],
+        ({f.feature: f for f in features} for features in (robot.features, robot.features_stated)),
+    )
+    for name, feature in (theirs | ours).items():
+        if feature.treatment == MODELLED or name in MAY_DIFFER:
+            continue
+        number, compiled = (float(features[name].count if name in features else 0) for features in (theirs, ours))
+        if not result.check("file", f"{name}, how many", compiled, number, "", rule="equal").passed:
+            text = f"{name}: {number:g} in {robot.stated_in}, {compiled:g} in this file"
+            causes.append(cause(2, name, number, compiled, text, 1.0, name))
+    return causes
 
 
-def words_of_numbers(tree: tmt.Tree, quantity: str) -> dict[int, str]:
-    """Words for numbers that are flags or indices."""
-    if quantity == "parent":
-        return dict(enumerate(("the world", *tree.hinge_names), start=-1))
-    return {0: "disable", 1: "enable"} if quantity.startswith("flag ") else {}
+def headline(result: Result) -> Finding | None:
+    """How many numbers are equal to the stated ones to the last bit, and the one with the largest relative difference."""
+    rows = [row for row in result.rows if row.get("stated") is not None and not row.get("asked_by")]
+    sizes = {}  # of each quantity of a joint or body, as for its tolerance: rounding of a stated zero is no large difference
+    for row in rows:
+        kind = row["of"], row["quantity"]
+        sizes[kind] = max(sizes.get(kind, 0.0), abs(row["stated"]))
+    off = [row for row in rows if row["difference"] != 0.0]
+    with np.errstate(divide="ignore"):
+        top = max(
+            off, key=lambda row: np.divide(abs(row["difference"]), sizes[row["of"], row["quantity"]]), default=None
+        )
+    return result.finding("headline", numbers=len(rows), off=len(off), top=top) if rows else None
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:

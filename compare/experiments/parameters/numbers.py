@@ -1,7 +1,4 @@
-"""A number, vector or tensor of the model, stated and compiled: its rows, its check, a cause for each component that differs.
-
-And the check that no other forces act.
-"""
+"""A number of the model, stated and compiled: its rows, check and causes; and the check that no other forces act."""
 
 from collections.abc import Mapping, Sequence
 
@@ -16,19 +13,13 @@ from ..setup import Setup
 
 # without a counterpart in the equations
 ABSENT = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
+OF_FORCES = (*ABSENT, "stiffness", "density", "viscosity", "gravcomp", "limited", "frictionloss")  # explain a force
 OPTIONS = (*STATED_FLAGS, "order", "parent", "ref", "density", "viscosity", "contact pairs")  # causes of rank 1
-EXPLAINED = {  # forces, by the quantities that cause them
-    "springs, fluid and tendons": ("stiffness", "density", "viscosity", "gravcomp", *ABSENT[1:4]),
-    "constraints and contacts": ("limited", "frictionloss", "contact pairs"),
-}
-PASSIVE = "fluid and tendons"  # MuJoCo adds their forces to those of springs and damping
 
 
 def component(k: int, count: int) -> str:
     """The k-th of 1, 3 or 9 components by name."""
-    if count == 1:
-        return ""
-    return "xyz"[k] if count == 3 else "xyz"[k // 3] + "xyz"[k % 3]
+    return {1: ("",), 3: "xyz", 9: [a + b for a in "xyz" for b in "xyz"]}[count][k]
 
 
 def rows_of(owner: str, quantity: str, stated: Sequence, compiled: Sequence, unit: str, **more) -> list[dict]:
@@ -83,17 +74,17 @@ def cause(rank: int, place: str, stated: float, compiled: float, text: str, size
 
 
 def check_forces(result: Result, setup: Setup, causes: Sequence[dict] = ()) -> list[dict]:
-    """Checks that no forces act that the equations do not have; returns the causes of those that `causes` do not explain.
+    """Checks that no forces act that the equations do not have; these are causes unless `causes` explain them.
 
-    Of a sum with springs and damping only the rounding is allowed.
+    Fluid and tendons: MuJoCo adds their forces to those of springs and damping, of whose sum the rounding is allowed.
     """
     tree, sample, unexplained = setup.robot.tree, setup.random, []
     largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(sample.q, tree)).max()
     for source, force in setup.compared()["mujoco"].other_forces(sample.q, sample.qd).items():
-        allowed = FACTOR * EPS * float(largest) if source == PASSIVE else 0.0
+        allowed = FACTOR * EPS * float(largest) if source == "fluid and tendons" else 0.0
         most = float(np.abs(force).max())
         check = result.check(sample.name, f"no forces of {source}", most, allowed, "N m", rounding=bool(allowed))
-        if not check.passed and not any(cause["quantity"] in EXPLAINED.get(source, ()) for cause in causes):
+        if not check.passed and not any(cause["quantity"] in OF_FORCES for cause in causes):
             place = f"forces of {source}"
             text = f"{place}: stated none, up to {most:.3g} N m at random states"
             unexplained.append(cause(2, place, 0.0, most, text, np.inf, place))

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from ...judge.check import Result, closest, worst_of_each
-from ...judge.entries import scales
+from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots.case import SEED, Case, Coordinates
 from ...robots.states import seconds
@@ -90,7 +90,7 @@ def sub_block_differences(
         q[:, places[name].q], v[:, places[name].qd] = position, 0.0
     free_q = [i for name in case.joints for i in range(places[name].q.start, places[name].q.stop)]
     free = [i for name in case.joints for i in range(places[name].qd.start, places[name].qd.stop)]
-    whole, left, scale = setup.compared(), setup.compared(case), scales(robot.tree, robot.is_read, q, v)
+    whole, left, scale = setup.compared(), setup.compared(case), Entries(robot.tree, q, v)
     blocks = {"Mbar": np.ix_(range(len(q)), free, free), "bias": np.ix_(range(len(q)), free)}
     of_scale = {"Mbar": scale.mass_matrix, "bias": scale.bias}
     for quantity, block in blocks.items():

@@ -47,7 +47,7 @@ EDITS = (
     Edit("verdict", "standing", "if differing:\n _1", "pass", "the line of an experiment whose checks fail says pass"),
     Edit("report.document", "Document.pictures", "any(one in wrong for one in of)", "False",
          "the picture that shows what fails is not marked"),
-    Edit("judge.check", "agreement_headline", "max(finite, *_1)", "min(finite, *_1)", "its line has the best difference"),
+    Edit("quantities", "headline", "max(rows, *_1)", "min(rows, *_1)", "its line has the best difference"),
     Edit("published", "headline", "all(_1)", "any(_1)", "a printed number that one engine meets is met by both"),
     Edit("judge.check", "largest_known", "max(known)", "min(known)", "the picture has the least distance"),
     Edit("stability.limits", "summary", "max(_1, default=0.0)", "min(_1, default=0.0)",
@@ -56,9 +56,7 @@ EDITS = (
          "the best row of each group is shown"),
     Edit("report.document", "Document.body", "_1 <= MOST_LINES", "False", "report.md is always as short as can be"),
     # what is drawn, and said of it
-    Edit("experiments.figures", "draw_distances", "max((largest_of(curves[q][f'{label} to MuJoCo']), q) for q in quantities)",
-         "min((largest_of(curves[q][f'{label} to MuJoCo']), q) for q in quantities)", "the least distance is told as the largest"),  # noqa: E501
-    Edit("experiments.figures", "draw_distances", "(label, 'MuJoCo')", "('MuJoCo', label)", "the caption exchanges the engines"),
+    Edit("experiments.figures", "draw_distances", "max(maxima)", "min(maxima)", "the least distance is told as the largest"),
     Edit("figures_runs", "draw_held", "curve['left']['tmt']", "curve['left']['mujoco']", "MuJoCo's departure is told of TMT"),
     Edit("figures_runs", "draw_held", "ours, theirs = _1", "theirs, ours = _1", "the caption exchanges the engines"),
     Edit("figures_runs", "run_caption", "largest_known(_1)", "min(_1)", "the least use of the band is told as the most"),
