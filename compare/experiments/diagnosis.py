@@ -6,18 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-import tmt
 from tmt import literal
 
 from ..diagnosis import STATES_ASKED, Diagnosis, Values, diagnose_stated, packed
 from ..diagnosis.cause import Cause
 from ..diagnosis.consistency import Condition, conditions
-from ..diagnosis.forces import causes_of_forces, force_left_over
+from ..diagnosis.forces import causes_of_forces, force_left_over, tolerance_of_forces
 from ..engines.own import QUICK, OwnDynamics
 from ..judge.check import Result, over
-from ..judge.entries import Entries
 from ..judge.finding import Finding
-from ..judge.scale import EPS, FACTOR
 from ..report.text import say
 from ..robots import Robot
 from . import Experiment
@@ -37,11 +34,11 @@ class Found(NamedTuple):
     engine: str
     states: int
     conditions: list[Condition]  # on Mbar and h of a user's own; [] of MuJoCo's
+    too_slow: bool  # whether the conditions were skipped because the equations take too long
     diagnosis: Diagnosis  # of Mbar and h
     ratio: float  # of a difference of Mbar or h to its tolerance, the largest
     of_forces: tuple[Cause, ...]  # what else acts in the accelerations
     force_ratio: float  # of a force left over to its tolerance, the largest
-    too_slow: bool = False  # whether the conditions were skipped because the equations take too long
 
     @property
     def causes(self) -> list[Cause]:
@@ -50,12 +47,7 @@ class Found(NamedTuple):
 
     @property
     def stated_by(self) -> str:
-        return stated_by(self.engine == "own")
-
-
-def stated_by(is_own: bool) -> str:
-    """How joints are stated: see `Cause.text`."""
-    return "option" if is_own else ""
+        return "option" if self.engine == "own" else ""
 
 
 def diagnosed(setup: Setup) -> Found:
@@ -68,10 +60,8 @@ def diagnosed(setup: Setup) -> Found:
 def search(setup: Setup) -> Found:
     tree, sample, name = setup.robot.tree, setup.random.first(STATES_ASKED), "own" if setup.robot.own else "mujoco"
     given, (q, qd, tau) = setup.engines[name].of(setup.robot.case()), (sample.q, sample.qd, sample.tau)
-    M, h = np.asarray(given.mass_matrix(q)), np.asarray(given.bias(q, qd))
-    scale, nv = Entries(tree, q, qd), tree.coordinates.nv
-    sizes = np.broadcast_to(scale.mass_matrix, M.shape), np.broadcast_to(scale.bias, h.shape)
-    values = Values(q, qd, M, h, tuple(FACTOR * EPS * size for size in sizes))
+    M, h, qdd = (np.asarray(part) for part in (given.mass_matrix(q), given.bias(q, qd), given.acceleration(q, qd, tau)))
+    values = Values.of(tree, q, qd, M, h)
 
     def bias(qd: np.ndarray) -> np.ndarray:
         return np.asarray(given.bias(q, qd))
@@ -82,20 +72,18 @@ def search(setup: Setup) -> Found:
         diagnosis = diagnose_stated(tree, given.equations.joints, values, SECONDS, of_speeds)
     else:
         met, too_slow, diagnosis = [], False, values.diagnosis(tree, SECONDS, bias)
-    right = packed(literal.mass_matrix(q, tree), literal.bias(q, qd, tree), nv, len(q))
-    ratio = largest_ratio(over(np.abs(packed(M, h, nv, len(q)) - right), packed(*values.tolerances, nv, len(q))))
-    qdd = np.asarray(given.acceleration(q, qd, tau))
-    acting, allowed = force_left_over(tree, q, qd, tau, M, h, qdd), tolerance_of_force(tree, q, qd, tau, M, h, qdd)
-    force_ratio = largest_ratio(over(np.abs(acting), allowed))
-    of_forces = causes_of_forces(tree, q, qd, tau, h, acting, allowed) if 1.0 < force_ratio < np.inf else ()
-    return Found(name, len(q), met, diagnosis, ratio, of_forces, force_ratio, too_slow)
+    off = packed(M, h) - packed(literal.mass_matrix(q, tree), literal.bias(q, qd, tree))
+    acting, allowed = force_left_over(tree, q, qd, tau, M, h, qdd), tolerance_of_forces(tree, q, qd, tau, qdd)
+    of_forces = causes_of_forces(tree, q, qd, tau, h, acting, allowed)
+    ratios = largest_ratio(off, packed(*values.tolerances)), largest_ratio(acting, allowed)
+    return Found(name, len(q), met, too_slow, diagnosis, ratios[0], of_forces, ratios[1])
 
 
 def conditions_of(given: OwnDynamics, values: Values) -> tuple[list[Condition], bool]:
     """The conditions at as many of the states as there is time for, and whether that is none."""
-    q, qd = values.q, values.qd
-    if not (np.isfinite(values.mass_matrix).all() and np.isfinite(values.bias).all()):
+    if not values.are_finite:
         return [], False
+    q, qd = values.q, values.qd
     calls = CALLS_OF_CONDITIONS + CALLS_FOR_A_JOINT * given.coordinates.nv
     count = given.equations.affordable(calls * len(q), SECONDS_OF_CONDITIONS) // calls
     if count == 0:
@@ -104,18 +92,9 @@ def conditions_of(given: OwnDynamics, values: Values) -> tuple[list[Condition], 
     return [condition for condition in found if np.isfinite(condition.tolerance)], False
 
 
-def largest_ratio(ratios: np.ndarray) -> float:
-    """The largest of them; inf if one is not a number."""
-    return float(np.where(np.isfinite(ratios), ratios, np.inf).max())
-
-
-def tolerance_of_force(tree: tmt.Tree, q, qd, tau, M, h, qdd) -> np.ndarray:
-    """Of the force left over, (states, nv)."""
-    scale = Entries(tree, q, qd)
-    sizes = scale.mass_matrix + np.abs(M)
-    terms = np.einsum("sij,sj->si", sizes, np.abs(qdd)) + scale.force(tau) + np.abs(h)
-    worst = np.linalg.cond(M).max() if np.isfinite(M).all() else 1.0  # of a solver that is not backward stable
-    return FACTOR * EPS * terms * max(1.0, np.sqrt(worst))
+def largest_ratio(off: np.ndarray, tolerance: np.ndarray) -> float:
+    """Of a difference to its tolerance; inf if one is not a number."""
+    return float(over(np.where(np.isfinite(off), np.abs(off), np.inf), tolerance).max())
 
 
 def rows(setup: Setup) -> Result:
@@ -151,13 +130,8 @@ def rows(setup: Setup) -> Result:
 
 def record(cause: Cause, is_own: bool = False) -> dict:
     """A cause as a report has it."""
-    return {
-        "rank": cause.rank,
-        "place": cause.place,
-        "stated": cause.stated,
-        "found": cause.explains,
-        "text": cause.text(stated_by(is_own)),
-    }
+    text = cause.text("option" if is_own else "")
+    return {"rank": cause.rank, "place": cause.place, "stated": cause.stated, "found": cause.explains, "text": text}
 
 
 def headline(result: Result) -> Finding | None:
