@@ -9,7 +9,7 @@ from tmt import literal
 from ..diagnosis import STATES_ASKED, Values, diagnose_stated
 from ..diagnosis.cause import LEAST_STATES
 from ..diagnosis.consistency import conditions, symmetric
-from ..diagnosis.forces import causes_of_forces, force_left_over, tolerance_of_forces
+from ..diagnosis.forces import causes_of_forces, force_left_over
 from ..engines.own import QUICK
 from ..judge.finding import Finding
 from ..report.text import say
@@ -77,8 +77,7 @@ def of_equations(given: Given, values: Values) -> Why:
 def of_accelerations(given: Given, q, qd, tau, own: dict[str, np.ndarray]) -> Why:
     """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right."""
     tree, qdd, h = given.tree, own["acceleration"], literal.bias(q, qd, given.tree)
-    acting = force_left_over(tree, q, qd, tau, literal.mass_matrix(q, tree), h, qdd)
-    allowed = tolerance_of_forces(tree, q, qd, tau, qdd, given.rounding)
+    acting, allowed = force_left_over(tree, q, qd, tau, literal.mass_matrix(q, tree), h, qdd, given.rounding)
     if causes := causes_of_forces(tree, q, qd, tau, h, acting, allowed):
         return Why(say(Finding("agreement", "forces", {"causes": causes})))
     if {"mass_matrix", "bias"} <= own.keys():

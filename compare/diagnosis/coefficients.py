@@ -17,16 +17,16 @@ from ..judge.words import listed
 from ..report.text import say
 from ..robots.coordinates import Coordinates
 from .cause import TEMPLATE, Cause, Change, cause_of
-from .model import Equations, speed_coefficients
-from .places import coefficients_by_place, entry_name
+from .model import MOST_SPEEDS, Equations, coefficients_of
+from .places import entry_name
 
-MOST_SPEEDS = 6  # for which your h is evaluated at every pair of speeds
 MOST_JOINTS = 3  # whose terms are tried
 ROUNDING = 8.0  # times the tolerance of an entry: of a sum of its values at several speeds
 SHOWN = 6  # positions, and coefficients, in a sentence
 STATES_PER_TERM = 2  # at which the right expressions are known
 FIT_ROUNDING = 1e-9  # of the largest coefficient
 SAME_FACTOR = 1e-7  # of the largest of several: two numbers that are one
+SHOWN_TIMES = {-2: "-2 ", -1: "-", 1: "", 2: "2 "}
 AS_NEAR = 1.0 - 1e-6  # of the largest part of a target along one term
 COMBINATIONS = (  # numbers of terms of the right expression and of other terms, and whether these replace those
     *((1, 0, False), (1, 1, True), (0, 1, False), (1, 1, False), (2, 0, False), (2, 1, False)),
@@ -64,11 +64,9 @@ class Compared:
         right, names, entries = right_values(equations), equations.names, equations.entries
         yours = {entry: given[:, k] for k, entry in enumerate(entries) if entry[0] == "M"}
         if not equations.qd.any():
-            yours |= coefficients_by_place({}, given[:, -nv:])
+            yours |= {("gravity", i): given[:, i - nv] for i in range(nv)}
         elif self.bias is not None and nv <= MOST_SPEEDS:
-            yours |= coefficients_by_place(
-                *speed_coefficients(lambda v: np.asarray(self.bias(np.tile(v, (len(given), 1)))), nv)
-            )
+            yours |= coefficients_of(lambda v: np.asarray(self.bias(np.tile(v, (len(given), 1)))), nv)
         of_h = ROUNDING * self.tolerance[:, -nv:].max(axis=1)
         known = [
             Coefficient(place, entry_name(place, names), values, right[place],
@@ -137,12 +135,10 @@ class Compared:
 
 def right_values(equations: Equations) -> dict[tuple, np.ndarray]:
     """The right coefficients, (states,) each."""
-    values = equations.values()[0]
-    found = {entry: values[:, k] for k, entry in enumerate(equations.entries) if entry[0] == "M"}
-    if equations.nv <= MOST_SPEEDS:
-        return found | coefficients_by_place(*equations.speed_coefficients())
-    still = Equations(equations.tree, equations.q, np.zeros_like(equations.qd))
-    return found | coefficients_by_place({}, still.values()[0][:, -equations.nv :])
+    values = equations.values()[0].T
+    return {
+        entry: column for entry, column in zip(equations.entries, values) if entry[0] == "M"
+    } | equations.coefficients()
 
 
 def products(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> dict[str, np.ndarray]:
@@ -173,9 +169,8 @@ def sums(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> dict[str,
     terms = {power: column * np.ones(len(x)) for power, column in powers.items()}
     for times in sorted(product(range(-2, 3), repeat=len(hinges)), key=lambda times: sum(map(abs, times))):
         if next((k for k in times if k), 0) > 0:  # the others are the same
-            parts = [f"{k:+d} {names[hinge]}" for k, hinge in zip(times, hinges) if k]
-            called = " ".join(parts).replace("+1 ", "+").replace("-1 ", "-").removeprefix("+")
-            called = called.replace(" +", " + ").replace(" -", " - ").replace("+2", "2")
+            parts = [f"{SHOWN_TIMES[k]}{names[hinge]}" for k, hinge in zip(times, hinges) if k]
+            called = " + ".join(parts).replace("+ -", "- ")
             angle = x[:, hinges] @ np.array(times)
             for power, column in powers.items():
                 before = "" if power == "1" else f"{power} "

@@ -21,15 +21,13 @@ from .places import forces
 SHARPER = 4.0  # times the tolerance: accelerations are rounded before Mbar is multiplied by them
 
 
-def force_left_over(tree: tmt.Tree, q, qd, tau, M, h, qdd) -> np.ndarray:
-    """r, (states, nv)."""
-    return tau - np.array(tree.damping) * qd - spring_force(tree, q) - h - np.einsum("sij,sj->si", M, qdd)
-
-
-def tolerance_of_forces(tree: tmt.Tree, q, qd, tau, qdd, rounding: float = FACTOR * EPS) -> np.ndarray:
-    """Of r, (states, nv). rounding: of the scale of an entry."""
-    scale = Entries(tree, q, qd)
-    return SHARPER * rounding * scale.residual(scale.force(tau), qdd)
+def force_left_over(
+    tree: tmt.Tree, q, qd, tau, M, h, qdd, rounding: float = FACTOR * EPS
+) -> tuple[np.ndarray, np.ndarray]:
+    """r and its tolerance, (states, nv). rounding: of the scale of an entry."""
+    scale, drag = Entries(tree, q, qd), np.array(tree.damping) * qd
+    left_over = tau - drag - spring_force(tree, q) - h - np.einsum("sij,sj->si", M, qdd)
+    return left_over, SHARPER * rounding * scale.residual(scale.force(tau), qdd)
 
 
 def spring_force(tree: tmt.Tree, q: np.ndarray) -> np.ndarray | float:

@@ -5,7 +5,7 @@ positions (states,), real or complex; the derivative by a number is the imaginar
 to rounding. Each term of each body has a factor, 1 in the right equations.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -16,7 +16,6 @@ from tmt.equations import method
 from tmt.equations.vectors import ZERO, Vector
 
 from ..robots.coordinates import Coordinates
-from ..robots.joint_map import JointMap
 
 FIELDS = ("offset", "axis", "com", "inertia", "mass", "gravity", "reference", "armature")
 OF_TERM = {  # of each body; the first two of Mbar
@@ -25,6 +24,7 @@ OF_TERM = {  # of each body; the first two of Mbar
     "gyroscopic": "gyroscopic term B' (omega x I omega) of {}",
 }  # fmt: skip
 BODY_TERMS = tuple(OF_TERM)
+MOST_SPEEDS = 8  # with more, coefficients of products of speeds are not compared: there are nv^2 (nv + 1) / 2
 TINY = 1e-100  # an imaginary change, whose square vanishes
 
 
@@ -38,13 +38,11 @@ class Path(NamedTuple):
 class Equations:
     """Mbar and h of a tree at states q (states, nq), qd (states, nv).
 
-    One array of numbers for each state: the lower triangle of Mbar by rows, then h; see `entries`. With `joints` the states,
-    Mbar and h are in the user's joints, see joint_map.py.
+    One array of numbers for each state: the lower triangle of Mbar by rows, then h; see `entries`.
     """
 
-    def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, joints: JointMap | None = None):
-        self.tree, self.joints = tree, joints
-        self.q, self.qd = (q, qd) if joints is None else (joints.positions(q), joints.speeds(qd))
+    def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray):
+        self.tree, self.q, self.qd = tree, q, qd
         self.nv = len(tree.axis)
         self.stated = {name: np.array(getattr(tree, name), float) for name in FIELDS}
         self.stated["factor"] = np.ones((len(tree.mass), len(BODY_TERMS)))
@@ -78,14 +76,13 @@ class Equations:
         )
         return self.summed(changed, method.bodies(changed, list(self.q.T), list(self.qd.T)))
 
-    def speed_coefficients(self) -> tuple[dict, np.ndarray]:
-        """See `speed_coefficients`."""
+    def coefficients(self) -> dict[tuple, np.ndarray]:
+        """See `coefficients_of`."""
 
         def h(speeds: np.ndarray) -> np.ndarray:
-            qd = np.broadcast_to(speeds, self.qd.shape)
-            return Equations(self.tree, self.q, qd).values()[0][:, -self.nv :]
+            return Equations(self.tree, self.q, np.broadcast_to(speeds, self.qd.shape)).values()[0][:, -self.nv :]
 
-        return speed_coefficients(h, self.nv)
+        return coefficients_of(h, self.nv)
 
     def summed(self, tree: tmt.Tree | SimpleNamespace, bodies: Sequence) -> np.ndarray:
         """Mbar and h of some bodies, (changes, states, entries). tree: with the factor of each term of these bodies."""
@@ -104,11 +101,7 @@ class Equations:
                     M[i][j] = M[i][j] + b.mass * translation * b.T[i].dot(b.T[j]) + rotation * b.B[i].dot(turned[j])
         flat = [*(M[i][j] for i, j in zip(*self.triangle)), *h]
         count = max([np.shape(value)[0] for value in flat if np.ndim(value) == 2], default=1)
-        values = np.stack([np.broadcast_to(value, (count, len(self.q))) for value in flat], axis=-1)
-        if self.joints is None:
-            return values
-        of_M, of_h = self.joints.own_mass_matrix, self.joints.own_forces
-        return packed(of_M(self.full_mass_matrix(values)), of_h(values[..., -self.nv :]))
+        return np.stack([np.broadcast_to(value, (count, len(self.q))) for value in flat], axis=-1)
 
     def full_mass_matrix(self, values: np.ndarray) -> np.ndarray:
         """Mbar (..., nv, nv) of values (..., entries)."""
@@ -124,17 +117,19 @@ def packed(mass_matrix: np.ndarray, bias: np.ndarray) -> np.ndarray:
     return np.concatenate([np.asarray(mass_matrix)[..., i, j], bias], axis=-1)
 
 
-def speed_coefficients(bias, nv: int) -> tuple[dict, np.ndarray]:
-    """The coefficient of qd_j qd_k in the part of h that is even in the speeds, {(j, k): (states, nv)}, j <= k, and h at rest.
+def coefficients_of(bias: Callable, nv: int) -> dict[tuple, np.ndarray]:
+    """Coefficients of h, (states,) each: ("gravity", i), and ("velocity", i, j, k) of qd_j qd_k, j <= k, in h_i.
 
-    bias: speeds (nv,) -> h (states, nv).
+    bias: speeds (nv,) -> h (states, nv), of which the part that is even in the speeds is taken.
     """
     unit, even, rest = np.eye(nv), {}, bias(np.zeros(nv))
-    for j, k in zip(*map(np.ndarray.tolist, np.triu_indices(nv))):
+    pairs = zip(*map(np.ndarray.tolist, np.triu_indices(nv)))
+    for j, k in pairs if nv <= MOST_SPEEDS else ():
         speeds = unit[j] + (j != k) * unit[k]
         even[j, k] = (bias(speeds) + bias(-speeds)) / 2.0 - rest
     mixed = {(j, k): values - even[j, j] - even[k, k] for (j, k), values in even.items() if j != k}
-    return even | mixed, rest
+    rows = {("gravity", i): rest[:, i] for i in range(nv)}
+    return rows | {("velocity", i, *pair): c[:, i] for pair, c in (even | mixed).items() for i in range(nv)}
 
 
 def unit_direction(x, y, z) -> list:

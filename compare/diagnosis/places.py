@@ -12,7 +12,7 @@ import numpy as np
 import tmt
 
 from .cause import Change
-from .model import BODY_TERMS, OF_TERM, Equations, Path
+from .model import BODY_TERMS, MOST_SPEEDS, OF_TERM, Equations, Path
 
 XYZ = "xyz"
 INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
@@ -23,7 +23,6 @@ TOGETHER = {  # terms that are often left out together
 }
 EVERY_BODY = "every body"
 OF_ZERO = "zero position"  # the kind of a place
-MOST_SPEEDS = 8  # with more, coefficients of products of speeds are not tried: there are nv^2 (nv + 1) / 2
 FIT_ROUNDING = 1e-11  # of the size of a number: what a fit leaves of a number that is 0
 TURNING = ("N m s/rad", "N m/rad", "N m")
 UNITS_OF_FORCES = {"hinge": TURNING, "slide": ("N s/m", "N/m", "N"), "ball": TURNING}  # of damping, stiffness, force
@@ -150,7 +149,7 @@ def groups(tree: tmt.Tree) -> dict[str, list[int]]:
 
 
 def entry_name(entry: tuple, names: Sequence[str]) -> str:
-    """An entry of Mbar or h, "M[hip][knee]", or a coefficient of h, "h[hip], gravity"; see `coefficients_by_place`."""
+    """An entry of Mbar or h, "M[hip][knee]", or a coefficient of h, "h[hip], gravity"; see `coefficients_of`."""
     kind, *indices = entry
     if kind == "gravity":
         return f"h[{names[indices[0]]}], gravity"
@@ -159,12 +158,6 @@ def entry_name(entry: tuple, names: Sequence[str]) -> str:
         rates = f"{names[j]}'^2" if j == k else f"{names[j]}' {names[k]}'"
         return f"h[{names[i]}], coefficient of {rates}"
     return kind + "".join(f"[{names[i]}]" for i in sorted(indices))
-
-
-def coefficients_by_place(products: dict, rest: np.ndarray) -> dict[tuple, np.ndarray]:
-    """Coefficients of h, (states,) each: ("gravity", i), and ("velocity", i, j, k) of qd_j qd_k; see `speed_coefficients`."""
-    rows = {("gravity", i): values for i, values in enumerate(rest.T)}
-    return rows | {("velocity", i, *pair): values for pair, c in products.items() for i, values in enumerate(c.T)}
 
 
 def coefficients(equations: Equations) -> list[Place]:
@@ -180,18 +173,19 @@ def coefficients(equations: Equations) -> list[Place]:
         add(entry_name(entry, names), k, right[:, k])
     for name, part in {"M": slice(parts), "h": slice(parts, None), "M and h": slice(None)}.items():
         add(f"all of {name}", part, right[:, part])
-    still = Equations(equations.tree, equations.q, np.zeros_like(qd))
-    if nv > MOST_SPEEDS:
-        products, rest = {}, still.values()[0][:, -nv:]
-    else:
-        products, rest = equations.speed_coefficients()
-    for (kind, i, *pair), column in coefficients_by_place(products, rest).items():
+    of_h = equations.coefficients()
+    for (kind, i, *pair), column in of_h.items():
         name = f"{entry_name(('h', i), names)} at rest" if kind == "gravity" else entry_name((kind, i, *pair), names)
         add(name, parts + i, column * np.prod(qd[:, pair], axis=1))
     if nv > MOST_SPEEDS:
         return places
     for i, j in np.argwhere(~np.eye(nv, dtype=bool)).tolist():
-        add(f"{entry_name(('h', j), names)} at rest in {entry_name(('h', i), names)}", parts + i, rest[:, j], 0.0)
+        add(
+            f"{entry_name(('h', j), names)} at rest in {entry_name(('h', i), names)}",
+            parts + i,
+            of_h["gravity", j],
+            0.0,
+        )
     of_bias = [place for place in terms(equations) if len(place.moves) == 1 and place.moves[0][0].index[1] > 1]
     for place in of_bias:  # the factor of each term of each body in one row of h alone
         added = (equations.values({place.moves[0][0]: np.ones(1)})[0] - right)[:, -nv:]

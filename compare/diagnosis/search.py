@@ -16,7 +16,7 @@ from .fit import Fitted, OutOfTime, Search
 from .model import Equations
 from .places import OF_ZERO, all_places, entry_name
 from .slips import slips
-from .variants import Variant, conventions, program_options, values_of
+from .variants import Variant, conventions, program_options, values_in
 
 FEW = 2  # states at which conventions are tried first
 SHOWN = 12  # single explanations that leave least
@@ -125,11 +125,10 @@ def explained(search: Search, rank: int, variants: Iterable[Variant], joints: Jo
 
 def explained_by_joints(search: Search) -> list[Cause]:
     """The conventions of the joints that leave nothing. They may be many: a few states come first."""
-    equations, causes = search.equations, []
-    options = list(conventions(equations.tree))
-    for (rank, change, joints), few in zip(options, values_of(equations, [one.joints for one in options], FEW)):
-        off = (search.given[:FEW] - few) * search.weight[:FEW]
-        if np.abs(off).max() <= 1.0:
-            values = Equations(equations.tree, equations.q, equations.qd, joints).values()[0]
+    equations, causes, options = search.equations, [], list(conventions(search.equations.tree))
+    every = values_in(equations, [option.joints for option in options], FEW) if options else ()
+    for (rank, change, joints), few in zip(options, every):
+        if np.abs((search.given[:FEW] - few) * search.weight[:FEW]).max() <= 1.0:
+            (values,) = values_in(equations, [joints], len(equations.q))
             causes += explained(search, rank, [Variant(change, values)], joints)
     return causes

@@ -18,9 +18,8 @@ from ..robots.joint_map import PER_UNIT, Joint, JointMap
 from .cause import Change
 from .model import BODY_TERMS, Equations, Path, packed
 
-MAPS_AT_ONCE = 2000  # maps of the joints in one evaluation
 PARALLEL = 1e-9  # of a cosine from 1
-MOST_PERMUTED = 6  # joints: with more, only exchanges of two and the sense of one are tried
+MOST_PERMUTED = 6  # joints: with more, only the sense and the unit of one are tried
 MOST_TURNED = 4  # joints whose order and senses are tried together
 
 
@@ -104,7 +103,10 @@ def conventions(tree: tmt.Tree) -> Iterator[Convention]:
         explains = explains or ", ".join(map(str, joints))
         return Convention(rank, Change(kind, name, stated, explains), JointMap(coordinates, joints))
 
-    orders = list(other_orders(names, tree.kind))
+    orders = list(permutations(names))[1:] if len(names) <= MOST_PERMUTED else []
+    orders = [
+        order for order in orders if all((kinds[a] == "ball") == (kinds[b] == "ball") for a, b in zip(order, names))
+    ]
     for order in orders:
         yield convention(1, "order", "order of the joints", ", ".join(names), "", order)
     most = len(straight) if len(straight) <= MOST_PERMUTED else 1
@@ -120,31 +122,11 @@ def conventions(tree: tmt.Tree) -> Iterator[Convention]:
         yield convention(3, "order", "order and senses of the joints", ", ".join(names), "", order, turned)
 
 
-def other_orders(names: tuple[str, ...], kinds: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """Other orders of joints, with balls in the places of balls."""
-    if len(names) <= MOST_PERMUTED:
-        tried = permutations(range(len(names)))
-    else:
-        tried = [list(range(len(names)))[::-1]]
-        for i, j in combinations(range(len(names)), 2):
-            order = list(range(len(names)))
-            order[i], order[j] = j, i
-            tried.append(order)
-    for order in tried:
-        alike = all((kinds[i] == "ball") == (kind == "ball") for i, kind in zip(order, kinds))
-        if alike and list(order) != sorted(order):
-            yield tuple(names[i] for i in order)
-
-
-def values_of(equations: Equations, maps: Sequence[JointMap], states: int) -> Iterator[np.ndarray]:
+def values_in(equations: Equations, maps: Sequence[JointMap], states: int) -> Iterator[np.ndarray]:
     """The values at the first states with each map of the joints, (states, entries), evaluated together."""
     q, qd = equations.q[:states], equations.qd[:states]
-    for first in range(0, len(maps), MAPS_AT_ONCE):
-        some = maps[first : first + MAPS_AT_ONCE]
-        positions, speeds = (
-            [getattr(one, way)(part) for one in some] for way, part in (("positions", q), ("speeds", qd))
-        )
-        inner = Equations(equations.tree, np.concatenate(positions), np.concatenate(speeds))
-        values = inner.values()[0].reshape(len(some), states, -1)
-        for one, M, h in zip(some, inner.full_mass_matrix(values), values[..., -inner.nv :]):
-            yield packed(one.own_mass_matrix(M), one.own_forces(h))
+    positions, speeds = [one.positions(q) for one in maps], [one.speeds(qd) for one in maps]
+    inner = Equations(equations.tree, np.concatenate(positions), np.concatenate(speeds))
+    values = inner.values()[0].reshape(len(maps), len(q), -1)
+    for one, M, h in zip(maps, inner.full_mass_matrix(values), values[..., -inner.nv :]):
+        yield packed(one.own_mass_matrix(M), one.own_forces(h))

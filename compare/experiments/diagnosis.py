@@ -11,7 +11,7 @@ from tmt import literal
 from ..diagnosis import STATES_ASKED, Diagnosis, Values, diagnose_stated, packed
 from ..diagnosis.cause import Cause
 from ..diagnosis.consistency import Condition, conditions
-from ..diagnosis.forces import causes_of_forces, force_left_over, tolerance_of_forces
+from ..diagnosis.forces import causes_of_forces, force_left_over
 from ..engines.own import QUICK, OwnDynamics
 from ..judge.check import Result, over
 from ..judge.finding import Finding
@@ -25,6 +25,7 @@ SECONDS = 8.0  # of a search
 SECONDS_OF_CONDITIONS = 3.0
 CALLS_OF_CONDITIONS, CALLS_FOR_A_JOINT = 30, 16  # of Mbar and h at each state, that the conditions take, about
 CAUSE_COLUMNS = ["rank", "kind", "place", "stated", "explains", "unit", "left_over", "tied"]
+OF_ACCELERATIONS = "accelerations follow from M and h: force left over, over its tolerance"
 WHOSE_VALUES = {"own": "Your", "mujoco": "MuJoCo's"}
 
 
@@ -73,7 +74,7 @@ def search(setup: Setup) -> Found:
     else:
         met, too_slow, diagnosis = [], False, values.diagnosis(tree, SECONDS, bias)
     off = packed(M, h) - packed(literal.mass_matrix(q, tree), literal.bias(q, qd, tree))
-    acting, allowed = force_left_over(tree, q, qd, tau, M, h, qdd), tolerance_of_forces(tree, q, qd, tau, qdd)
+    acting, allowed = force_left_over(tree, q, qd, tau, M, h, qdd)
     of_forces = causes_of_forces(tree, q, qd, tau, h, acting, allowed)
     ratios = largest_ratio(off, packed(*values.tolerances)), largest_ratio(acting, allowed)
     return Found(name, len(q), met, too_slow, diagnosis, ratios[0], of_forces, ratios[1])
@@ -101,24 +102,26 @@ def rows(setup: Setup) -> Result:
     """One row for each explanation; a check of each condition, of Mbar and h, and of accelerations, whose note is the cause."""
     result, found = Result("diagnosis", shown=CAUSE_COLUMNS), diagnosed(setup)
     scene, whose, diagnosis = f"{found.states} random states", WHOSE_VALUES[found.engine], found.diagnosis
-    for condition in found.conditions:
-        if not condition.is_met:
-            result.notes.append(condition.finding)
-        note, quantity = "" if condition.is_met else condition.text, f"{whose} {condition.name}"
-        result.check(scene, quantity, condition.value, condition.tolerance, condition.unit, note, rule=condition.rule)
-    finding = result.finding("of_equations", found=found)
-    note = say(finding) if found.ratio > 1.0 or diagnosis.differs else ""
-    result.check(scene, f"{whose} M and h, largest difference over its tolerance", found.ratio, 1.0, "", note)
-    forces = result.finding("of_forces", found=found)
-    quantity = f"{whose} accelerations follow from M and h: force left over, over its tolerance"
-    result.check(scene, quantity, found.force_ratio, 1.0, "", say(forces) if found.force_ratio > 1.0 else "")
+
+    def check(name, value, tolerance, fails: bool, finding: Finding, **more) -> None:
+        result.check(scene, f"{whose} {name}", value, tolerance, note=say(finding) if fails else "", **more)
+        if fails:
+            result.notes.append(finding)
+
+    for of in found.conditions:
+        check(of.name, of.value, of.tolerance, not of.is_met, of.finding, unit=of.unit, rule=of.rule)
+    for name, ratio, kind, is_known in (
+        (
+            "M and h, largest difference over its tolerance",
+            found.ratio,
+            "of_equations",
+            diagnosis.differs or np.isfinite(found.ratio),
+        ),
+        (OF_ACCELERATIONS, found.force_ratio, "of_forces", np.isfinite(found.force_ratio)),
+    ):
+        values = {"found": found} if is_known else {}
+        check(name, ratio, 1.0, ratio > 1.0, result.finding(kind if is_known else "no_numbers", **values), unit="")
     result.rows = [{name: getattr(cause, name) for name in CAUSE_COLUMNS} for cause in found.causes]
-    if diagnosis.differs:
-        result.notes.append(finding)
-    if not np.isfinite([found.ratio, found.force_ratio]).all():
-        result.find("no_numbers")
-    elif found.force_ratio > 1.0:
-        result.notes.append(forces)
     if found.too_slow:
         result.find("too_slow")
     if not result.notes:
