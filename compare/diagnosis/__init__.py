@@ -46,20 +46,19 @@ class Values(NamedTuple):
     def are_finite(self) -> bool:
         return bool(np.isfinite(self.mass_matrix).all() and np.isfinite(self.bias).all())
 
-    def diagnosis(self, tree: tmt.Tree, seconds: float, bias: Callable | None = None) -> Diagnosis:
-        """What explains the difference from a tree's equations, see `diagnose`."""
-        given, allowed = packed(self.mass_matrix, self.bias), packed(*self.tolerances)
-        return diagnose(tree, self.q, self.qd, given, allowed, seconds, bias)
-
 
 def diagnose_stated(
-    tree: tmt.Tree, joints: JointMap, values: Values, seconds: float, bias: Callable | None = None
+    tree: tmt.Tree, joints: JointMap | None, values: Values, seconds: float, bias: Callable | None = None
 ) -> Diagnosis:
     """The diagnosis of equations whose joints are stated: what is wrong with the statement comes first, as it is to be stated.
 
-    joints: as they were stated. bias: see `diagnose`.
+    joints: as they were stated; None: not at all. bias: see `diagnose`.
     """
-    found, coordinates = values.diagnosis(tree, seconds, bias), Coordinates(tree.hinge_names, tree.kind)
+    given, allowed = packed(values.mass_matrix, values.bias), packed(*values.tolerances)
+    found = diagnose(tree, values.q, values.qd, given, allowed, seconds, bias)
+    if joints is None or joints.is_same:
+        return found
+    coordinates = Coordinates(tree.hinge_names, tree.kind)
     of_joints = [again for cause in found.causes if cause.joints and (again := restated(cause, joints, coordinates))]
     return found._replace(causes=tied([*of_joints, *(cause for cause in found.causes if not cause.joints)]))
 
@@ -67,7 +66,7 @@ def diagnose_stated(
 def restated(cause: Cause, joints: JointMap, coordinates: Coordinates) -> Cause | None:
     """A convention that was found with what was stated; None where both together cannot be stated."""
     both = joints.after(cause.joints, coordinates)
-    if both is None or joints.is_same:
-        return both and cause
+    if both is None:
+        return None
     change = Change("order", "joints", ", ".join(map(str, joints.joints)), "those of the model")
     return cause._replace(joints=both, changes=(change,) if both.is_same else cause.changes)

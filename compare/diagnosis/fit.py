@@ -1,7 +1,7 @@
 """Fits: which change of one place, or of two, explains given values; least squares over the states, many places at once."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import combinations
 from typing import NamedTuple
@@ -65,6 +65,15 @@ class Search:
         self.size = float(np.linalg.norm(self.off))
         self.sizes = np.array([place.size for place in self.places])
         self.best: list[Fitted] = []  # of what was fitted so far
+        self.is_finished = True
+
+    def in_time(self, fits: Callable[[], list[Fitted]]) -> list[Fitted]:
+        """The fits, [] where the time is over."""
+        try:
+            return fits()
+        except OutOfTime:
+            self.is_finished = False
+            return []
 
     def weighted(self, values: np.ndarray) -> np.ndarray:
         """Given values minus others, in tolerances, (..., states, entries); 0 where nothing is given."""

@@ -12,7 +12,7 @@ from ..robots.coordinates import Coordinates
 from ..robots.joint_map import Joint, JointMap, within_a_turn
 from .cause import LEAST_STATES, Cause, Diagnosis, cause_of, tied
 from .coefficients import Compared
-from .fit import Fitted, OutOfTime, Search
+from .fit import Fitted, Search
 from .model import Equations
 from .places import OF_ZERO, all_places, entry_name
 from .slips import slips
@@ -60,21 +60,14 @@ def explanation(search: Search, compared: Compared, seconds: float) -> Diagnosis
     )
     if len(np.unique(equations.q, axis=0)) < LEAST_STATES:
         return found._replace(too_few=len(equations.q))
-    singles, out_of_time = [], None
-    try:
-        singles = search.singles()
-    except OutOfTime:
-        out_of_time = seconds
+    singles = search.in_time(search.singles)
     nearest = sorted(singles, key=lambda one: one.left)[:SHOWN]
     found = found._replace(nearest=tuple((one.places[0].name, one.left) for one in nearest))
-    try:
-        for causes in ranks(search, singles, compared):
-            if causes:
-                return found._replace(causes=tied(causes))
-    except OutOfTime:
-        out_of_time = seconds
+    for causes in ranks(search, singles, compared):
+        if causes:
+            return found._replace(causes=tied(causes))
     left = min([one.left for one in search.best], default=1.0)
-    return found._replace(left=left, details=compared.details(), seconds=out_of_time)
+    return found._replace(left=left, details=compared.details(), seconds=None if search.is_finished else seconds)
 
 
 def ranks(search: Search, singles: Sequence[Fitted], compared: Compared) -> Iterator[list[Cause]]:
@@ -84,19 +77,19 @@ def ranks(search: Search, singles: Sequence[Fitted], compared: Compared) -> Iter
     wrong number, agrees with a wrong model.
     """
     of_joints, explaining = explained_by_joints(search), [fit for fit in singles if fit.explains]
-    first = explained(search, 1, program_options(search.equations)) + [cause for cause in of_joints if cause.rank == 1]
+    first = explained(search, program_options(search.equations)) + [cause for cause in of_joints if cause.rank == 1]
     first += [of_fitted(fit, 1, search) for fit in explaining if fit.places[0].rank == 1]
     if not all(cause.joints for cause in first):
         yield first
     second = [of_fitted(fit, 2, search) for fit in explaining if fit.places[0].rank == 2]
     for lists in slips(search.equations):
-        second += next(filter(None, (explained(search, 2, variants) for variants in lists)), [])
+        second += next(filter(None, (explained(search, variants) for variants in lists)), [])
     if not second and (cause := compared.cause(1)):
         second = [cause]
     yield first + second
-    pairs = [of_fitted(fit, 3, search) for fit in search.pairs(("number", OF_ZERO)) if fit.explains]
-    more = compared.cause(2)
-    yield [cause for cause in of_joints if cause.rank == 3] + pairs + ([more] if more else [])
+    pairs = search.in_time(lambda: search.pairs(("number", OF_ZERO)))
+    third = [of_fitted(fit, 3, search) for fit in pairs if fit.explains]
+    yield [cause for cause in of_joints if cause.rank == 3] + third + [compared.cause(2)] * bool(compared.cause(2))
 
 
 def of_fitted(fitted: Fitted, rank: int, search: Search) -> Cause:
@@ -113,10 +106,10 @@ def of_fitted(fitted: Fitted, rank: int, search: Search) -> Cause:
     return cause_of(rank, changes, fitted.left, joints)
 
 
-def explained(search: Search, rank: int, variants: Iterable[Variant], joints: JointMap | None = None) -> list[Cause]:
+def explained(search: Search, variants: Iterable[Variant]) -> list[Cause]:
     """The variants that leave nothing."""
     causes = []
-    for change, values in variants:
+    for change, values, rank, joints in variants:
         left = search.weighted(values)
         if np.abs(left).max() <= 1.0:
             causes.append(cause_of(rank, [change], float(np.linalg.norm(left)) / search.size, joints))
@@ -125,10 +118,10 @@ def explained(search: Search, rank: int, variants: Iterable[Variant], joints: Jo
 
 def explained_by_joints(search: Search) -> list[Cause]:
     """The conventions of the joints that leave nothing. They may be many: a few states come first."""
-    equations, causes, options = search.equations, [], list(conventions(search.equations.tree))
-    every = values_in(equations, [option.joints for option in options], FEW) if options else ()
-    for (rank, change, joints), few in zip(options, every):
+    equations, causes, variants = search.equations, [], list(conventions(search.equations.tree))
+    every = values_in(equations, [variant.joints for variant in variants], FEW) if variants else ()
+    for variant, few in zip(variants, every):
         if np.abs((search.given[:FEW] - few) * search.weight[:FEW]).max() <= 1.0:
-            (values,) = values_in(equations, [joints], len(equations.q))
-            causes += explained(search, rank, [Variant(change, values)], joints)
+            (values,) = values_in(equations, [variant.joints], len(equations.q))
+            causes += explained(search, [variant._replace(values=values)])
     return causes

@@ -23,12 +23,14 @@ def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
     for name, changed in changed_bodies(equations, bodies):
         added = [equations.summed(of_one, [b])[0] - part for b, part in zip(changed, parts)]
         variants = [
-            Variant(Change("slip", name.format(body), "no", ""), right + sum(added[b] for b in which))
+            Variant(Change("slip", name.format(body), "no", ""), right + sum(added[b] for b in which), 2)
             for body, which in groups(tree).items()
         ]
         in_mass = [
-            Variant(change._replace(place=f"{change.place} in M alone"), np.hstack([of[:, :count], right[:, count:]]))
-            for change, of in variants
+            Variant(
+                change._replace(place=f"{change.place} in M alone"), np.hstack([of[:, :count], right[:, count:]]), 2
+            )
+            for change, of, *_ in variants
         ]
         yield [variants[: len(added)], variants[len(added) :], in_mass[: len(added)], in_mass[len(added) :]]
     if "ball" not in tree.kind:
@@ -90,4 +92,4 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
     ):
         h = of_Mdot * Mdot_qd - of_gradient * gradient + rest[:, -nv:]
         change = Change("slip", name, "Mdot qd - d(qd' Mbar qd / 2)/dq", explains)
-        yield Variant(change, np.hstack([right[:, :-nv], h]))
+        yield Variant(change, np.hstack([right[:, :-nv], h]), 2)

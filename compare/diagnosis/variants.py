@@ -27,7 +27,9 @@ class Variant(NamedTuple):
     """An explanation that applies or does not."""
 
     change: Change
-    values: np.ndarray  # (states, entries)
+    values: np.ndarray | None  # (states, entries); None: not yet evaluated in its joints
+    rank: int = 1
+    joints: JointMap | None = None  # of a convention of the joints
 
 
 def program_options(equations: Equations) -> Iterator[Variant]:
@@ -82,31 +84,20 @@ def absolute_angles(tree: tmt.Tree) -> np.ndarray | None:
     return turns if (turns != np.eye(len(turns))).any() else None
 
 
-class Convention(NamedTuple):
-    """Other joints of the same equations."""
-
-    rank: int
-    change: Change
-    joints: JointMap
-
-
-def conventions(tree: tmt.Tree) -> Iterator[Convention]:
+def conventions(tree: tmt.Tree) -> Iterator[Variant]:
     """Order, senses and units of the joints; the order and the senses of a few together, rank 3."""
     names, kinds = tree.hinge_names, dict(zip(tree.hinge_names, tree.kind))
     coordinates, straight = Coordinates(names, tree.kind), [name for name in names if kinds[name] != "ball"]
 
-    def convention(rank, kind, name, stated, explains, order=names, turned=(), units=None) -> Convention:
+    def convention(rank, kind, name, stated, explains, order=names, turned=(), units=None) -> Variant:
         joints = [
             Joint(one, -1.0 if one in turned else 1.0, 0.0, (units or {}).get(one, ""), kinds[one] == "slide")
             for one in order
         ]
         explains = explains or ", ".join(map(str, joints))
-        return Convention(rank, Change(kind, name, stated, explains), JointMap(coordinates, joints))
+        return Variant(Change(kind, name, stated, explains), None, rank, JointMap(coordinates, joints))
 
     orders = list(permutations(names))[1:] if len(names) <= MOST_PERMUTED else []
-    orders = [
-        order for order in orders if all((kinds[a] == "ball") == (kinds[b] == "ball") for a, b in zip(order, names))
-    ]
     for order in orders:
         yield convention(1, "order", "order of the joints", ", ".join(names), "", order)
     most = len(straight) if len(straight) <= MOST_PERMUTED else 1

@@ -67,12 +67,10 @@ def search(setup: Setup) -> Found:
     def bias(qd: np.ndarray) -> np.ndarray:
         return np.asarray(given.bias(q, qd))
 
-    if name == "own":
-        met, too_slow = conditions_of(given, values)
-        of_speeds = bias if given.equations.seconds <= QUICK else None
-        diagnosis = diagnose_stated(tree, given.equations.joints, values, SECONDS, of_speeds)
-    else:
-        met, too_slow, diagnosis = [], False, values.diagnosis(tree, SECONDS, bias)
+    is_own = name == "own"
+    met, too_slow = conditions_of(given, values) if is_own else ([], False)
+    of_speeds = None if is_own and given.equations.seconds > QUICK else bias
+    diagnosis = diagnose_stated(tree, given.equations.joints if is_own else None, values, SECONDS, of_speeds)
     off = packed(M, h) - packed(literal.mass_matrix(q, tree), literal.bias(q, qd, tree))
     acting, allowed = force_left_over(tree, q, qd, tau, M, h, qdd)
     of_forces = causes_of_forces(tree, q, qd, tau, h, acting, allowed)
