@@ -23,6 +23,7 @@ from ..robots.states import random
 from ..robots.validation import is_number
 
 SYMBOLS_OF = {"mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd"}  # quantities and their entries
+SCALES = {"mass_matrix": "mass_matrix", "bias": "bias", "gravity": "weight"}
 DEFAULT_STATES = 100
 OWN_SECONDS = 20.0  # s for the user's functions at random states
 
@@ -130,13 +131,11 @@ class Given:
     @cached_property
     def values(self) -> dict[str, np.ndarray]:
         """The user's values of each quantity, in the model's joints, (states, ...)."""
-        return {name: self.value(name, brought) for name, brought in self.brought.items()}
-
-    def value(self, name: str, brought: object) -> np.ndarray:
-        if self.own is not None and self.own.has(name):
-            return self.asked(self.own, name)
-        values = self.table(name, brought)
-        return self.joints.mass_matrix(values) if name == "mass_matrix" else self.joints.forces(values)
+        own = self.own
+        return {
+            name: self.asked(own, name) if own is not None and own.has(name) else self.table(name, brought)
+            for name, brought in self.brought.items()
+        }
 
     def asked(self, source: object, name: str) -> np.ndarray:
         """A quantity of an engine at the states."""
@@ -144,7 +143,7 @@ class Given:
         return getattr(source, {"gravity": "gravity_balance"}.get(name, name))(*state)
 
     def table(self, name: str, brought: object) -> np.ndarray:
-        """An array of values, (states, ...), in the user's joints; a row may hold Mbar flattened by rows."""
+        """An array of values in the user's joints, in the model's, (states, ...); a row may hold Mbar flattened by rows."""
         count, nv = len(self.q), self.coordinates.nv
         array = real_numbers(brought)
         shape = (count, nv, nv) if name == "mass_matrix" else (count, nv)
@@ -154,7 +153,8 @@ class Given:
         accepted += [shape[1:]] * (count == 1) + [(count,)] * (nv == 1)
         if array.shape not in accepted:
             raise ValueError(f"{name} has shape {array.shape}; expected {shape}, its values at the given q")
-        return array.reshape(shape)
+        values = array.reshape(shape)
+        return self.joints.mass_matrix(values) if name == "mass_matrix" else self.joints.forces(values)
 
     @cached_property
     def compared(self) -> dict[str, Compared]:
@@ -163,12 +163,13 @@ class Given:
         for name, own in self.values.items():
             right = self.asked(self.mujoco, name)
             try:
-                size = scale.acceleration(scale.force(self.tau), right) if name == "acceleration" else None
+                accelerations = name == "acceleration"
+                size = (
+                    scale.acceleration(scale.force(self.tau), right) if accelerations else getattr(scale, SCALES[name])
+                )
             except np.linalg.LinAlgError:
                 text = "Mbar of the model is singular at a state: there is no acceleration to compare"
                 raise ValueError(text) from None
-            if size is None:
-                size = getattr(scale, {"gravity": "weight"}.get(name, name))
             turned = self.joints.own_mass_matrix if name == "mass_matrix" else self.joints.own_forces
             size = np.abs(turned(np.broadcast_to(size, right.shape)))
             comparisons[name] = Compared(turned(own), turned(right), size, self.rounding * size)

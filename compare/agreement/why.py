@@ -35,13 +35,11 @@ def cause_of(given: Given) -> Why:
     failing = [name for name, comparison in given.compared.items() if (comparison.ratio > 1.0).any()]
     if failing == ["acceleration"]:
         return of_accelerations(given, q, qd, given.tau[which], own)
-    h = own.get("bias")
-    if "gravity" in own and (h is None or set(failing) <= {"gravity", "acceleration"}):
+    h = own.get("bias", np.nan * qd)
+    if "gravity" in own and ("bias" not in own or set(failing) <= {"gravity", "acceleration"}):
         h, qd = own["gravity"], np.zeros_like(qd)
     M = own.get("mass_matrix", np.full((*qd.shape, qd.shape[1]), np.nan))
-    return of_equations(
-        given, Values.of(given.tree, q, qd, M, np.full_like(qd, np.nan) if h is None else h, given.rounding)
-    )
+    return of_equations(given, Values.of(given.tree, q, qd, M, h, given.rounding))
 
 
 def some_states(given: Given) -> np.ndarray:

@@ -17,7 +17,7 @@ from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..robots.coordinates import Coordinates
 from ..robots.joint_map import JointMap
-from .cause import Cause, Change, Diagnosis, tied
+from .cause import Change, Diagnosis, tied
 from .model import packed
 from .search import diagnose
 
@@ -58,15 +58,12 @@ def diagnose_stated(
     found = diagnose(tree, values.q, values.qd, given, allowed, seconds, bias)
     if joints is None or joints.is_same:
         return found
-    coordinates = Coordinates(tree.hinge_names, tree.kind)
-    of_joints = [again for cause in found.causes if cause.joints and (again := restated(cause, joints, coordinates))]
-    return found._replace(causes=tied([*of_joints, *(cause for cause in found.causes if not cause.joints)]))
-
-
-def restated(cause: Cause, joints: JointMap, coordinates: Coordinates) -> Cause | None:
-    """A convention that was found with what was stated; None where both together cannot be stated."""
-    both = joints.after(cause.joints, coordinates)
-    if both is None:
-        return None
+    coordinates, causes = Coordinates(tree.hinge_names, tree.kind), []
     change = Change("order", "joints", ", ".join(map(str, joints.joints)), "those of the model")
-    return cause._replace(joints=both, changes=(change,) if both.is_same else cause.changes)
+    for cause in found.causes:
+        both = cause.joints and joints.after(cause.joints, coordinates)
+        if both:
+            cause = cause._replace(joints=both, changes=(change,) if both.is_same else cause.changes)
+        if both or not cause.joints:  # else both together cannot be stated
+            causes.append(cause)
+    return found._replace(causes=tied(causes))

@@ -28,9 +28,8 @@ FIT_ROUNDING = 1e-9  # of the largest coefficient
 SAME_FACTOR = 1e-7  # of the largest of several: two numbers that are one
 SHOWN_TIMES = {-2: "-2 ", -1: "-", 1: "", 2: "2 "}
 AS_NEAR = 1.0 - 1e-6  # of the largest part of a target along one term
-COMBINATIONS = (  # numbers of terms of the right expression and of other terms, and whether these replace those
-    *((1, 0, False), (1, 1, True), (0, 1, False), (1, 1, False), (2, 0, False), (2, 1, False)),
-)
+# numbers of terms of the right expression and of other terms, and whether these replace those
+COMBINATIONS = ((1, 0, False), (1, 1, True), (0, 1, False), (1, 1, False), (2, 0, False), (2, 1, False))
 
 
 class Coefficient(NamedTuple):
@@ -135,10 +134,9 @@ class Compared:
 
 def right_values(equations: Equations) -> dict[tuple, np.ndarray]:
     """The right coefficients, (states,) each."""
-    values = equations.values()[0].T
-    return {
-        entry: column for entry, column in zip(equations.entries, values) if entry[0] == "M"
-    } | equations.coefficients()
+    values = equations.values()[0]
+    of_M = {entry: k for k, entry in enumerate(equations.entries) if entry[0] == "M"}
+    return {entry: values[:, k] for entry, k in of_M.items()} | equations.coefficients()
 
 
 def products(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> dict[str, np.ndarray]:

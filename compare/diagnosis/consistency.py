@@ -134,15 +134,7 @@ def gradient_at_rest(weight: Callable, coordinates: Coordinates, q: np.ndarray, 
     return [closest_to_breaking("h at rest is a gradient", curl, allowed, "N m/rad", "gradient", values)]
 
 
-def power_balance(
-    mass_matrix: Callable,
-    coordinates: Coordinates,
-    q: np.ndarray,
-    qd: np.ndarray,
-    velocity: np.ndarray,
-    of_M: np.ndarray,
-    of_h: np.ndarray,
-) -> Condition:
+def power_balance(mass_matrix: Callable, coordinates: Coordinates, q, qd, velocity, of_M, of_h) -> Condition:
     """qd' (h - h at rest) = qd' Mdot qd / 2, Mdot along the motion. of_M, of_h: rounding and noise of both, (states,)."""
     largest = np.abs(qd).max(axis=1).clip(min=1e-100)
     rates = qd / largest[:, None]  # of about 1, so that the step is one of positions

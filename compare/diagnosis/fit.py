@@ -47,14 +47,7 @@ class Search:
     end: the time.monotonic() at which OutOfTime is raised.
     """
 
-    def __init__(
-        self,
-        equations: Equations,
-        places: Sequence[Place],
-        given: np.ndarray,
-        tolerance: np.ndarray,
-        end: float = np.inf,
-    ):
+    def __init__(self, equations: Equations, places: Sequence[Place], given, tolerance, end: float = np.inf):
         self.equations, self.places, self.end = equations, list(places), end
         least = tolerance[tolerance > 0.0].min(initial=1.0)  # what is always 0 has no scale
         self.known = np.isfinite(given)

@@ -34,15 +34,7 @@ def spring_force(tree: tmt.Tree, q: np.ndarray) -> np.ndarray | float:
     return literal.spring_torque(q, tree) if tree.has_springs else 0.0
 
 
-def causes_of_forces(
-    tree: tmt.Tree,
-    q: np.ndarray,
-    qd: np.ndarray,
-    tau: np.ndarray,
-    h: np.ndarray,
-    left_over: np.ndarray,
-    tolerance: np.ndarray,
-) -> tuple[Cause, ...]:
+def causes_of_forces(tree: tmt.Tree, q, qd, tau, h, left_over, tolerance) -> tuple[Cause, ...]:
     """What explains the forces left over, r (states, nv): all causes of the first rank that has one.
 
     q: (states, nq), qd, tau, h: (states, nv). tolerance: of r, (states, nv) or what broadcasts to it.

@@ -59,7 +59,8 @@ def diagnosed(setup: Setup) -> Found:
 
 
 def search(setup: Setup) -> Found:
-    tree, sample, name = setup.robot.tree, setup.random.first(STATES_ASKED), "own" if setup.robot.own else "mujoco"
+    tree, sample, is_own = setup.robot.tree, setup.random.first(STATES_ASKED), bool(setup.robot.own)
+    name = "own" if is_own else "mujoco"
     given, (q, qd, tau) = setup.engines[name].of(setup.robot.case()), (sample.q, sample.qd, sample.tau)
     M, h, qdd = (np.asarray(part) for part in (given.mass_matrix(q), given.bias(q, qd), given.acceleration(q, qd, tau)))
     values = Values.of(tree, q, qd, M, h)
@@ -67,7 +68,6 @@ def search(setup: Setup) -> Found:
     def bias(qd: np.ndarray) -> np.ndarray:
         return np.asarray(given.bias(q, qd))
 
-    is_own = name == "own"
     met, too_slow = conditions_of(given, values) if is_own else ([], False)
     of_speeds = None if is_own and given.equations.seconds > QUICK else bias
     diagnosis = diagnose_stated(tree, given.equations.joints if is_own else None, values, SECONDS, of_speeds)
@@ -136,7 +136,6 @@ def record(cause: Cause, is_own: bool = False) -> dict:
 
 
 def headline(result: Result) -> Finding | None:
-    """The first explanation, and how many more there are."""
     return result.finding("headline", place=result.rows[0]["place"], more=len(result.rows) - 1) if result.rows else None
 
 

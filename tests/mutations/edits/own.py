@@ -31,7 +31,7 @@ EDITS = (
     Edit("agreement.given", "Given.__init__", "FACTOR * EPS + float(rtol)", "max(FACTOR, 96) * EPS + float(rtol)",
          "64 eps become 96"),
     Edit("agreement.given", "Given.fails", "comparison.ratio > 1.0", "comparison.ratio > 2.0", "twice the tolerance agrees"),
-    Edit("agreement.given", "Given.value", "self.joints.mass_matrix(values)", "values", "a table of M keeps its own joints"),
+    Edit("agreement.given", "Given.table", "self.joints.mass_matrix(values)", "values", "a table of M keeps its own joints"),
     Edit("agreement.given", "Given.take_states", "self.joints.speeds(own['qd'])", "own['qd']", "speeds keep their own joints"),
     Edit("agreement", "assert_agrees", "given.fails or given.problems", "given.fails", "a changed argument agrees"),
     Edit("agreement", "rows", "-row.ratio", "row.ratio", "the smallest ratio first"),
