@@ -146,7 +146,7 @@ def message(given: Given) -> str:
         "quantities": worst,
         "why": why.text,
         "rounded": rounded(given) if why.may_be_rounded else None,
-        "joints": list(map(str, given.joints.joints)),
+        "hinge": next((name for name, kind in zip(given.tree.hinge_names, given.tree.kind) if kind == "hinge"), ""),
     }
     text = block("agreement", "message", **values)
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())
