@@ -18,7 +18,7 @@ import numpy as np
 
 import tmt
 from compare.diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
-from compare.diagnosis.places import OF_TERM
+from compare.diagnosis.model import OF_TERM
 from compare.engines.mujoco import reading
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
@@ -210,11 +210,11 @@ def all_faults() -> list[Fault]:
 
 
 def diagnosis_of(fault: Fault, seed: int) -> Diagnosis:
-    tree, nv = fault.tree, len(fault.tree.axis)
-    q, qd = np.random.default_rng(seed).uniform(-3.0, 3.0, (2, STATES_ASKED, nv))
+    tree = fault.tree
+    q, qd = np.random.default_rng(seed).uniform(-3.0, 3.0, (2, STATES_ASKED, len(tree.axis)))
     scale = Entries(tree, q, qd)
-    allowed = FACTOR * EPS * packed(scale.mass_matrix + np.zeros((len(q), 1, 1)), scale.bias, nv, len(q))
-    return diagnose(tree, q, qd, packed(*fault.make(tree, q, qd), nv, len(q)), allowed, SECONDS)
+    allowed = FACTOR * EPS * packed(scale.mass_matrix + np.zeros((len(q), 1, 1)), scale.bias)
+    return diagnose(tree, q, qd, packed(*fault.make(tree, q, qd)), allowed, SECONDS)
 
 
 def outcome(fault: Fault) -> tuple[str, list[str]]:

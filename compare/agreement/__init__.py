@@ -14,8 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..engines.own import ARGUMENTS, state_in_words
+from ..judge.check import over
+from ..report.text import block
 from .given import Given, State
-from .message import message
 from .why import Why, cause_of
 
 __all__ = ["Difference", "State", "assert_agrees", "differences"]
@@ -24,6 +26,7 @@ Model = str | PathLike | object  # a path, MJCF text or an MjModel
 Quantity = Callable | ArrayLike | tuple | None  # a function, values, or a SymPy matrix and its symbols
 Values = ArrayLike | None
 Names = Sequence[str] | None
+LEAST_DIGITS = 2  # in common: then the constants may be rounded
 
 
 class Difference(NamedTuple):
@@ -81,7 +84,7 @@ def assert_agrees(
     __tracebackhide__ = True  # pytest shows the line of the test
     given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
     if given.fails or given.problems:
-        raise AssertionError(message(given, cause_of(given) if given.fails else Why()))
+        raise AssertionError(message(given))
 
 
 def differences(
@@ -104,19 +107,61 @@ def differences(
     The same arguments and errors as `assert_agrees`.
     """
     given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
-    cause = cause_of(given).text if given.fails else ""
-    rows = []
+    return rows(given, cause_of(given).text if given.fails else "")
+
+
+def rows(given: Given, cause: str) -> list[Difference]:
+    """Every entry of every quantity at every state, the largest ratio first."""
+    found = []
     for name, comparison in given.compared.items():
-        entries = given.entries(name)
-        places = list(np.ndindex(comparison.own.shape))
-        values = zip(
-            *(
-                part.reshape(-1).tolist()
-                for part in (comparison.own, comparison.right, comparison.tolerance, comparison.ratio)
-            )
+        entries, columns = (
+            given.entries(name),
+            (comparison.own, comparison.right, comparison.tolerance, comparison.ratio),
         )
-        for (at, *entry), (own, right, tolerance, ratio) in zip(places, values):
+        for at, own, right, tolerance, ratio in zip(np.ndindex(comparison.own.shape), *(part.flat for part in columns)):
+            numbers = map(float, (own, right, own - right, tolerance, ratio))
             why = cause if ratio > 1.0 else ""
-            state = given.states[at]
-            rows.append(Difference(name, entries[tuple(entry)], state, own, right, own - right, tolerance, ratio, why))
-    return sorted(rows, key=lambda comparison: -comparison.ratio)
+            found.append(Difference(name, entries[at[1:]], given.states[at[0]], *numbers, why))
+    return sorted(found, key=lambda row: -row.ratio)
+
+
+def message(given: Given) -> str:
+    """Which entries of which quantity are off, the worst of them, the probable cause, and what can be stated."""
+    why, quantities = cause_of(given) if given.fails else Why("", False), {}
+    for row in rows(given, why.text):
+        if row.ratio > 1.0:
+            quantities.setdefault(row.quantity, []).append(row)
+    worst = [
+        {
+            "worst": failing[0],
+            "count": len(failing),
+            "of": given.compared[name].own.size,
+            "states": len({row.state.number for row in failing}),
+            "at": state_in_words(list(map(np.array, failing[0].state[1 : 1 + ARGUMENTS[name]]))),
+        }
+        for name, failing in quantities.items()
+    ]
+    values = {
+        "given": given,
+        "quantities": worst,
+        "why": why.text,
+        "rounded": rounded(given) if why.may_be_rounded else None,
+        "hinge": next((name for name, kind in zip(given.tree.hinge_names, given.tree.kind) if kind == "hinge"), ""),
+    }
+    text = block("agreement", "message", **values)
+    return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())
+
+
+def rounded(given: Given) -> tuple[int, float] | None:
+    """To how many digits of their terms all agree, and the rtol to state if the constants are rounded.
+
+    None where a quantity is off by more than that of its own largest entry: terms far from the origin are large, and a slip is
+    small compared with them.
+    """
+    off = [(np.abs(of.own - of.right), of) for of in given.compared.values()]
+    worst = max(float(over(difference, of.scale).max()) for difference, of in off)
+    of_largest = max(float(over(difference.max(), np.abs(of.right).max())) for difference, of in off)
+    if not 0.0 < worst <= 10.0**-LEAST_DIGITS or not of_largest <= 10.0**-LEAST_DIGITS:
+        return None
+    exponent = int(np.floor(np.log10(worst)))
+    return int(-np.log10(worst)), float(f"{np.ceil(worst / 10.0**exponent):.0f}e{exponent}")

@@ -1,7 +1,6 @@
 """The arguments of assert_agrees, validated: the model, the states, each quantity of the user and of MuJoCo."""
 
 import warnings
-from collections.abc import Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -24,6 +23,7 @@ from ..robots.states import random
 from ..robots.validation import is_number
 
 SYMBOLS_OF = {"mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd"}  # quantities and their entries
+SCALES = {"mass_matrix": "mass_matrix", "bias": "bias", "gravity": "weight"}
 DEFAULT_STATES = 100
 OWN_SECONDS = 20.0  # s for the user's functions at random states
 
@@ -57,32 +57,27 @@ class Given:
 
     def __init__(self, mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed):
         brought = dict(zip(SYMBOLS_OF, (mass_matrix, bias, gravity, acceleration)))
-        brought = {name: value for name, value in brought.items() if value is not None}
+        self.brought = brought = {name: value for name, value in brought.items() if value is not None}
         if not brought:
             raise ValueError(f"nothing to compare: expected {', '.join(SYMBOLS_OF)} or some of them")
         if not is_number(rtol) or rtol < 0.0:
             raise ValueError(f"rtol is {shown(rtol)}; expected a number of at least 0")
-        self.rtol, self.brought = float(rtol), brought
+        self.rtol, self.rounding = float(rtol), FACTOR * EPS + float(rtol)
         self.read(mjcf)
-        self.are_stated = joints is not None
         self.joints: JointMap = joint_map(self.coordinates, joints)
         functions = {name: value for name, value in brought.items() if is_function(value)}
-        for name, value in brought.items():
-            if q is None and name not in functions and real_numbers(value) is None:
-                raise ValueError(f"{name} is {shown(value)}; expected a function, or an array of its values at q")
         self.own = OwnEquations(functions, self.coordinates, self.joints, self.tree, ()) if functions else None
-        if q is None:
-            alone = [f"{name} is an array of values" for name in brought if name not in functions]
-            alone += [f"{name} is given" for name, value in {"qd": qd, "tau": tau}.items() if value is not None]
-            if alone:
-                raise ValueError(f"{alone[0]}, but not q; expected q of shape (states, {self.coordinates.nq})")
-            self.take_random(states, seed)
-        else:
+        if q is not None:
             self.take_states(q, qd, tau)
             if states != DEFAULT_STATES:
-                warnings.warn(
-                    f"states={shown(states)} is not used: the {len(self.q)} states of q are compared", stacklevel=3
-                )
+                text = f"states={shown(states)} is not used: the {len(self.q)} states of q are compared"
+                warnings.warn(text, stacklevel=3)
+            return
+        for name, value in (brought | {"qd": qd, "tau": tau}).items():
+            if value is not None and name not in functions:
+                expected = f"a function, or q of shape (states, {self.coordinates.nq})"
+                raise ValueError(f"{name} is {shown(value)}, but not q is given; expected {expected}")
+        self.take_random(states, seed)
 
     def read(self, mjcf) -> None:
         from ..engines.mujoco import engine, read  # here, so that `import compare` need not wait for it
@@ -100,15 +95,14 @@ class Given:
             if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
                 raise ValueError(f"{name} is {shown(value)}; expected a whole number of at least {least}")
         sample = random(self.robot, states, 0, seed)
-        self.q, self.qd, self.tau = sample.q, sample.qd, sample.tau
         for note in sample.notes:
             warnings.warn(say(note), stacklevel=4)
-        self.own.try_at(self.q, self.qd, self.tau)
-        count = self.own.affordable(len(self.q), OWN_SECONDS)
-        if count < len(self.q):
+        self.own.try_at(sample.q, sample.qd, sample.tau)
+        count = self.own.affordable(len(sample.q), OWN_SECONDS)
+        if count < len(sample.q):
             text = f"{count} states instead of {states}: your functions take {self.own.seconds:.2g} s per state"
             warnings.warn(text, stacklevel=4)
-            self.q, self.qd, self.tau = self.q[:count], self.qd[:count], self.tau[:count]
+        self.q, self.qd, self.tau = sample.q[:count], sample.qd[:count], sample.tau[:count]
 
     def take_states(self, q, qd, tau) -> None:
         """The given states, in the user's joints."""
@@ -119,7 +113,7 @@ class Given:
             needed = [of for of in self.brought if name in ("q", "qd", "tau")[: ARGUMENTS[of]]]
             if value is None and needed:
                 raise ValueError(f"{needed[0]} depends on {name}; expected {name} of shape ({count}, {nv}), or 0.0")
-            own[name] = np.zeros((count, nv)) if value is None else rows_given(name, value, nv, count)
+            own[name] = rows_given(name, 0.0 if value is None else value, nv, count)
         self.q = self.joints.positions(own["q"])
         self.qd, self.tau = self.joints.speeds(own["qd"]), self.joints.forces(own["tau"])
         for joint, name in zip(self.coordinates.places.joints, self.coordinates.names):
@@ -136,19 +130,20 @@ class Given:
 
     @cached_property
     def values(self) -> dict[str, np.ndarray]:
-        """The user's values of each quantity, in the model's joints."""
-        return {name: self.value(name, brought) for name, brought in self.brought.items()}
+        """The user's values of each quantity, in the model's joints, (states, ...)."""
+        own = self.own
+        return {
+            name: self.asked(own, name) if own is not None and own.has(name) else self.table(name, brought)
+            for name, brought in self.brought.items()
+        }
 
-    def value(self, name: str, brought: object) -> np.ndarray:
-        """The user's values of one quantity, in the model's joints, (states, ...)."""
-        if self.own is not None and self.own.has(name):
-            function = getattr(self.own, {"gravity": "gravity_balance"}.get(name, name))
-            return function(*(self.q, self.qd, self.tau)[: ARGUMENTS[name]])
-        values = self.table(name, brought)
-        return self.joints.mass_matrix(values) if name == "mass_matrix" else self.joints.forces(values)
+    def asked(self, source: object, name: str) -> np.ndarray:
+        """A quantity of an engine at the states."""
+        state = (self.q, self.qd, self.tau)[: ARGUMENTS[name]]
+        return getattr(source, {"gravity": "gravity_balance"}.get(name, name))(*state)
 
     def table(self, name: str, brought: object) -> np.ndarray:
-        """An array of values, (states, ...), in the user's joints; a row may hold Mbar flattened by rows."""
+        """An array of values in the user's joints, in the model's, (states, ...); a row may hold Mbar flattened by rows."""
         count, nv = len(self.q), self.coordinates.nv
         array = real_numbers(brought)
         shape = (count, nv, nv) if name == "mass_matrix" else (count, nv)
@@ -158,30 +153,26 @@ class Given:
         accepted += [shape[1:]] * (count == 1) + [(count,)] * (nv == 1)
         if array.shape not in accepted:
             raise ValueError(f"{name} has shape {array.shape}; expected {shape}, its values at the given q")
-        return array.reshape(shape)
+        values = array.reshape(shape)
+        return self.joints.mass_matrix(values) if name == "mass_matrix" else self.joints.forces(values)
 
     @cached_property
-    def compared(self) -> Mapping[str, Compared]:
+    def compared(self) -> dict[str, Compared]:
         """Each quantity of the user and of MuJoCo."""
-        scale = Entries(self.tree, self.q, self.qd)
-        comparisons = {}
+        scale, comparisons = Entries(self.tree, self.q, self.qd), {}
         for name, own in self.values.items():
-            state = (self.q, self.qd, self.tau)[: ARGUMENTS[name]]
-            right = getattr(self.mujoco, {"gravity": "gravity_balance"}.get(name, name))(*state)
+            right = self.asked(self.mujoco, name)
             try:
-                size = {
-                    "mass_matrix": lambda: scale.mass_matrix,
-                    "bias": lambda: scale.bias,
-                    "gravity": lambda: scale.weight,
-                    "acceleration": lambda right=right: scale.acceleration(scale.force(self.tau), right),
-                }[name]()
+                accelerations = name == "acceleration"
+                size = (
+                    scale.acceleration(scale.force(self.tau), right) if accelerations else getattr(scale, SCALES[name])
+                )
             except np.linalg.LinAlgError:
-                raise ValueError(
-                    "Mbar of the model is singular at a state: there is no acceleration to compare"
-                ) from None
+                text = "Mbar of the model is singular at a state: there is no acceleration to compare"
+                raise ValueError(text) from None
             turned = self.joints.own_mass_matrix if name == "mass_matrix" else self.joints.own_forces
             size = np.abs(turned(np.broadcast_to(size, right.shape)))
-            comparisons[name] = Compared(turned(own), turned(right), size, (FACTOR * EPS + self.rtol) * size)
+            comparisons[name] = Compared(turned(own), turned(right), size, self.rounding * size)
         return comparisons
 
     def entries(self, name: str) -> dict[tuple, str]:
@@ -210,8 +201,8 @@ def rows_given(name: str, values: object, size: int, count: int | None) -> np.nd
         raise ValueError(f"{name} is {shown(values)}; expected real numbers of shape {expected}")
     if array.ndim == 0 and count is not None:
         array = np.full((count, size), float(array))
-    elif array.ndim == 1:
-        array = array.reshape(-1, size) if array.shape == (size,) or size == 1 else array
+    elif array.ndim == 1 and size in (1, len(array)):
+        array = array.reshape(-1, size)
     if array.ndim != 2 or array.shape[1] != size or (count is not None and len(array) != count) or not len(array):
         raise ValueError(f"{name} has shape {np.shape(values)}; expected {expected}")
     if not np.isfinite(array).all():

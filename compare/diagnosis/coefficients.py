@@ -1,8 +1,13 @@
-"""Where equations differ: entries of Mbar, gravity, and coefficients of products of speeds in h, and which of their terms."""
+"""Where equations differ: entries of Mbar, gravity, and coefficients of products of speeds in h, and which of their terms.
 
-from collections.abc import Callable, Iterator
+These are polynomials in the sines and cosines of hinges and in the positions of slides, of second degree in each. A common error
+is one term with another factor, or replaced by another. Terms have two forms: products such as sin(hip) cos(knee) and sums such
+as sin(hip + knee).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from itertools import islice
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -12,237 +17,227 @@ from ..judge.words import listed
 from ..report.text import say
 from ..robots.coordinates import Coordinates
 from .cause import TEMPLATE, Cause, Change, cause_of
-from .model import Equations
-from .places import bias_at_rest, entry_name, products_of_rates, rates_name
-from .terms import JOINTS_OF_TERMS, STATES_PER_TERM, few_terms, right_terms, tried_terms
+from .model import MOST_SPEEDS, Equations, coefficients_of
+from .places import entry_name
 
-MOST_SPEEDS = 6  # for which your h is evaluated at every pair of speeds
+MOST_JOINTS = 3  # whose terms are tried
 ROUNDING = 8.0  # times the tolerance of an entry: of a sum of its values at several speeds
 SHOWN = 6  # positions, and coefficients, in a sentence
-SMALL_SHARE = 0.05  # of the largest value, that rounded constants may change
+STATES_PER_TERM = 2  # at which the right expressions are known
+FIT_ROUNDING = 1e-9  # of the largest coefficient
 SAME_FACTOR = 1e-7  # of the largest of several: two numbers that are one
-EXCHANGED = "sin and cos exchanged"
-SWAPPED = (("sin(", "cos("), ("cos(", "sin("))
+SHOWN_TIMES = {-2: "-2 ", -1: "-", 1: "", 2: "2 "}
+AS_NEAR = 1.0 - 1e-6  # of the largest part of a target along one term
+# numbers of terms of the right expression and of other terms, and whether these replace those
+COMBINATIONS = ((1, 0, False), (1, 1, True), (0, 1, False), (1, 1, False), (2, 0, False), (2, 1, False))
 
 
 class Coefficient(NamedTuple):
-    """One entry of Mbar or gravity, or the coefficient of a product of speeds in h, at some positions."""
+    """One entry of Mbar or gravity, or the coefficient of a product of speeds in h, at some positions, (states,) each."""
 
     place: tuple  # ("M", i, j), ("gravity", i) or ("velocity", i, j, k)
     name: str
-    yours: np.ndarray  # (states,)
-    right: np.ndarray  # (states,)
-    tolerance: np.ndarray  # (states,)
+    yours: np.ndarray
+    right: np.ndarray
+    tolerance: np.ndarray
 
     @property
     def off(self) -> np.ndarray:
-        return np.abs(self.yours - self.right)
-
-    @property
-    def is_small(self) -> bool:
-        """Whether the difference is small compared with the largest value: rounded constants leave no more."""
-        return bool(self.off.max() <= SMALL_SHARE * np.abs(self.right).max() + self.tolerance.max())
-
-    def at_worst(self, equations: Equations) -> dict:
-        """Both numbers at the position where they are furthest apart, for the template."""
-        k = int(np.argmax(self.off))
-        names = Coordinates(equations.tree.hinge_names, equations.tree.kind).positions
-        at = [f"{name} = {value:.6g}" for name, value in list(zip(names, equations.q[k]))[:SHOWN]]
-        return {"name": self.name, "yours": self.yours[k], "right": self.right[k], "at": at}
-
-
-class Slip(NamedTuple):
-    """What differs in one coefficient, in a few terms."""
-
-    kinds: tuple[str, ...]  # slips of several coefficients with the same kind are one slip
-    values: dict  # for the template
+        return self.yours - self.right
 
 
 class Compared:
-    """The coefficients of given values and the right ones.
+    """The coefficients of given values that differ from the right ones.
 
     given, tolerance: (states, entries) as those of `Equations`. bias: your h at these positions and other speeds,
     (states, nv) -> (states, nv); None: only values are given.
     """
 
     def __init__(self, equations: Equations, given: np.ndarray, tolerance: np.ndarray, bias: Callable | None):
-        self.equations, self.coefficients = equations, coefficients_of(equations, given, tolerance, bias)
-        self.differing = [
-            coefficient for coefficient in self.coefficients if (coefficient.off > coefficient.tolerance).any()
-        ]
-        self.is_complete = self.explains_bias(given, tolerance)
-        right = equations.values()[0]
-        off, largest = np.abs(given - right), np.abs(right).max(axis=0)
-        of_entries = np.nan_to_num(off).max(axis=0) <= SMALL_SHARE * largest + tolerance.max(axis=0)
-        every = (off > tolerance).any(axis=0) | np.isnan(off).all(axis=0) | (largest == 0.0)
-        self.is_small = bool(of_entries.all()) and (
-            bool(every.all()) or (bool(self.differing) and all(coefficient.is_small for coefficient in self.differing))
-        )
+        self.equations, self.given, self.bias = equations, given, bias
+        self.tolerance = np.maximum(tolerance, tolerance[tolerance > 0.0].min(initial=1.0))
 
-    def explains_bias(self, given: np.ndarray, tolerance: np.ndarray) -> bool:
+    @cached_property
+    def differing(self) -> list[Coefficient]:
+        equations, nv, given = self.equations, self.equations.nv, self.given
+        right, names, entries = right_values(equations), equations.names, equations.entries
+        yours = {entry: given[:, k] for k, entry in enumerate(entries) if entry[0] == "M"}
+        if not equations.qd.any():
+            yours |= {("gravity", i): given[:, i - nv] for i in range(nv)}
+        elif self.bias is not None and nv <= MOST_SPEEDS:
+            yours |= coefficients_of(lambda v: np.asarray(self.bias(np.tile(v, (len(given), 1)))), nv)
+        of_h = ROUNDING * self.tolerance[:, -nv:].max(axis=1)
+        known = [
+            Coefficient(place, entry_name(place, names), values, right[place],
+                        self.tolerance[:, entries.index(place)] if place[0] == "M" else of_h)
+            for place, values in yours.items() if np.isfinite(values).all()
+        ]  # fmt: skip
+        return [coefficient for coefficient in known if (np.abs(coefficient.off) > coefficient.tolerance).any()]
+
+    @property
+    def is_complete(self) -> bool:
         """Whether the coefficients that differ make up all that differs in h: nothing is linear or cubic in the speeds."""
         nv, qd = self.equations.nv, self.equations.qd
         h = self.equations.values()[0][:, -nv:].copy()
         for coefficient in self.differing:
             kind, i, *pair = coefficient.place
             if kind != "M":
-                h[:, i] += (coefficient.yours - coefficient.right) * np.prod(qd[:, pair], axis=1)
-        size = tolerance[:, -nv:] * (1.0 + np.abs(qd).max(axis=1, keepdims=True) ** 2)
-        off = np.abs(given[:, -nv:] - h)
+                h[:, i] += coefficient.off * np.prod(qd[:, pair], axis=1)
+        size = self.tolerance[:, -nv:] * (1.0 + np.abs(qd).max(axis=1, keepdims=True) ** 2)
+        off = np.abs(self.given[:, -nv:] - h)
         return bool(((off <= ROUNDING * size) | ~np.isfinite(off)).all())
 
     @cached_property
-    def right_terms(self) -> list[dict[str, float]]:
-        """The right coefficients that differ as sums of terms."""
-        tree, names = self.equations.tree, self.equations.names
-        reference, rng = np.array(tree.reference), np.random.default_rng(0)
-        x = rng.uniform(-3.0, 3.0, (STATES_PER_TERM * 5 ** len(tree.kind), len(tree.kind)))
-        known = right_values(Equations(tree, x + reference, np.zeros_like(x)))
-        return right_terms(names, tree.kind, x, np.array([known[coefficient.place] for coefficient in self.differing]))
-
-    @cached_property
-    def tried_terms(self):
-        tree = self.equations.tree
-        return tried_terms(self.equations.names, tree.kind, self.equations.q - np.array(tree.reference))
-
-    def slips(self) -> Iterator[Slip | None]:
-        """What differs in each coefficient, in a few terms; None where that is not found, or with many joints or balls."""
-        tree = self.equations.tree
-        is_known = "ball" not in tree.kind and len(tree.kind) <= JOINTS_OF_TERMS
-        for k, coefficient in enumerate(self.differing):
-            if not is_known:
-                yield None
-                continue
-            right = self.right_terms[k]
-            off = few_terms(self.tried_terms, right, coefficient.yours - coefficient.right, coefficient.tolerance)
-            yield off and slip_of(coefficient.name, right, off)
-
-    def details(self) -> dict:
-        """Which parts of the equations differ, and which coefficients: `parts`, `details` and `more` of a Diagnosis."""
-        differ, every = (
-            list(dict.fromkeys(coefficient.place[0] for coefficient in some))
-            for some in (self.differing, self.coefficients)
+    def terms(self) -> list[list[tuple[str, str]]]:
+        """Of each coefficient that differs, your terms and the right ones in their places, "" for none; [] if not found."""
+        tree, names, reference = self.equations.tree, self.equations.names, np.array(self.equations.tree.reference)
+        if "ball" in tree.kind or len(tree.kind) > MOST_JOINTS or len(self.differing) > SHOWN:
+            return [[] for _ in self.differing]
+        n = len(tree.kind)
+        x = np.random.default_rng(0).uniform(-3.0, 3.0, (STATES_PER_TERM * 5**n, n))
+        right = right_values(Equations(tree, x + reference, np.zeros_like(x)))
+        at_x, at_q = (
+            [form(names, tree.kind, angles) for form in (sums, products)]
+            for angles in (x, self.equations.q - reference)
         )
-        agree = [part for part in every if part not in differ]
-        slips = list(islice(self.slips(), SHOWN))
-        if self.is_small and not all(slips):
-            return {"parts": (differ, agree)}
-        details = [
-            slip.values if slip else coefficient.at_worst(self.equations)
-            for coefficient, slip in zip(self.differing, slips)
-        ]
-        return {"parts": (differ, agree), "details": tuple(details), "more": len(self.differing) - len(details)}
+        tried = at_q[0] | at_q[1] | dict(zip(names, (self.equations.q - reference).T))
+        found = []
+        for one in self.differing:
+            expression = right_terms(at_x, right[one.place], np.abs(one.yours).max())
+            off = few_terms(tried, expression, one.off, one.tolerance)
+            found.append(list(pairs_of_terms(expression, off)))
+        return found
+
+    def details(self) -> tuple[dict, ...]:
+        """The coefficients that differ, for the template: in terms, or both numbers where they are furthest apart."""
+        q, tree, details = self.equations.q, self.equations.tree, []
+        names = Coordinates(tree.hinge_names, tree.kind).positions
+        for one, terms in list(zip(self.differing, self.terms))[:SHOWN]:
+            k = int(np.argmax(np.abs(one.off)))
+            at = [f"{name} = {value:.6g}" for name, value in list(zip(names, q[k]))[:SHOWN]]
+            details.append({"name": one.name, "terms": terms, "yours": one.yours[k], "right": one.right[k], "at": at})
+        return tuple(details)
 
     def cause(self, most: int) -> Cause | None:
-        """The cause if all that differs is at most this number of slips."""
-        found, kinds = [], set()
-        for slip in self.slips() if self.is_complete else ():
-            if slip is None or len(kinds := kinds.union(slip.kinds)) > most:
-                return None
-            found.append(slip.values)
-        if not found:
+        """The cause if all that differs is at most this number of wrong terms; the same in several coefficients is one."""
+        if not self.differing or not self.is_complete or not all(self.terms):
             return None
-        text = say(Finding(TEMPLATE, "several_terms", {"list": found}))
-        values = {"exchanged": kinds == {EXCHANGED}, "list": found}
-        change = Change("term", listed([of["name"] for of in found]), "right", text, "", "term", values)
-        return cause_of(1 + len(kinds), [change], 0.0)
-
-
-def coefficients_of(equations: Equations, given: np.ndarray, tolerance: np.ndarray, bias: Callable | None) -> list:
-    """All coefficients that are known of given values."""
-    nv, right = equations.nv, right_values(equations)
-    allowed = np.maximum(tolerance, tolerance[tolerance > 0.0].min(initial=1.0))
-    of_h = ROUNDING * allowed[:, -nv:].max(axis=1)
-    entries = {entry: k for k, entry in enumerate(equations.entries)}
-    yours = {entry: given[:, k] for entry, k in entries.items() if entry[0] == "M"}
-    if not equations.qd.any():
-        yours |= {("gravity", i): given[:, i - nv] for i in range(nv)}
-    elif bias is not None and nv <= MOST_SPEEDS:
-        yours |= rows_of(*even_products(bias, nv, len(given)))
-    return [
-        Coefficient(place, name_of(place, equations.names), values, right[place],
-                    allowed[:, entries[place]] if place[0] == "M" else of_h)
-        for place, values in yours.items() if np.isfinite(values).all()
-    ]  # fmt: skip
-
-
-def rows_of(coefficients: dict, weight: np.ndarray) -> dict[tuple, np.ndarray]:
-    """Coefficients of h by their places, row by row."""
-    rows = {("gravity", i): values for i, values in enumerate(weight.T)}
-    return rows | {("velocity", i, *pair): values for pair, c in coefficients.items() for i, values in enumerate(c.T)}
+        texts = dict.fromkeys(
+            say(Finding(TEMPLATE, "details", {"coefficient": {"terms": terms}})) for terms in self.terms
+        )
+        kinds = {pair for terms in self.terms for pair in terms}
+        if len(kinds) > most:
+            return None
+        names = listed([one.name for one in self.differing])
+        return cause_of(1 + len(kinds), [Change("term", names, "right", "; ".join(texts))], 0.0)
 
 
 def right_values(equations: Equations) -> dict[tuple, np.ndarray]:
     """The right coefficients, (states,) each."""
     values = equations.values()[0]
-    found = {entry: values[:, k] for k, entry in enumerate(equations.entries) if entry[0] == "M"}
-    if equations.nv > MOST_SPEEDS:
-        return found | rows_of({}, bias_at_rest(equations))
-    return found | rows_of(*products_of_rates(equations))
+    of_M = {entry: k for k, entry in enumerate(equations.entries) if entry[0] == "M"}
+    return {entry: values[:, k] for entry, k in of_M.items()} | equations.coefficients()
 
 
-def even_products(bias: Callable, nv: int, states: int) -> tuple[dict, np.ndarray]:
-    """The coefficients of products of two speeds in your h, of its part that is even in them, and h at rest."""
-    unit, even = np.eye(nv), {}
-
-    def h(speeds: np.ndarray) -> np.ndarray:
-        return np.asarray(bias(np.tile(speeds, (states, 1))))
-
-    weight = h(np.zeros(nv))
-    for j, k in zip(*np.triu_indices(nv)):
-        speeds = unit[j] + (j != k) * unit[k]
-        even[j, k] = (h(speeds) + h(-speeds)) / 2.0 - weight
-    mixed = {(j, k): values - even[j, j] - even[k, k] for (j, k), values in even.items() if j != k}
-    return even | mixed, weight
-
-
-def name_of(place: tuple, names: tuple[str, ...]) -> str:
-    kind, *indices = place
-    if kind == "M":
-        return entry_name(place, names)
-    row = entry_name(("h", indices[0]), names)
-    return f"{row}, gravity" if kind == "gravity" else f"{row}, coefficient of {rates_name(*indices[1:], names)}"
+def products(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> dict[str, np.ndarray]:
+    """Products of one function of each joint, the simplest first, (states,) each."""
+    of_each = []
+    for name, kind, p in zip(names, kinds, x.T):
+        c, s = np.cos(p), np.sin(p)
+        powers = [("", np.ones(len(x))), (name, p), (f"{name}^2", p**2)]
+        turns = [
+            (f"cos({name})", c),
+            (f"sin({name})", s),
+            (f"cos({name})^2", c * c),
+            (f"sin({name}) cos({name})", s * c),
+        ]
+        of_each.append(powers if kind == "slide" else [*powers[:1], *turns])
+    chosen = sorted(product(*of_each), key=lambda factors: sum(bool(name) + ("^2" in name) for name, _ in factors))
+    return {
+        " ".join(filter(None, (name for name, _ in factors))) or "1": np.prod([part for _, part in factors], axis=0)
+        for factors in chosen
+    }
 
 
-def slip_of(name: str, right: dict[str, float], off: dict[str, float]) -> Slip:
-    """A difference in terms: replaced by others, with another factor, missing, or added."""
-    size = max(map(abs, (*off.values(), *right.values())))
-    new, kinds, terms = [term for term in off if term not in right], [], []
+def sums(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> dict[str, np.ndarray]:
+    """Sines and cosines of sums of the angles, each up to twice, times powers of the slides, (states,) each."""
+    slides = [k for k, kind in enumerate(kinds) if kind == "slide"]
+    hinges = [k for k in range(len(kinds)) if k not in slides]
+    powers = products([names[k] for k in slides], ["slide"] * len(slides), x[:, slides]) if slides else {"1": 1.0}
+    terms = {power: column * np.ones(len(x)) for power, column in powers.items()}
+    for times in sorted(product(range(-2, 3), repeat=len(hinges)), key=lambda times: sum(map(abs, times))):
+        if next((k for k in times if k), 0) > 0:  # the others are the same
+            parts = [f"{SHOWN_TIMES[k]}{names[hinge]}" for k, hinge in zip(times, hinges) if k]
+            called = " + ".join(parts).replace("+ -", "- ")
+            angle = x[:, hinges] @ np.array(times)
+            for power, column in powers.items():
+                before = "" if power == "1" else f"{power} "
+                terms |= {
+                    f"{before}cos({called})": column * np.cos(angle),
+                    f"{before}sin({called})": column * np.sin(angle),
+                }
+    return terms
+
+
+def right_terms(forms: list[dict[str, np.ndarray]], right: np.ndarray, size: float) -> dict[str, float]:
+    """An expression (states,) as a sum of terms, in the form that has fewer. size: of yours; less than its rounding is 0."""
+    fits = []
+    for form in forms:
+        x = np.linalg.lstsq(np.array(list(form.values())).T, right, rcond=None)[0]
+        fits.append(
+            {
+                name: float(value)
+                for name, value in zip(form, x)
+                if abs(value) > FIT_ROUNDING * max(np.abs(x).max(), size)
+            }
+        )
+    return min(fits, key=len)
+
+
+def few_terms(tried: dict, right: dict[str, float], off: np.ndarray, tolerance: np.ndarray) -> dict[str, float]:
+    """The terms that make up a difference, off (states,), with their coefficients; {}: a few do not suffice."""
+    names, columns, target = list(tried), np.array(list(tried.values())) / tolerance, off / tolerance
+    own = [names.index(name) for name in right]
+    for of_right, others, is_replaced in COMBINATIONS:
+        for chosen in combinations(own, of_right):
+            for best in completed(columns, target, list(chosen)) if others else [list(chosen)]:
+                x = np.linalg.lstsq(columns[best].T, target, rcond=None)[0]
+                sizes = np.abs(x)
+                if sizes.min() <= FIT_ROUNDING * sizes.max() or np.abs(target - x @ columns[best]).max() > 1.0:
+                    continue
+                if not is_replaced or np.ptp(sizes) <= FIT_ROUNDING * sizes.max():
+                    return {names[k]: float(value) for k, value in zip(best, x)}
+    return {}
+
+
+def completed(columns: np.ndarray, target: np.ndarray, chosen: list[int]) -> list[list[int]]:
+    """The chosen terms with the one that comes closest to a target with them, or all that come as close."""
+    basis = np.linalg.qr(columns[chosen].T)[0] if chosen else np.zeros((len(target), 0))
+    rest = columns - columns @ basis @ basis.T
+    lengths = np.linalg.norm(columns, axis=1)
+    sizes = np.linalg.norm(rest, axis=1)
+    along = np.where(sizes > 1e-6 * lengths, np.abs(rest @ target) / np.maximum(sizes, 1e-6 * lengths), 0.0)
+    return [[*chosen, int(k)] for k in np.flatnonzero(along >= AS_NEAR * along.max())]
+
+
+def pairs_of_terms(right: dict[str, float], off: dict[str, float]) -> Iterator[tuple[str, str]]:
+    """What yours has and the right expression in its place, "" for nothing: replaced, with another factor, missing, added."""
+    size = max(map(abs, (*off.values(), *right.values())), default=1.0)
+    new = [term for term in off if term not in right]
     for term in (term for term in off if term in right):
-        change, kind = off[term], f"{name} {term}"
-        partner = next((other for other in new if abs(abs(off[other]) - abs(change)) <= SAME_FACTOR * size), None)
-        if partner:
-            new.remove(partner)
-            kind = EXCHANGED if partner in sine_for_cosine(term) else f"{term} to {partner}"
-            both = {"yours": with_factor(off[partner], partner), "right": with_factor(-change, term)}
-            terms.append({"form": "replaced"} | both)
-        elif abs(right[term] + change) <= SAME_FACTOR * size:
-            terms.append({"form": "missing", "right": with_factor(right[term], term)})
+        same = [other for other in new if abs(abs(off[other]) - abs(off[term])) <= SAME_FACTOR * size]
+        if same:
+            new.remove(same[0])
+            yield with_factor(off[same[0]], same[0]), with_factor(-off[term], term)
         else:
-            both = {"yours": without_digits(right[term] + change), "right": without_digits(right[term])}
-            terms.append({"form": "factor", "name": term} | both)
-        kinds.append(kind)
-    terms += [{"form": "added", "yours": with_factor(off[term], term)} for term in new]
-    kinds += [f"{name} {term}" for term in new]
-    return Slip(tuple(kinds), {"name": name, "terms": terms})
-
-
-def sine_for_cosine(term: str) -> Iterator[str]:
-    """A term with a sine for one of its cosines, or the other way round."""
-    for old, new in SWAPPED:
-        start = term.find(old)
-        while start >= 0:
-            yield term[:start] + new + term[start + len(old) :]
-            start = term.find(old, start + 1)
-
-
-def without_digits(value: float) -> str:
-    """A coefficient without the digits of a fit."""
-    return f"{float(f'{value:.8g}'):.6g}"
+            mine = right[term] + off[term]
+            yield with_factor(mine, term) if abs(mine) > SAME_FACTOR * size else "", with_factor(right[term], term)
+    for term in new:
+        yield with_factor(off[term], term), ""
 
 
 def with_factor(value: float, term: str) -> str:
     """A coefficient with its term."""
     if term == "1":
-        return f"a constant {without_digits(value)}"
-    return term if abs(value - 1.0) <= SAME_FACTOR else f"{without_digits(value)} {term}"
+        return f"a constant {value:.6g}"
+    return term if abs(value - 1.0) <= SAME_FACTOR else f"{value:.6g} {term}"

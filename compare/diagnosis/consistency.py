@@ -51,22 +51,36 @@ def conditions(
 
     The power is evaluated only for a symmetric M, and without the part of h that is linear in the speeds.
     """
-    M, still = np.asarray(mass_matrix(q)), np.zeros_like(qd)
-    floors = FACTOR * EPS * np.abs(M).max(axis=(1, 2)) + SAFETY * noise(mass_matrix, coordinates, q)
+    M, names = np.asarray(mass_matrix(q)), coordinates.speeds
+    of_M = FACTOR * EPS * np.abs(M).max(axis=(1, 2)) + SAFETY * noise(mass_matrix, coordinates, q)
     of_h = SAFETY * noise(lambda q: bias(q, qd), coordinates, q)
-    names = coordinates.speeds
-    tested = [symmetric(M, floors, names), definite(M, floors)]
-    tested.append(gradient_at_rest(lambda q: bias(q, np.zeros((len(q), qd.shape[1]))), coordinates, q, of_h))
-    weight, ahead, behind = (np.asarray(bias(q, rates)) for rates in (still, qd, -qd))
-    doubled = (np.asarray(bias(q, 2.0 * qd)) + np.asarray(bias(q, -2.0 * qd))) / 2.0
-    size = np.max([np.abs(part) for part in (weight, ahead, behind, doubled)], axis=(0, 2))
-    size = FACTOR * EPS * size + of_h
-    tested.append(even(ahead, behind, size, names))
-    of_rates = (ahead + behind) / 2.0 - weight
-    tested.append(quadratic(of_rates, doubled - weight, size, names))
+    rest, ahead, behind, fast, back = (np.asarray(bias(q, factor * qd)) for factor in (0.0, 1.0, -1.0, 2.0, -2.0))
+    velocity, doubled = (ahead + behind) / 2.0 - rest, (fast + back) / 2.0 - rest
+    rounding = of_h + FACTOR * EPS * np.max([np.abs(h) for h in (rest, ahead, behind, fast, back)], axis=(0, 2))
+
+    def of_even(s, i) -> dict:
+        return {"name": names[i], "value": odd[s, i]}
+
+    def of_quadratic(s, i) -> dict:
+        return {"name": names[i], "factor": doubled[s, i] / velocity[s, i] if velocity[s, i] else np.inf}
+
+    odd, off, allowed = np.abs(ahead - behind) / 2.0, np.abs(doubled - 4.0 * velocity), rounding[:, None]
+    tested = [
+        symmetric(M, of_M, names),
+        definite(M, of_M),
+        *gradient_at_rest(lambda q: bias(q, 0.0 * qd), coordinates, q, of_h),
+        closest_to_breaking("h is even in the rates", odd, allowed, "N m", "even", of_even),
+        closest_to_breaking("h is quadratic in the rates", off, 4.0 * allowed, "N m", "quadratic", of_quadratic),
+    ]
     if tested[0].is_met:
-        tested.append(power_balance(mass_matrix, coordinates, q, qd, of_rates, floors, size))
-    return [condition for condition in tested if condition is not None]
+        tested.append(power_balance(mass_matrix, coordinates, q, qd, velocity, of_M, rounding))
+    return tested
+
+
+def closest_to_breaking(name: str, off, allowed, unit: str, kind: str, values: Callable[..., dict]) -> Condition:
+    """A condition on differences, off (states, ...). values: of an index, for the macro `kind`."""
+    at, allowed = closest(off, allowed), np.broadcast_to(allowed, off.shape)
+    return Condition(name, float(off[at]), float(allowed[at]), unit, Finding(TEMPLATE, kind, values(*at)))
 
 
 def noise(function: Callable, coordinates: Coordinates, q: np.ndarray) -> float:
@@ -81,11 +95,13 @@ def noise(function: Callable, coordinates: Coordinates, q: np.ndarray) -> float:
 
 
 def symmetric(M: np.ndarray, allowed: np.ndarray, names: Sequence[str]) -> Condition:
-    skew = np.abs(M - np.swapaxes(M, 1, 2))
-    (s,) = closest(skew.max(axis=(1, 2)), allowed)
-    i, j = np.unravel_index(np.argmax(skew[s]), skew[s].shape)
-    wrong = Finding(TEMPLATE, "symmetric", {"names": (names[i], names[j]), "values": (M[s, i, j], M[s, j, i])})
-    return Condition("M is symmetric", float(skew[s].max()), float(allowed[s]), "kg m2", wrong)
+    """allowed: (states,)."""
+
+    def values(s, i, j) -> dict:
+        return {"names": (names[i], names[j]), "values": (M[s, i, j], M[s, j, i])}
+
+    off = np.abs(M - np.swapaxes(M, 1, 2))
+    return closest_to_breaking("M is symmetric", off, allowed[:, None, None], "kg m2", "symmetric", values)
 
 
 def definite(M: np.ndarray, allowed: np.ndarray) -> Condition:
@@ -100,78 +116,42 @@ def definite(M: np.ndarray, allowed: np.ndarray) -> Condition:
     return Condition("M is positive definite", float(least[s]), float(floor), "", wrong, "at least")
 
 
-def gradient_at_rest(weight: Callable, coordinates: Coordinates, q: np.ndarray, floor: float) -> Condition | None:
-    """dh_i/dq_j at rest is symmetric, in hinges and slides; None where there is one of them at most."""
-    straight = [
-        by.start for kind, by in zip(coordinates.all_kinds, (p.qd for p in coordinates.places.joints)) if kind != "ball"
-    ]
+def gradient_at_rest(weight: Callable, coordinates: Coordinates, q: np.ndarray, floor: float) -> list[Condition]:
+    """dh_i/dq_j at rest is symmetric, in hinges and slides; [] where there is one of them at most."""
+    joints = zip(coordinates.all_kinds, coordinates.places.joints)
+    straight = [joint.qd.start for kind, joint in joints if kind != "ball"]
     if len(straight) < 2:
-        return None
-    nv, rows, sizes, errors = coordinates.nv, [], [], []
-    for j in straight:
-        slope, error, size = derivative(lambda t, j=j: weight(coordinates.move(q, t * np.eye(nv)[j]))[:, straight])
-        rows.append(slope)
-        errors.append(error)
-        sizes.append(size)
-    slopes, errors = np.stack(rows, axis=2), np.stack(errors, axis=2)  # (states, i, j)
-    curl = np.abs(slopes - np.swapaxes(slopes, 1, 2))
-    rounding = (FACTOR * EPS * np.max(sizes, axis=(0, 2)) + floor) / STEP
+        return []
+    steps = np.eye(coordinates.nv)[straight]
+    of_each = [derivative(lambda t, e=e: weight(coordinates.move(q, t * e))[:, straight]) for e in steps]
+    slopes, errors, sizes = (np.stack(part, axis=2) for part in zip(*of_each))  # (states, i, j)
+    curl, rounding = np.abs(slopes - np.swapaxes(slopes, 1, 2)), (FACTOR * EPS * sizes.max(axis=(1, 2)) + floor) / STEP
     allowed = SAFETY * (errors + np.swapaxes(errors, 1, 2)) + rounding[:, None, None]
-    s, a, b = closest(curl, allowed)
-    one, other = coordinates.speeds[straight[a]], coordinates.speeds[straight[b]]
-    wrong = Finding(TEMPLATE, "gradient", {"names": (one, other), "values": (slopes[s, a, b], slopes[s, b, a])})
-    return Condition("h at rest is a gradient", float(curl[s, a, b]), float(allowed[s, a, b]), "N m/rad", wrong)
+
+    def values(s, a, b) -> dict:
+        names = coordinates.speeds[straight[a]], coordinates.speeds[straight[b]]
+        return {"names": names, "values": (slopes[s, a, b], slopes[s, b, a])}
+
+    return [closest_to_breaking("h at rest is a gradient", curl, allowed, "N m/rad", "gradient", values)]
 
 
-def even(ahead: np.ndarray, behind: np.ndarray, allowed: np.ndarray, names: Sequence[str]) -> Condition:
-    """h(q, qd) = h(q, -qd)."""
-    odd = np.abs(ahead - behind) / 2.0
-    (s,) = closest(odd.max(axis=1), allowed)
-    i = int(np.argmax(odd[s]))
-    wrong = Finding(TEMPLATE, "even", {"name": names[i], "value": odd[s, i]})
-    return Condition("h is even in the rates", float(odd[s, i]), float(allowed[s]), "N m", wrong)
-
-
-def quadratic(of_rates: np.ndarray, doubled: np.ndarray, floor: np.ndarray, names: Sequence[str]) -> Condition:
-    """At twice the speed the velocity terms are four times as large."""
-    off = np.abs(doubled - 4.0 * of_rates)
-    allowed = 4.0 * floor
-    (s,) = closest(off.max(axis=1), allowed)
-    i = int(np.argmax(off[s]))
-    factor = doubled[s, i] / of_rates[s, i] if of_rates[s, i] else np.inf
-    wrong = Finding(TEMPLATE, "quadratic", {"name": names[i], "factor": factor})
-    return Condition("h is quadratic in the rates", float(off[s, i]), float(allowed[s]), "N m", wrong)
-
-
-def power_balance(
-    mass_matrix: Callable,
-    coordinates: Coordinates,
-    q: np.ndarray,
-    qd: np.ndarray,
-    of_rates: np.ndarray,
-    floor_M: np.ndarray,
-    floor_h: np.ndarray,
-) -> Condition:
-    """qd' (h - h at rest) = qd' Mdot qd / 2, Mdot along the motion. floor_M, floor_h: rounding and noise of both, (states,)."""
-    largest = np.abs(qd).max(axis=1, keepdims=True)
-    rates = qd / np.where(largest > 0.0, largest, 1.0)  # of about 1, so that the step is one of positions
-    sizes = np.abs(rates)
+def power_balance(mass_matrix: Callable, coordinates: Coordinates, q, qd, velocity, of_M, of_h) -> Condition:
+    """qd' (h - h at rest) = qd' Mdot qd / 2, Mdot along the motion. of_M, of_h: rounding and noise of both, (states,)."""
+    largest = np.abs(qd).max(axis=1).clip(min=1e-100)
+    rates = qd / largest[:, None]  # of about 1, so that the step is one of positions
 
     def kinetic(t):
-        M = np.asarray(mass_matrix(coordinates.move(q, t * rates)))
-        return np.einsum("si,sij,sj->s", rates, M, rates) / 2.0
+        return np.einsum("si,sij,sj->s", rates, np.asarray(mass_matrix(coordinates.move(q, t * rates))), rates) / 2.0
 
     slope, error, _ = derivative(kinetic)
-    squared = largest[:, 0].clip(min=1e-300) ** 2
-    given = np.einsum("si,si->s", rates, of_rates) / squared
-    off = np.abs(given - slope)
-    total = sizes.sum(axis=1)
-    allowed = SAFETY * error + total**2 * floor_M / STEP + 2.0 * total * floor_h / squared
-    (s,) = closest(off, allowed)
-    watts = largest[s, 0] ** 3
-    wrong = Finding(TEMPLATE, "power", {"yours": given[s] * watts, "right": slope[s] * watts})
+    given, total, watts = np.einsum("si,si->s", rates, velocity) / largest**2, np.abs(rates).sum(axis=1), largest**3
+    allowed = SAFETY * error + total**2 * of_M / STEP + 2.0 * total * of_h / largest**2
+
+    def values(s) -> dict:
+        return {"yours": given[s] * watts[s], "right": slope[s] * watts[s]}
+
     name = "h belongs to M: qd'(h - h at rest) = qd' Mdot qd / 2"
-    return Condition(name, float(off[s] * watts), float(allowed[s] * watts), "W", wrong)
+    return closest_to_breaking(name, np.abs(given - slope) * watts, allowed * watts, "W", "power", values)
 
 
 def derivative(function: Callable) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

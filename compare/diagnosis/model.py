@@ -5,6 +5,7 @@ positions (states,), real or complex; the derivative by a number is the imaginar
 to rounding. Each term of each body has a factor, 1 in the right equations.
 """
 
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -12,20 +13,18 @@ import numpy as np
 
 import tmt
 from tmt.equations import method
-from tmt.equations.vectors import Vector
+from tmt.equations.vectors import ZERO, Vector
 
 from ..robots.coordinates import Coordinates
-from ..robots.joint_map import JointMap
 
 FIELDS = ("offset", "axis", "com", "inertia", "mass", "gravity", "reference", "armature")
-BODY_TERMS = (
-    "translation",
-    "rotation",
-    "gravity",
-    "convective",
-    "Euler",
-    "gyroscopic",
-)  # of each body; the first two of Mbar
+OF_TERM = {  # of each body; the first two of Mbar
+    "translation": "T' m T of {}", "rotation": "B' I B of {}", "gravity": "gravity term T' m g of {}",
+    "convective": "convective term T' m v_conv of {}", "Euler": "Euler term B' I w_conv of {}",
+    "gyroscopic": "gyroscopic term B' (omega x I omega) of {}",
+}  # fmt: skip
+BODY_TERMS = tuple(OF_TERM)
+MOST_SPEEDS = 8  # with more, coefficients of products of speeds are not compared: there are nv^2 (nv + 1) / 2
 TINY = 1e-100  # an imaginary change, whose square vanishes
 
 
@@ -39,15 +38,11 @@ class Path(NamedTuple):
 class Equations:
     """Mbar and h of a tree at states q (states, nq), qd (states, nv).
 
-    One array of numbers for each state: the lower triangle of Mbar by rows, then h; see `entries`. With `joints` the states,
-    Mbar and h are in the user's joints, see joint_map.py.
+    One array of numbers for each state: the lower triangle of Mbar by rows, then h; see `entries`.
     """
 
-    def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, joints: JointMap | None = None):
-        self.tree, self.joints = tree, joints
-        self.q, self.qd = np.asarray(q, float), np.asarray(qd, float)
-        if joints is not None:
-            self.q, self.qd = joints.positions(self.q), joints.speeds(self.qd)
+    def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray):
+        self.tree, self.q, self.qd = tree, q, qd
         self.nv = len(tree.axis)
         self.stated = {name: np.array(getattr(tree, name), float) for name in FIELDS}
         self.stated["factor"] = np.ones((len(tree.mass), len(BODY_TERMS)))
@@ -67,64 +62,78 @@ class Equations:
 
         changes: {Path: what is added, (changes,)}. Changed axes are normalized.
         """
-        return self.packed(*self.summed(self.parts(changes or {})))
-
-    def parts(self, changes: dict) -> SimpleNamespace:
-        """Bodies of the changed tree, with its numbers."""
         numbers = {name: value.tolist() for name, value in self.stated.items()}
-        for path, added in changes.items():
+        for path, added in (changes or {}).items():
             row, (*places, last) = numbers[path.field], path.index
             for place in places:
                 row = row[place]
             row[last] = row[last] + np.asarray(added)[:, None]
-        turned = {path.index[0] for path in changes if path.field == "axis"}
-        numbers["axis"] = [unit_direction(axis) if k in turned else axis for k, axis in enumerate(numbers["axis"])]
+        for k in {path.index[0] for path in changes or {} if path.field == "axis"}:
+            numbers["axis"][k] = unit_direction(*numbers["axis"][k])
         tree = self.tree
         changed = SimpleNamespace(
             **numbers, parent=tree.parent, coordinates=tree.coordinates, body_hinge=tree.body_hinge, moves=tree.moves
         )
-        return SimpleNamespace(tree=changed, bodies=method.bodies(changed, list(self.q.T), list(self.qd.T)))
+        return self.summed(changed, method.bodies(changed, list(self.q.T), list(self.qd.T)))
 
-    def summed(self, parts: SimpleNamespace) -> tuple[list, list]:
-        """Mbar, rows of its lower triangle, and h of bodies, each term times its factor."""
-        tree, bodies = parts.tree, parts.bodies
-        g, of = Vector(*tree.gravity), range(self.nv)
-        M = [[0.0] * (i + 1) for i in of]
+    def coefficients(self) -> dict[tuple, np.ndarray]:
+        """See `coefficients_of`."""
+
+        def h(speeds: np.ndarray) -> np.ndarray:
+            return Equations(self.tree, self.q, np.broadcast_to(speeds, self.qd.shape)).values()[0][:, -self.nv :]
+
+        return coefficients_of(h, self.nv)
+
+    def summed(self, tree: tmt.Tree | SimpleNamespace, bodies: Sequence) -> np.ndarray:
+        """Mbar and h of some bodies, (changes, states, entries). tree: with the factor of each term of these bodies."""
+        g = Vector(*tree.gravity)
+        M = [[0.0] * i + [rotor] for i, rotor in enumerate(tree.armature)]
         h = [0.0] * self.nv
         for b, factor in zip(bodies, tree.factor):
             translation, rotation, weight, convective, Euler, gyroscopic = factor
             force = (b.v_conv * convective - g * weight) * b.mass
             moment = (b.inertia @ b.w_conv) * Euler + b.omega.cross(b.inertia @ b.omega) * gyroscopic
             turned = [b.inertia @ column for column in b.B]
-            for i in of:
+            moving = [i for i in range(self.nv) if b.T[i] is not ZERO]
+            for i in moving:
                 h[i] = h[i] + b.T[i].dot(force) + b.B[i].dot(moment)
-                for j in range(i + 1):
+                for j in moving[: moving.index(i) + 1]:
                     M[i][j] = M[i][j] + b.mass * translation * b.T[i].dot(b.T[j]) + rotation * b.B[i].dot(turned[j])
-        for i, rotor in enumerate(tree.armature):
-            M[i][i] = M[i][i] + rotor
-        return M, h
-
-    def packed(self, M: list, h: list) -> np.ndarray:
-        """Rows of the lower triangle of Mbar and h as one array, (changes, states, entries)."""
         flat = [*(M[i][j] for i, j in zip(*self.triangle)), *h]
-        if self.joints is not None:
-            flat = [flat[k] * s for k, s in zip(*packing(self.joints, self))]
-        states = len(self.q)
         count = max([np.shape(value)[0] for value in flat if np.ndim(value) == 2], default=1)
-        return np.stack([np.broadcast_to(value, (count, states)) for value in flat], axis=-1)
+        return np.stack([np.broadcast_to(value, (count, len(self.q))) for value in flat], axis=-1)
+
+    def full_mass_matrix(self, values: np.ndarray) -> np.ndarray:
+        """Mbar (..., nv, nv) of values (..., entries)."""
+        i, j = self.triangle
+        M = np.zeros((*values.shape[:-1], self.nv, self.nv), values.dtype)
+        M[..., i, j] = M[..., j, i] = values[..., : len(i)]
+        return M
 
 
-def packing(joints: JointMap, equations: Equations) -> tuple[list[int], np.ndarray]:
-    """The index and sign, in the model's joints, of each entry in the user's joints."""
-    v, sense, (i, j) = joints.v, joints.sense, equations.triangle
-    high, low = np.maximum(v[i], v[j]), np.minimum(v[i], v[j])
-    index = np.concatenate([high * (high + 1) // 2 + low, len(i) + v])
-    return index.tolist(), np.concatenate([sense[i] * sense[j], sense])
+def packed(mass_matrix: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    """Mbar (..., nv, nv) and h (..., nv) as `Equations` has them, (..., entries)."""
+    i, j = np.tril_indices(np.shape(bias)[-1])
+    return np.concatenate([np.asarray(mass_matrix)[..., i, j], bias], axis=-1)
 
 
-def unit_direction(axis: list) -> list:
+def coefficients_of(bias: Callable, nv: int) -> dict[tuple, np.ndarray]:
+    """Coefficients of h, (states,) each: ("gravity", i), and ("velocity", i, j, k) of qd_j qd_k, j <= k, in h_i.
+
+    bias: speeds (nv,) -> h (states, nv), of which the part that is even in the speeds is taken.
+    """
+    unit, even, rest = np.eye(nv), {}, bias(np.zeros(nv))
+    pairs = zip(*map(np.ndarray.tolist, np.triu_indices(nv)))
+    for j, k in pairs if nv <= MOST_SPEEDS else ():
+        speeds = unit[j] + (j != k) * unit[k]
+        even[j, k] = (bias(speeds) + bias(-speeds)) / 2.0 - rest
+    mixed = {(j, k): values - even[j, j] - even[k, k] for (j, k), values in even.items() if j != k}
+    rows = {("gravity", i): rest[:, i] for i in range(nv)}
+    return rows | {("velocity", i, *pair): c[:, i] for pair, c in (even | mixed).items() for i in range(nv)}
+
+
+def unit_direction(x, y, z) -> list:
     """A direction at length 1."""
-    x, y, z = axis
     length = np.sqrt(x * x + y * y + z * z)
     length = np.where(length == 0.0, 1.0, length)  # of a change that leaves no direction
     return [x / length, y / length, z / length]

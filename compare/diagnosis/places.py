@@ -1,81 +1,93 @@
 """The places where equations can be wrong by one number: of the model, of a term, of a coefficient.
 
 A change x of a place adds x times a coefficient to entries of the tree (or to factors of terms), or x times a column of values
-to an entry of Mbar or h. The zero of a joint is a convention and has rank 1; the other numbers have rank 2.
+to entries of Mbar or h. The zero of a joint is a convention and has rank 1; the other numbers have rank 2.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from .model import BODY_TERMS, Equations, Path
+import tmt
+
+from .cause import Change
+from .model import BODY_TERMS, MOST_SPEEDS, OF_TERM, Equations, Path
 
 XYZ = "xyz"
 INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
-OF_TERM = {
-    "translation": "T' m T of {}", "rotation": "B' I B of {}", "gravity": "gravity term T' m g of {}",
-    "convective": "convective term T' m v_conv of {}", "Euler": "Euler term B' I w_conv of {}",
-    "gyroscopic": "gyroscopic term B' (omega x I omega) of {}",
-}  # fmt: skip
 TOGETHER = {  # terms that are often left out together
     "all moments of {} in the bias": ("Euler", "gyroscopic"),
     "velocity terms of {} in h": ("convective", "Euler", "gyroscopic"),
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
 }
-OF_BIAS = ("gravity", "convective", "Euler", "gyroscopic")  # of the terms, those of h
 EVERY_BODY = "every body"
 OF_ZERO = "zero position"  # the kind of a place
-MOST_SPEEDS = 12  # with more, coefficients of products of speeds are not tried: there are nv^2 (nv + 1) / 2
+FIT_ROUNDING = 1e-11  # of the size of a number: what a fit leaves of a number that is 0
+TURNING = ("N m s/rad", "N m/rad", "N m")
+UNITS_OF_FORCES = {"hinge": TURNING, "slide": ("N s/m", "N/m", "N"), "ball": TURNING}  # of damping, stiffness, force
 
 
 class Place(NamedTuple):
     """One number that can be wrong."""
 
     rank: int
-    kind: str  # "number", "term", "coefficient"
+    kind: str  # "number", "force", "term", "coefficient" or OF_ZERO
     name: str
     stated: float
     unit: str
     size: float  # of a change that matters, for starts of a search
     moves: tuple[tuple[Path, float], ...] = ()  # entries of the tree, and how far they go with a change of 1
-    entry: int | slice | None = None  # of the values of a state, with a column of its own instead
-    column: np.ndarray | None = None  # (states,), of several entries (states, entries)
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether it is the zero of a joint."""
-        return self.kind == OF_ZERO
+    column: np.ndarray | None = None  # what a change of 1 adds to `entry` instead, (states, ...)
+    entry: int | slice = slice(None)  # of the values of a state
+    least: float = -np.inf  # possible value
 
     @property
     def is_quadratic(self) -> bool:
         """Whether Mbar and h are a polynomial of second degree in it."""
         return not any(path.field in ("axis", "reference") for path, _ in self.moves)
 
+    def value(self, change: float) -> float:
+        """The value after a change; 0 where only the digits of a fit remain."""
+        value = self.stated + change
+        return 0.0 if abs(value) < FIT_ROUNDING * self.size else float(value)
+
+    def changed(self, change: float) -> Change:
+        return Change(self.kind, self.name, float(self.stated), self.value(change), self.unit)
+
 
 def all_places(equations: Equations) -> list[Place]:
     return [*numbers(equations), *terms(equations), *coefficients(equations), *forces_in_bias(equations)]
 
 
-def forces_in_bias(equations: Equations) -> list[Place]:
+def forces_in_bias(equations: Equations) -> Iterator[Place]:
     """Damping and springs of joints that were added to h."""
-    tree, nv, places = equations.tree, equations.nv, []
-    first = len(equations.entries) - nv
+    tree, bias = equations.tree, slice(-equations.nv, None)
+    for place in forces(tree, equations.q, equations.qd):
+        if place.name.startswith(("damping", "stiffness")):
+            yield place._replace(kind="force", name=f"{place.name} in h", stated=0.0, entry=bias)
 
-    def add(name, unit, entry, column):
-        places.append(Place(2, "force", f"{name} in h", 0.0, unit, 1.0, entry=entry, column=column))
 
-    for i, (joint, (kind, at, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
-        of_speed, of_length = ("N s/m", "N/m") if kind == "slide" else ("N m s/rad", "N m/rad")
+def forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Place]:
+    """Damping, stiffness, friction and a constant force of each joint, and damping of all together."""
+
+    def place(name: str, unit: str, stated: float, force: np.ndarray, least: float = 0.0) -> Place:
+        return Place(2, "number", name, stated, unit, 1.0, column=force, least=least)
+
+    joints = tree.coordinates.joints
+    for i, (name, (kind, at, by)) in enumerate(zip(tree.hinge_names, joints)):
+        of_damping, of_stiffness, of_force = UNITS_OF_FORCES[kind]
         for v in range(by.start, by.stop):
-            name = joint if kind != "ball" else f"{joint} {XYZ[v - by.start]}"
-            add(f"damping of {name}", of_speed, first + v, equations.qd[:, v])
-        if kind != "ball":
-            stretched = equations.q[:, at.start] - tree.reference[i]
-            add(f"stiffness of {joint}", of_length, first + by.start, stretched)
-    if nv > 1:
-        add("the same damping of every joint", "N m s/rad", slice(first, first + nv), equations.qd)
-    return places
+            axis = name if kind != "ball" else f"{name} {XYZ[v - by.start]}"
+            own, speed = np.eye(qd.shape[1])[v], qd[:, v : v + 1]
+            yield place(f"damping of {axis}", of_damping, tree.damping[v], speed * own)
+            yield place(f"friction of {axis}", of_force, 0.0, np.sign(speed) * own)
+            yield place(f"constant force at {axis}", of_force, 0.0, np.ones_like(speed) * own, -np.inf)
+            if kind != "ball":
+                rest = tree.rest[at.start] if tree.stiffness[i] else tree.reference[i]
+                yield place(f"stiffness of {axis}", of_stiffness, tree.stiffness[i], (q[:, at] - rest) * own)
+    if len(joints) > 1:
+        yield place("damping added to every joint", "N m s/rad", 0.0, qd)
 
 
 def numbers(equations: Equations) -> list[Place]:
@@ -84,135 +96,99 @@ def numbers(equations: Equations) -> list[Place]:
     length = max(1e-3, float(np.abs(stated["offset"]).max()), float(np.abs(stated["com"]).max()))
     places = []
 
-    def add(kind, name, field, index, unit, size, *more, rank=2):
+    def add(name, field, index, unit, size, *more, least=-np.inf, rank=2, kind="number"):
         moves = ((Path(field, index), 1.0), *more)
-        places.append(Place(rank, kind, name, float(stated[field][index]), unit, float(size), moves))
+        places.append(Place(rank, kind, name, float(stated[field][index]), unit, float(size), moves, least=least))
 
     for b, body in enumerate(tree.body_names):
         heavy = stated["mass"][b] or stated["mass"].max()
-        add("number", f"mass of {body}", "mass", (b,), "kg", heavy)
+        add(f"mass of {body}", "mass", (b,), "kg", heavy, least=0.0)
         for k, axis in enumerate(XYZ):
-            add("number", f"CoM {axis} of {body}", "com", (b, k), "m", length)
+            add(f"CoM {axis} of {body}", "com", (b, k), "m", length)
         size = np.abs(stated["inertia"][b]).max() or heavy * length**2
         for name, i, j in INERTIA:
             mirrored = () if i == j else ((Path("inertia", (b, j, i)), 1.0),)
-            add("number", f"inertia {name} of {body}", "inertia", (b, i, j), "kg m2", size, *mirrored)
+            least = 0.0 if i == j else -np.inf
+            add(f"inertia {name} of {body}", "inertia", (b, i, j), "kg m2", size, *mirrored, least=least)
     carried = [[b for b, joint in enumerate(tree.body_hinge) if joint == i] for i in range(len(tree.parent))]
     following = [[j for j, parent in enumerate(tree.parent) if parent == i] for i in range(len(tree.parent))]
     for i, (joint, (kind, _, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
         for k, axis in enumerate(XYZ):
-            add("number", f"offset {axis} of {joint}", "offset", (i, k), "m", length)
+            add(f"offset {axis} of {joint}", "offset", (i, k), "m", length)
             if kind != "slide":
                 stays = [(Path("com", (b, k)), -1.0) for b in carried[i]]
                 stays += [(Path("offset", (j, k)), -1.0) for j in following[i]]
-                add("number", f"anchor {axis} of {joint}", "offset", (i, k), "m", length, *stays)
+                add(f"anchor {axis} of {joint}", "offset", (i, k), "m", length, *stays)
         if kind != "ball":
-            unit = "m" if kind == "slide" else "rad"
-            add(OF_ZERO, f"zero of {joint}", "reference", (i,), unit, length if kind == "slide" else 1.0, rank=1)
+            unit, size = ("m", length) if kind == "slide" else ("rad", 1.0)
+            add(f"zero of {joint}", "reference", (i,), unit, size, rank=1, kind=OF_ZERO)
             for k, axis in enumerate(XYZ):
-                add("number", f"axis {axis} of {joint}", "axis", (by.start, k), "", 0.5)
+                add(f"axis {axis} of {joint}", "axis", (by.start, k), "", 0.5)
         for speed in range(by.start, by.stop):
-            rotor = "kg" if kind == "slide" else "kg m2"
-            size = stated["mass"].max() * (1.0 if kind == "slide" else length**2)
+            rotor, scale = ("kg", 1.0) if kind == "slide" else ("kg m2", length**2)
             name = joint if kind != "ball" else f"{joint} {XYZ[speed - by.start]}"
-            add("number", f"armature of {name}", "armature", (speed,), rotor, size)
+            add(f"armature of {name}", "armature", (speed,), rotor, stated["mass"].max() * scale, least=0.0)
     for k, axis in enumerate(XYZ):
-        add("number", f"gravity {axis}", "gravity", (k,), "m/s2", 9.81)
+        add(f"gravity {axis}", "gravity", (k,), "m/s2", 9.81)
     return places
 
 
-def terms(equations: Equations) -> list[Place]:
+def terms(equations: Equations) -> Iterator[Place]:
     """The factor of every term of each body and of all bodies together; 1 is right."""
-    bodies = equations.tree.body_names
-    groups = {body: [b] for b, body in enumerate(bodies)}
-    if len(bodies) > 1:
-        groups[EVERY_BODY] = list(range(len(bodies)))
     called = {name: (term,) for term, name in OF_TERM.items()} | TOGETHER
-    places = []
     for name, together in called.items():
-        for body, which in groups.items():
+        for body, which in groups(equations.tree).items():
             moves = tuple((Path("factor", (b, BODY_TERMS.index(term))), 1.0) for b in which for term in together)
-            places.append(Place(2, "term", name.format(body), 1.0, "times", 1.0, moves))
-    return places
+            yield Place(2, "term", name.format(body), 1.0, "times", 1.0, moves)
+
+
+def groups(tree: tmt.Tree) -> dict[str, list[int]]:
+    """Each body alone, and all together."""
+    alone = {body: [b] for b, body in enumerate(tree.body_names)}
+    return alone | ({EVERY_BODY: list(range(len(alone)))} if len(alone) > 1 else {})
 
 
 def entry_name(entry: tuple, names: Sequence[str]) -> str:
-    """An entry of Mbar or h, "M[hip][knee]"; the entry of Mbar above the diagonal names both."""
+    """An entry of Mbar or h, "M[hip][knee]", or a coefficient of h, "h[hip], gravity"; see `coefficients_of`."""
     kind, *indices = entry
+    if kind == "gravity":
+        return f"h[{names[indices[0]]}], gravity"
+    if kind == "velocity":
+        i, j, k = indices
+        rates = f"{names[j]}'^2" if j == k else f"{names[j]}' {names[k]}'"
+        return f"h[{names[i]}], coefficient of {rates}"
     return kind + "".join(f"[{names[i]}]" for i in sorted(indices))
-
-
-def rates_name(j: int, k: int, names: Sequence[str]) -> str:
-    """A product of two speeds, "hip' knee'"."""
-    return f"{names[j]}'^2" if j == k else f"{names[j]}' {names[k]}'"
 
 
 def coefficients(equations: Equations) -> list[Place]:
     """Entries of Mbar, entries of gravity, and the coefficients of products of rates in h; 1 is right."""
-    nv, states, names = equations.nv, len(equations.q), equations.names
-    values = dict(zip(equations.entries, equations.values()[0].T))
-    at = {entry: k for k, entry in enumerate(equations.entries)}
-    places = []
+    nv, names, qd, right = equations.nv, equations.names, equations.qd, equations.values()[0]
+    parts, places = len(equations.triangle[0]), []
 
-    def add(name, entry, column, stated=1.0):
-        places.append(Place(2, "coefficient", name, stated, "times", 1.0, entry=entry, column=column))
+    def add(name, entry, column, stated=1.0, kind="coefficient"):
+        if np.abs(column).max() > 0.0:
+            places.append(Place(2, kind, name, stated, "times", 1.0, column=column, entry=entry))
 
-    for i, j in zip(*map(np.ndarray.tolist, equations.triangle)):
-        add(entry_name(("M", i, j), names), at["M", i, j], values["M", i, j])
-    whole, parts = equations.values()[0], len(equations.triangle[0])
+    for k, entry in enumerate(equations.entries):
+        add(entry_name(entry, names), k, right[:, k])
     for name, part in {"M": slice(parts), "h": slice(parts, None), "M and h": slice(None)}.items():
-        add(f"all of {name}", part, whole[:, part])
-    of_rates, weight = products_of_rates(equations) if nv <= MOST_SPEEDS else ({}, bias_at_rest(equations))
-    for i in range(nv):
-        row, entry = entry_name(("h", i), names), at["h", i]
-        add(row, entry, values["h", i])
-        add(f"{row} at rest", entry, weight[:, i])
-        for j in range(nv) if nv <= MOST_SPEEDS else ():
-            if j != i:
-                add(f"{entry_name(('h', j), names)} at rest in {row}", entry, weight[:, j], stated=0.0)
-        for (j, k), column in of_rates.items():
-            name = f"{row}, coefficient of {rates_name(j, k, names)}"
-            add(name, entry, column[:, i] * equations.qd[:, j] * equations.qd[:, k])
-    places += terms_of_rows(equations) if nv <= MOST_SPEEDS else []
-    return [place for place in places if np.abs(place.column).max() > 0.0 and len(place.column) == states]
-
-
-def terms_of_rows(equations: Equations) -> list[Place]:
-    """The factor of each term of each body in one row of h alone."""
-    nv, right = equations.nv, equations.values()[0]
-    names = [name for name in OF_TERM if name in OF_BIAS]
-    indices = [(b, BODY_TERMS.index(name)) for b in range(len(equations.tree.mass)) for name in names]
-    changes = {Path("factor", index): row for index, row in zip(indices, np.eye(len(indices)))}
-    added = equations.values(changes) - right  # of each term doubled, (terms, states, entries)
-    places = []
-    for (b, term), column in zip(indices, added[..., -nv:]):
+        add(f"all of {name}", part, right[:, part])
+    of_h = equations.coefficients()
+    for (kind, i, *pair), column in of_h.items():
+        name = f"{entry_name(('h', i), names)} at rest" if kind == "gravity" else entry_name((kind, i, *pair), names)
+        add(name, parts + i, column * np.prod(qd[:, pair], axis=1))
+    if nv > MOST_SPEEDS:
+        return places
+    for i, j in np.argwhere(~np.eye(nv, dtype=bool)).tolist():
+        add(
+            f"{entry_name(('h', j), names)} at rest in {entry_name(('h', i), names)}",
+            parts + i,
+            of_h["gravity", j],
+            0.0,
+        )
+    of_bias = [place for place in terms(equations) if len(place.moves) == 1 and place.moves[0][0].index[1] > 1]
+    for place in of_bias:  # the factor of each term of each body in one row of h alone
+        added = (equations.values({place.moves[0][0]: np.ones(1)})[0] - right)[:, -nv:]
         for i in range(nv):
-            of = OF_TERM[BODY_TERMS[term]].format(equations.tree.body_names[b])
-            name = f"{of} in {entry_name(('h', i), equations.names)}"
-            at = right.shape[1] - nv + i
-            places.append(Place(2, "term", name, 1.0, "times", 1.0, entry=at, column=column[:, i]))
+            add(f"{place.name} in {entry_name(('h', i), names)}", parts + i, added[:, i], kind="term")
     return places
-
-
-def bias_at_rest(equations: Equations) -> np.ndarray:
-    """h without rates, (states, nv)."""
-    still = Equations(equations.tree, equations.q, np.zeros_like(equations.qd))
-    return still.values()[0][:, -equations.nv :]
-
-
-def products_of_rates(equations: Equations) -> tuple[dict, np.ndarray]:
-    """The coefficient of qd_j qd_k in h, {(j, k): (states, nv)} with j at most k, and h at rest, (states, nv).
-
-    h is quadratic in the rates: c_jj = (h(e_j) + h(-e_j) - 2 h(0)) / 2, c_jk = h(e_j + e_k) - h(e_j) - h(e_k) + h(0).
-    """
-    nv, states = equations.nv, len(equations.q)
-    pairs = [(j, k) for j in range(nv) for k in range(j, nv)]
-    rates = [np.zeros(nv)] + [np.eye(nv)[j] + (np.eye(nv)[k] if k != j else 0.0) for j, k in pairs]
-    q, qd = np.tile(equations.q, (len(rates), 1)), np.repeat(rates, states, axis=0)
-    h = Equations(equations.tree, q, qd).values()[0, :, -nv:].reshape(len(rates), states, nv)
-    weight, single = h[0], {j: h[1 + pairs.index((j, j))] for j in range(nv)}
-    of = {
-        (j, k): single[j] - weight if j == k else h[1 + pairs.index((j, k))] - single[j] - single[k] + weight
-        for j, k in pairs
-    }
-    return of, weight

@@ -23,7 +23,7 @@ FORCES = {  # what acts besides: rank, place, and what explains it
     "stiffness": (2.0 * Q * [0, 0, 1], 2, "stiffness of gamma", 2.0),
     "friction": (0.3 * np.sign(QD) * [1, 0, 0], 2, "friction of alpha", 0.3),
     "a constant force": (-0.4 * np.ones_like(QD) * [0, -1, 0], 2, "constant force at beta", 0.4),
-    "damping of all": (0.7 * QD, 2, "damping of every joint", 0.7),
+    "damping of all": (0.7 * QD, 2, "damping added to every joint", 0.7),
     "damping of two": (QD * [0.1, 0.2, 0.0], 3, "damping of alpha and damping of beta", "0.1 and 0.2"),
 }
 

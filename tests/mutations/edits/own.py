@@ -27,14 +27,14 @@ EDITS = (
     # the comparison
     Edit("agreement.given", "Compared.ratio", "np.where(np.isfinite(off), off, np.inf)", "np.where(np.isfinite(off), off, 0.0)",
          "NaN agrees"),
-    Edit("agreement.given", "Given.compared", "FACTOR * EPS + self.rtol", "FACTOR * EPS", "rtol is not added"),
-    Edit("agreement.given", "Given.compared", "FACTOR * EPS + self.rtol", "max(FACTOR, 96) * EPS + self.rtol",
+    Edit("agreement.given", "Given.__init__", "FACTOR * EPS + float(rtol)", "FACTOR * EPS", "rtol is not added"),
+    Edit("agreement.given", "Given.__init__", "FACTOR * EPS + float(rtol)", "max(FACTOR, 96) * EPS + float(rtol)",
          "64 eps become 96"),
     Edit("agreement.given", "Given.fails", "comparison.ratio > 1.0", "comparison.ratio > 2.0", "twice the tolerance agrees"),
-    Edit("agreement.given", "Given.value", "self.joints.mass_matrix(values)", "values", "a table of M keeps its own joints"),
+    Edit("agreement.given", "Given.table", "self.joints.mass_matrix(values)", "values", "a table of M keeps its own joints"),
     Edit("agreement.given", "Given.take_states", "self.joints.speeds(own['qd'])", "own['qd']", "speeds keep their own joints"),
     Edit("agreement", "assert_agrees", "given.fails or given.problems", "given.fails", "a changed argument agrees"),
-    Edit("agreement", "differences", "-comparison.ratio", "comparison.ratio", "the smallest ratio first"),
+    Edit("agreement", "rows", "-row.ratio", "row.ratio", "the smallest ratio first"),
     Edit("agreement.why", "some_states", "np.flatnonzero(np.isfinite(worst))", "np.arange(len(worst))",
          "a cause is sought where there are no values"),
 )  # fmt: skip
