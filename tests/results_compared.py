@@ -14,8 +14,10 @@ FIELDS = ("experiment", "scene", "quantity", "rule")
 RENAMED = [  # (field, regular expression, replacement): a name of before, and what it is now
     ("quantity", "^smallest error of MuJoCo's RK4, beside that of tmt's rk4$",
      "smallest error of MuJoCo's RK4, compared with tmt's rk4"),
+    ("scene", "^(.*), free base, (.*)$", r"\1, \2"),
 ]  # fmt: skip
 WITHOUT = {  # regular expression for the checks of before, or "after: " and one for those of after, without partner: the reason
+    r"stability .*, locked base, ": "one base for each robot: free where it floats",
     r"stability .* growth in \d+ steps": "the growth per step is covered by limits and times of departure",
     "stability .* exponent of the time to leave|stability .* zero, .* departure": "no user asks how a marginal posture is left",
     "stability .* near sqrt 3": "the resonance at sqrt 3 was deleted",

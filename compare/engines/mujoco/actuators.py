@@ -24,22 +24,13 @@ def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequenc
     """
     count = number_of_actuators(model)
     passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
-    by_actuators = np.flatnonzero(model.jnt_actgravcomp[model.dof_jntid]).tolist()
     return Drive(
         actuators=tuple(actuator(model, i) for i in range(count)),
         tendons=tuple(tendon(model, i) for i in range(model.ntendon) if pulls(model, i)),
         compensation=tuple(map(float, model.body_gravcomp[list(bodies)] * passive)),
         damping=own_damping(model, count),
         controls={keys[k]: u for k, u in stated_controls(model, source).items()},
-        ranges={
-            int(model.jnt_dofadr[j]): between(model.jnt_actfrcrange[j]) for j in np.flatnonzero(model.jnt_actfrclimited)
-        },
-        tendon_ranges={
-            int(i): between(model.tendon_actfrcrange[i]) for i in np.flatnonzero(model.tendon_actfrclimited)
-        },
-        **{"lifted" if on(model, "ACTUATION") else "unlifted": tuple(by_actuators)},
         unknown=unknown_springs(model),
-        joints_alone=model.opt.solver == mujoco.mjtSolver.mjSOL_PGS,
         explicit_damping=not on(model, "EULERDAMP"),
     )
 
@@ -58,7 +49,6 @@ def actuator(m: mujoco.MjModel, i: int) -> Actuator:
     joint, moment = moment_of(m, i)
     filters = dynamics in ("FILTER", "FILTEREXACT")
     clamped = inputs and on(m, "CLAMPCTRL") and m.actuator_ctrllimited[place]
-    along_tendon = mujoco.mjtTrn(m.actuator_trntype[i]) == mujoco.mjtTrn.mjTRN_TENDON
     return Actuator(
         name=own_name(m.actuator(i).name, "actuator", i),
         joint=joint,
@@ -69,11 +59,19 @@ def actuator(m: mujoco.MjModel, i: int) -> Actuator:
         time_constant=max(float(m.actuator_dynprm[i, 0]), mujoco.mjMINVAL) if filters else 0.0,
         control_range=between(m.actuator_ctrlrange[place]) if clamped else None,
         activation_range=between(m.actuator_actrange[i]) if m.actuator_actlimited[i] else None,
-        force_range=between(m.actuator_forcerange[i]) if m.actuator_forcelimited[i] else None,
-        tendon=int(m.actuator_trnid[i, 0]) if along_tendon else -1,
+        force_range=force_range(m, i),
         off=off(m, i),
         refused=refused(m, i, gain, bias, dynamics, inputs),
     )
+
+
+def force_range(m: mujoco.MjModel, i: int) -> tuple[float, float] | None:
+    """Of an actuator at a joint also that of the joint over the gear, as if no other actuator were at it; None: no range."""
+    j, gear = int(m.actuator_trnid[i, 0]), float(m.actuator_gear[output_of(m, i), 0])
+    ranges = [m.actuator_forcerange[i]] if m.actuator_forcelimited[i] else []
+    if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT and m.jnt_actfrclimited[j] and gear:
+        ranges.append(np.sort(m.jnt_actfrcrange[j] / gear))
+    return (float(max(low for low, _ in ranges)), float(min(high for _, high in ranges))) if ranges else None
 
 
 def control_of(m: mujoco.MjModel, i: int) -> tuple[int, int]:
@@ -172,8 +170,10 @@ def own_damping(m: mujoco.MjModel, count: int) -> tuple[float, ...]:
 
 
 def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
-    """Joints and tendons whose springs or dampers are not linear, by name, and why they are left out."""
-    reasons = {}
+    """What is left out of joints and tendons, by name, and why: springs and dampers that are not linear, a tendon's range."""
+    tendons = [own_name(m.tendon(k).name, "tendon", k) for k in range(m.ntendon)]
+    limited = np.flatnonzero(m.tendon_actfrclimited)
+    reasons = {f"tendon {tendons[k]}": "a range of its actuators' force" for k in limited}
     for what, fields in (
         ("joint", ("jnt_stiffnesspoly", "dof_dampingpoly", "jnt_springyield")),
         ("tendon", ("tendon_stiffnesspoly", "tendon_dampingpoly", "tendon_springyield")),
@@ -182,7 +182,7 @@ def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
             values = np.asarray(getattr(m, name, np.zeros(0)))
             for k in np.flatnonzero(values.reshape(len(values), -1).any(axis=1)) if len(values) else ():
                 k = int(m.dof_jntid[k]) if name.startswith("dof_") else int(k)
-                element = joint_name(m, k) if what == "joint" else own_name(m.tendon(k).name, "tendon", k)
+                element = joint_name(m, k) if what == "joint" else tendons[k]
                 reasons[f"{what} {element}"] = reason
     return reasons
 
