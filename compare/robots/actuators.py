@@ -116,13 +116,12 @@ class Drive:
     """The actuators, tendons and gravity compensation of a robot.
 
     controls: by posture, u of each actuator in its keyframe, or None. compensation: of each body of the Tree, the part of its
-    weight that is compensated. damping: of each speed, by the actuators. unknown: other elements that are left out, and why.
+    weight that is compensated. unknown: other elements that are left out, and why.
     """
 
     actuators: tuple[Actuator, ...] = ()
     tendons: tuple[Tendon, ...] = ()
     compensation: tuple[float, ...] = ()
-    damping: tuple[float, ...] = ()
     controls: Mapping[str, tuple] = field(default_factory=dict)
     unknown: Mapping[str, str] = field(default_factory=dict)
     explicit_damping: bool = False  # the file disables EULERDAMP

@@ -105,7 +105,7 @@ class Posture:
         """Small deviations of all speeds, without the steps of constraints."""
         tree, drive = self.robot.tree, self.robot.drive
         slopes, joint = self.driven.slopes(self.q, self.u), by_speed(tree, range(len(tree.parent)))
-        speeds = np.add(tree.damping, drive.damping or 0.0) * (not drive.explicit_damping)
+        speeds = np.array(tree.damping) * (not drive.explicit_damping)
         filters = [act for act in drive.actuators if act.acts and act.dynamics in ("filter", "filterexact")]
         on_path = carries(tree) | carries(tree).T
         return Small(

@@ -36,15 +36,6 @@ class Along(NamedTuple):
     turns: np.ndarray
 
 
-class Pulls(NamedTuple):
-    """Actuators, then tendons at rest, (k,) each: force, -d force/dl and -d force/dldot; the derivatives are 0 at a range."""
-
-    forces: np.ndarray
-    stiffness: np.ndarray
-    damping: np.ndarray
-    cut: np.ndarray  # whether a range cuts the force
-
-
 class Slopes(NamedTuple):
     """Derivatives of the forces at rest, (nv, nv) each: K = -d force/dq, D = -d force/dqd.
 
@@ -104,8 +95,8 @@ class Driven:
             )
         return Along(lengths, slopes, moments, turns)
 
-    def pulls(self, along: Along, u: np.ndarray) -> Pulls:
-        """The forces of actuators and tendons at rest at a posture, under the controls u."""
+    def pulls(self, along: Along, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Of actuators, then tendons at rest, (k,): force, -d force/dl, -d force/dldot, and whether a range cuts the force."""
         laws = []
         for act, control, length in zip(self.drive.actuators, u, along.lengths):
             force = act.force(control, length)
@@ -115,35 +106,35 @@ class Driven:
         for tendon, length in zip(self.drive.tendons, along.lengths[len(laws) :]):
             laws.append((tendon.force(length), tendon.stiffness * tendon.pulls(length), tendon.damping, False))
         forces, stiff, damped, cut = np.array(laws, float).reshape(-1, 4).T
-        return Pulls(forces, np.where(cut, 0.0, stiff), np.where(cut, 0.0, damped), cut.astype(bool))
+        return forces, np.where(cut, 0.0, stiff), np.where(cut, 0.0, damped), cut.astype(bool)
 
     def cut(self, q: np.ndarray, u: np.ndarray) -> dict[int, float]:
         """The forces that ranges cut at a posture, by the number of the actuator."""
-        pulls = self.pulls(self.along(q), u)
-        return {int(i): float(pulls.forces[i]) for i in np.flatnonzero(pulls.cut)}
+        forces, _, _, cut = self.pulls(self.along(q), u)
+        return {int(i): float(forces[i]) for i in np.flatnonzero(cut)}
 
     def forces(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
         """The sum of all forces at rest, (nv,) N m or N, and its largest term."""
         along, count = self.along(q), len(self.drive.actuators)
-        pulls, weigh = self.pulls(along, u), self.weight(q)
+        weigh = self.weight(q)
         sizes = [act.largest(x, length) * act.acts for act, x, length in zip(self.drive.actuators, u, along.lengths)]
         sizes += [tendon.largest(length) for tendon, length in zip(self.drive.tendons, along.lengths[count:])]
         by_drive = (np.abs(along.moments) * np.array(sizes).reshape(-1, 1)).max(initial=0.0)
         by_springs = np.abs(by_speed(self.tree, self.tree.stiffness)).max() * max(1.0, np.abs(q).max())
-        total = pulls.forces @ along.moments - weigh.torque - literal.spring_torque(q, self.tree)
+        total = self.pulls(along, u)[0] @ along.moments - weigh.torque - literal.spring_torque(q, self.tree)
         return total, float(max(by_drive, by_springs, weigh.size))
 
     def slopes(self, q: np.ndarray, u: np.ndarray) -> Slopes:
         """Derivatives of the forces at rest at a posture, under the controls u."""
         along = self.along(q, differenced=True)
-        pulls, J = self.pulls(along, u), along.moments
-        each = np.einsum("ki,k,kj->kij", J, pulls.stiffness, along.slopes)
-        each -= np.einsum("k,kij->kij", pulls.forces, along.turns)
-        lost = np.einsum("ki,k,kj->kij", J, pulls.damping, J)
-        D = lost.sum(axis=0) + np.diag(np.add(self.tree.damping, self.drive.damping or 0.0))
-        springs = np.diag(by_speed(self.tree, self.tree.stiffness)) + (J.T * np.maximum(pulls.stiffness, 0.0)) @ J
+        J, (forces, stiffness, damping, _) = along.moments, self.pulls(along, u)
+        each = np.einsum("ki,k,kj->kij", J, stiffness, along.slopes)
+        each -= np.einsum("k,kij->kij", forces, along.turns)
+        lost = np.einsum("ki,k,kj->kij", J, damping, J)
+        D = lost.sum(axis=0) + np.diag(self.tree.damping)
+        springs = np.diag(by_speed(self.tree, self.tree.stiffness)) + (J.T * np.maximum(stiffness, 0.0)) @ J
         K = each.sum(axis=0) + self.weight(q).slope + spring_slope(self.tree, q)
-        return Slopes(K, D, springs, D - lost[pulls.damping < 0.0].sum(axis=0))
+        return Slopes(K, D, springs, D - lost[damping < 0.0].sum(axis=0))
 
     def at_rest(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
         """The nearest posture at rest, by Newton's method from q, and the residual force; 0.0: it rests.

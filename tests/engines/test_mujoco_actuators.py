@@ -38,7 +38,7 @@ REFUSED = {  # actuator, and a word of why it takes no part
     '<dcmotor joint="k" motorconst="0.1" resistance="1"/>': "DC",
     '<adhesion body="b" ctrlrange="0 1" gain="2"/>': "body",
     '<position joint="k" kp="3" delay="0.02" nsample="3"/>': "delay",
-    '<general joint="k" damping="1 2"/>': "polynomial",
+    '<general joint="k" damping="1 2"/>': "damping",
     '<general tendon="t" damping="1"/>': "damping",
     '<pid joint="k" kp="3" ki="1"/>': "pid",
     '<orientation site="s" refsite="s" kp="1"/>': "so3",
@@ -75,11 +75,10 @@ def test_a_keyframe_states_controls_activations_or_neither(actuators, key, expec
     assert controls.get("home") == expected and "plain" not in controls
 
 
-def test_a_disabled_group_is_off_and_damping_by_an_actuator_goes_with_the_square_of_its_gear():
+def test_a_disabled_group_is_off():
     servos = '<position joint="j" kp="5" group="2"/><position joint="k" kp="5" group="1"/>'
     drive = drive_of(servos, before='<option actuatorgroupdisable="2"/>')
     assert [one.acts for one in drive.actuators] == [False, True]
-    assert read(since(text_of('<general joint="j" damping="3" gear="2"/>'))).drive.damping == (12.0, 0.0)
 
 
 def test_armature_is_added_to_bodies_whose_inertia_never_changes():

@@ -13,10 +13,10 @@ from .actuators import control_of
 from .engine import MOST_ITERATIONS, SOLVED, UNLIMITED
 from .inventory import NOT_HAD_FIELDS, open_equalities
 from .linear import NUDGE
-from .names import INTEGRATORS, OF_A_JOINT, bit, kind_of, output_of
+from .names import INTEGRATORS, bit, kind_of, output_of
 
 # besides the joints' springs and dampers these drive a robot here and stay
-DRIVES = ("body_gravcomp", "actuator_damping", "tendon_stiffness", "tendon_damping")
+DRIVES = ("body_gravcomp", "tendon_stiffness", "tendon_damping")
 FREE = ("slide", "slide", "slide", "ball")
 DISCRETE = getattr(
     mujoco.mjtIntegrator, "mjINT_DISCRETE", None
@@ -59,12 +59,6 @@ class Acting:
                 m.actuator_biasprm[i, 0] = cut.get(i, 0.0)
                 if m.actuator_plugin[i] >= 0:  # its own law overrides this one
                     m.actuator_gear[output_of(m, i)] = 0.0
-            if (
-                one.refused
-                and hasattr(m, "actuator_damping")
-                and mujoco.mjtTrn(m.actuator_trntype[i]) not in OF_A_JOINT
-            ):
-                m.actuator_damping[i] = 0.0
         if weightless:
             m.opt.gravity[:] = 0.0
         self.data = mujoco.MjData(m)
@@ -159,10 +153,9 @@ class Acting:
     ) -> Iterator[np.ndarray]:
         """Deviations from q after each step of a run, then of filters' activations from u; one array for each part of the run.
 
-        steps: their number in each part. Each array is (steps, nv + filters), in rad or m, a ball's turn in its own axes. The run
-        starts at rest at q, moved by a small movement (nv,), with a speed (nv,) and an offset of all activations of filters;
-        jump: of u, (k,), constant. A run that diverges stays where MuJoCo stopped it. Where constraints hold joints, the position
-        of rest depends on the step: then the deviation is that from a run that starts at rest at q under u.
+        steps: their number in each part. Each array is (steps, nv + filters), in rad or m. The run starts at q with a small
+        movement (nv,), a speed (nv,), an offset of all activations of filters; jump: of u, (k,), constant. A run that diverges
+        stays where MuJoCo stopped it. With constraints, whose rest depends on the step, from a run that starts at rest at q.
         """
         model, data = self.at(q, np.add(u, jump), dt, integrator)
         mujoco.mj_integratePos(model, data.qpos, np.broadcast_to(movement, model.nv).astype(float), 1.0)

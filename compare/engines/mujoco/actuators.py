@@ -28,7 +28,6 @@ def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequenc
         actuators=tuple(actuator(model, i) for i in range(count)),
         tendons=tuple(tendon(model, i) for i in range(model.ntendon) if pulls(model, i)),
         compensation=tuple(map(float, model.body_gravcomp[list(bodies)] * passive)),
-        damping=own_damping(model, count),
         controls={keys[k]: u for k, u in stated_controls(model, source).items()},
         unknown=unknown_springs(model),
         explicit_damping=not on(model, "EULERDAMP"),
@@ -92,13 +91,12 @@ def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inpu
         return f"{inputs} controls"
     if np.any(getattr(m, "actuator_delay", np.zeros(i + 1))[i]):
         return "a delay"
-    if np.any(getattr(m, "actuator_dampingpoly", np.zeros((i + 1, 1)))[i]):
-        return "polynomial damping"
     transmission = mujoco.mjtTrn(m.actuator_trntype[i])
     if transmission not in WITH_LENGTH:
         return f"a transmission of type {transmission.name.removeprefix('mjTRN_').lower()}"
-    if transmission not in OF_A_JOINT and np.any(getattr(m, "actuator_damping", np.zeros(i + 1))[i]):
-        return "damping of its own, not at a joint"
+    damping = (getattr(m, name, np.zeros(i + 1))[i] for name in ("actuator_damping", "actuator_dampingpoly"))
+    if any(map(np.any, damping)):
+        return "damping of its own"
     return ""
 
 
@@ -158,15 +156,6 @@ def tendon(m: mujoco.MjModel, i: int) -> Tendon:
         low,
         high,
     )
-
-
-def own_damping(m: mujoco.MjModel, count: int) -> tuple[float, ...]:
-    """Damping of actuators at joints times the gear squared, (nv,); MuJoCo adds it to the joint's."""
-    total = np.zeros(m.nv)
-    for i, damping in enumerate(getattr(m, "actuator_damping", np.zeros(count))):
-        if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT and on(m, "DAMPER"):
-            total[m.dof_jntid == m.actuator_trnid[i, 0]] += damping * m.actuator_gear[output_of(m, i), 0] ** 2
-    return tuple(total.tolist())
 
 
 def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:

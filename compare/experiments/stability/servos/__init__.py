@@ -109,9 +109,14 @@ def add(result: Result, setup: Setup, work: dict) -> None:
     findings.find_answer(result, rows, setup.robot, predictions)
     if setup.step:
         dt, name = setup.step
-        stable = [prediction for prediction in predictions if prediction.is_stable(name, dt)]
-        errors = [error_at(prediction, name, reading, dt) for prediction in stable]
-        findings.find_requested(result, predictions, dt, name, errors)
+        requested, by_name = (
+            limit_rows(predictions, dt, name),
+            {prediction.name: prediction for prediction in predictions},
+        )
+        for row in findings.known(requested, name):
+            if row["stable_at_file_dt"]:
+                row["step_response_error"] = error_at(by_name[row["posture"]], name, reading, dt)
+        findings.find_requested(result, requested, setup.robot, predictions)
     for (prediction, name), lifts in zip(*work["lifts"]):
         findings.find_changes(result, prediction, name, lifts, reading.dt)
     findings.find_notes(result, rows, predictions)

@@ -83,19 +83,15 @@ def conditions(predictions: Sequence[Prediction]) -> dict:
     return {"contacts": contacts, "floats": bool(predictions[0].at.base)}
 
 
-def find_requested(
-    result: Result, predictions: Sequence[Prediction], dt: float, integrator: str, errors: Sequence[float | None]
-) -> None:
-    """Whether the step of --dt and --integrator is stable; errors: of the step response, where it is."""
-    has_servos, lowest = predictions[0].at.robot.drive.feeds_back, least(predictions, integrator)
-    values = {"dt": dt, "integrator": integrator, "has_servos": has_servos, "known": lowest is not None}
-    if lowest:
-        resting = [prediction for prediction in predictions if integrator in prediction.known]
-        bad = [prediction for prediction in resting if not prediction.is_stable(integrator, dt)]
-        where, limit = [prediction.name for prediction in bad or resting], lowest.limits[integrator]
-        values |= {"stable": not bad, "postures": [] if len(where) == len(predictions) else where, "limit": limit.dt}
-        values |= {"joint": limit.joint, "posture": lowest.name if len(predictions) > 1 else None}
-        values["error"] = max((error for error in errors if error is not None), default=None)
+def find_requested(result: Result, rows: Sequence[dict], robot: Robot, predictions: Sequence[Prediction]) -> None:
+    """Whether the step of --dt and --integrator is stable; rows: as if the file stated them, with errors where it is."""
+    dt, integrator = rows[0]["file_dt_s"], rows[0]["file_integrator"]
+    values = {
+        "dt": dt,
+        "integrator": integrator,
+        "has_servos": robot.drive.feeds_back,
+        "own": verdict(rows, integrator),
+    }
     result.top.append(result.finding("requested_step", "servos", **values, conditions=conditions(predictions)))
 
 

@@ -11,7 +11,7 @@ RESPONSE_SIZE = 1e-4  # rad or m: how far a response, and the posture at rest, m
 RESPONSE_LEAST = 1e-3  # of the largest response: joints of a unit that move less count as if they did so much
 RESPONSE_MOST = 100.0  # fold, of the largest response
 MOST_STEPS = 10_000  # of a run
-CURVE_FROM, CURVE_BY = 16.0, np.sqrt(2.0)  # of a curve: the file's step over its first, and one step over the next
+CURVE_FROM, CURVE_STEPS = 16.0, 16  # of a curve: the file's step over its first; how many
 
 
 def response_error(acting: Acting, at: Posture, integrator: str, dt: float) -> float | None:
@@ -59,9 +59,7 @@ def curve(
     first = max(min(file_dt, end) / CURVE_FROM, LASTS / MOST_STEPS)
     if first >= end:
         return []
-    count = int(np.ceil(np.log(end / first) / np.log(CURVE_BY))) + 1
-    dts = np.geomspace(first, end, max(count, 2)).tolist()
-    errors = [(dt, response_error(acting, at, integrator, dt)) for dt in dts]
+    errors = [(dt, response_error(acting, at, integrator, dt)) for dt in np.geomspace(first, end, CURVE_STEPS).tolist()]
     return [(dt, off) for dt, off in errors if off is not None]
 
 
