@@ -120,7 +120,7 @@ class Posture:
             poles=tuple((act.name, act.time_constant, act.dynamics == "filterexact") for act in filters),
         )
 
-    @cached_property
+    @property
     def kept(self) -> list[int]:
         """The speeds of `small`: with a free base those that do not follow from the others."""
         return [k for k, name in enumerate(self.whole.names) if name in self.small.names]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -15,6 +16,14 @@ GAINS = {"FIXED": 1, "AFFINE": 3}  # how many numbers of its law each kind has
 BIASES = {"NONE": 0, "AFFINE": 3}
 DYNAMICS = {"NONE": "none", "INTEGRATOR": "integrator", "FILTER": "filter", "FILTEREXACT": "filterexact"}
 GROUPS = 31  # that can be switched off
+NOT_LINEAR = {  # fields of springs and dampers that are left out where they are not 0
+    "jnt_stiffnesspoly": "polynomial stiffness",
+    "dof_dampingpoly": "polynomial damping",
+    "jnt_springyield": "a spring that yields",
+    "tendon_stiffnesspoly": "polynomial stiffness",
+    "tendon_dampingpoly": "polynomial damping",
+    "tendon_springyield": "a spring that yields",
+}
 
 
 def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequence[str]) -> Drive:
@@ -22,11 +31,10 @@ def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequenc
 
     source: what it was read from, a Path, text or None; bodies: of the Tree, by number; keys: names of the keyframes.
     """
-    count = number_of_actuators(model)
     passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
     return Drive(
-        actuators=tuple(actuator(model, i) for i in range(count)),
-        tendons=tuple(tendon(model, i) for i in range(model.ntendon) if pulls(model, i)),
+        actuators=tuple(actuator(model, i) for i in range(number_of_actuators(model))),
+        tendons=tuple(one for one in map(partial(tendon, model), range(model.ntendon)) if one.stiffness or one.damping),
         compensation=tuple(map(float, model.body_gravcomp[list(bodies)] * passive)),
         controls={keys[k]: u for k, u in stated_controls(model, source).items()},
         unknown=unknown_springs(model),
@@ -36,14 +44,8 @@ def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequenc
 
 def actuator(m: mujoco.MjModel, i: int) -> Actuator:
     """One actuator; its law is that of the compiled model."""
-    gain, bias, dynamics = (
-        kind(getattr(mujoco, enum), values[i])
-        for enum, values in (
-            ("mjtGain", m.actuator_gaintype),
-            ("mjtBias", m.actuator_biastype),
-            ("mjtDyn", m.actuator_dyntype),
-        )
-    )
+    gain, bias = kind(mujoco.mjtGain, m.actuator_gaintype[i]), kind(mujoco.mjtBias, m.actuator_biastype[i])
+    dynamics = kind(mujoco.mjtDyn, m.actuator_dyntype[i])
     place, inputs = control_of(m, i)
     joint, moment = moment_of(m, i)
     filters = dynamics in ("FILTER", "FILTEREXACT")
@@ -138,11 +140,6 @@ def tendon_moment(m: mujoco.MjModel, i: int) -> np.ndarray | None:
     return moment
 
 
-def pulls(m: mujoco.MjModel, i: int) -> bool:
-    """Whether a tendon has a spring or a damper in force."""
-    return bool((m.tendon_stiffness[i] and on(m, "SPRING")) or (m.tendon_damping[i] and on(m, "DAMPER")))
-
-
 def tendon(m: mujoco.MjModel, i: int) -> Tendon:
     """The spring and the damper of a tendon."""
     moment = tendon_moment(m, i)
@@ -163,16 +160,12 @@ def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
     tendons = [own_name(m.tendon(k).name, "tendon", k) for k in range(m.ntendon)]
     limited = np.flatnonzero(m.tendon_actfrclimited)
     reasons = {f"tendon {tendons[k]}": "a range of its actuators' force" for k in limited}
-    for what, fields in (
-        ("joint", ("jnt_stiffnesspoly", "dof_dampingpoly", "jnt_springyield")),
-        ("tendon", ("tendon_stiffnesspoly", "tendon_dampingpoly", "tendon_springyield")),
-    ):
-        for name, reason in zip(fields, ("polynomial stiffness", "polynomial damping", "a spring that yields")):
-            values = np.asarray(getattr(m, name, np.zeros(0)))
-            for k in np.flatnonzero(values.reshape(len(values), -1).any(axis=1)) if len(values) else ():
-                k = int(m.dof_jntid[k]) if name.startswith("dof_") else int(k)
-                element = joint_name(m, k) if what == "joint" else tendons[k]
-                reasons[f"{what} {element}"] = reason
+    for field, reason in NOT_LINEAR.items():
+        values = np.asarray(getattr(m, field, np.zeros((0, 1))))
+        for k in np.flatnonzero(values.reshape(len(values), -1).any(axis=1) if len(values) else ()).tolist():
+            joint = int(m.dof_jntid[k]) if field.startswith("dof_") else k
+            element = f"tendon {tendons[k]}" if field.startswith("tendon_") else f"joint {joint_name(m, joint)}"
+            reasons[element] = reason
     return reasons
 
 
