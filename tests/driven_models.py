@@ -70,8 +70,7 @@ def add_tendons(rng, root, joints: list[str], sites: list[str], stiffness: float
 def with_drive(seed: int, transmissions=TRANSMISSIONS, flags: dict | None = None) -> str:
     """A random robot with an actuator of every law, each at a random place of one of the transmissions.
 
-    Some have ranges of controls and forces, some are in a group that is disabled; some joints have ranges of the sum of their
-    actuators and gravity compensation by them.
+    Some have ranges of controls and forces, some are in a group that is disabled.
     """
     rng = np.random.default_rng(seed)
     root, sites = robot(rng, random_tree(seed, joints=6), flags)
@@ -79,10 +78,6 @@ def with_drive(seed: int, transmissions=TRANSMISSIONS, flags: dict | None = None
     every = [*root.iter("joint"), *root.iter("freejoint")]
     single = [one for one in every if one.get("type", "hinge") in ("hinge", "slide") and one.tag == "joint"]
     turning = [one.get("name") for one in every if one not in single]
-    for joint in single:
-        if rng.random() < 0.3:
-            joint.set("actuatorfrcrange", numbers([-rng.uniform(0, 3), rng.uniform(0, 3)]))
-            joint.set("actuatorgravcomp", str(rng.random() < 0.5).lower())
     names = [joint.get("name") for joint in single]
     add_tendons(rng, root, names, sites, rng.uniform(0, 20), rng.uniform(0, 3), rng.uniform(0, 0.5))
     actuators = ET.SubElement(root, "actuator")

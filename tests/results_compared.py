@@ -16,8 +16,10 @@ RENAMED = [  # (field, regular expression, replacement): a name of before, and w
      "smallest error of MuJoCo's RK4, compared with tmt's rk4"),
     ("quantity", "Mbar - Mbar' over its largest entry$", "Mbar - Mbar' over the scale of the entry"),
     ("quantity", "least eigenvalue of Mbar over", "least eigenvalue of Mbar in units of its diagonal over"),
+    ("scene", "^(.*), free base, (.*)$", r"\1, \2"),
 ]  # fmt: skip
 WITHOUT = {  # regular expression for the checks of before, or "after: " and one for those of after, without partner: the reason
+    r"stability .*, locked base, ": "one base for each robot: free where it floats",
     r"stability .* growth in \d+ steps": "the growth per step is covered by limits and times of departure",
     "stability .* exponent of the time to leave|stability .* zero, .* departure": "no user asks how a marginal posture is left",
     "stability .* near sqrt 3": "the resonance at sqrt 3 was deleted",
@@ -49,6 +51,7 @@ WITHOUT = {  # regular expression for the checks of before, or "after: " and one
 OTHER_VALUES = {  # regular expression for the checks whose values changed by more: the reason
     r"parameters \| .* \| inertia": "stated tensors are turned by matrices: the last bit",
     r"^(mass|kinematics|gravity|acceleration) \||reduction .*(Mbar|bias), ": "each entry has its own scale for the arm too",
+    r"step limit with servos, observed": "the second run for slow alternating growth was deleted",
     r"reduction \| .* locked \| (Mbar|bias), ": "random locked angles are now in degrees: the last bit",
     "stability .* automatic reset on": "the time counts from the reset, and energy shows the failure before it",
 }

@@ -46,7 +46,6 @@ def posture_of(source, name: str | None = None):
     return Posture(robot, name or next(iter(robot.positions)), acting.along, rows, reading.dt), reading
 
 
-def acting_of(at: Posture, reading, base: str | None = None) -> Acting:
-    """MuJoCo at a posture, with a base, by default the one that counts."""
-    locked = at.base if base == "locked" else ()
-    return Acting(reading.model, at.robot.drive, at.cut, locked=locked, weightless=bool(at.base))
+def acting_of(at: Posture, reading) -> Acting:
+    """MuJoCo at a posture."""
+    return Acting(reading.model, at.robot.drive, at.cut, weightless=bool(at.base))

@@ -31,7 +31,6 @@ class Actuator:
     control_range: tuple | None = None  # (low, high)
     activation_range: tuple | None = None
     force_range: tuple | None = None  # N or N m
-    tendon: int = -1  # index of its tendon; -1: none
     off: str = ""  # why it exerts no force; "": it does
     refused: str = ""  # why its law is not supported; "": it is
 
@@ -44,11 +43,6 @@ class Actuator:
     def is_servo(self) -> bool:
         """Whether its force depends on the length, so that it has a target."""
         return self.acts and bool(self.bias[1] or self.gain[1])
-
-    @property
-    def holds_speed(self) -> bool:
-        """Whether its control is a target of the speed."""
-        return self.gain[0] == -self.bias[2] != 0.0 and not any((*self.gain[1:], *self.bias[:2]))
 
     def target(self, length: float) -> float:
         """The u, within its range, for which a servo has force 0 at this length; other actuators: 0."""
@@ -81,17 +75,6 @@ class Actuator:
         return self.force_range is not None and not self.force_range[0] < force < self.force_range[1]
 
 
-@dataclass(frozen=True)
-class Cut:
-    """Forces at a posture that ranges limit, N or N m; they are constant near it."""
-
-    forces: Mapping[int, float]  # by index of the actuator
-    sums: Mapping[int, float]  # of all actuators, by index of the speed
-
-
-UNCUT = Cut({}, {})
-
-
 class Tendon(NamedTuple):
     """A tendon with a spring, whose force is 0 from `low` to `high`, and a damper."""
 
@@ -118,7 +101,7 @@ class Rows(NamedTuple):
     """c constraints of MuJoCo near a posture at rest: J qdd + R f = aref, aref = -damping J qd - stiffness r + aref at rest.
 
     jacobian: J (c, nv); forces: f at rest, (c,) N m or N, generalized force J' f; damping (c,), 1/s; stiffness (c,), 1/s2, per
-    violation r, includes the effect of the change of R on f; softness: R (c,); limits: joints at whose limits rows are.
+    violation r, includes the effect of the change of R on f; softness: R (c,).
     """
 
     jacobian: np.ndarray
@@ -126,12 +109,6 @@ class Rows(NamedTuple):
     damping: np.ndarray
     stiffness: np.ndarray
     softness: np.ndarray
-    limits: tuple[int, ...] = ()
-
-    @property
-    def springs(self) -> np.ndarray:
-        """J' (-df/dr) J, (nv, nv): the stiffness at rest."""
-        return (self.jacobian.T * (self.stiffness / self.softness)) @ self.jacobian
 
 
 @dataclass(frozen=True)
@@ -139,23 +116,14 @@ class Drive:
     """The actuators, tendons and gravity compensation of a robot.
 
     controls: by posture, u of each actuator in its keyframe, or None. compensation: of each body of the Tree, the part of its
-    weight that is compensated; lifted: speeds where that counts as an actuator force; unlifted: where it is left out.
-    damping: of each speed, by the actuators. ranges, tendon_ranges: (low, high) of the sum of the actuator forces, by index of
-    the speed or tendon. unknown: other elements that are left out, and why, by name.
+    weight that is compensated. unknown: other elements that are left out, and why.
     """
 
     actuators: tuple[Actuator, ...] = ()
     tendons: tuple[Tendon, ...] = ()
     compensation: tuple[float, ...] = ()
-    damping: tuple[float, ...] = ()
     controls: Mapping[str, tuple] = field(default_factory=dict)
-    ranges: Mapping[int, tuple] = field(default_factory=dict)
-    tendon_ranges: Mapping[int, tuple] = field(default_factory=dict)
-    lifted: tuple[int, ...] = ()
-    unlifted: tuple[int, ...] = ()
     unknown: Mapping[str, str] = field(default_factory=dict)
-    # with the solver PGS, MuJoCo's discrete treats only springs and damping of joints implicitly (measured)
-    joints_alone: bool = False
     explicit_damping: bool = False  # the file disables EULERDAMP
 
     @property
@@ -171,12 +139,6 @@ class Drive:
     @property
     def servos(self) -> tuple[Actuator, ...]:
         return tuple(actuator for actuator in self.actuators if actuator.is_servo)
-
-    @property
-    def without_ranges(self) -> "Drive":
-        """The same without limits of forces."""
-        actuators = tuple(replace(actuator, force_range=None) for actuator in self.actuators)
-        return replace(self, actuators=actuators, ranges={}, tendon_ranges={})
 
     def control(self, posture: str, lengths: Sequence[float]) -> np.ndarray:
         """u of each actuator at a posture, within its range: that of the keyframe, else the target is the posture.

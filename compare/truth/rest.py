@@ -1,35 +1,14 @@
-"""What holds a posture at rest: gravity and springs, their exact derivatives, and where a robot rests without torque."""
+"""What holds a posture at rest: gravity and springs, and their exact derivatives."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import eigh
 
 import tmt
-from tmt import literal
 from tmt.equations import method
 from tmt.equations.dual import seeded
-
-from ..robots.case import Coordinates
-
-BALANCED = 1e-13  # of the largest torque of gravity and springs on the way: less is rounding
-MOST_TRIED = 100  # postures on the way down
-FARTHEST = 0.5  # rad or m of one joint in a step
-ASIDE = 0.1  # rad or m, along the unstable mode of a saddle
-FLAT = 1e-6  # of the largest stiffness over inertia: less is zero
-
-
-def stiffness(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
-    """d(holding torque)/dq at q, of gravity, springs and a controller, N m/rad, (nv, nv), by movements: exact.
-
-    Of hinges without springs V is a + b cos q_i + c sin q_i in each angle; else by dual numbers.
-    """
-    if set(tree.kind) == {"hinge"} and not (tree.has_springs or tree.has_gains):
-        quarter = np.pi / 2 * np.eye(len(q))
-        return (literal.gravity_balance(q + quarter, tree) - literal.gravity_balance(q - quarter, tree)) / 2
-    moved = moving(tree, q, np.eye(tree.coordinates.nv))
-    return np.array(slopes(moved, holding(tree, moved)))
+from tmt.methods import by_speed
 
 
 def moving(tree: tmt.Tree, q, directions) -> list:
@@ -53,6 +32,15 @@ def slopes(seeds, values) -> list:
     return [np.broadcast_to(slope, shape) if np.ndim(slope) < len(shape) else slope for slope in derivatives]
 
 
+def carries(tree: tmt.Tree) -> np.ndarray:
+    """[i, j]: whether joint i carries joint j, or is it."""
+    carrying = np.eye(len(tree.parent), dtype=bool)
+    for j, before in enumerate(tree.parent):
+        if before >= 0:
+            carrying[:, j] |= carrying[:, before]
+    return carrying
+
+
 class Weight(NamedTuple):
     """The torque that holds a posture against gravity, (nv,) N m or N, and its derivative along movements, (nv, nv)."""
 
@@ -67,25 +55,20 @@ def weight(tree: tmt.Tree, q: np.ndarray, mass: Sequence[float], gravity: Sequen
     With the mass m that a joint carries, and its first moment s about the joint, force F = m a along a slide's axis a, a x s
     about that of a hinge: the torque is -g . F. What a joint carries turns about its axis w with all vectors on it, by w x F.
     """
-    frames, joints = method.joint_frames(tree, q.tolist()), tree.coordinates.joints
-    n = len(frames)
-    carries = np.eye(n, dtype=bool)  # [i, j]: joint i carries joint j, or is it
-    for j, before in enumerate(tree.parent):
-        if before >= 0:
-            carries[:, j] |= carries[:, before]
-    masses, moments = np.zeros(n), np.zeros((n, 3))
+    frames, carrying = method.joint_frames(tree, q.tolist()), carries(tree)
+    masses, moments = np.zeros(len(frames)), np.zeros((len(frames), 3))
     for m, com, j in zip(mass, tree.com, tree.body_hinge):
         if j >= 0:
             masses[j] += m
             moments[j] += m * (np.array([*frames[j].origin]) + np.array([[*row] for row in frames[j].turn]) @ com)
-    masses, moments = carries @ masses, carries @ moments
-    joint = np.repeat(np.arange(n), [by.stop - by.start for _, _, by in joints])
+    masses, moments = carrying @ masses, carrying @ moments
+    joint = by_speed(tree, range(len(frames)))
     axes = np.array([[*axis] for frame in frames for axis in frame.axes])
     slides = np.array([frames[j].slides for j in joint])[:, None]
     about = moments[joint] - masses[joint, None] * np.array([[*frames[j].origin] for j in joint])
     forces = np.where(slides, masses[joint, None] * axes, np.cross(axes, about))
     turned = -np.where(slides, 0.0, axes) @ np.cross(forces, gravity).T  # [outer, inner]
-    outer = carries[np.ix_(joint, joint)]
+    outer = carrying[np.ix_(joint, joint)]
     slope = np.where(outer.T, turned.T, np.where(outer, turned, 0.0))
     size = np.linalg.norm(forces, axis=1).max() * np.linalg.norm(gravity)
     return Weight(-forces @ np.asarray(gravity, float), slope, float(size))
@@ -96,41 +79,4 @@ def spring_slope(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     if any(k and kind == "ball" for k, kind in zip(tree.stiffness, tree.kind)):
         moved = moving(tree, q, np.eye(len(tree.axis)))
         return np.array(slopes(moved, method.spring_torque(tree, moved)))
-    return np.diag(tmt.methods.by_speed(tree, tree.stiffness)).astype(float)
-
-
-def at_rest(tree: tmt.Tree, q: np.ndarray) -> np.ndarray | None:
-    """The stable posture (nq,), rad or m, at which it rests without torque, downhill from q. None: there is none.
-
-    Newton's method in the modes of the mass matrix at q, with the absolute value of each stiffness, so that it never climbs.
-    """
-    coordinates = Coordinates(tree.hinge_names, tree.kind)
-    largest, height, inertia = 0.0, potential(tree, q), literal.mass_matrix(q, tree)
-    for _ in range(MOST_TRIED):
-        force = -literal.gravity_balance(q, tree) - literal.spring_torque(q, tree)
-        K = stiffness(tree, q)
-        squares, shapes = eigh(0.5 * (K + K.T), inertia)
-        flat = FLAT * np.abs(squares).max()
-        largest = max(largest, np.abs(force).max())
-        if np.abs(force).max() <= BALANCED * largest:
-            if squares[0] >= -flat:
-                return q
-            down = ASIDE * shapes[:, 0] / np.abs(shapes[:, 0]).max()
-        else:
-            down = shapes @ (shapes.T @ force / np.maximum(np.abs(squares), max(flat, 1e-300)))
-            down *= min(1.0, FARTHEST / np.abs(down).max())
-        for _ in range(40):
-            lower = coordinates.move(q, down)
-            if potential(tree, lower) < height:
-                break
-            down = 0.5 * down
-        else:
-            # doubles cannot represent a lower posture
-            return q if squares[0] >= -flat and np.abs(force).max() <= 1e6 * BALANCED * largest else None
-        q, height = lower, potential(tree, lower)
-    return None
-
-
-def potential(tree: tmt.Tree, q: np.ndarray) -> float:
-    """Of gravity and springs, J."""
-    return float(literal.potential_energy(q, tree))
+    return np.diag(by_speed(tree, tree.stiffness)).astype(float)

@@ -7,7 +7,6 @@ from servo_models import posture_of
 
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting
-from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments.stability.servos.observed import grows_in_runs
 from compare.experiments.stability.servos.predicted import acting_at, predicted_at
 from compare.robots.file import robot_of
@@ -27,12 +26,6 @@ FOUR_BARS = """<mujoco><default><geom type="capsule" size="0.01" mass="0.1"/></d
   <body name="rocker" pos="0.2 0 0"><joint name="rocker" axis="0 1 0"/><geom fromto="0 0 0 0 0 0.15"/></body></worldbody>
   <equality><connect body1="rocker" body2="last" anchor="0 0 0.15" solref="0.01 1"/></equality>
   <actuator><position name="crank" joint="crank" kp="20" kv="1"/></actuator></mujoco>"""
-# an arm with a servo, and a finger that may slide down
-SLIDE = '<joint name="finger" type="slide" axis="0 0 1"/>'
-LOOSE = f"""<mujoco><worldbody><geom type="plane" size="1 1 1" pos="0 0 -1"/>
-  <body><joint name="arm" axis="0 1 0"/><geom type="capsule" size="0.02" fromto="0 0 0 0.3 0 0" mass="1"/>
-  <body pos="0.3 0 0">{SLIDE}<geom size="0.02" mass="0.1"/></body></body>
-  </worldbody><actuator><position name="arm" joint="arm" kp="200" kv="5"/></actuator></mujoco>"""
 MIMIC, BENT = GRIPPER.format("0 1 0"), GRIPPER.format("0.01 1 20")
 
 
@@ -46,11 +39,11 @@ def predicted(source):
 def test_the_limit_is_where_steps_and_runs_of_mujoco_with_its_equalities_begin_to_grow(source):
     one, reading = predicted(source)
     finite = 0
-    for (base, integrator), limit in one.limits.items():
+    for integrator, limit in one.limits.items():
         if limit.limit == "finite":
             finite += 1
-            at = one.there[base, integrator]
-            acting = acting_at(reading, at, base)
+            at = one.there[integrator]
+            acting = acting_at(reading, at)
             if integrator not in ("RK4", "discrete"):
                 below, above = (
                     np.abs(np.linalg.eigvals(acting.transition(at.q, at.u, by * limit.dt, integrator))).max()
@@ -63,13 +56,14 @@ def test_the_limit_is_where_steps_and_runs_of_mujoco_with_its_equalities_begin_t
     assert finite >= 2
 
 
-def test_a_rigid_mimic_has_the_limit_of_both_masses():
-    small = predicted(MIMIC)[0].at.small("fixed")
+def test_a_mimic_has_the_modes_of_both_masses_and_a_lower_limit_than_a_rigid_one():
+    small = predicted(MIMIC)[0].at.small
     # 4 (m1 + m2) + 2 dt (damping - kv) - dt^2 kp = 0
     m, d, k = 0.4, 2.0 - 40.0, 400.0
-    assert small.rigid.limit("Euler").dt == pytest.approx((2 * d + np.sqrt(4 * d * d + 16 * m * k)) / (2 * k), rel=1e-9)
+    rigid = (2 * d + np.sqrt(4 * d * d + 16 * m * k)) / (2 * k)
+    assert np.sort(small.modes[0].real) == pytest.approx(np.sort(np.roots([m, 42.0, k]).real), rel=1e-9)
     # what a soft one changes: kv brakes one finger before the other is told
-    assert small.limit("Euler").dt < 0.99 * small.rigid.limit("Euler").dt
+    assert small.limit("Euler").dt < 0.99 * rigid
 
 
 def test_constraints_at_rest_carry_what_mujoco_says_and_are_stiff_by_turning():
@@ -84,12 +78,3 @@ def test_constraints_at_rest_carry_what_mujoco_says_and_are_stiff_by_turning():
     for j, step in enumerate(1e-7 * np.eye(len(K))):
         ahead, behind = (constraint_forces(rows, coordinates, coordinates.move(at.q, s * step))[0] for s in (1, -1))
         assert -(ahead - behind) / 2e-7 == pytest.approx(K[:, j], rel=1e-3, abs=1e-3 * np.abs(K).max())
-
-
-def test_what_nothing_holds_is_set_aside_by_name_and_the_rest_is_answered():
-    (one, _), (held, _) = predicted(LOOSE), predicted(LOOSE.replace(SLIDE, ""))
-    assert one.is_known and [one.at.robot.coordinates.speeds[k] for k in one.at.aside] == ["finger"]
-    assert not held.at.aside
-    for name in INTEGRATORS:
-        found, alone = one.limits["fixed", name], held.limits["fixed", name]
-        assert found.limit == alone.limit and (found.dt is None or found.dt == pytest.approx(alone.dt, rel=1e-3))

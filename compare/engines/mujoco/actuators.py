@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -15,6 +16,14 @@ GAINS = {"FIXED": 1, "AFFINE": 3}  # how many numbers of its law each kind has
 BIASES = {"NONE": 0, "AFFINE": 3}
 DYNAMICS = {"NONE": "none", "INTEGRATOR": "integrator", "FILTER": "filter", "FILTEREXACT": "filterexact"}
 GROUPS = 31  # that can be switched off
+NOT_LINEAR = {  # fields of springs and dampers that are left out where they are not 0
+    "jnt_stiffnesspoly": "polynomial stiffness",
+    "dof_dampingpoly": "polynomial damping",
+    "jnt_springyield": "a spring that yields",
+    "tendon_stiffnesspoly": "polynomial stiffness",
+    "tendon_dampingpoly": "polynomial damping",
+    "tendon_springyield": "a spring that yields",
+}
 
 
 def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequence[str]) -> Drive:
@@ -22,43 +31,25 @@ def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequenc
 
     source: what it was read from, a Path, text or None; bodies: of the Tree, by number; keys: names of the keyframes.
     """
-    count = number_of_actuators(model)
     passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
-    by_actuators = np.flatnonzero(model.jnt_actgravcomp[model.dof_jntid]).tolist()
     return Drive(
-        actuators=tuple(actuator(model, i) for i in range(count)),
-        tendons=tuple(tendon(model, i) for i in range(model.ntendon) if pulls(model, i)),
+        actuators=tuple(actuator(model, i) for i in range(number_of_actuators(model))),
+        tendons=tuple(one for one in map(partial(tendon, model), range(model.ntendon)) if one.stiffness or one.damping),
         compensation=tuple(map(float, model.body_gravcomp[list(bodies)] * passive)),
-        damping=own_damping(model, count),
         controls={keys[k]: u for k, u in stated_controls(model, source).items()},
-        ranges={
-            int(model.jnt_dofadr[j]): between(model.jnt_actfrcrange[j]) for j in np.flatnonzero(model.jnt_actfrclimited)
-        },
-        tendon_ranges={
-            int(i): between(model.tendon_actfrcrange[i]) for i in np.flatnonzero(model.tendon_actfrclimited)
-        },
-        **{"lifted" if on(model, "ACTUATION") else "unlifted": tuple(by_actuators)},
         unknown=unknown_springs(model),
-        joints_alone=model.opt.solver == mujoco.mjtSolver.mjSOL_PGS,
         explicit_damping=not on(model, "EULERDAMP"),
     )
 
 
 def actuator(m: mujoco.MjModel, i: int) -> Actuator:
     """One actuator; its law is that of the compiled model."""
-    gain, bias, dynamics = (
-        kind(getattr(mujoco, enum), values[i])
-        for enum, values in (
-            ("mjtGain", m.actuator_gaintype),
-            ("mjtBias", m.actuator_biastype),
-            ("mjtDyn", m.actuator_dyntype),
-        )
-    )
+    gain, bias = kind(mujoco.mjtGain, m.actuator_gaintype[i]), kind(mujoco.mjtBias, m.actuator_biastype[i])
+    dynamics = kind(mujoco.mjtDyn, m.actuator_dyntype[i])
     place, inputs = control_of(m, i)
     joint, moment = moment_of(m, i)
     filters = dynamics in ("FILTER", "FILTEREXACT")
     clamped = inputs and on(m, "CLAMPCTRL") and m.actuator_ctrllimited[place]
-    along_tendon = mujoco.mjtTrn(m.actuator_trntype[i]) == mujoco.mjtTrn.mjTRN_TENDON
     return Actuator(
         name=own_name(m.actuator(i).name, "actuator", i),
         joint=joint,
@@ -69,11 +60,19 @@ def actuator(m: mujoco.MjModel, i: int) -> Actuator:
         time_constant=max(float(m.actuator_dynprm[i, 0]), mujoco.mjMINVAL) if filters else 0.0,
         control_range=between(m.actuator_ctrlrange[place]) if clamped else None,
         activation_range=between(m.actuator_actrange[i]) if m.actuator_actlimited[i] else None,
-        force_range=between(m.actuator_forcerange[i]) if m.actuator_forcelimited[i] else None,
-        tendon=int(m.actuator_trnid[i, 0]) if along_tendon else -1,
+        force_range=force_range(m, i),
         off=off(m, i),
         refused=refused(m, i, gain, bias, dynamics, inputs),
     )
+
+
+def force_range(m: mujoco.MjModel, i: int) -> tuple[float, float] | None:
+    """Of an actuator at a joint also that of the joint over the gear, as if no other actuator were at it; None: no range."""
+    j, gear = int(m.actuator_trnid[i, 0]), float(m.actuator_gear[output_of(m, i), 0])
+    ranges = [m.actuator_forcerange[i]] if m.actuator_forcelimited[i] else []
+    if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT and m.jnt_actfrclimited[j] and gear:
+        ranges.append(np.sort(m.jnt_actfrcrange[j] / gear))
+    return (float(max(low for low, _ in ranges)), float(min(high for _, high in ranges))) if ranges else None
 
 
 def control_of(m: mujoco.MjModel, i: int) -> tuple[int, int]:
@@ -94,13 +93,12 @@ def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inpu
         return f"{inputs} controls"
     if np.any(getattr(m, "actuator_delay", np.zeros(i + 1))[i]):
         return "a delay"
-    if np.any(getattr(m, "actuator_dampingpoly", np.zeros((i + 1, 1)))[i]):
-        return "polynomial damping"
     transmission = mujoco.mjtTrn(m.actuator_trntype[i])
     if transmission not in WITH_LENGTH:
         return f"a transmission of type {transmission.name.removeprefix('mjTRN_').lower()}"
-    if transmission not in OF_A_JOINT and np.any(getattr(m, "actuator_damping", np.zeros(i + 1))[i]):
-        return "damping of its own, not at a joint"
+    damping = (getattr(m, name, np.zeros(i + 1))[i] for name in ("actuator_damping", "actuator_dampingpoly"))
+    if any(map(np.any, damping)):
+        return "damping of its own"
     return ""
 
 
@@ -142,11 +140,6 @@ def tendon_moment(m: mujoco.MjModel, i: int) -> np.ndarray | None:
     return moment
 
 
-def pulls(m: mujoco.MjModel, i: int) -> bool:
-    """Whether a tendon has a spring or a damper in force."""
-    return bool((m.tendon_stiffness[i] and on(m, "SPRING")) or (m.tendon_damping[i] and on(m, "DAMPER")))
-
-
 def tendon(m: mujoco.MjModel, i: int) -> Tendon:
     """The spring and the damper of a tendon."""
     moment = tendon_moment(m, i)
@@ -162,28 +155,17 @@ def tendon(m: mujoco.MjModel, i: int) -> Tendon:
     )
 
 
-def own_damping(m: mujoco.MjModel, count: int) -> tuple[float, ...]:
-    """Damping of actuators at joints times the gear squared, (nv,); MuJoCo adds it to the joint's."""
-    total = np.zeros(m.nv)
-    for i, damping in enumerate(getattr(m, "actuator_damping", np.zeros(count))):
-        if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT and on(m, "DAMPER"):
-            total[m.dof_jntid == m.actuator_trnid[i, 0]] += damping * m.actuator_gear[output_of(m, i), 0] ** 2
-    return tuple(total.tolist())
-
-
 def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
-    """Joints and tendons whose springs or dampers are not linear, by name, and why they are left out."""
-    reasons = {}
-    for what, fields in (
-        ("joint", ("jnt_stiffnesspoly", "dof_dampingpoly", "jnt_springyield")),
-        ("tendon", ("tendon_stiffnesspoly", "tendon_dampingpoly", "tendon_springyield")),
-    ):
-        for name, reason in zip(fields, ("polynomial stiffness", "polynomial damping", "a spring that yields")):
-            values = np.asarray(getattr(m, name, np.zeros(0)))
-            for k in np.flatnonzero(values.reshape(len(values), -1).any(axis=1)) if len(values) else ():
-                k = int(m.dof_jntid[k]) if name.startswith("dof_") else int(k)
-                element = joint_name(m, k) if what == "joint" else own_name(m.tendon(k).name, "tendon", k)
-                reasons[f"{what} {element}"] = reason
+    """What is left out of joints and tendons, by name, and why: springs and dampers that are not linear, a tendon's range."""
+    tendons = [own_name(m.tendon(k).name, "tendon", k) for k in range(m.ntendon)]
+    limited = np.flatnonzero(m.tendon_actfrclimited)
+    reasons = {f"tendon {tendons[k]}": "a range of its actuators' force" for k in limited}
+    for field, reason in NOT_LINEAR.items():
+        values = np.asarray(getattr(m, field, np.zeros((0, 1))))
+        for k in np.flatnonzero(values.reshape(len(values), -1).any(axis=1) if len(values) else ()).tolist():
+            joint = int(m.dof_jntid[k]) if field.startswith("dof_") else k
+            element = f"tendon {tendons[k]}" if field.startswith("tendon_") else f"joint {joint_name(m, joint)}"
+            reasons[element] = reason
     return reasons
 
 

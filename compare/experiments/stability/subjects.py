@@ -14,7 +14,7 @@ from ...robots import Robot
 from ...robots.case import Case
 from ...truth.conserved import floats
 from ...truth.linear import held, posture_names
-from ...truth.rest import at_rest
+from ...truth.servos import at_rest
 
 DAMPINGS = (0.0, 0.5, 50.0)  # N m s/rad, added
 SCHEMES = ("rk4", "explicit_euler", "semi_implicit_euler", "implicit", "implicit_midpoint")  # tmt's names

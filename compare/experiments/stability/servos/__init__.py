@@ -28,83 +28,57 @@ def begin(setup: Setup) -> dict | None:
     if reading is None or not robot.drive.actuators:
         return None
     predictions = [predicted_at(robot, name, reading) for name in posture_names(robot)[:MOST_POSTURES_DRIVEN]]
-    resting = [prediction for prediction in predictions if prediction.rests]
-    shown = next((prediction for prediction in resting if prediction.is_finite), None)
+    resting = [prediction for prediction in predictions if prediction.limits]
+    finite = [prediction for prediction in resting if any(limit.dt for limit in prediction.limits.values())]
+    shown = finite[0] if finite else None
     examined = resting if setup.alone and not setup.is_quick else [shown] * bool(shown)
-    own = (reading.integrator, findings.DEFAULT_INTEGRATOR)
+    own = tuple(dict.fromkeys((reading.integrator, findings.DEFAULT_INTEGRATOR)))
+    all_run = None if setup.is_quick else shown  # the posture at which all integrators are run
     tried = [
-        (prediction, base, name)
+        (prediction, name)
         for prediction in examined
-        for base, name in prediction.pairs
-        if ((prediction is shown and not setup.is_quick) or (name in own and base == prediction.base))
-        and not prediction.gives_way(base, name)
+        for name in prediction.known
+        if (prediction is all_run or name in own) and not prediction.gives_way(name)
     ]
-    least = [(least_at(resting, name, reading.dt), name) for name in dict.fromkeys(own)]
-    unstable = [(prediction, name) for prediction, name in least if prediction]
-    full = []
-    for prediction in resting:
-        names = integrators_run(prediction, own, reading.dt, prediction is shown and not setup.is_quick)
-        full += [(prediction, name) for name in names]
-
-    drawn = [
-        (shown, name) for name in INTEGRATORS if shown and not setup.is_quick and (shown.base, name) in shown.pairs
-    ]
+    full = [(prediction, name) for prediction in resting for name in (INTEGRATORS if prediction is all_run else own)]
+    unstable = [(findings.least(resting, name), name) for name in own]
+    unstable = [(at, name) for at, name in unstable if at and at.is_stable(name, reading.dt) is False]
+    drawn = [(shown, name) for name in shown.known] if all_run else []
 
     def start(function, items):
-        return setup.map(partial(function, reading=reading), *(zip(*items) if items else [()]))
+        return items, setup.map(partial(function, reading=reading), *(zip(*items) if items else [()]))
 
     return {
         "predictions": predictions,
-        "tried": tried,
         "observed": start(observed_limit_at, tried),
         "radii": start(radii_apart, [(prediction,) for prediction in resting]),
-        "errors": start(errors_at, [(prediction,) for prediction in resting]),
-        "lifts": (unstable, start(lifts_at, unstable)),
-        "full": (full, start(full_at, full)),
-        "curves": (drawn, start(curve_at, drawn)),
+        "errors": start(error_at, [(prediction, name) for prediction in resting for name in prediction.known]),
+        "lifts": start(lifts_at, unstable),
+        "full": start(full_at, full),
+        "curves": start(curve_at, drawn),
     }
-
-
-def least_at(resting: Sequence[Prediction], integrator: str, dt: float) -> Prediction | None:
-    """The posture with the least limit of an integrator, if a step is not stable there; else None."""
-    bad = [prediction for prediction in resting if prediction.is_stable(prediction.base, integrator, dt) is False]
-    return min(
-        bad, key=lambda prediction: prediction.limits[prediction.base, integrator].dt or LIMIT_UP_TO, default=None
-    )
-
-
-def integrators_run(prediction: Prediction, own: Sequence[str], dt: float, every: bool) -> list[str]:
-    """The integrators with which the full model is run: every one, or these and, if none of them is stable, one that is."""
-    stable = [name for name in INTEGRATORS if prediction.is_stable(prediction.base, name, dt)]
-    more = () if set(stable) & {*own} else stable[:1]
-    return [name for name in INTEGRATORS if every or name in (*own, *more)]
 
 
 # in a further process
 
 
-def observed_limit_at(prediction: Prediction, base: str, integrator: str, reading: Reading) -> tuple[str, float | None]:
-    at = prediction.there[base, integrator]  # where it rests with such a step
-    return observed.limit(acting_at(reading, at, base), at, integrator)
+def observed_limit_at(prediction: Prediction, integrator: str, reading: Reading) -> tuple[str, float | None]:
+    at = prediction.there[integrator]  # where it rests with such a step
+    return observed.limit(acting_at(reading, at), at, integrator)
 
 
-def errors_at(prediction: Prediction, reading: Reading) -> dict[tuple[str, str], float | None]:
-    """The error of the step response at the file's step, by base and integrator."""
-    return {(base, name): error_at(prediction, base, name, reading.dt, reading) for base, name in prediction.pairs}
-
-
-def error_at(prediction: Prediction, base: str, integrator: str, dt: float, reading: Reading) -> float | None:
-    return response.response_error(acting_at(reading, prediction.at, base), prediction.at, base, integrator, dt)
+def error_at(prediction: Prediction, integrator: str, reading: Reading, dt: float | None = None) -> float | None:
+    acting = acting_at(reading, prediction.at)
+    return response.response_error(acting, prediction.at, integrator, dt or reading.dt)
 
 
 def curve_at(prediction: Prediction, integrator: str, reading: Reading) -> list[tuple[float, float]]:
-    at, base, limit = prediction.at, prediction.base, prediction.limits[prediction.base, integrator].dt
-    return response.curve(acting_at(reading, at, base), at, base, integrator, reading.dt, limit)
+    at, limit = prediction.at, prediction.limits[integrator].dt
+    return response.curve(acting_at(reading, at), at, integrator, reading.dt, limit)
 
 
 def lifts_at(prediction: Prediction, integrator: str, reading: Reading) -> list[lifting.Lift]:
-    base = prediction.base
-    return lifting.lifts(acting_at(reading, prediction.at, base), prediction.at, base, integrator, reading.dt)
+    return lifting.lifts(acting_at(reading, prediction.at), prediction.at, integrator, reading.dt)
 
 
 def full_at(prediction: Prediction, integrator: str, reading: Reading) -> dict:
@@ -118,56 +92,50 @@ def add(result: Result, setup: Setup, work: dict) -> None:
     """Rows, checks, curves, the answer at the top and the notes of the computations that `begin` has started."""
     predictions, reading = work["predictions"], setup.reading
     rows = limit_rows(predictions, reading.dt, reading.integrator)
-    by_place = {(row["posture"], row["base"], row["integrator"]): row for row in rows}
-    resting = [prediction for prediction in predictions if prediction.rests]
-    for prediction, errors, radii in zip(resting, work["errors"], work["radii"]):
-        for pair, error in errors.items():
-            by_place[prediction.name, *pair]["step_response_error"] = error
-        check_radii(result, prediction, radii)
-    for (prediction, base, name), (kind, dt) in zip(work["tried"], work["observed"]):
-        row = by_place[prediction.name, base, name]
+    by_place = {(row["posture"], row["integrator"]): row for row in rows}
+    for (prediction, name), error in zip(*work["errors"]):
+        by_place[prediction.name, name]["step_response_error"] = error
+    for (prediction,), radii in zip(*work["radii"]):
+        check_radii(result, prediction.name, radii)
+    for (prediction, name), (kind, dt) in zip(*work["observed"]):
+        row = by_place[prediction.name, name]
         row["observed_dt_s"] = dt
-        check_observed(result, row, kind, len(prediction.at.bases) > 1)
+        check_observed(result, row, kind)
     for (prediction, name), run in zip(*work["full"]):
-        by_place[prediction.name, prediction.base, name].update(run)
+        by_place[prediction.name, name].update(run)
     if setup.robot.drive.feeds_back:
         check_own_step(result, rows)
     result.tables["step_limits"] = rows
     findings.find_answer(result, rows, setup.robot, predictions)
     if setup.step:
         dt, name = setup.step
-        within = findings.with_limit(predictions, name)
-        stable = [prediction for prediction in within if prediction.is_stable(prediction.base, name, dt)]
-        errors = [error_at(prediction, prediction.base, name, dt, reading) for prediction in stable]
-        findings.find_requested(result, predictions, dt, name, errors)
+        requested, by_name = (
+            limit_rows(predictions, dt, name),
+            {prediction.name: prediction for prediction in predictions},
+        )
+        for row in findings.known(requested, name):
+            if row["stable_at_file_dt"]:
+                row["step_response_error"] = error_at(by_name[row["posture"]], name, reading, dt)
+        findings.find_requested(result, requested, setup.robot, predictions)
     for (prediction, name), lifts in zip(*work["lifts"]):
         findings.find_changes(result, prediction, name, lifts, reading.dt)
     findings.find_notes(result, rows, predictions)
     drawn, curves = work["curves"]
     if drawn:
-        shown = drawn[0][0]
-        result.curves["step response"] = {
-            "posture": shown.name,
-            "rows": [row for row in rows if (row["posture"], row["base"]) == (shown.name, shown.base)],
-            "lines": {name: curve for (_, name), curve in zip(drawn, curves)},
-        }
+        shown = drawn[0][0].name
+        lines = {name: curve for (_, name), curve in zip(drawn, curves)}
+        of_posture = [row for row in rows if row["posture"] == shown]
+        result.curves["step response"] = {"posture": shown, "rows": of_posture, "lines": lines}
 
 
-def named_place(posture: str, base: str, integrator: str, several: bool) -> str:
-    """The scene of a check; several: whether there are several bases."""
-    return f"{posture}, " + f"{base} base, " * several + integrator
-
-
-def check_radii(result: Result, prediction: Prediction, radii: Mapping[tuple[str, str], float]) -> None:
+def check_radii(result: Result, posture: str, radii: Mapping[str, float]) -> None:
     """The growth of a step near the limit compared with MuJoCo's own derivative."""
-    for (base, integrator), apart in radii.items():
-        where = named_place(prediction.name, base, integrator, len(prediction.at.bases) > 1)
-        result.check(
-            where, "spectral radius of a step near the limit with servos, TMT to MuJoCo", apart, RADII_WITHIN, ""
-        )
+    quantity = "spectral radius of a step near the limit with servos, TMT to MuJoCo"
+    for integrator, apart in radii.items():
+        result.check(f"{posture}, {integrator}", quantity, apart, RADII_WITHIN, "")
 
 
-def check_observed(result: Result, row: dict, kind: str, several: bool) -> None:
+def check_observed(result: Result, row: dict, kind: str) -> None:
     """The limit in MuJoCo's runs compared with the predicted one."""
     below = kind == "always" and row["limit"] == "finite" and row["predicted_dt_s"] < observed.SOUGHT_FROM
     if kind == row["limit"] == "none" or below:  # shorter steps are not tried
@@ -175,8 +143,7 @@ def check_observed(result: Result, row: dict, kind: str, several: bool) -> None:
     both = kind == row["limit"] == "finite"
     apart = abs(row["observed_dt_s"] / row["predicted_dt_s"] - 1.0) if both else None
     note = "" if both else f"predicted: {row['limit']}, observed: {kind}"
-    where = named_place(row["posture"], row["base"], row["integrator"], several)
-    quantity = "step limit with servos, observed / predicted - 1"
+    where, quantity = f"{row['posture']}, {row['integrator']}", "step limit with servos, observed / predicted - 1"
     result.check(where, quantity, apart, OBSERVED_WITHIN, "", note, about=About.PREDICTION)
 
 

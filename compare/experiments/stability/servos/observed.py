@@ -19,10 +19,6 @@ APART = 0.01  # of a deviation at the start: what constraints do not allow, whic
 RUN_PARTS = 8  # of a run: after each it ends if the deviation has grown far
 GROWN_FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
 GROWN_STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
-# an alternating deviation grows if it does so from part to part after the first two: the smallest growth in all, fold, of the
-# slowest growth over the fastest, and the smallest share of the deviation at the start
-GROWN_SLOWLY, GROWN_EVENLY, GROWN_FROM = 1.003, 0.5, 1e-5
-LARGER = 30.0  # times the deviation, of a second run
 NARROWED = 1e-3  # relative, between a step that holds and one that does not
 FULL_TIME, FULL_LAST = 2.0, 0.5  # s: of a run of the whole file, and of its part whose speeds count
 FULL_PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
@@ -33,7 +29,6 @@ def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | No
     """The largest dt, s, at which no small deviation grows in MuJoCo: ("finite", dt); ("none", None): none grows up to 5 s.
 
     Upwards to the first step that fails, then by bisection; ("always", None): the shortest that is tried fails.
-    acting: MuJoCo at the posture, with a base.
     """
     count = int(np.log(LIMIT_UP_TO / SOUGHT_FROM) / np.log(SOUGHT_BY)) + 2
     tried = LIMIT_UP_TO / SOUGHT_BY ** np.arange(count)[::-1]  # the first at most SOUGHT_FROM
@@ -52,66 +47,30 @@ def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | No
 
 def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = NARROWED_STEPS) -> bool:
     """Whether a small random deviation from rest grows in a run."""
-    largest, turning = sizes_in_a_run(acting, at, integrator, dt, steps)
-    late = 3 * RUN_PARTS // 4
-    if len(largest) < RUN_PARTS or largest[late:].max() > GROWN_STILL * max(1.0, largest[: RUN_PARTS // 2].max()):
-        return True
-    if steps < NARROWED_STEPS or not hardly_grows(turning):
-        return False
-    # rounding, which may seem to grow, is less of a larger deviation
-    larger = sizes_in_a_run(acting, at, integrator, dt, steps, LARGER)[1]
-    return len(larger) < RUN_PARTS or (hardly_grows(larger) and larger[-1] > GROWN_EVENLY * turning[-1])
-
-
-def hardly_grows(turning: np.ndarray) -> bool:
-    """Whether what changes its sign with every step, by the parts of a run, grows steadily after the first two."""
-    if turning.min() < GROWN_FROM:
-        return False
-    growth = np.diff(np.log(turning[2:]))
-    return bool(growth.sum() > np.log(GROWN_SLOWLY) and growth.min() > GROWN_EVENLY * growth.max())
-
-
-def sizes_in_a_run(
-    acting: Acting, at: Posture, integrator: str, dt: float, steps: int, times: float = 1.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """By the parts of a run, up to where it has grown far: the largest deviation, and what of it changes its sign every step."""
     sizes = []
     with np.errstate(over="ignore", invalid="ignore"):
-        for off in run_parts(acting, at, integrator, dt, steps, times):
-            size = np.linalg.norm(off, axis=1).max()
-            if not size <= GROWN_FAR:  # or no number
-                break
-            sizes.append((size, alternating(off)))
-    return np.array(sizes).reshape(-1, 2).T
+        for off in run_parts(acting, at, integrator, dt, steps):
+            sizes.append(np.linalg.norm(off, axis=1).max())
+            if not sizes[-1] <= GROWN_FAR:  # or no number
+                return True
+    return max(sizes[3 * RUN_PARTS // 4 :]) > GROWN_STILL * max(1.0, *sizes[: RUN_PARTS // 2])
 
 
-def alternating(off: np.ndarray) -> float:
-    """The part of deviations (steps, n) that changes its sign with every step, in the mean, so that swings cancel.
-
-    So grows, and hardly, what is damped by explicit and implicit damping almost alike.
-    """
-    changes = np.diff(off, n=4, axis=0) / 16.0
-    weight = np.hanning(len(changes) + 2)[1:-1]
-    return float(np.sqrt(weight @ (changes**2).sum(axis=1) / weight.sum()))
-
-
-def run_parts(
-    acting: Acting, at: Posture, integrator: str, dt: float, steps: int, times: float = 1.0
-) -> Iterator[np.ndarray]:
-    """Deviations in each part of a run, (steps, n), in units of that at its start; times: its multiple.
+def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[np.ndarray]:
+    """Deviations in each part of a run, (steps, n), in units of that at its start.
 
     The square of their length is dx' M dx, of which no swing makes more than it was. At the start each joint has its part of it,
     by chance, and so have activations of filters. A free base moves so that there is no momentum, and is not measured.
     """
-    times = times * (SOFTLY if acting.is_coupled else 1.0)
-    rng, kept = np.random.default_rng(SEED), measured_speeds(acting, at)
+    times = SOFTLY if acting.is_coupled else 1.0
+    rng, kept = np.random.default_rng(SEED), at.kept
     M = acting.mass_matrix(at.q)
     inner = np.linalg.inv(np.linalg.inv(M)[np.ix_(kept, kept)])  # of the joints where the base gives way
     root = np.linalg.cholesky(0.5 * (inner + inner.T))
     inertia = np.diag(inner)
     each = times * np.clip(MOVED_BY * np.sqrt(np.median(inertia) / inertia), MOVED_LEAST, MOVED_MOST)
     movement, speed = np.zeros((2, len(M)))
-    allowed = at.small(base_of(acting, at)).meeting
+    allowed = at.small.meeting
     together = (1.0 - APART) * allowed @ allowed.T + APART * np.eye(len(kept))
     movement[kept] = together @ (each * rng.uniform(-1.0, 1.0, len(kept)))
     # what nothing pulls back drifts no farther in the run than it was moved
@@ -123,17 +82,6 @@ def run_parts(
     for off in acting.deviations(at.q, at.u, dt, integrator, parts, movement, speed, times * MOVED_BY):
         filters = off[:, len(M) :] / (times * MOVED_BY * np.sqrt(max(1, off.shape[1] - len(M))))
         yield np.hstack([off[:, kept] @ (root / start), filters])
-
-
-def measured_speeds(acting: Acting, at: Posture) -> list[int]:
-    """The speeds that are measured: with a free base, those that do not follow from the others."""
-    names = set(at.small(base_of(acting, at)).names)
-    return [k for k, name in enumerate(at.robot.coordinates.speeds) if name in names]
-
-
-def base_of(acting: Acting, at: Posture) -> str:
-    """The base that a run has."""
-    return "locked" if {*at.base} & {*acting.locked} else at.bases[0]
 
 
 def full_model(model, at: Posture, dt: float, integrator: str) -> dict:

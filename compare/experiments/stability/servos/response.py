@@ -5,17 +5,16 @@ from scipy.linalg import expm
 
 from ....engines.mujoco.acting import Acting
 from ....truth.driven import Posture
-from .observed import measured_speeds
 
 LASTS = 0.2  # s, of a response; at least one step
 RESPONSE_SIZE = 1e-4  # rad or m: how far a response, and the posture at rest, may move
 RESPONSE_LEAST = 1e-3  # of the largest response: joints of a unit that move less count as if they did so much
 RESPONSE_MOST = 100.0  # fold, of the largest response
 MOST_STEPS = 10_000  # of a run
-CURVE_FROM, CURVE_BY = 16.0, np.sqrt(2.0)  # of a curve: the file's step over its first, and one step over the next
+CURVE_FROM, CURVE_STEPS = 16.0, 16  # of a curve: the file's step over its first; how many
 
 
-def response_error(acting: Acting, at: Posture, base: str, integrator: str, dt: float) -> float | None:
+def response_error(acting: Acting, at: Posture, integrator: str, dt: float) -> float | None:
     """The largest difference from the exact response over the largest response, in 0.2 s, a ratio.
 
     Of rad and of m separately, the larger of both; None: no servo, nothing moves, it diverged, or more than 10,000 steps.
@@ -23,34 +22,34 @@ def response_error(acting: Acting, at: Posture, base: str, integrator: str, dt: 
     activation jumps too. Exact: the matrix exponential of the linear equations. Half of the difference of two runs, there and
     back, has neither an offset nor squares.
     """
-    jump = jump_of(at)
+    jump, force = jump_of(at)
     if not jump.any() or LASTS / dt > MOST_STEPS:
         return None
     steps = max(1, round(LASTS / dt))
-    kept = measured_speeds(acting, at)
-    exact = exact_response(at, base, jump, dt, steps)
-    if not np.abs(exact).max() > 0.0:
+    exact, end = exact_response(at, force, dt, steps)
+    largest = max(np.abs(exact).max(), np.abs(end).max())
+    if not largest > 0.0:
         return None
-    size = RESPONSE_SIZE / np.abs(exact).max()
+    size = RESPONSE_SIZE / largest
     with np.errstate(over="ignore", invalid="ignore"):
         there, back = (
             next(acting.deviations(at.q, at.u, dt, integrator, [steps], jump=sign * size * jump))
             for sign in (1.0, -1.0)
         )
-        off = np.abs((there - back)[:, kept] / (2.0 * size) - exact[:steps])
-    if not off.max() <= RESPONSE_MOST * np.abs(exact).max():  # or no number
+        off = np.abs((there - back)[:, at.kept] / (2.0 * size) - exact)
+    if not off.max() <= RESPONSE_MOST * largest:  # or no number
         return None
-    units = np.array(at.robot.coordinates.units)[kept]
-    largest = np.abs(exact).max()
-    ratios = [
-        off[:, units == unit].max() / max(np.abs(exact[:, units == unit]).max(), RESPONSE_LEAST * largest)
-        for unit in set(units)
-    ]
-    return float(max(ratios))
+    units, most = np.array(at.robot.coordinates.units)[at.kept], np.abs(np.vstack([exact, end])).max(axis=0)
+    return float(
+        max(
+            off[:, units == unit].max() / max(most[units == unit].max(), RESPONSE_LEAST * largest)
+            for unit in set(units)
+        )
+    )
 
 
 def curve(
-    acting: Acting, at: Posture, base: str, integrator: str, file_dt: float, limit: float | None
+    acting: Acting, at: Posture, integrator: str, file_dt: float, limit: float | None
 ) -> list[tuple[float, float]]:
     """(dt, error) from well below the file's step up to the limit, s; without one up to the whole response.
 
@@ -60,55 +59,40 @@ def curve(
     first = max(min(file_dt, end) / CURVE_FROM, LASTS / MOST_STEPS)
     if first >= end:
         return []
-    count = int(np.ceil(np.log(end / first) / np.log(CURVE_BY))) + 1
-    errors = [
-        (float(dt), response_error(acting, at, base, integrator, dt)) for dt in np.geomspace(first, end, max(count, 2))
-    ]
+    errors = [(dt, response_error(acting, at, integrator, dt)) for dt in np.geomspace(first, end, CURVE_STEPS).tolist()]
     return [(dt, off) for dt, off in errors if off is not None]
 
 
-def jump_of(at: Posture) -> np.ndarray:
-    """By how much u of each actuator jumps so that all targets move by the same length, 1 rad or m, (k,)."""
-    lengths = at.driven.along(at.q).lengths
-    jump = np.zeros(len(at.u))
-    for i, (actuator, u, length) in enumerate(zip(at.robot.drive.actuators, at.u, lengths)):
-        gain = actuator.gain[0] + actuator.gain[1] * length
-        if actuator.is_servo and gain and i not in at.cut.forces:
-            jump[i] = actuator.stiffness(u) / gain
-    return jump
+def jump_of(at: Posture) -> tuple[np.ndarray, np.ndarray]:
+    """By how much u of each actuator jumps so that all targets move by the same length, 1 rad or m, (k,); the force, (n,).
 
-
-def exact_response(at: Posture, base: str, jump: np.ndarray, dt: float, steps: int) -> np.ndarray:
-    """Movements of the speeds that count after each step, (steps + 1, n), the last where it rests then: of a jump of u.
-
-    Without stiffness in some direction the last is the rest in the others.
+    The force is that on the speeds of Posture.small: a free base gives way.
     """
-    small, force = at.small(base), pushed(at, base, jump)
+    along, M, kept = at.driven.along(at.q), at.whole.M, at.kept
+    jump, force = np.zeros(len(at.u)), np.zeros(len(M))
+    for i, (actuator, u, length) in enumerate(zip(at.robot.drive.actuators, at.u, along.lengths)):
+        gain = actuator.gain[0] + actuator.gain[1] * length
+        if actuator.is_servo and gain and i not in at.cut:
+            jump[i] = actuator.stiffness(u) / gain
+            force += gain * jump[i] * along.moments[i]
+    free = [k for k in at.base if k not in kept]
+    return jump, force[kept] - M[np.ix_(kept, free)] @ np.linalg.solve(M[np.ix_(free, free)], force[free])
+
+
+def exact_response(at: Posture, force: np.ndarray, dt: float, steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """Movements under a constant force on the speeds of Posture.small after each step, (steps, n), and at rest then, (n,).
+
+    Without stiffness in some direction the rest is that in the others.
+    """
     n = len(force)
     # the state is movement, speed, and a constant 1 that pushes
     A = np.zeros((2 * n + 1, 2 * n + 1))
     A[:n, n : 2 * n] = np.eye(n)
-    by_place, by_speed, by_force = small.equations(dt)
+    by_place, by_speed, by_force = at.small.equations(dt)
     A[n : 2 * n] = np.hstack([by_place, by_speed, by_force @ force[:, None]])
     step, state = expm(dt * A), np.eye(2 * n + 1)[-1]
     states = []
     for _ in range(steps):
         state = step @ state
         states.append(state[:n])
-    return np.array([*states, np.linalg.lstsq(-by_place, by_force @ force, rcond=1e-9)[0]])
-
-
-def pushed(at: Posture, base: str, jump: np.ndarray) -> np.ndarray:
-    """The force of a jump of u on the speeds of Posture.small, (n,); a free base gives way."""
-    along = at.driven.along(at.q)
-    gains = [
-        actuator.gain[0] + actuator.gain[1] * length
-        for actuator, length in zip(at.robot.drive.actuators, along.lengths)
-    ]
-    force = (gains * jump) @ along.moments[: len(jump)]
-    names = at.small(base).names
-    kept = [k for k, name in enumerate(at.whole.names) if name in names]
-    free = [k for k in at.base if k not in kept] if base == "free" else []
-    M = at.whole.M
-    away = M[np.ix_(kept, free)] @ np.linalg.solve(M[np.ix_(free, free)], force[free]) if free else 0.0
-    return force[kept] - away
+    return np.array(states), np.linalg.lstsq(-by_place, by_force @ force, rcond=1e-9)[0]
