@@ -57,7 +57,7 @@ TREE = tmt.Tree(
 )
 SHORT = {"duration": 0.25, "dt": 0.25 / 64}
 SCENES = (
-    Scene("let go", "reaching", tags=("speed", "regular", "digits"), **SHORT),
+    Scene("let go", "reaching", tags=("speed", "regular"), **SHORT),
     Scene("held up", "raised", "hold", **SHORT),
     Scene("let go, damped", "reaching", damping=0.1, **SHORT),
     Scene("thrown, weightless", "down", speed=(200.0, 100.0, 0.0, -100.0), gravity=False, **SHORT),

@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
+import mpmath
 import numpy as np
 
 from tmt import Tree
+from tmt.exact.values import DIGITS
 
 
 def random_tree(rng, bodies=4, damping=0.0) -> Tree:
@@ -146,3 +148,16 @@ def mjcf(tree) -> str:
       <option gravity="{numbers(tree.gravity)}"><flag contact="disable" constraint="disable"/></option>
       <worldbody>{on(-1, np.zeros(3))}</worldbody>
     </mujoco>"""
+
+
+def exact_swing(t: np.ndarray, q: float, qd: float, hanging: float, frequency: float) -> np.ndarray:
+    """The angle of a pendulum, as compare.truth.pendulum.swing, with 50 digits of mpmath's elliptic functions."""
+    with mpmath.workdps(DIGITS):
+        q, qd, hanging, frequency = (mpmath.mpf(float(v)) for v in (q, qd, hanging, frequency))
+        turns = mpmath.floor((q - hanging) / (2 * mpmath.pi) + 0.5)
+        theta = q - hanging - 2 * mpmath.pi * turns
+        height, speed = mpmath.sin(theta / 2), qd / (2 * frequency)
+        m = height**2 + speed**2
+        begin = mpmath.ellipf(mpmath.atan2(height, speed), m)
+        sn = [mpmath.ellipfun("sn", u=frequency * mpmath.mpf(float(time)) + begin, m=m) for time in t]
+        return np.array([q - theta + 2 * mpmath.asin(mpmath.sqrt(m) * s) for s in sn], dtype=object)

@@ -17,8 +17,6 @@ from . import Engine, EngineRecord, Method, Motion, Prepared, as_far_as_it_goes
 from .scipy import ScipyDynamics, of_length_1
 
 ENGINE = EngineRecord(order=40, label="heyoka", colour="#CC79A7", marker="D", package="heyoka", extra="taylor")
-# options of a compiled function: sums in any order, a less exact sine, and the fastest number of states in a loop's turn
-FASTEST = {"fast_math": True, "batch_size": 16}
 FULL = 1e-15  # tolerance: all digits of a double
 # of the accelerations: heyoka's compilation takes longer than in proportion, 15 s for 290 of them, 266 s for 2479
 MOST_OPERATIONS = 600
@@ -72,13 +70,13 @@ def integrator(tree: Tree, tau: tuple[float, ...], tolerance: float):
 
 
 @lru_cache(maxsize=8)
-def compiled_accelerations(tree: Tree, fastest: bool = False):
+def compiled_accelerations(tree: Tree):
     """heyoka's compiled function of many states, f(states, outputs=qdd): states (nq + 2 nv, N), of q, qd, tau; qdd (nv, N)."""
     import heyoka
 
     q, qd, tau = variables(tree, "q", "qd", "tau")
     qdd = acceleration(tree, q, qd, tau, composite.mass_matrix_and_bias)
-    return heyoka.cfunc(qdd, vars=[*q, *qd, *tau], **(FASTEST if fastest else {}))
+    return heyoka.cfunc(qdd, vars=[*q, *qd, *tau])
 
 
 def variables(tree: Tree, *names: str) -> list:

@@ -58,30 +58,6 @@ class PinocchioCalls:
         """run(count): aba of one state again and again, each a call from Python."""
         return aba_again(self.model, self.data, *self.given(q, v, tau))
 
-    @staticmethod
-    def call_loop() -> Callable[[int], object]:
-        """run(count): the same call for a model without joints, which leaves nothing but the call."""
-        import pinocchio
-
-        model, nothing = pinocchio.Model(), np.empty(0)
-        return aba_again(model, model.createData(), nothing, nothing, nothing)
-
-    def aba_of_many(self, q, v, tau) -> Callable[[], np.ndarray] | None:
-        """run() -> accelerations (N, nv) of states (N, n), one call for all on one thread; None where it was built without it."""
-        import pinocchio
-
-        if not hasattr(pinocchio, "abaInParallel"):
-            return None
-        pool = pinocchio.ModelPool(self.model, 1)
-        columns = [np.asfortranarray(part.T) for part in self.given(q, v, tau)]
-        out = np.empty(columns[2].shape, order="F")
-
-        def run():
-            pinocchio.abaInParallel(1, pool, *columns, out)
-            return out.T
-
-        return run
-
 
 def joint(kind: str, axis: np.ndarray):
     """Pinocchio's joint, which is a faster one where the axis is one of the coordinates'."""

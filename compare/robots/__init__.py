@@ -54,7 +54,7 @@ class Claims(NamedTuple):
 class Robot:
     """A robot: a file for MuJoCo, the numbers that are compared with it, and scenes.
 
-    Tags of scenes: "full only": not in a quick run; "digits": compared with many digits (a small run: only the last one);
+    Tags of scenes: "full only": not in a quick run;
     "speed": every method is run; "regular": errors are regular from large steps on; "fewer joints": some joints never move;
     "falls": a free body falls and nothing else moves; "own": of a user or a file, only agreement is expected.
     """

@@ -20,8 +20,8 @@ POSTURES = {  # deg, (alpha, beta, gamma); the assignment's named postures
 }
 SCENES = (
     Scene("zero, free", "zero", "free", tags=("full only", "speed", "fewer joints")),
-    Scene("ball catch, free", "ball catch", "free", tags=("digits", "speed")),
-    Scene("bent, free", "bent", "free", tags=("digits", "speed", "regular")),
+    Scene("ball catch, free", "ball catch", "free", tags=("speed",)),
+    Scene("bent, free", "bent", "free", tags=("speed", "regular")),
     Scene("ball catch, held", "ball catch", "hold", judged=2.5),  # unstable: rounding grows fast
     Scene("bent, held", "bent", "hold"),
     Scene("bent, damped", "bent", "free", damping=0.5, tags=("full only", "speed")),

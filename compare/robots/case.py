@@ -257,15 +257,8 @@ class Case:
 
     def whole_positions(self, q: np.ndarray) -> np.ndarray:
         """Positions of all joints, (..., nq), from those of the free joints, (..., nq)."""
-        return self._whole(self.posture, q, "q")
-
-    def whole_speeds(self, v: np.ndarray) -> np.ndarray:
-        """Speeds of all joints, (..., nv), from those of the free joints, (..., nv)."""
-        return self._whole(np.zeros(self.robot.coordinates.nv), v, "qd")
-
-    def _whole(self, locked, values, which):
-        whole = np.tile(locked, (*np.shape(values)[:-1], 1))
-        whole[..., self._free(which)] = values
+        whole = np.tile(self.posture, (*np.shape(q)[:-1], 1))
+        whole[..., self._free("q")] = q
         return whole
 
     def _free(self, which):

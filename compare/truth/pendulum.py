@@ -1,11 +1,9 @@
 """The exact motion of a pendulum, by elliptic functions."""
 
-import mpmath
 import numpy as np
 from scipy.special import ellipj, ellipkinc
 
 import tmt
-from tmt.exact.values import DIGITS
 
 
 def pendulum(tree: tmt.Tree) -> tuple[float, float]:
@@ -36,16 +34,3 @@ def swing(t: np.ndarray, q: float, qd: float, hanging: float, frequency: float) 
     k = np.hypot(height, speed)
     sn = ellipj(frequency * t + ellipkinc(np.arctan2(height, speed), k * k), k * k)[0]
     return q - theta + 2 * np.arcsin(k * sn) if k < 1.0 else np.full_like(t, np.nan)
-
-
-def exact_swing(t: np.ndarray, q: float, qd: float, hanging: float, frequency: float) -> np.ndarray:
-    """The same with 50 digits of mpmath's elliptic functions."""
-    with mpmath.workdps(DIGITS):
-        q, qd, hanging, frequency = (mpmath.mpf(float(v)) for v in (q, qd, hanging, frequency))
-        turns = mpmath.floor((q - hanging) / (2 * mpmath.pi) + 0.5)
-        theta = q - hanging - 2 * mpmath.pi * turns
-        height, speed = mpmath.sin(theta / 2), qd / (2 * frequency)
-        m = height**2 + speed**2
-        begin = mpmath.ellipf(mpmath.atan2(height, speed), m)
-        sn = [mpmath.ellipfun("sn", u=frequency * mpmath.mpf(float(time)) + begin, m=m) for time in t]
-        return np.array([q - theta + 2 * mpmath.asin(mpmath.sqrt(m) * s) for s in sn], dtype=object)

@@ -7,11 +7,10 @@ from edited import XML
 
 import tmt
 from compare.engines.mujoco import load, parse
-from compare.engines.mujoco.linear import implicit_derivative, left_to_itself
+from compare.engines.mujoco.linear import left_to_itself
 from compare.engines.mujoco.parameters import parameters
 from compare.experiments.parameters import stated
 from compare.robots.arm import ARM
-from tmt.equations.method import bias_rates
 
 REST = np.zeros(3)
 
@@ -47,7 +46,5 @@ def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path
     assert np.allclose(motion.q, ours.q, atol=1e-11) and np.allclose(motion.v, ours.qd, atol=1e-10)
     alone, motion = left_to_itself(dynamics, q, v, tau, dt, 5, "Euler"), dynamics.run(q, v, tau, dt, 5, "Euler")
     assert np.allclose(alone["q"], motion.q, atol=1e-13) and np.allclose(alone["qd"], motion.v, atol=1e-12)
-    rates = np.array(bias_rates(case.tree, list(q), list(v))) + np.diag(case.tree.damping)
-    assert np.allclose(-implicit_derivative(dynamics, q, v), rates, atol=1e-12)
     compiled = parameters(dynamics)
     assert all(np.allclose(compiled[name], numbers, atol=1e-14) for name, numbers in stated(case.tree).items())

@@ -7,11 +7,10 @@ import mpmath
 import numpy as np
 import pytest
 from models import PATHS
-from trees import random_state, small_tree, tree_of_kinds
+from trees import exact_swing, random_state, small_tree, tree_of_kinds
 
 import tmt
 from compare.engines.mujoco import read
-from compare.truth.pendulum import exact_swing
 from tmt.equations import composite
 from tmt.equations.method import acceleration
 from tmt.exact import motion as reference_run

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from models import PATHS, random_tree
-from trees import random_state, tree_of_kinds
+from trees import exact_swing, random_state, tree_of_kinds
 
 import tmt
 from compare.engines.mujoco import read
@@ -13,7 +13,7 @@ from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.truth.conserved import floats
 from compare.truth.linear import Held, held, posture_names
-from compare.truth.pendulum import exact_swing, pendulum, swing
+from compare.truth.pendulum import pendulum, swing
 from compare.truth.rest import holding, moving, slopes, spring_slope, weight
 from compare.truth.servos import at_rest
 from tmt import METHODS

@@ -107,15 +107,6 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tmt"
 
 
-def size_of_cache() -> int:
-    """Bytes of what lies there."""
-    found = 0
-    for path in cache_folder().rglob("*"):
-        with suppress(OSError):  # another process was sooner
-            found += path.lstat().st_size * path.is_file()
-    return found
-
-
 def own_folder(folder: Path | None = None) -> Path:
     """The cache folder (or another), its links resolved, made if it is not there; NotOwn unless it is the user's own."""
     folder = Path(os.path.realpath(folder or cache_folder()))

@@ -21,7 +21,6 @@ class Feature(NamedTuple):
     names: tuple[str, ...]
     treatment: str  # modelled, switched_off, open_tree
     reason: str
-    numbers: tuple[float, ...] = ()  # of a feature that is not modelled: those other than 0, sorted
 
 
 REASONS = {
@@ -44,13 +43,6 @@ REASONS = {
     "keyframe": (MODELLED, "postures of the comparison"),
     "other": (OFF, "it changes the motion; the equations do not have it"),
 }
-FIELDS_OF_FEATURES = {
-    "gravcomp": ("body_gravcomp",),
-    "frictionloss": ("dof_frictionloss", "tendon_frictionloss"),
-    "tendon": ("tendon_stiffness", "tendon_damping", "tendon_lengthspring", "wrap_prm"),
-    "other": ("dof_dampingpoly", "jnt_stiffnesspoly", "jnt_springyield"),
-}
-OF_COORDINATES = int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON)
 QUIET = ("OVERRIDE", "ENERGY", "FWDINV", "DIAGEXACT")  # enable flags that cannot change a motion without contacts
 
 
@@ -58,20 +50,7 @@ def features(m: mujoco.MjModel) -> tuple[Feature, ...]:
     """The features of a compiled model, always in the same order."""
     names = names_of_features(m)
     rows = [(feature, names[feature]) for feature in REASONS if names[feature]]
-    return tuple(
-        Feature(feature, len(own), tuple(own), *REASONS[feature], numbers_of_feature(m, feature))
-        for feature, own in rows
-    )
-
-
-def numbers_of_feature(m: mujoco.MjModel, feature: str) -> tuple[float, ...]:
-    """The numbers of a feature that do not depend on how frames of bodies are placed."""
-    fields = [np.ravel(getattr(m, name)) for name in FIELDS_OF_FEATURES.get(feature, ()) if hasattr(m, name)]
-    if feature == "fluid":
-        fields = [np.array([m.opt.density, m.opt.viscosity, *m.opt.wind])]
-    if feature == "equality":
-        fields = [m.eq_data[np.isin(m.eq_type, OF_COORDINATES), :5].ravel()]
-    return tuple(sorted(float(x) for field in fields for x in field if x))
+    return tuple(Feature(feature, len(own), tuple(own), *REASONS[feature]) for feature, own in rows)
 
 
 def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
@@ -100,7 +79,9 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
         "spring": having("jnt_stiffness") if sprung else [],
         "contact": named("geom", np.unique(contact_pairs(m))) if constrained and on(m, "CONTACT") else [],
         "limit": having("jnt_limited", "tendon_limited") if constrained and on(m, "LIMIT") else [],
-        "frictionloss": having(*FIELDS_OF_FEATURES["frictionloss"]) if constrained and on(m, "FRICTIONLOSS") else [],
+        "frictionloss": having("dof_frictionloss", "tendon_frictionloss")
+        if constrained and on(m, "FRICTIONLOSS")
+        else [],
         "clamp": named("actuator", clamped) + having("jnt_actfrclimited", "tendon_actfrclimited"),
         "fluid": [name for name in ("density", "viscosity") if getattr(m.opt, name)],
         "gravcomp": having("body_gravcomp"),

@@ -38,15 +38,6 @@ def left_to_itself(dynamics: MujocoDynamics, q, qd, tau, dt: float, steps: int, 
     return dict(zip(("time", "q", "qd"), map(np.array, zip(*path)))) | {"warnings": int(data.warning.number.sum())}
 
 
-def implicit_derivative(dynamics: MujocoDynamics, q: np.ndarray, qd: np.ndarray, dt: float = 1e-3) -> np.ndarray:
-    """d(passive force - bias)/dqd that the implicit integrator uses, N m s/rad, (nv, nv): qDeriv."""
-    model, data = dynamics.own_copy(dt, "implicit", q, qd)
-    mujoco.mj_step(model, data)
-    dense = np.zeros((model.nv, model.nv))
-    mujoco.mju_sparse2dense(dense, data.qDeriv, model.D_rownnz, model.D_rowadr, model.D_colind)
-    return dense[np.ix_(dynamics.dofs, dynamics.dofs)]
-
-
 class WholeRun(NamedTuple):
     """A run of a file's model as it is."""
 
