@@ -14,6 +14,13 @@ FIELDS = ("experiment", "scene", "quantity", "rule")
 RENAMED = [  # (field, regular expression, replacement): a name of before, and what it is now
     ("quantity", "^smallest error of MuJoCo's RK4, beside that of tmt's rk4$",
      "smallest error of MuJoCo's RK4, compared with tmt's rk4"),
+    ("quantity", r"^distance of the measured order from (\d)$", r"deviation from order \1: error"),
+    ("quantity", "^measured order, of 8$", "measured order, nominal 8"),
+    ("quantity", r"^order of the error against the elliptic function, from (\d)$",
+     r"deviation from order \1: error from the elliptic function"),
+    ("quantity", "^growth of a step near that limit, TMT to MuJoCo$",
+     "spectral radius of a step near the limit with servos, TMT to MuJoCo"),
+    ("quantity", "^limit of the step under its servos, observed to predicted$", "step limit with servos, observed / predicted - 1"),
     ("quantity", "Mbar - Mbar' over its largest entry$", "Mbar - Mbar' over the scale of the entry"),
     ("quantity", "least eigenvalue of Mbar over", "least eigenvalue of Mbar in units of its diagonal over"),
     ("scene", "^(.*), free base, (.*)$", r"\1, \2"),
