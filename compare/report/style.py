@@ -94,7 +94,7 @@ def name_ends(ax: Axes, ends: Sequence[tuple], size: float = 8.0) -> None:
             left = at[0] + step[0] - wide * (step[0] < -1e-9)
             box = Bbox.from_bounds(left, at[1] + step[1] - high / 2, wide, high)
             cost = far + TO_THE_LEFT * (1.0 - np.cos(angle)) + OVER_A_LINE * box.padded(1.0).count_contains(crowd)
-            cost += OVER_A_NAME * box.padded(3.0, 0.0).count_overlaps(placed)
+            cost += OVER_A_NAME * box.padded(8.0, 0.0).count_overlaps(placed)
             return cost + OUTSIDE * (box.min < ax.bbox.min).any() + OUTSIDE * (box.max > ax.bbox.max).any(), far, box
 
         places = (place(far, angle) for far in DISTANCES for angle in DIRECTIONS)
