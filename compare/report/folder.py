@@ -58,28 +58,26 @@ def new_report(out: str | Path) -> Iterator[Path]:
 
 
 class Work:
+    """The folder of one run inside `out`."""
+
     def __init__(self, out):
         self.out, self.path, self.lock = out, None, None
         self.made = [path for path in (out, *out.parents) if not os.path.lexists(path)]  # the innermost first
 
     def make(self):
         """Make and lock the folder; restore and delete what killed runs have left."""
-        for attempt in range(TRIES):
-            try:
-                self.out.mkdir(parents=True, exist_ok=True)
-                with locked(self.out):
-                    with interrupt.postponed():
-                        self.path = Path(tempfile.mkdtemp(prefix=".new-", dir=self.out))
-                        self.lock = lock(self.path)
-                    (self.path / "new").mkdir()
-                    clear_away(self.out)
-                    refuse_foreign(self.out)
-                return
-            except OSError as error:
-                # not found: another run has just taken away the folder that it had made
-                if not isinstance(error, FileNotFoundError) or attempt == TRIES - 1:
-                    text = f"cannot write to {self.out}: {what_is_wrong(self.out, error)}"
-                    raise FolderError(f"{text}; expected a writable folder") from None
+        try:
+            self.out.mkdir(parents=True, exist_ok=True)
+            with locked(self.out):
+                with interrupt.postponed():
+                    self.path = Path(tempfile.mkdtemp(prefix=".new-", dir=self.out))
+                    self.lock = lock(self.path)
+                (self.path / "new").mkdir()
+                clear_away(self.out)
+                refuse_foreign(self.out)
+        except OSError as error:
+            text = f"cannot write to {self.out}: {what_is_wrong(self.out, error)}"
+            raise FolderError(f"{text}; expected a writable folder") from None
 
     def exchange(self):
         """Move the old report away and the new one in; on an error put everything back."""
@@ -171,20 +169,15 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def lock(folder: Path, wait: bool = True) -> int | None:
-    """A file descriptor with the folder's lock; None where somebody else has it, or there are no locks.
-
-    The system takes a lock away when its process ends, however that ends.
-    """
+    """A file descriptor with the folder's lock, which ends with the process; None: it is locked, or there are no locks."""
     if fcntl is None:
         return None
-    number = None
+    number = os.open(folder, os.O_RDONLY)
     try:
-        number = os.open(folder, os.O_RDONLY)
         fcntl.flock(number, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
         return number
     except OSError:
-        if number is not None:
-            os.close(number)
+        os.close(number)
         return None
 
 
@@ -222,17 +215,18 @@ def files(folder: Path) -> list[str]:
 
 def refuse_foreign(out: Path) -> None:
     """FolderError for a file under a report's names that the report in `out` does not list as its own."""
-    try:
-        own = json.loads((out / "results.json").read_text(encoding="utf-8"))["provenance"]["files"]
-        foreign = [name for name in files(out) if name not in own]
-    except (OSError, ValueError, KeyError, TypeError):
-        foreign = files(out)
-    if foreign:
+    own = provenance_of(out).get("files", ())
+    if foreign := [name for name in files(out) if name not in own]:
         raise FolderError(f"{out} has {foreign[0]}, which no earlier report has written; use another folder (--out)")
 
 
 def made_by(out: str | Path) -> str | None:
+    """The command of the report in a folder, if there is one."""
+    return provenance_of(Path(out)).get("command")
+
+
+def provenance_of(out: Path) -> dict:
     try:
-        return str(json.loads((Path(out) / "results.json").read_text(encoding="utf-8"))["provenance"]["command"])
+        return dict(json.loads((out / "results.json").read_text(encoding="utf-8"))["provenance"])
     except (OSError, ValueError, KeyError, TypeError):
-        return None
+        return {}
