@@ -29,6 +29,9 @@ KINDS = {
 }
 
 
+FREE = ("slide", "slide", "slide", "ball")
+
+
 class Coordinates(NamedTuple):
     """Positions q, nq numbers, and speeds, nv numbers, of a number of joints.
 
@@ -120,6 +123,21 @@ class Coordinates(NamedTuple):
                 place = at if positions else by
                 values[place] = np.radians(values[place])
         return values
+
+
+def free_joints(tree: Tree) -> list[int]:
+    """The first joint of each free joint: three slides and a ball, each at the one before."""
+    return [
+        i
+        for i in range(len(tree.kind) - 3)
+        if tree.kind[i : i + 4] == FREE
+        and all(tree.parent[k + 1] == k and not any(tree.offset[k + 1]) for k in range(i, i + 3))
+    ]
+
+
+def floats(tree: Tree) -> bool:
+    """Whether a joint to the world is free: such a robot has no rest under gravity."""
+    return any(tree.parent[i] == -1 for i in free_joints(tree))
 
 
 def rates_at(tree: Tree, q: np.ndarray) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from tmt.model.tree import GAINS
 from . import Robot
 from .actuators import Drive, controller
 from .case import KINDS, Coordinates, Scene, fastest_rates
+from .coordinates import free_joints
 
 DURATION = 1.0  # s; longer free motions are chaotic
 MIN_STEPS, MAX_STEPS_OF_A_FILE = 64, 8192  # of a scene, with its largest step
@@ -124,9 +125,9 @@ def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Dri
     damped = timing | {"dt": DURATION / coarsest(tree, inverse, dt, added)}
     made = [] if rests else [Scene(f"{start}, held", start, "hold", tags=("own",), **timing)]
     tags = ("own", "speed", "regular")
-    if free := free_bodies(coordinates):
-        made.append(Scene(f"{start}, thrown", start, speed=thrown(coordinates), tags=tags, **timing))
-        turns = np.delete(accelerations, [k for slides, _ in free for k in slides])
+    if free := free_joints(tree):
+        made.append(Scene(f"{start}, thrown", start, speed=thrown(tree), tags=tags, **timing))
+        turns = np.delete(accelerations, [tree.coordinates.joints[i + k].qd.start for i in free for k in range(3)])
         tags = ("own", "speed") if rests or np.abs(turns).max() >= STILL else ("own", "falls")
     made += [
         Scene(f"{start}, {how}", start, tags=tags, **speed, **timing),
@@ -149,7 +150,7 @@ def servo_scenes(
         return []
     driven = replace(tree, **{name: getattr(acting, name) for name in GAINS})
     count, least = coarsest(driven, inverse, dt, duration=SERVOS_ACT), SERVOS_ACT * max(fastest_rates(driven, inverse))
-    free = bool(free_bodies(Coordinates(tree.hinge_names, tree.kind)))
+    free = bool(free_joints(tree))
     settings = {"gravity": not free, "duration": SERVOS_ACT, "dt": SERVOS_ACT / count, "judged": 0.0}
     moved = tuple(MOVED_TARGETS[kind] for kind, _, by in joints for _ in range(by.start, by.stop))
     followed = ("speed",) if least <= count else ()
@@ -188,17 +189,10 @@ def coarsest(tree: tmt.Tree, inverse: np.ndarray, dt: float, added: tuple = (), 
     return count
 
 
-def thrown(coordinates: Coordinates) -> tuple[float, ...]:
+def thrown(tree: tmt.Tree) -> tuple[float, ...]:
     """Speeds, (nv,) m/s and deg/s, of tumbling free bodies; () if there are none."""
-    speed, free = np.zeros(coordinates.nv), free_bodies(coordinates)
-    for slides, turn in free:
-        speed[slides[-1]] = THROWN_UP
-        speed[turn] = TUMBLING
+    speed, free = np.zeros(tree.coordinates.nv), free_joints(tree)
+    for i in free:
+        speed[tree.coordinates.joints[i + 2].qd.start] = THROWN_UP
+        speed[tree.coordinates.joints[i + 3].qd] = TUMBLING
     return tuple(map(float, speed)) if free else ()
-
-
-def free_bodies(coordinates: Coordinates) -> list[tuple[list[int], slice]]:
-    """The indices of the speeds of each free body (three slides and a ball): of the slides, of the ball."""
-    kinds, joints = coordinates.all_kinds, coordinates.places.joints
-    free = [i for i in range(3, len(kinds)) if kinds[i - 3 : i + 1] == ("slide", "slide", "slide", "ball")]
-    return [([joints[k].qd.start for k in range(i - 3, i)], joints[i].qd) for i in free]

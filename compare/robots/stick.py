@@ -4,11 +4,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
-import tmt
 from tmt import literal
 from tmt.equations import method
 
 from . import Robot
+from .coordinates import free_joints
 
 ELEVATION, AZIMUTH = 20.0, -70.0  # deg, of the camera
 _E, _A = np.radians([ELEVATION, AZIMUTH])
@@ -25,10 +25,10 @@ def stick_figure(robot: Robot, q: np.ndarray, crosses: bool = False) -> tuple[np
     if robot.landmarks:
         points = np.array([list(robot.landmarks(one).values()) for one in q])
         return points, [(k, k + 1) for k in range(points.shape[1] - 1)]
-    tree, free = robot.tree, free_parts(robot.tree)
+    tree, free = robot.tree, {i + k for i in free_joints(robot.tree) for k in range(4)}
     frames = method.joint_frames(tree, list(q.T))
     points = [along_run(frame.origin, q) for frame in frames]
-    links = [(up, j) for j, up in enumerate(tree.parent) if up >= 0 and not (free[j] and free[up])]
+    links = [(up, j) for j, up in enumerate(tree.parent) if up >= 0 and not {j, up} <= free]
     coms = literal.com_positions(q, tree)
     for body, joint in enumerate(tree.body_hinge):
         if joint >= 0 and joint not in tree.parent:
@@ -52,15 +52,3 @@ def along_run(vector: Iterable, q: np.ndarray) -> np.ndarray:
 def as_seen(points: np.ndarray) -> np.ndarray:
     """Points in the world, (..., 3) m, in the view: right and up, (..., 2) m."""
     return points @ np.stack([RIGHTWARD, UPWARD], axis=1)
-
-
-def free_parts(tree: tmt.Tree) -> list[bool]:
-    """Whether each joint is one of the four of a free joint."""
-    is_free = [False] * len(tree.kind)
-    for i in range(3, len(tree.kind)):
-        row = range(i - 2, i + 1)
-        if tree.kind[i - 3 : i + 1] == ("slide", "slide", "slide", "ball") and all(
-            tree.parent[k] == k - 1 and not any(tree.offset[k]) for k in row
-        ):
-            is_free[i - 3 : i + 1] = [True] * 4
-    return is_free

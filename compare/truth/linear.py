@@ -12,7 +12,7 @@ from tmt.equations import composite, method
 from tmt.equations.dual import seeded
 
 from ..robots.case import SEED, Case
-from .conserved import floats
+from ..robots.coordinates import floats
 from .rest import holding, moving, slopes
 from .steps import growth_of, is_runge_kutta, linear_step
 

@@ -10,8 +10,8 @@ from trees import exact_swing, random_state, tree_of_kinds
 import tmt
 from compare.engines.mujoco import read
 from compare.robots.arm import ARM
+from compare.robots.coordinates import floats
 from compare.robots.file import robot_of
-from compare.truth.conserved import floats
 from compare.truth.linear import Held, held, posture_names
 from compare.truth.pendulum import pendulum, swing
 from compare.truth.rest import holding, moving, slopes, spring_slope, weight

@@ -12,7 +12,7 @@ import tmt
 from ...engines import LABELS, Engine, Method, one_of_each_scheme, same_scheme
 from ...robots import Robot
 from ...robots.case import Case
-from ...truth.conserved import floats
+from ...robots.coordinates import floats
 from ...truth.linear import held, posture_names
 from ...truth.servos import at_rest
 
