@@ -4,11 +4,12 @@ import mujoco
 import numpy as np
 import pytest
 from files import TENDON, TWO, mjcf
-from servo_models import FILTERED, acting_of, hinge, posture_of
+from servo_models import FILTERED, hinge, posture_of
 
 import tmt
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting, add_armature
+from compare.experiments.stability.servos.predicted import acting_at
 
 SITES = TWO.replace("<geom", '<site name="s" pos="0.1 0 0"/><geom', 1)
 FREE = '<body><freejoint/><geom size="0.1"/></body>'
@@ -108,7 +109,7 @@ def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
 @pytest.mark.parametrize("integrator", ["Euler", "RK4"])
 def test_a_run_in_parts_is_the_run_that_steps_make(integrator):
     at, reading = posture_of(hinge(actuator=FILTERED.format(kind="filter", constant=0.01)))
-    acting, u, jump = acting_of(at, reading), np.array([0.3]), np.array([0.1])
+    acting, u, jump = acting_at(reading, at), np.array([0.3]), np.array([0.1])
     parts = list(acting.deviations(at.q, u, 0.004, integrator, [3, 5], 1e-3, 2e-3, 0.05, jump))
     assert [part.shape for part in parts] == [(3, 2), (5, 2)]
     model, data = acting.at(at.q, u + jump, 0.004, integrator)
