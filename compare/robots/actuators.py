@@ -136,10 +136,6 @@ class Drive:
         """Whether an actuator force depends on position or speed; if none does, there is no step limit."""
         return any(actuator.acts and any((*actuator.bias[1:], *actuator.gain[1:])) for actuator in self.actuators)
 
-    @property
-    def servos(self) -> tuple[Actuator, ...]:
-        return tuple(actuator for actuator in self.actuators if actuator.is_servo)
-
     def control(self, posture: str, lengths: Sequence[float]) -> np.ndarray:
         """u of each actuator at a posture, within its range: that of the keyframe, else the target is the posture.
 

@@ -64,7 +64,7 @@ def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: in
     """
     times = SOFTLY if acting.is_coupled else 1.0
     rng, kept = np.random.default_rng(SEED), at.kept
-    M = acting.mass_matrix(at.q)
+    M = at.whole.M
     inner = np.linalg.inv(np.linalg.inv(M)[np.ix_(kept, kept)])  # of the joints where the base gives way
     root = np.linalg.cholesky(0.5 * (inner + inner.T))
     inertia = np.diag(inner)
