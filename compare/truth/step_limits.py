@@ -147,16 +147,11 @@ class Small:
     @cached_property
     def growing(self) -> tuple[float, np.ndarray] | None:
         """The rate, 1/s, and the movement of the fastest growing mode of the equations of motion, or None."""
-        stiff, _, basis = self.rigid
-        if not stiff.size:
-            return None
         values, moves = self.modes
+        if not values.size:
+            return None
         fastest = int(np.argmax(values.real))
         rate = float(values[fastest].real)
-        if np.abs(stiff - stiff.T).max() <= SYMMETRIC * np.abs(stiff).max():
-            lowest, shapes = np.linalg.eigh(0.5 * (stiff + stiff.T))
-            if lowest[0] < -VANISHING * largest(stiff):
-                return (rate, moves[:, fastest]) if rate > 0.0 else (0.0, basis @ shapes[:, 0])
         return (rate, moves[:, fastest]) if rate > max(NEGLIGIBLE * np.abs(values).max(), SLOWEST) else None
 
     @cached_property

@@ -40,7 +40,7 @@ EDITS = (
     Edit("mujoco.actuators", "off", "m.opt.disableactuator & (1 << group)", "False", "no group is disabled"),
     Edit("mujoco.acting", "add_armature", "model.dof_M0[speeds] += more", "pass", "a body that never changes stays as it is"),
     Edit("step_limits", "Small.drifts", "loose > loose_base", "False", "nothing drifts"),
-    Edit("step_limits", "VANISHING", "1e-10", "1e-30", "rounding is a saddle"),
+    Edit("step_limits", "VANISHING", "1e-10", "1e-30", "rounding is stiff"),
     Edit("step_limits", "Small.pole_limit", "not (exact and is_exact)", "True", "a filterexact has the limit of a filter"),
     Edit("step_limits", "Small.pole_limit", "by * constant", "10.0 * by * constant", "a filter may step ten times as far"),
     Edit("step_limits", "Small.nearest", "'swing' if _1 else 'real'", "'real'", "no mode swings"),
