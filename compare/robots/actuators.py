@@ -159,16 +159,14 @@ class Controller(NamedTuple):
 
 
 def reason(actuator: Actuator, u: float) -> str:
-    """Why an actuator is left out of a Controller; "" if it is not.
-
-    With negative stiffness MuJoCo's `discrete` uses another scheme.
-    """
+    """Why an actuator is left out of a Controller; "" if it is not."""
     if actuator.off or actuator.refused:
         return actuator.off or actuator.refused
     if actuator.moment is None:
         return "its moment depends on the posture"
     if not any(actuator.moment):
         return "it moves no joint"
+    # with negative stiffness MuJoCo's `discrete` uses another scheme
     return "it pushes away from its target" if actuator.stiffness(u) < 0.0 else ""
 
 
@@ -178,7 +176,7 @@ def controller(drive: Drive, posture: object, q: np.ndarray, targets: np.ndarray
     The controls are those of the keyframe, else the targets are the posture. posture: its name, or numbers; q: (nv,) rad or m,
     of a ball any numbers; targets: (nv,) rad or m, shift of the targets: the target length of a servo by |J| @ targets.
     """
-    moved, n = np.broadcast_to(targets, len(q)), len(q)
+    n = len(q)
     moments = [np.zeros(n) if actuator.moment is None else np.array(actuator.moment) for actuator in drive.actuators]
     stated = drive.control(posture if isinstance(posture, str) else "", [moment @ q for moment in moments])
     torque, position_gain, speed_gain = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
@@ -187,7 +185,9 @@ def controller(drive: Drive, posture: object, q: np.ndarray, targets: np.ndarray
         if why := reason(actuator, u):
             left_out[actuator.name] = why
             continue
-        u = controls[actuator.name] = moved_target(actuator, float(u), float(np.abs(moment) @ moved))
+        u = controls[actuator.name] = moved_target(
+            actuator, float(u), float(np.abs(moment) @ np.broadcast_to(targets, n))
+        )
         torque += moment * actuator.force(u, 0.0)
         position_gain += np.outer(moment, moment) * actuator.stiffness(u)
         speed_gain += np.outer(moment, moment) * actuator.damping(u)

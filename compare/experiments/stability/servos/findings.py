@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from ....engines.mujoco.names import INTEGRATORS
 from ....judge.check import Result
 from ....truth.step_limits import LIMIT_UP_TO
 from . import response
@@ -70,13 +71,9 @@ def verdict(rows: Sequence[dict], integrator: str) -> dict:
 
 def find_notes(result: Result, rows: Sequence[dict], predictions: Sequence[Prediction]) -> None:
     """The limits and errors of all integrators, where the postures rest, and actuators whose force is cut by its range."""
-    of_each = [known(rows, integrator) for integrator in dict.fromkeys(row["integrator"] for row in rows)]
-    integrators = [
-        mine[0] | {"error": max((row["step_response_error"] or 0.0 for row in mine), default=0.0)}
-        for mine in of_each
-        if mine
-    ]
-    if integrators:
+    of_each = [known(rows, integrator) for integrator in INTEGRATORS]
+    errors = [max((row["step_response_error"] or 0.0 for row in mine), default=0.0) for mine in of_each]
+    if integrators := [mine[0] | {"error": error} for mine, error in zip(of_each, errors) if mine]:
         values = {"dt": rows[0]["file_dt_s"], "seconds": response.LASTS, "up_to": LIMIT_UP_TO}
         result.find("integrators", "servos", integrators=integrators, **values)
     resting, robot = [prediction.at for prediction in predictions if prediction.limits], predictions[0].at.robot
