@@ -176,7 +176,7 @@ def controller(drive: Drive, posture: object, q: np.ndarray, targets: np.ndarray
     The controls are those of the keyframe, else the targets are the posture. posture: its name, or numbers; q: (nv,) rad or m,
     of a ball any numbers; targets: (nv,) rad or m, shift of the targets: the target length of a servo by |J| @ targets.
     """
-    n = len(q)
+    moved, n = np.broadcast_to(targets, len(q)), len(q)
     moments = [np.zeros(n) if actuator.moment is None else np.array(actuator.moment) for actuator in drive.actuators]
     stated = drive.control(posture if isinstance(posture, str) else "", [moment @ q for moment in moments])
     torque, position_gain, speed_gain = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
@@ -185,9 +185,7 @@ def controller(drive: Drive, posture: object, q: np.ndarray, targets: np.ndarray
         if why := reason(actuator, u):
             left_out[actuator.name] = why
             continue
-        u = controls[actuator.name] = moved_target(
-            actuator, float(u), float(np.abs(moment) @ np.broadcast_to(targets, n))
-        )
+        u = controls[actuator.name] = moved_target(actuator, float(u), float(np.abs(moment) @ moved))
         torque += moment * actuator.force(u, 0.0)
         position_gain += np.outer(moment, moment) * actuator.stiffness(u)
         speed_gain += np.outer(moment, moment) * actuator.damping(u)
