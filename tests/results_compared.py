@@ -59,7 +59,7 @@ WITHOUT = {  # regular expression for the checks of before, or "after: " and one
 OTHER_VALUES = {  # regular expression for the checks whose values changed by more: the reason
     r"parameters \| .* \| inertia": "stated tensors are turned by matrices: the last bit",
     r"^(mass|kinematics|gravity|acceleration) \||reduction .*(Mbar|bias), ": "each entry has its own scale for the arm too",
-    r"step limit with servos, observed": "the second run for slow alternating growth was deleted",
+    r"step limit with servos, observed": "no second run for slow alternating growth; plain bisection",
     r"reduction \| .* locked \| (Mbar|bias), ": "random locked angles are now in degrees: the last bit",
     "stability .* automatic reset on": "the time counts from the reset, and energy shows the failure before it",
 }

@@ -44,8 +44,3 @@ def posture_of(source, name: str | None = None):
     acting = Acting(reading.model, robot.drive)
     rows = acting.rows if acting.is_coupled else None
     return Posture(robot, name or next(iter(robot.positions)), acting.along, rows, reading.dt), reading
-
-
-def acting_of(at: Posture, reading) -> Acting:
-    """MuJoCo at a posture."""
-    return Acting(reading.model, at.robot.drive, at.cut, weightless=bool(at.base))

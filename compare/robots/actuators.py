@@ -136,10 +136,6 @@ class Drive:
         """Whether an actuator force depends on position or speed; if none does, there is no step limit."""
         return any(actuator.acts and any((*actuator.bias[1:], *actuator.gain[1:])) for actuator in self.actuators)
 
-    @property
-    def servos(self) -> tuple[Actuator, ...]:
-        return tuple(actuator for actuator in self.actuators if actuator.is_servo)
-
     def control(self, posture: str, lengths: Sequence[float]) -> np.ndarray:
         """u of each actuator at a posture, within its range: that of the keyframe, else the target is the posture.
 
@@ -163,16 +159,14 @@ class Controller(NamedTuple):
 
 
 def reason(actuator: Actuator, u: float) -> str:
-    """Why an actuator is left out of a Controller; "" if it is not.
-
-    With negative stiffness MuJoCo's `discrete` uses another scheme.
-    """
+    """Why an actuator is left out of a Controller; "" if it is not."""
     if actuator.off or actuator.refused:
         return actuator.off or actuator.refused
     if actuator.moment is None:
         return "its moment depends on the posture"
     if not any(actuator.moment):
         return "it moves no joint"
+    # with negative stiffness MuJoCo's `discrete` uses another scheme
     return "it pushes away from its target" if actuator.stiffness(u) < 0.0 else ""
 
 

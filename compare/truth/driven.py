@@ -12,7 +12,7 @@ from tmt.methods import by_speed, lone_speeds
 
 from ..robots.actuators import Rows
 from .rest import carries
-from .servos import Driven, turning
+from .servos import Driven, constraint_terms
 from .step_limits import Small
 
 
@@ -86,8 +86,10 @@ class Posture:
     def base(self) -> list[int]:
         """The speeds of free joints that carry the robot, or parts of it, and that no servo or spring of their own holds."""
         tree, drive = self.robot.tree, self.robot.drive
-        held = np.any([servo.moment for servo in drive.servos if servo.moment] or [[False] * len(tree.axis)], axis=0)
-        held = held | (springs_of(tree) != 0.0)
+        held = np.array(by_speed(tree, tree.stiffness)) != 0.0
+        for actuator in drive.actuators:
+            if actuator.is_servo and actuator.moment:
+                held = held | np.array(actuator.moment, bool)
         return [k for body in floating(tree) if not held[body].any() for k in body if k not in self.lone]
 
     @property
@@ -111,7 +113,7 @@ class Posture:
         return Small(
             names=self.robot.coordinates.speeds,
             M=np.array(mass_matrix_and_bias(tree, self.q.tolist(), [0.0] * len(speeds))[0]),
-            K=slopes.K + turning(self.driven.rows, self.robot.coordinates, self.q),
+            K=slopes.K + constraint_terms(self.driven.rows, self.robot.coordinates, self.q)[2],
             D=slopes.D,
             damping=speeds,
             springs=slopes.springs,
@@ -140,11 +142,6 @@ class Posture:
         """The Rows of some speeds at rest."""
         rows = self.rows(self.q, dt, integrator)
         return rows._replace(jacobian=rows.jacobian[:, kept])
-
-
-def springs_of(tree: tmt.Tree) -> np.ndarray:
-    """The stiffness of the joint at each speed, (nv,)."""
-    return np.array(by_speed(tree, tree.stiffness or [0.0] * len(tree.kind)))
 
 
 def floating(tree: tmt.Tree) -> list[list[int]]:

@@ -1,7 +1,7 @@
 """Forces and their derivatives at rest under a robot's own servos: K and D of M x'' + D x' + K x = 0 for small deviations x."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -139,29 +139,19 @@ class Driven:
     def at_rest(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
         """The nearest posture at rest, by Newton's method from q, and the residual force; 0.0: it rests.
 
-        A force on its range has no derivative: without success the search starts again from the rest without ranges.
+        Downhill if K is symmetric, so that it does not climb to a saddle.
         """
-        rest = self.descended(q, u)
-        if rest[1]:
-            actuators = tuple(replace(actuator, force_range=None) for actuator in self.drive.actuators)
-            unlimited = replace(self, drive=replace(self.drive, actuators=actuators)).descended(q, u)[0]
-            rest = min(rest, self.descended(unlimited, u), key=lambda found: found[1])
-        return rest
-
-    def descended(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
-        """The same by Newton's method from q alone; downhill if K is symmetric, so that it does not climb to a saddle."""
         best, left, scale = q, np.inf, 0.0
         for _ in range(REST_STEPS):
             force, largest = self.forces(q, u)
-            held, springs = constraint_forces(self.rows, self.coordinates, q)
+            held, springs, turning = constraint_terms(self.rows, self.coordinates, q)
             force = force + held
             size, scale = float(np.abs(force).max()), max(scale, largest, np.abs(held).max())
             if size < left:
                 best, left = q, size
             if size <= 1e-4 * REST_FORCE * scale:
                 break
-            K = self.slopes(q, u).K + springs + turning(self.rows, self.coordinates, q)
-            step = downhill(K, force)
+            step = downhill(self.slopes(q, u).K + springs + turning, force)
             q = self.coordinates.move(q, step * min(1.0, REST_REACH / max(np.abs(step).max(), 1e-300)))
         return best, 0.0 if left <= REST_FORCE * scale else left
 
@@ -170,7 +160,7 @@ def at_rest(tree: tmt.Tree, q: np.ndarray) -> np.ndarray | None:
     """The stable posture (nq,), rad or m, at which it rests without torque, downhill from q. None: none was found."""
     driven = Driven(tree, Drive())
     for _ in range(MOST_SADDLES):
-        q, left = driven.descended(q, ())
+        q, left = driven.at_rest(q, ())
         if left:
             return None
         K = driven.slopes(q, ()).K
@@ -181,24 +171,24 @@ def at_rest(tree: tmt.Tree, q: np.ndarray) -> np.ndarray | None:
     return None
 
 
-def constraint_forces(ask: Callable | None, coordinates: Coordinates, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """J' f of constraints at rest, (nv,), and their stiffness as springs, (nv, nv). ask: the Rows at q."""
-    if ask is None:
-        return np.zeros(coordinates.nv), np.zeros((coordinates.nv, coordinates.nv))
-    rows = ask(q)
-    return rows.jacobian.T @ rows.forces, (rows.jacobian.T * (rows.stiffness / rows.softness)) @ rows.jacobian
+def constraint_terms(
+    ask: Callable | None, coordinates: Coordinates, q: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """J' f of constraints at rest, (nv,), their stiffness as springs, and by their rotation, (nv, nv). ask: the Rows at q.
 
-
-def turning(ask: Callable | None, coordinates: Coordinates, q: np.ndarray) -> np.ndarray:
-    """-d(J' f)/dq of constraints with constant f, (nv, nv): the effect of their rotation."""
+    By rotation: -d(J' f)/dq with constant f.
+    """
     n = coordinates.nv
-    stiffness, rows = np.zeros((n, n)), ask and ask(q)
-    if rows and rows.forces.any():
-        for j, step in enumerate(TURNED_BY * np.eye(n)):
-            ahead, behind = (ask(coordinates.move(q, sign * step)).jacobian for sign in (1.0, -1.0))
-            if ahead.shape == behind.shape == rows.jacobian.shape:
-                stiffness[:, j] = (behind - ahead).T @ rows.forces / (2.0 * TURNED_BY)
-    return stiffness
+    turning = np.zeros((n, n))
+    if ask is None:
+        return np.zeros(n), turning, turning
+    rows = ask(q)
+    for j, step in enumerate(TURNED_BY * np.eye(n) if rows.forces.any() else ()):
+        ahead, behind = (ask(coordinates.move(q, sign * step)).jacobian for sign in (1.0, -1.0))
+        if ahead.shape == behind.shape == rows.jacobian.shape:
+            turning[:, j] = (behind - ahead).T @ rows.forces / (2.0 * TURNED_BY)
+    springs = (rows.jacobian.T * (rows.stiffness / rows.softness)) @ rows.jacobian
+    return rows.jacobian.T @ rows.forces, springs, turning
 
 
 def downhill(K: np.ndarray, force: np.ndarray) -> np.ndarray:

@@ -45,9 +45,7 @@ def needed(case: Case) -> Needed:
     moves = {name: f"{name} has a speed at the start" for name, joint in joints.items() if any(case.v[joint.qd])}
     undecided = ()
     while still := tuple(name for name in names if name not in moves and name not in undecided):
-        when = "at the start" if len(still) == len(names) else "when the others move"
-        largest = dict.fromkeys(still, 0.0)
-        rng, alone = np.random.default_rng(SEED), len(still) == len(names)
+        alone, largest, rng = len(still) == len(names), dict.fromkeys(still, 0.0), np.random.default_rng(SEED)
         # if no joint moves there is only one state; with many joints an evaluation takes long
         for _ in range(1 if alone or coordinates.nv > MOST_FOLDED else TRIALS):
             (q,), qd = coordinates.random(rng, 1), rng.uniform(-10.0, 10.0, coordinates.nv)
@@ -55,13 +53,11 @@ def needed(case: Case) -> Needed:
                 largest[name] = max(largest[name], *map(abs, values))
             if min(largest.values()) > 0.0:
                 break
-        accelerated = {
-            name: f"{name} accelerates by {float(a):.2g} {units[name]}/s2 {when}"
-            for name, a in largest.items()
-            if a > 0.0
-        }
-        moves |= accelerated
-        if not accelerated:
+        when = "at the start" if alone else "when the others move"
+        for name, a in largest.items():
+            if a > 0.0:
+                moves[name] = f"{name} accelerates by {float(a):.2g} {units[name]}/s2 {when}"
+        if not any(largest.values()):
             unfolded = tuple(name for name, parts in folded(case, still).items() if any(n != 0.0 for n in parts))
             if not unfolded:
                 break

@@ -136,7 +136,9 @@ class Small:
     def drifts(self) -> bool:
         """Whether a movement other than of a free base has neither stiffness nor damping."""
         stiff, damped, basis = self.rigid
-        both = np.vstack([matrix / largest(matrix) for matrix in (stiff, damped)])
+        # a matrix of rounding errors counts as zero
+        sizes = [max(np.abs(matrix).max(initial=0.0), CREEPING / VANISHING) for matrix in (stiff, damped)]
+        both = np.vstack([stiff / sizes[0], damped / sizes[1]])
         of_base = basis.T @ self.root.T[:, list(self.base)]
         loose, loose_base = (
             int((np.linalg.svd(matrix, compute_uv=False) <= VANISHING).sum()) if matrix.size else 0
@@ -147,16 +149,11 @@ class Small:
     @cached_property
     def growing(self) -> tuple[float, np.ndarray] | None:
         """The rate, 1/s, and the movement of the fastest growing mode of the equations of motion, or None."""
-        stiff, _, basis = self.rigid
-        if not stiff.size:
-            return None
         values, moves = self.modes
+        if not values.size:
+            return None
         fastest = int(np.argmax(values.real))
         rate = float(values[fastest].real)
-        if np.abs(stiff - stiff.T).max() <= SYMMETRIC * np.abs(stiff).max():
-            lowest, shapes = np.linalg.eigh(0.5 * (stiff + stiff.T))
-            if lowest[0] < -VANISHING * largest(stiff):
-                return (rate, moves[:, fastest]) if rate > 0.0 else (0.0, basis @ shapes[:, 0])
         return (rate, moves[:, fastest]) if rate > max(NEGLIGIBLE * np.abs(values).max(), SLOWEST) else None
 
     @cached_property
@@ -277,11 +274,6 @@ class Small:
         """The speed with most of the kinetic energy of a movement."""
         x = self.unrooted.T @ shape
         return self.names[int(np.argmax(np.abs(x.conj() * (self.M @ x))))]
-
-
-def largest(matrix: np.ndarray) -> float:
-    """The largest entry, to which VANISHING is relative; a matrix of rounding errors counts as zero."""
-    return max(np.abs(matrix).max(initial=0.0), CREEPING / VANISHING)
 
 
 def bisected(holds: Callable, low: float, high: float, refined: float = REFINED) -> float:

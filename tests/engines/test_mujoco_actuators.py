@@ -4,11 +4,12 @@ import mujoco
 import numpy as np
 import pytest
 from files import TENDON, TWO, mjcf
-from servo_models import FILTERED, acting_of, hinge, posture_of
+from servo_models import FILTERED, hinge, posture_of
 
 import tmt
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting, add_armature
+from compare.experiments.stability.servos.predicted import acting_at
 
 SITES = TWO.replace("<geom", '<site name="s" pos="0.1 0 0"/><geom', 1)
 FREE = '<body><freejoint/><geom size="0.1"/></body>'
@@ -50,7 +51,7 @@ def test_a_law_that_is_not_known_is_refused_by_name_and_the_rest_is_done(text):
     more = text.replace(" ", ' name="x" ', 1)
     drive = read(since(text_of('<position name="p" joint="j" kp="5"/>' + more, content=SITES))).drive
     assert drive.refused.keys() == {"x"} and REFUSED[text] in drive.refused["x"]
-    assert [one.name for one in drive.servos] == ["p"]
+    assert [one.name for one in drive.actuators if one.is_servo] == ["p"]
 
 
 @pytest.mark.parametrize("what", ["stiffness", "damping"])
@@ -81,13 +82,20 @@ def test_a_disabled_group_is_off():
     assert [one.acts for one in drive.actuators] == [False, True]
 
 
+def mass_matrix(model):
+    data, full = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, full)
+    return full
+
+
 def test_armature_is_added_to_bodies_whose_inertia_never_changes():
     """A free body, a slide and a wheel: their inertia is stored."""
     reading = read(mjcf(FREE + '<body><joint type="slide"/><geom size="0.1"/></body>' + TWO))
     model = reading.model
     heavy = mujoco.MjModel.__copy__(model)
     add_armature(heavy, list(range(model.nv)), 2.0)
-    after, before = (Acting(one, reading.drive).mass_matrix(model.qpos0) for one in (heavy, model))
+    after, before = (mass_matrix(one) for one in (heavy, model))
     assert after - before == pytest.approx(2.0 * np.eye(model.nv), abs=1e-12)
 
 
@@ -97,10 +105,7 @@ def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
     text = since(text_of(before + motor, content=SITES))
     reading, model = read(text), mujoco.MjModel.from_xml_string(text)
     assert [one.moment for one in reading.drive.actuators[1:]] == [(3.0, 0.0), (5.0, 10.0)]
-    data, full = mujoco.MjData(model), np.zeros((2, 2))
-    mujoco.mj_forward(model, data)
-    mujoco.mj_fullM(model, data, full)
-    assert tmt.mass_matrix(np.zeros(2), reading.tree) == pytest.approx(full)
+    assert tmt.mass_matrix(np.zeros(2), reading.tree) == pytest.approx(mass_matrix(model))
     _, moments = Acting(model, reading.drive).along(np.zeros(2))
     assert moments[1:].tolist() == [[3.0, 0.0], [5.0, 10.0]]
 
@@ -108,7 +113,7 @@ def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
 @pytest.mark.parametrize("integrator", ["Euler", "RK4"])
 def test_a_run_in_parts_is_the_run_that_steps_make(integrator):
     at, reading = posture_of(hinge(actuator=FILTERED.format(kind="filter", constant=0.01)))
-    acting, u, jump = acting_of(at, reading), np.array([0.3]), np.array([0.1])
+    acting, u, jump = acting_at(reading, at), np.array([0.3]), np.array([0.1])
     parts = list(acting.deviations(at.q, u, 0.004, integrator, [3, 5], 1e-3, 2e-3, 0.05, jump))
     assert [part.shape for part in parts] == [(3, 2), (5, 2)]
     model, data = acting.at(at.q, u + jump, 0.004, integrator)

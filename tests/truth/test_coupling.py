@@ -10,7 +10,7 @@ from compare.engines.mujoco.acting import Acting
 from compare.experiments.stability.servos.observed import grows_in_runs
 from compare.experiments.stability.servos.predicted import acting_at, predicted_at
 from compare.robots.file import robot_of
-from compare.truth.servos import constraint_forces, turning
+from compare.truth.servos import constraint_terms
 
 # two fingers of unlike mass on slides, one servo: the other finger follows by an equality
 GRIPPER = """<mujoco><worldbody>
@@ -72,9 +72,9 @@ def test_constraints_at_rest_carry_what_mujoco_says_and_are_stiff_by_turning():
     model, data = Acting(reading.model, at.robot.drive).at(at.q, at.u, reading.dt, "Euler")
     mujoco.mj_forward(model, data)
     rows, coordinates = at.driven.rows, at.robot.coordinates
-    force, springs = constraint_forces(rows, coordinates, at.q)
+    force, springs, turning = constraint_terms(rows, coordinates, at.q)
     assert force == pytest.approx(data.qfrc_constraint, abs=1e-8) and np.abs(force).max() > 0.01
-    K = springs + turning(rows, coordinates, at.q)
+    K = springs + turning
     for j, step in enumerate(1e-7 * np.eye(len(K))):
-        ahead, behind = (constraint_forces(rows, coordinates, coordinates.move(at.q, s * step))[0] for s in (1, -1))
+        ahead, behind = (constraint_terms(rows, coordinates, coordinates.move(at.q, s * step))[0] for s in (1, -1))
         assert -(ahead - behind) / 2e-7 == pytest.approx(K[:, j], rel=1e-3, abs=1e-3 * np.abs(K).max())

@@ -5,9 +5,10 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from driven_models import with_servos
-from servo_models import acting_of, posture_of
+from servo_models import posture_of
 
 from compare.engines.mujoco.names import INTEGRATORS
+from compare.experiments.stability.servos.predicted import acting_at
 
 STEPPED = [name for name in INTEGRATORS if name != "RK4"]  # whose step MuJoCo differentiates
 LINEAR = {"discrete": 1e-3}  # what the linear map of a step may differ by; of the others 1e-8: central differences
@@ -28,7 +29,7 @@ def transition(source, dt, integrator):
     posture, reading = at(source)
     kept = [k for k in range(reading.model.nv) if k not in posture.lone]
     kept += [reading.model.nv + k for k in kept]
-    stepped = acting_of(posture, reading).transition(posture.q, posture.u, dt, integrator)
+    stepped = acting_at(reading, posture).transition(posture.q, posture.u, dt, integrator)
     return stepped[np.ix_(kept, kept)]
 
 

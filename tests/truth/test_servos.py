@@ -121,12 +121,3 @@ def test_what_only_rounding_leaves_is_a_rest():
     rod = '<body euler="0.3 0 0"><joint axis="0 1 0" ref="0.1"/><geom size="0.1" pos="0.1 0 0.7"/></body>'
     driven, _ = driven_of(f'<mujoco><compiler angle="radian"/><worldbody>{rod}</worldbody></mujoco>')
     assert driven.at_rest(np.array([0.1 - np.arctan(0.1 / 0.7)]), np.zeros(0))[1] == 0.0
-
-
-@pytest.mark.parametrize("start", [0.05, -2.0])
-def test_a_rest_is_found_from_where_a_force_is_on_its_range(start):
-    """The servo is stiff within 5 mrad of its target only; it rests there from wherever it starts."""
-    servos = '<position joint="a" kp="1000" forcerange="-5 5"/><position joint="b" kp="1000"/>'
-    driven, _ = driven_of(arm(servos, gravity=0.0))
-    q, left = driven.at_rest(np.array([start, 0.1]), np.array([0.2, 0.1]))
-    assert left == 0.0 and q == pytest.approx([0.2, 0.1], abs=1e-9)

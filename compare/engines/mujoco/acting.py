@@ -66,14 +66,6 @@ class Acting:
         kinds = tuple(kind for of_joint in kinds for kind in of_joint)
         self.coordinates = Coordinates(tuple(map(str, range(len(kinds)))), kinds)
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
-        """M, (nv, nv)."""
-        full = np.zeros((self.model.nv, self.model.nv))
-        self.data.qpos[:] = q
-        mujoco.mj_forward(self.model, self.data)
-        mujoco.mj_fullM(self.model, self.data, full)
-        return full
-
     def along(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Lengths (k,) and moments (k, nv) of all actuators and then of the tendons that pull, at a posture."""
         m, d = self.model, self.data

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from ...robots.actuators import Actuator, Drive, Tendon
-from .names import OF_A_JOINT, joint_name, kind_of, number_of_actuators, on, output_of, own_name
+from .names import OF_A_JOINT, element_name, joint_name, kind_of, number_of_actuators, on, output_of, own_name
 from .source import editable_again
 
 WITH_LENGTH = (*OF_A_JOINT, mujoco.mjtTrn.mjTRN_SLIDERCRANK, mujoco.mjtTrn.mjTRN_TENDON, mujoco.mjtTrn.mjTRN_SITE)
@@ -16,13 +16,10 @@ GAINS = {"FIXED": 1, "AFFINE": 3}  # how many numbers of its law each kind has
 BIASES = {"NONE": 0, "AFFINE": 3}
 DYNAMICS = {"NONE": "none", "INTEGRATOR": "integrator", "FILTER": "filter", "FILTEREXACT": "filterexact"}
 GROUPS = 31  # that can be switched off
-NOT_LINEAR = {  # fields of springs and dampers that are left out where they are not 0
-    "jnt_stiffnesspoly": "polynomial stiffness",
-    "dof_dampingpoly": "polynomial damping",
-    "jnt_springyield": "a spring that yields",
-    "tendon_stiffnesspoly": "polynomial stiffness",
-    "tendon_dampingpoly": "polynomial damping",
-    "tendon_springyield": "a spring that yields",
+# springs and dampers that are left out where these fields are not 0: by element
+NOT_LINEAR = {
+    "joint": ("jnt_stiffnesspoly", "dof_dampingpoly", "jnt_springyield"),
+    "tendon": ("tendon_stiffnesspoly", "tendon_dampingpoly", "tendon_springyield", "tendon_actfrclimited"),
 }
 
 
@@ -58,8 +55,8 @@ def actuator(m: mujoco.MjModel, i: int) -> Actuator:
         bias=law(m.actuator_biasprm[i], BIASES.get(bias, 0)),
         dynamics=DYNAMICS.get(dynamics, "none"),
         time_constant=max(float(m.actuator_dynprm[i, 0]), mujoco.mjMINVAL) if filters else 0.0,
-        control_range=between(m.actuator_ctrlrange[place]) if clamped else None,
-        activation_range=between(m.actuator_actrange[i]) if m.actuator_actlimited[i] else None,
+        control_range=tuple(m.actuator_ctrlrange[place].tolist()) if clamped else None,
+        activation_range=tuple(m.actuator_actrange[i].tolist()) if m.actuator_actlimited[i] else None,
         force_range=force_range(m, i),
         off=off(m, i),
         refused=refused(m, i, gain, bias, dynamics, inputs),
@@ -76,7 +73,7 @@ def force_range(m: mujoco.MjModel, i: int) -> tuple[float, float] | None:
 
 
 def control_of(m: mujoco.MjModel, i: int) -> tuple[int, int]:
-    """The index of the control of an actuator, and its number of inputs."""
+    """The index of the first control of an actuator, and the number of its controls."""
     if hasattr(m, "actuator_ctrlnum"):
         return int(m.actuator_ctrladr[i]), int(m.actuator_ctrlnum[i])
     return i, 1
@@ -113,21 +110,19 @@ def off(m: mujoco.MjModel, i: int) -> str:
 
 
 def moment_of(m: mujoco.MjModel, i: int) -> tuple[str, tuple | None]:
-    """The joint at which an actuator acts, or ""; and dl/dq where it is the same everywhere, else None."""
+    """The first joint on which an actuator acts, or ""; and dl/dq where it is the same everywhere, else None."""
     transmission, target = mujoco.mjtTrn(m.actuator_trntype[i]), int(m.actuator_trnid[i, 0])
-    gear = float(m.actuator_gear[output_of(m, i), 0])
+    joint, moment = "", None
     if transmission in OF_A_JOINT:
-        moment = np.zeros(m.nv)
-        moment[m.jnt_dofadr[target]] = gear
-        single = kind_of(m, target) in ("hinge", "slide")
-        return joint_name(m, target), tuple(moment.tolist()) if single else None
-    if transmission == mujoco.mjtTrn.mjTRN_TENDON:
+        joint = joint_name(m, target)
+        if kind_of(m, target) in ("hinge", "slide"):
+            moment = np.eye(m.nv)[m.jnt_dofadr[target]]
+    elif transmission == mujoco.mjtTrn.mjTRN_TENDON:
         moment = tendon_moment(m, target)
-        first = (
-            "" if moment is None else joint_name(m, int(m.dof_jntid[np.flatnonzero(moment)[0]])) if moment.any() else ""
-        )
-        return first, None if moment is None else tuple((gear * moment).tolist())
-    return "", None
+        if moment is not None and moment.any():
+            joint = joint_name(m, m.dof_jntid[np.flatnonzero(moment)[0]])
+    gear = m.actuator_gear[output_of(m, i), 0]
+    return joint, None if moment is None else tuple((gear * moment).tolist())
 
 
 def tendon_moment(m: mujoco.MjModel, i: int) -> np.ndarray | None:
@@ -156,23 +151,22 @@ def tendon(m: mujoco.MjModel, i: int) -> Tendon:
 
 
 def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
-    """What is left out of joints and tendons, by name, and why: springs and dampers that are not linear, a tendon's range."""
-    tendons = [own_name(m.tendon(k).name, "tendon", k) for k in range(m.ntendon)]
-    limited = np.flatnonzero(m.tendon_actfrclimited)
-    reasons = {f"tendon {tendons[k]}": "a range of its actuators' force" for k in limited}
-    for field, reason in NOT_LINEAR.items():
-        values = np.asarray(getattr(m, field, np.zeros((0, 1))))
-        for k in np.flatnonzero(values.reshape(len(values), -1).any(axis=1) if len(values) else ()).tolist():
-            joint = int(m.dof_jntid[k]) if field.startswith("dof_") else k
-            element = f"tendon {tendons[k]}" if field.startswith("tendon_") else f"joint {joint_name(m, joint)}"
-            reasons[element] = reason
+    """What is left out of joints and tendons, by name, and the field that is not 0: not linear, or a tendon's force range."""
+    reasons = {}
+    for element, fields in NOT_LINEAR.items():
+        for field in fields:
+            values = np.asarray(getattr(m, field, ()))
+            for k in np.flatnonzero(values.reshape(len(values), -1).any(axis=1)) if len(values) else ():
+                number = m.dof_jntid[k] if field.startswith("dof_") else k
+                reasons[f"{element} {element_name(m, element, number)}"] = f"{field} is not 0"
     return reasons
 
 
 def stated_controls(m: mujoco.MjModel, source) -> dict[int, tuple]:
     """By the number of a keyframe u of each actuator, None where it states none.
 
-    The compiled model has zeros where a file states none: the file tells. Of a model compiled elsewhere all zeros are none.
+    u of an integrator is its activation, of a filter the control, at which it settles. The compiled model has zeros where a file
+    states none: the file tells. Of a model compiled elsewhere all zeros are none.
     """
     spec = None  # its keyframes live as long as it does
     if source is not None:
@@ -183,17 +177,16 @@ def stated_controls(m: mujoco.MjModel, source) -> dict[int, tuple]:
     for k in range(m.nkey):
         control = len(keys[k].ctrl) > 0 if keys else m.key_ctrl[k].any()
         activation = len(keys[k].act) > 0 if keys else m.key_act[k].any()
-        if m.nu and (control or activation):
-            controls[k] = tuple(stated_u(m, k, i, control, activation) for i in range(number_of_actuators(m)))
+        stated = [None] * number_of_actuators(m)
+        for i in range(len(stated)):
+            place, inputs = control_of(m, i)
+            if kind(mujoco.mjtDyn, m.actuator_dyntype[i]) == "INTEGRATOR":
+                stated[i] = float(m.key_act[k, m.actuator_actadr[i]]) if activation else None
+            elif inputs and control:
+                stated[i] = float(m.key_ctrl[k, place])
+        if stated and (control or activation):
+            controls[k] = tuple(stated)
     return controls
-
-
-def stated_u(m: mujoco.MjModel, k: int, i: int, control: bool, activation: bool) -> float | None:
-    """u of an actuator in a keyframe, or None: the activation of an integrator; of a filter its control, at which it settles."""
-    place, inputs = control_of(m, i)
-    if kind(mujoco.mjtDyn, m.actuator_dyntype[i]) == "INTEGRATOR":
-        return float(m.key_act[k, m.actuator_actadr[i]]) if activation else None
-    return float(m.key_ctrl[k, place]) if inputs and control else None
 
 
 def kind(enum, value) -> str:
@@ -204,7 +197,3 @@ def kind(enum, value) -> str:
 def law(values, count: int) -> tuple:
     """The first numbers of a law, filled up with zeros to three."""
     return (*map(float, values[:count]), *[0.0] * (3 - count))
-
-
-def between(limits) -> tuple[float, float]:
-    return float(limits[0]), float(limits[1])

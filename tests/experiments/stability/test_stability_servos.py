@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from models import PATHS
-from servo_models import FILTERED, FLOATING, FORK, INERTIA, acting_of, hinge, posture_of
+from servo_models import FILTERED, FLOATING, FORK, INERTIA, hinge, posture_of
 
 from compare.engines.mujoco import reading
 from compare.engines.mujoco.names import INTEGRATORS
@@ -13,9 +13,10 @@ from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
 from compare.experiments.stability import servos
 from compare.experiments.stability.servos import figures_step, observed, predicted, response
-from compare.experiments.stability.servos.findings import shaking, verdict
+from compare.experiments.stability.servos.findings import verdict
 from compare.experiments.stability.servos.lifting import lifts
 from compare.experiments.stability.servos.observed import grows_in_runs
+from compare.experiments.stability.servos.predicted import acting_at
 from compare.judge.check import AT_OWN_STEP, Result
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
@@ -70,29 +71,16 @@ def test_a_step_is_stable_up_to_its_limit_where_one_counts(result, more, passed)
     assert [check.passed for check in result.checks] == passed
 
 
-@pytest.mark.parametrize("speeds, expected", [
-    ([], None), ([("Euler", 0.4)], (0.4, None)), ([("Euler", None)], (np.inf, None)),
-    ([("Euler", 0.99), ("RK4", 0.1), ("implicit", 0.2)], (0.99, 0.1)),  # compared with integrators that are stable
-])  # fmt: skip
-def test_what_the_full_model_does_where_a_step_is_not_stable(speeds, expected):
-    rows = [
-        row(integrator=name, stable_at_file_dt=name != "Euler", full_model_rms_speed=speed, full_model_warnings=1,
-            full_model_resets=0, full_model_calm=speed is not None and speed < 1e-3)
-        for name, speed in speeds
-    ]  # fmt: skip
-    found = shaking(rows, rows[:1])
-    assert found is expected or (found["speed"], found["stable_speed"]) == expected
-
-
 @pytest.mark.parametrize("stable, changed, answer", [
     ([True, True], {}, (True, [])), ([True, False], {}, (False, ["q"])), ([False, False], {}, (False, [])),
     ([True, True], {"limit": "saddle"}, (True, ["q"])),
 ])  # fmt: skip
 def test_the_answer_for_the_files_step(stable, changed, answer):
-    calm = {"full_model_calm": None}
-    rows = [row(stable_at_file_dt=stable[0], **calm, **changed), row(posture="q", stable_at_file_dt=stable[1], **calm)]
+    run = {"full_model_calm": False, "full_model_rms_speed": None}
+    rows = [row(stable_at_file_dt=stable[0], **run, **changed), row(posture="q", stable_at_file_dt=stable[1], **run)]
     found = verdict(rows, "Euler")
     assert (found["stable"], found["postures"]) == answer
+    assert found["speed"] == (None if found["stable"] else np.inf) and found["calm"] is found["stable"]
     assert verdict(rows, "RK4") == {"stable": None}
 
 
@@ -112,7 +100,7 @@ def of_euler(kp, explicit, implicit=0.0):
 ])  # fmt: skip
 def test_the_limit_of_one_hinge_is_that_of_the_formula(source, integrator, expected):
     at, reading = posture_of(source)
-    found = observed.limit(acting_of(at, reading), at, integrator)
+    found = observed.limit(at, integrator, reading)
     assert found == (("finite", pytest.approx(expected, rel=2e-3)) if expected else ("none", None))
 
 
@@ -122,7 +110,7 @@ def test_the_limit_of_one_hinge_is_that_of_the_formula(source, integrator, expec
 ])  # fmt: skip
 def test_runs_show_the_predicted_limit(source, integrator):
     at, reading = posture_of(source)
-    acting, predicted = acting_of(at, reading), at.small.limit(integrator)
+    acting, predicted = acting_at(reading, at), at.small.limit(integrator)
     assert predicted.limit == "finite"
     grows = [grows_in_runs(acting, at, integrator, share * predicted.dt) for share in (0.997, 1.003)]
     assert grows == [False, True]
@@ -130,8 +118,7 @@ def test_runs_show_the_predicted_limit(source, integrator):
 
 def errors(source, integrator, dts):
     at, reading = posture_of(source)
-    acting = acting_of(at, reading)
-    return [response.response_error(acting, at, integrator, dt) for dt in dts]
+    return [response.response_error(at, integrator, reading, dt) for dt in dts]
 
 
 @pytest.mark.parametrize("source", [FORK.format(kv=5), FLOATING], ids=["fork", "floating"])
@@ -152,29 +139,30 @@ def test_the_exact_response_of_one_hinge_is_the_known_one():
 
 def lifts_of(source, dt):
     at, reading = posture_of(source)
-    found = lifts(acting_of(at, reading), at, "Euler", dt)
-    return {one.names[0] if one.kind == "integrator" else one.kind: one for one in found}
+    return lifts(at, "Euler", replace(reading, dt=dt))
 
 
 def test_one_hinge_is_lifted_by_the_numbers_of_the_formula():
     kp, dt, inertia = 20.0, 0.02, INERTIA + 0.01
     found = lifts_of(hinge(kp, 30.0, joint='armature="0.01"'), dt)
-    assert {"implicit", "discrete"} < found.keys()
+    assert {"implicit", "discrete"} <= {*found["integrators"]}
     # 4 I > 2 dt kv + dt^2 kp
     most = (4.0 * inertia - dt**2 * kp) / (2.0 * dt)
-    assert found["kv"].names == ("servo",) and 0.9 * most < found["kv"].values[0] < most
+    ((name, value, _),) = found["kv"]
+    assert name == "servo" and 0.9 * most < value < most
     least = (2.0 * dt * 30.0 + dt**2 * kp) / 4.0 - INERTIA  # with what the joint has
-    assert found["armature"].names == ("turn",) and least < found["armature"].values[0] < 1.1 * least
+    ((name, value, unit),) = found["armature"]
+    assert (name, unit) == ("turn", "rad") and least < value < 1.1 * least
 
 
 def test_what_is_above_the_cap_or_below_the_floor_is_named():
     found = lifts_of(FORK.format(kv=5), 0.05)
-    assert set(found["armature"].names) >= {"left", "right"}
+    assert {name for name, *_ in found["armature"]} >= {"left", "right"}
     # the tendon's kv alone is too large: its actuator is named
-    found = lifts_of(FORK.format(kv=60), 0.01)
-    assert found["kv"].names == ("grip",) and found["kv"].values[0] < 60.0
+    ((name, value, _),) = lifts_of(FORK.format(kv=60), 0.01)["kv"]
+    assert name == "grip" and value < 60.0
     # without any kv the stiffness alone is too much for the step
-    assert "kv" not in lifts_of(hinge(2000.0, 5.0), 0.03)
+    assert not lifts_of(hinge(2000.0, 5.0), 0.03)["kv"]
 
 
 @pytest.mark.parametrize("joint, start, calm", [
@@ -185,7 +173,7 @@ def test_rows_of_the_full_model_say_what_it_does(joint, start, calm):
     servo, key = '<position name="s" joint="turn" kp="20" kv="300" forcerange="-1 1"/>', f'<key {start} ctrl="0"/>'
     source = hinge(actuator=servo, joint=joint).replace("</mujoco>", f"<keyframe>{key}</keyframe></mujoco>")
     at, reading = posture_of(source)
-    shaken, still = (observed.full_model(reading.model, at, 0.002, name) for name in ("Euler", "implicitfast"))
+    shaken, still = (observed.full_model(at, name, reading) for name in ("Euler", "implicitfast"))
     assert (shaken["full_model_calm"], still["full_model_calm"]) == (calm, True)
     assert (shaken["full_model_rms_speed"] < 0.01) is calm
 
@@ -231,7 +219,7 @@ def test_a_full_run_observes_every_integrator_and_draws_curves(result):
         # every integrator at the first posture with a limit; `stability` alone the file's, which is Euler, at the other
         assert [one.name for one, *_ in work["observed"][0]] == ["up"] * len(INTEGRATORS) + ["qpos0"] * alone
     drawn, curves = work["curves"]
-    assert [name for _, name in drawn] == [*INTEGRATORS]
+    assert [name for _, name, _ in drawn] == [*INTEGRATORS]
     servos.add(
         result, setup, work | {"observed": ([], ()), "curves": (drawn[:1], curves)}
     )  # one curve, and no limit is sought

@@ -3,14 +3,13 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from ....engines.mujoco import Reading
 from ....engines.mujoco.names import INTEGRATORS
 from ....judge.check import AT_OWN_STEP, About, Result
 from ....truth.linear import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from ...setup import Setup
 from . import findings, lifting, observed, response
-from .predicted import Prediction, acting_at, limit_rows, predicted_at, radii_apart
+from .predicted import limit_rows, predicted_at, radii_apart
 
 MOST_POSTURES_DRIVEN = 6  # the first of the named ones
 OBSERVED_WITHIN = 0.01  # relative
@@ -30,62 +29,32 @@ def begin(setup: Setup) -> dict | None:
     predictions = [predicted_at(robot, name, reading) for name in posture_names(robot)[:MOST_POSTURES_DRIVEN]]
     resting = [prediction for prediction in predictions if prediction.limits]
     finite = [prediction for prediction in resting if any(limit.dt for limit in prediction.limits.values())]
-    shown = finite[0] if finite else None
-    examined = resting if setup.alone and not setup.is_quick else [shown] * bool(shown)
+    examined = resting if setup.alone and not setup.is_quick else finite[:1]
+    shown = finite[:1] if not setup.is_quick else []  # where all integrators are run
     own = tuple(dict.fromkeys((reading.integrator, findings.DEFAULT_INTEGRATOR)))
-    all_run = None if setup.is_quick else shown  # the posture at which all integrators are run
     tried = [
-        (prediction, name)
+        (prediction.there[name], name)
         for prediction in examined
         for name in prediction.known
-        if (prediction is all_run or name in own) and not prediction.gives_way(name)
+        if (prediction in shown or name in own) and not prediction.gives_way(name)
     ]
-    full = [(prediction, name) for prediction in resting for name in (INTEGRATORS if prediction is all_run else own)]
-    unstable = [(findings.least(resting, name), name) for name in own]
-    unstable = [(at, name) for at, name in unstable if at and at.is_stable(name, reading.dt) is False]
-    drawn = [(shown, name) for name in shown.known] if all_run else []
+    full = [(one.at, name) for one in resting for name in (INTEGRATORS if one in shown else own)]
+    unstable = [(one, name) for name in own for one in resting if one.is_stable(name, reading.dt) is False]
+    worst = {name: one.at for one, name in sorted(unstable, key=lambda pair: -pair[0].longest(pair[1]))}
+    drawn = [(one.at, name, one.limits[name].dt) for one in shown for name in one.known]
 
     def start(function, items):
         return items, setup.map(partial(function, reading=reading), *(zip(*items) if items else [()]))
 
     return {
         "predictions": predictions,
-        "observed": start(observed_limit_at, tried),
+        "observed": start(observed.limit, tried),
         "radii": start(radii_apart, [(prediction,) for prediction in resting]),
-        "errors": start(error_at, [(prediction, name) for prediction in resting for name in prediction.known]),
-        "lifts": start(lifts_at, unstable),
-        "full": start(full_at, full),
-        "curves": start(curve_at, drawn),
+        "errors": start(response.response_error, [(one.at, name) for one in resting for name in one.known]),
+        "lifts": start(lifting.lifts, [(at, name) for name, at in worst.items()]),
+        "full": start(observed.full_model, full),
+        "curves": start(response.curve, drawn),
     }
-
-
-# in a further process
-
-
-def observed_limit_at(prediction: Prediction, integrator: str, reading: Reading) -> tuple[str, float | None]:
-    at = prediction.there[integrator]  # where it rests with such a step
-    return observed.limit(acting_at(reading, at), at, integrator)
-
-
-def error_at(prediction: Prediction, integrator: str, reading: Reading, dt: float | None = None) -> float | None:
-    acting = acting_at(reading, prediction.at)
-    return response.response_error(acting, prediction.at, integrator, dt or reading.dt)
-
-
-def curve_at(prediction: Prediction, integrator: str, reading: Reading) -> list[tuple[float, float]]:
-    at, limit = prediction.at, prediction.limits[integrator].dt
-    return response.curve(acting_at(reading, at), at, integrator, reading.dt, limit)
-
-
-def lifts_at(prediction: Prediction, integrator: str, reading: Reading) -> list[lifting.Lift]:
-    return lifting.lifts(acting_at(reading, prediction.at), prediction.at, integrator, reading.dt)
-
-
-def full_at(prediction: Prediction, integrator: str, reading: Reading) -> dict:
-    return observed.full_model(reading.model, prediction.at, reading.dt, integrator)
-
-
-# in the main process
 
 
 def add(result: Result, setup: Setup, work: dict) -> None:
@@ -93,37 +62,34 @@ def add(result: Result, setup: Setup, work: dict) -> None:
     predictions, reading = work["predictions"], setup.reading
     rows = limit_rows(predictions, reading.dt, reading.integrator)
     by_place = {(row["posture"], row["integrator"]): row for row in rows}
-    for (prediction, name), error in zip(*work["errors"]):
-        by_place[prediction.name, name]["step_response_error"] = error
+    for (at, name), error in zip(*work["errors"]):
+        by_place[at.name, name]["step_response_error"] = error
     for (prediction,), radii in zip(*work["radii"]):
-        check_radii(result, prediction.name, radii)
-    for (prediction, name), (kind, dt) in zip(*work["observed"]):
-        row = by_place[prediction.name, name]
+        check_radii(result, prediction.at.name, radii)
+    for (at, name), (kind, dt) in zip(*work["observed"]):
+        row = by_place[at.name, name]
         row["observed_dt_s"] = dt
         check_observed(result, row, kind)
-    for (prediction, name), run in zip(*work["full"]):
-        by_place[prediction.name, name].update(run)
+    for (at, name), run in zip(*work["full"]):
+        by_place[at.name, name].update(run)
     if setup.robot.drive.feeds_back:
         check_own_step(result, rows)
     result.tables["step_limits"] = rows
-    findings.find_answer(result, rows, setup.robot, predictions)
+    findings.find_answer(result, rows, predictions)
     if setup.step:
         dt, name = setup.step
-        requested, by_name = (
-            limit_rows(predictions, dt, name),
-            {prediction.name: prediction for prediction in predictions},
-        )
+        requested, by_name = limit_rows(predictions, dt, name), {one.at.name: one.at for one in predictions}
         for row in findings.known(requested, name):
             if row["stable_at_file_dt"]:
-                row["step_response_error"] = error_at(by_name[row["posture"]], name, reading, dt)
-        findings.find_requested(result, requested, setup.robot, predictions)
-    for (prediction, name), lifts in zip(*work["lifts"]):
-        findings.find_changes(result, prediction, name, lifts, reading.dt)
+                row["step_response_error"] = response.response_error(by_name[row["posture"]], name, reading, dt)
+        findings.find_answer(result, requested, predictions, requested=True)
+    for (at, name), changes in zip(*work["lifts"]):
+        result.find("changes", "servos", dt=reading.dt, posture=at.name, integrator=name, **changes)
     findings.find_notes(result, rows, predictions)
     drawn, curves = work["curves"]
     if drawn:
         shown = drawn[0][0].name
-        lines = {name: curve for (_, name), curve in zip(drawn, curves)}
+        lines = {name: curve for (_, name, _), curve in zip(drawn, curves)}
         of_posture = [row for row in rows if row["posture"] == shown]
         result.curves["step response"] = {"posture": shown, "rows": of_posture, "lines": lines}
 

@@ -4,11 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ....engines.mujoco import Reading
 from ....engines.mujoco.acting import Acting
 from ....engines.mujoco.linear import whole_run
 from ....robots.case import SEED
 from ....truth.driven import Posture
-from ....truth.step_limits import LIMIT_UP_TO
+from ....truth.step_limits import LIMIT_UP_TO, bisected
+from .predicted import acting_at
 
 MOVED_BY, MOVED_LEAST, MOVED_MOST = 1e-6, 1e-8, 1e-5  # rad or m at the start, of a joint of middling inertia; of any
 SOUGHT_FROM = 1e-7  # s: from which the limit is sought
@@ -25,11 +27,12 @@ FULL_PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly wou
 CALM = 1e-3  # rad/s or m/s, root of the mean square
 
 
-def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | None]:
+def limit(at: Posture, integrator: str, reading: Reading) -> tuple[str, float | None]:
     """The largest dt, s, at which no small deviation grows in MuJoCo: ("finite", dt); ("none", None): none grows up to 5 s.
 
     Upwards to the first step that fails, then by bisection; ("always", None): the shortest that is tried fails.
     """
+    acting = acting_at(reading, at)
     count = int(np.log(LIMIT_UP_TO / SOUGHT_FROM) / np.log(SOUGHT_BY)) + 2
     tried = LIMIT_UP_TO / SOUGHT_BY ** np.arange(count)[::-1]  # the first at most SOUGHT_FROM
     failed = next((k for k, dt in enumerate(tried) if grows_in_runs(acting, at, integrator, dt, SOUGHT_STEPS)), count)
@@ -39,10 +42,7 @@ def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | No
     if failed in (0, count):
         return ("none" if failed else "always"), None
     low, high = tried[failed - 1], tried[failed]
-    while high / low > 1.0 + NARROWED:
-        middle = np.sqrt(low * high)
-        low, high = (low, middle) if grows_in_runs(acting, at, integrator, middle) else (middle, high)
-    return "finite", float(np.sqrt(low * high))
+    return "finite", bisected(lambda dt: not grows_in_runs(acting, at, integrator, dt), low, high, NARROWED)
 
 
 def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = NARROWED_STEPS) -> bool:
@@ -64,7 +64,7 @@ def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: in
     """
     times = SOFTLY if acting.is_coupled else 1.0
     rng, kept = np.random.default_rng(SEED), at.kept
-    M = acting.mass_matrix(at.q)
+    M = at.whole.M
     inner = np.linalg.inv(np.linalg.inv(M)[np.ix_(kept, kept)])  # of the joints where the base gives way
     root = np.linalg.cholesky(0.5 * (inner + inner.T))
     inertia = np.diag(inner)
@@ -84,14 +84,15 @@ def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: in
         yield np.hstack([off[:, kept] @ (root / start), filters])
 
 
-def full_model(model, at: Posture, dt: float, integrator: str) -> dict:
-    """The whole file, contacts and friction on, for two seconds: columns of step_limits.csv.
+def full_model(at: Posture, integrator: str, reading: Reading) -> dict:
+    """The whole file, contacts and friction on, for two seconds at its own step: columns of step_limits.csv.
 
-    model: the file's, as it was compiled. It starts at the posture itself, which need not be where it rests.
+    It starts at the posture itself, which need not be where it rests.
     """
-    speed = FULL_PUSH * np.random.default_rng(SEED).normal(size=model.nv)
+    speed = FULL_PUSH * np.random.default_rng(SEED).normal(size=reading.model.nv)
+    start = at.robot.drive, at.start, at.u, reading.dt, integrator
     with np.errstate(over="ignore", invalid="ignore"):
-        run = whole_run(model, at.robot.drive, at.start, at.u, dt, integrator, FULL_TIME, FULL_LAST, speed)
+        run = whole_run(reading.model, *start, FULL_TIME, FULL_LAST, speed)
     return {
         "full_model_rms_speed": run.rms_speed if np.isfinite(run.rms_speed) else None,
         "full_model_warnings": run.warnings,

@@ -28,10 +28,6 @@ class Prediction(NamedTuple):
     limits: dict[str, Limit]  # by integrator
 
     @property
-    def name(self) -> str:
-        return self.at.name
-
-    @property
     def known(self) -> list[str]:
         """The integrators that have a limit, or are known to have none."""
         return [name for name, limit in self.limits.items() if limit.limit in KNOWN]
@@ -40,11 +36,15 @@ class Prediction(NamedTuple):
         """Whether soft constraints give way at a limit to another posture: that limit is not observed."""
         return self.there[integrator].away(self.at.q) > GIVEN_WAY
 
+    def longest(self, integrator: str) -> float:
+        """The longest step that is stable or was tried, s."""
+        return self.limits[integrator].dt or LIMIT_UP_TO
+
     def is_stable(self, integrator: str, dt: float) -> bool | None:
         """Whether a step is within the limit; None: there is none, or no servo whose step it is."""
         if integrator not in self.known or not self.at.robot.drive.feeds_back:
             return None
-        return bool(dt <= (self.limits[integrator].dt or LIMIT_UP_TO))
+        return bool(dt <= self.longest(integrator))
 
 
 def acting_at(reading: Reading, at: Posture) -> Acting:
@@ -83,7 +83,7 @@ def limit_rows(predictions: Sequence[Prediction], dt: float, integrator: str) ->
         for name in INTEGRATORS:
             limit = prediction.limits.get(name, Limit("not_at_rest"))
             rows.append({
-                "posture": prediction.name, "base": prediction.at.base_kind, "integrator": name, "limit": limit.limit,
+                "posture": prediction.at.name, "base": prediction.at.base_kind, "integrator": name, "limit": limit.limit,
                 "predicted_dt_s": limit.dt and float(limit.dt), "observed_dt_s": None, "file_dt_s": dt,
                 "file_integrator": integrator, "stable_at_file_dt": prediction.is_stable(name, dt),
                 "limiting_joint": limit.joint if limit.limit == "finite" else None, "mode_per_s": limit.rate,

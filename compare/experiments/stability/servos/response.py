@@ -3,8 +3,9 @@
 import numpy as np
 from scipy.linalg import expm
 
-from ....engines.mujoco.acting import Acting
+from ....engines.mujoco import Reading
 from ....truth.driven import Posture
+from .predicted import acting_at
 
 LASTS = 0.2  # s, of a response; at least one step
 RESPONSE_SIZE = 1e-4  # rad or m: how far a response, and the posture at rest, may move
@@ -14,14 +15,15 @@ MOST_STEPS = 10_000  # of a run
 CURVE_FROM, CURVE_STEPS = 16.0, 16  # of a curve: the file's step over its first; how many
 
 
-def response_error(acting: Acting, at: Posture, integrator: str, dt: float) -> float | None:
-    """The largest difference from the exact response over the largest response, in 0.2 s, a ratio.
+def response_error(at: Posture, integrator: str, reading: Reading, dt: float | None = None) -> float | None:
+    """The largest difference from the exact response over the largest response, in 0.2 s, a ratio. dt: by default the file's.
 
     Of rad and of m separately, the larger of both; None: no servo, nothing moves, it diverged, or more than 10,000 steps.
     The targets of all servos jump by the same length, so that nothing moves by more than 1e-4 rad or m; u of those with an
     activation jumps too. Exact: the matrix exponential of the linear equations. Half of the difference of two runs, there and
     back, has neither an offset nor squares.
     """
+    dt = dt or reading.dt
     jump, force = jump_of(at)
     if not jump.any() or LASTS / dt > MOST_STEPS:
         return None
@@ -30,7 +32,7 @@ def response_error(acting: Acting, at: Posture, integrator: str, dt: float) -> f
     largest = max(np.abs(exact).max(), np.abs(end).max())
     if not largest > 0.0:
         return None
-    size = RESPONSE_SIZE / largest
+    acting, size = acting_at(reading, at), RESPONSE_SIZE / largest
     with np.errstate(over="ignore", invalid="ignore"):
         there, back = (
             next(acting.deviations(at.q, at.u, dt, integrator, [steps], jump=sign * size * jump))
@@ -48,18 +50,15 @@ def response_error(acting: Acting, at: Posture, integrator: str, dt: float) -> f
     )
 
 
-def curve(
-    acting: Acting, at: Posture, integrator: str, file_dt: float, limit: float | None
-) -> list[tuple[float, float]]:
+def curve(at: Posture, integrator: str, limit: float | None, reading: Reading) -> list[tuple[float, float]]:
     """(dt, error) from well below the file's step up to the limit, s; without one up to the whole response.
 
     Empty where each step up to the limit would be too short.
     """
     end = min(limit or LASTS, LASTS)
-    first = max(min(file_dt, end) / CURVE_FROM, LASTS / MOST_STEPS)
-    if first >= end:
-        return []
-    errors = [(dt, response_error(acting, at, integrator, dt)) for dt in np.geomspace(first, end, CURVE_STEPS).tolist()]
+    first = max(min(reading.dt, end) / CURVE_FROM, LASTS / MOST_STEPS)
+    dts = np.geomspace(first, end, CURVE_STEPS).tolist() if first < end else []
+    errors = [(dt, response_error(at, integrator, reading, dt)) for dt in dts]
     return [(dt, off) for dt, off in errors if off is not None]
 
 
