@@ -1,13 +1,25 @@
 """A run of the command line without its two further processes, which take 2.5 s to start: for test_command_line, test_help,
 test_own_reference and test_random_mjcf."""
 
+from concurrent.futures import Future
 from contextlib import contextmanager
 
 import pytest
 
-from compare.fleet.task import InProcess
 from compare.process import workers
 from compare.process.clock import Clock
+
+
+class InProcess:
+    """Runs functions at once, in this process; see process.workers."""
+
+    def submit(self, function, /, *arguments, **named):
+        future = Future()
+        try:
+            future.set_result(function(*arguments, **named))
+        except Exception as error:
+            future.set_exception(error)
+        return future
 
 
 class Inside(InProcess):

@@ -10,10 +10,10 @@ from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 
 from crane import crane
+from in_process import InProcess
 
 from compare.engines.mujoco import load
 from compare.experiments import EXPERIMENTS, module, skipped
-from compare.fleet.task import InProcess
 from compare.report import files, verdict
 from compare.report.text import say
 from compare.robots.arm import ARM

@@ -7,13 +7,13 @@ from functools import partial
 from types import SimpleNamespace
 
 import pandas as pd
+from in_process import InProcess
 from jinja2 import ChoiceLoader, DictLoader
 from matplotlib.figure import Figure
 
 from compare.__main__ import main
 from compare.cli import command_line
 from compare.experiments import EXPERIMENTS, Experiment
-from compare.fleet.task import InProcess
 from compare.judge.check import Result
 from compare.report.terminal import Terminal
 from compare.report.text import environment

@@ -4,7 +4,6 @@ import hashlib
 import os
 import pickle
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -14,6 +13,7 @@ from ..process import interrupt
 from ..process.crash import ROOT, Refused
 from ..report.folder import lock, what_is_wrong
 from ..report.provenance import installed
+from .models import unpacked
 
 FILES = "files"
 MARK = ".fleet"  # file in a report: key and row
@@ -33,19 +33,12 @@ def program() -> str:
     return digest.hexdigest()
 
 
-def key_of(*inputs: object) -> str:
-    """The key of what depends on these inputs and on the program."""
-    return hashlib.sha256(repr((program(), *inputs)).encode("utf-8", "backslashreplace")).hexdigest()
-
-
 @contextmanager
 def locked(out: Path) -> Iterator[None]:
-    """Hold the folder of a fleet. Refused: it is not writable, or another fleet uses it."""
+    """Hold the folder of a fleet. Refused: it cannot be made, or another fleet uses it."""
     try:
         (out / FILES).mkdir(parents=True, exist_ok=True)
         held = lock(out / FILES, wait=False)
-        with tempfile.TemporaryFile(dir=out):
-            pass
     except OSError as error:
         raise Refused(f"cannot write to {out}: {what_is_wrong(out, error)}; expected a writable folder") from None
     if held is None and os.name == "posix":
@@ -74,9 +67,7 @@ def write_whole(path: Path, content: bytes | dict[str, bytes]) -> None:
             part.write_bytes(content)
         else:
             shutil.rmtree(part, ignore_errors=True)
-            for name, each in content.items():
-                (part / name).parent.mkdir(parents=True, exist_ok=True)
-                (part / name).write_bytes(each)
+            unpacked(content, part)
         with interrupt.postponed():
             if path.is_dir():
                 shutil.rmtree(path)

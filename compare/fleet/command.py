@@ -6,7 +6,6 @@ import shlex
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tmt.compiled.cores import cores
 
@@ -27,10 +26,6 @@ from ..process.streams import in_one_line
 from ..report.terminal import Terminal
 from ..report.text import block
 
-if TYPE_CHECKING:
-    from .task import FleetOptions
-
-MAX_LINES = 20  # of one kind, on the terminal
 SENT = "reference of the fleet"  # folder of the solution in a bundle
 EPILOG = block("fleet", "examples") + "\n"
 
@@ -71,15 +66,13 @@ def experiments_of(made: Parser, only: str | None, timing: bool = False) -> tupl
     """The experiments of --only, in their order; None: all that may run."""
     if only is None:
         return tuple(name for name in EXPERIMENTS if timing or name not in TIMED)
-    names = [name.strip() for name in only.split(",") if name.strip()]
+    names = only.replace(" ", "").split(",")
     for name in names:
         if name not in EXPERIMENTS:
             near = expected(name, {known: known for known in EXPERIMENTS}, ", ".join(EXPERIMENTS))
             made.error(f"--only: {name!r} is not an experiment; {near}")
         if name in TIMED and not timing:
             made.error(f"--only: {name} measures time; add --timing")
-    if not names:
-        made.error("--only names no experiment")
     return tuple(name for name in EXPERIMENTS if name in names)
 
 
@@ -94,8 +87,8 @@ def fleet_status(arguments: Sequence[str]) -> int:
         raise SystemExit(0)
     if not options.paths:
         made.error(f"no PATH given; expected a file, a folder, a pattern or @LIST: {PROGRAM} {FLEET} models")
-    if options.workers and (options.dask or options.timing):
-        made.error(f"--workers cannot be combined with {'--dask' if options.dask else '--timing'}")
+    if bool(options.workers) + bool(options.dask) + options.timing > 1:
+        made.error("only one of --workers, --dask and --timing can be given")
     names = experiments_of(made, options.only, options.timing)
     return run_fleet(options, names, shlex.join(["python", "-m", "compare", FLEET, *arguments]))
 
@@ -113,58 +106,48 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     terminal, out = Terminal(), Path(options.out)
     before = earlier(options.since) if options.since else None
     models, left_out = found_models(options.paths)
-    untimed = () if options.timing or options.only else tuple((name, "it measures time: --timing") for name in TIMED)
-    file_options, sent = with_reference(FleetOptions(names, untimed, not options.full), options.reference)
+    sent = solution_files(options.reference)
+    file_options = FleetOptions(names, not options.full, options.reference, next(iter(sent), ""))
     with locked(out):
         if options.dask:
-            executor = Cluster(options.dask, options.limit, options.timing)
+            executor = Cluster(options.dask, options.limit)
         else:
             executor = Pool(1 if options.timing else options.workers or cores(), options.limit)
         try:
             run = Run(models, file_options, executor, out, sent)
-            say_first(terminal, [f"left out: {name}, {why}" for name, why in left_out])
             terminal.tell(run.progress)
             with terminal.progress(""):
                 run.carry_out(lambda rows: say_rows(terminal, rows))
-            say_first(terminal, [f"left out: {name}, {why}" for name, why in run.parts])
         finally:
             executor.close()
-        changed = None if before is None else changes(before, sorted(run.rows, key=lambda row: row["file"]))
-        took = time.perf_counter() - started
-        summary = write_table(out, run, left_out, changed, command, took)
+        changed = None if before is None else changes(before, run.rows)
+        summary = write_table(out, run, left_out, changed, command)
     terminal.say()
     terminal.say(summary[0], "bold green" if run.is_good else "bold red")
     for line in summary[1:]:
         terminal.say(line)
-    say_first(terminal, [f"changed: {line}" for line in changed or ()])
-    if changed == []:
-        terminal.say(f"no changes since {in_one_line(options.since)}")
-    terminal.say(f"Fleet: {in_one_line(os.path.join(options.out, 'index.html'))} ({took:.1f} s)")
+    for line in ["no changes"] if changed == [] else changed or ():
+        terminal.say(f"since {in_one_line(options.since)}: {line}")
+    terminal.say(
+        f"Fleet: {in_one_line(os.path.join(options.out, 'index.html'))} ({time.perf_counter() - started:.1f} s)"
+    )
     return 0 if run.is_good else 1
 
 
-def with_reference(options: "FleetOptions", reference: str | None) -> tuple["FleetOptions", dict[str, bytes]]:
-    """The options with a reference, and the files of a solution. Refused if they cannot be read."""
+def solution_files(reference: str | None) -> dict[str, bytes]:
+    """The files of a reference that is a solution, itself first, else {}. Refused if they cannot be read."""
     from ..engines.mujoco import ModelError, read  # imports are slow
     from ..run.reference import is_solution
     from .models import Model, bundle, needed_by
 
     if not is_solution(reference):
-        return options._replace(reference=reference), {}
+        return {}
     try:
         read(Path(reference))
     except ModelError as error:
         raise Refused(f"--reference: {error}") from None
-    model = Model(Path(reference), needed_by(Path(reference)))
-    files = {f"{SENT}/{name}": content for name, content in bundle(model).items()}
-    return options._replace(reference=reference, solution=next(iter(files)), solution_hash=model.hash), files
-
-
-def say_first(terminal: Terminal, lines: Sequence[str]) -> None:
-    """The first MAX_LINES lines; the page has all."""
-    more = len(lines) - MAX_LINES
-    for line in [*lines[:MAX_LINES], *[f"and {more} more, in index.html"] * (more > 0)]:
-        terminal.say(line)
+    files = bundle(Model(Path(reference), needed_by(Path(reference))))
+    return {f"{SENT}/{name}": content for name, content in files.items()}
 
 
 def say_rows(terminal: Terminal, rows: Sequence[dict]) -> None:

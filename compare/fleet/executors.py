@@ -30,11 +30,9 @@ try:
 except ImportError:  # Windows: no memory limit
     resource = None
 
-MAX_TRIES = 4  # of a call whose process ended: three repetitions
 SHARE = 0.9  # of the machine's memory, for all its processes together
 CONNECTING = 10.0  # s, time limit for the scheduler and its first worker to answer
-ALONE = 60.0  # s without a worker after which a fleet ends
-TIMING = "timing"  # resource of a worker with one thread that runs timed calls
+ALONE = 60.0  # s without a worker or a connection after which a fleet ends
 LOGGERS = ("distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio")
 
 
@@ -49,29 +47,20 @@ def guarded(function: Callable, arguments: tuple, limit: float, memory: int) -> 
     context = multiprocessing.get_context("forkserver" if hasattr(os, "fork") else "spawn")
     if hasattr(os, "fork"):
         context.set_forkserver_preload([__name__, function.__module__])
-    for _ in range(MAX_TRIES):
-        with tempfile.TemporaryDirectory(dir=get_temp_dir(), ignore_cleanup_errors=True) as folder:
-            pool = ProcessPool(1, max_tasks=1, context=context)
-            try:
-                return pool.schedule(alone, (function, arguments, folder, memory), timeout=limit).result()
-            except TimeoutError:
-                return None, f"time limit of {limit:g} s exceeded"
-            except ProcessExpired as error:
-                why = ended(error.exitcode)
-            except Exception as error:  # the value cannot be sent
-                return None, described(error)
-            finally:
-                pool.stop()
-                pool.join()
-    return None, f"{why}, {MAX_TRIES} times"
-
-
-def ended(status: int) -> str:
-    if status >= 0:
-        return f"exit status {status}"
-    with suppress(ValueError):
-        return f"killed by {signal.Signals(-status).name}"
-    return f"killed by signal {-status}"
+    with tempfile.TemporaryDirectory(dir=get_temp_dir(), ignore_cleanup_errors=True) as folder:
+        pool = ProcessPool(1, max_tasks=1, context=context)
+        try:
+            return pool.schedule(alone, (function, arguments, folder, memory), timeout=limit).result()
+        except TimeoutError:
+            return None, f"time limit of {limit:g} s exceeded"
+        except ProcessExpired as error:
+            code = error.exitcode
+            return None, f"exit status {code}" if code >= 0 else f"killed by {signal.Signals(-code).name}"
+        except Exception as error:  # the value cannot be sent
+            return None, described(error)
+        finally:
+            pool.stop()
+            pool.join()
 
 
 def alone(function: Callable, arguments: tuple, folder: str, memory: int) -> tuple[object, str]:
@@ -93,10 +82,9 @@ def alone(function: Callable, arguments: tuple, folder: str, memory: int) -> tup
 
 def memory_of_machine() -> int:
     """Memory of the machine or its container, bytes."""
-    sizes = [2**33]
+    sizes = [2**33]  # if the system does not say it
     with suppress(OSError, ValueError, AttributeError):
         sizes = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
-    with suppress(OSError, ValueError):
         sizes.append(int(Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii")))
     return min(sizes)
 
@@ -111,7 +99,6 @@ class Pool:
         interrupt.undo.append(partial(shutil.rmtree, get_temp_dir(), ignore_errors=True))
 
     def submit(self, function: Callable, *arguments: object):
-        """A future with `add_done_callback`."""
         return self.threads.submit(guarded, function, arguments, self.limit, self.memory)
 
     def outcome(self, future) -> tuple[object, str]:
@@ -128,7 +115,7 @@ class Pool:
 class Cluster:
     """The workers of a Dask scheduler; the methods are those of Pool. Refused: no scheduler, or no worker."""
 
-    def __init__(self, address: str, limit: float, timing: bool = False):
+    def __init__(self, address: str, limit: float):
         try:
             import distributed
         except ImportError:
@@ -136,8 +123,7 @@ class Cluster:
         for name in LOGGERS:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are reported here, in one line
         warnings.filterwarnings("ignore", module="distributed")
-        self.address, self.limit, self.resources = address, limit, {TIMING: 1} if timing else None
-        self.seen = time.monotonic()
+        self.address, self.limit, self.answered = address, limit, time.monotonic()
         try:
             self.client = distributed.Client(address, timeout=CONNECTING, set_as_default=False, name="fleet")
         except Exception as error:
@@ -145,22 +131,20 @@ class Cluster:
             raise Refused(f"no answer from the scheduler {address}: {why}") from None
         with suppress(TimeoutError):
             self.client.wait_for_workers(1, timeout=CONNECTING)
-        able = self.able()
-        self.workers = sum(worker["nthreads"] for worker in able)
-        if not able:
+        self.workers = self.threads_now()
+        if not self.workers:
             self.close()
-            kind = f"worker with --nthreads 1 --resources '{TIMING}=1'" if timing else "worker"
-            raise Refused(f"the scheduler {address} has no {kind}")
+            raise Refused(f"the scheduler {address} has no worker")
 
-    def able(self) -> list[dict]:
-        """The workers that may run the calls."""
-        workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
-        timing = [worker for worker in workers if worker["resources"].get(TIMING) and worker["nthreads"] == 1]
-        return timing if self.resources else list(workers)
+    def threads_now(self) -> int:
+        """Number of calls that the workers run at the same time; 0 without a connection."""
+        with suppress(Exception):
+            if self.client.status == "running":
+                return sum(self.client.nthreads().values())
+        return 0
 
     def submit(self, function: Callable, *arguments: object):
-        call = function, arguments, self.limit, program()
-        return self.client.submit(on_worker, *call, pure=False, resources=self.resources)
+        return self.client.submit(on_worker, function, arguments, self.limit, program(), pure=False)
 
     def outcome(self, future) -> tuple[object, str]:
         if future.status == "finished":
@@ -170,21 +154,16 @@ class Cluster:
             raise Refused(f"lost the connection to the scheduler {self.address}; {RESUME}")
         error = future.exception(timeout=CONNECTING)
         if type(error).__name__ == "KilledWorker":
-            return None, f"{MAX_TRIES} workers lost, the last one {error.last_worker.address}"
+            return None, f"several workers lost, the last one {error.last_worker.address}"
         if isinstance(error, OtherVersion | ImportError | AttributeError):
             raise Refused(f"a worker runs a different version of compare or MuJoCo: {error}; {RESUME}")
         return None, described(error)
 
     def check(self) -> None:
-        able = None
-        with suppress(Exception):
-            able = self.able() if self.client.status == "running" else None
-        if able is None:
-            raise Refused(f"lost the connection to the scheduler {self.address}; {RESUME}")
-        if able:
-            self.seen = time.monotonic()
-        if time.monotonic() - self.seen > ALONE:
-            raise Refused(f"the scheduler {self.address} has no worker any more; {RESUME}")
+        if self.threads_now():
+            self.answered = time.monotonic()
+        elif time.monotonic() - self.answered > ALONE:
+            raise Refused(f"no worker of the scheduler {self.address} for {ALONE:g} s; {RESUME}")
 
     def close(self) -> None:
         with suppress(Exception):

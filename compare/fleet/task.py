@@ -1,17 +1,18 @@
 """The task of a fleet: compare one file, and give its row of the table and its report."""
 
+import hashlib
 import shlex
 import shutil
 import time
-from concurrent.futures import Future
-from dataclasses import replace
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
 from ..engines.mujoco import ModelError, read
-from ..experiments import EXPERIMENTS, skipped
+from ..experiments import TIMED, skipped
 from ..process.clock import Clock
 from ..report import folder, provenance
+from ..report.terminal import Terminal
 from ..report.text import say
 from ..robots.case import SEED
 from ..run import examine as experiment
@@ -23,18 +24,14 @@ from .table import DIFFER, REFUSED, row_of_file
 
 class FleetOptions(NamedTuple):
     names: tuple[str, ...]  # of experiments
-    left_out: tuple[tuple[str, str], ...] = ()  # others, with the reason
     is_quick: bool = True
     reference: str | None = None  # as given; None: the arm for a file with its hinges, else the model
     solution: str = ""  # its path in the bundle
-    solution_hash: str = ""
 
     def command(self, shown: str) -> str:
         """The command that writes the same report for one file."""
-        if set(self.names) >= set(EXPERIMENTS):
-            words = ["all", *["--quick"] * self.is_quick, "--mjcf", shown]
-        else:
-            words = ["fleet", shown, *["--full"] * (not self.is_quick), "--only", ",".join(self.names)]
+        words = ["fleet", shown, *["--full"] * (not self.is_quick), *["--timing"] * bool({*TIMED} & {*self.names})]
+        words += ["--only", ",".join(self.names)]
         words += ["--reference", self.reference] if self.reference else []
         return shlex.join(["python", "-m", "compare", *words])
 
@@ -44,25 +41,20 @@ def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) ->
     began, top, out = time.process_time(), Path.cwd() / "model", Path.cwd() / "report"
     path = unpacked(bundle, top)
     solution = str(top / options.solution) if options.solution else None
-
-    def as_given(text: str) -> str:
-        """A text with the path of the file as given, not where it was unpacked."""
-        return text.replace(str(path), shown).replace(f"{path.parent}/", "")
-
+    row = {"sha256": hashlib.sha256(next(iter(bundle.values()))).hexdigest()}
     try:
         compared = compared_with(options.reference, str(path), shown=shown, solution=solution)
         reading = compared.reading or read(path)
     except JointsDiffer as error:
         reference = "arm" if options.reference == "arm" else SOLUTION
-        return {"verdict": DIFFER, "reason": error.why, "reference": reference}, {}
+        return row | {"verdict": DIFFER, "reason": error.why, "reference": reference}, {}
     except ModelError as error:
-        reason = as_given(str(error)).removeprefix(f"{shown} cannot be compared: ")
-        reason = reason.replace(f" {shown}:", " it:").replace(f"{shown} is ", "it is ")
-        return {"verdict": REFUSED, "reason": reason}, {}
+        reason = str(error).replace(str(path), shown).replace(f"{path.parent}/", "")
+        return row | {"verdict": REFUSED, "reason": reason.removeprefix(f"{shown} cannot be compared: ")}, {}
     reasons = {name: say(reason) for name in options.names if (reason := skipped(name, compared.robot))}
     names = [name for name in options.names if name not in reasons]
-    left_out = [*reasons.items(), *options.left_out]
-    row = {
+    left_out = list(reasons.items())
+    row |= {
         "joints": len(compared.robot.joints), "file_integrator": reading.integrator, "file_dt_s": reading.dt,
         "reference": compared.reference.kind,
     }  # fmt: skip
@@ -70,10 +62,8 @@ def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) ->
         return row | {"verdict": REFUSED, "reason": f"no experiment applies: {'; '.join(map(': '.join, left_out))}"}, {}
     out.mkdir()
     setup = experiment.setup_of(compared, options.is_quick)
-    sections, *outcome = experiment.examine(names, setup, out, NoTerminal(), InProcess(), Clock())
-    for result in (section.result for section in sections):
-        result.notes = [as_given(say(note)) for note in result.notes]
-        result.checks = [replace(check, note=as_given(check.note)) for check in result.checks]
+    with ThreadPoolExecutor(1) as workers:
+        sections, *outcome = experiment.examine(names, setup, out, Terminal(), workers, Clock())
     origin = provenance.provenance(options.command(shown), compared.robot.mjcf, shown, SEED)
     origin["seconds"] = round(time.process_time() - began, 1)
     report, parts = write_report(out, sections, *outcome, left_out, origin, compared)
@@ -81,20 +71,3 @@ def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) ->
     shutil.rmtree(top)
     row |= row_of_file(report.sections, report.causes, parts.lines, compared.reference)
     return row | {"seconds": round(time.process_time() - began, 2), "has_report": True}, written
-
-
-class NoTerminal:
-    def say(self, text: str = "", style: str = "") -> None:
-        pass
-
-
-class InProcess:
-    """Runs functions at once, in this process; see process.workers."""
-
-    def submit(self, function, /, *arguments, **named) -> Future:
-        future = Future()
-        try:
-            future.set_result(function(*arguments, **named))
-        except Exception as error:
-            future.set_exception(error)
-        return future

@@ -112,5 +112,6 @@ class Moving:
 
 def wipe() -> None:
     Stream.silent = True
+    time.sleep(0.02)  # what another thread is writing comes before this
     with suppress(OSError):
         os.write(2, (EMPTY_LINE + SHOW_CURSOR).encode())

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from compare.fleet.command import with_reference
+from compare.fleet.command import solution_files
 from compare.fleet.models import found_models, place_of_report
 from compare.fleet.run import AHEAD, Run
 from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, REFUSED
@@ -64,7 +64,8 @@ def fleet(tmp_path, monkeypatch):
         for name, text in files.items():
             (tmp_path / "m" / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / "m" / name).write_text(text)
-        options, sent = with_reference(FleetOptions(tuple(names), is_quick=is_quick), reference)
+        sent = solution_files(reference)
+        options = FleetOptions(tuple(names), is_quick, reference, next(iter(sent), ""))
         executor = Inside(tmp_path / "places", answer)
         of = Run(found_models(paths)[0], options, executor, tmp_path / "out", sent)
         of.carry_out(lambda rows: None)
@@ -81,15 +82,12 @@ def verdicts(found):
     return {name: row["verdict"] for name, row in found.rows.items()}
 
 
-def test_files_agree_or_are_refused_with_the_reason_and_parts_are_left_out(fleet, tmp_path):
+def test_files_agree_or_are_refused_with_the_reason(fleet, tmp_path):
     found = fleet({
         "good.xml": PENDULUM.format(0.1), "broken.xml": "<mujoco><worldbody>", "none.xml": "<mujoco/>",
-        "scene.xml": "<mujoco><include file='part.xml'/><include file='good.xml'/></mujoco>",
-        "part.xml": "<mujoco><actuator><motor joint='j'/></actuator></mujoco>",
     }, ["parameters"])  # fmt: skip
-    assert verdicts(found) == {"good.xml": ITSELF, "scene.xml": ITSELF, "broken.xml": REFUSED, "none.xml": REFUSED}
-    ((part, why),) = found.of.parts
-    assert part == "m/part.xml" and "m/scene.xml" in why and "joint" in found.rows["none.xml"]["reason"]
+    assert verdicts(found) == {"good.xml": ITSELF, "broken.xml": REFUSED, "none.xml": REFUSED}
+    assert "joint" in found.rows["none.xml"]["reason"] and len(found.rows["broken.xml"]["sha256"]) == 64
     assert found.rows["good.xml"]["joints"] == 1 and found.rows["good.xml"]["seconds"] > 0.0 and found.of.is_good
     assert (report(tmp_path, "good.xml") / "index.html").is_file() and not found.rows["none.xml"]["has_report"]
     assert fleet(ONE, ["published"]).rows["a.xml"]["verdict"] == REFUSED  # which serves the arm alone
@@ -100,7 +98,7 @@ ANSWER = ({"verdict": AGREE, "reason": "", "seconds": 1.0, "has_report": True}, 
 
 def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
     first, second = fleet(TWO, answer=ANSWER), fleet(TWO, answer=ANSWER)
-    assert len(first.executor.calls) == 2 and second.executor.calls == [] and second.of.cached == 2
+    assert len(first.executor.calls) == 2 and second.executor.calls == []
     assert second.rows == first.rows
     third = fleet({"b.xml": PENDULUM.format(0.3), "b/a.xml": PENDULUM.format(0.4)}, answer=ANSWER)
     assert set(third.executor.calls) == {"m/b.xml", "m/b/a.xml"}
@@ -131,7 +129,7 @@ def test_few_models_are_in_memory_at_a_time(fleet):
 SOLUTION = PENDULUM.format(0.1)
 HEAVY = SOLUTION.replace("mass='1'", "mass='2'")
 CLASS = {
-    "heavy.xml": HEAVY, "heavy_too.xml": HEAVY, "renamed.xml": SOLUTION.replace("name='j' ", ""),
+    "heavy.xml": HEAVY, "renamed.xml": SOLUTION.replace("name='j' ", ""),
     "slide.xml": SOLUTION.replace("axis", "type='slide' axis"), "right.xml": SOLUTION,
 }  # fmt: skip
 
@@ -140,20 +138,10 @@ def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_ma
     (tmp_path / "solution.xml").write_text(SOLUTION)
     found = fleet(CLASS, ["parameters"], reference="solution.xml")
     named = {
-        "heavy.xml": (DIFFER, "mass of b: stated 1 kg, compiled 2 kg"), "heavy_too.xml": (DIFFER, "m/heavy.xml"),
+        "heavy.xml": (DIFFER, "mass of b: stated 1 kg, compiled 2 kg"),
         "renamed.xml": (AGREE, "joint 0 as j"), "slide.xml": (DIFFER, "solution.xml"), "right.xml": (AGREE, ""),
     }  # fmt: skip
     assert verdicts(found) == {name: verdict for name, (verdict, _) in named.items()}
     assert all(word in found.rows[name]["reason"] for name, (_, word) in named.items())
     assert [name for name, row in found.rows.items() if not row["has_report"]] == ["slide.xml"]
     assert "--only parameters --reference solution.xml" in (report(tmp_path, "renamed.xml") / "report.md").read_text()
-    assert not report(tmp_path, "heavy_too.xml").exists() and found.rows["heavy_too.xml"]["report_of"] == "m/heavy.xml"
-
-
-def test_files_of_one_content_are_computed_once_if_what_they_load_is_the_same(fleet):
-    text = "<mujoco><include file='part.xml'/></mujoco>"
-    parts = {f"{name}/part.xml": PENDULUM.format(x) for name, x in (("a", 0.1), ("b", 0.1), ("c", 0.2))}
-    found = fleet(parts | {f"{name}/scene.xml": text for name in "abc"}, answer=ANSWER)
-    scenes = {row["file"]: row["reason"] for row in found.of.rows if "scene" in row["file"]}
-    assert [scenes[f"m/{name}/scene.xml"] != "" for name in "abc"] == [False, True, False]
-    assert "m/a/scene.xml" in scenes["m/b/scene.xml"] and "m/b/scene.xml" not in found.executor.calls

@@ -73,33 +73,31 @@ def test_the_same_file_is_there_once_however_it_is_named(here, tmp_path):
     assert names("m", "m/a.xml", "./m/../m/a.xml", str(tmp_path / "m" / "a.xml"), "m/*.xml") == ["m/a.xml", "m/b.xml"]
     for name, target in (("m/0.xml", "a.xml"), ("m/dangling.xml", "nowhere.xml"), ("m/self", "."), ("n", "m")):
         Path(name).symlink_to(target)
-    assert names("m", "n") == ["m/a.xml", "m/b.xml"] and "m/a.xml" in left_out("m", "n")["m/0.xml"]
+    assert names("m", "n") == ["m/a.xml", "m/b.xml"]
 
 
 def test_parts_are_left_out_unless_they_are_named(here):
     here("m/scene.xml", "<mujoco><include file='robot.xml'/><include file='settings.xml'/></mujoco>")
     here("m/robot.xml")
     here(["m/settings.xml", "m/lonely.xml"], "<mujocoinclude><option timestep='0.001'/></mujocoinclude>")
-    models, left = found_models(["m"])
-    assert [(model.shown, model.included_by) for model in models] == [
-        ("m/robot.xml", "m/scene.xml"), ("m/scene.xml", ""),
-    ]  # fmt: skip
-    assert [name for name, _ in left] == ["m/lonely.xml", "m/settings.xml"]
-    assert "m/scene.xml" in left_out("m")["m/settings.xml"] and "m/lonely.xml" in names("m", "m/lonely.xml")
+    left = left_out("m")
+    assert names("m") == ["m/scene.xml"] and list(left) == ["m/lonely.xml", "m/robot.xml", "m/settings.xml"]
+    assert "m/scene.xml" in left["m/settings.xml"] and left["m/robot.xml"] == left["m/settings.xml"]
+    assert names("m", "m/lonely.xml", "m/robot.xml") == ["m/lonely.xml", "m/robot.xml", "m/scene.xml"]
 
 
 def test_reports_of_two_files_are_never_in_one_folder(tmp_path):
-    asked = ["a/b.xml", "/a/b.xml", "../a/b.xml", "../../a/b.xml", "a/../b.xml", "b.xml", "up/a/b.xml", "x" * 300 + ".xml",
-             "x" * 301 + ".xml", "ü/b.xml" if sys.getfilesystemencoding() == "utf-8" else "u/b.xml", "a/B.xml/c.xml"]  # fmt: skip
+    asked = ["a/b.xml", "/a/b.xml", "../a/b.xml", "../../a/b.xml", "a/../b.xml", "b.xml", "up/a/b.xml",
+             "ü/b.xml" if sys.getfilesystemencoding() == "utf-8" else "u/b.xml", "a/B.xml/c.xml"]  # fmt: skip
     places = [place_of_report(shown) for shown in asked]
     assert len({place.casefold() for place in places}) == len(asked) and places[0] == "files/a/b.xml"
     assert not any(other.startswith(f"{place}/") for place in places for other in places)
     for place in places:
         whole = (tmp_path / place).resolve()
-        assert whole.is_relative_to(tmp_path / "files") and all(len(part.encode()) < 250 for part in whole.parts)
+        assert whole.is_relative_to(tmp_path / "files")
 
 
-# what a file needs beside itself: it is sent along, and its change changes the hash
+# what a file needs beside itself is sent along
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 GEOM, MESH = "<geom type='mesh' mesh='m'/>", "<mesh name='m' file='{}'/>"
@@ -135,18 +133,12 @@ def collection(here):
     return files
 
 
-def test_a_change_of_a_part_changes_the_hash_and_everything_is_sent_and_compiles_elsewhere(collection, here, tmp_path):
-    def found():
-        return found_models(["robots/r/r.xml"])[0][0]
-
-    known = found()
-    here("robots/r/assets/unused.obj", "")
-    assert found().hash == known.hash
-    for name in collection:
-        here(name, Path(name).read_bytes() + b"\n")
-        before, known = known, found()
-        assert known.hash != before.hash and (known.sha256 != before.sha256) == name.endswith("r/r.xml"), name
-    before, files = MjModel.from_xml_path("robots/r/r.xml"), bundle(known)
+def test_everything_that_a_model_needs_is_sent_and_compiles_elsewhere(collection, here, tmp_path):
+    (model,) = found_models(["robots/r/r.xml"])[0]
+    files = bundle(model)
+    assert set(files) == set(collection)
+    assert next(iter(files)) == "robots/r/r.xml" and all(files[name] == Path(name).read_bytes() for name in files)
+    before = MjModel.from_xml_path("robots/r/r.xml")
     os.rename("robots", "gone")
     os.rename("shared", "gone_too")
     after = MjModel.from_xml_path(str(unpacked(files, tmp_path / "elsewhere")))
@@ -162,9 +154,7 @@ def test_paths_that_are_absolute_stripped_missing_or_in_a_circle(here, tmp_path)
     (model,) = found_models(["stripped.xml"])[0]
     assert MjModel.from_xml_path(str(unpacked(bundle(model), tmp_path / "elsewhere"))).nmesh == 1
     here("absolute.xml", robot(MESH.format(f"{tmp_path}/far/s.obj")))
-    before = found_models(["absolute.xml"])[0][0].hash
-    here("far/s.obj", TETRAHEDRON.format(2))
-    assert found_models(["absolute.xml"])[0][0].hash != before
+    assert Path(tmp_path, "far/s.obj") in found_models(["absolute.xml"])[0][0].parts
     here("missing.xml", robot(MESH.format("x" * 5000) + "<mesh file='/dev/zero'/>"))
     assert list(found_models(["missing.xml"])[0][0].parts) == [Path("missing.xml")]
     here("a.xml", "<mujoco><compiler meshdir='far'/><include file='b.xml'/><include file='a.xml'/></mujoco>")
