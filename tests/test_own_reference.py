@@ -37,7 +37,7 @@ def folder(tmp_path, monkeypatch):
     assert not list(tmp_path.rglob("__pycache__"))
 
 
-IDLE = SimpleNamespace(submit=lambda *_: SimpleNamespace(result=lambda: ([], [])))  # workers that draw nothing
+IDLE = SimpleNamespace(submit=lambda *_: SimpleNamespace(result=list))  # workers that draw nothing
 
 
 def examined(folder, asked, names, mjcf="double.xml", joints=None, states=30, workers=IDLE):

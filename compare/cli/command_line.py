@@ -18,11 +18,6 @@ TEXT = "command_line"  # the template
 EXAMPLES = block(TEXT, "examples")
 
 
-def in_lines(text: str, indent: str = "") -> str:
-    """A text in lines that an ordinary terminal has room for; indent: of all lines but the first."""
-    return fill(text, LINE_WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
-
-
 class Parser(argparse.ArgumentParser):
     def error(self, message):
         self.exit(2, f"{self.prog}: {in_one_line(' '.join(message.split()))}\n")
@@ -48,7 +43,7 @@ def not_empty(text: str) -> str:
 
 
 def seconds(most: float) -> Callable[[str], float]:
-    """A type of options: seconds, above 0 and at most so many."""
+    """A type of options: a time above 0, s."""
 
     def read(text: str) -> float:
         try:
@@ -123,19 +118,23 @@ def parser(experiment: str | None = None) -> Parser:
 
 def help_of_all() -> str:
     """What the program does, and a line for each experiment."""
-    lines = (in_lines(f"  {name:<13} {block(name, 'summary')}", " " * 16) for name in EXPERIMENTS)
-    return "\n".join([in_lines(block(TEXT, "description")), "", "experiments (`all`: every one of them):", *lines])
+    lines = (f"  {name:<13} {block(name, 'summary')}" for name in EXPERIMENTS)
+    lines = (fill(line, LINE_WIDTH, subsequent_indent=" " * 16) for line in lines)
+    return "\n".join([block(TEXT, "description"), "", "experiments (`all`: every one of them):", *lines])
 
 
 def help_of(experiment: str) -> str:
     first, *rest = block(experiment, "help").split("\n")
-    return "\n".join([in_lines(first), *rest])
+    return "\n".join([fill(first, LINE_WIDTH), *rest])
 
 
 def request(arguments: Sequence[str]) -> argparse.Namespace:
     """The parsed request. SystemExit: with 0 after help, with 2 and one line for what is mistyped."""
-    whole = parser()
-    options, unknown = whole.parse_known_args(arguments or ["--help"])
+    whole, words = parser(), list(arguments) or ["--help"]
+    if "--joints" in words[:-1]:  # its value may begin with a minus
+        at = words.index("--joints")
+        words[at : at + 2] = [f"--joints={words[at + 1]}"]
+    options, unknown = whole.parse_known_args(words)
     refuse_unknown(whole, options, unknown, shlex.join(arguments))
     if options.help:
         (whole if options.experiment in (None, "all") else parser(options.experiment)).print_help()
@@ -146,7 +145,6 @@ def request(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence[str], given: str) -> None:
-    words = {name: name for name in (*EXPERIMENTS, "all")}
     for word in unknown:
         if word.startswith("-"):
             whole.refuse_option(word, list(OPTIONS))
@@ -155,9 +153,9 @@ def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence
         whole.error(f"expected an experiment: {choices}, as in {PROGRAM} all {given}")
     if name == FLEET:
         whole.error(f"{FLEET} must come first, before its options, as in {PROGRAM} {FLEET} models")
-    if name is not None and name not in words:
-        near = expected(name, words | {"help": "--help", FLEET: FLEET}, choices)
-        whole.error(f"{name!r} is not an experiment; {near}")
+    if name not in (None, "all", *EXPERIMENTS):
+        words = {word: word for word in (*EXPERIMENTS, "all", FLEET)} | {"help": "--help"}
+        whole.error(f"{name!r} is not an experiment; {expected(name, words, choices)}")
     if unknown:
         whole.error(f"unexpected argument {unknown[0]!r}: expected one experiment, or all")
 

@@ -13,21 +13,17 @@ class Clock:
         self.task = ""  # to which processor time is assigned
         self.under_way = ""
         self.ended = {}  # s from the start, of each task that has ended
-        self.taken = []  # (task, processor time)
+        self.taken = []  # (task, processor time); threads append to it
 
     @contextmanager
     def of(self, task: str) -> Iterator[None]:
         """Assign the processor time of this block, and of calls of workers in it, to a task."""
-        before, self.task = self.task, task
-        began = time.process_time()
+        before, self.task, began = self.task, task, time.process_time()
         try:
             yield
         finally:
             self.task = before
-            self.add(task, time.process_time() - began)
-
-    def add(self, task: str, seconds: float) -> None:
-        self.taken.append((task, seconds))
+            self.taken.append((task, time.process_time() - began))
 
     def ends(self, task: str) -> None:
         self.under_way = ""

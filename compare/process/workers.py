@@ -3,7 +3,6 @@
 import importlib
 import logging
 import os
-import pickle
 import shutil
 import threading
 import time
@@ -15,7 +14,7 @@ from multiprocessing import active_children, get_context, parent_process
 
 from . import interrupt
 from .clock import Clock
-from .crash import described, place
+from .crash import place
 
 
 class WorkerEnded(RuntimeError):
@@ -40,7 +39,7 @@ class Workers(ThreadPoolExecutor):
             value, error, seconds = self.processes.submit(timed, *call).result()
         except (BrokenProcessPool, RuntimeError):  # RuntimeError: shut down
             raise WorkerEnded("a worker process was killed; the earlier report is unchanged") from None
-        self.clock.add(task, seconds)
+        self.clock.taken.append((task, seconds))
         if error:
             raise error
         return value
@@ -95,20 +94,9 @@ def load_modules(*modules: str) -> None:
 
 def timed(function, arguments: tuple, named: dict) -> tuple:
     """The value of a call, the exception, and the processor time in s."""
-    began, value, error = time.process_time(), None, None
+    began, value, raised = time.process_time(), None, None
     try:
         value = function(*arguments, **named)
-    except Exception as raised:
-        error = portable(raised)
-    return value, error, time.process_time() - began
-
-
-def portable(error: Exception) -> Exception:
-    """An exception that can be pickled, with the attribute `place`."""
-    where = error.place = place(error)
-    try:
-        return pickle.loads(pickle.dumps(error))
-    except Exception:
-        error = RuntimeError(described(error, with_place=False))
-        error.place = where
-        return error
+    except Exception as error:
+        error.place, raised = place(error), error  # it is sent without its traceback
+    return value, raised, time.process_time() - began
