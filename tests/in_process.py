@@ -7,7 +7,7 @@ import pytest
 
 from compare.fleet.task import InProcess
 from compare.process import workers
-from compare.process.clock import Clock
+from compare.process.workers import Clock
 
 
 class Inside(InProcess):

@@ -12,7 +12,6 @@ from ..process.streams import PROGRAM, in_one_line
 from ..report.text import block
 
 FLEET = "fleet"  # the command for many files
-LONGEST_STEP = 5.0  # s, for --dt
 LINE_WIDTH = 80
 TEXT = "command_line"  # the template
 EXAMPLES = block(TEXT, "examples")
@@ -45,16 +44,12 @@ def not_empty(text: str) -> str:
 def seconds(most: float) -> Callable[[str], float]:
     """A type of options: a time above 0, s."""
 
-    def read(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = 0.0
-        if not 0.0 < value <= most:
+    def time(text: str) -> float:
+        if not 0.0 < float(text) <= most:
             raise argparse.ArgumentTypeError(f"{text!r} is not a time: expected seconds, above 0 and at most {most:g}")
-        return value
+        return float(text)
 
-    return read
+    return time
 
 
 def process_count(text: str) -> int:
@@ -67,10 +62,7 @@ def stated_reference(text: str) -> str:
     """What a model is compared with; a text with a colon is read later."""
     if text in ("arm", "model") or ":" in text or text.lower().endswith((".xml", ".mjcf")):
         return text
-    if text.endswith(".py"):
-        hint = f"a colon is missing: {text}:OBJECT, or {text}: for the file itself"
-    else:
-        hint = expected(text, {"arm": "arm", "model": "model"}, "arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT")
+    hint = expected(text, {"arm": "arm", "model": "model"}, "arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT")
     raise argparse.ArgumentTypeError(f"{text!r} is not a reference; {hint}")
 
 
@@ -80,8 +72,7 @@ class Option(NamedTuple):
     type: Callable[[str], object] | None = not_empty  # None: it takes no value
     metavar: str | None = None
     default: object = None
-    of_every: bool = False  # whether every experiment takes it; else those whose record has it
-    in_all: bool = False  # whether `all` takes it
+    of_every: bool = False  # whether every experiment takes it; else `all`, and those whose record has it
 
 
 OPTIONS = {
@@ -89,19 +80,22 @@ OPTIONS = {
     "--quick": Option(None, of_every=True),
     "--mjcf": Option(metavar="FILE", of_every=True),
     "--reference": Option(stated_reference, "WHAT", of_every=True),
-    "--joints": Option(metavar="LIST", in_all=True),
-    "--scenes": Option(metavar="FILE", in_all=True),
-    "--dt": Option(seconds(LONGEST_STEP), "S"),
+    "--joints": Option(metavar="LIST"),
+    "--scenes": Option(metavar="FILE"),
+    "--dt": Option(seconds(5.0), "S"),
     "--integrator": Option(metavar="NAME"),
 }
 
 
 def parser(experiment: str | None = None) -> Parser:
     """The parser of one experiment with the options that it takes, or of all."""
+    lines = [f"  {name:<13} {block(name, 'summary')}" for name in EXPERIMENTS]
+    lines = "\n".join(fill(line, LINE_WIDTH, subsequent_indent=" " * 16) for line in lines)
+    of_all = f"{block(TEXT, 'description')}\n\nexperiments (`all`: every one of them):\n{lines}"
     made = Parser(
         prog=PROGRAM,
         usage=f"{PROGRAM} {experiment or 'EXPERIMENT|all'} [options]",
-        description=help_of(experiment) if experiment else help_of_all(),
+        description=help_of(experiment) if experiment else of_all,
         epilog=None if experiment else EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         add_help=False,
@@ -116,16 +110,15 @@ def parser(experiment: str | None = None) -> Parser:
     return made
 
 
-def help_of_all() -> str:
-    """What the program does, and a line for each experiment."""
-    lines = (f"  {name:<13} {block(name, 'summary')}" for name in EXPERIMENTS)
-    lines = (fill(line, LINE_WIDTH, subsequent_indent=" " * 16) for line in lines)
-    return "\n".join([block(TEXT, "description"), "", "experiments (`all`: every one of them):", *lines])
-
-
 def help_of(experiment: str) -> str:
     first, *rest = block(experiment, "help").split("\n")
     return "\n".join([fill(first, LINE_WIDTH), *rest])
+
+
+def expected(word: str, known: dict[str, str], choices: str) -> str:
+    """A hint for an unknown word: the nearest known word, or all choices."""
+    near = get_close_matches(word.casefold(), known, 1)
+    return f"did you mean {known[near[0]]}?" if near else f"expected one of {choices}"
 
 
 def request(arguments: Sequence[str]) -> argparse.Namespace:
@@ -135,20 +128,20 @@ def request(arguments: Sequence[str]) -> argparse.Namespace:
         at = words.index("--joints")
         words[at : at + 2] = [f"--joints={words[at + 1]}"]
     options, unknown = whole.parse_known_args(words)
-    refuse_unknown(whole, options, unknown, shlex.join(arguments))
+    refuse_words(whole, options, unknown, shlex.join(arguments))
     if options.help:
         (whole if options.experiment in (None, "all") else parser(options.experiment)).print_help()
         raise SystemExit(0)
     if not options.version:
-        refuse_what_does_not_go_together(whole, options)
+        refuse_combinations(whole, options)
     return options
 
 
-def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence[str], given: str) -> None:
+def refuse_words(whole: Parser, options: argparse.Namespace, unknown: Sequence[str], given: str) -> None:
+    name, choices = options.experiment, f"{', '.join(EXPERIMENTS)} or all"
     for word in unknown:
         if word.startswith("-"):
             whole.refuse_option(word, list(OPTIONS))
-    name, choices = options.experiment, f"{', '.join(EXPERIMENTS)} or all"
     if name is None and not (options.help or options.version):
         whole.error(f"expected an experiment: {choices}, as in {PROGRAM} all {given}")
     if name == FLEET:
@@ -160,17 +153,11 @@ def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence
         whole.error(f"unexpected argument {unknown[0]!r}: expected one experiment, or all")
 
 
-def expected(word: str, known: dict[str, str], choices: str) -> str:
-    """A hint for an unknown word: the nearest known word, or all choices."""
-    near = get_close_matches(word.casefold(), known, 1)
-    return f"did you mean {known[near[0]]}?" if near else f"expected one of {choices}"
-
-
-def refuse_what_does_not_go_together(whole: Parser, options: argparse.Namespace) -> None:
+def refuse_combinations(whole: Parser, options: argparse.Namespace) -> None:
     name, given = options.experiment, vars(options)
-    for option, rule in OPTIONS.items():
-        takers = [other for other, record in EXPERIMENTS.items() if option in record.options] + ["all"] * rule.in_all
-        if given[option.strip("-")] and not rule.of_every and name not in takers:
+    for option in OPTIONS if name != "all" else ():
+        takers = [other for other, record in EXPERIMENTS.items() if option in record.options]
+        if given[option.strip("-")] and not OPTIONS[option].of_every and name not in takers:
             whole.error(f"{option} is an option of {', '.join(takers)}; {name} does not take it")
     if options.joints and ":" not in (options.reference or ""):
         whole.error("--joints needs equations of your own: --reference FILE.py:OBJECT or MODULE:OBJECT")

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from ..engines.mujoco import ModelError, read
 from ..experiments import EXPERIMENTS, skipped
-from ..process.clock import Clock
+from ..process.workers import Clock
 from ..report import folder, provenance
 from ..report.text import say
 from ..robots.case import SEED

@@ -11,7 +11,7 @@ from contextlib import suppress
 from multiprocessing import resource_tracker
 
 undo = []  # functions to call before the process ends, last first
-postponed = threading.RLock()  # in its block, an interrupt waits until the end of the block
+turn = threading.RLock()  # held while a thread decides how the run ends
 
 
 class Now:
@@ -31,15 +31,20 @@ def listen() -> None:
         threading.Thread(target=end_when_asked, args=(numbers,), daemon=True).start()
 
 
+def postponed() -> threading.RLock:
+    """For `with`: an interrupt in the block takes effect at its end."""
+    return turn
+
+
 def settle() -> None:
     """From now on an interrupt does not change the exit status."""
-    with postponed:
+    with turn:
         Now.settled = True
 
 
 def end_when_asked(numbers: list[int]) -> None:
     signal.sigwait(numbers)
-    with postponed:
+    with turn:
         if not Now.settled:
             clear_up()
             with suppress(OSError):

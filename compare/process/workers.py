@@ -1,4 +1,4 @@
-"""Two worker processes of a run, for figures and scenes."""
+"""Two worker processes of a run, for figures and scenes, and the clock of its tasks."""
 
 import importlib
 import logging
@@ -8,13 +8,40 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 
 from . import interrupt
-from .clock import Clock
 from .crash import place
+
+
+class Clock:
+    """The processor time of each task, in this process and in workers, and when each ended."""
+
+    def __init__(self):
+        self.started = time.perf_counter()
+        self.task = ""  # to which processor time is assigned
+        self.under_way = ""
+        self.ended = {}  # s from the start, of each task that has ended
+        self.taken = []  # (task, processor time); threads append to it
+
+    @contextmanager
+    def of(self, task: str) -> Iterator[None]:
+        """Assign the processor time of this block, and of calls of workers in it, to a task."""
+        before, self.task, began = self.task, task, time.process_time()
+        try:
+            yield
+        finally:
+            self.task = before
+            self.taken.append((task, time.process_time() - began))
+
+    def ends(self, task: str) -> None:
+        self.under_way = ""
+        self.ended[task] = time.perf_counter() - self.started
+
+    def seconds_of(self, task: str) -> float:
+        """The processor time of a task so far, s."""
+        return sum(seconds for name, seconds in list(self.taken) if name == task)
 
 
 class WorkerEnded(RuntimeError):
@@ -37,7 +64,7 @@ class Workers(ThreadPoolExecutor):
         """The result or exception of a call in one of the processes."""
         try:
             value, error, seconds = self.processes.submit(timed, *call).result()
-        except (BrokenProcessPool, RuntimeError):  # RuntimeError: shut down
+        except RuntimeError:  # a broken pool, or shut down
             raise WorkerEnded("a worker process was killed; the earlier report is unchanged") from None
         self.clock.taken.append((task, seconds))
         if error:

@@ -13,7 +13,7 @@ from ..experiments import EXPERIMENTS, skipped
 from ..process.crash import Refused
 from ..process.streams import say_error
 from ..process.workers import WorkerEnded, load_modules, start_workers
-from ..report.folder import FolderError, made_by, new_report
+from ..report.folder import FolderError, new_report
 from ..report.terminal import Terminal
 from ..report.text import say
 from ..robots.case import SEED
@@ -36,7 +36,6 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             compared = compared._replace(robot=compared.robot.with_scenes(read_scenes(options.scenes, compared.robot)))
         if options.experiment != "all" and (reason := skipped(options.experiment, compared.robot)):
             raise Refused(f"{options.experiment} does not apply to {compared.robot.name}: {say(reason)}")
-        before = made_by(options.out)
         with new_report(options.out) as folder:
             report, parts = compute(options, command, compared, folder, terminal)
     except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded) as error:
@@ -49,8 +48,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
         terminal.say(line, "" if number else "bold green" if good else "bold red")
     for line in parts.lines:
         say_error(line)
-    place = f" in place of that of `{before}`" if before not in (None, report.origin["command"]) else ""
-    terminal.say(f"Report: {os.path.join(options.out, 'index.html')}{place} ({time.perf_counter() - started:.1f} s)")
+    terminal.say(f"Report: {os.path.join(options.out, 'index.html')} ({time.perf_counter() - started:.1f} s)")
     return 0 if good else 1
 
 

@@ -6,15 +6,14 @@ from pathlib import Path
 from types import ModuleType
 
 from ..experiments import EXPERIMENTS, TIMED, Experiment, module
-from ..experiments.setup import Setup, engines, nothing
+from ..experiments.setup import Setup, engines
 from ..judge.check import ENDS, About, Result
 from ..judge.finding import Finding
-from ..process.clock import Clock
 from ..process.crash import described
-from ..process.workers import WorkerEnded, Workers
+from ..process.workers import Clock, WorkerEnded, Workers
 from ..report.terminal import Terminal
 from ..report.text import block, say
-from ..report.verdict import STATES_CAUSES, Section, explained, failures
+from ..report.verdict import GEOMETRY, STATES_CAUSES, Section, explained, failures
 from .drawing import draw, quiet, results_needed
 from .reference import Compared
 
@@ -22,11 +21,9 @@ START, END = "start", "figures"  # tasks of the clock: what comes before the fir
 
 DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers on which Mbar and h depend, by their names in `parameters`
-IN_EQUATIONS = (
-    "order", "parent", "ref", "axis", "anchor", "com", "mass", "inertia", "gravity", "armature", "flag gravity",
-)  # fmt: skip
+IN_EQUATIONS = (*GEOMETRY, "mass", "inertia", "gravity", "armature", "flag gravity")
 NOTHING_FAILED = "nothing failed"
-SHOWN, SHOWN_BESIDE_CAUSE = 5, 2  # lines on the terminal about an experiment that fails; where a cause explains some
+SHOWN = 5  # lines on the terminal about an experiment that fails
 
 
 def setup_of(compared: Compared, is_quick: bool, **more: object) -> Setup:
@@ -48,8 +45,9 @@ def examine(
     sections, drawings, waiting, causes, reasons = [], [], [], [], {}
     own, reported, crashed = setup.engines.get("own"), set(), {}
     for name in names:
-        with clock.of(name):
-            _, crashed[name] = attempt(name, getattr(module(name), "begin", nothing), setup)
+        if hasattr(module(name), "begin"):
+            with clock.of(name):
+                _, crashed[name] = attempt(name, module(name).begin, setup)
     clock.ends(START)
     order = sorted(names, key=TIMED.__contains__)
     for name in order:
@@ -62,7 +60,7 @@ def examine(
         clock.under_way = name
         with clock.of(name):
             setup.progress(block(name, "summary"))
-            section, crash = None, crashed[name]
+            section, crash = None, crashed.get(name)
             if not crash:
                 section, crash = attempt(name, partial(section_of, name), setup)
             sections.append(section or Section(name, name, "", "", crash))
@@ -182,9 +180,7 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
     result.check("", quantity, None, 0.0, "", described(error), rule="equal", about=About.PROGRAM)
 
 
-def say_outcome(
-    terminal: Terminal, section: Section, seconds: float, new: Sequence[dict], causes: Sequence[dict] = ()
-) -> None:
+def say_outcome(terminal: Terminal, section: Section, seconds: float, new: Sequence, causes: Sequence = ()) -> None:
     """One line for an experiment; then the causes that are new, and the first failing checks that no cause explains.
 
     seconds: of the processor, for the experiment itself; causes: all that are known.
@@ -192,17 +188,16 @@ def say_outcome(
     checks, of_cause = section.result.checks, explained(section, causes)
     failed = [check for check in checks if not check.passed]
     used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
-    most = f"at most {100.0 * max(used):.2g} % of tolerance" if any(used) and not failed else ""
-    if of_cause:
-        most = f"{len(of_cause)} explained by the cause"
+    most = f"{len(of_cause)} explained by the cause" if of_cause else ""
+    if any(used) and not failed:
+        most = f"at most {100.0 * max(used):.2g} % of tolerance"
     many = f"{len(checks):>3} check{' ' if len(checks) == 1 else 's'}"
     word = f"{len(failed)} FAILED" if failed else "ok" if checks else "nothing"
     terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<27} {seconds:5.1f} s", "red" * bool(failed))
     lines = [f"  CAUSE {cause['text']}" for cause in new]
     if not (causes and section.name in STATES_CAUSES):  # there the causes are the checks
         lines += [f"  FAIL {check}" for check in failed if check not in of_cause]
-    shown = SHOWN_BESIDE_CAUSE if of_cause else SHOWN
-    lines[shown:] = [f"  and {len(lines) - shown} more: in the report"] * (len(lines) > shown)
+    lines[SHOWN:] = [f"  and {len(lines) - SHOWN} more: in the report"] * (len(lines) > SHOWN)
     for line in lines:
         terminal.say(line, "red")
 

@@ -1,8 +1,4 @@
-"""The reference with which a file is compared.
-
-The arm's stated numbers, those of a solution, another MJCF file, tmt's equations for the compiled model, or a user's
-own equations: FILE.py:OBJECT, MODULE:OBJECT.
-"""
+"""The reference of a file: the arm's stated numbers, those of a solution, tmt's equations for the model, or a user's own."""
 
 import dataclasses
 from pathlib import Path
@@ -24,7 +20,6 @@ from ..robots.joint_map import JointsError, Unmatched, joint_map, matched_joints
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 SOLUTION = "solution"  # the kind of reference that is another file
-OWN_FILE = "mjcf/arm.xml"  # what is compared where no file is given
 
 
 class JointsDiffer(ModelError):
@@ -87,7 +82,7 @@ def compared_with(reference, path, joints=None, shown=None, solution=None) -> Co
     solution: the path of the solution, if not `reference`. ModelError, in one line, for a file that cannot be compared,
     JointsDiffer for different joints, OwnFileError for equations that cannot be used.
     """
-    file, shown, source = path or ARM.mjcf, in_one_line(shown or path or OWN_FILE), in_one_line(reference or "")
+    file, shown, source = path or ARM.mjcf, in_one_line(shown or path or "mjcf/arm.xml"), in_one_line(reference or "")
     if reference == "arm" or (reference is None and (path is None or has_hinges(path, ARM.joints))):
         robot, renamed = ARM, ()
         if not has_hinges(file, ARM.joints):
@@ -126,15 +121,14 @@ def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose:
 def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None) -> Own:
     """The engine of the equations that FILE.py:OBJECT or MODULE:OBJECT names, called once. OwnFileError if that cannot be."""
     source, coordinates, rng = own_object(reference), robot.coordinates, np.random.default_rng(SEED)
-    try:
-        stated = joint_map(coordinates, joints.split(",")) if joints else None
-    except JointsError as error:
-        raise OwnFileError(f"--joints: {error}") from None
     q = np.concatenate([robot.posture()[None], coordinates.random(rng, 2, robot.ranges)])
     try:
+        stated = joint_map(coordinates, joints.split(",")) if joints else None
         with aside():
             equations = OwnEquations(source, coordinates, stated, robot.tree)
             equations.try_at(q, *rng.uniform(-1.0, 1.0, (2, len(q), coordinates.nv)))
+    except JointsError as error:
+        raise OwnFileError(f"--joints: {error}") from None
     except OwnError as error:
         raise OwnFileError(f"{reference.rstrip(':')}: {error}") from None
     return Own(equations, (method.scheme for method in mujoco.methods.values()))
