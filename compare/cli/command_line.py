@@ -90,12 +90,12 @@ OPTIONS = {
 def parser(experiment: str | None = None) -> Parser:
     """The parser of one experiment with the options that it takes, or of all."""
     lines = [f"  {name:<13} {block(name, 'summary')}" for name in EXPERIMENTS]
-    lines = "\n".join(fill(line, LINE_WIDTH, subsequent_indent=" " * 16) for line in lines)
-    of_all = f"{block(TEXT, 'description')}\n\nexperiments (`all`: every one of them):\n{lines}"
+    lines = [fill(line, LINE_WIDTH, subsequent_indent=" " * 16) for line in lines]
+    of_all = [block(TEXT, "description"), "", "experiments (`all`: every one of them):", *lines]
     made = Parser(
         prog=PROGRAM,
         usage=f"{PROGRAM} {experiment or 'EXPERIMENT|all'} [options]",
-        description=help_of(experiment) if experiment else of_all,
+        description=help_of(experiment) if experiment else "\n".join(of_all),
         epilog=None if experiment else EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         add_help=False,
@@ -132,8 +132,15 @@ def request(arguments: Sequence[str]) -> argparse.Namespace:
     if options.help:
         (whole if options.experiment in (None, "all") else parser(options.experiment)).print_help()
         raise SystemExit(0)
-    if not options.version:
-        refuse_combinations(whole, options)
+    name, given = options.experiment, vars(options)
+    for option in OPTIONS if name != "all" else ():
+        takers = [other for other, record in EXPERIMENTS.items() if option in record.options]
+        if given[option.strip("-")] and not OPTIONS[option].of_every and name not in takers:
+            whole.error(f"{option} is an option of {', '.join(takers)}; {name} does not take it")
+    if options.joints and ":" not in (options.reference or ""):
+        whole.error("--joints needs equations of your own: --reference FILE.py:OBJECT or MODULE:OBJECT")
+    if name == "diagnosis" and not (options.mjcf or options.reference or options.version):
+        whole.error("diagnosis needs a robot's file or equations of your own (--mjcf, --reference)")
     return options
 
 
@@ -151,15 +158,3 @@ def refuse_words(whole: Parser, options: argparse.Namespace, unknown: Sequence[s
         whole.error(f"{name!r} is not an experiment; {expected(name, words, choices)}")
     if unknown:
         whole.error(f"unexpected argument {unknown[0]!r}: expected one experiment, or all")
-
-
-def refuse_combinations(whole: Parser, options: argparse.Namespace) -> None:
-    name, given = options.experiment, vars(options)
-    for option in OPTIONS if name != "all" else ():
-        takers = [other for other, record in EXPERIMENTS.items() if option in record.options]
-        if given[option.strip("-")] and not OPTIONS[option].of_every and name not in takers:
-            whole.error(f"{option} is an option of {', '.join(takers)}; {name} does not take it")
-    if options.joints and ":" not in (options.reference or ""):
-        whole.error("--joints needs equations of your own: --reference FILE.py:OBJECT or MODULE:OBJECT")
-    if name == "diagnosis" and not (options.mjcf or options.reference):
-        whole.error("diagnosis needs a robot's file or equations of your own (--mjcf, --reference)")

@@ -94,10 +94,7 @@ def start_workers() -> Iterator[Workers]:
         interrupt.undo.remove(kill_children)
 
 
-# in a worker
-
-
-def begin() -> None:
+def begin() -> None:  # in a worker
     logging.getLogger("tmt").setLevel(logging.ERROR)  # the main process has the same warnings
     end_with_parent()
 

@@ -5,7 +5,6 @@ import os
 import time
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..engines.mujoco import ModelError
 from ..engines.own.own_file import OwnFileError
@@ -19,9 +18,6 @@ from ..report.text import say
 from ..robots.case import SEED
 from ..robots.scene_file import SceneError, read_scenes
 from .reference import Compared, compared_with
-
-if TYPE_CHECKING:
-    from ..report.verdict import Parts, Report
 
 COMPUTING = ("compare.run.examine", "scipy.optimize", "tmt.compiled.machine")  # modules that take long to load
 DRAWING = ("compare.report.style", *COMPUTING)
@@ -52,8 +48,8 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     return 0 if good else 1
 
 
-def compute(options, command: str, compared: Compared, folder: Path, terminal: Terminal) -> tuple["Report", "Parts"]:
-    """Run the experiments and write the report to a folder."""
+def compute(options, command: str, compared: Compared, folder: Path, terminal: Terminal) -> tuple:
+    """Run the experiments and write the report to a folder; see write_report."""
     is_alone, robot, started = options.experiment != "all", compared.robot, time.perf_counter()
     step = compared.integrator_step(options.dt, options.integrator)
     for line in compared.reference.lines:
@@ -78,10 +74,11 @@ def compute(options, command: str, compared: Compared, folder: Path, terminal: T
     return write_report(folder, *outcome, list(reasons.items()), origin, compared)
 
 
-def write_report(
-    folder: Path, sections: list, causes: list, needless: dict, skipped: list, origin: dict, compared: Compared
-) -> tuple["Report", "Parts"]:
-    """Write a report with its verdict to a folder that has its figures. The arguments are those of examine and of Report."""
+def write_report(folder: Path, sections, causes, needless, skipped, origin: dict, compared: Compared) -> tuple:
+    """Write a report with its verdict to a folder that has its figures: the verdict.Report and its Parts.
+
+    sections, causes, needless: see examine; skipped, origin: see Report.
+    """
     from ..report import files, verdict
 
     parts, count = verdict.Parts(), len(EXPERIMENTS) - len(needless)

@@ -1,7 +1,6 @@
 """Figures on disk, drawn in another process than the one that computes."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from itertools import chain, islice
 from pathlib import Path
 
@@ -51,6 +50,6 @@ def results_needed(experiment: str, names: Sequence[str], sections: Sequence[Sec
     return {of.experiment: Result(of.experiment, rows=of.rows, label=of.label) for of in results}
 
 
-def quiet(robot: Robot) -> AbstractContextManager:
+def quiet(robot: Robot) -> np.errstate:
     """A block in which NumPy does not warn of NaN where a user's own equations may give it: checks report that."""
-    return np.errstate(all="ignore") if getattr(robot, "own", ()) else nullcontext()
+    return np.errstate(all="ignore" if getattr(robot, "own", ()) else None)

@@ -18,11 +18,9 @@ from .drawing import draw, quiet, results_needed
 from .reference import Compared
 
 START, END = "start", "figures"  # tasks of the clock: what comes before the first experiment and after the last
-
 DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers on which Mbar and h depend, by their names in `parameters`
 IN_EQUATIONS = (*GEOMETRY, "mass", "inertia", "gravity", "armature", "flag gravity")
-NOTHING_FAILED = "nothing failed"
 SHOWN = 5  # lines on the terminal about an experiment that fails
 
 
@@ -53,8 +51,8 @@ def examine(
     for name in order:
         is_needed = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
         if name == "diagnosis" and len(names) > 1 and not is_needed:
-            reasons[name] = NOTHING_FAILED
-            terminal.say(f"{name:<13} skipped: {NOTHING_FAILED}")
+            reasons[name] = "nothing failed"
+            terminal.say(f"{name:<13} skipped: {reasons[name]}")
             clock.ends(name)
             continue
         clock.under_way = name

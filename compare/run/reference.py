@@ -50,11 +50,10 @@ class Reference(NamedTuple):
     @property
     def lines(self) -> tuple[str, ...]:
         """The first lines of the output and of the report."""
-        lines = [f"reference: {self.kind}; {self.file} compared with {REFERENCES.get(self.kind, self.source)}"]
-        lines += [self.matched] if self.renamed else []
-        if self.open_tree:
-            lines.append(f"equalities switched off ({len(self.open_tree)}): {', '.join(self.open_tree)}")
-        return tuple(map(in_one_line, (*lines, *(f"MuJoCo warns: {line}" for line in self.warnings))))
+        first = f"reference: {self.kind}; {self.file} compared with {REFERENCES.get(self.kind, self.source)}"
+        off = f"equalities switched off ({len(self.open_tree)}): {', '.join(self.open_tree)}" if self.open_tree else ""
+        lines = first, self.matched, off, *(f"MuJoCo warns: {line}" for line in self.warnings)
+        return tuple(in_one_line(line) for line in lines if line)
 
 
 class Compared(NamedTuple):
