@@ -10,7 +10,8 @@ from tmt.equations import method
 from ..judge.finding import Finding
 from ..report.style import BLUE, GREEN, GREY, RED, WIDTH, file_name, joint_lines, plain
 from ..robots import Robot
-from ..robots.stick import AZIMUTH, ELEVATION, free_parts, stick_figure
+from ..robots.coordinates import free_joints
+from ..robots.stick import AZIMUTH, ELEVATION, stick_figure
 
 MOST_NAMED = 6  # joints, and bodies, that are named in a sketch
 KIND_COLOURS = {"hinge": BLUE, "slide": RED, "ball": GREEN}
@@ -46,7 +47,7 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
         ax.set_box_aspect((1, 1, 1), zoom=1.1)
     counts = {kind: tree.kind.count(kind) for kind in KIND_COLOURS if kind in tree.kind}
     bodies = tree.body_names if few else ()
-    values = {"noun": robot.noun, "bodies": bodies, "counts": counts, "has_free": any(free_parts(tree))}
+    values = {"noun": robot.noun, "bodies": bodies, "counts": counts, "has_free": bool(free_joints(tree))}
     return file_name(robot.name), fig, Finding("parameters", "sketch", values)
 
 
