@@ -145,7 +145,7 @@ BROKEN = "x = 1\ndef mass_matrix(q:\n"
     (":Object", "':Object'"), ("./:Object", "folder"), ("mine.py:inside.alsso", "known: also"),
     ("broken.py:", "broken.py, line 2: SyntaxError"), ("broken:", "broken, line 2: SyntaxError"),
     ("leaving.py:x", "leaving.py, line 2: SystemExit: 3"), ("mine.py:Needing", "'mass'"),
-    ("mine.py:&--joints=-hip,ankle", "'ankle'"),
+    ("mine.py:&--joints&-hip,ankle", "'ankle'"),
 ])  # fmt: skip
 def test_a_bad_reference_gets_one_line_and_status_2(folder, capsys, asked, word):
     (folder / "broken.py").write_text(BROKEN)
