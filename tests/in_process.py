@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import pytest
 
 from compare.process import workers
-from compare.process.clock import Clock
+from compare.process.workers import Clock
 
 
 class InProcess:

@@ -152,7 +152,7 @@ WRONG = {  # arguments, each with what is in its line
     "mass -quick": "did you mean --quick?", "mass --xyz": " ".join(command_line.OPTIONS), "mass gravity": "'gravity'",
     "--mjcf robot.xml": "all --mjcf robot.xml", "mass --reference modle": "did you mean model?",
     "--quick fleet x": "fleet must come first",
-    "mass --reference my.py": "my.py:OBJECT", "mass --out": "--out: expected one argument",
+    "mass --reference my.py": "FILE.py:OBJECT", "mass --out": "--out: expected one argument",
     # values, and options that do not go together
     "mass --mjcf=": "--mjcf: the name is empty", "stability --dt nan": "'nan'",
     "stability --dt 5.1": "'5.1'", "mass --scenes my.toml": "mass", "mass --dask tcp://x:1": "--dask",

@@ -12,15 +12,9 @@ from ..process.streams import PROGRAM, in_one_line
 from ..report.text import block
 
 FLEET = "fleet"  # the command for many files
-LONGEST_STEP = 5.0  # s, for --dt
 LINE_WIDTH = 80
 TEXT = "command_line"  # the template
 EXAMPLES = block(TEXT, "examples")
-
-
-def in_lines(text: str, indent: str = "") -> str:
-    """A text in lines that an ordinary terminal has room for; indent: of all lines but the first."""
-    return fill(text, LINE_WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 class Parser(argparse.ArgumentParser):
@@ -48,18 +42,14 @@ def not_empty(text: str) -> str:
 
 
 def seconds(most: float) -> Callable[[str], float]:
-    """A type of options: seconds, above 0 and at most so many."""
+    """A type of options: a time above 0, s."""
 
-    def read(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = 0.0
-        if not 0.0 < value <= most:
+    def time(text: str) -> float:
+        if not 0.0 < float(text) <= most:
             raise argparse.ArgumentTypeError(f"{text!r} is not a time: expected seconds, above 0 and at most {most:g}")
-        return value
+        return float(text)
 
-    return read
+    return time
 
 
 def process_count(text: str) -> int:
@@ -72,10 +62,7 @@ def stated_reference(text: str) -> str:
     """What a model is compared with; a text with a colon is read later."""
     if text in ("arm", "model") or ":" in text or text.lower().endswith((".xml", ".mjcf")):
         return text
-    if text.endswith(".py"):
-        hint = f"a colon is missing: {text}:OBJECT, or {text}: for the file itself"
-    else:
-        hint = expected(text, {"arm": "arm", "model": "model"}, "arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT")
+    hint = expected(text, {"arm": "arm", "model": "model"}, "arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT")
     raise argparse.ArgumentTypeError(f"{text!r} is not a reference; {hint}")
 
 
@@ -85,8 +72,7 @@ class Option(NamedTuple):
     type: Callable[[str], object] | None = not_empty  # None: it takes no value
     metavar: str | None = None
     default: object = None
-    of_every: bool = False  # whether every experiment takes it; else those whose record has it
-    in_all: bool = False  # whether `all` takes it
+    of_every: bool = False  # whether every experiment takes it; else `all`, and those whose record has it
 
 
 OPTIONS = {
@@ -94,19 +80,22 @@ OPTIONS = {
     "--quick": Option(None, of_every=True),
     "--mjcf": Option(metavar="FILE", of_every=True),
     "--reference": Option(stated_reference, "WHAT", of_every=True),
-    "--joints": Option(metavar="LIST", in_all=True),
-    "--scenes": Option(metavar="FILE", in_all=True),
-    "--dt": Option(seconds(LONGEST_STEP), "S"),
+    "--joints": Option(metavar="LIST"),
+    "--scenes": Option(metavar="FILE"),
+    "--dt": Option(seconds(5.0), "S"),
     "--integrator": Option(metavar="NAME"),
 }
 
 
 def parser(experiment: str | None = None) -> Parser:
     """The parser of one experiment with the options that it takes, or of all."""
+    lines = [f"  {name:<13} {block(name, 'summary')}" for name in EXPERIMENTS]
+    lines = [fill(line, LINE_WIDTH, subsequent_indent=" " * 16) for line in lines]
+    of_all = [block(TEXT, "description"), "", "experiments (`all`: every one of them):", *lines]
     made = Parser(
         prog=PROGRAM,
         usage=f"{PROGRAM} {experiment or 'EXPERIMENT|all'} [options]",
-        description=help_of(experiment) if experiment else help_of_all(),
+        description=help_of(experiment) if experiment else "\n".join(of_all),
         epilog=None if experiment else EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         add_help=False,
@@ -121,45 +110,9 @@ def parser(experiment: str | None = None) -> Parser:
     return made
 
 
-def help_of_all() -> str:
-    """What the program does, and a line for each experiment."""
-    lines = (in_lines(f"  {name:<13} {block(name, 'summary')}", " " * 16) for name in EXPERIMENTS)
-    return "\n".join([in_lines(block(TEXT, "description")), "", "experiments (`all`: every one of them):", *lines])
-
-
 def help_of(experiment: str) -> str:
     first, *rest = block(experiment, "help").split("\n")
-    return "\n".join([in_lines(first), *rest])
-
-
-def request(arguments: Sequence[str]) -> argparse.Namespace:
-    """The parsed request. SystemExit: with 0 after help, with 2 and one line for what is mistyped."""
-    whole = parser()
-    options, unknown = whole.parse_known_args(arguments or ["--help"])
-    refuse_unknown(whole, options, unknown, shlex.join(arguments))
-    if options.help:
-        (whole if options.experiment in (None, "all") else parser(options.experiment)).print_help()
-        raise SystemExit(0)
-    if not options.version:
-        refuse_what_does_not_go_together(whole, options)
-    return options
-
-
-def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence[str], given: str) -> None:
-    words = {name: name for name in (*EXPERIMENTS, "all")}
-    for word in unknown:
-        if word.startswith("-"):
-            whole.refuse_option(word, list(OPTIONS))
-    name, choices = options.experiment, f"{', '.join(EXPERIMENTS)} or all"
-    if name is None and not (options.help or options.version):
-        whole.error(f"expected an experiment: {choices}, as in {PROGRAM} all {given}")
-    if name == FLEET:
-        whole.error(f"{FLEET} must come first, before its options, as in {PROGRAM} {FLEET} models")
-    if name is not None and name not in words:
-        near = expected(name, words | {"help": "--help", FLEET: FLEET}, choices)
-        whole.error(f"{name!r} is not an experiment; {near}")
-    if unknown:
-        whole.error(f"unexpected argument {unknown[0]!r}: expected one experiment, or all")
+    return "\n".join([fill(first, LINE_WIDTH), *rest])
 
 
 def expected(word: str, known: dict[str, str], choices: str) -> str:
@@ -168,13 +121,40 @@ def expected(word: str, known: dict[str, str], choices: str) -> str:
     return f"did you mean {known[near[0]]}?" if near else f"expected one of {choices}"
 
 
-def refuse_what_does_not_go_together(whole: Parser, options: argparse.Namespace) -> None:
+def request(arguments: Sequence[str]) -> argparse.Namespace:
+    """The parsed request. SystemExit: with 0 after help, with 2 and one line for what is mistyped."""
+    whole, words = parser(), list(arguments) or ["--help"]
+    if "--joints" in words[:-1]:  # its value may begin with a minus
+        at = words.index("--joints")
+        words[at : at + 2] = [f"--joints={words[at + 1]}"]
+    options, unknown = whole.parse_known_args(words)
+    refuse_words(whole, options, unknown, shlex.join(arguments))
+    if options.help:
+        (whole if options.experiment in (None, "all") else parser(options.experiment)).print_help()
+        raise SystemExit(0)
     name, given = options.experiment, vars(options)
-    for option, rule in OPTIONS.items():
-        takers = [other for other, record in EXPERIMENTS.items() if option in record.options] + ["all"] * rule.in_all
-        if given[option.strip("-")] and not rule.of_every and name not in takers:
+    for option in OPTIONS if name != "all" else ():
+        takers = [other for other, record in EXPERIMENTS.items() if option in record.options]
+        if given[option.strip("-")] and not OPTIONS[option].of_every and name not in takers:
             whole.error(f"{option} is an option of {', '.join(takers)}; {name} does not take it")
     if options.joints and ":" not in (options.reference or ""):
         whole.error("--joints needs equations of your own: --reference FILE.py:OBJECT or MODULE:OBJECT")
-    if name == "diagnosis" and not (options.mjcf or options.reference):
+    if name == "diagnosis" and not (options.mjcf or options.reference or options.version):
         whole.error("diagnosis needs a robot's file or equations of your own (--mjcf, --reference)")
+    return options
+
+
+def refuse_words(whole: Parser, options: argparse.Namespace, unknown: Sequence[str], given: str) -> None:
+    name, choices = options.experiment, f"{', '.join(EXPERIMENTS)} or all"
+    for word in unknown:
+        if word.startswith("-"):
+            whole.refuse_option(word, list(OPTIONS))
+    if name is None and not (options.help or options.version):
+        whole.error(f"expected an experiment: {choices}, as in {PROGRAM} all {given}")
+    if name == FLEET:
+        whole.error(f"{FLEET} must come first, before its options, as in {PROGRAM} {FLEET} models")
+    if name not in (None, "all", *EXPERIMENTS):
+        words = {word: word for word in (*EXPERIMENTS, "all", FLEET)} | {"help": "--help"}
+        whole.error(f"{name!r} is not an experiment; {expected(name, words, choices)}")
+    if unknown:
+        whole.error(f"unexpected argument {unknown[0]!r}: expected one experiment, or all")

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from ..engines.mujoco import ModelError, read
 from ..experiments import TIMED, skipped
-from ..process.clock import Clock
+from ..process.workers import Clock
 from ..report import folder, provenance
 from ..report.terminal import Terminal
 from ..report.text import say

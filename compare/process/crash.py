@@ -1,10 +1,10 @@
 """An unexpected exception in one line, for a check or the terminal."""
 
+import textwrap
 import traceback
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-MAX_MESSAGE = 300  # characters of a message
 
 
 class Refused(ValueError):
@@ -13,8 +13,7 @@ class Refused(ValueError):
 
 def described(error: BaseException, with_place: bool = True) -> str:
     """An exception in one line: "ValueError: message (compare/mass.py:12)"."""
-    message = " ".join(str(error).split())
-    message = message if len(message) <= MAX_MESSAGE else message[: MAX_MESSAGE - 3] + "..."
+    message = textwrap.shorten(str(error), 300, placeholder=" ...")
     where = place(error) if with_place else ""
     return type(error).__name__ + (f": {message}" if message else "") + (f" ({where})" if where else "")
 

@@ -7,8 +7,7 @@ in worker processes too, and a thread waits for them. Only `python -m compare` u
 import os
 import signal
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from multiprocessing import resource_tracker
 
 undo = []  # functions to call before the process ends, last first
@@ -22,19 +21,19 @@ class Now:
 
 def listen() -> None:
     """From now on an interrupt ends the process. Ignored signals (nohup, background of a script) stay ignored."""
-    numbers = [number for name in ("SIGINT", "SIGTERM", "SIGHUP") if (number := getattr(signal, name, None))]
+    numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
     numbers = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
     if numbers and hasattr(signal, "pthread_sigmask"):  # not on Windows
+        before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # the tracker inherits this: it ends after the run
         resource_tracker.ensure_running()  # unblocks signals where it starts
+        signal.signal(signal.SIGHUP, before)
         signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
         threading.Thread(target=end_when_asked, args=(numbers,), daemon=True).start()
 
 
-@contextmanager
-def postponed() -> Iterator[None]:
-    """An interrupt in this block takes effect at its end."""
-    with turn:
-        yield
+def postponed() -> threading.RLock:
+    """For `with`: an interrupt in the block takes effect at its end."""
+    return turn
 
 
 def settle() -> None:
@@ -47,18 +46,13 @@ def end_when_asked(numbers: list[int]) -> None:
     signal.sigwait(numbers)
     with turn:
         if not Now.settled:
-            end()
+            clear_up()
+            with suppress(OSError):
+                os.write(2, ("\r" * os.isatty(2) + Now.line + "\n").encode())  # overwrites ^C on a terminal
+            os._exit(2)
 
 
 def clear_up() -> None:
     for act in reversed(undo):
         with suppress(Exception):
             act()
-
-
-def end() -> None:
-    """End the process, whatever the main thread does."""
-    clear_up()
-    with suppress(OSError):
-        os.write(2, ("\r" * os.isatty(2) + Now.line + "\n").encode())  # overwrites ^C on a terminal
-    os._exit(2)

@@ -2,7 +2,6 @@
 
 import os
 import sys
-from contextlib import suppress
 
 PROGRAM = "python -m compare"
 
@@ -55,8 +54,7 @@ def in_one_line(text: str) -> str:
 
 def say_error(line: str) -> None:
     """One line on stderr, if it can be written."""
-    with suppress(OSError, ValueError, AttributeError):
-        print(in_one_line(" ".join(f"{PROGRAM}: {line}".split())), file=sys.stderr, flush=True)
+    print(in_one_line(" ".join(f"{PROGRAM}: {line}".split())), file=Stream(sys.stderr), flush=True)
 
 
 def prepare() -> None:

@@ -1,21 +1,47 @@
-"""Two worker processes of a run, for figures and scenes."""
+"""Two worker processes of a run, for figures and scenes, and the clock of its tasks."""
 
 import importlib
 import logging
 import os
-import pickle
 import shutil
 import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 
 from . import interrupt
-from .clock import Clock
-from .crash import described, place
+from .crash import place
+
+
+class Clock:
+    """The processor time of each task, in this process and in workers, and when each ended."""
+
+    def __init__(self):
+        self.started = time.perf_counter()
+        self.task = ""  # to which processor time is assigned
+        self.under_way = ""
+        self.ended = {}  # s from the start, of each task that has ended
+        self.taken = []  # (task, processor time); threads append to it
+
+    @contextmanager
+    def of(self, task: str) -> Iterator[None]:
+        """Assign the processor time of this block, and of calls of workers in it, to a task."""
+        before, self.task, began = self.task, task, time.process_time()
+        try:
+            yield
+        finally:
+            self.task = before
+            self.taken.append((task, time.process_time() - began))
+
+    def ends(self, task: str) -> None:
+        self.under_way = ""
+        self.ended[task] = time.perf_counter() - self.started
+
+    def seconds_of(self, task: str) -> float:
+        """The processor time of a task so far, s."""
+        return sum(seconds for name, seconds in list(self.taken) if name == task)
 
 
 class WorkerEnded(RuntimeError):
@@ -38,9 +64,9 @@ class Workers(ThreadPoolExecutor):
         """The result or exception of a call in one of the processes."""
         try:
             value, error, seconds = self.processes.submit(timed, *call).result()
-        except (BrokenProcessPool, RuntimeError):  # RuntimeError: shut down
+        except RuntimeError:  # a broken pool, or shut down
             raise WorkerEnded("a worker process was killed; the earlier report is unchanged") from None
-        self.clock.add(task, seconds)
+        self.clock.taken.append((task, seconds))
         if error:
             raise error
         return value
@@ -68,10 +94,7 @@ def start_workers() -> Iterator[Workers]:
         interrupt.undo.remove(kill_children)
 
 
-# in a worker
-
-
-def begin() -> None:
+def begin() -> None:  # in a worker
     logging.getLogger("tmt").setLevel(logging.ERROR)  # the main process has the same warnings
     end_with_parent()
 
@@ -95,20 +118,9 @@ def load_modules(*modules: str) -> None:
 
 def timed(function, arguments: tuple, named: dict) -> tuple:
     """The value of a call, the exception, and the processor time in s."""
-    began, value, error = time.process_time(), None, None
+    began, value, raised = time.process_time(), None, None
     try:
         value = function(*arguments, **named)
-    except Exception as raised:
-        error = portable(raised)
-    return value, error, time.process_time() - began
-
-
-def portable(error: Exception) -> Exception:
-    """An exception that can be pickled, with the attribute `place`."""
-    where = error.place = place(error)
-    try:
-        return pickle.loads(pickle.dumps(error))
-    except Exception:
-        error = RuntimeError(described(error, with_place=False))
-        error.place = where
-        return error
+    except Exception as error:
+        error.place, raised = place(error), error  # it is sent without its traceback
+    return value, raised, time.process_time() - began

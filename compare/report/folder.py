@@ -220,11 +220,6 @@ def refuse_foreign(out: Path) -> None:
         raise FolderError(f"{out} has {foreign[0]}, which no earlier report has written; use another folder (--out)")
 
 
-def made_by(out: str | Path) -> str | None:
-    """The command of the report in a folder, if there is one."""
-    return provenance_of(Path(out)).get("command")
-
-
 def provenance_of(out: Path) -> dict:
     try:
         return dict(json.loads((out / "results.json").read_text(encoding="utf-8"))["provenance"])

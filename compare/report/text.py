@@ -91,7 +91,3 @@ def say(finding: Finding | str) -> str:
 def block(of: str, kind: str, **values) -> str:
     """What the macro `kind` of a template gives, with its lines."""
     return str(getattr(environment().get_template(f"{of}.md.jinja").module, kind)(**values)).strip()
-
-
-def has(of: str, kind: str) -> bool:
-    return hasattr(environment().get_template(f"{of}.md.jinja").module, kind)

@@ -3,10 +3,8 @@
 import argparse
 import os
 import time
-from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..engines.mujoco import ModelError
 from ..engines.own.own_file import OwnFileError
@@ -14,29 +12,28 @@ from ..experiments import EXPERIMENTS, skipped
 from ..process.crash import Refused
 from ..process.streams import say_error
 from ..process.workers import WorkerEnded, load_modules, start_workers
-from ..report.folder import FolderError, made_by, new_report
+from ..report.folder import FolderError, new_report
 from ..report.terminal import Terminal
-from ..report.text import block, say
+from ..report.text import say
 from ..robots.case import SEED
 from ..robots.scene_file import SceneError, read_scenes
 from .reference import Compared, compared_with
 
-if TYPE_CHECKING:
-    from ..report.verdict import Parts, Report, Section
-
 COMPUTING = ("compare.run.examine", "scipy.optimize", "tmt.compiled.machine")  # modules that take long to load
 DRAWING = ("compare.report.style", *COMPUTING)
-TEMPLATE = "command_line"
 
 
 def carry_out(options: argparse.Namespace, command: str) -> int:
     """Compare the models and write the report; the exit status. Refused: the request cannot be carried out."""
     started, terminal = time.perf_counter(), Terminal()
     try:
-        compared = comparison(options)
-        before = made_by(options.out)
+        compared = compared_with(options.reference, options.mjcf, options.joints)
+        if options.scenes:
+            compared = compared._replace(robot=compared.robot.with_scenes(read_scenes(options.scenes, compared.robot)))
+        if options.experiment != "all" and (reason := skipped(options.experiment, compared.robot)):
+            raise Refused(f"{options.experiment} does not apply to {compared.robot.name}: {say(reason)}")
         with new_report(options.out) as folder:
-            report, parts = compute(options, command, compared, folder, terminal, started)
+            report, parts = compute(options, command, compared, folder, terminal)
     except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     from ..report.verdict import passed
@@ -47,31 +44,16 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
         terminal.say(line, "" if number else "bold green" if good else "bold red")
     for line in parts.lines:
         say_error(line)
-    place = f" in place of that of `{before}`" if before not in (None, report.origin["command"]) else ""
-    terminal.say(f"Report: {os.path.join(options.out, 'index.html')}{place} ({time.perf_counter() - started:.1f} s)")
+    terminal.say(f"Report: {os.path.join(options.out, 'index.html')} ({time.perf_counter() - started:.1f} s)")
     return 0 if good else 1
 
 
-def comparison(options: argparse.Namespace) -> Compared:
-    """The file and its reference, with the scenes of --scenes. Refused: the experiment does not apply to the robot."""
-    compared = compared_with(options.reference, options.mjcf, options.joints)
-    if options.scenes:
-        compared = compared._replace(robot=compared.robot.with_scenes(read_scenes(options.scenes, compared.robot)))
-    if options.experiment != "all" and (reason := skipped(options.experiment, compared.robot)):
-        raise Refused(f"{options.experiment} does not apply to {compared.robot.name}: {say(reason)}")
-    return compared
-
-
-def compute(
-    options: argparse.Namespace, command: str, compared: Compared, folder: Path, terminal: Terminal, started: float
-) -> tuple["Report", "Parts"]:
-    """Run the experiments and write the report to a folder."""
-    is_alone, robot = options.experiment != "all", compared.robot
+def compute(options, command: str, compared: Compared, folder: Path, terminal: Terminal) -> tuple:
+    """Run the experiments and write the report to a folder; see write_report."""
+    is_alone, robot, started = options.experiment != "all", compared.robot, time.perf_counter()
     step = compared.integrator_step(options.dt, options.integrator)
     for line in compared.reference.lines:
         terminal.say(line)
-    if options.experiment == "stability" and compared.reading and not compared.reading.drive.feeds_back:
-        terminal.say(block(TEMPLATE, "no_servo", robot=robot.name))
     names = [options.experiment] if is_alone else list(EXPERIMENTS)
     with start_workers() as workers, terminal.progress("imports"):
         for modules in (DRAWING, COMPUTING)[: len(names)]:  # in further processes at the same time
@@ -92,21 +74,17 @@ def compute(
     return write_report(folder, *outcome, list(reasons.items()), origin, compared)
 
 
-def write_report(
-    folder: Path,
-    sections: Sequence["Section"],
-    causes: Sequence[dict],
-    needless: Mapping[str, str],
-    skipped: Sequence[tuple[str, str]],
-    origin: dict,
-    compared: Compared,
-) -> tuple["Report", "Parts"]:
-    """Write a report with its verdict to a folder that has its figures. The arguments are those of examine and of Report."""
+def write_report(folder: Path, sections, causes, needless, skipped, origin: dict, compared: Compared) -> tuple:
+    """Write a report with its verdict to a folder that has its figures: the verdict.Report and its Parts.
+
+    sections, causes, needless: see examine; skipped, origin: see Report.
+    """
     from ..report import files, verdict
 
     parts, count = verdict.Parts(), len(EXPERIMENTS) - len(needless)
-    subject = compared.reference.compared, compared.robot.name
-    words = parts.attempt("the verdict", "No verdict.", verdict.verdict, sections, count, causes, *subject)
+    subjects = {"model": "TMT and MuJoCo", "own": "Your equations and MuJoCo"}
+    of = subjects.get(compared.reference.kind, "The two models"), compared.robot.name
+    words = parts.attempt("the verdict", "No verdict.", verdict.verdict, sections, count, causes, *of)
     skipped = [*skipped, *needless.items()]
     report = verdict.Report(sections, compared.robot, origin, words, causes, skipped, compared.reference)
     return report, files.write(folder, report, parts)

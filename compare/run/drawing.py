@@ -1,7 +1,6 @@
 """Figures on disk, drawn in another process than the one that computes."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from itertools import chain, islice
 from pathlib import Path
 
@@ -9,7 +8,6 @@ import numpy as np
 
 from ..experiments import EXPERIMENTS, module
 from ..judge.check import Result
-from ..process.crash import described
 from ..report import images
 from ..report.folder import writing
 from ..report.text import say
@@ -18,44 +16,25 @@ from ..robots import Robot
 
 
 def draw(
-    experiment: str,
-    result: Result,
-    robot: Robot,
-    folder: Path,
-    others: Mapping[str, Result] | None = None,
-    first: bool = False,
-) -> tuple[list, list]:
-    """The figures of an experiment on disk: names (without .png) and captions; of those that failed: names and why.
+    experiment: str, result: Result, robot: Robot, folder: Path, others: Mapping | None = None, first: bool = False
+) -> list[tuple[str, str]]:
+    """The figures of an experiment on disk: names (without .png) and captions.
 
-    A call of `figures(result, robot)` that raises leaves the later ones alone; an error of the disk is raised. others: the
-    results for the picture of the first screen, see `results_needed`. first: only the first figure, and this picture.
+    others: the results for the picture of the first screen, see `results_needed`. first: only the first figure, and this picture.
     """
-    drawn, failed = [], []
-    try:
-        own = islice(module(experiment).figures(result, robot), 1 if first else None)
-        pictures = getattr(module(experiment), "overview", None) if others else None
-        for call in chain(own, pictures({**others, experiment: result}, robot) if pictures else ()):
-            path = None
-            try:
-                with quiet(robot):
-                    file, figure, caption = call()
-                    while file.casefold() in {other.casefold() for other, _ in drawn}:
-                        file += "_"  # names that differ in signs alone may give one file
-                    path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
-                    with writing(path):
-                        images.save_figure(figure, path)
-                drawn.append((path.name.removesuffix(".png"), say(caption)))
-            except OSError:
-                raise
-            except Exception as error:
-                if path:
-                    path.unlink(missing_ok=True)
-                failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
-    except OSError:
-        raise
-    except Exception as error:
-        failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
-    return drawn, failed
+    drawn, calls = [], islice(module(experiment).figures(result, robot), 1 if first else None)
+    if others and hasattr(module(experiment), "overview"):
+        calls = chain(calls, module(experiment).overview({**others, experiment: result}, robot))
+    with quiet(robot):
+        for call in calls:
+            file, figure, caption = call()
+            while file.casefold() in {other.casefold() for other, _ in drawn}:
+                file += "_"  # names that differ in signs alone may give one file
+            path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
+            with writing(path):
+                images.save_figure(figure, path)
+            drawn.append((path.name.removesuffix(".png"), say(caption)))
+    return drawn
 
 
 def results_needed(experiment: str, names: Sequence[str], sections: Sequence[Section]) -> dict[str, Result]:
@@ -71,6 +50,6 @@ def results_needed(experiment: str, names: Sequence[str], sections: Sequence[Sec
     return {of.experiment: Result(of.experiment, rows=of.rows, label=of.label) for of in results}
 
 
-def quiet(robot: Robot) -> AbstractContextManager:
+def quiet(robot: Robot) -> np.errstate:
     """A block in which NumPy does not warn of NaN where a user's own equations may give it: checks report that."""
-    return np.errstate(all="ignore") if getattr(robot, "own", ()) else nullcontext()
+    return np.errstate(all="ignore" if getattr(robot, "own", ()) else None)

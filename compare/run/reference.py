@@ -1,8 +1,4 @@
-"""The reference with which a file is compared.
-
-The arm's stated numbers, those of a solution, another MJCF file, tmt's equations for the compiled model, or a user's
-own equations: FILE.py:OBJECT, MODULE:OBJECT.
-"""
+"""The reference of a file: the arm's stated numbers, those of a solution, tmt's equations for the model, or a user's own."""
 
 import dataclasses
 from pathlib import Path
@@ -24,7 +20,6 @@ from ..robots.joint_map import JointsError, Unmatched, joint_map, matched_joints
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 SOLUTION = "solution"  # the kind of reference that is another file
-OWN_FILE = "mjcf/arm.xml"  # what is compared where no file is given
 
 
 class JointsDiffer(ModelError):
@@ -36,8 +31,6 @@ class JointsDiffer(ModelError):
 
 
 class Reference(NamedTuple):
-    """The reference of a file."""
-
     kind: str  # of REFERENCES, "solution" or "own"
     file: str  # as it is given, in one line
     open_tree: tuple[str, ...] = ()  # equalities of the file, which are switched off
@@ -48,104 +41,72 @@ class Reference(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The arm, the file, the solution, or the place of own equations."""
         return "arm" if self.kind == "arm" else self.source or self.file
 
     @property
-    def compared(self) -> str:
-        """The subject of the verdict."""
-        return {"model": "TMT and MuJoCo", "own": "Your equations and MuJoCo"}.get(self.kind, "The two models")
-
-    @property
     def matched(self) -> str:
-        """The joints matched under other names, in words; "": none."""
         return f"joints matched: {', '.join(self.renamed)}" if self.renamed else ""
 
     @property
     def lines(self) -> tuple[str, ...]:
         """The first lines of the output and of the report."""
-        lines = [f"reference: {self.kind}; {self.file} compared with {REFERENCES.get(self.kind, self.source)}"]
-        lines += [self.matched] * bool(self.renamed)
-        if self.open_tree:
-            lines.append(f"equalities switched off ({len(self.open_tree)}): {', '.join(self.open_tree)}")
-        return tuple(map(in_one_line, (*lines, *(f"MuJoCo warns: {line}" for line in self.warnings))))
+        first = f"reference: {self.kind}; {self.file} compared with {REFERENCES.get(self.kind, self.source)}"
+        off = f"equalities switched off ({len(self.open_tree)}): {', '.join(self.open_tree)}" if self.open_tree else ""
+        lines = first, self.matched, off, *(f"MuJoCo warns: {line}" for line in self.warnings)
+        return tuple(in_one_line(line) for line in lines if line)
 
 
 class Compared(NamedTuple):
-    """MuJoCo's model, the robot, and the reading of the file."""
-
     reference: Reference
     robot: Robot
     mujoco: Mujoco
     reading: Reading | None  # None: the robot's numbers are stated
 
     def integrator_step(self, dt: float | None, integrator: str | None) -> tuple[float, str] | None:
-        """The step, s, and the integrator of --dt and --integrator, the file's where one is None; None: both are.
-
-        ModelError, in one line: unknown integrator, or no servo.
-        """
+        """The step, s, and the integrator of --dt and --integrator, the file's where one is None; None: both are."""
         if dt is None and integrator is None:
             return None
         if self.reading is None or not self.robot.drive.actuators:
-            why = "has no actuator" if self.reading else "is compared by its stated numbers, which have no actuator"
-            raise ModelError(f"--dt and --integrator need servos, and {self.robot.name} {why}")
+            raise ModelError(f"--dt and --integrator need the servos of a robot's file; {self.robot.name} has none")
         try:
-            name = integrator_by_name(integrator or self.reading.integrator)
+            return self.reading.dt if dt is None else dt, integrator_by_name(integrator or self.reading.integrator)
         except ValueError as error:
             raise ModelError(f"--integrator: {error}") from None
-        return (self.reading.dt if dt is None else dt), name
 
 
-def compared_with(
-    reference: str | None,
-    path: str | None,
-    joints: str | None = None,
-    shown: str | None = None,
-    solution: str | None = None,
-) -> Compared:
+def compared_with(reference, path, joints=None, shown=None, solution=None) -> Compared:
     """A file (None: the arm's) and a reference (None: the arm, if the file has exactly its hinges, else the compiled model).
 
-    joints: of own equations, separated by commas, see joint_map; shown: the name of the file, if not its path; solution: the
-    path of the solution, if not `reference`. ModelError, in one line, for a file that cannot be compared, JointsDiffer for
-    different joints, OwnFileError for equations that cannot be used.
+    All are texts. joints: of own equations, separated by commas, see joint_map; shown: the name of the file, if not its path;
+    solution: the path of the solution, if not `reference`. ModelError, in one line, for a file that cannot be compared,
+    JointsDiffer for different joints, OwnFileError for equations that cannot be used.
     """
-    file, shown = path or ARM.mjcf, in_one_line(shown or path or OWN_FILE)
+    file, shown, source = path or ARM.mjcf, in_one_line(shown or path or "mjcf/arm.xml"), in_one_line(reference or "")
     if reference == "arm" or (reference is None and (path is None or has_hinges(path, ARM.joints))):
-        return with_arm(file, shown)
+        robot, renamed = ARM, ()
+        if not has_hinges(file, ARM.joints):
+            names, renamed = joints_matched(ARM, read(Path(file)), shown, "the arm")
+            robot = ARM.with_joints(names)
+        mujoco = load(file, robot.tree)
+        return Compared(Reference("arm", shown, warnings=mujoco.warnings, renamed=renamed), robot, mujoco, None)
     reading = read(Path(file))
-    of_file = shown, reading.open_tree, reading.warnings
+    of_file = Reference("model", shown, reading.open_tree, reading.warnings)
     if is_solution(reference):
-        return with_solution(reading, of_file, in_one_line(reference), read(Path(solution or reference)))
-    robot = robot_of(reading, shown)
-    mujoco = engine(reading)
+        stated = read(Path(solution or reference))
+        names, renamed = joints_matched(stated, reading, shown, source)
+        robot, stated = robot_of_solution(reading, shown, stated, source, names)
+        of_file = of_file._replace(kind=SOLUTION, source=source, renamed=renamed)
+        return Compared(of_file, robot, engine(reading, stated), reading)
+    robot, mujoco = robot_of(reading, shown), engine(reading)
     if reference in (None, "model"):
-        return Compared(Reference("model", *of_file), robot, mujoco, reading)
+        return Compared(of_file, robot, mujoco, reading)
     own = own_engine(reference, robot, mujoco, joints)
     robot = dataclasses.replace(robot, own=tuple(own.equations.functions))
-    return Compared(Reference("own", *of_file, in_one_line(reference), own), robot, mujoco, reading)
+    return Compared(of_file._replace(kind="own", source=source, own=own), robot, mujoco, reading)
 
 
 def is_solution(reference: str | None) -> bool:
     return (reference or "").lower().endswith((".xml", ".mjcf"))
-
-
-def with_arm(file: str | Path, shown: str) -> Compared:
-    """A file and the arm's stated numbers."""
-    robot, renamed = ARM, ()
-    if not has_hinges(file, ARM.joints):
-        names, renamed = joints_matched(ARM, read(Path(file)), shown, "the arm")
-        robot = ARM.with_joints(names)
-    mujoco = load(file, robot.tree)
-    return Compared(Reference("arm", shown, warnings=mujoco.warnings, renamed=renamed), robot, mujoco, None)
-
-
-def with_solution(reading: Reading, of_file: tuple, reference: str, solution: Reading) -> Compared:
-    """A file and the numbers of a solution."""
-    names, renamed = joints_matched(solution, reading, of_file[0], reference)
-    robot, solution = robot_of_solution(reading, of_file[0], solution, reference, names)
-    return Compared(
-        Reference(SOLUTION, *of_file, reference, renamed=renamed), robot, engine(reading, solution), reading
-    )
 
 
 def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose: str) -> tuple[tuple, tuple]:
@@ -159,15 +120,14 @@ def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose:
 def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None) -> Own:
     """The engine of the equations that FILE.py:OBJECT or MODULE:OBJECT names, called once. OwnFileError if that cannot be."""
     source, coordinates, rng = own_object(reference), robot.coordinates, np.random.default_rng(SEED)
-    try:
-        stated = joint_map(coordinates, joints.split(",")) if joints else None
-    except JointsError as error:
-        raise OwnFileError(f"--joints: {error}") from None
     q = np.concatenate([robot.posture()[None], coordinates.random(rng, 2, robot.ranges)])
     try:
+        stated = joint_map(coordinates, joints.split(",")) if joints else None
         with aside():
             equations = OwnEquations(source, coordinates, stated, robot.tree)
             equations.try_at(q, *rng.uniform(-1.0, 1.0, (2, len(q), coordinates.nv)))
+    except JointsError as error:
+        raise OwnFileError(f"--joints: {error}") from None
     except OwnError as error:
         raise OwnFileError(f"{reference.rstrip(':')}: {error}") from None
     return Own(equations, (method.scheme for method in mujoco.methods.values()))

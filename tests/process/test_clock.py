@@ -4,8 +4,7 @@ import time
 
 import pytest
 
-from compare.process.clock import Clock
-from compare.process.workers import start_workers
+from compare.process.workers import Clock, start_workers
 
 LONG = 0.1  # s
 

@@ -8,7 +8,7 @@ import shutil
 import pytest
 from runs import ROOT, compare, in_shell
 
-from compare.process.clock import Clock
+from compare.process.workers import Clock
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
 from compare.run.examine import progress

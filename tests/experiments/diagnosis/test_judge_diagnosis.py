@@ -4,7 +4,8 @@ import pytest
 from edited import XML, setup_of
 from small_runs import InProcess, Lines
 
-from compare.experiments import diagnosis
+from compare.experiments import diagnosis, parameters
+from compare.judge.check import Result
 from compare.run import examine as experiment
 
 HEAVY = XML.replace('mass="1.5"', 'mass="1.51"')
@@ -48,7 +49,8 @@ def test_damping_is_seen_in_accelerations_alone():
     (["mass", "diagnosis"], HEAVY, ["mass", "diagnosis"], ["mass of forearm"]), (["diagnosis"], XML, ["diagnosis"], []),
 ])  # fmt: skip
 def test_beside_others_it_is_made_where_one_fails(names, text, made, found, tmp_path, monkeypatch):
-    monkeypatch.setattr(experiment, "find_causes", lambda setup: [])  # not by parameters, but in the values
+    # not by parameters, but in the values
+    monkeypatch.setattr(parameters, "rows", lambda setup: Result("parameters", curves={"causes": []}))
     setup = setup_of(text, make=experiment.Setup, states=20, exact_states=1, size="small")
     sections, causes, reasons = experiment.examine(names, setup, tmp_path, Lines(), InProcess())
     assert [section.name for section in sections] == made and list(reasons) == [n for n in names if n not in made]

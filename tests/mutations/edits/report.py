@@ -23,7 +23,7 @@ EDITS = (
     Edit("report.document", "Document.section", "one['file'].endswith(LINKED)", "False",
          "a figure to which the first screen leads is folded"),
     Edit("run.command", "carry_out", "0 if good else 1", "0", "the exit status is 0 whatever fails"),
-    Edit("experiment", "attempt", "result.check(*_1)", "None", "an experiment that breaks off is no failed check"),
+    Edit("run.examine", "add_crash", "result.check(*_1)", "None", "an experiment that breaks off is no failed check"),
     Edit("experiment", "say_outcome", "not check.passed", "False", "the terminal never names a check that fails"),
     Edit("experiment", "say_outcome", "max(used)", "min(used)", "the terminal gives the best check as the worst"),
     # files
