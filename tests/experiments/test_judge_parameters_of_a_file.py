@@ -120,6 +120,14 @@ def test_a_number_that_is_another_one_than_in_the_solution_is_the_cause(tmp_path
     assert len(failing(result)) == len(causes) and len(result.checks) > 20
 
 
+def test_a_small_body_beside_a_large_one_has_its_own_tolerance(tmp_path):
+    large = CART.replace('mass="2" diaginertia="1 1 1"', 'mass="1e5" diaginertia="1e6 1e6 1e6"')
+    small = large.replace('mass="1" diaginertia="0.1 0.2 0.3"', 'mass="1e-3" diaginertia="1e-9 1e-9 1e-9"')
+    for old, new in (("1e-9 1e-9 1e-9", "1e-9 1.000001e-9 1e-9"), ('mass="1e-3"', 'mass="1.000000001e-3"')):
+        assert len(failing(beside_solution(tmp_path, small.replace(old, new), small))) == 1
+    assert failing(beside_solution(tmp_path, small, small)) == []
+
+
 def test_what_is_modelled_is_not_called_switched_off():
     features, result = read(PATHS["gripper"]).features, Result("parameters")
     add_inventory(result, features)

@@ -101,7 +101,8 @@ def rows(setup: Setup) -> Result:
         names = owners(tree, quantity)
         is_whole = quantity in WHOLE_NUMBERS
         for owner, a, b in zip(names, numbers.reshape(len(names), -1), values.reshape(len(names), -1)):
-            unit, tolerance = UNITS[quantity], FACTOR * EPS * np.abs(numbers if robot.stated_in else a).max()
+            is_of_file = robot.stated_in and quantity in ("anchor", "com")  # sums of lengths of the file
+            unit, tolerance = UNITS[quantity], FACTOR * EPS * np.abs(numbers if is_of_file else a).max()
             if owner in slides and quantity not in (*OF_BODIES, "anchor"):
                 unit = OF_SLIDES.get(unit, unit)
             words = dict(enumerate(("the world", *tree.hinge_names), start=-1)) if quantity == "parent" else {}

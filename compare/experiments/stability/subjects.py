@@ -19,7 +19,7 @@ from ...truth.servos import at_rest
 DAMPINGS = (0.0, 0.5, 50.0)  # N m s/rad, added
 SCHEMES = ("rk4", "explicit_euler", "semi_implicit_euler", "implicit", "implicit_midpoint")  # tmt's names
 MOST_POSTURES = 6  # the first of the named postures
-REST = "at rest"  # the posture at which a file's robot rests without torque
+REST = "rest"  # the posture at which a file's robot rests without torque
 
 
 class Subjects(NamedTuple):

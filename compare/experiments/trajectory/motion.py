@@ -73,10 +73,10 @@ def frames(
     alive = (t < (np.inf if ended is None else ended)) & np.isfinite(q).all(axis=1)
     q = np.where(alive[:, None], q, np.nan)
     parts, every = max(1, FRAMES // (len(t) - 1)), -(-(len(t) - 1) // FRAMES)
-    if parts == 1 or case.coordinates.has_balls or alive.sum() < 2:
+    if parts == 1 or case.coordinates.has_balls:
         return t[::every], q[::every]
     times = np.linspace(t[0], t[-1], parts * (len(t) - 1) + 1)
-    between = CubicHermiteSpline(t[alive], q[alive], v[alive])(times)
+    between = CubicHermiteSpline(t[alive], q[alive], v[alive])(times) if alive.sum() > 1 else q[:1]
     return times, np.where((times <= t[alive][-1])[:, None], between, np.nan)
 
 

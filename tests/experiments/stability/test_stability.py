@@ -59,15 +59,15 @@ def read(source):
 def test_of_many_keyframes_the_first_are_looked_at():
     keys = "".join(f'<key name="k{i}" qpos="{0.3 * i}"/>' for i in range(9))
     seen = subjects_of(read(SWING.format(keys=f"<keyframe>{keys}</keyframe>"))[0])
-    assert posture_names(seen.robot) == (*(f"k{i}" for i in range(MOST_POSTURES)), "at rest")
-    assert np.abs(held(seen.robot, "at rest").tau).max() < 1e-6
+    assert posture_names(seen.robot) == (*(f"k{i}" for i in range(MOST_POSTURES)), "rest")
+    assert np.abs(held(seen.robot, "rest").tau).max() < 1e-6
     body = read(PATHS["free_body"])[0]
     assert not subjects_of(body).centres and held(body, "qpos0").sizes[3:].tolist() == [1.0, 1.0, 1.0]
 
 
 def test_a_limit_is_sought_about_the_predicted_one_and_found_again():
     robot, mujoco = read(SWING.format(keys=""))
-    at, known = held(subjects_of(robot).robot, "at rest"), engines_of(mujoco)
+    at, known = held(subjects_of(robot).robot, "rest"), engines_of(mujoco)
     predicted, rk4 = at.limit("rk4")[1], known["mujoco"].methods["RK4"]
     seen, observed = limits.observed_limit(rk4, known, at, 1000, predicted * limits.TRIED_ABOUT)
     assert seen == "finite" and observed == pytest.approx(predicted, rel=1e-3)

@@ -45,7 +45,7 @@ def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_
 
 def test_between_steps_a_run_is_interpolated_until_it_has_diverged(runs):
     coarse = runs[CATCH.name, "rk4", 64]
-    for ended, last in ((None, 5.0), (2.5, 2.5 - 5 / 64)):
+    for ended, last in ((None, 5.0), (2.5, 2.5 - 5 / 64), (5 / 64, 0.0)):
         times, q = motion.frames(CATCH, coarse["t"], *coarse["tmt"], ended)
         np.testing.assert_allclose(times, np.linspace(0.0, 5.0, 129))
         assert (np.isfinite(q).all(axis=1) == (times <= last)).all()

@@ -80,4 +80,4 @@ def find_notes(result: Result, rows: Sequence[dict], predictions: Sequence[Predi
     moved = {at.name: at.away(at.start) for at in resting if at.away(at.start) > RESTS_WITHIN}
     cut = {at.name: [robot.drive.actuators[i].name for i in at.cut] for at in resting if at.cut}
     if moved or cut:
-        result.find("rests", "servos", moved=moved, unit="/".join(dict.fromkeys(robot.coordinates.units)), cut=cut)
+        result.find("rests", "servos", moved=moved, unit=" or ".join(dict.fromkeys(robot.coordinates.units)), cut=cut)
