@@ -6,6 +6,7 @@ from ....engines.mujoco.names import INTEGRATORS
 from ....judge.check import Result
 from ....truth.step_limits import LIMIT_UP_TO
 from . import response
+from .observed import FULL_PUSH
 from .predicted import KNOWN, Prediction
 
 DEFAULT_INTEGRATOR = "Euler"  # MuJoCo's integrator where a file states none
@@ -65,6 +66,7 @@ def verdict(rows: Sequence[dict], integrator: str) -> dict:
         "posture": mine[0]["posture"] if len(postures) > 1 else None,
         "calm": all(row["full_model_calm"] for row in run),
         "speed": max(speeds, default=None),
+        "push": FULL_PUSH,
         "error": max(row["step_response_error"] or 0.0 for row in mine),
     }
 
