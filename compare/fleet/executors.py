@@ -30,6 +30,7 @@ try:
 except ImportError:  # Windows: no memory limit
     resource = None
 
+LONGEST_PATH = 70  # bytes, of the folder of the forkserver's socket, whose whole path may have 107
 SHARE = 0.9  # of the machine's memory, for all its processes together
 CONNECTING = 10.0  # s, time limit for the scheduler and its first worker to answer
 ALONE = 60.0  # s without a worker or a connection after which a fleet ends
@@ -44,8 +45,9 @@ def guarded(function: Callable, arguments: tuple, limit: float, memory: int) -> 
     """The value of a call and "", or None and why there is none. limit: s; memory: bytes."""
     multiprocessing.current_process().daemon = False  # else a worker of Dask may not start a process
     os.environ |= {"MUJOCO_GL": "disabled", "OPENBLAS_NUM_THREADS": "1"}
-    context = multiprocessing.get_context("forkserver" if hasattr(os, "fork") else "spawn")
-    if hasattr(os, "fork"):
+    is_forked = hasattr(os, "fork") and len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PATH
+    context = multiprocessing.get_context("forkserver" if is_forked else "spawn")
+    if is_forked:
         context.set_forkserver_preload([__name__, function.__module__])
     with tempfile.TemporaryDirectory(dir=get_temp_dir(), ignore_cleanup_errors=True) as folder:
         pool = ProcessPool(1, max_tasks=1, context=context)
