@@ -1,5 +1,8 @@
 """Tolerances and rules of what is compared at states and with printed numbers, from the stated numbers written out."""
 
+import dataclasses
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from edited import MOON, setup_of
@@ -8,6 +11,7 @@ from judged import verdicts
 import tmt
 from compare.engines.mujoco import parse
 from compare.experiments import acceleration, gravity, kinematics, mass, published
+from compare.experiments.parameters.numbers import check_forces
 from compare.experiments.quantities import QUANTITIES
 from compare.judge.check import Result
 from compare.judge.entries import Entries
@@ -47,8 +51,21 @@ def test_a_mass_matrix_is_definite_by_more_than_rounding(least, passes):
     # in units of its diagonal: eigenvalues 1 - c and 1 + c of ((1, c), (c, 1)), whatever the units
     c, units = (1 - small) / (1 + small), np.sqrt([1e-9, 1.0])
     M = np.array([[1.0, c], [c, 1.0]]) * np.outer(units, units)
-    mass.check_definiteness(result, "TMT", M[None])
+    mass.check_definiteness(result, "TMT", np.array([np.eye(2), M]))  # the worst state decides
     assert list(verdicts(result).values()) == [passes]
+
+
+def test_forces_that_the_equations_lack_are_zero_except_for_rounding_of_what_is_subtracted():
+    tree, state = dataclasses.replace(ARM.tree, damping=(0.5, 0.5, 0.5)), np.array([[0.1, 0.2, 0.3]])
+    least, forces = 64 * EPS * 0.5 * 4.0, {"actuators": 0.0, "constraints and contacts": 1e-300}
+    other_forces = lambda q, qd: {source: np.array([[force]]) for source, force in forces.items()}  # noqa: E731
+    sample = Sample(tree, "random states", state, np.array([[1.0, -4.0, 2.0]]), state, 0)
+    setup = SimpleNamespace(robot=SimpleNamespace(tree=tree), random=sample)
+    setup.compared = lambda: {"mujoco": SimpleNamespace(other_forces=other_forces)}
+    for share, passed in ((0.99, [True, False, True]), (1.01, [True, False, False])):
+        forces["fluid and tendons"], result = share * least, Result("parameters")
+        check_forces(result, setup)
+        assert list(verdicts(result).values()) == passed
 
 
 @pytest.mark.parametrize("share, passes", [(0.99, True), (1.01, False)])

@@ -48,6 +48,9 @@ def test_lengths_have_what_slides_have_moved():
     assert np.allclose(OF.length, LENGTH, rtol=1e-14)
     for b, T in enumerate(np.broadcast_to(OF.T, (2, 3, 3, 6))[0]):
         assert np.allclose(T[1], COUNT[b] * (SLIDES[b] + LENGTH[0] * TURNS[b]))
+        spin, slip = np.abs(QD) @ TURNS[b], np.abs(QD) @ SLIDES[b]
+        assert np.allclose(OF.v_conv[:, b, 0], COUNT[b] * 2.0 * spin * (LENGTH * spin + slip))
+        assert np.allclose(OF.w_conv[:, b, 0], COUNT[b] * spin**2)
         assert np.allclose(OF.B[0, b], COUNT[b]) and np.allclose(OF.positions[:, b, 0], COUNT[b] * LENGTH)
 
 

@@ -1,6 +1,7 @@
 """The whole experiment: a small run, joints that are locked in both engines, what each scene needs."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import pytest
 from edited import XML, setup_of
@@ -80,6 +81,20 @@ def test_every_subset_agrees_and_a_wrong_lock_is_seen(mujoco):
     assert {check.scene for check in deleted.checks if not check.passed} == expected
 
 
+def test_each_pair_has_its_own_models_and_the_bias_is_compared_in_motion(mujoco):
+    class Faster(Mujoco):
+        """With locked joints its bias is that of speeds that are a bit larger."""
+
+        def of(self, case):
+            dynamics = mujoco.of(case)
+            bias = (lambda q, v: dynamics.bias(q, (1.0 + 1e-9) * v)) if case.locked else dynamics.bias
+            return SimpleNamespace(mass_matrix=dynamics.mass_matrix, bias=bias)
+
+    wrong = Faster(mujoco.model, mujoco.joints, mujoco.bodies, mujoco.source)
+    off = [check for check in blocks(Setup.small(ARM, engines(wrong))).checks if not check.passed]
+    assert {check.quantity for check in off} == {"bias, MuJoCo, reduced to whole", "bias, reduced, TMT to MuJoCo"}
+
+
 @pytest.mark.parametrize("model, joints", [("gripper", 4), ("free_body", 4), ("pendulum_ball", 2)])
 def test_slides_balls_and_each_part_of_a_free_joint_are_locked_alike(model, joints):
     of_blocks = blocks(of_file(PATHS[model]))
@@ -113,6 +128,18 @@ def test_the_planar_arm_moves_as_the_whole_one(engines):
     # a planar arm that starts elsewhere is another motion
     needs.compare_smaller(result, case, smaller.changed(posture=(0, 0, 1e-6)), setup)
     assert {check.quantity for check in result.checks if not check.passed} == {"smallest model to whole"}
+
+
+def test_each_engine_is_compared_with_its_own_smaller_model(engines):
+    class Braked(Mujoco):
+        def of(self, case):
+            return engines["mujoco"].of(case.changed(damping=1e-6) if case.locked else case)
+
+    wrong, case = engines["mujoco"], ARM.cases[0]
+    wrong = Braked(wrong.model, wrong.joints, wrong.bodies, wrong.source)
+    result = Result("reduction", curves={"apart": {}})
+    needs.compare_smaller(result, case, reduced(case), Setup.small(ARM, {**engines, "mujoco": wrong}))
+    assert [check.scene.split(", ")[2] for check in result.checks if not check.passed] == ["MuJoCo"]
 
 
 def test_of_a_users_own_scene_nothing_is_expected_but_agreement(engines):
