@@ -1,6 +1,6 @@
 """Time against error: every integrator of MuJoCo, every method of tmt, SciPy and heyoka, over all useful steps."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
 from ...engines import GRID, IN_QUICK_RUNS, LABELS, methods_in
@@ -12,12 +12,13 @@ from ...judge.scale import EPS, FACTOR
 from ...judge.units import renamed
 from ...judge.words import scene_begins
 from ...robots import Robot
+from ...robots.case import Case
 from ...truth.reference import LOST, has_no_reference
 from .. import Experiment
 from ..setup import Setup
 from . import accuracy, advice, evaluations
 from .first_screen import best_curves, cheapest, choice, target
-from .runs import FIRST_STEPS, measured, prepared, take_times
+from .runs import FIRST_STEPS, measured, prepared, rows_of_scene, take_times
 from .settings import followed, left_out, regular_of, scenes_of
 
 EXPERIMENT = Experiment(order=90, serves_own=False, options=("--scenes",), timed=True, overview="times")
@@ -38,8 +39,8 @@ def skipped(robot: Robot) -> Finding | str | None:
 
 
 def begin(setup: Setup) -> None:
-    """Start measuring all errors, in parallel with other work: they are not timed."""
-    setup.background["speed"] = measured(setup, followed(setup.robot, setup.size))
+    """Start measuring the errors of MuJoCo and tmt, in parallel with other work: they are timed later."""
+    setup.background["speed"] = measured(setup, followed(setup.robot, setup.size), "compiled")
 
 
 def rows(setup: Setup, timed: bool = True) -> Result:
@@ -51,13 +52,15 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result = Result("speed", shown=[])
     if timed and "speed" not in setup.background:
         begin(setup)
-    which, regular = "all" if timed else "same schemes", regular_of(setup.robot)
-    cases, scenes = setup.background.pop("speed") if timed else measured(setup, [regular], which)
+    regular = regular_of(setup.robot)
+    cases, scenes = setup.background.pop("speed") if timed else measured(setup, [regular], "same schemes")
     by_scene = {name: parts for name, *parts in scenes}
-    references, rows_of, floors = ({case.name: by_scene[case.name][k] for case in cases} for k in range(3))
-    result.rows += [row for of_scene in rows_of.values() for row in of_scene]
+    references, floors, rows_of = ({case.name: by_scene[case.name][k] for case in cases} for k in range(3))
     unit = movement_unit(setup.robot.coordinates)
     result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "of_file": setup.robot.is_read}
+    if timed:
+        compiled = add_times(setup, cases, references, floors, rows_of)
+    result.rows += [row for of_scene in rows_of.values() for row in of_scene]
     # with the coarse steps of a quick run errors are regular in this scene only, and other engines have too few settings
     whole, mujoco = setup.size == "full", setup.engines["mujoco"]
     ran = {(row["engine"], row["method"]): row["run"][1] for row in result.rows}
@@ -75,7 +78,7 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     ]
     result.find("references", runs=runs, unit=unit)
     if timed:
-        add_times(result, setup, rows_of)
+        add_advice(result, setup, compiled)
         add_absent(result, setup)
     result.rows = renamed([{name: row.get(name) for name in COLUMNS} for row in result.rows], unit)
     if timed:
@@ -83,18 +86,27 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     return result
 
 
-def add_times(result: Result, setup: Setup, rows_of: Mapping[str, list[dict]]) -> None:
-    """The seconds of all rows, the cheapest settings, and the cost of one evaluation."""
+def add_times(setup: Setup, cases: Sequence[Case], references, floors, rows_of) -> evaluations.Evaluations:
+    """The seconds of all rows of the scenes, the rows of engines that are called, and what `evaluations.costs` times."""
     compiled = evaluations.compiled_evaluations(setup)
-    runs = [prepared(of_scene, setup) for of_scene in rows_of.values()]
+    runs = [prepared(rows_of[case.name], setup) for case in cases]
     setup.quiet()  # nothing else may run while times are taken
-    for (name, of_scene), its_runs in zip(rows_of.items(), runs):
-        setup.progress(f"speed: timing {name}")
-        take_times(of_scene, its_runs, setup)
+    for case, its_runs in zip(cases, runs):
+        setup.progress(f"speed: timing {case.name}")
+        name, of_scene = case.name, rows_of[case.name]
+        called = rows_of_scene(case, setup.engines, references[name], floors[name], setup.size, "called")
+        again = [row for row in called if row["seconds"] < timing.ONCE]
+        take_times(of_scene + again, its_runs + prepared(again, setup), setup)
+        of_scene += called
+    return compiled
+
+
+def add_advice(result: Result, setup: Setup, compiled: evaluations.Evaluations) -> None:
+    """The cheapest settings, and the cost of one evaluation."""
     if settings := cheapest(best_curves(result)):
         result.headline = result.finding("headline", settings=settings, **target(result))
     table = advice.advice(result.rows, list(result.curves["floors"]))
-    result.tables["what_should_i_use"] = renamed(table, result.curves.get("unit", "rad"))
+    result.tables["what_should_i_use"] = renamed(table, result.curves["unit"])
     result.find("columns")
     setup.progress("speed: one evaluation")
     result.tables["evaluations"] = evaluations.costs(setup, compiled)

@@ -1,11 +1,12 @@
 """The runs of each scene by each method and setting: their errors, their times, and the error that rounding leaves."""
 
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
-from tmt import literal
+import tmt
 from tmt.methods import METHODS, amplification
 
 from ...engines import GRID, Dynamics, Engine, Method, Setting
@@ -24,38 +25,36 @@ EACH_STEP = 12  # nv up to which the growth takes the Jacobian of every step; ab
 FIRST_STEPS = 4096  # a longer run of MuJoCo is timed over its first steps only
 
 
-def measured(setup: Setup, cases: Sequence[Case], which: str = "all") -> tuple[Sequence[Case], Iterator[tuple]]:
-    """The scenes, and `rows_of_scene` of each. Different trees come first: their code compiles in parallel."""
+def measured(setup: Setup, cases: Sequence[Case], which: str) -> tuple[Sequence[Case], Iterator[tuple]]:
+    """The scenes, and `scene` of each. Different trees come first: their code compiles in parallel."""
     trees = [case.tree for case in cases]
     different_first = sorted(cases, key=lambda case: trees[: cases.index(case)].count(case.tree))
     return cases, setup.map(partial(scene, engines=setup.engines, size=setup.size, which=which), different_first)
 
 
 def scene(case: Case, engines: Mapping[str, Engine], size: str, which: str) -> tuple:
-    """Name, reference, rows without times, and error of rounding (rad) of a scene."""
+    """Name, reference, error of rounding, rad, and rows without times of a scene; which: see settings.methods."""
     reference = references([case])[case.name]
-    return case.name, reference, *rows_of_scene(case, engines, reference, size, which)
+    left = max(floor(case, engines["tmt"].of(case)), reference.apart)
+    return case.name, reference, left, rows_of_scene(case, engines, reference, left, size, which)
 
 
 def rows_of_scene(
-    case: Case, engines: Mapping[str, Engine], reference: Reference, size: str, which: str
-) -> tuple[list[dict], float]:
-    """The rows of a scene without times, and the error that rounding or the reference leaves in it, rad."""
-    rows, left = [], max(floor(case, engines["tmt"].of(case)), reference.apart)
-    nq = case.coordinates.nq
-    energy = literal.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
+    case: Case, engines: Mapping[str, Engine], reference: Reference, left: float, size: str, which: str
+) -> list[dict]:
+    """The rows of a scene, with times of what is called; left: the error that rounding or the reference leaves in it, rad."""
+    rows, nq = [], case.coordinates.nq
+    energy = tmt.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
     for method in methods(engines, size, which, case.robot, case):
         best, last = np.inf, 0
         for setting in settings_of(method, case, size, which):
             rows.append(row_of_run(case, engines, method, setting, reference, energy, left))
             error, work = accuracy.error(rows[-1]), rows[-1]["evaluations"] or rows[-1]["steps"]
-            too_long = (
-                case.robot.is_read and method.adaptive and work * estimated(method, case.tree) > MOST_SECONDS[size] / 2
-            )
+            too_long = method.adaptive and work * estimated(method, case.tree) > MOST_SECONDS[size] / 2
             if too_long or accuracy.gained_nothing(error, work, best, last, left):
                 break
             best, last = min(best, error), work
-    return rows, left
+    return rows if which == "called" else [row | {"seconds": None} for row in rows]
 
 
 def row_of_run(
@@ -74,15 +73,18 @@ def row_of_run(
     """
     run, read = engines[method.engine].of(case).prepare(*case.start, case.tau, setting, method.name)
     with np.errstate(all="ignore"):
-        motion = read(run())
+        begin = time.perf_counter()
+        outcome = run()
+        seconds = time.perf_counter() - begin
+        motion = read(outcome)
         ended = diverged_at(case, reference.t, motion.q, motion.v) is not None
         error = reference.error(motion.q, range(len(case.joints)))
         error = np.maximum(error, left) if reference.why else error
-        off = 0.0 if ended else np.abs(literal.energy(motion.q, motion.v, case.tree) - energy).max()
+        off = 0.0 if ended else np.abs(tmt.energy(motion.q, motion.v, case.tree) - energy).max()
     return {
         "scene": case.name, "engine": method.engine, "method": method.name,
         "dt_s": setting.duration / setting.steps if setting.steps else None, "tolerance": setting.tolerance,
-        "steps": motion.steps, "evaluations": motion.evaluations, "seconds": None,
+        "steps": motion.steps, "evaluations": motion.evaluations, "seconds": seconds,
         "error_rad": None if ended else float(error[-1]), "worst_error_rad": None if ended else float(error.max()),
         "energy_error_J": None if ended else float(off), "diverged": ended,
         "early": float(error[reference.t <= accuracy.EARLY].max()), "run": (case, method, setting),

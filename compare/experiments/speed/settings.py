@@ -9,17 +9,18 @@ from ...engines import GRID, IN_QUICK_RUNS, Engine, Method, Setting, methods_in,
 from ...robots import Robot
 from ...robots.case import Case
 
-# steps; more would take too long to be timed repeatedly
-FINEST = {"mujoco": 2**16, ("mujoco", "RK4"): 2**17, "tmt": 2**18}
+# steps; more would take too long
+FINEST = {"mujoco": 2**15, ("mujoco", "RK4"): 2**16, "tmt": 2**18}
 FINEST_OTHERS = 2**15  # of other engines, and of methods that solve their stages
 EXPONENTS = {  # k of the coarsest and of the finest tolerance, 10^-k
-    "dopri8_adaptive": (2, 14), "RK45": (2, 12), "DOP853": (2, 13), "Radau": (2, 6), "LSODA": (2, 12), "Taylor": (4, 16),
+    "dopri8_adaptive": (2, 14), "RK45": (2, 12), "DOP853": (2, 13), "Radau": (2, 5), "LSODA": (2, 12), "Taylor": (4, 16),
 }  # fmt: skip
 FEW_SETTINGS = {"quick": 5, "small": 7}  # of a run that is not full: the coarsest settings
 FEW_OTHERS = 2  # the same for engines other than MuJoCo and tmt
 SETTINGS_OF_SAME_SCHEMES = slice(3, 7)  # coarse, yet near the reference where the motion is regular
-# A robot from a file may have any number of joints. Seconds of one evaluation are about a constant times nv^1.5:
-SECONDS, CALL_SECONDS = {"mujoco": 2e-7, "tmt": 5e-8}, 4e-7  # of others, which are called from Python
+# A robot from a file may have any number of joints. Seconds of one evaluation are about a constant times nv^1.5, and of
+# engines that are called from Python those of a call and of the solver's own work:
+SECONDS, CALL_SECONDS = {"mujoco": 2e-7, "tmt": 5e-8}, 3e-5
 ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
 MOST_SECONDS = {"full": 0.6, "quick": 0.1, "small": 0.1}  # estimated, of the finest run of a method
 LEAST_SETTINGS = {"full": 3, "quick": 2, "small": 2}  # of a method, whatever they take
@@ -53,8 +54,10 @@ def followed(robot: Robot, size: str) -> list[Case]:
 def methods(
     engines: Mapping[str, Engine], size: str, which: str = "all", robot: Robot | None = None, case: Case | None = None
 ) -> list[Method]:
-    """The methods of the available engines; which = "same schemes": one of MuJoCo for each scheme, and the same of tmt.
+    """The methods of the available engines, which = "all".
 
+    "same schemes": one of MuJoCo for each scheme, and the same of tmt; "compiled": those whose loop over the steps is compiled;
+    "called": the others, whose runs take so long that they are followed only once.
     case: one in which the robot's actuators may act, which changes the schemes of some methods.
     """
     if which == "same schemes":
@@ -62,11 +65,13 @@ def methods(
         schemes = {method.scheme for method in theirs}
         return [*theirs, *(method for method in engines["tmt"].methods.values() if method.scheme in schemes)]
     excluded = left_out(engines, size, robot)
+    compiled = {name: name in IN_QUICK_RUNS for name in engines}
     return [
         method
-        for engine in engines.values()
+        for name, engine in engines.items()
+        if (compiled[name] or size != "quick") and which in ("all", "compiled" if compiled[name] else "called")
         for method in (methods_in(engine, case) if case else engine.methods).values()
-        if (size != "quick" or engine.name in IN_QUICK_RUNS) and (engine.name, method.name) not in excluded
+        if (name, method.name) not in excluded
     ]
 
 
@@ -100,7 +105,8 @@ def too_slow(method: Method, robot: Robot, size: str) -> str | None:
 def estimated(method: Method, tree: Tree) -> float:
     """Approximate seconds of a step, or of an evaluation of a method with adaptive steps."""
     n = tree.coordinates.nv
-    evaluation = SECONDS.get(method.engine, CALL_SECONDS) * n**1.5
+    is_called = method.engine not in SECONDS
+    evaluation = SECONDS.get(method.engine, SECONDS["tmt"]) * n**1.5 + CALL_SECONDS * is_called
     if method.engine == "mujoco":
         return evaluation * (4 if method.name == "RK4" else 1)
     if method.engine != "tmt" or method.adaptive:

@@ -161,10 +161,15 @@ def test_nanoseconds_of_a_state():
     assert found == {"forward": pytest.approx(2000.0), "step": pytest.approx(10_000.0)}
 
 
-def test_nothing_is_timed_before_all_else_has_ended(setup, monkeypatch):
-    log, setup = [], replace(setup, quiet=lambda: log.append("quiet"))
-    monkeypatch.setattr(speed, "take_times", lambda *_: log.append("timed") or [])
+def test_what_is_called_is_followed_once_after_all_else_has_ended(setup, monkeypatch):
+    log, setup, case = [], replace(setup, quiet=lambda: log.append("quiet")), setup.robot.cases[0]
+    known, called = [row("tmt", "rk4", 1.0)], [row("scipy", "RK45", 1.0, 64, s) for s in (0.019, 0.021)]
+    monkeypatch.setattr(speed, "rows_of_scene", lambda *given: log.append(given[-1]) or called)
+    monkeypatch.setattr(speed, "prepared", lambda rows, setup: rows)
+    monkeypatch.setattr(
+        speed, "take_times", lambda rows, runs, setup: log.append(rows == runs == [known[0], called[0]])
+    )
     monkeypatch.setattr(speed.evaluations, "compiled_evaluations", lambda setup: log.append("made"))
-    monkeypatch.setattr(speed.evaluations, "costs", lambda *_: [])
-    speed.add_times(Result("speed", curves={"floors": {}, "unit": "rad"}), setup, {"a": []})
-    assert log == ["made", "quiet", "timed"]
+    of = {case.name: known}
+    speed.add_times(setup, [case], {case.name: None}, {case.name: 0.0}, of)
+    assert log == ["made", "quiet", "called", True] and of[case.name][1:] == called

@@ -7,7 +7,7 @@ EDITS = (
     Edit("timing", "in_turns", "time.perf_counter() - begin", "7 * (time.perf_counter() - begin)", "seconds x 7"),
     Edit("speed.runs", "take_times", "factor * min(of_row)", "7 * factor * min(of_row)", "reported seconds x 7"),
     Edit("speed.runs", "take_times", "factor * min(of_row)", "factor * max(of_row)", "the slowest run is reported"),
-    Edit("speed.runs", "rows_of_scene", "max(_1, reference.apart)", "_1",
+    Edit("speed.runs", "scene", "max(_1, reference.apart)", "_1",
          "a reference of few digits is taken as exact"),
     Edit("evaluations", "per_state", "1e9 * min(of_call) / count", "1e9 * min(of_call)", "time of all states as that of one"),
     Edit("truth.reference", "Reference.error", "self.low[_1]", "0 * self.low[_1]", "the low part of the reference is dropped"),
