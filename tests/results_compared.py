@@ -47,7 +47,7 @@ WITHOUT = {  # regular expression for the checks of before, or "after: " and one
     "trajectory .* over that of Euler": "energy.csv has the drift of each method",
     "trajectory .* locked, RK4": "reduction compares the smaller model with the whole",
     "trajectory .* drift of energy": "now the order is at least the nominal one",
-    r"speed .*dt = (3\.81|7\.63)e-05 s|speed .* smallest error of mujoco's RK4, where": "steps end a halving earlier, to save time",
+    r"speed .*dt = (3\.81|7\.63)e-05 s|speed .* smallest error of mujoco's RK4, where": "steps end a halving earlier",
     "speed .* scenes that show its order": "orders are checked where errors fall regularly",
     "reduction .* Euler.* (smallest model|time judged|movement|deviation from order)": "the smaller model runs by RK4 only",
     "reduction .* elliptic function, scipy": "tests of truth compare it with 50 digits",

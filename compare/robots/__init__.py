@@ -71,7 +71,7 @@ class Robot:
     kinds: Mapping[str, str] = field(
         default_factory=dict
     )  # example postures of a centre, a saddle, a marginal equilibrium
-    landmarks: Callable | None = None  # q (n,) rad -> {name: point, m}, drawn as a chain; None: origins of the joints
+    landmarks: Callable | None = None  # q (times, n) rad -> points, m, drawn as a chain; None: origins of the joints
     sketched: tuple[str, ...] = ()  # postures of the sketch; (): the first two
     axes: tuple[str, str, str] = ("x", "y", "z")  # labels of the inertial frame
     printed: tuple[Printed, ...] = ()

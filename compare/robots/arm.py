@@ -68,10 +68,9 @@ CLAIMS = Claims(
 )
 
 
-def landmarks(q: np.ndarray) -> dict:
-    """Shoulder, elbow and hand in the world, m, at hinge angles q, rad."""
-    points = tmt.arm.points([float(angle) for angle in q])
-    return {name: np.array([float(c) for c in point]) for name, point in zip(("shoulder", "elbow", "hand"), points)}
+def landmarks(q: np.ndarray) -> list:
+    """Shoulder, elbow and finger tips, vectors in the world of numbers or arrays (times,), m, at angles q (times, 3), rad."""
+    return tmt.arm.points(list(q.T))
 
 
 def remarks(answers: Mapping, dynamics: Mapping) -> list[Finding]:

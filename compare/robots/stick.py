@@ -23,7 +23,7 @@ def stick_figure(robot: Robot, q: np.ndarray, crosses: bool = False) -> tuple[np
     crosses: with the axes of balls at the end of a chain, to show their rotation.
     """
     if robot.landmarks:
-        points = np.array([list(robot.landmarks(one).values()) for one in q])
+        points = np.stack([along_run(point, q) for point in robot.landmarks(q)], axis=1).astype(float)
         return points, [(k, k + 1) for k in range(points.shape[1] - 1)]
     tree, free = robot.tree, {i + k for i in free_joints(robot.tree) for k in range(4)}
     frames = method.joint_frames(tree, list(q.T))

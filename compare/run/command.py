@@ -19,7 +19,7 @@ from ..robots.case import SEED
 from ..robots.scene_file import SceneError, read_scenes
 from .reference import Compared, compared_with
 
-COMPUTING = ("compare.run.examine", "scipy.optimize", "tmt.compiled.machine")  # modules that take long to load
+COMPUTING = ("compare.run.examine", "tmt.compiled.machine")  # modules that take long to load
 DRAWING = ("compare.report.style", *COMPUTING)
 
 

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from ...engines import LABELS
 from ...judge.finding import Finding
@@ -75,6 +74,8 @@ def frames(
     parts, every = max(1, FRAMES // (len(t) - 1)), -(-(len(t) - 1) // FRAMES)
     if parts == 1 or case.coordinates.has_balls:
         return t[::every], q[::every]
+    from scipy.interpolate import CubicHermiteSpline  # slow import
+
     times = np.linspace(t[0], t[-1], parts * (len(t) - 1) + 1)
     between = CubicHermiteSpline(t[alive], q[alive], v[alive])(times) if alive.sum() > 1 else q[:1]
     return times, np.where((times <= t[alive][-1])[:, None], between, np.nan)

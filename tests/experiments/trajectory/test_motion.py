@@ -27,7 +27,7 @@ def runs(engines):
 
 
 def seen(path) -> np.ndarray:
-    return as_seen(np.array([list(landmarks(q).values()) for q in path]))
+    return as_seen(np.array([[np.array([*point], float) for point in landmarks(q)] for q in path]))
 
 
 @pytest.fixture(scope="module")
