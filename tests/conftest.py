@@ -3,6 +3,7 @@
 import os
 import pickle
 import signal
+import tempfile
 from collections import defaultdict
 from pathlib import Path
 
@@ -71,6 +72,11 @@ def common(tmp_path_factory, worker_id) -> Path:
     """A folder of all processes that run the tests."""
     own = tmp_path_factory.getbasetemp()
     return own if worker_id == "master" else own.parent
+
+
+@pytest.fixture(scope="session", autouse=True)
+def temporary_files(tmp_path_factory):
+    tempfile.tempdir = str(tmp_path_factory.getbasetemp())
 
 
 @pytest.fixture(scope="session")

@@ -25,6 +25,13 @@ def test_outcomes_on_this_machine():
         toy.check_all(pool)
 
 
+@pytest.mark.parametrize("times, outcome", [(1, (4, "")), (9, (None, "killed by SIGKILL, 4 times"))])
+def test_a_call_whose_process_is_killed_is_made_again_three_times(times, outcome, tmp_path):
+    with closing(Pool(1, 60.0)) as pool:
+        assert pool.outcome(pool.submit(toy.is_killed, str(tmp_path), times)) == outcome
+    assert len(os.listdir(tmp_path)) == min(times + 1, 4)
+
+
 class Machines:
     """A scheduler and workers, started with Dask's own commands. folder: for what they write."""
 
@@ -92,6 +99,29 @@ def test_a_worker_and_a_scheduler_that_are_killed(machines, tmp_path, monkeypatc
         assert soon(lambda: cluster.client.status != "running")
         with pytest.raises(Refused, match=f"no worker .* {machines.address}"):
             cluster.check()
+
+
+@pytest.mark.slow
+def test_a_call_that_costs_four_workers_is_not_made_again(machines):
+    machines.worker("--nanny")
+    with closing(Cluster(machines.address, 60.0)) as cluster:
+        (future := cluster.submit(toy.kills_its_parent)).exception()
+        value, why = cluster.outcome(future)
+        assert value is None and "4 workers" in why
+
+
+@pytest.mark.slow
+def test_times_are_measured_by_workers_that_offer_it(machines):
+    machines.worker()
+    with pytest.raises(Refused, match="timing=1"):
+        Cluster(machines.address, 60.0, "timing")
+    machines.worker("--no-nanny", "--resources", "timing=1")
+    with closing(Cluster(machines.address, 60.0)) as all_workers:
+        assert soon(lambda: all_workers.threads_now() == 2)
+    with closing(Cluster(machines.address, 60.0, "timing")) as cluster:
+        futures = [cluster.submit(os.getppid) for _ in range(3)]
+        assert cluster.workers == 1
+        assert len({cluster.outcome(future) for future in futures if not future.exception()}) == 1
 
 
 @pytest.mark.slow
