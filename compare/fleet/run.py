@@ -27,11 +27,7 @@ class Run:
         self, models: Sequence[Model], options: FleetOptions, executor: Pool | Cluster, out: Path, sent: Mapping
     ):
         self.models, self.options, self.executor, self.out, self.sent = models, options, executor, out, sent
-        self.rows, self.first, self.copies = (
-            [],
-            {},
-            [],
-        )  # first: the model of each content; copies: (model, first model)
+        self.rows, self.first, self.copies = [], {}, []  # first: model of each content; copies: (model, first)
 
     def carry_out(self, progress: Callable[[list[dict]], object]) -> None:
         """Run to the end, copies last. progress is called with the new rows, and every POLLING s."""
@@ -51,12 +47,12 @@ class Run:
                 else:
                     self.receive(*under_way.pop(future), *self.executor.outcome(future))
             progress(self.rows[before:])
-        rows = {row["file"]: row for row in self.rows}
+        before, rows = len(self.rows), {row["file"]: row for row in self.rows}
         for model, first in self.copies:
             row = rows[first.shown]
             reason = ": ".join(filter(None, (f"copy of {first.shown}", row["reason"])))
             self.end(model, row | {"same_as": first.shown, "reason": reason, "seconds": 0.0})
-        progress(self.rows[len(rows) :])
+        progress(self.rows[before:])
 
     def start(self, model: Model) -> tuple | None:
         """The future of a file and its key; None: it is not readable, a copy, or its report is up to date."""

@@ -56,8 +56,7 @@ def row_of(*checks, limits=(), causes=(), lost=(), reference=("arm",)):
     (AGREE, [good(), OWN], {}, "2 ms"),  # its own step is not stable: the reason says so
     (ITSELF, [good()], {"reference": ("model",)}, ""),
     (DIFFER, [good(1.0 + 1e-9), OWN, OFF], {"causes": CAUSES}, "mass of upper"),
-    (DIFFER, [good(1.0 + 1e-9), BROKEN, OWN, OFF], {"causes": CAUSES}, "SIGKILL, 4 times"),
-    (DIFFER, [good(1.0 + 1e-9)], {"lost": ["the table"]}, "the table"),
+    (DIFFER, [good(1.0 + 1e-9), BROKEN], {"causes": CAUSES, "lost": ["the table"]}, "SIGKILL, 4 times, and 1 more"),
     (BROKE, [good(), BROKEN, OWN, OFF], {}, "SIGKILL, 4 times"),
     (BROKE, [good()], {"lost": ["the table"]}, "the table"),
     (UNCONFIRMED, [good(), OFF, OWN], {}, "0.01"),
