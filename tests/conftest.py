@@ -3,6 +3,7 @@
 import os
 import pickle
 import signal
+import tempfile
 from collections import defaultdict
 from pathlib import Path
 
@@ -66,10 +67,11 @@ def pytest_terminal_summary(terminalreporter):
             terminalreporter.line(f"{seconds[name]:7.1f} s  {name}")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="session", autouse=True)
 def common(tmp_path_factory, worker_id) -> Path:
     """A folder of all processes that run the tests."""
     own = tmp_path_factory.getbasetemp()
+    tempfile.tempdir = str(own)  # a fleet leaves its folder there until its process ends
     return own if worker_id == "master" else own.parent
 
 

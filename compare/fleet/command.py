@@ -27,6 +27,8 @@ from ..report.terminal import Terminal
 from ..report.text import block
 
 SENT = "reference of the fleet"  # folder of the solution in a bundle
+TIMING = "timing"  # resource of Dask's workers on which nothing else runs
+PERIOD = 10.0  # s between two lines of the progress where it cannot be shown
 EPILOG = block("fleet", "examples") + "\n"
 
 
@@ -87,8 +89,8 @@ def fleet_status(arguments: Sequence[str]) -> int:
         raise SystemExit(0)
     if not options.paths:
         made.error(f"no PATH given; expected a file, a folder, a pattern or @LIST: {PROGRAM} {FLEET} models")
-    if bool(options.workers) + bool(options.dask) + options.timing > 1:
-        made.error("only one of --workers, --dask and --timing can be given")
+    if options.workers and (options.dask or options.timing):
+        made.error("--workers cannot be combined with --dask or --timing")
     names = experiments_of(made, options.only, options.timing)
     return run_fleet(options, names, shlex.join(["python", "-m", "compare", FLEET, *arguments]))
 
@@ -110,13 +112,13 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     file_options = FleetOptions(names, not options.full, options.reference, next(iter(sent), ""))
     with locked(out):
         if options.dask:
-            executor = Cluster(options.dask, options.limit)
+            executor = Cluster(options.dask, options.limit, TIMING if options.timing else None)
         else:
             executor = Pool(1 if options.timing else options.workers or cores(), options.limit)
         try:
             run = Run(models, file_options, executor, out, sent)
             terminal.tell(run.progress)
-            with terminal.progress(""):
+            with terminal.progress("", PERIOD):
                 run.carry_out(lambda rows: say_rows(terminal, rows))
         finally:
             executor.close()

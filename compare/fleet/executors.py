@@ -14,8 +14,7 @@ import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from functools import partial
-from multiprocessing.util import get_temp_dir
+from functools import cache, partial
 from pathlib import Path
 
 from pebble import ProcessExpired, ProcessPool
@@ -30,6 +29,7 @@ try:
 except ImportError:  # Windows: no memory limit
     resource = None
 
+KILLED, RETRIES = -9, 3  # exit code after SIGKILL, and how often the call is made again, as a Dask scheduler does
 LONGEST_PATH = 70  # bytes, of the folder of the forkserver's socket, whose whole path may have 107
 SHARE = 0.9  # of the machine's memory, for all its processes together
 CONNECTING = 10.0  # s, time limit for the scheduler and its first worker to answer
@@ -41,33 +41,47 @@ class OtherVersion(RuntimeError):
     """A worker runs a different version of compare or MuJoCo."""
 
 
-def guarded(function: Callable, arguments: tuple, limit: float, memory: int) -> tuple[object, str]:
-    """The value of a call and "", or None and why there is none. limit: s; memory: bytes."""
+@cache
+def own_folder() -> str:
+    """A folder for the temporary files of this process and those that it starts; deleted when the command ends."""
+    tempfile.tempdir = tempfile.mkdtemp(prefix="fleet-")  # of the forkserver's socket too
+    interrupt.undo.append(partial(shutil.rmtree, tempfile.tempdir, ignore_errors=True))
+    return tempfile.tempdir
+
+
+def guarded(function: Callable, arguments: tuple, limit: float, memory: int, place: str) -> tuple[object, str]:
+    """The value of a call and "", or None and why there is none.
+
+    A process that is killed by SIGKILL (no memory, an operator) may have done nothing wrong: its call is made again.
+    limit: s; memory: bytes; place: folder for temporary files, deleted if this process is killed.
+    """
     multiprocessing.current_process().daemon = False  # else a worker of Dask may not start a process
     os.environ |= {"MUJOCO_GL": "disabled", "OPENBLAS_NUM_THREADS": "1"}
     is_forked = hasattr(os, "fork") and len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PATH
     context = multiprocessing.get_context("forkserver" if is_forked else "spawn")
     if is_forked:
         context.set_forkserver_preload([__name__, function.__module__])
-    with tempfile.TemporaryDirectory(dir=get_temp_dir(), ignore_cleanup_errors=True) as folder:
-        pool = ProcessPool(1, max_tasks=1, context=context)
-        try:
-            return pool.schedule(alone, (function, arguments, folder, memory), timeout=limit).result()
-        except TimeoutError:
-            return None, f"time limit of {limit:g} s exceeded"
-        except ProcessExpired as error:
-            code = error.exitcode
-            return None, f"exit status {code}" if code >= 0 else f"killed by {signal.Signals(-code).name}"
-        except Exception as error:  # the value cannot be sent
-            return None, described(error)
-        finally:
-            pool.stop()
-            pool.join()
+    for _ in range(1 + RETRIES):
+        with tempfile.TemporaryDirectory(dir=place, ignore_cleanup_errors=True) as folder:
+            pool = ProcessPool(1, max_tasks=1, context=context)
+            try:
+                return pool.schedule(alone, (function, arguments, folder, memory, place), timeout=limit).result()
+            except TimeoutError:
+                return None, f"time limit of {limit:g} s exceeded"
+            except ProcessExpired as error:
+                if (code := error.exitcode) != KILLED:
+                    return None, f"exit status {code}" if code >= 0 else f"killed by {signal.Signals(-code).name}"
+            except Exception as error:  # the value cannot be sent
+                return None, described(error)
+            finally:
+                pool.stop()
+                pool.join()
+    return None, f"killed by SIGKILL, {1 + RETRIES} times"
 
 
-def alone(function: Callable, arguments: tuple, folder: str, memory: int) -> tuple[object, str]:
+def alone(function: Callable, arguments: tuple, folder: str, memory: int, place: str) -> tuple[object, str]:
     """Make a call in this process, in a folder of its own."""
-    end_with_parent(os.path.dirname(folder))
+    end_with_parent(place)
     os.chdir(folder)
     for number in (1, 2):
         os.dup2(os.open(os.devnull, os.O_WRONLY), number)
@@ -98,10 +112,9 @@ class Pool:
         self.workers, self.limit = workers, limit
         self.memory = int(SHARE * memory_of_machine() / workers)
         self.threads = ThreadPoolExecutor(workers)
-        interrupt.undo.append(partial(shutil.rmtree, get_temp_dir(), ignore_errors=True))
 
     def submit(self, function: Callable, *arguments: object):
-        return self.threads.submit(guarded, function, arguments, self.limit, self.memory)
+        return self.threads.submit(guarded, function, arguments, self.limit, self.memory, own_folder())
 
     def outcome(self, future) -> tuple[object, str]:
         """The value of a call that is done and "", or None and why there is none."""
@@ -115,9 +128,12 @@ class Pool:
 
 
 class Cluster:
-    """The workers of a Dask scheduler; the methods are those of Pool. Refused: no scheduler, or no worker."""
+    """The workers of a Dask scheduler; the methods are those of Pool. Refused: no scheduler, or no worker.
 
-    def __init__(self, address: str, limit: float):
+    resource: of the workers, 1 of which a call needs; None: a thread.
+    """
+
+    def __init__(self, address: str, limit: float, resource: str | None = None):
         try:
             import distributed
         except ImportError:
@@ -125,7 +141,7 @@ class Cluster:
         for name in LOGGERS:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are reported here, in one line
         warnings.filterwarnings("ignore", module="distributed")
-        self.address, self.limit, self.answered = address, limit, time.monotonic()
+        self.address, self.limit, self.resource, self.answered = address, limit, resource, time.monotonic()
         try:
             self.client = distributed.Client(address, timeout=CONNECTING, set_as_default=False, name="fleet")
         except Exception as error:
@@ -136,17 +152,23 @@ class Cluster:
         self.workers = self.threads_now()
         if not self.workers:
             self.close()
-            raise Refused(f"the scheduler {address} has no worker")
+            offers = f" with --resources {resource}=1" if resource else ""
+            raise Refused(f"the scheduler {address} has no worker{offers}")
 
     def threads_now(self) -> int:
         """Number of calls that the workers run at the same time; 0 without a connection."""
         with suppress(Exception):
             if self.client.status == "running":
-                return sum(self.client.nthreads().values())
+                workers = self.client.scheduler_info()["workers"].values()
+                if self.resource:
+                    return int(sum(worker["resources"].get(self.resource, 0) for worker in workers))
+                return sum(worker["nthreads"] for worker in workers)
         return 0
 
     def submit(self, function: Callable, *arguments: object):
-        return self.client.submit(on_worker, function, arguments, self.limit, program(), pure=False)
+        resources = {self.resource: 1} if self.resource else None
+        given = function, arguments, self.limit, program()
+        return self.client.submit(on_worker, *given, pure=False, resources=resources)
 
     def outcome(self, future) -> tuple[object, str]:
         if future.status == "finished":
@@ -156,7 +178,7 @@ class Cluster:
             raise Refused(f"lost the connection to the scheduler {self.address}; {RESUME}")
         error = future.exception(timeout=CONNECTING)
         if type(error).__name__ == "KilledWorker":
-            return None, f"several workers lost, the last one {error.last_worker.address}"
+            return None, f"{1 + error.allowed_failures} workers lost, the last one {error.last_worker.address}"
         if isinstance(error, OtherVersion | ImportError | AttributeError):
             raise Refused(f"a worker runs a different version of compare or MuJoCo: {error}; {RESUME}")
         return None, described(error)
@@ -179,4 +201,4 @@ def on_worker(function: Callable, arguments: tuple, limit: float, expected: str)
     if program() != expected:
         raise OtherVersion(f"worker {worker.address}; all workers need the version of this machine")
     memory = worker.memory_manager.memory_limit or memory_of_machine()
-    return guarded(function, arguments, limit, int(SHARE * memory / worker.state.nthreads))
+    return guarded(function, arguments, limit, int(SHARE * memory / worker.state.nthreads), worker.local_directory)

@@ -27,10 +27,10 @@ class Run:
         self, models: Sequence[Model], options: FleetOptions, executor: Pool | Cluster, out: Path, sent: Mapping
     ):
         self.models, self.options, self.executor, self.out, self.sent = models, options, executor, out, sent
-        self.rows = []
+        self.rows, self.first, self.copies = [], {}, []  # first: model of each content; copies: (model, first)
 
     def carry_out(self, progress: Callable[[list[dict]], object]) -> None:
-        """Run to the end. progress is called with the new rows, and every POLLING s."""
+        """Run to the end, copies last. progress is called with the new rows, and every POLLING s."""
         done, under_way, waiting = SimpleQueue(), {}, self.models[::-1]
         while waiting or under_way:
             before = len(self.rows)
@@ -47,15 +47,26 @@ class Run:
                 else:
                     self.receive(*under_way.pop(future), *self.executor.outcome(future))
             progress(self.rows[before:])
+        before, rows = len(self.rows), {row["file"]: row for row in self.rows}
+        for model, first in self.copies:
+            row = rows[first.shown]
+            reason = ": ".join(filter(None, (f"copy of {first.shown}", row["reason"])))
+            self.end(model, row | {"same_as": first.shown, "reason": reason, "seconds": 0.0})
+        progress(self.rows[before:])
 
     def start(self, model: Model) -> tuple | None:
-        """The future of a file and its key; None: it is done, because it is not readable or its report is up to date."""
+        """The future of a file and its key; None: it is not readable, a copy, or its report is up to date."""
         try:
             files = bundle(model) | self.sent
         except OSError as error:
             self.end(model, {"verdict": REFUSED, "reason": f"not readable: {error.strerror}"})
             return None
         hashes = [(name, hashlib.sha256(content).hexdigest()) for name, content in files.items()]
+        (own_name, own_hash), *others = hashes
+        first = self.first.setdefault((Path(own_name).with_stem("model"), own_hash, *others), model)
+        if first is not model:
+            self.copies.append((model, first))
+            return None
         inputs = repr((program(), hashes, model.shown, self.options))
         key = hashlib.sha256(inputs.encode("utf-8", "backslashreplace")).hexdigest()
         if row := saved_row(self.out / place_of_report(model.shown), key):
@@ -72,7 +83,7 @@ class Run:
         self.end(model, row)
 
     def end(self, model: Model, row: dict) -> None:
-        self.rows.append(EMPTY_ROW | {"file": model.shown} | row)
+        self.rows.append(EMPTY_ROW | row | {"file": model.shown})
 
     def progress(self) -> list[str]:
         """How far the fleet is: "3 of 12 files", "1 differ", "2 agree"."""

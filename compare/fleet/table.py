@@ -28,7 +28,7 @@ HEADS = {  # columns of the page, after the file
     "worst_ratio": "share of tolerance", "file_integrator": "integrator", "file_dt_s": "step, ms",
     "stable_at_file_dt": "stable", "limit_s": "limit, ms", "seconds": "processor, s",
 }  # fmt: skip
-FLEET_COLUMNS = ("file", "sha256", *HEADS)
+FLEET_COLUMNS = ("file", "sha256", "same_as", *HEADS)
 EMPTY_ROW = dict.fromkeys(FLEET_COLUMNS) | {"reason": "", "seconds": 0.0, "has_report": False}
 REFERENCES = {"arm": "stated numbers", SOLUTION: "the solution", "model": "itself"}
 CHANGES = {"verdict": "verdict", "stable_at_file_dt": "stable", "limit_s": "limit in s"}  # columns and their names
@@ -41,25 +41,28 @@ def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Seque
     An unstable step of the file and joints that are matched by other names do not change the verdict; the reason names them.
     """
     differing, broke, unstable, unconfirmed = failures(sections)
+    unfinished = [*(f"{check.experiment}: {check.note}" for check in broke), *lost]
     top = worst(sections)
     stable, limit = own_step(sections)
     if differing:
-        outcome, reason = DIFFER, str(differing[0])
-        if causes:
-            reason = causes[0]["text"] + (f", and {len(causes) - 1} more" if len(causes) > 1 else "")
-    elif broke or lost:
-        outcome, reason = BROKE, f"{broke[0].experiment}: {broke[0].note}" if broke else lost[0]
+        outcome, reasons = DIFFER, [first_of([cause["text"] for cause in causes] or [str(differing[0])])]
+    elif unfinished:
+        outcome, reasons = BROKE, []
     elif not any(check.about == About.MODELS for section in sections for check in section.result.checks):
-        outcome, reason = REFUSED, "no comparison was possible"
+        outcome, reasons = REFUSED, ["no comparison was possible"]
     else:
         outcome = UNCONFIRMED if unconfirmed else ITSELF if reference.kind == "model" else AGREE
         reasons = [unconfirmed_in_words(unconfirmed)] if unconfirmed else []
         reasons += [unstable_in_words(unstable)] if unstable else []
-        reason = "; ".join(reasons)
+    reasons += [f"not finished: {first_of(unfinished)}"] if unfinished else []
     return {
-        "verdict": outcome, "reason": "; ".join(filter(None, (reason, reference.matched))),
+        "verdict": outcome, "reason": "; ".join(filter(None, (*reasons, reference.matched))),
         "worst_ratio": None if top is None else top.over_tolerance, "stable_at_file_dt": stable, "limit_s": limit,
     }  # fmt: skip
+
+
+def first_of(reasons: Sequence[str]) -> str:
+    return reasons[0] + (f", and {len(reasons) - 1} more" if len(reasons) > 1 else "")
 
 
 def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
@@ -128,8 +131,9 @@ def write_table(
     rows = sorted(run.rows, key=order)
     numbers = run.verdicts
     unstable = [row["file"] for row in rows if row["stable_at_file_dt"] is False]
-    text = block("fleet", "summary", numbers={v: numbers[v] for v in VERDICTS if numbers[v]}, unstable=unstable,
-                 left_out=left_out)  # fmt: skip
+    copies = sum(row["same_as"] is not None for row in rows)
+    text = block("fleet", "summary", numbers={v: numbers[v] for v in VERDICTS if numbers[v]}, copies=copies,
+                 unstable=unstable, left_out=left_out)  # fmt: skip
     summary = [line for line in text.split("\n") if line]
     origin = {
         "command": command,
@@ -159,7 +163,7 @@ def shown_row(row: dict) -> dict:
     return row | {
         "cells": {name: cell(name, row[name]) for name in HEADS},
         "kind": "bad" if is_bad else "good" if row["verdict"] == AGREE else "none",
-        "address": quote(f"{place_of_report(row['file'])}/index.html"),
+        "address": quote(f"{place_of_report(row['same_as'] or row['file'])}/index.html"),
     }
 
 

@@ -18,9 +18,6 @@ from ..process.streams import Stream, readable
 EMPTY_LINE, SHOW_CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the cursor that was hidden
 
 
-SILENT_FOR = 25.0  # s, at most, without a line if the progress cannot be shown
-
-
 class Terminal:
     """Prints lines on stdout. If stderr is a terminal, it shows the progress there, else in a line now and then."""
 
@@ -29,7 +26,7 @@ class Terminal:
         self.lines, self.screen = (
             Console(file=stream, force_terminal=stream.isatty(), width=80, height=25) for stream in (self.out, self.err)
         )
-        self.status, self.text, self.how_far, self.spoke = None, "", list, time.monotonic()
+        self.status, self.text, self.how_far = None, "", list
 
     def say(self, text="", style="") -> None:
         """Print a line; on a narrower terminal without wide gaps, wrapped between words."""
@@ -40,7 +37,6 @@ class Terminal:
             text = fill(
                 text, max(columns, 20), subsequent_indent=indent + "  ", break_long_words=False, break_on_hyphens=False
             )
-        self.spoke = time.monotonic()
         with self.paused():
             self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
 
@@ -52,12 +48,12 @@ class Terminal:
         self.how_far = how_far
 
     @contextmanager
-    def progress(self, text: str):
-        """Show the progress during this block, if that is possible; else print it after 25 s without a line."""
+    def progress(self, text: str, period: float = 25.0):
+        """Show the progress during this block, if that is possible; else print it every period (s)."""
         self.show(text)
         if not self.screen.is_terminal or self.screen.is_dumb_terminal:
             ended = threading.Event()
-            threading.Thread(target=self.speak_until, args=(ended,), daemon=True).start()
+            threading.Thread(target=self.speak_until, args=(ended, period), daemon=True).start()
             try:
                 yield
             finally:
@@ -73,11 +69,9 @@ class Terminal:
             self.status = None
             interrupt.undo.remove(wipe)
 
-    def speak_until(self, ended: threading.Event) -> None:
-        """Print the progress whenever no line was printed for long."""
-        while not ended.wait(min(1.0, SILENT_FOR)):
-            if time.monotonic() - self.spoke >= SILENT_FOR:
-                self.say("  " + ": ".join(filter(None, (", ".join(self.how_far()), self.text))))
+    def speak_until(self, ended: threading.Event, period: float) -> None:
+        while not ended.wait(period):
+            self.say("  " + ": ".join(filter(None, (", ".join(self.how_far()), self.text))))
 
     def line(self) -> str:
         """The progress, as far as there is room, no name twice."""

@@ -25,6 +25,13 @@ def test_outcomes_on_this_machine():
         toy.check_all(pool)
 
 
+@pytest.mark.parametrize("times, outcome", [(1, (4, "")), (9, (None, "killed by SIGKILL, 4 times"))])
+def test_a_call_whose_process_is_killed_is_made_again_three_times(times, outcome, tmp_path):
+    with closing(Pool(1, 60.0)) as pool:
+        assert pool.outcome(pool.submit(toy.is_killed, str(tmp_path), times)) == outcome
+    assert len(os.listdir(tmp_path)) == min(times + 1, 4)
+
+
 class Machines:
     """A scheduler and workers, started with Dask's own commands. folder: for what they write."""
 
@@ -92,6 +99,21 @@ def test_a_worker_and_a_scheduler_that_are_killed(machines, tmp_path, monkeypatc
         assert soon(lambda: cluster.client.status != "running")
         with pytest.raises(Refused, match=f"no worker .* {machines.address}"):
             cluster.check()
+
+
+@pytest.mark.slow
+def test_times_are_measured_where_that_is_offered_and_a_call_costs_four_workers_at_most(machines):
+    machines.worker()
+    machines.worker("--nanny", "--resources", "timing=1")
+    with closing(Cluster(machines.address, 60.0)) as cluster:
+        assert soon(lambda: cluster.threads_now() == 2)
+    with pytest.raises(Refused, match="quiet=1"):
+        Cluster(machines.address, 60.0, "quiet")
+    with closing(Cluster(machines.address, 60.0, "timing")) as cluster:
+        futures = [cluster.submit(os.getppid) for _ in range(3)]
+        assert len({cluster.outcome(future) for future in futures if not future.exception()}) == 1 == cluster.workers
+        (future := cluster.submit(toy.kills_its_worker)).exception()
+        assert "4 workers" in cluster.outcome(future)[1]
 
 
 @pytest.mark.slow

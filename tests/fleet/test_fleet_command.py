@@ -35,12 +35,13 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_a_fleet_says_which_file_differs_and_why_and_has_a_tidy_table(folder, capsys):
+def test_a_fleet_says_which_file_differs_and_why_and_has_a_tidy_table(folder, monkeypatch, capsys):
+    monkeypatch.setattr("compare.fleet.command.PERIOD", 0.1)
     assert main(["fleet", "m/**", "--only", "parameters", "--out", "out", "--workers", "1"]) == 1
     shown, err = capsys.readouterr()
     lines = shown.splitlines()
     said = {line.split()[0]: line for line in lines if line.split()[:1] and ".xml:" in line}
-    assert err == "" and "Left out: 1 file" in shown and "out/index.html (" in lines[-1]
+    assert err == "" and "0 of 3 files" in shown and "Left out: 1 file" in shown and "out/index.html (" in lines[-1]
     assert f"m/x/{NAME}: " in said["self-consistent"] and " %" in said["self-consistent"]
     assert "m/heavy.xml: mass of upper arm: stated 1.9 kg, compiled 9 kg" in said["differ"]
     assert "\x1b" not in shown and "\r" not in shown  # nothing moves in a pipe
@@ -86,7 +87,7 @@ def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_
 @pytest.mark.parametrize("arguments, word", [
     (["fleet", "m", "--onyl=mass"], "did you mean --only?"), (["fleet", "m", "--reference", "my.py:"], "FILE.xml"),
     (["fleet", "m", "--limit", "nan"], "--limit: 'nan'"), (["fleet", "m", "--only", "speed"], "--timing"),
-    (["fleet", "m", "--dask", "x", "--workers", "2"], "--workers"),
+    (["fleet", "m", "--dask", "x", "--workers", "2"], "--workers"), (["fleet", "m", "--timing", "--workers", "2"], "--workers"),
     (["fleet", "m", "--since", "nowhere"], "nowhere/fleet.csv"), (["fleet", "m", "--out", "m/part.xml"], "m/part.xml"),
 ])  # fmt: skip
 def test_what_is_mistyped_or_cannot_be_carried_out_gets_status_2_and_one_line(arguments, word, folder, capsys):
@@ -100,7 +101,8 @@ def test_what_is_mistyped_or_cannot_be_carried_out_gets_status_2_and_one_line(ar
 
 @pytest.mark.parametrize("words, asked", [
     (["--workers", "3", "--limit", "7"], ("Pool", 3, 7.0, True)),
-    (["--dask", "tcp://x:1", "--full"], ("Cluster", "tcp://x:1", 1800.0, False)),
+    (["--dask", "tcp://x:1", "--full"], ("Cluster", "tcp://x:1", 1800.0, None, False)),
+    (["--dask", "tcp://x:1", "--timing"], ("Cluster", "tcp://x:1", 1800.0, "timing", True)),
 ])  # fmt: skip
 def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, capsys):
     seen = []
@@ -165,3 +167,4 @@ def test_a_signal_and_the_same_command_again(temporary, tmp_path, number):
     assert (run.returncode, run.stderr) == (0, ""), run.stdout
     assert {path: when for path, when in cached().items() if path in known} == known  # not computed again
     assert len(cached()) == 2 > len(known)
+    assert number == signal.SIGKILL or not list(temporary.iterdir())

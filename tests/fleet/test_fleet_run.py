@@ -112,6 +112,18 @@ def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
         assert len(found.executor.calls) == computed
 
 
+def test_a_copy_has_the_row_of_the_first_file_and_is_not_computed(fleet):
+    whole, of_parts = PENDULUM.format(0.1), "<mujoco><include file='part.xml'/></mujoco>"
+    same = {"a.xml": whole, "b.xml": whole, "c.mjcf": whole}  # MuJoCo reads a file by the end of its name
+    parts = {f"{name}/part.xml": PENDULUM.format(number) for name, number in (("x", 0.1), ("y", 0.1), ("z", 0.2))}
+    first = fleet(same | parts | {f"{name}/whole.xml": of_parts for name in "xyz"}, answer=ANSWER)
+    assert first.executor.calls == ["m/a.xml", "m/c.mjcf", "m/x/whole.xml", "m/z/whole.xml"]
+    copies = {row["file"]: row["same_as"] for row in first.of.rows if row["same_as"]}
+    assert copies == {"m/b.xml": "m/a.xml", "m/y/whole.xml": "m/x/whole.xml"} and len(first.of.rows) == 6
+    assert "m/a.xml" in first.rows["b.xml"]["reason"] and first.rows["b.xml"]["verdict"] == AGREE
+    assert fleet({}, answer=ANSWER).rows["b.xml"] == first.rows["b.xml"]
+
+
 def test_a_file_that_breaks_off_keeps_its_earlier_report_and_is_tried_again(fleet, tmp_path):
     fleet(ONE, answer=ANSWER)
     found = fleet({"a.xml": PENDULUM.format(0.2)}, answer=(None, "killed by SIGKILL"))

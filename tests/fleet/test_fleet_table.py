@@ -55,7 +55,8 @@ def row_of(*checks, limits=(), causes=(), lost=(), reference=("arm",)):
     (AGREE, [good(1.0)], {}, ""),
     (AGREE, [good(), OWN], {}, "2 ms"),  # its own step is not stable: the reason says so
     (ITSELF, [good()], {"reference": ("model",)}, ""),
-    (DIFFER, [good(1.0 + 1e-9), BROKEN, OWN, OFF], {"causes": CAUSES}, "mass of upper"),
+    (DIFFER, [good(1.0 + 1e-9), OWN, OFF], {"causes": CAUSES}, "mass of upper"),
+    (DIFFER, [good(1.0 + 1e-9), BROKEN], {"causes": CAUSES, "lost": ["the table"]}, "SIGKILL, 4 times, and 1 more"),
     (BROKE, [good(), BROKEN, OWN, OFF], {}, "SIGKILL, 4 times"),
     (BROKE, [good()], {"lost": ["the table"]}, "the table"),
     (UNCONFIRMED, [good(), OFF, OWN], {}, "0.01"),
@@ -105,7 +106,7 @@ def test_what_needs_a_look_comes_first():
 ROW = {
     "file": "a b.xml", "sha256": "1", "verdict": AGREE, "reason": "", "joints": 3, "worst_ratio": 0.123456,
     "file_integrator": "Euler", "file_dt_s": 0.002, "stable_at_file_dt": True, "limit_s": 0.01, "seconds": 1.26,
-    "has_report": True, "reference": "arm",
+    "has_report": True, "reference": "arm", "same_as": None,
 }  # fmt: skip
 
 
@@ -159,13 +160,15 @@ def test_a_row_is_marked_by_its_verdict_and_nothing_that_is_said_is_taken_for_ht
 
 
 def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
-    rows = [ROW, ROW | {"file": "b.xml", "verdict": DIFFER}, ROW | {"file": "c.xml", "stable_at_file_dt": False}]
+    rows = [ROW, ROW | {"file": "b.xml", "verdict": DIFFER}, ROW | {"file": "c.xml", "stable_at_file_dt": False},
+            ROW | {"file": "d.xml", "same_as": "c.xml", "verdict": REFUSED}]  # fmt: skip
     run = SimpleNamespace(rows=rows, verdicts=Counter(row["verdict"] for row in rows))
-    write_table(tmp_path, run, [("early.xml", "because")], None, "the command")
+    summary = write_table(tmp_path, run, [("early.xml", "because")], None, "the command")
+    assert all(part in summary[0] for part in ("4 files", "1 copy", "1 was refused"))
     with (tmp_path / "fleet.csv").open(newline="") as file:
         found = list(csv.DictReader(file))
-    assert [row["file"] for row in found] == ["b.xml", "c.xml", "a b.xml"]
+    assert [row["file"] for row in found] == ["b.xml", "d.xml", "c.xml", "a b.xml"]
     assert tuple(found[0]) == FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
     text = (tmp_path / "index.html").read_text()
-    assert all(part in text for part in ("early.xml", "the command"))
+    assert all(part in text for part in ("early.xml", "the command", '<a href="files/c.xml/index.html">d.xml</a>'))
     assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")

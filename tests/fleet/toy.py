@@ -1,5 +1,6 @@
 """Calls that return, raise, crash or hang; for test_executors."""
 
+import multiprocessing
 import os
 import signal
 import time
@@ -16,6 +17,18 @@ def waits(folder, opened):
     return 4
 
 
+def is_killed(counted, times):
+    """4, after its process was killed several times. counted: a folder with a file for each call."""
+    (Path(counted) / f"{time.time_ns()}").write_text("")
+    if len(os.listdir(counted)) <= times:
+        signal.raise_signal(signal.SIGKILL)
+    return 4
+
+
+def kills_its_worker():
+    os.kill(multiprocessing.parent_process().pid, signal.SIGKILL)
+
+
 def soon(question):
     """Whether something holds before long."""
     until = time.monotonic() + SOON
@@ -30,7 +43,7 @@ FAULTS = {
     "raises": (divmod, (1, 0), None, "ZeroDivisionError"),
     "exits": (os._exit, (3,), None, "status 3"),
     "crashes": (os.abort, (), None, "SIGABRT"),
-    "is killed": (signal.raise_signal, (signal.SIGKILL,), None, "SIGKILL"),
+    "reads elsewhere": (signal.raise_signal, (signal.SIGSEGV,), None, "SIGSEGV"),
     "eats": (bytearray, (4 * 10**12,), None, "out of memory"),
     "prints": (print, ("no answer",), None, ""),
     "returns": (abs, (-4,), 4, ""),

@@ -3,9 +3,14 @@
 from ..edit import Edit
 
 EDITS = (
-    Edit("fleet.table", "row_of_file", 'outcome, reason = DIFFER, str(differing[0])',
-         'outcome, reason = AGREE, ""', "a file that differs agrees"),
-    Edit("fleet.table", "row_of_file", "outcome, reason = BROKE, _1", 'outcome, reason = AGREE, ""', "what broke off agrees"),
+    Edit("fleet.table", "row_of_file", "outcome, reasons = DIFFER, _1", "outcome, reasons = AGREE, _1",
+         "a file that differs agrees"),
+    Edit("fleet.table", "row_of_file", "outcome, reasons = BROKE, []", "outcome, reasons = AGREE, []", "what broke off agrees"),
+    Edit("fleet.table", "row_of_file", "reasons += _1 if unfinished else []", "reasons += []",
+         "what differs hides what broke off"),
+    Edit("fleet.run", "Run.start", "_1, own_hash, *others", "_1, own_hash", "a file with other parts is a copy"),
+    Edit("fleet.executors", "guarded", "(code := error.exitcode) != KILLED", "(code := error.exitcode)",
+         "no killed process is tried again"),
     Edit("fleet.table", "own_step", "all(stable)", "any(stable)", "one posture at which the step is stable is enough"),
     Edit("fleet.table", "own_step", "min(limits, default=None)", "max(limits, default=None)", "the largest of the limits"),
     Edit("fleet.table", "own_step", 'row["integrator"] == row["file_integrator"]', "True", "limits of any integrator"),
