@@ -2,7 +2,7 @@
 
 A set of joints stays if their accelerations vanish for all values of the others, with these joints at their start and at
 rest. There is a largest such set: remove the joints that move from all joints until none moves. "Stays" is decided on the
-expressions of the traced method, where the acceleration must fold to the number 0; "moves" by one state at which the
+expressions of the traced method, where the acceleration must fold to the number 0; "moves" at a random state, where the
 acceleration in 50 digits of the robot's doubles is not 0. A joint for which neither is decided is kept.
 """
 
@@ -23,7 +23,6 @@ from tmt.exact.values import DIGITS
 
 from ..robots.case import SEED, Case
 
-TRIALS = 3  # random states of the other joints, with 50 digits
 # an acceleration in 50 digits that counts as 0, relative to the largest one at that state, which is taken as at least 1
 ZERO = mpmath.mpf(10) ** (10 - DIGITS)
 MOST_FOLDED = 20  # speeds up to which accelerations are traced; beyond only the forces
@@ -45,15 +44,10 @@ def needed(case: Case) -> Needed:
     moves = {name: f"{name} has a speed at the start" for name, joint in joints.items() if any(case.v[joint.qd])}
     undecided = ()
     while still := tuple(name for name in names if name not in moves and name not in undecided):
-        alone, largest, rng = len(still) == len(names), dict.fromkeys(still, 0.0), np.random.default_rng(SEED)
-        # if no joint moves there is only one state; with many joints an evaluation takes long
-        for _ in range(1 if alone or coordinates.nv > MOST_FOLDED else TRIALS):
-            (q,), qd = coordinates.random(rng, 1), rng.uniform(-10.0, 10.0, coordinates.nv)
-            for name, values in exact_accelerations(case, still, q, qd).items():
-                largest[name] = max(largest[name], *map(abs, values))
-            if min(largest.values()) > 0.0:
-                break
-        when = "at the start" if alone else "when the others move"
+        rng = np.random.default_rng(SEED)
+        (q,), qd = coordinates.random(rng, 1), rng.uniform(-10.0, 10.0, coordinates.nv)
+        largest = {name: max(map(abs, a)) for name, a in exact_accelerations(case, still, q, qd).items()}
+        when = "at the start" if len(still) == len(names) else "when the others move"
         for name, a in largest.items():
             if a > 0.0:
                 moves[name] = f"{name} accelerates by {float(a):.2g} {units[name]}/s2 {when}"

@@ -80,6 +80,15 @@ def test_a_limit_that_runs_show_no_nearer_than_a_tenth_is_not_decided_by_them():
     assert limits.is_shown(arm7, 0.0999) and not limits.is_shown(arm7, 0.1001)
 
 
+@pytest.mark.parametrize("stiffness, shown", [(9.8101, True), (9.810001, False)])
+def test_a_limit_is_not_decided_by_runs_in_which_a_slow_mode_is_lost_in_rounding(stiffness, shown):
+    """An inverted pendulum of 9.81 N m/rad that its spring just balances."""
+    joint = f'<joint name="swing" axis="0 1 0" stiffness="{stiffness}"/>'
+    body = f'<body>{joint}<geom type="sphere" size="0.1" pos="0 0 0.5" mass="2"/></body>'
+    robot = robot_of(reading.read(f"<mujoco><worldbody>{body}</worldbody></mujoco>"), "swing.xml")
+    assert limits.is_shown(held(robot, "qpos0"), 1e-3) is shown
+
+
 def departure_row(observed, predicted, **more):
     return {"scene": "ball catch", "engine": "tmt", "method": "rk4", "dt_s": 0.01, "perturbation_rad": 1e-6,
             "predicted_s": predicted, "observed_s": observed} | more  # fmt: skip

@@ -11,7 +11,7 @@ from compare.engines.mujoco import reading
 from compare.experiments import stability
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
-from compare.experiments.stability import departure, failure, limits, subjects
+from compare.experiments.stability import claims, departure, failure, limits, subjects
 from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
@@ -120,6 +120,14 @@ def test_own_bias_holds_for_ever(engines, method):
     ours = method("tmt", "rk4")  # no double need be the bias of compiled code: the nearest is taken
     left = departure.residual(ours, engines, BALL, departure.own_torque(ours, engines, BALL)[None])
     assert np.abs(left).max() <= np.spacing(np.abs(BALL.tau).max())
+
+
+def test_the_clear_torques_push_as_much_as_sixteen_ulps(engines):
+    """The torques within an ulp span the push of two."""
+    of_tmt = {row["torque"]: row for row in claims.holding_torques(ARM, engines) if row["engine"] == "tmt"}
+    push = {name: row["push_rad_per_s2"] for name, row in of_tmt.items()}
+    ulp = np.ptp([size for name, size in push.items() if name.startswith(claims.VARIANT)]) / 2
+    assert [push[name] / ulp for name in claims.CLEAR_TORQUES] == pytest.approx([16.0, -16.0], rel=0.1)
 
 
 def test_a_reset_is_caught(engines):

@@ -38,7 +38,7 @@ def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco):
     checks = judged_with(mujoco, damped)
     used = checks[name].over_tolerance
     assert all(check.passed for check in checks.values()) and 1e-5 < used < 1.0
-    assert checks[name].tolerance in getattr(damped, field)
+    assert checks[name].tolerance in getattr(damped, field) and np.array_equal(damped.at, damped.t)
     for more, passes in ((1.01, True), (0.99, False)):
         tight = judged_with(mujoco, damped._replace(**{field: more * used * getattr(damped, field)}))
         assert {quantity for quantity, check in tight.items() if not check.passed} == (set() if passes else {name})

@@ -40,6 +40,8 @@ EDITS = (
     Edit("run", "MOVES", "0.1", "0.001", "a run that hardly moves is enough"),
     Edit("trajectory", "judged", "width < NARROW", "True", "runs are judged however wide the band is"),
     Edit("trajectory", "check_divergence", "width[_1] < NARROW", "False", "the step of divergence is never compared"),
+    Edit("trajectory", "tmt_side", "slow & _1", "slow & _1 & (t[::every] < case.duration / 2)",
+         "single steps are compared in the first half of a run"),
     Edit("trajectory", "check_level", "closest(_1, _2)", "(0, 0)", "the first state is judged"),
     Edit("trajectory", "check_level", "difference[:, :n].max()", "difference[:, :n].min()",
          "the least difference is the largest"),
