@@ -5,9 +5,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-TIMED_ENOUGH = 0.01  # s: a function whose calls took this long together is called at most twice
+TIMED_ENOUGH = 0.025  # s: a function is called until as many calls as fast as its fastest take this long
 WARM = 0.004  # s: a longer call needs no call before it to warm up
-ONCE = 0.02  # s: a longer call is timed once
 WIDTHS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("asimd", "NEON"), ("sse2", "SSE2"))
 
 
@@ -16,7 +15,7 @@ def in_turns(runs: list[Callable], rounds: int) -> list[list[float]]:
     times = [[] for _ in runs]
     for k in range(rounds + 1):
         for run, taken in zip(runs, times):
-            if not taken or (len(taken) < 2 and taken[0] < ONCE) or sum(taken) < TIMED_ENOUGH:
+            if not taken or len(taken) * min(taken) < TIMED_ENOUGH:
                 begin = time.perf_counter()
                 run()
                 taken.append(time.perf_counter() - begin)

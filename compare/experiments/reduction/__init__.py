@@ -51,7 +51,7 @@ def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) 
     result, models = next(iter(begun)) if begun else untimed(setup, cases, timed)
     if timed and models is not None:
         setup.quiet()
-        time_models(result, models, setup, rounds=setup.of(160, 16, 2))
+        time_models(result, models, setup, rounds=setup.of(64, 16, 2))
         best = largest_gain(result.rows, setup.robot.coordinates.nv)
         if best and best["speedup"] >= NO_GAIN:
             values = {"speedup": best["speedup"], "joints": best["hinges"].split(), "scene": best["scene"]}

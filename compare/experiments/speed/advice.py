@@ -29,7 +29,7 @@ def advice(rows: list[dict], scenes: Sequence[str]) -> list[dict]:
             }
             for name, row in (("mujoco", theirs), ("tmt", ours), ("of_all", best)):
                 line |= {
-                    name: row and setting(row),
+                    name: setting(row) if row else "none",
                     f"{name}_dt_s": row and row["dt_s"],
                     f"{name}_ms": row and 1e3 * row["seconds"],
                     f"{name}_evaluations": row and row["evaluations"],

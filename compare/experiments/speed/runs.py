@@ -22,7 +22,7 @@ from .settings import MOST_SECONDS, coarsest_steps, estimated, methods, settings
 
 GROWTH_STEPS = 16  # of the run whose growth is computed, between two recorded times
 EACH_STEP = 12  # nv up to which the growth takes the Jacobian of every step; above, that of one in GROWTH_STEPS
-FIRST_STEPS = 4096  # a longer run of MuJoCo is timed over its first steps only
+FIRST_STEPS = 512  # a longer run of MuJoCo is timed over its first steps only
 
 
 def measured(setup: Setup, cases: Sequence[Case], which: str) -> tuple[Sequence[Case], Iterator[tuple]]:
@@ -133,6 +133,6 @@ def prepared(rows: list[dict], setup: Setup) -> list[tuple]:
 
 def take_times(rows: Sequence[dict], runs: Sequence[tuple], setup: Setup) -> None:
     """Set the seconds of the rows of one scene to the least of their times; runs: see `prepared`, timed in turns."""
-    times = timing.in_turns([run for run, _ in runs], rounds=setup.of(5, 2, 2))
+    times = timing.in_turns([run for run, _ in runs], rounds=5)
     for row, (_, factor), of_row in zip(rows, runs, times):
         row["seconds"] = factor * min(of_row)
