@@ -30,8 +30,7 @@ def some_of(words: Sequence[str], most: int = 6) -> str:
     return f"{', '.join(words[:most])} and {more} more" if more > 0 else listed(words)
 
 
-def seconds(time: float, near: float | None = None) -> str:
-    """A time with two digits, 2 ms or 0.15 s; with four where it is near another one."""
+def milliseconds(time: float, near: float | None = None) -> str:
+    """A time in s with two digits, 2 ms; with four where it is near another one."""
     digits = 4 if near and abs(time / near - 1.0) < 0.1 and time != near else 2
-    number, unit = (1e3 * time, "ms") if time < 0.1 else (time, "s")
-    return f"{float(f'{number:.{digits}g}'):g} {unit}"
+    return f"{float(f'{1e3 * time:.{digits}g}'):g} ms"

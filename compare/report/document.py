@@ -67,7 +67,7 @@ class Document:
         if report.causes:
             texts.append(self.template.causes(table_of(of_causes(report.causes))))
         if self.answers is not None and len(self.answers):
-            texts.append(self.template.questions(table_of(self.answers), bool(report.robot.questions)))
+            texts.append(self.template.questions(table_of(self.answers)))
         for section in report.sections:
             text = self.parts.attempt(f"{section.name} in {self.file}", None, self.section, section)
             texts.append(self.template.missing(section.name, section.title) if text is None else text)

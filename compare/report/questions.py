@@ -1,4 +1,4 @@
-"""The answers to the questions of a robot's assignment, and to a user's question: which integrator, which step?"""
+"""The answers to the questions of a robot's assignment."""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,13 +11,10 @@ from .verdict import Section
 
 
 def answers(sections: Sequence[Section], robot) -> pd.DataFrame:
-    """For each part: its letter, the question, where it is answered, the answer; no letters where there is no assignment."""
+    """For each part: its letter, the question, where it is answered, the answer."""
     results = {section.name: section.result for section in sections}
     rows = [(q.part, q.question, q.answered_in, say(answer(results, *q.answer))) for q in robot.questions]
-    choice = results["speed"].curves.get("choice") if "speed" in results else None
-    rows += [("", "which integrator and which step", "speed", say(choice))] if choice else []
-    table = pd.DataFrame(rows, columns=["part", "question", "answered in", "answer"])
-    return table if table["part"].any() else table.drop(columns="part")
+    return pd.DataFrame(rows, columns=["part", "question", "answered in", "answer"])
 
 
 def answer(results: Mapping[str, Result], kind: str, *about) -> Finding:

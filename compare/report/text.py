@@ -13,7 +13,7 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from ..judge.finding import Finding
-from ..judge.words import capital, listed, seconds, some_of
+from ..judge.words import capital, listed, milliseconds, some_of
 
 MARKUP = re.compile(  # code, which stays; signs that Markdown would take for markup
     r"(`[^`\n]*`)|\\(?=[!-/:-@\[-`{-~])|\*|(?<![^\W_])_|_(?![^\W_])|\[(?=[^\n]*\]\()|&(?=#?\w+;)|<(?=[A-Za-z/!?])|~(?=~)"
@@ -64,7 +64,7 @@ FILTERS = {
     "share_of": lambda share: f"{rounded(share)} times" if share > 1.0 else f"{100.0 * share:.2g} % of",
     "listed": lambda words: listed(list(words)),
     "some": lambda words: some_of(list(words)),
-    "seconds": seconds,
+    "milliseconds": milliseconds,
     "capital": capital,
 }
 

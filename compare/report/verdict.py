@@ -130,6 +130,7 @@ def verdict(
     checked = [section for section in sections if section.result.checks]
     consequences = [check for section in sections for check in explained(section, causes)]
     also = failures(checked)
+    failed = sum(map(len, also))
     also = also._replace(unconfirmed=[check for check in also.unconfirmed if check not in consequences])
     checks = [check for section in checked for check in section.result.checks]
     top = worst(checked)
@@ -142,7 +143,7 @@ def verdict(
         robot=robot,
         ran={"names": names, "differ": bool(named), "checked": len(checked), "all": experiments},
         models=sum(check.about == About.MODELS for check in checks),
-        failed=len(also.differing),
+        failed=failed,
         checks=len(checks),
         empty=[section.name for section in sections if not section.result.checks],
         also=also,

@@ -40,7 +40,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
 
     good = passed(report.sections) and not parts.broken
     terminal.say()
-    for number, line in enumerate([*report.verdict.split("\n"), *report.top]):
+    for number, line in enumerate(report.verdict.split("\n")):
         terminal.say(line, "" if number else "bold green" if good else "bold red")
     for line in parts.lines:
         say_error(line)

@@ -179,7 +179,7 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
 
 
 def say_outcome(terminal: Terminal, section: Section, seconds: float, new: Sequence, causes: Sequence = ()) -> None:
-    """One line for an experiment; then the causes that are new, and the first failing checks that no cause explains.
+    """One line for an experiment, then its answer, the causes that are new, and the first failing checks that no cause explains.
 
     seconds: of the processor, for the experiment itself; causes: all that are known.
     """
@@ -191,7 +191,9 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, new: Seque
         most = f"at most {100.0 * max(used):.2g} % of tolerance"
     many = f"{len(checks):>3} check{' ' if len(checks) == 1 else 's'}"
     word = f"{len(failed)} FAILED" if failed else "ok" if checks else "nothing"
-    terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<27} {seconds:5.1f} s", "red" * bool(failed))
+    terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<27} {seconds:5.1f} s CPU", "red" * bool(failed))
+    for text in section.result.top:
+        terminal.say(f"  {say(text)}")
     lines = [f"  CAUSE {cause['text']}" for cause in new]
     if not (causes and section.name in STATES_CAUSES):  # there the causes are the checks
         lines += [f"  FAIL {check}" for check in failed if check not in of_cause]

@@ -17,7 +17,7 @@ from ...truth.reference import LOST, has_no_reference
 from .. import Experiment
 from ..setup import Setup
 from . import accuracy, advice, evaluations
-from .first_screen import best_curves, cheapest, choice, target
+from .first_screen import best_curves, cheapest, target
 from .runs import FIRST_STEPS, measured, prepared, rows_of_scene, take_times
 from .settings import followed, left_out, regular_of, scenes_of
 
@@ -57,7 +57,9 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     by_scene = {name: parts for name, *parts in scenes}
     references, floors, rows_of = ({case.name: by_scene[case.name][k] for case in cases} for k in range(3))
     unit = movement_unit(setup.robot.coordinates)
-    result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "of_file": setup.robot.is_read}
+    servos_off = setup.robot.drive.feeds_back and not regular.controller
+    result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "servos_off": servos_off}
+    result.curves["of_file"] = setup.robot.is_read
     if timed:
         compiled = add_times(setup, cases, references, floors, rows_of)
     result.rows += [row for of_scene in rows_of.values() for row in of_scene]
@@ -81,8 +83,6 @@ def rows(setup: Setup, timed: bool = True) -> Result:
         add_advice(result, setup, compiled)
         add_absent(result, setup)
     result.rows = renamed([{name: row.get(name) for name in COLUMNS} for row in result.rows], unit)
-    if timed:
-        result.curves["choice"] = choice(result)
     return result
 
 
@@ -95,7 +95,7 @@ def add_times(setup: Setup, cases: Sequence[Case], references, floors, rows_of) 
         setup.progress(f"speed: timing {case.name}")
         name, of_scene = case.name, rows_of[case.name]
         called = rows_of_scene(case, setup.engines, references[name], floors[name], setup.size, "called")
-        again = [row for row in called if row["seconds"] < timing.ONCE]
+        again = [row for row in called if row["seconds"] < timing.TIMED_ENOUGH]
         take_times(of_scene + again, its_runs + prepared(again, setup), setup)
         of_scene += called
     return compiled
@@ -105,12 +105,13 @@ def add_advice(result: Result, setup: Setup, compiled: evaluations.Evaluations) 
     """The cheapest settings, and the cost of one evaluation."""
     if settings := cheapest(best_curves(result)):
         result.headline = result.finding("headline", settings=settings, **target(result))
+        result.top.append(result.finding("answer", settings=settings, **target(result)))
     table = advice.advice(result.rows, list(result.curves["floors"]))
     result.tables["what_should_i_use"] = renamed(table, result.curves["unit"])
     result.find("columns")
     setup.progress("speed: one evaluation")
     result.tables["evaluations"] = evaluations.costs(setup, compiled)
-    result.find("timing", once=timing.ONCE, first_steps=FIRST_STEPS)
+    result.find("timing", once=timing.TIMED_ENOUGH, first_steps=FIRST_STEPS)
 
 
 def add_absent(result: Result, setup: Setup) -> None:

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 from ...judge import units
 from ...judge.check import Result
-from ...judge.finding import Finding
 
 TARGET = 1e-6  # rad or m: the error for which the cheapest setting is named
 NOT_SOLVED = 1.0  # rad or m: a run with a larger error is none
@@ -33,7 +32,8 @@ class Curve(NamedTuple):
 
 
 def target(result: Result) -> dict:
-    return {"target": TARGET, "unit": result.curves.get("unit", "rad"), "scene": result.curves.get("regular")}
+    about = {"unit": "rad", "servos_off": False} | result.curves
+    return {"target": TARGET, "scene": about.get("regular"), "unit": about["unit"], "servos_off": about["servos_off"]}
 
 
 def front(rows: Sequence[dict]) -> list[dict]:
@@ -73,13 +73,3 @@ def cheapest(curves: Sequence[Curve]) -> list[Cheapest]:
     first = min(reached, key=lambda engine: reached[engine].milliseconds)
     other = "mujoco" if first != "mujoco" else "tmt"
     return [reached[engine] for engine in (first, other) if engine in reached]
-
-
-def choice(result: Result) -> Finding | None:
-    """The answer to: which integrator, which step? The cheapest settings of MuJoCo and of tmt; None if one has none."""
-    scene, reached = result.curves.get("regular"), {curve.engine: curve.cheapest for curve in best_curves(result)}
-    settings = [reached.get(engine) for engine in ("mujoco", "tmt")]
-    if not all(settings):
-        return None
-    duration = next(row["dt_s"] * row["steps"] for row in result.rows if row["scene"] == scene and row.get("dt_s"))
-    return result.finding("choice", settings=settings, duration=duration, **target(result))

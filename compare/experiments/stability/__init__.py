@@ -134,6 +134,7 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
 def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
     from .figures_stability import draw_overview  # matplotlib is for the process that draws
 
-    rows = limits_shown(results["stability"])
+    driven = servos.limits_in_use(results["stability"].tables.get("step_limits", ()))
+    rows = driven if robot.drive.feeds_back and driven else limits_shown(results["stability"])
     if any(row["predicted_dt_s"] or row["observed_dt_s"] or row["passed"] is False for row in rows):
         yield partial(draw_overview, results["stability"], robot, rows)

@@ -40,7 +40,8 @@ def limits_in(ax: Axes, rows: list[dict], known: dict, most: int | None = None) 
     for row in rows:
         of_scheme.setdefault(known.get((row["engine"], row["method"]), row["method"]), []).append(row)
     of_scheme = dict(list(of_scheme.items())[:most])
-    ends = [dt for row in rows for dt in (row["predicted_dt_s"], row["observed_dt_s"]) if dt] or [1e-3, 1.0]
+    steps = ("predicted_dt_s", "observed_dt_s", "file_dt_s")
+    ends = [row[key] for row in rows for key in steps if row.get(key)] or [1e-3, 1.0]
     low, high = min(ends) / 2, max(ends) * 2
     for place, mine in enumerate(of_scheme.values()):
         for row in mine:
@@ -73,11 +74,15 @@ def limits_in(ax: Axes, rows: list[dict], known: dict, most: int | None = None) 
 def draw_overview(result: Result, robot: Robot, rows: list[dict]) -> tuple[str, Figure, Finding]:
     """The limits of the first screen, all postures in one."""
     fig, ax = chart()
-    handles = limits_in(ax, rows, result.curves["schemes"], MOST_ROWS)
+    dt = rows[0].get("file_dt_s")  # of limits with servos
+    handles = limits_in(ax, rows, {} if dt else result.curves["schemes"], MOST_ROWS)
+    if dt:
+        ax.axvline(dt, color="black", linestyle=":")
     ax.set_xlabel("largest stable dt, s")
-    fig.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=7.5, handletextpad=0.1, columnspacing=0.8)
-    actuators_off = bool(robot.is_read and robot.drive.actuators)
-    return "overview_limits", fig, result.finding("overview_caption", actuators_off=actuators_off, **summary(rows))
+    looks = {"ncols": 3, "fontsize": 7.5, "handletextpad": 0.1, "columnspacing": 0.8}
+    fig.legend(handles=handles[:: 2 if dt else 1], loc="outside upper center", **looks)
+    values = {"file_dt": dt, "actuators_off": bool(robot.is_read and robot.drive.actuators and not dt)}
+    return "overview_limits", fig, result.finding("overview_caption", **values, **summary(rows))
 
 
 def draw_limits(result: Result, robot: Robot, rows: list[dict]) -> tuple[str, Figure, Finding]:

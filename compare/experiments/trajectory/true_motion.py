@@ -75,7 +75,7 @@ def difference_while_judged(curve: dict, case: Case) -> float:
 
 
 def find_departures(result: Result, robot: Robot, engines: Mapping[str, Engine]) -> None:
-    """When each engine leaves the posture of each held scene, and whether its torque holds but for rounding."""
+    """When each engine leaves the posture of each held scene, and whether its torque holds it within rounding."""
     claims = robot.claims.of_scenes if robot.claims else {}
     for case, curve in coarsest_runs(result, robot):
         if case.is_held:

@@ -222,3 +222,8 @@ def test_a_reference_in_doubles_measures_turns_and_no_quaternions():
     turned = case.coordinates.move(known.high[:, :7], [0.0, 0.0, 0.0, 0.0, 1e-3, 0.0])
     assert known.error(turned[:, 3:], [3]) == pytest.approx(1e-3)
     assert known.error(turned, range(4)) == pytest.approx(1e-3)
+
+
+def test_whether_servos_are_off_is_known(engines, of_gripper):
+    setups = Setup.quick(GRIPPER, of_gripper), Setup.quick(ARM, engines)
+    assert [speed.rows(setup, timed=False).curves["servos_off"] for setup in setups] == [True, False]

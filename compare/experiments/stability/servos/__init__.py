@@ -8,6 +8,7 @@ from ....judge.check import AT_OWN_STEP, About, Result
 from ....truth.linear import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from ...setup import Setup
+from ..limits import apart
 from . import findings, lifting, observed, response
 from .predicted import limit_rows, predicted_at, radii_apart
 
@@ -97,8 +98,8 @@ def add(result: Result, setup: Setup, work: dict) -> None:
 def check_radii(result: Result, posture: str, radii: Mapping[str, float]) -> None:
     """The growth of a step near the limit compared with MuJoCo's own derivative."""
     quantity = "spectral radius of a step near the limit with servos, TMT to MuJoCo"
-    for integrator, apart in radii.items():
-        result.check(f"{posture}, {integrator}", quantity, apart, RADII_WITHIN, "")
+    for integrator, difference in radii.items():
+        result.check(f"{posture}, {integrator}", quantity, difference, RADII_WITHIN, "")
 
 
 def check_observed(result: Result, row: dict, kind: str) -> None:
@@ -106,11 +107,19 @@ def check_observed(result: Result, row: dict, kind: str) -> None:
     below = kind == "always" and row["limit"] == "finite" and row["predicted_dt_s"] < observed.SOUGHT_FROM
     if kind == row["limit"] == "none" or below:  # shorter steps are not tried
         return
-    both = kind == row["limit"] == "finite"
-    apart = abs(row["observed_dt_s"] / row["predicted_dt_s"] - 1.0) if both else None
-    note = "" if both else f"predicted: {row['limit']}, observed: {kind}"
+    off = apart(row)
+    note = f"predicted: {row['limit']}, observed: {kind}" if off is None else ""
     where, quantity = f"{row['posture']}, {row['integrator']}", "step limit with servos, observed / predicted - 1"
-    result.check(where, quantity, apart, OBSERVED_WITHIN, "", note, about=About.PREDICTION)
+    result.check(where, quantity, off, OBSERVED_WITHIN, "", note, about=About.PREDICTION)
+
+
+def limits_in_use(rows: Sequence[dict]) -> list[dict]:
+    """The limits that are known with servos, in the form of those without."""
+    kinds, known = {"finite": "finite", "none": "never_fails"}, []
+    for row in (row for row in rows if row["limit"] in kinds):
+        about = {"engine": "mujoco", "method": row["integrator"], "limit": kinds[row["limit"]]}
+        known.append(row | about | {"passed": (apart(row) or 0.0) <= OBSERVED_WITHIN})
+    return known
 
 
 def check_own_step(result: Result, rows: Sequence[dict]) -> None:

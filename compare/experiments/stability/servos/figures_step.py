@@ -4,7 +4,7 @@ from matplotlib.figure import Figure
 
 from ....judge.check import Result
 from ....judge.finding import Finding
-from ....judge.words import seconds
+from ....judge.words import milliseconds
 from ....report.style import BLUE, GREEN, ORANGE, PINK, RED, WIDTH
 from ....robots import Robot
 from .response import LASTS
@@ -28,12 +28,12 @@ def draw_step_response(result: Result, robot: Robot) -> tuple[str, Figure, Findi
     for name, line in drawn["lines"].items():
         colour, dash, marker, width = STEP_LOOKS[name]
         limit = rows[name]["predicted_dt_s"]
-        ends = f"stable up to {seconds(limit)}" if limit else "no limit up to 5 s"
+        ends = f"stable up to {milliseconds(limit)}" if limit else "no limit up to 5000 ms"
         ax.loglog(*zip(*line), color=colour, linestyle=dash, linewidth=width, label=f"{name}, {ends}")
         if limit and line and limit <= 1.001 * line[-1][0]:
             ax.plot(*line[-1], marker=marker, color=colour, markersize=7, markeredgecolor="black", zorder=4)
     if error := rows[integrator]["step_response_error"]:
-        label = f"the file's step: {seconds(dt)}, {integrator}"
+        label = f"the file's step: {milliseconds(dt)}, {integrator}"
         ax.plot(dt, error, "*", color="black", markersize=13, zorder=5, label=label)
     ax.set(xlabel="dt, s", ylabel="relative error of the step response")
     ax.axvline(dt, color="black", linewidth=0.6, linestyle=":")
