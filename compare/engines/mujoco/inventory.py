@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 
 from .actuators import control_of
-from .names import bit, element_name, kind_of, number_of_actuators, on
+from .names import bit, element_name, kind_of, number_of_actuators, on, own_name
 
 KINDS = ("hinge", "slide", "ball", "free")
-MODELLED, OFF, OPEN = "modelled", "switched_off", "open_tree"
+MODELLED, OFF, OPEN, LEFT_OUT = "modelled", "switched_off", "open_tree", "left_out"
 
 
 class Feature(NamedTuple):
@@ -19,7 +19,7 @@ class Feature(NamedTuple):
     feature: str
     count: int
     names: tuple[str, ...]
-    treatment: str  # modelled, switched_off, open_tree
+    treatment: str  # modelled, switched_off, open_tree, left_out
     reason: str
 
 
@@ -41,6 +41,7 @@ REASONS = {
     "equality": (OPEN, "the equations are those of the open tree"),
     "tendon": (OFF, "the equations have no forces along tendons"),
     "keyframe": (MODELLED, "postures of the comparison"),
+    "unusable keyframe": (LEFT_OUT, "not every number is finite"),
     "other": (OFF, "it changes the motion; the equations do not have it"),
 }
 QUIET = ("OVERRIDE", "ENERGY", "FWDINV", "DIAGEXACT")  # enable flags that cannot change a motion without contacts
@@ -77,7 +78,9 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
         "armature": having("dof_armature", "actuator_armature"),
         "damping": having("dof_damping") if damped else [],
         "spring": having("jnt_stiffness") if sprung else [],
-        "contact": named("geom", np.unique(contact_pairs(m))) if constrained and on(m, "CONTACT") else [],
+        "contact": [*named("geom", np.unique(contact_pairs(m))), *flexes(m)]
+        if constrained and on(m, "CONTACT")
+        else [],
         "limit": having("jnt_limited", "tendon_limited") if constrained and on(m, "LIMIT") else [],
         "frictionloss": having("dof_frictionloss", "tendon_frictionloss")
         if constrained and on(m, "FRICTIONLOSS")
@@ -88,9 +91,20 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
         "actuator": named("actuator", actuators),
         "equality": list(open_equalities(m)),
         "tendon": named("tendon", range(m.ntendon)),
-        "keyframe": named("key", range(m.nkey)),
+        "keyframe": named("key", np.flatnonzero(usable_keys(m))),
+        "unusable keyframe": named("key", np.flatnonzero(~usable_keys(m))),
         "other": others,
     }
+
+
+def flexes(m: mujoco.MjModel) -> list[str]:
+    names = [mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, i) for i in range(m.nflex)]
+    return [own_name(name or "", "flex", i) for i, name in enumerate(names)]
+
+
+def usable_keys(m: mujoco.MjModel) -> np.ndarray:
+    """Of each keyframe whether its numbers are finite, (nkey,)."""
+    return np.isfinite(np.hstack([m.key_qpos, m.key_act, m.key_ctrl])).all(axis=1)
 
 
 def names_where(m: mujoco.MjModel, field: str, holds: Callable) -> list[str]:
@@ -159,8 +173,9 @@ def contact_pairs(m: mujoco.MjModel) -> np.ndarray:
 FINITE = (
     "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat", "jnt_pos", "jnt_axis", "jnt_stiffness",
     "dof_armature", "dof_damping", "actuator_gainprm", "actuator_biasprm", "actuator_gear", "tendon_stiffness",
-    "tendon_damping", "key_qpos", "key_ctrl",
+    "tendon_damping",
 )  # fmt: skip
+ELASTIC = ("flex_stiffness", "flex_bending", "flex_edgestiffness", "flex_edgedamping")
 NOT_NEGATIVE = ("jnt_stiffness", "dof_armature", "dof_damping")
 
 
@@ -173,9 +188,9 @@ def refuse(m: mujoco.MjModel) -> None:
             raise ValueError(
                 f"joint {element_name(m, 'joint', number)!r} is of type {kind}; known are {', '.join(KINDS)}"
             )
-    if m.nflex:
-        name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, 0)
-        raise ValueError(f"flex {name!r} is deformable; only rigid bodies are compared")
+    if any(np.any(getattr(m, field)) for field in ELASTIC):
+        name = flexes(m)[int(np.argmin(m.flex_rigid))]
+        raise ValueError(f"flex {name!r} is elastic; only rigid bodies are compared")
     for body in np.flatnonzero(m.body_plugin >= 0):
         raise ValueError(f"a plugin acts on body {element_name(m, 'body', body)!r}; its forces are unknown")
     for tendon in np.flatnonzero(m.tendon_armature):

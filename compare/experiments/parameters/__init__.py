@@ -7,7 +7,7 @@ import numpy as np
 
 import tmt
 
-from ...engines.mujoco.inventory import MODELLED
+from ...engines.mujoco.inventory import LEFT_OUT, MODELLED
 from ...engines.mujoco.parameters import STATED_FLAGS, parameters
 from ...judge.check import Result
 from ...judge.finding import Finding
@@ -125,7 +125,7 @@ def compare_features(result: Result, robot: Robot) -> list[dict]:
         ({f.feature: f for f in features} for features in (robot.features, robot.features_stated)),
     )
     for name, feature in (theirs | ours).items():
-        if feature.treatment == MODELLED or name in MAY_DIFFER:
+        if feature.treatment in (MODELLED, LEFT_OUT) or name in MAY_DIFFER:
             continue
         number, compiled = (float(features[name].count if name in features else 0) for features in (theirs, ours))
         if not result.check("file", f"{name}, how many", compiled, number, "", rule="equal").passed:
