@@ -78,9 +78,8 @@ class Search:
     def values(self, which: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Values for each row of changes, (rows, states, entries): x (rows, k), of the places which (rows, k)."""
         if len(which) > ROWS:
-            return np.concatenate(
-                [self.values(which[k : k + ROWS], x[k : k + ROWS]) for k in range(0, len(which), ROWS)]
-            )
+            starts = range(0, len(which), ROWS)
+            return np.concatenate([self.values(which[k : k + ROWS], x[k : k + ROWS]) for k in starts])
         if time.monotonic() > self.end:
             raise OutOfTime
         changes, columns = {}, []

@@ -69,8 +69,8 @@ def is_common(factor: float) -> bool:
 
 
 def all_places(equations: Equations) -> list[Place]:
-    of_tree = *numbers(equations), *terms(equations), *coefficients(equations), *forces_in_bias(equations)
-    return [*of_tree, *parts_of_terms(equations)]
+    kinds = numbers, terms, coefficients, forces_in_bias, parts_of_terms
+    return [place for places_of in kinds for place in places_of(equations)]
 
 
 def forces_in_bias(equations: Equations) -> Iterator[Place]:
@@ -176,11 +176,9 @@ def parts_of_terms(equations: Equations) -> Iterator[Place]:
     for b, body in enumerate(tree.body_names):
         added = {f"B' I B of {body}": alone(("inertia", b))}
         for one, other in combinations_with_replacement([*lengths, (f"CoM of {body}", ("com", b))], 2):
-            squares = [alone(("mass", b), of) for _, of in (one, other)]
-            if one == other:
-                added[f"mass of {body} * ({one[0]})^2"] = squares[0]
-            else:
-                added[f"mass of {body} * {one[0]} * {other[0]}"] = alone(("mass", b), one[1], other[1]) - sum(squares)
+            name = f"({one[0]})^2" if one == other else f"{one[0]} * {other[0]}"
+            squares = 0.0 if one == other else sum(alone(("mass", b), of) for _, of in (one, other))
+            added[f"mass of {body} * {name}"] = alone(("mass", b), one[1], other[1]) - squares
         for name, column in added.items():
             active = np.abs(column).max(axis=0) > FIT_ROUNDING * np.abs(column).max()
             parts = {f"{name} in {entries[k]}": k for k in np.flatnonzero(active[:count])}
@@ -229,12 +227,8 @@ def coefficients(equations: Equations) -> list[Place]:
     if nv > MOST_SPEEDS:
         return places
     for i, j in np.argwhere(~np.eye(nv, dtype=bool)).tolist():
-        add(
-            f"{entry_name(('h', j), names)} at rest in {entry_name(('h', i), names)}",
-            parts + i,
-            of_h["gravity", j],
-            0.0,
-        )
+        name = f"{entry_name(('h', j), names)} at rest in {entry_name(('h', i), names)}"
+        add(name, parts + i, of_h["gravity", j], 0.0)
     of_bias = [place for place in terms(equations) if len(place.moves) == 1 and place.moves[0][0].index[1] > 1]
     for place in of_bias:  # the factor of each term of each body in one row of h alone
         added = (equations.values({place.moves[0][0]: np.ones(1)})[0] - right)[:, -nv:]

@@ -199,10 +199,7 @@ class Case:
         tree, scene = self.robot.tree, self.scene
         gravity = tree.gravity if scene.gravity else (0.0, 0.0, 0.0)
         gains = {name: getattr(self.controller, name) for name in GAINS} if self.controller else {}
-        changes = {"damping": np.add(tree.damping, scene.damping), "gravity": gravity, **gains}
-        if all(np.array_equal(getattr(tree, name), value) for name, value in changes.items()):
-            return tree  # a new one is checked, which takes a second for 60 joints
-        return dataclasses.replace(tree, **changes)
+        return dataclasses.replace(tree, damping=np.add(tree.damping, scene.damping), gravity=gravity, **gains)
 
     @property
     def locked(self) -> Mapping[str, float | tuple]:

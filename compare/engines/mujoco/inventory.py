@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from .actuators import control_of
-from .names import bit, element_name, kind_of, number_of_actuators, on, own_name
+from .names import bit, element_name, kind_of, number_of_actuators, on
 
 KINDS = ("hinge", "slide", "ball", "free")
 MODELLED, OFF, OPEN, LEFT_OUT = "modelled", "switched_off", "open_tree", "left_out"
@@ -68,6 +68,7 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
     controls = [inputs[place : place + count].any() for place, count in (control_of(m, i) for i in actuators)]
     clamped = [i for i in actuators if controls[i] or m.actuator_forcelimited[i] or m.actuator_actlimited[i]]
     constrained, damped, sprung = on(m, "CONSTRAINT"), on(m, "DAMPER"), on(m, "SPRING")
+    has_friction = constrained and on(m, "FRICTIONLOSS")
     flags = {name[7:]: int(bit) for name, bit in mujoco.mjtEnableBit.__members__.items() if name.startswith("mjENBL_")}
     others = [f"flag {name.lower()}" for name in flags if m.opt.enableflags & flags[name] and name not in QUIET]
     others += ["flag eulerdamp"] * (not on(m, "EULERDAMP"))
@@ -78,13 +79,9 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
         "armature": having("dof_armature", "actuator_armature"),
         "damping": having("dof_damping") if damped else [],
         "spring": having("jnt_stiffness") if sprung else [],
-        "contact": [*named("geom", np.unique(contact_pairs(m))), *flexes(m)]
-        if constrained and on(m, "CONTACT")
-        else [],
+        "contact": named("geom", np.unique(contact_pairs(m))) if constrained and on(m, "CONTACT") else [],
         "limit": having("jnt_limited", "tendon_limited") if constrained and on(m, "LIMIT") else [],
-        "frictionloss": having("dof_frictionloss", "tendon_frictionloss")
-        if constrained and on(m, "FRICTIONLOSS")
-        else [],
+        "frictionloss": having("dof_frictionloss", "tendon_frictionloss") if has_friction else [],
         "clamp": named("actuator", clamped) + having("jnt_actfrclimited", "tendon_actfrclimited"),
         "fluid": [name for name in ("density", "viscosity") if getattr(m.opt, name)],
         "gravcomp": having("body_gravcomp"),
@@ -95,11 +92,6 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
         "unusable keyframe": named("key", np.flatnonzero(~usable_keys(m))),
         "other": others,
     }
-
-
-def flexes(m: mujoco.MjModel) -> list[str]:
-    names = [mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, i) for i in range(m.nflex)]
-    return [own_name(name or "", "flex", i) for i, name in enumerate(names)]
 
 
 def usable_keys(m: mujoco.MjModel) -> np.ndarray:
@@ -185,11 +177,10 @@ def refuse(m: mujoco.MjModel) -> None:
         raise ValueError("it has no joint")
     for number in range(m.njnt):
         if (kind := kind_of(m, number)) not in KINDS:
-            raise ValueError(
-                f"joint {element_name(m, 'joint', number)!r} is of type {kind}; known are {', '.join(KINDS)}"
-            )
+            name = element_name(m, "joint", number)
+            raise ValueError(f"joint {name!r} is of type {kind}; known are {', '.join(KINDS)}")
     if any(np.any(getattr(m, field)) for field in ELASTIC):
-        name = flexes(m)[int(np.argmin(m.flex_rigid))]
+        name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, int(np.argmin(m.flex_rigid)))
         raise ValueError(f"flex {name!r} is elastic; only rigid bodies are compared")
     for body in np.flatnonzero(m.body_plugin >= 0):
         raise ValueError(f"a plugin acts on body {element_name(m, 'body', body)!r}; its forces are unknown")

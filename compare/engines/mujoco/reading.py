@@ -59,6 +59,7 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
         raise ModelError(f"cannot compare {name_of(source)}: {error}") from None
     name = bytes(model.names).partition(b"\0")[0].decode("utf-8", "replace").strip()
     keys = {k: element_name(model, "key", k) for k in np.flatnonzero(usable_keys(model)).tolist()}
+    ranges = [tuple(limits) for limits in model.jnt_range.tolist()]
     integrator = mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_")
     return Reading(
         source=source,
@@ -68,10 +69,7 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
         open_tree=open_equalities(model),
         keyframes={name: model.key_qpos[k].copy() for k, name in keys.items()},
         qpos0=model.qpos0.copy(),
-        ranges=tuple(
-            tuple(model.jnt_range[place.joint].tolist()) if model.jnt_limited[place.joint] else None
-            for place in joints.values()
-        ),
+        ranges=tuple(ranges[place.joint] if model.jnt_limited[place.joint] else None for place in joints.values()),
         warnings=warnings,
         integrator={member: name for name, member in NAMES.items()}.get(integrator, integrator),
         dt=float(model.opt.timestep),

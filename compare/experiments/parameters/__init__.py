@@ -120,10 +120,8 @@ def rows(setup: Setup) -> Result:
 
 def compare_features(result: Result, robot: Robot) -> list[dict]:
     """Checks that features without a term in the equations are as many as in the solution; the causes where they are not."""
-    causes, (ours, theirs) = (
-        [],
-        ({f.feature: f for f in features} for features in (robot.features, robot.features_stated)),
-    )
+    ours, theirs = ({f.feature: f for f in features} for features in (robot.features, robot.features_stated))
+    causes = []
     for name, feature in (theirs | ours).items():
         if feature.treatment in (MODELLED, LEFT_OUT) or name in MAY_DIFFER:
             continue
@@ -143,9 +141,8 @@ def headline(result: Result) -> Finding | None:
         sizes[kind] = max(sizes.get(kind, 0.0), abs(row["stated"]))
     off = [row for row in rows if row["difference"] != 0.0]
     with np.errstate(divide="ignore"):
-        top = max(
-            off, key=lambda row: np.divide(abs(row["difference"]), sizes[row["of"], row["quantity"]]), default=None
-        )
+        shares = [np.divide(abs(row["difference"]), sizes[row["of"], row["quantity"]]) for row in off]
+        top = off[int(np.argmax(shares))] if off else None
     return result.finding("headline", numbers=len(rows), off=len(off), top=top) if rows else None
 
 
