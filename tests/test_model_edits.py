@@ -87,7 +87,7 @@ EDITS = {  # by quantity: what is replaced by what; the causes: rank, place, sta
                           [(2, "actuator armature", 0, 0.1)], NOT_TRIED),
     "tendon armature": ("</worldbody>", f"</worldbody>{TENDON}", [(2, "tendon armature", 0, 0.1)], NO_WEIGHT),
     "no forces of actuators": ("</mujoco>", '<actuator><position joint="beta" kp="3"/></actuator></mujoco>',
-                               [(2, "forces of actuators", 0, pytest.approx(3.0 * pi, rel=0.05))], NOT_AT_ZERO),
+                               [(2, "forces of actuators (actuator 0)", 0, pytest.approx(3.0 * pi, rel=0.05))], NOT_AT_ZERO),
 }  # fmt: skip
 
 
@@ -196,7 +196,10 @@ def test_causes_come_by_rank_then_by_size():
 
 
 def test_a_force_that_no_number_explains_is_the_cause():
-    assert set(places(edited(SERVO, ('mass="1.5"', 'mass="1.501"')))) == {"forces of actuators", "mass of forearm"}
+    assert set(places(edited(SERVO, ('mass="1.5"', 'mass="1.501"')))) == {
+        "forces of actuators (actuator 0)",
+        "mass of forearm",
+    }
     held = "</mujoco>", '<equality><joint joint1="gamma" polycoef="0.3 0 0 0 0"/></equality></mujoco>'
     assert places(edited(held, ('constraint="disable" ', ""))) == ["forces of constraints and contacts"]
 

@@ -45,10 +45,11 @@ def answers_of(model: Tree) -> "Answers":
     return known.setdefault(id(model), Answers(model))
 
 
-def prepare(model: Tree = ARM) -> None:
+def prepare(model: Tree = ARM, *quantities: str) -> None:
     """Have machine code answer for a model from now on, so that no call of up to some hundred states waits: in a controller.
 
-    The first time on a machine it takes about a second for an arm and several for a humanoid. ValueError if it is no Tree.
+    quantities: names of functions of `tmt`; all without any. The first time on a machine all take about a second for an arm and
+    several for a humanoid. ValueError if the model is no Tree or there is no such quantity.
 
     >>> forearm = tmt.ARM.lock({"alpha": 0.0, "beta": 0.0})
     >>> tmt.prepare(forearm)
@@ -56,7 +57,9 @@ def prepare(model: Tree = ARM) -> None:
     [-2.20725]
     """
     checked_model(model)
-    for quantity in QUANTITIES:
+    if unknown := [name for name in quantities if name not in QUANTITIES]:
+        raise ValueError(f"{unknown[0]!r} is no quantity; known are {', '.join(QUANTITIES)}")
+    for quantity in quantities or QUANTITIES:
         (known.get(id(model)) or answers_of(model)).get(quantity)
 
 

@@ -114,10 +114,8 @@ def rows(given: Given, cause: str) -> list[Difference]:
     """Every entry of every quantity at every state, the largest ratio first."""
     found = []
     for name, comparison in given.compared.items():
-        entries, columns = (
-            given.entries(name),
-            (comparison.own, comparison.right, comparison.tolerance, comparison.ratio),
-        )
+        entries = given.entries(name)
+        columns = comparison.own, comparison.right, comparison.tolerance, comparison.ratio
         for at, own, right, tolerance, ratio in zip(np.ndindex(comparison.own.shape), *(part.flat for part in columns)):
             numbers = map(float, (own, right, own - right, tolerance, ratio))
             why = cause if ratio > 1.0 else ""

@@ -164,9 +164,8 @@ class Given:
             right = self.asked(self.mujoco, name)
             try:
                 accelerations = name == "acceleration"
-                size = (
-                    scale.acceleration(scale.force(self.tau), right) if accelerations else getattr(scale, SCALES[name])
-                )
+                size = getattr(scale, SCALES.get(name, name))
+                size = size(scale.force(self.tau), right) if accelerations else size
             except np.linalg.LinAlgError:
                 text = "Mbar of the model is singular at a state: there is no acceleration to compare"
                 raise ValueError(text) from None

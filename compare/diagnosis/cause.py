@@ -52,7 +52,8 @@ class Diagnosis(NamedTuple):
     details: tuple[dict, ...] = ()  # coefficients that differ, with both numbers or in terms
     entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[hip][knee]"
     compared: int = 0  # entries in all
-    nearest: tuple[tuple[str, float], ...] = ()  # single explanations that leave least, and what they leave, a share
+    # single changes that leave least: what they leave, a share, and whether it is within the tolerance
+    nearest: tuple[tuple[str, float, bool], ...] = ()
     too_few: int = 0  # states, if they are too few for a search
     seconds: float | None = None  # of a search that was not finished
 

@@ -96,11 +96,9 @@ class Compared:
         n = len(tree.kind)
         x = np.random.default_rng(0).uniform(-3.0, 3.0, (STATES_PER_TERM * 5**n, n))
         right = right_values(Equations(tree, x + reference, np.zeros_like(x)))
-        at_x, at_q = (
-            [form(names, tree.kind, angles) for form in (sums, products)]
-            for angles in (x, self.equations.q - reference)
-        )
-        tried = at_q[0] | at_q[1] | dict(zip(names, (self.equations.q - reference).T))
+        angles = self.equations.q - reference
+        at_x = [form(names, tree.kind, x) for form in (sums, products)]
+        tried = sums(names, tree.kind, angles) | products(names, tree.kind, angles) | dict(zip(names, angles.T))
         found = []
         for one in self.differing:
             expression = right_terms(at_x, right[one.place], np.abs(one.yours).max())
@@ -172,10 +170,8 @@ def sums(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> dict[str,
             angle = x[:, hinges] @ np.array(times)
             for power, column in powers.items():
                 before = "" if power == "1" else f"{power} "
-                terms |= {
-                    f"{before}cos({called})": column * np.cos(angle),
-                    f"{before}sin({called})": column * np.sin(angle),
-                }
+                terms[f"{before}cos({called})"] = column * np.cos(angle)
+                terms[f"{before}sin({called})"] = column * np.sin(angle)
     return terms
 
 
@@ -184,13 +180,8 @@ def right_terms(forms: list[dict[str, np.ndarray]], right: np.ndarray, size: flo
     fits = []
     for form in forms:
         x = np.linalg.lstsq(np.array(list(form.values())).T, right, rcond=None)[0]
-        fits.append(
-            {
-                name: float(value)
-                for name, value in zip(form, x)
-                if abs(value) > FIT_ROUNDING * max(np.abs(x).max(), size)
-            }
-        )
+        least = FIT_ROUNDING * max(np.abs(x).max(), size)
+        fits.append({name: float(value) for name, value in zip(form, x) if abs(value) > least})
     return min(fits, key=len)
 
 

@@ -16,7 +16,7 @@ FIRST_ROUNDS, FINALISTS = 6, 24  # after these rounds only the best go on
 CONVERGED = 1e-14  # a step of a place, of its size
 SEEN = 1e-100  # of the square of a derivative, in tolerances
 LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
-POLISHED = 16  # places with a quadratic influence that are fitted
+POLISHED = 24  # places with a quadratic influence that are fitted
 CANDIDATES = 64  # pairs that are fitted, the most promising of all
 ROWS = 256  # of changes in one evaluation
 TURNED = np.pi * np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # further starts for the zero of a hinge
@@ -31,9 +31,12 @@ class Fitted(NamedTuple):
     left: float  # of the difference, a share: root of the sum of the squares
 
     @property
+    def is_possible(self) -> bool:
+        return all(of.is_possible(change) for of, change in zip(self.places, self.changes))
+
+    @property
     def explains(self) -> bool:
-        """Whether it does, by numbers that are possible: no mass, moment of inertia, damping or stiffness is below zero."""
-        return self.ratio <= 1.0 and all(of.value(change) >= of.least for of, change in zip(self.places, self.changes))
+        return self.ratio <= 1.0 and self.is_possible
 
 
 class OutOfTime(Exception):
@@ -75,9 +78,8 @@ class Search:
     def values(self, which: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Values for each row of changes, (rows, states, entries): x (rows, k), of the places which (rows, k)."""
         if len(which) > ROWS:
-            return np.concatenate(
-                [self.values(which[k : k + ROWS], x[k : k + ROWS]) for k in range(0, len(which), ROWS)]
-            )
+            starts = range(0, len(which), ROWS)
+            return np.concatenate([self.values(which[k : k + ROWS], x[k : k + ROWS]) for k in starts])
         if time.monotonic() > self.end:
             raise OutOfTime
         changes, columns = {}, []

@@ -70,10 +70,8 @@ class Equations:
             row[last] = row[last] + np.asarray(added)[:, None]
         for k in {path.index[0] for path in changes or {} if path.field == "axis"}:
             numbers["axis"][k] = unit_direction(*numbers["axis"][k])
-        tree = self.tree
-        changed = SimpleNamespace(
-            **numbers, parent=tree.parent, coordinates=tree.coordinates, body_hinge=tree.body_hinge, moves=tree.moves
-        )
+        kept = {name: getattr(self.tree, name) for name in ("parent", "coordinates", "body_hinge", "moves")}
+        changed = SimpleNamespace(**numbers, **kept)
         return self.summed(changed, method.bodies(changed, list(self.q.T), list(self.qd.T)))
 
     def coefficients(self) -> dict[tuple, np.ndarray]:

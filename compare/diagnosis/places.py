@@ -5,6 +5,7 @@ to entries of Mbar or h. The zero of a joint is a convention and has rank 1; the
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,8 @@ TOGETHER = {  # terms that are often left out together
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
 }
 EVERY_BODY = "every body"
+COMMON_FACTORS = (-1.0, 0.0, 0.5, 1.0, 2.0)
+MOST_HINGES = 3  # whose single terms of Mbar are tried
 OF_ZERO = "zero position"  # the kind of a place
 FIT_ROUNDING = 1e-11  # of the size of a number: what a fit leaves of a number that is 0
 TURNING = ("N m s/rad", "N m/rad", "N m")
@@ -32,7 +35,7 @@ class Place(NamedTuple):
     """One number that can be wrong."""
 
     rank: int
-    kind: str  # "number", "force", "term", "coefficient" or OF_ZERO
+    kind: str  # "number", "force", "term", "part" of a term, "coefficient" or OF_ZERO
     name: str
     stated: float
     unit: str
@@ -52,12 +55,22 @@ class Place(NamedTuple):
         value = self.stated + change
         return 0.0 if abs(value) < FIT_ROUNDING * self.size else float(value)
 
+    def is_possible(self, change: float) -> bool:
+        """Whether no mass, moment of inertia, damping or stiffness is below zero, and a part has a common factor."""
+        return self.value(change) >= self.least and (self.kind != "part" or is_common(self.value(change)))
+
     def changed(self, change: float) -> Change:
         return Change(self.kind, self.name, float(self.stated), self.value(change), self.unit)
 
 
+def is_common(factor: float) -> bool:
+    """Whether a wrong term often has this factor."""
+    return bool(np.isclose(factor, COMMON_FACTORS, rtol=0.0, atol=1e-6).any())
+
+
 def all_places(equations: Equations) -> list[Place]:
-    return [*numbers(equations), *terms(equations), *coefficients(equations), *forces_in_bias(equations)]
+    kinds = numbers, terms, coefficients, forces_in_bias, parts_of_terms
+    return [place for places_of in kinds for place in places_of(equations)]
 
 
 def forces_in_bias(equations: Equations) -> Iterator[Place]:
@@ -142,6 +155,40 @@ def terms(equations: Equations) -> Iterator[Place]:
             yield Place(2, "term", name.format(body), 1.0, "times", 1.0, moves)
 
 
+def parts_of_terms(equations: Equations) -> Iterator[Place]:
+    """The factor of each part of a term of a body in an entry of M, in M, and in M and h, for a few hinges.
+
+    T is a sum over the offsets of the joints that carry the body and its CoM, T' m T over pairs of these lengths.
+    """
+    tree, count = equations.tree, len(equations.triangle[0])
+    if set(tree.kind) != {"hinge"} or equations.nv > MOST_HINGES:
+        return
+    entries = [entry_name(entry, equations.names) for entry in equations.entries[:count]]
+    lengths = [(f"offset of {name}", ("offset", i)) for i, name in enumerate(tree.hinge_names) if tree.parent[i] >= 0]
+
+    def alone(*kept: tuple[str, int]) -> np.ndarray:
+        """Mbar and h if all masses, tensors and lengths are zero except some."""
+        fields = ("mass", "inertia", "offset", "com", "gravity", "armature")
+        entries = [(field, at, x) for field in fields for at, x in np.ndenumerate(equations.stated[field])]
+        others = {Path(field, at): np.array([-x]) for field, at, x in entries if (field, at[0]) not in kept}
+        return equations.values(others)[0]
+
+    for b, body in enumerate(tree.body_names):
+        added = {f"B' I B of {body}": alone(("inertia", b))}
+        for one, other in combinations_with_replacement([*lengths, (f"CoM of {body}", ("com", b))], 2):
+            name = f"({one[0]})^2" if one == other else f"{one[0]} * {other[0]}"
+            squares = 0.0 if one == other else sum(alone(("mass", b), of) for _, of in (one, other))
+            added[f"mass of {body} * {name}"] = alone(("mass", b), one[1], other[1]) - squares
+        for name, column in added.items():
+            active = np.abs(column).max(axis=0) > FIT_ROUNDING * np.abs(column).max()
+            parts = {f"{name} in {entries[k]}": k for k in np.flatnonzero(active[:count])}
+            if name.startswith("mass"):  # `terms` has those of B' I B
+                parts |= {f"{name} in M": slice(count)} if len(parts) > 1 else {}
+                parts |= {name: slice(None)} if active[count:].any() else {}
+            for place, part in parts.items():
+                yield Place(2, "part", place, 1.0, "times", 1.0, column=column[:, part], entry=part)
+
+
 def groups(tree: tmt.Tree) -> dict[str, list[int]]:
     """Each body alone, and all together."""
     alone = {body: [b] for b, body in enumerate(tree.body_names)}
@@ -180,12 +227,8 @@ def coefficients(equations: Equations) -> list[Place]:
     if nv > MOST_SPEEDS:
         return places
     for i, j in np.argwhere(~np.eye(nv, dtype=bool)).tolist():
-        add(
-            f"{entry_name(('h', j), names)} at rest in {entry_name(('h', i), names)}",
-            parts + i,
-            of_h["gravity", j],
-            0.0,
-        )
+        name = f"{entry_name(('h', j), names)} at rest in {entry_name(('h', i), names)}"
+        add(name, parts + i, of_h["gravity", j], 0.0)
     of_bias = [place for place in terms(equations) if len(place.moves) == 1 and place.moves[0][0].index[1] > 1]
     for place in of_bias:  # the factor of each term of each body in one row of h alone
         added = (equations.values({place.moves[0][0]: np.ones(1)})[0] - right)[:, -nv:]

@@ -14,11 +14,12 @@ from .cause import LEAST_STATES, Cause, Diagnosis, cause_of, tied
 from .coefficients import Compared
 from .fit import Fitted, Search
 from .model import Equations
-from .places import OF_ZERO, all_places, entry_name
+from .places import OF_ZERO, all_places, entry_name, is_common
 from .slips import slips
 from .variants import Variant, conventions, program_options, values_in
 
 FEW = 2  # states at which conventions are tried first
+UNCOMMON = 2  # see `order`
 SHOWN = 12  # single explanations that leave least
 
 
@@ -61,8 +62,8 @@ def explanation(search: Search, compared: Compared, seconds: float) -> Diagnosis
     if len(np.unique(equations.q, axis=0)) < LEAST_STATES:
         return found._replace(too_few=len(equations.q))
     singles = search.in_time(search.singles)
-    nearest = sorted(singles, key=lambda one: one.left)[:SHOWN]
-    found = found._replace(nearest=tuple((one.places[0].name, one.left) for one in nearest))
+    nearest = sorted((one for one in singles if one.is_possible), key=lambda one: one.left)[:SHOWN]
+    found = found._replace(nearest=tuple((one.places[0].name, one.left, one.explains) for one in nearest))
     for causes in ranks(search, singles, compared):
         if causes:
             return found._replace(causes=tied(causes))
@@ -84,12 +85,21 @@ def ranks(search: Search, singles: Sequence[Fitted], compared: Compared) -> Iter
     second = [of_fitted(fit, 2, search) for fit in explaining if fit.places[0].rank == 2]
     for lists in slips(search.equations):
         second += next(filter(None, (explained(search, variants) for variants in lists)), [])
-    if not second and (cause := compared.cause(1)):
-        second = [cause]
-    yield first + second
+    second.sort(key=order)
+    least = order(second[0]) if second else UNCOMMON
+    if least >= UNCOMMON and (cause := compared.cause(1)):
+        second.insert(0, cause)
+    yield first + [cause for cause in second if least > 0 or order(cause) < UNCOMMON]
     pairs = search.in_time(lambda: search.pairs(("number", OF_ZERO)))
     third = [of_fitted(fit, 3, search) for fit in pairs if fit.explains]
     yield [cause for cause in of_joints if cause.rank == 3] + third + [compared.cause(2)] * bool(compared.cause(2))
+
+
+def order(cause: Cause) -> int:
+    """Of a cause of rank 2 in a list: slips and factors that are common mistakes, numbers, other factors, negative ones."""
+    if cause.unit != "times":
+        return int(cause.kind != "slip")
+    return 0 if is_common(cause.explains) else UNCOMMON + (cause.explains < 0.0)
 
 
 def of_fitted(fitted: Fitted, rank: int, search: Search) -> Cause:

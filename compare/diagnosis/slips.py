@@ -22,16 +22,11 @@ def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
     parts = [equations.summed(of_one, [b])[0] for b in bodies]
     for name, changed in changed_bodies(equations, bodies):
         added = [equations.summed(of_one, [b])[0] - part for b, part in zip(changed, parts)]
-        variants = [
-            Variant(Change("slip", name.format(body), "no", ""), right + sum(added[b] for b in which), 2)
-            for body, which in groups(tree).items()
-        ]
-        in_mass = [
-            Variant(
-                change._replace(place=f"{change.place} in M alone"), np.hstack([of[:, :count], right[:, count:]]), 2
-            )
-            for change, of, *_ in variants
-        ]
+        sums = {body: right + sum(added[b] for b in which) for body, which in groups(tree).items()}
+        variants = [Variant(Change("slip", name.format(body), "no", ""), values, 2) for body, values in sums.items()]
+        alone = [change._replace(place=f"{change.place} in M alone") for change, *_ in variants]
+        of_M = [np.hstack([values[:, :count], right[:, count:]]) for _, values, *_ in variants]
+        in_mass = [Variant(change, values, 2) for change, values in zip(alone, of_M)]
         yield [variants[: len(added)], variants[len(added) :], in_mass[: len(added)], in_mass[len(added) :]]
     if "ball" not in tree.kind:
         yield [list(lagrange(equations))]
@@ -52,10 +47,8 @@ def changed_bodies(equations: Equations, bodies: list[method.Body]) -> Iterator[
 
     yield "R for R' in the angular velocity of {}", [turned(b, R) for b, R in zip(world, turns)]
     yield "inertia of {} not turned to the inertial frame", world
-    yield (
-        "R' I R for R I R' of {}",
-        [b._replace(inertia=R.transposed @ b.inertia @ R) for b, R in zip(world, turns)],
-    )
+    wrong_way = [b._replace(inertia=R.transposed @ b.inertia @ R) for b, R in zip(world, turns)]
+    yield "R' I R for R I R' of {}", wrong_way
     again = with_field("inertia", [b.inertia + more for b, more in zip(bodies, moved)])
     yield "inertia of {} about its joint and mass counted again", again
     less = with_field("inertia", [b.inertia - more for b, more in zip(bodies, moved)])

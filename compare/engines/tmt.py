@@ -87,8 +87,8 @@ class Compiled:
     """A Tree's quantities by tmt's compiled code."""
 
     def __init__(self, tree: tmt.Tree):
-        tmt.prepare(tree)
         self.tree = tree
 
     def __getattr__(self, quantity: str) -> Callable:
+        tmt.prepare(self.tree, quantity)
         return partial(getattr(tmt, quantity), model=self.tree)

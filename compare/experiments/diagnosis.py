@@ -108,13 +108,9 @@ def rows(setup: Setup) -> Result:
 
     for of in found.conditions:
         check(of.name, of.value, of.tolerance, not of.is_met, of.finding, unit=of.unit, rule=of.rule)
+    is_finite = diagnosis.differs or np.isfinite(found.ratio)
     for name, ratio, kind, is_known in (
-        (
-            "M and h, largest difference over its tolerance",
-            found.ratio,
-            "of_equations",
-            diagnosis.differs or np.isfinite(found.ratio),
-        ),
+        ("M and h, largest difference over its tolerance", found.ratio, "of_equations", is_finite),
         (OF_ACCELERATIONS, found.force_ratio, "of_forces", np.isfinite(found.force_ratio)),
     ):
         values = {"found": found} if is_known else {}

@@ -54,15 +54,15 @@ def draw_distances(result: Result, quantities: list[str]) -> tuple[str, Figure, 
 
 def draw_nearest(result: Result) -> tuple[str, Figure, Finding]:
     """The share of the difference that remains after each of the best single corrections."""
-    names, left = zip(*result.curves["nearest"])
+    names, left, explains = zip(*result.curves["nearest"])
     left = np.maximum(left, EPS)
     fig = Figure(figsize=(WIDTH, 0.9 + 0.25 * len(names)), layout="constrained")
     ax = fig.subplots()
-    explaining = {row["place"] for row in result.rows}
-    ax.barh(range(len(names)), left, color=[GREEN if name in explaining else GREY for name in names])
+    ax.barh(range(len(names)), left, color=[GREEN if one else GREY for one in explains])
     ax.set(xscale="log", xlim=(EPS / 3.0, 1.5), xlabel="remaining share of the difference", yticks=range(len(names)))
     ax.set_yticklabels(map(plain, names))
     ax.invert_yaxis()
-    looks = ((GREEN, "explains the difference down to rounding"), (GREY, "does not explain it"))
-    fig.legend(handles=[Patch(color=colour, label=name) for colour, name in looks], loc="outside upper center", ncols=2)
+    looks = ((True, GREEN, "explains the difference down to rounding"), (False, GREY, "does not explain it"))
+    handles = [Patch(color=colour, label=name) for one, colour, name in looks if one in explains]
+    fig.legend(handles=handles, loc="outside upper center", ncols=2)
     return "diagnosis_nearest", fig, result.finding("nearest", names=names[:2], left=left[:2].tolist())

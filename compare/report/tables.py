@@ -90,6 +90,10 @@ def shortened(rows: Sequence[dict], most: int, most_of_runs: int | None = None) 
     if {"stated", "compiled"} <= set(rows[0]):
         off = [row for row in rows if row.get("difference")]
         words = f"{len(off)} of {len(rows)} rows differ" if off else f"none of {len(rows)} rows differs"
+        if off and all(
+            f"{row['stated']:.{DIGITS['stated']}g}" == f"{row['compiled']:.{DIGITS['stated']}g}" for row in off
+        ):
+            words += ", in digits that are not shown"
         return off[:most], words + (f", the first {most}" if len(off) > most else "")
     measure = next((measure for measure in MEASURES if any(measure(row) is not None for row in rows)), None)
     size = pd.Series([badness(row, measure) if measure else 0.0 for row in rows])

@@ -190,7 +190,8 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, new: Seque
     if any(used) and not failed:
         most = f"at most {100.0 * max(used):.2g} % of tolerance"
     many = f"{len(checks):>3} check{' ' if len(checks) == 1 else 's'}"
-    word = f"{len(failed)} FAILED" if failed else "ok" if checks else "nothing"
+    fails = "DIFFER" if section.name in STATES_CAUSES else "FAILED"
+    word = f"{len(failed)} {fails}" if failed else "ok" if checks else "nothing"
     terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<27} {seconds:5.1f} s CPU", "red" * bool(failed))
     for text in section.result.top:
         terminal.say(f"  {say(text)}")

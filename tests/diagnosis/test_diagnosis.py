@@ -152,7 +152,7 @@ def told(changes, bias=lambda q, qd: tmt.bias(q, qd, TREE)):
 
 LOWER = 4.905 * (np.sin(HIP - KNEE) - np.sin(HIP + KNEE))
 TERMS = {  # what is added: the coefficients that are named, and what is said of each: of yours, of the right one
-    "a factor": ({M00: -0.5 * np.cos(KNEE)}, ["M[hip][hip]"], [" 0.5 cos(knee) ", " cos(knee)"]),
+    "a factor": ({M00: -0.7 * np.cos(KNEE)}, ["M[hip][hip]"], [" 0.3 cos(knee) ", " cos(knee)"]),
     "another angle": (
         {H0: LOWER, H1: LOWER}, ["h[hip], gravity", "h[knee], gravity"],
         [" 4.905 sin(hip - knee) ", " 4.905 sin(hip + knee)"],
@@ -170,6 +170,20 @@ def test_a_wrong_term_is_named(changes, names, numbers):
     assert cause.place.count("[") == " ".join(names).count("[")  # and no other
     at = [cause.text().find(number) for number in numbers]
     assert -1 not in at and at == sorted(at)
+
+
+@pytest.mark.parametrize(
+    "added, factor, places",
+    [
+        (-2.0, -1.0, {"mass of lower * (offset of knee)^2 in M[hip][hip]"}),
+        (np.cos(KNEE), 2.0, {"mass of lower * offset of knee * CoM of lower in M[hip][hip]"}),
+        (-0.1, 0.0, {"B' I B of lower in M[hip][hip]", "B' I B of upper in M[hip][hip]"}),
+    ],
+)
+def test_a_slip_in_one_part_of_M_comes_before_unusual_factors_of_other_terms(added, factor, places):
+    causes = told({M00: added}).causes
+    assert places <= {cause.place for cause in causes}
+    assert all(cause.explains == pytest.approx(factor, abs=1e-9) for cause in causes if cause.unit == "times")
 
 
 def test_a_wrong_term_of_the_speeds_is_named():

@@ -57,6 +57,12 @@ def test_a_body_that_no_hinge_tells_is_found_by_its_name():
     assert parse(CRANE.replace('name="boom"', 'name="other"'), TREE).bodies == [1, 2, 4, 5, 3]
 
 
+def test_bodies_whose_hinges_have_exchanged_their_names():
+    """The forearm is one of the arm's bodies: no other has mass."""
+    exchanged = XML.replace('"alpha"', '"x"').replace('"gamma"', '"alpha"').replace('"x"', '"gamma"')
+    assert parse(exchanged, ARM.tree).bodies == [1, 2]
+
+
 def test_body_axes_are_those_of_the_world_at_zero(rng):
     """A forearm frame that lies turned in the file describes the same arm."""
     turned = edited('"forearm" pos="0 0 -0.3"', '"forearm" pos="0 0 -0.3" euler="0 0 1.5707963267948966"')

@@ -101,6 +101,7 @@ MORE = {  # feature: file, names
         mjcf(TWO, after='<equality><weld body1="c"/><joint joint1="j" joint2="k" active="false"/></equality>'),
         ("equality 0",),
     ),
+    "unusable keyframe": (mjcf(after='<keyframe><key name="up" qpos="inf"/><key qpos="1"/></keyframe>'), ("up",)),
     "tendon": (mjcf(TWO, after=TENDON.format('stiffness="9" damping="3" springlength="0.3" range="0 1"')), ("t",)),
 }  # fmt: skip
 
@@ -144,6 +145,17 @@ def test_what_has_no_name_is_called_by_its_kind_and_number():
     assert found.tree.hinge_names == ("w", "joint 1")
     keys = {"k": [0.0, 0.0, 1.0, 0.0, 0.0], "key 1": [1.0, 0.0, 0.0, 0.0, 0.0]}  # quaternions of length 1
     assert {name: q.tolist() for name, q in found.keyframes.items()} == keys
+
+
+def test_a_joint_without_a_name_does_not_get_that_of_another():
+    assert (
+        read(mjcf(TWO.replace('name="j"', "").replace('name="k"', 'name="joint 0"'))).tree.hinge_names[1] == "joint 0"
+    )
+
+
+def test_a_flex_without_elasticity_is_compared(rng):
+    sheet = '<flexcomp name="f" type="grid" count="2 2 1" spacing=".1 .1 .1" dim="2" mass="1" rigid="true"/></body>'
+    assert compared(mjcf(PLAIN.replace("</body>", sheet)), rng).tree.body_names == ("b",)
 
 
 # locked joints

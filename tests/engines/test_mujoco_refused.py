@@ -11,12 +11,12 @@ REFUSED = {  # a word of why, and the file
     "tendon 't'": mjcf(TWO, after=TENDON.format('armature="1"')),
     "actuator 'a'": mjcf(TWO, after=TENDON.format("") + ALONG),
     "flex 'soft'": mjcf(
-        PLAIN + '<flexcomp name="soft" type="grid" count="3 3 1" spacing=".1 .1 .1" radius="0.01" dim="2" mass="1"/>'
+        PLAIN + '<flexcomp name="soft" type="grid" count="2 2 2" spacing=".1 .1 .1" dim="3" mass="1">'
+        '<elasticity young="1e3"/></flexcomp>'
     ),
     "mass": mjcf("<body><joint/></body>"),
     "body_pos of 'far'": mjcf('<body name="far" pos="inf 0 0"><geom size="1"/></body>' + PLAIN),
     "dof_damping of 'j'": mjcf(PLAIN.replace('name="j"', 'name="j" damping="-1"')),
-    "key_qpos of 'up'": mjcf(after='<keyframe><key name="up" qpos="inf"/></keyframe>'),
     "actuator_gainprm of 's'": mjcf(after='<actuator><position name="s" joint="j" kp="nan"/></actuator>'),
     "together": mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")),
     "'w x'": mjcf(BALL),

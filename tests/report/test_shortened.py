@@ -36,6 +36,10 @@ def test_of_numbers_that_are_stated_those_that_differ_are_shown_and_without_grou
     assert shortened(rows, 10)[0] == [rows[7]]
     rows = [{"at": k, "predicted_dt_s": 1.0, "observed_dt_s": 1.0 - 0.1 * (k % 7)} for k in range(21)]
     assert [row["at"] for row in shortened(rows, 3)[0]] == [6, 13, 20]
+    number = {"stated": 0.1, "compiled": 0.1, "difference": 0.0}
+    for compiled, is_hidden in ((0.1 + 1e-16, True), (0.101, False)):
+        words = shortened([number, number, number | {"compiled": compiled, "difference": compiled - 0.1}], 2)[1]
+        assert ("not shown" in words) is is_hidden
     assert [row["at"] for row in shortened([{"at": k} for k in range(21)], 3)[0]] == [0, 1, 2]
 
 

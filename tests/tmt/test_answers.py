@@ -163,6 +163,10 @@ def test_numbers_beyond_the_largest_double(compiled):
 
 def test_who_cannot_wait_has_it_prepared(monkeypatch):
     tree = tmt.ARM.lock({"alpha": 0.0, "beta": 0.5})
+    tmt.prepare(tree, "bias")
+    assert set(answers.answers_of(tree).ready) == {"bias"}
+    with pytest.raises(ValueError, match="'weight'"):
+        tmt.prepare(tree, "weight")
     assert tmt.prepare(tree) is None and set(answers.answers_of(tree).ready) == set(QUANTITIES)
     monkeypatch.setattr(literal, "acceleration", None)
     assert np.isfinite(tmt.acceleration(Z[:1], Z[:1], Z[:1], tree)).all()

@@ -21,6 +21,8 @@ def locked(tree, angles: Mapping):
         raise ValueError(f"there is no hinge {shown(unknown[0])} to lock; the hinges are {', '.join(names)}")
     if len(angles) == len(names):
         raise ValueError(f"all hinges ({', '.join(names)}) are locked; at least one must be free")
+    if not angles:
+        return tree
     held = {name: _position(tree.kind[names.index(name)], value) for name, value in angles.items()}
     free = [i for i, name in enumerate(names) if name not in held]
 

@@ -125,11 +125,8 @@ class Acting:
     @property
     def filters(self) -> list[int]:
         """Indices of the activations of filters that act: they decay by themselves."""
-        return [
-            int(self.model.actuator_actadr[i])
-            for i, one in enumerate(self.drive.actuators)
-            if one.acts and one.dynamics.startswith("filter")
-        ]
+        filters = [i for i, one in enumerate(self.drive.actuators) if one.acts and one.dynamics.startswith("filter")]
+        return [int(self.model.actuator_actadr[i]) for i in filters]
 
     def deviations(
         self,

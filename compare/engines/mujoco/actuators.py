@@ -1,6 +1,6 @@
 """The actuators, tendons and gravity compensation of a compiled model."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 
@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from ...robots.actuators import Actuator, Drive, Tendon
-from .names import OF_A_JOINT, element_name, joint_name, kind_of, number_of_actuators, on, output_of, own_name
+from .names import OF_A_JOINT, element_name, joint_name, kind_of, number_of_actuators, on, output_of
 from .source import editable_again
 
 WITH_LENGTH = (*OF_A_JOINT, mujoco.mjtTrn.mjTRN_SLIDERCRANK, mujoco.mjtTrn.mjTRN_TENDON, mujoco.mjtTrn.mjTRN_SITE)
@@ -23,17 +23,17 @@ NOT_LINEAR = {
 }
 
 
-def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequence[str]) -> Drive:
+def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Mapping[int, str]) -> Drive:
     """Actuators, tendons and gravity compensation of a compiled model.
 
-    source: what it was read from, a Path, text or None; bodies: of the Tree, by number; keys: names of the keyframes.
+    source: what it was read from, a Path, text or None; bodies: of the Tree, by number; keys: names of keyframes.
     """
     passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
     return Drive(
         actuators=tuple(actuator(model, i) for i in range(number_of_actuators(model))),
         tendons=tuple(one for one in map(partial(tendon, model), range(model.ntendon)) if one.stiffness or one.damping),
         compensation=tuple(map(float, model.body_gravcomp[list(bodies)] * passive)),
-        controls={keys[k]: u for k, u in stated_controls(model, source).items()},
+        controls={keys[k]: u for k, u in stated_controls(model, source).items() if k in keys},
         unknown=unknown_springs(model),
         explicit_damping=not on(model, "EULERDAMP"),
     )
@@ -48,7 +48,7 @@ def actuator(m: mujoco.MjModel, i: int) -> Actuator:
     filters = dynamics in ("FILTER", "FILTEREXACT")
     clamped = inputs and on(m, "CLAMPCTRL") and m.actuator_ctrllimited[place]
     return Actuator(
-        name=own_name(m.actuator(i).name, "actuator", i),
+        name=element_name(m, "actuator", i),
         joint=joint,
         moment=moment,
         gain=law(m.actuator_gainprm[i], GAINS.get(gain, 0)),
@@ -140,7 +140,7 @@ def tendon(m: mujoco.MjModel, i: int) -> Tendon:
     moment = tendon_moment(m, i)
     low, high = map(float, m.tendon_lengthspring[i])
     return Tendon(
-        own_name(m.tendon(i).name, "tendon", i),
+        element_name(m, "tendon", i),
         i,
         None if moment is None else tuple(moment.tolist()),
         float(m.tendon_stiffness[i]) * on(m, "SPRING"),

@@ -13,7 +13,7 @@ import numpy as np
 from mujoco.rollout import rollout
 
 from .. import GRID, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
-from .names import EVALUATIONS, INTEGRATORS, bit, joint_places, moving
+from .names import EVALUATIONS, INTEGRATORS, bit, element_name, joint_places, moving, number_of_actuators
 
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
 _log = mujoco.MjLogConfig.get()
@@ -100,6 +100,11 @@ class MujocoDynamics:
             return d.qfrc_inverse[self.dofs]
 
         return self._each(torque, q, v, a)  # a travels in the place of tau
+
+    def acting_actuators(self, q, v) -> list[str]:
+        """The names of the actuators that exert a force at a state."""
+        forces = self._each(lambda d: d.actuator_force, q, v).reshape(-1, number_of_actuators(self.model))
+        return [element_name(self.model, "actuator", i) for i in np.flatnonzero(forces.any(axis=0))]
 
     def other_forces(self, q, v) -> dict:
         """Forces that the case's equations do not have, by source, N m, (..., nv) each."""

@@ -10,7 +10,7 @@ from .actuators import control_of
 from .names import bit, element_name, kind_of, number_of_actuators, on
 
 KINDS = ("hinge", "slide", "ball", "free")
-MODELLED, OFF, OPEN = "modelled", "switched_off", "open_tree"
+MODELLED, OFF, OPEN, LEFT_OUT = "modelled", "switched_off", "open_tree", "left_out"
 
 
 class Feature(NamedTuple):
@@ -19,7 +19,7 @@ class Feature(NamedTuple):
     feature: str
     count: int
     names: tuple[str, ...]
-    treatment: str  # modelled, switched_off, open_tree
+    treatment: str  # modelled, switched_off, open_tree, left_out
     reason: str
 
 
@@ -41,6 +41,7 @@ REASONS = {
     "equality": (OPEN, "the equations are those of the open tree"),
     "tendon": (OFF, "the equations have no forces along tendons"),
     "keyframe": (MODELLED, "postures of the comparison"),
+    "unusable keyframe": (LEFT_OUT, "not every number is finite"),
     "other": (OFF, "it changes the motion; the equations do not have it"),
 }
 QUIET = ("OVERRIDE", "ENERGY", "FWDINV", "DIAGEXACT")  # enable flags that cannot change a motion without contacts
@@ -67,6 +68,7 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
     controls = [inputs[place : place + count].any() for place, count in (control_of(m, i) for i in actuators)]
     clamped = [i for i in actuators if controls[i] or m.actuator_forcelimited[i] or m.actuator_actlimited[i]]
     constrained, damped, sprung = on(m, "CONSTRAINT"), on(m, "DAMPER"), on(m, "SPRING")
+    has_friction = constrained and on(m, "FRICTIONLOSS")
     flags = {name[7:]: int(bit) for name, bit in mujoco.mjtEnableBit.__members__.items() if name.startswith("mjENBL_")}
     others = [f"flag {name.lower()}" for name in flags if m.opt.enableflags & flags[name] and name not in QUIET]
     others += ["flag eulerdamp"] * (not on(m, "EULERDAMP"))
@@ -79,18 +81,22 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
         "spring": having("jnt_stiffness") if sprung else [],
         "contact": named("geom", np.unique(contact_pairs(m))) if constrained and on(m, "CONTACT") else [],
         "limit": having("jnt_limited", "tendon_limited") if constrained and on(m, "LIMIT") else [],
-        "frictionloss": having("dof_frictionloss", "tendon_frictionloss")
-        if constrained and on(m, "FRICTIONLOSS")
-        else [],
+        "frictionloss": having("dof_frictionloss", "tendon_frictionloss") if has_friction else [],
         "clamp": named("actuator", clamped) + having("jnt_actfrclimited", "tendon_actfrclimited"),
         "fluid": [name for name in ("density", "viscosity") if getattr(m.opt, name)],
         "gravcomp": having("body_gravcomp"),
         "actuator": named("actuator", actuators),
         "equality": list(open_equalities(m)),
         "tendon": named("tendon", range(m.ntendon)),
-        "keyframe": named("key", range(m.nkey)),
+        "keyframe": named("key", np.flatnonzero(usable_keys(m))),
+        "unusable keyframe": named("key", np.flatnonzero(~usable_keys(m))),
         "other": others,
     }
+
+
+def usable_keys(m: mujoco.MjModel) -> np.ndarray:
+    """Of each keyframe whether its numbers are finite, (nkey,)."""
+    return np.isfinite(np.hstack([m.key_qpos, m.key_act, m.key_ctrl])).all(axis=1)
 
 
 def names_where(m: mujoco.MjModel, field: str, holds: Callable) -> list[str]:
@@ -159,8 +165,9 @@ def contact_pairs(m: mujoco.MjModel) -> np.ndarray:
 FINITE = (
     "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat", "jnt_pos", "jnt_axis", "jnt_stiffness",
     "dof_armature", "dof_damping", "actuator_gainprm", "actuator_biasprm", "actuator_gear", "tendon_stiffness",
-    "tendon_damping", "key_qpos", "key_ctrl",
+    "tendon_damping",
 )  # fmt: skip
+ELASTIC = ("flex_stiffness", "flex_bending", "flex_edgestiffness", "flex_edgedamping")
 NOT_NEGATIVE = ("jnt_stiffness", "dof_armature", "dof_damping")
 
 
@@ -170,12 +177,11 @@ def refuse(m: mujoco.MjModel) -> None:
         raise ValueError("it has no joint")
     for number in range(m.njnt):
         if (kind := kind_of(m, number)) not in KINDS:
-            raise ValueError(
-                f"joint {element_name(m, 'joint', number)!r} is of type {kind}; known are {', '.join(KINDS)}"
-            )
-    if m.nflex:
-        name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, 0)
-        raise ValueError(f"flex {name!r} is deformable; only rigid bodies are compared")
+            name = element_name(m, "joint", number)
+            raise ValueError(f"joint {name!r} is of type {kind}; known are {', '.join(KINDS)}")
+    if any(np.any(getattr(m, field)) for field in ELASTIC):
+        name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, int(np.argmin(m.flex_rigid)))
+        raise ValueError(f"flex {name!r} is elastic; only rigid bodies are compared")
     for body in np.flatnonzero(m.body_plugin >= 0):
         raise ValueError(f"a plugin acts on body {element_name(m, 'body', body)!r}; its forces are unknown")
     for tendon in np.flatnonzero(m.tendon_armature):

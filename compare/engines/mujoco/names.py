@@ -48,8 +48,12 @@ def own_name(name: str, what: str, number: int) -> str:
 
 
 def element_name(m: mujoco.MjModel, kind: str, number: int) -> str:
-    """own_name of an element of a kind, by mujoco.MjModel's names of kinds."""
-    return own_name(getattr(m, kind)(int(number)).name, kind, int(number))
+    """own_name of an element of a kind, by mujoco.MjModel's names of kinds; not the name of another element."""
+    stated, known = getattr(m, kind)(int(number)).name, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+    name = own_name(stated, kind, int(number))
+    while name != stated and mujoco.mj_name2id(m, known, name) >= 0:
+        name = f"unnamed {name}"
+    return name
 
 
 def joint_name(m: mujoco.MjModel, number: int) -> str:

@@ -35,11 +35,8 @@ def parameters(dynamics: MujocoDynamics) -> dict:
     """
     m, d, bodies = dynamics.model, dynamics.data, dynamics.bodies
     dynamics.forward(m.qpos0[dynamics.qpos])
-    joints, turns, in_force = (
-        dynamics.joints.tolist(),
-        dynamics.turns(d.ximat),
-        on(m, "CONTACT") and on(m, "CONSTRAINT"),
-    )
+    joints, turns = dynamics.joints.tolist(), dynamics.turns(d.ximat)
+    in_force = on(m, "CONTACT") and on(m, "CONSTRAINT")
     parent = {j: j - 1 if j > m.body_jntadr[body] else last_hinge(m, m.body_parentid[body])
               for j, body in zip(joints, m.jnt_bodyid[joints])}  # fmt: skip
     is_order = all(parent[j] in (-1, *joints[:i]) for i, j in enumerate(joints))

@@ -12,7 +12,7 @@ import tmt
 from ...robots.actuators import Drive
 from .actuators import drive_of
 from .engine import Mujoco, methods_for
-from .inventory import Feature, features, open_equalities, refuse, take_away
+from .inventory import Feature, features, open_equalities, refuse, take_away, usable_keys
 from .names import NAMES, Place, element_name, joint_name, joint_places, kind_of, moving, rotors
 from .source import ModelError, compiled, name_of
 
@@ -58,7 +58,8 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
     except ValueError as error:
         raise ModelError(f"cannot compare {name_of(source)}: {error}") from None
     name = bytes(model.names).partition(b"\0")[0].decode("utf-8", "replace").strip()
-    keys = {element_name(model, "key", k): model.key_qpos[k].copy() for k in range(model.nkey)}
+    keys = {k: element_name(model, "key", k) for k in np.flatnonzero(usable_keys(model)).tolist()}
+    ranges = [tuple(limits) for limits in model.jnt_range.tolist()]
     integrator = mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_")
     return Reading(
         source=source,
@@ -66,17 +67,14 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
         tree=tree,
         features=features(model),
         open_tree=open_equalities(model),
-        keyframes=keys,
+        keyframes={name: model.key_qpos[k].copy() for k, name in keys.items()},
         qpos0=model.qpos0.copy(),
-        ranges=tuple(
-            tuple(model.jnt_range[place.joint].tolist()) if model.jnt_limited[place.joint] else None
-            for place in joints.values()
-        ),
+        ranges=tuple(ranges[place.joint] if model.jnt_limited[place.joint] else None for place in joints.values()),
         warnings=warnings,
         integrator={member: name for name, member in NAMES.items()}.get(integrator, integrator),
         dt=float(model.opt.timestep),
         bodies=tuple(bodies),
-        drive=drive_of(model, source, bodies, list(keys)),
+        drive=drive_of(model, source, bodies, keys),
         model=model,
     )
 
@@ -157,7 +155,7 @@ def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
     for joint in solution.tree.hinge_names:
         bodies, stated = moved_by(reading, joint), moved_by(solution, joint)
         if len(bodies) != len(stated):
-            counts = f"joint {joint} moves {len(bodies)} bodies with mass, in the solution {len(stated)}"
+            counts = f"bodies with mass on joint {joint}: {len(bodies)}, in the solution {len(stated)}"
             raise ModelError(f"cannot compare the bodies of {name_of(reading.source)}: {counts}")
         order = stated if stated.keys() == bodies.keys() else bodies
         numbers |= zip(stated.values(), [bodies[name] for name in order])
@@ -200,4 +198,7 @@ def parse(source: Path | str, tree: tmt.Tree) -> Mujoco:
             bodies.append(number)
         else:
             raise ModelError(f"{name_of(source)} has no body {name!r}, and no hinge identifies it")
+    of_hinges = sorted(set(model.jnt_bodyid.tolist()))
+    if len(set(bodies)) < len(bodies) == len(of_hinges):  # hinges of two bodies have exchanged their names
+        bodies = of_hinges
     return Mujoco(model, hinges, bodies, source, warnings=warnings)

@@ -13,17 +13,8 @@ from .. import GRID, EngineRecord, Method, Motion, Prepared, Setting, rows_of_st
 from .equations import OwnEquations
 from .functions import ARGUMENTS, QUICK, OwnError, Problem, is_function, state_in_words
 
-__all__ = [
-    "ARGUMENTS",
-    "QUICK",
-    "Own",
-    "OwnDynamics",
-    "OwnEquations",
-    "OwnError",
-    "Problem",
-    "is_function",
-    "state_in_words",
-]
+__all__ = ["ARGUMENTS", "QUICK", "Own", "OwnDynamics", "OwnEquations", "OwnError", "Problem", "is_function"]
+__all__ += ["state_in_words"]
 
 ENGINE = EngineRecord(order=50, label="yours", possessive="your", from_file=True)
 RK4_SCHEMES = ("rk4", "rk4_mean_speed")  # the second where a ball makes MuJoCo's RK4 another scheme

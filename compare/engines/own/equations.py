@@ -67,10 +67,8 @@ class OwnEquations:
     @property
     def problems(self) -> list[Problem]:
         """The errors so far, each once."""
-        return [
-            Problem(quantity, state, f"{text} at {state}{and_more(count - 1)}")
-            for (quantity, _), (state, text, count) in self.errors.items()
-        ]
+        errors = [(quantity, *error) for (quantity, _), error in self.errors.items()]
+        return [Problem(name, state, f"{text} at {state}{and_more(count - 1)}") for name, state, text, count in errors]
 
     @property
     def seconds(self) -> float:

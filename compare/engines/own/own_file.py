@@ -78,9 +78,8 @@ def part_of(module: ModuleType, place: str, name: str) -> object:
     value = module
     for part in filter(None, name.split(".")):
         if not hasattr(value, part):
-            names = [
-                other for other in dir(value) if not (other[0] == "_" or inspect.ismodule(getattr(value, other, None)))
-            ]
+            public = [other for other in dir(value) if other[0] != "_"]
+            names = [other for other in public if not inspect.ismodule(getattr(value, other, None))]
             raise OwnFileError(f"{place} has no {part!r}{close_names(part, names)}")
         value = getattr(value, part)
     return value
@@ -104,11 +103,8 @@ def raised_in(place: str) -> Iterator[None]:
         where = place if Path(error.filename or place).stem == Path(place).stem else error.filename
         raise OwnFileError(f"{where}, line {error.lineno}: {type(error).__name__}, {error.msg}{text}") from None
     except BaseException as error:  # also SystemExit: the file may be a script
-        frames = [
-            frame
-            for frame in traceback.extract_tb(error.__traceback__)
-            if Path(frame.filename).stem == Path(place).stem
-        ]
+        every = traceback.extract_tb(error.__traceback__)
+        frames = [frame for frame in every if Path(frame.filename).stem == Path(place).stem]
         at = f", line {frames[-1].lineno}" if frames else ""
         raise OwnFileError(f"{place}{at}: {described(error, with_place=False)}") from None
 

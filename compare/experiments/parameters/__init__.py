@@ -7,7 +7,7 @@ import numpy as np
 
 import tmt
 
-from ...engines.mujoco.inventory import MODELLED
+from ...engines.mujoco.inventory import LEFT_OUT, MODELLED
 from ...engines.mujoco.parameters import STATED_FLAGS, parameters
 from ...judge.check import Result
 from ...judge.finding import Finding
@@ -120,12 +120,10 @@ def rows(setup: Setup) -> Result:
 
 def compare_features(result: Result, robot: Robot) -> list[dict]:
     """Checks that features without a term in the equations are as many as in the solution; the causes where they are not."""
-    causes, (ours, theirs) = (
-        [],
-        ({f.feature: f for f in features} for features in (robot.features, robot.features_stated)),
-    )
+    ours, theirs = ({f.feature: f for f in features} for features in (robot.features, robot.features_stated))
+    causes = []
     for name, feature in (theirs | ours).items():
-        if feature.treatment == MODELLED or name in MAY_DIFFER:
+        if feature.treatment in (MODELLED, LEFT_OUT) or name in MAY_DIFFER:
             continue
         number, compiled = (float(features[name].count if name in features else 0) for features in (theirs, ours))
         if not result.check("file", f"{name}, how many", compiled, number, "", rule="equal").passed:
@@ -143,9 +141,8 @@ def headline(result: Result) -> Finding | None:
         sizes[kind] = max(sizes.get(kind, 0.0), abs(row["stated"]))
     off = [row for row in rows if row["difference"] != 0.0]
     with np.errstate(divide="ignore"):
-        top = max(
-            off, key=lambda row: np.divide(abs(row["difference"]), sizes[row["of"], row["quantity"]]), default=None
-        )
+        shares = [np.divide(abs(row["difference"]), sizes[row["of"], row["quantity"]]) for row in off]
+        top = off[int(np.argmax(shares))] if off else None
     return result.finding("headline", numbers=len(rows), off=len(off), top=top) if rows else None
 
 

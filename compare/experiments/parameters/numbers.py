@@ -78,14 +78,16 @@ def check_forces(result: Result, setup: Setup, causes: Sequence[dict] = ()) -> l
 
     Fluid and tendons: MuJoCo adds their forces to those of springs and damping, of whose sum the rounding is allowed.
     """
-    tree, sample, unexplained = setup.robot.tree, setup.random, []
+    tree, sample, unexplained, dynamics = setup.robot.tree, setup.random, [], setup.compared()["mujoco"]
     largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(sample.q, tree)).max()
-    for source, force in setup.compared()["mujoco"].other_forces(sample.q, sample.qd).items():
+    for source, force in dynamics.other_forces(sample.q, sample.qd).items():
         allowed = FACTOR * EPS * float(largest) if source == "fluid and tendons" else 0.0
         most = float(np.abs(force).max())
         check = result.check(sample.name, f"no forces of {source}", most, allowed, "N m", rounding=bool(allowed))
         if not check.passed and not any(cause["quantity"] in OF_FORCES for cause in causes):
             place = f"forces of {source}"
+            if source == "actuators":
+                place += f" ({', '.join(dynamics.acting_actuators(sample.q, sample.qd))})"
             text = f"{place}: stated none, up to {most:.3g} N m at random states"
             unexplained.append(cause(2, place, 0.0, most, text, np.inf, place))
     return unexplained
