@@ -135,7 +135,7 @@ def verdict(
     checks = [check for section in checked for check in section.result.checks]
     top = worst(checked)
     named = {check.experiment for check in also.differing} - {SEEKS_CAUSES}
-    names = [section.name for section in checked if not also.differing or section.name in named]
+    names = [section.name for section in checked if not named or section.name in named]
     lines = block(
         "verdict",
         "verdict",

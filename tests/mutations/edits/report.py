@@ -38,7 +38,7 @@ EDITS = (
     Edit("report.document", "Document.section", "not check.passed and _1", "False", "the table of checks that fail is empty"),
     Edit("report.document", "Document.text", "passed(self.report.sections)", "True", "the page is green whatever fails"),
     Edit("report.verdict", "Parts.attempt", "self.broken.setdefault(*_1)", "None", "a part that breaks is missed by nobody"),
-    Edit("verdict", "verdict", "not also.differing or section.name in named", "True", "what agrees is said not to"),
+    Edit("verdict", "verdict", "not named or section.name in named", "True", "what agrees is said not to"),
     Edit("folder", "put_back", "move(work / 'old', out)", "None", "the old report is not put back"),
     Edit("folder", "refuse_foreign", "name not in own", "False", "files of somebody else's are not seen"),
     Edit("folder", "clear_away", "number is not None", "True", "the folder of a run that is alive is cleared"),
