@@ -48,7 +48,9 @@ def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
     text = verdict(sections, 10)
     assert all(part in text for part in ("mass, gravity", "2 of 10", "all 3", "0.5 kg m2", " 50 %", "torque"))
     assert "Mbar" not in text and "0.9" not in text
-    assert "Mbar" not in verdict([section("mass", ("Mbar", 0.0, 1.0, "at most", True))], 10)  # no difference is the largest
+    assert "Mbar" not in verdict(
+        [section("mass", ("Mbar", 0.0, 1.0, "at most", True))], 10
+    )  # no difference is the largest
 
 
 def test_what_does_not_agree_is_named_with_its_first_cause_and_nothing_else():
