@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-TIMED_ENOUGH = 0.025  # s: a function is called until as many calls as fast as its fastest take this long
+TIMED_ENOUGH = 0.015  # s: a function is called until as many calls as fast as its fastest take this long
 WARM = 0.004  # s: a longer call needs no call before it to warm up
 WIDTHS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("asimd", "NEON"), ("sse2", "SSE2"))
 

@@ -16,7 +16,6 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.textpath import TextPath
-from matplotlib.transforms import Bbox
 
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#666666"
 PINK, SKY = "#CC79A7", "#56B4E9"
@@ -84,28 +83,32 @@ def name_ends(ax: Axes, ends: Sequence[tuple], size: float = 8.0) -> None:
     """
     scale = ax.figure.dpi / 72.0  # pixels of a point
     ax.set(xlim=ax.get_xlim(), ylim=ax.get_ylim())  # which are found now, and stay
-    crowd, placed, to_data = on_paper(ax), [], ax.transData.inverted().transform
+    crowd, placed, to_data = on_paper(ax), np.empty((0, 2, 2)), ax.transData.inverted().transform
+    far, angles = (part.ravel() for part in np.meshgrid(DISTANCES, DIRECTIONS, indexing="ij"))
+    steps = scale * far[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    corners = ax.bbox.get_points()
     for x, y, name, colour in sorted(ends, key=lambda end: -end[1]):
         at = ax.transData.transform((x, y))
         wide, high = 1.05 * scale * TextPath((0, 0), name, size=size).get_extents().width, 1.3 * scale * size
-
-        def place(far: float, angle: float, at=at, wide=wide, high=high) -> tuple[float, float, Bbox]:
-            step = far * scale * np.array([np.cos(angle), np.sin(angle)])
-            left = at[0] + step[0] - wide * (step[0] < -1e-9)
-            box = Bbox.from_bounds(left, at[1] + step[1] - high / 2, wide, high)
-            cost = far + TO_THE_LEFT * (1.0 - np.cos(angle)) + OVER_A_LINE * box.padded(1.0).count_contains(crowd)
-            cost += OVER_A_NAME * box.padded(8.0, 0.0).count_overlaps(placed)
-            return cost + OUTSIDE * (box.min < ax.bbox.min).any() + OUTSIDE * (box.max > ax.bbox.max).any(), far, box
-
-        places = (place(far, angle) for far in DISTANCES for angle in DIRECTIONS)
-        _, far, box = min(places, key=lambda one: one[0])
-        placed.append(box)
+        low = at + steps - np.stack([wide * (steps[:, 0] < -1e-9), np.full(len(steps), high / 2)], axis=1)
+        boxes = np.stack([low, low + [wide, high]], axis=1)  # (places, corners, 2)
+        cost = far + TO_THE_LEFT * (1.0 - np.cos(angles)) + OVER_A_LINE * overlaps(boxes, crowd[:, None], 1.0)
+        cost += OVER_A_NAME * overlaps(boxes, placed, (8.0, 0.0))
+        cost += OUTSIDE * ((low < corners[0]).any(axis=1) + 1.0 * (boxes[:, 1] > corners[1]).any(axis=1))
+        best = np.argmin(cost)
+        box, placed = boxes[best], np.concatenate([placed, boxes[[best]]])
         halo = [withStroke(linewidth=1.5, foreground="white")]
-        start = to_data((box.x0, (box.y0 + box.y1) / 2))
+        start = to_data((box[0, 0], box[:, 1].mean()))
         ax.text(*start, name, color=in_letters(colour), fontsize=size, va="center", path_effects=halo)
-        if far > LEADER:
-            near = to_data(np.clip(at, box.min, box.max))
+        if far[best] > LEADER:
+            near = to_data(np.clip(at, *box))
             ax.plot([x, near[0]], [y, near[1]], color=colour, linewidth=0.5, zorder=1.5, label="_leader")
+
+
+def overlaps(boxes: np.ndarray, others: np.ndarray, margin) -> np.ndarray:
+    """How many of the others, (n, 1 or 2 corners, 2), each box with a margin overlaps, (boxes,)."""
+    low, high = boxes[:, None, 0] - margin, boxes[:, None, 1] + margin
+    return ((others[:, -1] > low) & (others[:, 0] < high)).all(axis=-1).sum(axis=1)
 
 
 def in_letters(colour: str) -> tuple[float, float, float]:

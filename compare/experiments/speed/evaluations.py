@@ -15,7 +15,7 @@ from ...judge import timing
 from ...robots.case import SEED
 from ..setup import Setup
 
-FEW, MANY = 1000, 1_000_000  # states of one call
+FEW, MANY = 1000, 100_000  # states of one call
 MOST_OF_MANY = 3  # nv up to which MANY states fit into memory
 MOST_CALLS = 100_000  # repetitions in a timed call
 MOST_NUMBERS = 10_000_000  # of a path of many steps

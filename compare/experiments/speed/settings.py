@@ -13,7 +13,7 @@ from ...robots.case import Case
 FINEST = {"mujoco": 2**15, ("mujoco", "RK4"): 2**16, "tmt": 2**18}
 FINEST_OTHERS = 2**15  # of other engines, and of methods that solve their stages
 EXPONENTS = {  # k of the coarsest and of the finest tolerance, 10^-k
-    "dopri8_adaptive": (2, 14), "RK45": (2, 12), "DOP853": (2, 13), "Radau": (2, 5), "LSODA": (2, 12), "Taylor": (4, 16),
+    "dopri8_adaptive": (2, 14), "RK45": (2, 10), "DOP853": (2, 13), "Radau": (2, 4), "LSODA": (2, 12), "Taylor": (4, 16),
 }  # fmt: skip
 FEW_SETTINGS = {"quick": 5, "small": 7}  # of a run that is not full: the coarsest settings
 FEW_OTHERS = 2  # the same for engines other than MuJoCo and tmt
