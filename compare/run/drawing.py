@@ -16,13 +16,15 @@ from ..robots import Robot
 
 
 def draw(
-    experiment: str, result: Result, robot: Robot, folder: Path, others: Mapping | None = None, first: bool = False
+    experiment: str, result: Result, robot: Robot, folder: Path, others: Mapping | None = None, few: bool = False
 ) -> list[tuple[str, str]]:
     """The figures of an experiment on disk: names (without .png) and captions.
 
-    others: the results for the picture of the first screen, see `results_needed`. first: only the first figure, and this picture.
+    others: the results for the picture of the first screen, see `results_needed`. few: this picture alone; the first figure of
+    an experiment that has none.
     """
-    drawn, calls = [], islice(module(experiment).figures(result, robot), 1 if first else None)
+    many = (0 if EXPERIMENTS[experiment].overview else 1) if few else None
+    drawn, calls = [], islice(module(experiment).figures(result, robot), many)
     if others and hasattr(module(experiment), "overview"):
         calls = chain(calls, module(experiment).overview({**others, experiment: result}, robot))
     with quiet(robot):

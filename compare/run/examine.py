@@ -10,7 +10,7 @@ from ..experiments.setup import Setup, engines
 from ..judge.check import ENDS, About, Result
 from ..judge.finding import Finding
 from ..process.crash import described
-from ..process.workers import Clock, WorkerEnded, Workers
+from ..process.workers import Clock, WorkerEnded, Workers, load_modules
 from ..report.terminal import Terminal
 from ..report.text import block, say
 from ..report.verdict import GEOMETRY, STATES_CAUSES, Section, explained, failures
@@ -68,10 +68,9 @@ def examine(
             causes = new + causes
         clock.ends(name)
         if section:
-            # all figures; in a quick run of several experiments the first one, unless a check fails
-            first = setup.is_quick and not setup.alone and not any(failures([section]))
+            few = setup.is_quick and not setup.alone and not any(failures([section]))
             others = results_needed(name, order, sections)
-            drawing = draw, name, section.result, setup.robot, folder / "figures", others, first
+            drawing = draw, name, section.result, setup.robot, folder / "figures", others, few
             with clock.of(END):
                 if name in TIMED:  # no drawing delays a timing
                     waiting.append((section, drawing))
@@ -80,7 +79,9 @@ def examine(
         say_outcome(terminal, sections[-1], clock.seconds_of(name), new, causes)
     with clock.of(END):
         setup.progress("figures")
-        for section, drawing in [*drawings, *((section, workers.submit(*drawing)) for section, drawing in waiting)]:
+        drawings += [(section, workers.submit(*drawing)) for section, drawing in waiting]
+        load_modules("compare.report.files")  # it takes long; meanwhile workers draw
+        for section, drawing in drawings:
             try:
                 section.figures = drawing.result()
             except OSError:  # of the disk

@@ -74,10 +74,12 @@ def frames(
     parts, every = max(1, FRAMES // (len(t) - 1)), -(-(len(t) - 1) // FRAMES)
     if parts == 1 or case.coordinates.has_balls:
         return t[::every], q[::every]
-    from scipy.interpolate import CubicHermiteSpline  # slow import
-
     times = np.linspace(t[0], t[-1], parts * (len(t) - 1) + 1)
-    between = CubicHermiteSpline(t[alive], q[alive], v[alive])(times) if alive.sum() > 1 else q[:1]
+    first = np.clip(np.searchsorted(t, times, "right") - 1, 0, max(0, alive.sum() - 2))  # step of each time
+    share, step, rise = ((times - t[first]) / (t[1] - t[0]))[:, None], t[1] - t[0], q[first + 1] - q[first]
+    # Hermite's cubic polynomial
+    bent = (1.0 - share) * (step * v[first] - rise) - share * (step * v[first + 1] - rise)
+    between = q[first] + share * rise + share * (1.0 - share) * bent if alive.sum() > 1 else q[:1]
     return times, np.where((times <= t[alive][-1])[:, None], between, np.nan)
 
 
