@@ -6,14 +6,11 @@ the filters below or Python's `format`.
 
 import html
 import re
-from contextlib import suppress
 from functools import cache
 from math import isfinite
 from pathlib import Path
 
-from jinja2 import BytecodeCache, Environment, FileSystemLoader, StrictUndefined
-
-from tmt.compiled.store import own_folder, write_aside
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from ..judge.finding import Finding
 from ..judge.words import capital, listed, milliseconds, some_of
@@ -72,24 +69,13 @@ FILTERS = {
 }
 
 
-class Stored(BytecodeCache):
-    """Compiled templates in the folder of compiled code: to compile all takes half a second in each process."""
-
-    def load_bytecode(self, bucket) -> None:
-        with suppress(OSError):
-            bucket.bytecode_from_string((own_folder() / f"{bucket.key}.jinja").read_bytes())
-
-    def dump_bytecode(self, bucket) -> None:
-        with suppress(OSError):
-            write_aside(own_folder() / f"{bucket.key}.jinja", bucket.bytecode_to_string())
-
-
 @cache
 def environment() -> Environment:
     """Jinja2 with the folders of all templates."""
     folders = sorted({str(file.parent) for file in ROOT.rglob("*.jinja")})
-    made = Environment(loader=FileSystemLoader(folders), undefined=StrictUndefined, trim_blocks=True,
-                       lstrip_blocks=True, bytecode_cache=Stored())  # fmt: skip
+    made = Environment(
+        loader=FileSystemLoader(folders), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
     made.filters |= FILTERS
     made.tests["finite"] = isfinite
     return made

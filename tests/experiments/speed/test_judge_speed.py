@@ -163,7 +163,7 @@ def test_nanoseconds_of_a_state():
 
 def test_what_is_called_is_followed_once_after_all_else_has_ended(setup, monkeypatch):
     log, setup, case = [], replace(setup, quiet=lambda: log.append("quiet")), setup.robot.cases[0]
-    known, called = [row("tmt", "rk4", 1.0)], [row("scipy", "RK45", 1.0, 64, s) for s in (0.024, 0.026)]
+    known, called = [row("tmt", "rk4", 1.0)], [row("scipy", "RK45", 1.0, 64, s) for s in (0.014, 0.016)]
     monkeypatch.setattr(speed, "rows_of_scene", lambda *given: log.append(given[-1]) or called)
     monkeypatch.setattr(speed, "prepared", lambda rows, setup: rows)
     monkeypatch.setattr(
