@@ -54,7 +54,9 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
     files, left_out = {}, []
     for path, is_named in sorted(paths_of(words), key=lambda pair: (not pair[1], pair[0].is_symlink())):
         files.setdefault(os.path.realpath(path), (path, is_named))  # the same file may be found more than once
-    kinds = {file: MODEL_ELEMENT if is_named else root_element(path) for file, (path, is_named) in files.items()}
+    roots = {file: None if is_named else next(elements_of(path), None) for file, (path, is_named) in files.items()}
+    # without a root it cannot be read and counts as a model: the table shows it with the reason
+    kinds = {file: MODEL_ELEMENT if root is None else root.tag for file, root in roots.items()}
     models = {file: Model(path, needed_by(path)) for file, (path, _) in files.items() if kinds[file] == MODEL_ELEMENT}
     users = {os.path.realpath(part): model.shown for model in models.values() for part in model.parts[1:]}
     for file, (path, is_named) in files.items():
@@ -119,11 +121,6 @@ def elements_of(path: Path) -> Iterator[ElementTree.Element]:
             yield element
     except (ElementTree.ParseError, LookupError, OSError, ValueError):
         return
-
-
-def root_element(path: Path) -> str:
-    """The name of the root element. A file that cannot be read counts as a model: the table shows it with the reason."""
-    return next((element.tag for element in elements_of(path)), MODEL_ELEMENT)
 
 
 def needed_by(path: Path) -> tuple[Path, ...]:

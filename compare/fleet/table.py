@@ -10,11 +10,12 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from ..judge.check import About
+from ..judge.finding import Finding
 from ..process.crash import Refused
 from ..process.streams import in_one_line
 from ..report.provenance import OURS, commit, installed
-from ..report.text import block, environment
-from ..report.verdict import Section, failures, unconfirmed_in_words, unstable_in_words, worst
+from ..report.text import block, environment, say
+from ..report.verdict import Section, failures, worst
 from ..run.reference import SOLUTION, Reference
 from .cache import write_whole
 from .models import place_of_report
@@ -52,8 +53,8 @@ def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Seque
         outcome, reasons = REFUSED, ["no comparison was possible"]
     else:
         outcome = UNCONFIRMED if unconfirmed else ITSELF if reference.kind == "model" else AGREE
-        reasons = [unconfirmed_in_words(unconfirmed)] if unconfirmed else []
-        reasons += [unstable_in_words(unstable)] if unstable else []
+        said = {"unconfirmed": unconfirmed, "unstable": unstable}
+        reasons = [say(Finding("verdict", kind, {"checks": checks})) for kind, checks in said.items() if checks]
     reasons += [f"not finished: {first_of(unfinished)}"] if unfinished else []
     return {
         "verdict": outcome, "reason": "; ".join(filter(None, (*reasons, reference.matched))),

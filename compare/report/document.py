@@ -11,10 +11,11 @@ import pandas as pd
 from markdown_it import MarkdownIt
 
 from ..experiments import EXPERIMENTS, Experiment
-from .images import embedded, moves
+from ..judge.words import capital
+from .images import embedded
 from .motion import motion_in_html
 from .questions import answers
-from .tables import closest_checks, heading, of_causes, origins, records, shortened, shown
+from .tables import TITLES, closest_checks, of_causes, origins, records, shortened, shown
 from .text import block, count, environment, sentence
 from .verdict import Parts, Report, Section, explained, failures, headline, outcome, passed, standing
 
@@ -81,7 +82,8 @@ class Document:
         """The whole document, with what could not be made of it."""
         report, good = self.report, passed(self.report.sections) and not self.parts.broken
         reference = () if report.reference is None else report.reference.lines
-        lines, title = report.verdict.split("\n"), title_of(report.robot)
+        lines, robot = report.verdict.split("\n"), report.robot
+        title = block("verdict", "title", own=bool(robot.own), robot=robot.described or robot.name)
         head = self.template.head(title, reference, lines, self.parts.lines, report.top, good)
         if not self.page:
             return joined([head, *body])
@@ -190,7 +192,8 @@ class Document:
 
     def table(self, section: Section, name: str, rows: Sequence[dict]) -> dict:
         """A table with the rows that a reader needs; its rows are None where only its file has them."""
-        about = {"name": name, "title": heading(name), "count": len(rows), "which": "", "rows": None}
+        title = TITLES.get(name, capital(name.replace("_", " ")))
+        about = {"name": name, "title": title, "count": len(rows), "which": "", "rows": None}
         columns = section.result.shown if name == section.name else None
         is_main = self.page or (self.rows and (name == section.name or name in MAIN_TABLES))
         if columns == [] or name in section.result.filed or not is_main:
@@ -205,10 +208,6 @@ def picture_of(section: Section) -> str:
     return EXPERIMENTS.get(section.name, Experiment(0)).overview
 
 
-def title_of(robot) -> str:
-    return block("verdict", "title", own=bool(robot.own), robot=robot.described or robot.name)
-
-
 def kind(good: bool | None) -> str:
     return "none" if good is None else "good" if good else "bad"
 
@@ -219,8 +218,9 @@ def table_of(table: pd.DataFrame) -> dict:
 
 def figures_of(section: Section) -> list[dict]:
     return [
-        {"file": file, "path": file if moves(file) else f"{file}.png", "caption": caption, "moves": moves(file)}
+        {"file": file, "path": file if moves else f"{file}.png", "caption": caption, "moves": moves}
         for file, caption in section.figures
+        for moves in [file.endswith(".gif")]  # the page has another form of it
         if not file.startswith(OVERVIEW)
     ]
 

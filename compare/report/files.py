@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -52,18 +53,14 @@ def records(parts: Parts, name: str, found: Sequence[dict]) -> list[dict]:
     """Those of the records that can be written as JSON."""
     written = []
     for number, record in enumerate(found, start=1):
-        written += parts.attempt(f"{name} {number} in results.json", [], as_json, record)
+        text = parts.attempt(f"{name} {number} in results.json", None, partial(json.dumps, allow_nan=False), record)
+        written += [json.loads(text)] if text else []
     return written
 
 
-def as_json(record: dict) -> list[dict]:
-    return [json.loads(json.dumps(record, allow_nan=False))]
-
-
 def csv(rows: Sequence[dict]) -> str:
-    return for_csv(pd.DataFrame(rows, dtype=object)).to_csv(index=False)
-
-
-def for_csv(table: pd.DataFrame) -> pd.DataFrame:
-    """A table of objects for a CSV file: true and false in lower case, integers also in columns with empty cells."""
-    return table.map(lambda value: str(value).lower() if isinstance(value, bool | np.bool_) else value)
+    """A table with true and false in lower case, and integers also in columns with empty cells."""
+    table = pd.DataFrame(rows, dtype=object)
+    return table.map(lambda value: str(value).lower() if isinstance(value, bool | np.bool_) else value).to_csv(
+        index=False
+    )

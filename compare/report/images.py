@@ -30,8 +30,3 @@ def embedded(path: Path) -> tuple[str, int, int]:
     with Image.open(path) as image:
         width, height = image.size
     return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}", width, height
-
-
-def moves(file: str) -> bool:
-    """Whether a figure is a GIF, by its name: the page has what moves in another way."""
-    return file.endswith(".gif")

@@ -66,10 +66,6 @@ def closest_checks(section: Section, most: int) -> pd.DataFrame:
     return records(kept).drop(columns="experiment")
 
 
-def heading(name: str) -> str:
-    return TITLES.get(name, name.replace("_", " ").capitalize())
-
-
 def origins(origin: dict) -> pd.DataFrame:
     def in_one_cell(value) -> str:
         return ", ".join(f"{name} {part}" for name, part in value.items()) if isinstance(value, dict) else str(value)

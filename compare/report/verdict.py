@@ -97,14 +97,6 @@ def depends_on(experiment: str, quantity: str | None) -> bool:
     return quantity in DEPENDS_ON.get(experiment, (quantity,)) if quantity else experiment != "kinematics"
 
 
-def unstable_in_words(unstable: Sequence[Check]) -> str:
-    return say(Finding("verdict", "unstable", {"checks": unstable}))
-
-
-def unconfirmed_in_words(unconfirmed: Sequence[Check]) -> str:
-    return say(Finding("verdict", "unconfirmed", {"checks": unconfirmed}))
-
-
 def passed(sections: Sequence[Section]) -> bool:
     """Whether something was compared, and no check fails."""
     return any(section.result.checks for section in sections) and not any(failures(sections))

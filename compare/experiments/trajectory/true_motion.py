@@ -13,7 +13,7 @@ from ...judge.run import LEFT, deviation, moved_from, movement_unit, number_or_n
 from ...judge.words import scene_begins
 from ...robots import Robot
 from ...robots.case import Case
-from ...truth.reference import RECORDS, Reference
+from ...truth.reference import Reference
 
 SCHEMES_OF_RK4 = ("rk4", "rk4_mean_speed")
 SAYS_NOTHING = 100  # times the difference of the engines: their agreement says nothing about a larger error
@@ -26,11 +26,6 @@ def coarsest_runs(result: Result, robot: Robot) -> Iterator[tuple[Case, dict]]:
         for scheme in SCHEMES_OF_RK4:
             if curve := result.curves["runs"].get((case.name, scheme, case.steps)):
                 yield case, curve
-
-
-def has_reference(case: Case) -> bool:
-    """Whether the true motion of a case is computed here: not of a file's robot, whose scenes have steps of their own."""
-    return "speed" in case.scene.tags and not case.robot.is_read and case.steps == RECORDS
 
 
 def deviations(case: Case, curve: dict) -> dict[str, float | None]:
