@@ -41,6 +41,10 @@ class EngineRecord:
     from_file: bool = False  # it is made of a user's file: of a model, or of the user's own equations
     package: str = ""  # that must be installed
     extra: str = ""  # of this project, which installs the package
+    reads_file: bool = False  # it reads the robot's file itself, in a process of its own: see engines.outside
+    precision: str = "float64"
+    environment: tuple[tuple[str, str], ...] = ()  # of that process
+    module: str = ""  # which has the methods and the model, if it is another one
 
 
 RECORDS = records_in(Path(__file__).parent, "ENGINE", EngineRecord)
@@ -53,9 +57,15 @@ IN_QUICK_RUNS = tuple(name for name, record in RECORDS.items() if record.in_quic
 
 def made(schemes: Collection[str], from_file: Mapping[str, "Engine"]) -> dict[str, "Engine"]:
     """All engines by their names, in their order; some may be unavailable. from_file: those made of a user's files."""
-    modules = {name: importlib.import_module(f".{name}", __name__) for name in RECORDS if not RECORDS[name].from_file}
-    return {name: modules[name].engine(schemes) if name in modules else from_file[name]
-            for name in RECORDS if name in modules or name in from_file}  # fmt: skip
+    engines = {}
+    for name, record in RECORDS.items():
+        if record.reads_file:
+            engines[name] = importlib.import_module(".outside", __name__).Outside(name)
+        elif not record.from_file:
+            engines[name] = importlib.import_module(f".{name}", __name__).engine(schemes)
+        elif name in from_file:
+            engines[name] = from_file[name]
+    return engines
 
 
 class Method(NamedTuple):
@@ -96,6 +106,7 @@ class Motion(NamedTuple):
     evaluations: int | None = None  # of the dynamics in all; None where a method has no such thing
     ended: str | np.ndarray | None = None  # when and why a run ended early, or None; of a batch an array of its shape
     steps: int | None = None  # that the method took; None: not known
+    seconds: float | None = None  # of the run, where the engine measures it in a process of its own
 
     @property
     def states(self) -> np.ndarray:

@@ -1,0 +1,145 @@
+"""Engines that read the robot's file: each installed one against closed forms and exact values, and seeded errors."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.engines import RECORDS, Setting
+from compare.engines.outside import EPS_OF, Outside, Unread
+from compare.judge.entries import Entries
+from compare.judge.scale import FACTOR
+from compare.robots.states import Sample
+from compare.run.reference import compared_with
+from tmt.exact.values import distance
+
+ROOT = Path(__file__).parents[2]
+ENGINES = [name for name, record in RECORDS.items() if record.reads_file and not Outside(name).unavailable()]
+ROBOTS = [ROOT / "mjcf" / "arm.xml", *(ROOT / "tests" / "models" / f"{name}.xml" for name in ("arm7", "quadruped"))]
+BODY = '<inertial pos="{}" mass="{}" diaginertia="{}"/>'
+PENDULUM = f"""<mujoco><option gravity="0 0 -9.81"/><worldbody><body><joint name="hip" axis="0 1 0" damping="0.1"/>
+{BODY.format("0 0 -0.5", 2, "0.3 0.2 0.1")}</body></worldbody></mujoco>"""
+TWO_LINKS = f"""<mujoco><option gravity="1 2 -9.81"/><worldbody><body><joint name="hip" axis="0 1 0" armature="0.01"/>
+{BODY.format("0 0 -0.5", 1, "0.1 0.1 0.01")}<body pos="0 0 -1"><joint name="knee" axis="0 1 0"/>
+{BODY.format("0 0 -0.5", 1, "0.1 0.1 0.01")}</body></body></worldbody></mujoco>"""
+FREE_BODY = f"""<mujoco><option gravity="0 0 0"/><worldbody><body name="top"><freejoint name="base"/>
+{BODY.format("0 0 0", 2, "0.3 0.2 0.1")}</body></worldbody></mujoco>"""
+
+
+def dynamics(engine, text_or_path, folder=None):
+    """The dynamics of a file, or of MJCF text, in an outside engine, and its robot."""
+    path = text_or_path
+    if isinstance(path, str):
+        path = folder / "robot.xml"
+        path.write_text(text_or_path)
+    robot = compared_with("model", str(path)).robot
+    return Outside(engine).of(robot.case()), robot
+
+
+def near(values, expected, engine, scale=1.0):
+    return np.abs(np.subtract(values, expected)).max() <= FACTOR * EPS_OF[RECORDS[engine].precision] * scale
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_pendulum(engine, tmp_path):
+    of, robot = dynamics(engine, PENDULUM, tmp_path)
+    q, v, tau = np.array([[0.5]]), np.array([[1.5]]), np.array([[0.25]])
+    inertia, moment = 0.2 + 2 * 0.25, 2 * 9.81 * 0.5 * np.sin(0.5)
+    assert near(of.mass_matrix(q), inertia, engine) and near(of.bias(q, v), moment, engine, 10.0)
+    assert near(of.acceleration(q, v, tau), (0.25 - 0.1 * 1.5 - moment) / inertia, engine, 100.0)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_free_body_that_spins(engine, tmp_path):
+    """Euler's equations in body axes; the linear velocity is the world's; the body is turned."""
+    of, robot = dynamics_or_skip(engine, FREE_BODY, tmp_path)
+    turn = np.array([0.8, 0.0, 0.6, 0.0])
+    q, v = np.array([[1.0, 2.0, 3.0, *turn]]), np.array([[0.5, -0.5, 0.25, 1.0, 2.0, 3.0]])
+    tau, moments, w = np.array([[2.0, 0.0, 4.0, 0.1, 0.2, 0.3]]), np.array([0.3, 0.2, 0.1]), v[0, 3:]
+    turning = np.cross(w, moments * w)
+    assert near(of.mass_matrix(q), np.diag([2.0, 2.0, 2.0, *moments]), engine, 2.0)
+    assert near(of.bias(q, v), [0, 0, 0, *turning], engine, 10.0)
+    assert near(of.acceleration(q, v, tau), [1.0, 0.0, 2.0, *((tau[0, 3:] - turning) / moments)], engine, 100.0)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_arm_of_two_links_under_an_oblique_gravity(engine, tmp_path):
+    of, robot = dynamics(engine, TWO_LINKS, tmp_path)
+    (a, b), (x, y) = q, v = np.array([0.4, -0.9]), np.array([1.1, -0.7])
+    c, s = np.cos(b), np.sin(b)
+    M = [[1.7 + c + 0.01, 0.35 + 0.5 * c], [0.35 + 0.5 * c, 0.35]]
+    weight = [[1.5 * (9.81 * np.sin(a) + np.cos(a)) + 0.5 * (9.81 * np.sin(a + b) + np.cos(a + b))],
+              [0.5 * (9.81 * np.sin(a + b) + np.cos(a + b))]]  # fmt: skip
+    h = np.add(np.ravel(weight), [-0.5 * s * (2 * x * y + y * y), 0.5 * s * x * x])
+    assert near(of.mass_matrix(q[None]), M, engine, 3.0) and near(of.bias(q[None], v[None]), h, engine, 30.0)
+
+
+def dynamics_or_skip(engine, model, folder=None):
+    """Skips a test where the engine says why it cannot read the file."""
+    of, robot = dynamics(engine, model, folder)
+    try:
+        of.reading  # noqa: B018
+    except Unread as error:
+        pytest.skip(f"{engine}: {error}")
+    return of, robot
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_robot_against_the_exact_values(engine, robot):
+    """Of doubles; a float32 engine is asked at numbers that float32 has, and its own numbers of the model are rounded."""
+    of, robot = dynamics_or_skip(engine, robot)
+    precision, rng = RECORDS[engine].precision, np.random.default_rng(3)
+    q = robot.coordinates.random(rng, 5, robot.ranges)
+    v, tau = rng.uniform(-2.0, 2.0, (2, 5, robot.coordinates.nv))
+    q, v, tau = (values.astype(precision).astype(float) for values in (q, v, tau))
+    sample, scales = Sample(robot.tree, "", q, v, tau, 5), Entries(robot.tree, q, v)
+    bound = FACTOR * EPS_OF[precision]
+    assert (distance(of.mass_matrix(q), sample.truth("mass_matrix")) <= bound * scales.mass_matrix).all()
+    assert (distance(of.bias(q, v), sample.truth("bias")) <= bound * scales.bias).all()
+    exact = sample.truth("acceleration")
+    size = scales.acceleration(scales.force(tau), exact.astype(float))
+    assert (distance(of.acceleration(q, v, tau), exact) <= bound * size).all()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("number", ("mass", "moments", "gravity", "armature", "damping"))
+def test_a_number_that_differs_is_named(engine, number, tmp_path):
+    """A wrong number of the Tree is found in what the engine has read, where it tells; a mended one is set."""
+    of, robot = dynamics(engine, TWO_LINKS, tmp_path)
+    tree = robot.tree
+    wrong = {
+        "mass": {"mass": [1.0, 1.01]}, "moments": {"inertia": [np.array(I) * (1.0 + 0.01 * k) for k, I in enumerate(tree.inertia)]},
+        "gravity": {"gravity": (1.0, 2.0, 9.81)}, "armature": {"armature": [0.01, 0.02]}, "damping": {"damping": [0.0, 0.3]},
+    }[number]  # fmt: skip
+    of.tree = dataclasses.replace(tree, **wrong)
+    if number in of.reading["read"]:
+        assert number in of.reading["mended"]
+    M = of.mass_matrix(np.array([[0.4, -0.9]]))[0]
+    if of.reading["mended"].get(number) and number == "armature":
+        assert near(M[1, 1], 0.37, engine)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_each_integrator_falls_as_its_order_says(engine, tmp_path):
+    """A pendulum without damping swings for a second: the error against a run with steps a hundred times as fine."""
+    of, robot = dynamics(engine, PENDULUM.replace(' damping="0.1"', ""), tmp_path)
+    start, engine = (np.array([1.0]), np.array([0.5]), np.array([0.25])), Outside(engine)
+    import tmt
+
+    end = tmt.simulate(*start, 1e-4, 10_000, "dopri8", robot.tree).q[-1]
+    floor = 1e-5 if engine.record.precision == "float32" else 1e-11
+    for method in engine.methods.values():
+        settings = (
+            [Setting(1.0, tolerance=10.0**-k) for k in (3, 6)]
+            if method.adaptive
+            else [Setting(1.0, n) for n in (128, 256)]
+        )
+        errors = []
+        for setting in settings:
+            run, read = of.prepare(*start, setting, method.name)
+            motion = read(run())
+            assert motion.ended is None and motion.q.shape == (65, 1)
+            errors.append(abs(motion.q[-1] - end).max())
+        assert errors[1] <= max(floor, errors[0] / 1.9 ** (method.order or 1)), method
