@@ -64,8 +64,8 @@ class ReadModel:
     """What an engine has made of a file; a base class.
 
     All methods take and return numbers in the Tree's order of joints and in MuJoCo's conventions: q with quaternions w x y z; of
-    a free joint the position and velocity of the body's origin in the world, and the angular velocity in body axes. Units: rad, m,
-    N m, N. No contacts, limits, actuators or friction losses act. The quantities of one state; q (nq,), v, tau (nv,).
+    a free joint the position and velocity of the body's origin in the world, and the angular velocity in body axes. Units: rad,
+    m, N m, N. No contacts, limits, actuators or friction losses act. The quantities of one state; q (nq,), v, tau (nv,).
     """
 
     is_compiled = False  # whether the first call compiles, which may take long
@@ -217,7 +217,7 @@ def answer(name: str, file: File, act: str, arguments: tuple) -> object:
 
 
 def read(name: str, file: File, tree: tmt.Tree) -> dict:
-    """The numbers that the engine has read, those of the Tree, and which that differ were mended; seconds until they were read."""
+    """The numbers that the engine has read, those of the Tree, which that differ were mended, and the seconds that it took."""
     begin = time.perf_counter()
     record = RECORDS[name]
     module = importlib.import_module(f".{record.module or name}", __package__)

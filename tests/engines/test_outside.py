@@ -43,7 +43,7 @@ def near(values, expected, engine, scale=1.0):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_pendulum(engine, tmp_path):
-    of, robot = dynamics(engine, PENDULUM, tmp_path)
+    of, _robot = dynamics(engine, PENDULUM, tmp_path)
     q, v, tau = np.array([[0.5]]), np.array([[1.5]]), np.array([[0.25]])
     inertia, moment = 0.2 + 2 * 0.25, 2 * 9.81 * 0.5 * np.sin(0.5)
     assert near(of.mass_matrix(q), inertia, engine) and near(of.bias(q, v), moment, engine, 10.0)
@@ -53,7 +53,7 @@ def test_a_pendulum(engine, tmp_path):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_free_body_that_spins(engine, tmp_path):
     """Euler's equations in body axes; the linear velocity is the world's; the body is turned."""
-    of, robot = dynamics_or_skip(engine, FREE_BODY, tmp_path)
+    of, _ = dynamics_or_skip(engine, FREE_BODY, tmp_path)
     turn = np.array([0.8, 0.0, 0.6, 0.0])
     q, v = np.array([[1.0, 2.0, 3.0, *turn]]), np.array([[0.5, -0.5, 0.25, 1.0, 2.0, 3.0]])
     tau, moments, w = np.array([[2.0, 0.0, 4.0, 0.1, 0.2, 0.3]]), np.array([0.3, 0.2, 0.1]), v[0, 3:]
@@ -65,7 +65,7 @@ def test_a_free_body_that_spins(engine, tmp_path):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_an_arm_of_two_links_under_an_oblique_gravity(engine, tmp_path):
-    of, robot = dynamics(engine, TWO_LINKS, tmp_path)
+    of, _ = dynamics(engine, TWO_LINKS, tmp_path)
     (a, b), (x, y) = q, v = np.array([0.4, -0.9]), np.array([1.1, -0.7])
     c, s = np.cos(b), np.sin(b)
     M = [[1.7 + c + 0.01, 0.35 + 0.5 * c], [0.35 + 0.5 * c, 0.35]]
@@ -109,8 +109,9 @@ def test_a_number_that_differs_is_named(engine, number, tmp_path):
     """A wrong number of the Tree is found in what the engine has read, where it tells; a mended one is set."""
     of, robot = dynamics(engine, TWO_LINKS, tmp_path)
     tree = robot.tree
+    inertia = [np.array(tensor) * (1.0 + 0.01 * k) for k, tensor in enumerate(tree.inertia)]
     wrong = {
-        "mass": {"mass": [1.0, 1.01]}, "moments": {"inertia": [np.array(I) * (1.0 + 0.01 * k) for k, I in enumerate(tree.inertia)]},
+        "mass": {"mass": [1.0, 1.01]}, "moments": {"inertia": inertia},
         "gravity": {"gravity": (1.0, 2.0, 9.81)}, "armature": {"armature": [0.01, 0.02]}, "damping": {"damping": [0.0, 0.3]},
     }[number]  # fmt: skip
     of.tree = dataclasses.replace(tree, **wrong)
