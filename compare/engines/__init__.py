@@ -45,6 +45,7 @@ class EngineRecord:
     precision: str = "float64"
     environment: tuple[tuple[str, str], ...] = ()  # of that process
     module: str = ""  # which has the methods and the model, if it is another one
+    compiles: bool = False  # its first calls take tens of seconds
 
 
 RECORDS = records_in(Path(__file__).parent, "ENGINE", EngineRecord)

@@ -30,7 +30,7 @@ from ..process.crash import described
 from ..process.streams import in_one_line
 from ..process.workers import begin
 from ..robots.case import Case, Coordinates
-from . import GRID, RECORDS, Engine, Method, Motion, Prepared, Setting, as_far_as_it_goes
+from . import GRID, RECORDS, Engine, Method, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
 
 EPS_OF = {name: float(np.finfo(name).eps) for name in ("float32", "float64")}
 ONE = 20  # calls of one state that are timed together
@@ -56,8 +56,12 @@ class File(NamedTuple):
                      if kind == "ball" and f"{name.removesuffix(' turn')} x" in self.names)  # fmt: skip
 
 
-class Unread(ValueError):
-    """An engine cannot read a file; the message says why, in one line."""
+class EngineError(ValueError):
+    """An engine fails; the message says why, in one line."""
+
+
+class Unread(EngineError):
+    """An engine cannot read a file."""
 
 
 class ReadModel:
@@ -68,7 +72,6 @@ class ReadModel:
     m, N m, N. No contacts, limits, actuators or friction losses act. The quantities of one state; q (nq,), v, tau (nv,).
     """
 
-    is_compiled = False  # whether the first call compiles, which may take long
     drops = ()  # numbers of the Tree that its equations do not have at all: they act as part of the torque
 
     def __init__(self, file: File, precision: str):
@@ -148,7 +151,7 @@ class OutsideDynamics:
             return process(self.name).submit(answer, self.name, self.file, act, arguments).result()
         except BrokenProcessPool:
             process.cache_clear()
-            raise Unread(f"its process was killed while it did: {act}") from None
+            raise EngineError("its process was killed") from None
 
     def rows(self, quantity: str, *values) -> np.ndarray:
         """A quantity at many states, (states, ...)."""
@@ -163,6 +166,22 @@ class OutsideDynamics:
 
     def acceleration(self, q, v, tau):
         return self.rows("acceleration", q, v, tau - passive(self.tree, q, v))
+
+    def has(self, quantity: str) -> bool:
+        return quantity in self.reading["has"]
+
+    def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
+        """Motions recorded at every multiple of dt."""
+        self.reading  # noqa: B018
+        t, (batch, states), ended = np.linspace(0.0, dt * steps, steps + 1), rows_of_states(q, v, tau), []
+        paths = []
+        for state in zip(*states):
+            of, _, _, why = self.ask("ran", *state, t, None if tolerance else steps, method, tolerance)
+            path, end = as_far_as_it_goes(t, of, np.concatenate(state[:2]), why)
+            paths.append(path)
+            ended.append(end)
+        q, v = np.split(np.reshape(paths, (*batch, steps + 1, -1)), [self.coordinates.nq], axis=-1)
+        return Motion(t, q, v, None, np.reshape(np.array(ended, dtype=object), batch)[()], steps)
 
     def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
         self.reading  # noqa: B018
@@ -205,15 +224,16 @@ models = {}  # (file, tree): (model, reading), of this process
 
 
 def answer(name: str, file: File, act: str, arguments: tuple) -> object:
-    """What a function below returns for a model; Unread with the reason, in one line, where the engine raises."""
+    """What a function below returns for a model; EngineError with the reason, in one line, where it raises."""
     try:
         return {"read": read, "each": each, "prepared": prepared, "ran": ran, "timed": timed}[act](
             name, file, *arguments
         )
-    except Unread:
+    except EngineError:
         raise
     except Exception as error:
-        raise Unread(in_one_line(" ".join(described(error).split()))) from None
+        kind = Unread if act == "read" else EngineError
+        raise kind(in_one_line(" ".join(described(error).split()))) from None
 
 
 def read(name: str, file: File, tree: tmt.Tree) -> dict:
@@ -232,8 +252,12 @@ def read(name: str, file: File, tree: tmt.Tree) -> dict:
         if not np.abs(values - stated[number]).max(initial=0.0) <= FACTOR * eps * size:
             mended[number] = number in model.drops or model.mend(number, stated[number])
     models[file] = model, tree
-    return {"read": found, "stated": stated, "mended": mended, "seconds": time.perf_counter() - begin,
-            "is_compiled": model.is_compiled}  # fmt: skip
+    has = {
+        name
+        for name in ("mass_matrix", "bias", "acceleration")
+        if getattr(type(model), name) is not getattr(ReadModel, name)
+    }
+    return {"read": found, "stated": stated, "mended": mended, "seconds": time.perf_counter() - begin, "has": has}
 
 
 def numbers_of(tree: tmt.Tree) -> dict[str, np.ndarray]:

@@ -33,6 +33,7 @@ class Experiment:
     serves_own: bool = True  # whether it applies to a user's own equations; if not, the macro not_of_own says why
     asks_of_own: tuple[str, ...] | None = None  # which of a user's own functions it calls; None: all
     options: tuple[str, ...] = ()  # of the command line, in addition to those of every experiment
+    in_quick: bool = True  # whether a quick run of several experiments has it
     timed: bool = False  # it measures times: it runs last, while nothing else does
     diagnosed: bool = False  # where it fails, `diagnosis` looks for the cause
     overview: str = ""  # the picture of the first screen that its result is part of

@@ -27,6 +27,7 @@ class About(Enum):
     MODELS = "difference between the two models, or between one and the exact or stated value"
     PREDICTION = "prediction for a run: stability limit, order, time of departure"
     STEP = "stability of the step at which the robot is used"
+    ENGINE = "difference of another engine that reads the robot's file"
     PROGRAM = "errors of the program itself"
 
 

@@ -67,12 +67,13 @@ class Failures(NamedTuple):
     broke: list[Check]
     unstable: list[Check]
     unconfirmed: list[Check]
+    of_engines: list[Check]
 
 
 def failures(sections: Sequence[Section]) -> Failures:
-    """The failed checks: of the models, of broken experiments, of the step, of predictions that no run confirms."""
+    """The failed checks: of the models, of broken experiments, the step, predictions that no run confirms, other engines."""
     failed = [check for section in sections for check in section.result.checks if not check.passed]
-    kinds = About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION
+    kinds = About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION, About.ENGINE
     return Failures(*([check for check in failed if check.about == kind] for kind in kinds))
 
 
@@ -135,6 +136,7 @@ def verdict(
         robot=robot,
         ran={"names": names, "differ": bool(named), "checked": len(checked), "all": experiments},
         models=sum(check.about == About.MODELS for check in checks),
+        engines=sum(check.about == About.ENGINE for check in checks),
         failed=failed,
         checks=len(checks),
         empty=[section.name for section in sections if not section.result.checks],
@@ -157,11 +159,13 @@ def outcome(section: Section, causes: Sequence[dict] = ()) -> str:
 def standing(section: Section) -> tuple[bool | None, str]:
     """Whether a section passes, and that in two or three words; None where nothing was compared."""
     checks = section.result.checks
-    differing, broke, unstable, unconfirmed = failures([section])
+    differing, broke, unstable, unconfirmed, of_engines = failures([section])
     if differing:
         return False, f"{sum(not check.passed for check in checks)} of {len(checks)} fail"
     if broke:
         return False, "broke off" if any(check.quantity == ENDS for check in broke) else "incomplete"
+    if of_engines:
+        return False, f"{len(of_engines)} of {len(checks)} fail"
     if unconfirmed:
         return False, f"{len(unconfirmed)} not confirmed"
     if unstable:

@@ -50,8 +50,11 @@ def examine(
     order = sorted(names, key=TIMED.__contains__)
     for name in order:
         is_needed = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
-        if name == "diagnosis" and len(names) > 1 and not is_needed:
-            reasons[name] = "nothing failed"
+        needless = {"diagnosis": "nothing failed"} if len(names) > 1 and not is_needed else {}
+        if setup.is_quick and not setup.alone and not EXPERIMENTS[name].in_quick:
+            needless[name] = "not in a quick run"
+        if name in needless:
+            reasons[name] = needless[name]
             terminal.say(f"{name:<13} skipped: {reasons[name]}")
             clock.ends(name)
             continue
