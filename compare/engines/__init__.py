@@ -47,6 +47,11 @@ class EngineRecord:
     module: str = ""  # which has the methods and the model, if it is another one
     compiles: bool = False  # its first calls take tens of seconds
 
+    @property
+    def eps(self) -> float:
+        """Of its precision."""
+        return float(np.finfo(self.precision).eps)
+
 
 RECORDS = records_in(Path(__file__).parent, "ENGINE", EngineRecord)
 LABELS = {name: record.label for name, record in RECORDS.items()}

@@ -26,13 +26,13 @@ import tmt
 
 from ..judge import timing
 from ..judge.scale import FACTOR
+from ..judge.words import listed
 from ..process.crash import described
 from ..process.streams import in_one_line
 from ..process.workers import begin
 from ..robots.case import Case, Coordinates
 from . import GRID, RECORDS, Engine, Method, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
 
-EPS_OF = {name: float(np.finfo(name).eps) for name in ("float32", "float64")}
 ONE = 20  # calls of one state that are timed together
 
 
@@ -129,6 +129,10 @@ class Outside(Engine):
             method: Method(name, method, order, scheme, order is None) for method, (order, scheme) in methods.items()
         }
 
+    def methods_in(self, case: Case) -> Mapping[str, Method]:
+        """None where joints are locked or the robot's own actuators act."""
+        return {} if case.scene.locked or case.controller else self.methods
+
     def of(self, case: Case) -> "OutsideDynamics":
         return OutsideDynamics(self.name, case)
 
@@ -184,10 +188,11 @@ class OutsideDynamics:
         return Motion(t, q, v, None, np.reshape(np.array(ended, dtype=object), batch)[()], steps)
 
     def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
-        self.reading  # noqa: B018
+        if different := [number for number, is_set in self.reading["mended"].items() if not is_set]:
+            raise EngineError(f"it has read another {listed(different)}, which cannot be set")
         t = np.linspace(0.0, setting.duration, GRID + 1)
         arguments = q, v, tau, t, setting.steps, method, setting.tolerance
-        self.ask("prepared", *arguments)
+        self.seconds_prepared = self.ask("prepared", *arguments)  # of compilation, where it compiles
 
         def run():
             return self.ask("ran", *arguments)
@@ -243,13 +248,12 @@ def read(name: str, file: File, tree: tmt.Tree) -> dict:
     module = importlib.import_module(f".{record.module or name}", __package__)
     model, stated = module.Model(file, record.precision), numbers_of(tree)
     found = {number: np.asarray(values, float) for number, values in model.numbers().items()}
-    eps = EPS_OF[record.precision]
     mended = {}
     for number, values in found.items():
         size = np.abs(stated[number]).max(initial=0.0)
         if np.shape(values) != np.shape(stated[number]):
             raise Unread(f"{number}: {len(values)} values, {len(stated[number])} in the compared model")
-        if not np.abs(values - stated[number]).max(initial=0.0) <= FACTOR * eps * size:
+        if not np.abs(values - stated[number]).max(initial=0.0) <= FACTOR * record.eps * size:
             mended[number] = number in model.drops or model.mend(number, stated[number])
     models[file] = model, tree
     has = {

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from compare.engines import RECORDS, Setting
-from compare.engines.outside import EPS_OF, Outside, Unread
+from compare.engines.outside import Outside, Unread
 from compare.judge.entries import Entries
 from compare.judge.scale import FACTOR
 from compare.robots.states import Sample
@@ -38,7 +38,7 @@ def dynamics(engine, text_or_path, folder=None):
 
 
 def near(values, expected, engine, scale=1.0):
-    return np.abs(np.subtract(values, expected)).max() <= FACTOR * EPS_OF[RECORDS[engine].precision] * scale
+    return np.abs(np.subtract(values, expected)).max() <= FACTOR * RECORDS[engine].eps * scale
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -95,7 +95,7 @@ def test_a_robot_against_the_exact_values(engine, robot):
     v, tau = rng.uniform(-2.0, 2.0, (2, 5, robot.coordinates.nv))
     q, v, tau = (values.astype(precision).astype(float) for values in (q, v, tau))
     sample, scales = Sample(robot.tree, "", q, v, tau, 5), Entries(robot.tree, q, v)
-    bound = FACTOR * EPS_OF[precision]
+    bound = FACTOR * RECORDS[engine].eps
     assert (distance(of.mass_matrix(q), sample.truth("mass_matrix")) <= bound * scales.mass_matrix).all()
     assert (distance(of.bias(q, v), sample.truth("bias")) <= bound * scales.bias).all()
     exact = sample.truth("acceleration")

@@ -8,8 +8,8 @@ import numpy as np
 from tmt.exact.values import distance
 
 from ...diagnosis import Values, diagnose_stated
-from ...engines import LABELS, RECORDS, Engine
-from ...engines.outside import EPS_OF, EngineError, Outside, OutsideDynamics, Unread
+from ...engines import LABELS, RECORDS, Engine, EngineRecord
+from ...engines.outside import EngineError, Outside, OutsideDynamics, Unread
 from ...judge.check import ENDS, About, Result, closest, over
 from ...judge.entries import Entries, unit
 from ...judge.finding import Finding
@@ -93,17 +93,18 @@ def compare_engine(result: Result, setup: Setup, engine: Engine, label: str) -> 
     setup.progress(Finding("engines", "compiling" if record.compiles else "reading", {"engine": label}))
     case = setup.robot.case()
     dynamics = engine.of(case)
-    compare_numbers(result, setup.robot, label, dynamics.reading, record.precision)
-    compare_quantities(result, setup, label, dynamics, record.precision)
-    integrators.compare_methods(result, setup, engine)
+    compare_numbers(result, setup.robot, label, dynamics.reading, record)
+    compare_quantities(result, setup, label, dynamics, record)
+    if all(dynamics.reading["mended"].values()):
+        integrators.compare_methods(result, setup, engine)
 
 
-def compare_numbers(result: Result, robot: Robot, label: str, reading: dict, precision: str) -> None:
+def compare_numbers(result: Result, robot: Robot, label: str, reading: dict, record: EngineRecord) -> None:
     """A row for each number that the engine has read differently, and a check of the masses and moments of inertia."""
     for number, values in reading["read"].items():
         stated = reading["stated"][number]
         size = np.abs(stated).max(initial=0.0)
-        tolerance = FACTOR * EPS_OF[precision] * size
+        tolerance = FACTOR * record.eps * size
         if number in OF_BODIES:
             most = np.abs(values - stated).max(initial=0.0)
             result.check(label, f"{number} as read", most, tolerance, UNITS[number], rounding=True, about=About.ENGINE)
@@ -134,9 +135,11 @@ def named_after(robot: Robot, number: str) -> list[str]:
     return list(robot.coordinates.speeds)
 
 
-def compare_quantities(result: Result, setup: Setup, label: str, dynamics: OutsideDynamics, precision: str) -> None:
+def compare_quantities(
+    result: Result, setup: Setup, label: str, dynamics: OutsideDynamics, record: EngineRecord
+) -> None:
     """Rows and checks: M, h and accelerations at the states that have exact values, in eps of the engine's precision."""
-    sample, eps = asked_at(setup, precision), EPS_OF[precision]
+    sample, eps = asked_at(setup, record.precision), record.eps
     scale, mujoco = Entries(sample.tree, sample.q, sample.qd), setup.engines["mujoco"].of(setup.robot.case())
     found = {}
     for name in COMPARED:
@@ -159,7 +162,7 @@ def compare_quantities(result: Result, setup: Setup, label: str, dynamics: Outsi
             label, f"{name} to exact", difference[worst], tolerance[worst], units, note, True, about=About.ENGINE
         )
         theirs = distance(getattr(mujoco, quantity.function)(*states), exact)
-        row = {"engine": label, "precision": precision, "quantity": name, "unit": units, "states": len(sample.q),
+        row = {"engine": label, "precision": record.precision, "quantity": name, "unit": units, "states": len(sample.q),
                "worst_difference": check.value, "bar": check.tolerance, "difference_over_bar": check.over_tolerance,
                "difference_eps": float(over(difference, eps * size).max()),
                "mujoco_eps": float(over(theirs, EPS * size).max())}  # fmt: skip

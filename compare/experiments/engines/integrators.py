@@ -7,7 +7,6 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...engines import GRID, LABELS, RECORDS, Engine, Method, Setting
-from ...engines.outside import EPS_OF
 from ...judge.check import About, Result, closest
 from ...judge.rounding import step_rounding
 from ...judge.run import ORDER_MARGIN
@@ -20,6 +19,7 @@ STEP = 2.0**-7  # s: of single steps, a number that float32 has
 STATES = 8  # from which single steps are compared
 FINER = (1, 2, 4, 8, 16)  # steps of the runs, as multiples of GRID or of the scene's own
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
+EARLY = 1.0  # s: until then errors fall regularly
 REGULAR = 3e-2  # rad: a smaller error falls with its order
 CLEAR = 100.0  # times the smallest error that rounding allows: a larger one falls with its order
 
@@ -44,14 +44,14 @@ def free_scene(setup: Setup) -> Case | None:
 
 def compare_steps(result: Result, setup: Setup, engine: Engine, method: Method) -> None:
     """A check of one step from random states, compared with the same scheme of tmt."""
-    sample, eps = setup.random, EPS_OF[RECORDS[engine.name].precision]
-    states = [values[:STATES].astype(RECORDS[engine.name].precision).astype(float) for values in (sample.q, sample.qd)]
+    sample, record = setup.random, RECORDS[engine.name]
+    states = [values[:STATES].astype(record.precision).astype(float) for values in (sample.q, sample.qd)]
     case, tau = setup.robot.case(), np.zeros(setup.robot.coordinates.nv)
     ours, theirs = (of.of(case).run(*states, tau, STEP, 1, method.name if of is engine else method.scheme)
                     for of in (setup.engines["tmt"], engine))  # fmt: skip
     movement = case.coordinates.difference(theirs.q[:, 1], ours.q[:, 1])
     difference = np.abs(np.concatenate([movement, theirs.v[:, 1] - ours.v[:, 1]], axis=1))
-    tolerance = step_rounding(METHODS[method.scheme], case.tree, *states, tau, STEP) * eps / EPS
+    tolerance = step_rounding(METHODS[method.scheme], case.tree, *states, tau, STEP) * record.eps / EPS
     worst = closest(difference, tolerance)
     quantity = f"one step of {method.name}, compared with tmt's {method.scheme}"
     result.check(LABELS[engine.name], quantity, difference[worst], tolerance[worst], "", sample.describe(worst[0]), True,
@@ -68,15 +68,22 @@ def follow(
         settings = [Setting(case.duration, tolerance=tolerance) for tolerance in TOLERANCES[: len(finer)]]
     rows = []
     for setting in settings:
-        run, read = engine.of(case).prepare(*case.start, case.tau, setting, method.name)
+        dynamics = engine.of(case)
+        run, read = dynamics.prepare(*case.start, case.tau, setting, method.name)
         motion = read(run())
-        error = None if motion.ended else float(truth.error(motion.q, range(len(case.joints))).max())
+        error = truth.error(motion.q, range(len(case.joints)))
         row = {"scene": case.name, "engine": LABELS[engine.name], "method": method.name, "scheme": method.scheme,
                "dt_s": case.duration / setting.steps if setting.steps else None, "tolerance": setting.tolerance,
-               "worst_error_rad": error, "seconds": motion.seconds, "ended": motion.ended}  # fmt: skip
+               "worst_error_rad": None if motion.ended else float(error.max()),
+               "early": None if motion.ended else float(error[truth.t <= EARLY].max()),
+               "seconds": motion.seconds, "seconds_prepared": dynamics.seconds_prepared, "ended": motion.ended}  # fmt: skip
         rows.append(row)
-    order = measured_order(rows, EPS_OF[RECORDS[engine.name].precision])
-    result.tables["engines_methods"] += [row | {"order": method.order, "measured_order": order} for row in rows]
+    order = measured_order(rows, RECORDS[engine.name].eps)
+    result.tables["engines_methods"] += [
+        {name: value for name, value in row.items() if name != "early"}
+        | {"order": method.order, "measured_order": order}
+        for row in rows
+    ]
     if order is not None and method.order:
         deviation = order - method.order
         where = f"{case.name}, {method.label}"
@@ -88,12 +95,7 @@ def follow(
 def measured_order(rows: list[dict], eps: float) -> float | None:
     """The order by which the error falls between the last two runs whose errors are regular, and settled before; or None."""
     least = CLEAR * eps
-    regular = [
-        row for row in rows if row["dt_s"] and row["worst_error_rad"] and least < row["worst_error_rad"] < REGULAR
-    ]
-    orders = [
-        np.log(a["worst_error_rad"] / b["worst_error_rad"]) / np.log(a["dt_s"] / b["dt_s"])
-        for a, b in pairwise(regular)
-    ]
+    regular = [row for row in rows if row["dt_s"] and row["early"] and least < row["early"] < REGULAR]
+    orders = [np.log(a["early"] / b["early"]) / np.log(a["dt_s"] / b["dt_s"]) for a, b in pairwise(regular)]
     settled = len(orders) > 1 and abs(orders[-1] - orders[-2]) <= ORDER_MARGIN
     return float(orders[-1]) if settled else None

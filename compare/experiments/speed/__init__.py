@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
-from ...engines import GRID, IN_QUICK_RUNS, LABELS, methods_in
+from ...engines import GRID, IN_QUICK_RUNS, LABELS, RECORDS, methods_in
 from ...judge import timing
 from ...judge.check import Result
 from ...judge.finding import Finding
@@ -61,7 +61,7 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "servos_off": servos_off}
     result.curves["of_file"] = setup.robot.is_read
     if timed:
-        compiled = add_times(setup, cases, references, floors, rows_of)
+        compiled, failed = add_times(setup, cases, references, floors, rows_of)
     result.rows += [row for of_scene in rows_of.values() for row in of_scene]
     # with the coarse steps of a quick run errors are regular in this scene only, and other engines have too few settings
     whole, mujoco = setup.size == "full", setup.engines["mujoco"]
@@ -82,23 +82,28 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     if timed:
         add_advice(result, setup, compiled)
         add_absent(result, setup)
+        result.rows += failed
     result.rows = renamed([{name: row.get(name) for name in COLUMNS} for row in result.rows], unit)
     return result
 
 
-def add_times(setup: Setup, cases: Sequence[Case], references, floors, rows_of) -> evaluations.Evaluations:
-    """The seconds of all rows of the scenes, the rows of engines that are called, and what `evaluations.costs` times."""
-    compiled = evaluations.compiled_evaluations(setup)
+def add_times(setup: Setup, cases: Sequence[Case], references, floors, rows_of) -> tuple[evaluations.Evaluations, list]:
+    """The seconds of all rows, the rows of engines that are called, and what `evaluations.costs` times; rows that fail."""
+    compiled, failed = evaluations.compiled_evaluations(setup), []
     runs = [prepared(rows_of[case.name], setup) for case in cases]
     setup.quiet()  # nothing else may run while times are taken
     for case, its_runs in zip(cases, runs):
         setup.progress(f"speed: timing {case.name}")
         name, of_scene = case.name, rows_of[case.name]
         called = rows_of_scene(case, setup.engines, references[name], floors[name], setup.size, "called")
-        again = [row for row in called if row["seconds"] < timing.TIMED_ENOUGH]
+        failed += [row for row in called if "why_not" in row]
+        called = [row for row in called if "why_not" not in row]
+        again = [
+            row for row in called if row["seconds"] < timing.TIMED_ENOUGH and not RECORDS[row["engine"]].reads_file
+        ]
         take_times(of_scene + again, its_runs + prepared(again, setup), setup)
         of_scene += called
-    return compiled
+    return compiled, failed
 
 
 def add_advice(result: Result, setup: Setup, compiled: evaluations.Evaluations) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import tmt
 from tmt.methods import METHODS, amplification
 
-from ...engines import GRID, Dynamics, Engine, Method, Setting
+from ...engines import GRID, RECORDS, Dynamics, Engine, Method, Setting
+from ...engines.outside import EngineError
 from ...judge import timing
 from ...judge.rounding import growth
 from ...judge.run import diverged_at
@@ -46,12 +47,20 @@ def rows_of_scene(
     rows, nq = [], case.coordinates.nq
     energy = tmt.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
     for method in methods(engines, size, which, case.robot, case):
-        best, last = np.inf, 0
+        best, last, of_precision = np.inf, 0, RECORDS[method.engine].eps / EPS
         for setting in settings_of(method, case, size, which):
-            rows.append(row_of_run(case, engines, method, setting, reference, energy, left))
-            error, work = accuracy.error(rows[-1]), rows[-1]["evaluations"] or rows[-1]["steps"]
+            try:
+                rows.append(row_of_run(case, engines, method, setting, reference, energy, left))
+            except EngineError as failed:
+                rows.append(
+                    {"scene": case.name, "engine": method.engine, "method": method.name, "why_not": str(failed)}
+                )
+                break
+            error, work = accuracy.error(rows[-1]), rows[-1]["evaluations"] or rows[-1]["steps"] or 2 * last + 1
             too_long = method.adaptive and work * estimated(method, case.tree) > MOST_SECONDS[size] / 2
-            if too_long or accuracy.gained_nothing(error, work, best, last, left):
+            if RECORDS[method.engine].reads_file:
+                too_long = rows[-1]["seconds"] > MOST_SECONDS[size]
+            if too_long or accuracy.gained_nothing(error, work, best, last, left * of_precision):
                 break
             best, last = min(best, error), work
     return rows if which == "called" else [row | {"seconds": None} for row in rows]
@@ -77,6 +86,7 @@ def row_of_run(
         outcome = run()
         seconds = time.perf_counter() - begin
         motion = read(outcome)
+        seconds = seconds if motion.seconds is None else motion.seconds
         ended = diverged_at(case, reference.t, motion.q, motion.v) is not None
         error = reference.error(motion.q, range(len(case.joints)))
         error = np.maximum(error, left) if reference.why else error
