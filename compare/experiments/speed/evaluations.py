@@ -9,7 +9,9 @@ import tmt
 from tmt.compiled import evaluator, runner
 from tmt.compiled.cores import cores
 
+from ...engines import LABELS
 from ...engines.heyoka import Heyoka, compiled_accelerations
+from ...engines.outside import EngineError, Outside
 from ...engines.pinocchio import PinocchioCalls
 from ...judge import timing
 from ...robots.case import SEED
@@ -137,8 +139,27 @@ def costs(setup: Setup, made: Evaluations) -> list[dict]:
     for key, value in sorted(ns.items(), key=lambda item: (item[0][0], -item[1])):
         count = of_compiled.get(key[:2])
         rows.append((*key, value, count, count / value if count else None, None))
+    rows += [] if setup.is_quick else of_outside_engines(setup)
     rows += [(*key, *[None] * 5, reason) for key, reason in made.absent.items()]
     return [dict(zip(COLUMNS, row)) for row in rows]
+
+
+def of_outside_engines(setup: Setup) -> list[tuple]:
+    """The same rows of engines that read the file: each is timed in its own process, which calls it from Python."""
+    rng, case, rows = np.random.default_rng([SEED, 2]), setup.robot.case(), []
+    q, qd, tau = case.coordinates.random(rng, FEW), *rng.uniform(-3.0, 3.0, (2, FEW, case.coordinates.nv))
+    for engine in setup.engines.values():
+        if isinstance(engine, Outside) and not engine.unavailable():
+            label, dynamics = LABELS[engine.name], engine.of(case)
+            try:
+                times = dynamics.timed(q, qd, tau)
+            except EngineError as error:
+                rows.append((FORWARD, label, *[None] * 5, str(error)))
+                continue
+            for count, ns in times.items():
+                name = f"{label}, {'called from Python' if count == 1 else 'many states in a call'}"
+                rows.append((FORWARD, name, count, None, ns, None, None, None))
+    return rows
 
 
 def counted(loop: Callable[[int], object]) -> tuple[Callable, int]:
