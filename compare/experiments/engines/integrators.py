@@ -47,8 +47,8 @@ def compare_steps(result: Result, setup: Setup, engine: Engine, method: Method) 
     sample, record = setup.random, RECORDS[engine.name]
     states = [values[:STATES].astype(record.precision).astype(float) for values in (sample.q, sample.qd)]
     case, tau = setup.robot.case(), np.zeros(setup.robot.coordinates.nv)
-    ours, theirs = (of.of(case).run(*states, tau, STEP, 1, method.name if of is engine else method.scheme)
-                    for of in (setup.engines["tmt"], engine))  # fmt: skip
+    ours = setup.engines["tmt"].of(case).run(*states, tau, STEP, 1, method.scheme)
+    theirs = engine.of(case).run(*states, tau, STEP, 1, method.name)
     movement = case.coordinates.difference(theirs.q[:, 1], ours.q[:, 1])
     difference = np.abs(np.concatenate([movement, theirs.v[:, 1] - ours.v[:, 1]], axis=1))
     tolerance = step_rounding(METHODS[method.scheme], case.tree, *states, tau, STEP) * record.eps / EPS

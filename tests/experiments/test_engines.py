@@ -1,0 +1,228 @@
+"""Other engines: what is found in what one has read, in its equations and in its integrators; one that errs fails, and alone."""
+
+import csv
+import dataclasses
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from edited import setup_of
+
+from compare.engines import EngineRecord, Method
+from compare.engines.outside import numbers_of, together
+from compare.engines.tmt import TmtDynamics
+from compare.experiments.engines import compare_numbers, compare_quantities, integrators
+from compare.judge.check import About, Result
+from compare.judge.entries import Entries
+from compare.judge.scale import FACTOR
+from compare.robots.arm import ARM
+
+ROOT = Path(__file__).resolve().parents[2]
+RECORDS = {name: EngineRecord(order=1, label="Other", precision=name) for name in ("float64", "float32")}
+TWO_LINKS = """<mujoco><worldbody><body><joint name="hip" axis="0 1 0" armature="0.01" damping="0.1"/>
+<inertial pos="0.1 0 -0.5" mass="1" diaginertia="0.1 0.1 0.01"/><body pos="0 0 -1"><joint name="knee" axis="1 0 0"/>
+<inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.01"/></body></body></worldbody></mujoco>"""
+AGAIN = '''"""tmt in a process of its own, which reads the file by MuJoCo."""
+
+import dataclasses
+
+import numpy as np
+
+import tmt
+
+from . import EngineRecord
+from .outside import ReadModel, Unread, numbers_of
+
+ENGINE = EngineRecord(order=90, label="{label}", reads_file=True, precision="{precision}")
+METHODS = {{"rk4": (4, "rk4"), "Euler": (1, "semi_implicit_euler"), "free": (None, "own")}}
+
+
+class Model(ReadModel):
+    def __init__(self, file, precision):
+        from .mujoco import read
+
+        tree = read(file.path).tree
+        self.tree = dataclasses.replace(tree, {wrong})
+
+    def numbers(self):
+        return {{name: values for name, values in numbers_of(self.tree).items() if name != "{untold}"}}
+
+    def mend(self, name, values):
+        if name == "gravity":
+            self.tree = dataclasses.replace(self.tree, gravity=values)
+        return name == "gravity"
+
+    def mass_matrix(self, q):
+        return tmt.mass_matrix(q, self.tree)
+
+    def bias(self, q, v):
+        return tmt.bias(q, v, self.tree)
+
+    def acceleration(self, q, v, force):
+        return tmt.acceleration(q, v, force, dataclasses.replace(self.tree, damping=[0.0] * len(v)))
+
+    def run(self, q, v, tau, times, steps, method, tolerance):
+        method = {{"Euler": "{euler}", "free": "dopri8_adaptive"}}.get(method, method)
+        steps = steps or len(times) - 1
+        m = tmt.simulate(q, v, tau, times[-1] / steps, steps, method, self.tree, tolerance)
+        return np.hstack([m.q, m.qd])[:: steps // (len(times) - 1)], m.evaluations
+'''
+RIGHT = {"label": "Right", "precision": "float64", "wrong": "", "untold": "", "euler": "semi_implicit_euler"}
+ENGINES = {
+    "again": {},
+    "heavy": {"label": "Heavy", "wrong": "mass=[1.0, 1.001]"},
+    "tilted": {"label": "Tilted", "wrong": "axis=[(0.0, 1.0, 0.0), (1.0, 1e-6, 0.0)]"},
+    "upside": {"label": "Upside", "wrong": "gravity=(0.0, 0.0, 9.81)"},
+    "bare": {"label": "Bare", "wrong": "armature=[0.0, 0.0]", "untold": "armature"},
+    "later": {"label": "Later", "euler": "explicit_euler"},
+    "blind": {"label": "Blind", "wrong": "**{}[0]"},
+}
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    """The report of a copy of the package with these engines, and what it prints; its exit status is 1."""
+    root = tmp_path_factory.mktemp("copy")
+    for name in ("compare", "mjcf", "tmt"):
+        shutil.copytree(ROOT / name, root / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name, of in ENGINES.items():
+        (root / "compare/engines" / f"{name}.py").write_text(AGAIN.format(**(RIGHT | of)))
+    (root / "robot.xml").write_text(TWO_LINKS)
+    run = subprocess.run(
+        [sys.executable, "-m", "compare", "engines", "--quick", "--mjcf", "robot.xml", "--out", "report"], cwd=root,
+        env=os.environ | {"PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert run.returncode == 1, run.stdout + run.stderr
+    return root / "report", run.stdout
+
+
+def table(folder, name):
+    with open(folder / "tables" / f"{name}.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_each_seeded_error_fails_its_own_checks_and_no_others(report):
+    checks = json.loads((report[0] / "results.json").read_text())["checks"]
+    failed = {}
+    for check in checks:
+        if not check["passed"]:
+            failed.setdefault(check["scene"].split()[0].rstrip(","), set()).add(check["quantity"])
+    assert "Right" not in failed and "Upside" not in failed
+    assert failed["Heavy"] == {"mass as read", "Mbar to exact", "bias to exact", "qdd to exact"}
+    assert failed["Tilted"] == {"Mbar to exact", "bias to exact", "qdd to exact"} | failed["Tilted"] - {"mass as read"}
+    assert {"Mbar to exact", "qdd to exact"} <= failed["Bare"] and "bias to exact" not in failed["Bare"]
+    assert failed["Later"] == {"one step of Euler, compared with tmt's semi_implicit_euler"}
+
+
+def test_what_is_read_differently_is_a_row_and_says_whether_it_was_set(report):
+    rows = {(row["engine"], row["number"], row["of"]): row for row in table(report[0], "engines_read")}
+    assert rows["Upside", "gravity", "z"]["set_by_this_program"] == "true"
+    heavy = rows["Heavy", "mass", next(of for engine, number, of in rows if (engine, number) == ("Heavy", "mass"))]
+    assert (float(heavy["read"]), float(heavy["compared"])) == (1.001, 1.0) and heavy["set_by_this_program"] == "false"
+    assert ("Blind", "", "") in rows and rows["Blind", "", ""]["why_not"]  # it cannot read the file
+    assert {engine for engine, *_ in rows} == {"Upside", "Heavy", "Blind"}
+
+
+def test_orders_are_measured_and_what_cannot_be_set_does_not_run(report):
+    rows = table(report[0], "engines_methods")
+    assert {row["engine"] for row in rows} == {"Right", "Tilted", "Upside", "Bare", "Later"}
+    errors = {row["dt_s"]: float(row["worst_error_rad"]) for row in rows
+              if row["engine"] == "Right" and row["method"] == "rk4"}  # fmt: skip
+    assert len(errors) > 2 and min(errors.values()) < max(errors.values()) / 100.0
+    assert "Heavy" in report[1] and "1 more" not in report[1].splitlines()[0]
+
+
+class Other(TmtDynamics):
+    """tmt as another engine; a quantity is off by a share of its tolerance with this eps."""
+
+    def __init__(self, quantity="", share=0.0, eps=0.0):
+        super().__init__(ARM.case())
+        self.quantity, self.off = quantity, share * FACTOR * eps
+
+    def has(self, quantity):
+        return quantity != "bias" or self.quantity != "none"
+
+    def __getattr__(self, quantity):
+        values = super().__getattr__(quantity)
+        return (
+            (lambda *states: values(*states) + self.off * self.size(*states)) if quantity == self.quantity else values
+        )
+
+    def size(self, q, v=0.0, tau=0.0):
+        scale, quantity = Entries(self.tree, q, v), self.quantity
+        if quantity == "acceleration":
+            return scale.acceleration(scale.force(tau), super().__getattr__(quantity)(q, v, tau))
+        return getattr(scale, quantity)
+
+
+@pytest.mark.parametrize("precision", RECORDS)
+@pytest.mark.parametrize("quantity, name", (("mass_matrix", "Mbar"), ("bias", "bias"), ("acceleration", "qdd")))
+def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, precision):
+    """A float32 engine is allowed what its own eps allows, and no more."""
+    for share, fails in ((0.9, False), (1.1, True)):
+        result, record = Result("engines"), RECORDS[precision]
+        compare_quantities(result, setup_of(), "Other", Other(quantity, share, record.eps), record)
+        assert {check.quantity for check in result.checks if not check.passed} == (
+            {f"{name} to exact"} if fails else set()
+        )
+        assert all(check.about is About.ENGINE for check in result.checks)
+        assert [note.kind for note in result.notes] == ["cause"] * fails
+
+
+def test_an_engine_without_a_function_is_not_judged_by_it():
+    result = Result("engines")
+    compare_quantities(result, setup_of(), "Other", Other("none"), RECORDS["float64"])
+    assert [check.quantity for check in result.checks] == ["Mbar to exact", "qdd to exact"]
+
+
+@pytest.mark.parametrize("number", ("mass", "moments", "gravity", "armature"))
+def test_a_number_as_read_just_inside_and_just_outside(number):
+    """Masses and moments are checked; a number that an engine drops or sets otherwise is a finding."""
+    stated = numbers_of(ARM.tree)
+    for off, differs in ((60.0, False), (70.0, True)):
+        result, read = Result("engines"), {name: values.copy() for name, values in stated.items()}
+        result.tables["engines_read"] = []
+        size = np.abs(stated[number]).max() or 1.0
+        read[number][..., -1] += off * RECORDS["float64"].eps * size * (1.0 if stated[number].any() else differs)
+        reading = {"read": read, "stated": stated, "mended": {number: True} if differs else {}}
+        compare_numbers(result, ARM, "Other", reading, RECORDS["float64"])
+        is_checked = number in ("mass", "moments")
+        assert [check.quantity for check in result.checks if not check.passed] == [f"{number} as read"] * (
+            is_checked and differs
+        )
+        assert [row["number"] for row in result.tables["engines_read"][:1]] == [number] * differs
+
+
+def test_bodies_that_move_as_one():
+    """Two points of 1 kg at 1 m from each other: 2 kg, and moments 0, 1/2, 1/2 kg m2 about their centre."""
+    nothing = np.zeros((3, 3))
+    mass, moments = together([(1.0, np.array([0.0, 0.0, 1.0]), nothing), (1.0, np.array([0.0, 0.0, 2.0]), nothing)])
+    assert mass == 2.0 and moments == pytest.approx([0.0, 0.5, 0.5])
+    assert numbers_of(dataclasses.replace(ARM.tree, armature=[0.1, 0.2, 0.3]))["armature"] == pytest.approx(
+        [0.1, 0.2, 0.3]
+    )
+
+
+@pytest.mark.parametrize("order", (1, 4))
+def test_an_order_is_taken_from_regular_errors_above_the_floor(order):
+    def run(dt, error):
+        return {"dt_s": dt, "early": error}
+
+    falling = [run(0.1 / 2**k, 2e-2 / 2 ** (order * k)) for k in range(4)]
+    assert integrators.measured_order(falling, 2.2e-16) == pytest.approx(order)
+    assert integrators.measured_order(falling[:2], 2.2e-16) is None  # one order has not settled
+    assert integrators.measured_order([*falling[:2], run(0.1 / 4, 1e-14)], 2.2e-16) is None  # rounding
+    assert integrators.measured_order(falling, 1e-2) is None
+
+
+def test_a_step_is_compared_with_the_same_scheme():
+    setup, result = setup_of(), Result("engines")
+    for scheme, passes in (("semi_implicit_euler", True), ("explicit_euler", False)):
+        method = Method("mujoco", "Euler", 1, scheme)
+        integrators.compare_steps(result, setup, setup.engines["mujoco"], method)
+        assert result.checks[-1].passed == passes
