@@ -1,4 +1,4 @@
-"""The models of a fleet: all MJCF files below the given paths, except files that only other files include.
+"""The models of a fleet: all MJCF and URDF files below the given paths, except files that only other files include.
 
 mju_getXMLDependencies of MuJoCo 4.0.0 searches for height fields and stripped paths where the compiler does not. So
 `needed_by` searches every folder that the compiler may use, and takes the files that exist.
@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 from ..process.crash import Refused
 from ..process.streams import in_one_line, readable
 
-MODEL_ELEMENT = "mujoco"  # root element of MJCF
+MODEL_ELEMENTS = "mujoco", "robot"  # root elements of MJCF and of URDF
 DIRECTORIES = ("assetdir", "meshdir", "texturedir")
 
 
@@ -56,17 +56,19 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
         files.setdefault(os.path.realpath(path), (path, is_named))  # the same file may be found more than once
     roots = {file: None if is_named else next(elements_of(path), None) for file, (path, is_named) in files.items()}
     # without a root it cannot be read and counts as a model: the table shows it with the reason
-    kinds = {file: MODEL_ELEMENT if root is None else root.tag for file, root in roots.items()}
-    models = {file: Model(path, needed_by(path)) for file, (path, _) in files.items() if kinds[file] == MODEL_ELEMENT}
+    kinds = {file: MODEL_ELEMENTS[0] if root is None else root.tag for file, root in roots.items()}
+    models = {file: Model(path, needed_by(path)) for file, (path, _) in files.items() if kinds[file] in MODEL_ELEMENTS}
     users = {os.path.realpath(part): model.shown for model in models.values() for part in model.parts[1:]}
     for file, (path, is_named) in files.items():
         if file in users and not is_named:
             models.pop(file, None)
             left_out.append((in_one_line(os.fspath(path)), f"included by {users[file]}"))
         elif file not in models:
-            left_out.append((in_one_line(os.fspath(path)), f"root element <{in_one_line(kinds[file])}>, not <mujoco>"))
+            left_out.append(
+                (in_one_line(os.fspath(path)), f"root element <{in_one_line(kinds[file])}>, not <mujoco> or <robot>")
+            )
     if not models:
-        raise Refused(f"no MJCF file in {', '.join(map(in_one_line, words))}")
+        raise Refused(f"no MJCF or URDF file in {', '.join(map(in_one_line, words))}")
     return sorted(models.values(), key=lambda model: model.shown), sorted(left_out)
 
 
@@ -97,11 +99,15 @@ def is_a_file(path: Path) -> bool:
 
 
 def files_in(folder: Path) -> Iterator[Path]:
-    """The .xml and .mjcf files of a folder at any depth, without hidden files and folders."""
+    """The .xml, .mjcf and .urdf files of a folder at any depth, without hidden files and folders."""
     for place, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(names):
-            if name.lower().endswith((".xml", ".mjcf")) and not name.startswith(".") and is_a_file(Path(place, name)):
+            if (
+                name.lower().endswith((".xml", ".mjcf", ".urdf"))
+                and not name.startswith(".")
+                and is_a_file(Path(place, name))
+            ):
                 yield Path(place, name)
 
 

@@ -15,6 +15,13 @@ from compare.engines.mujoco import ModelError, engine, read
 from compare.engines.mujoco.inventory import REASONS
 from compare.engines.mujoco.parameters import stated_numbers
 
+URDF = """<robot name="two"><link name="base"/>
+<link name="upper"><inertial><origin xyz="0.1 0 -0.5"/><mass value="2"/>
+<inertia ixx="0.3" iyy="0.2" izz="0.2" ixy="0.01" ixz="0" iyz="0"/></inertial></link>
+<link name="tip"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="hip" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
+<joint name="rail" type="prismatic"><parent link="upper"/><child link="tip"/><origin xyz="0 0 -1" rpy="0.3 0 0"/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="10" velocity="10"/></joint></robot>"""
 FEW = ("ant.xml", "humanoid.xml", "reacher.xml", "swimmer.xml")
 PUBLISHED = [pytest.param(path, marks=[pytest.mark.slow] * (path.name not in FEW)) for path in gymnasium_files()]
 
@@ -63,6 +70,12 @@ def test_a_file_is_the_same_in_both_and_a_change_of_the_case_reaches_mujoco(sour
     reading = compared(source, rng)
     tree = replace(reading.tree, gravity=(0.0,) * 3, damping=np.add(reading.tree.damping, 0.4))
     assert_the_same(engine(reading).of(case_of(tree, damping=0.4, gravity=False)), tree, rng, states=1)
+
+
+def test_a_urdf_is_the_same_in_both(tmp_path, rng):
+    (tmp_path / "robot.urdf").write_text(URDF)
+    reading = compared(tmp_path / "robot.urdf", rng)
+    assert reading.tree.hinge_names == ("hip", "rail") and reading.tree.kind == ("hinge", "slide")
 
 
 @pytest.mark.parametrize("path", PUBLISHED, ids=lambda path: path.name)

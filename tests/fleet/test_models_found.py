@@ -39,13 +39,15 @@ def left_out(*asked):
 
 def test_a_folder_gives_its_mjcf_at_any_depth_and_nothing_else(here):
     here(["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/.git/f.xml", "m/b/.g.xml", "m/mesh.obj", "m/folder.xml/h.xml"])
-    here("m/robot.urdf.xml", "<robot name='x'/>")
+    here(["m/robot.urdf", "m/robot.urdf.xml"], "<robot name='x'/>")
+    here(["m/robot.urdf.xacro", "m/world.sdf.xml"], "<sdf/>")
     here("m/part.xml", "<mujocoinclude><body>")
     here(["m/none.xml", "m/words.xml"], "alpha turns")  # these are refused
     os.mkfifo("m/pipe.xml")
-    found = ["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/folder.xml/h.xml", "m/none.xml", "m/words.xml"]
-    assert names("m") == found and "<robot>" in left_out("m")["m/robot.urdf.xml"]
-    assert names("m/robot.urdf.xml") == ["m/robot.urdf.xml"]  # what is named is a model
+    found = ["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/folder.xml/h.xml", "m/none.xml", "m/robot.urdf",
+             "m/robot.urdf.xml", "m/words.xml"]  # fmt: skip
+    assert names("m") == found and "<sdf>" in left_out("m")["m/world.sdf.xml"]
+    assert names("m/world.sdf.xml") == ["m/world.sdf.xml"]  # what is named is a model
 
 
 def test_patterns_and_lists(here):

@@ -49,7 +49,7 @@ def compiled(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     """The model without what is only drawn, and the warnings of MuJoCo's compiler, one line each; ModelError if it fails."""
     text = text_of(source) if isinstance(source, Path) else source
     if not text.strip():
-        raise ModelError(f"{name_of(source)} is empty; expected MJCF")
+        raise ModelError(f"{name_of(source)} is empty; expected MJCF or URDF")
     lines, before = [], mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lines.append)
     try:
@@ -57,7 +57,8 @@ def compiled(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
             warnings.simplefilter("always")
             model = without_visuals(editable(source)).compile()
     except ValueError as error:
-        problem = f"MuJoCo cannot compile {name_of(source)}" if "<mujoco" in text else f"{name_of(source)} is not MJCF"
+        is_model = "<mujoco" in text or "<robot" in text
+        problem = f"MuJoCo cannot compile {name_of(source)}" if is_model else f"{name_of(source)} is not MJCF"
         raise ModelError(f"{problem}: {error}") from None
     finally:
         mujoco.set_mju_user_warning(before)
