@@ -36,7 +36,7 @@ def test_one_failing_check_among_many_fails_the_verdict(place):
     assert passed([section("mass", *checks)])
     checks[place] = BAD
     sections = [section("gravity", GOOD), section("mass", *checks)]
-    assert not passed(sections) and counts(*sections) == [1, 0, 0, 0]
+    assert not passed(sections) and counts(*sections) == [1, 0, 0, 0, 0]
     assert "1 of 201 checks" in verdict(sections, 2) and "1 of 200 checks" in outcome(sections[-1])
 
 
@@ -86,15 +86,15 @@ def test_a_cause_explains_comparisons_that_depend_on_it_from_its_experiment_on_a
 def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagree():
     differs = "differ:"  # the sentence that decides: none of the others may have it
     said = set()
-    for k, about in enumerate((About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION)):
+    for k, about in enumerate((About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION, About.ENGINE)):
         of = section("mass", GOOD, ("what", 2.0, 1.0, "at most", False, about))
         assert not passed([of]) and standing(of)[0] is False
-        assert counts(of) == [int(k == one) for one in range(4)]
+        assert counts(of) == [int(k == one) for one in range(5)]
         assert (differs in verdict([of], 1)) == (about == About.MODELS) and "1 of 2 checks" in verdict([of], 1)
         assert differs in verdict([of, section("gravity", BAD)], 2)
         said.add(standing(of)[1])
     assert len(said) == 4 and standing(section("mass", GOOD))[0] is True and standing(section("mass"))[0] is None
-    assert counts(section("trajectory", ("open loop", None, 1.0, "at most", True))) == [1, 0, 0, 0]  # it diverged
+    assert counts(section("trajectory", ("open loop", None, 1.0, "at most", True))) == [1, 0, 0, 0, 0]  # it diverged
     assert passed([section("stability", (*OWN_STEP[:2], 0.002, *OWN_STEP[3:]))])  # just stable
 
 

@@ -96,8 +96,8 @@ def add_times(setup: Setup, cases: Sequence[Case], references, floors, rows_of) 
         setup.progress(f"speed: timing {case.name}")
         name, of_scene = case.name, rows_of[case.name]
         called = rows_of_scene(case, setup.engines, references[name], floors[name], setup.size, "called")
-        failed += [row for row in called if "why_not" in row]
-        called = [row for row in called if "why_not" not in row]
+        failed += [row for row in called if row.get("why_not")]
+        called = [row for row in called if not row.get("why_not")]
         again = [
             row for row in called if row["seconds"] < timing.TIMED_ENOUGH and not RECORDS[row["engine"]].reads_file
         ]
