@@ -1,0 +1,16 @@
+"""Edits of the comparison with other engines."""
+
+from ..edit import Edit
+
+EDITS = (
+    Edit("experiments.engines", "compare_quantities", "FACTOR * eps * size", "100 * FACTOR * eps * size", "tolerance x 100"),
+    Edit("experiments.engines", "compare_quantities", "record.eps", "1.2e-07", "every engine is judged as float32"),
+    Edit("experiments.engines", "compare_numbers", "FACTOR * record.eps * size", "1e9 * record.eps * size",
+         "numbers as read: 64 -> 1e9"),
+    Edit("experiments.engines", "OF_BODIES", "('mass', 'moments')", "('moments',)", "a mass that is read wrongly is only listed"),
+    Edit("engines.integrators", "compare_steps", "record.eps / EPS", "1e9", "one step: tolerance x 1e9"),
+    Edit("engines.integrators", "measured_order", "orders[-1]", "round(orders[-1])", "an order is rounded"),
+    Edit("engines.outside", "read", "model.mend(number, stated[number])", "True", "nothing is set, and it is said to be"),
+    Edit("engines.outside", "OutsideDynamics.acceleration", "tau - passive(self.tree, q, v)", "tau", "damping is forgotten"),
+    Edit("engines.outside", "together", "m * (d @ d * np.eye(3) - np.outer(d, d))", "0.0", "Steiner's part is forgotten"),
+)  # fmt: skip
