@@ -31,6 +31,7 @@ DIRECTIONS = {
 LIBRARIES = {
     "mujoco": ("compare.engines.mujoco",),
     "heyoka": ("compare.engines.heyoka",),
+    "dartpy": ("compare.engines.dart",),
     "pinocchio": ("compare.engines.pinocchio",),
     "pandas": ("compare.report",),
     "matplotlib": ("compare.report.style",),
