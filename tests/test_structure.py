@@ -32,6 +32,8 @@ LIBRARIES = {
     "mujoco": ("compare.engines.mujoco",),
     "heyoka": ("compare.engines.heyoka",),
     "dartpy": ("compare.engines.dart",),
+    "newton": ("compare.engines.newton",),
+    "warp": ("compare.engines.newton",),
     "pinocchio": ("compare.engines.pinocchio",),
     "pandas": ("compare.report",),
     "matplotlib": ("compare.report.style",),
