@@ -31,6 +31,9 @@ DIRECTIONS = {
 LIBRARIES = {
     "mujoco": ("compare.engines.mujoco",),
     "heyoka": ("compare.engines.heyoka",),
+    "dartpy": ("compare.engines.dart",),
+    "newton": ("compare.engines.newton",),
+    "warp": ("compare.engines.newton",),
     "pinocchio": ("compare.engines.pinocchio",),
     "pandas": ("compare.report",),
     "matplotlib": ("compare.report.style",),

@@ -227,6 +227,9 @@ def process(name: str) -> ProcessPoolExecutor:
 def started(environment: tuple[tuple[str, str], ...]) -> None:
     begin()
     os.environ.update(environment)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):  # what engines print, their libraries of C++ too
+        os.dup2(nowhere, stream)
 
 
 models = {}  # (file, tree): (model, reading), of this process

@@ -19,7 +19,7 @@ ENGINES = [name for name, record in RECORDS.items() if record.reads_file and not
 ROBOTS = [ROOT / "mjcf" / "arm.xml", *(ROOT / "tests" / "models" / f"{name}.xml" for name in ("arm7", "quadruped"))]
 BODY = '<inertial pos="{}" mass="{}" diaginertia="{}"/>'
 PENDULUM = f"""<mujoco><option gravity="0 0 -9.81"/><worldbody><body><joint name="hip" axis="0 1 0" damping="0.1"/>
-{BODY.format("0 0 -0.5", 2, "0.3 0.2 0.1")}</body></worldbody></mujoco>"""
+{BODY.format("0 0 -0.5", 2, "0.25 0.2 0.1")}</body></worldbody></mujoco>"""
 TWO_LINKS = f"""<mujoco><option gravity="1 2 -9.81"/><worldbody><body><joint name="hip" axis="0 1 0" armature="0.01"/>
 {BODY.format("0 0 -0.5", 1, "0.1 0.1 0.01")}<body pos="0 0 -1"><joint name="knee" axis="0 1 0"/>
 {BODY.format("0 0 -0.5", 1, "0.1 0.1 0.01")}</body></body></worldbody></mujoco>"""
