@@ -17,7 +17,8 @@ from ..setup import Setup
 
 STEP = 2.0**-7  # s: of single steps, a number that float32 has
 STATES = 8  # from which single steps are compared
-FINER = (1, 2, 4, 8, 16)  # steps of the runs, as multiples of GRID or of the scene's own
+FINER = (1, 2, 4, 8, 16, 32, 64)  # steps of the runs, as multiples of GRID or of the scene's own
+LONGEST = 1.0  # s: after a run that takes longer, no finer one is made
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 EARLY = 1.0  # s: until then errors fall regularly
 REGULAR = 3e-2  # rad: a smaller error falls with its order
@@ -33,7 +34,7 @@ def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
         if method.scheme in METHODS and not method.adaptive:
             compare_steps(result, setup, engine, method)
         if truth is not None:
-            follow(result, case, truth, engine, method, setup.of(FINER, FINER[:3], FINER[:2]))
+            follow(result, case, truth, engine, method, setup.of(FINER, FINER[:4], FINER[:4]))
 
 
 def free_scene(setup: Setup) -> Case | None:
@@ -78,6 +79,8 @@ def follow(
                "early": None if motion.ended else float(error[truth.t <= EARLY].max()),
                "seconds": motion.seconds, "seconds_prepared": dynamics.seconds_prepared, "ended": motion.ended}  # fmt: skip
         rows.append(row)
+        if motion.seconds > LONGEST:
+            break
     order = measured_order(rows, RECORDS[engine.name].eps)
     result.tables["engines_methods"] += [
         {name: value for name, value in row.items() if name != "early"}
