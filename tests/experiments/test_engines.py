@@ -135,7 +135,7 @@ def test_what_is_read_differently_is_a_row_and_says_whether_it_was_set(report):
 
 def test_orders_are_measured_and_what_cannot_be_set_does_not_run(report):
     rows = table(report[0], "engines_methods")
-    assert {row["engine"] for row in rows} == {"Right", "Tilted", "Upside", "Bare", "Later"}
+    assert {row["engine"] for row in rows} == {"Right", "Tilted", "Upside", "Bare", "Later", "MuJoCo", "TMT"}
     errors = {row["dt_s"]: float(row["worst_error_rad"]) for row in rows
               if row["engine"] == "Right" and row["method"] == "rk4"}  # fmt: skip
     assert len(errors) > 2 and min(errors.values()) < max(errors.values()) / 100.0
@@ -215,14 +215,12 @@ def test_bodies_that_move_as_one():
 
 @pytest.mark.parametrize("order", (1, 4))
 def test_an_order_is_taken_from_regular_errors_above_the_floor(order):
-    def run(dt, error):
-        return {"dt_s": dt, "early": error}
-
-    falling = [run(0.1 / 2**k, 2e-2 / 2 ** (order * k)) for k in range(4)]
-    assert integrators.measured_order(falling, 2.2e-16) == pytest.approx(order)
-    assert integrators.measured_order(falling[:2], 2.2e-16) is None  # one order has not settled
-    assert integrators.measured_order([*falling[:2], run(0.1 / 4, 1e-14)], 2.2e-16) is None  # rounding
-    assert integrators.measured_order(falling, 1e-2) is None
+    steps = [0.1 / 2**k for k in range(4)]
+    errors = [2e-2 / 2 ** (order * k) for k in range(4)]
+    assert integrators.measured_order(steps, errors, 2.2e-16) == pytest.approx(order)
+    assert integrators.measured_order(steps[:2], errors[:2], 2.2e-16) is None  # one order has not settled
+    assert integrators.measured_order(steps[:3], [*errors[:2], 1e-14], 2.2e-16) is None  # rounding
+    assert integrators.measured_order(steps, errors, 1e-2) is None
 
 
 def test_a_step_is_compared_with_the_same_scheme():

@@ -24,27 +24,12 @@ from . import integrators
 
 EXPERIMENT = Experiment(order=65, serves_own=False, in_quick=False)
 COMPARED = ("Mbar", "bias", "qdd")
-UNITS = {
-    "gravity": "m/s2",
-    "mass": "kg",
-    "moments": "kg m2",
-    "armature": "kg m2",
-    "damping": "N m s/rad",
-    "stiffness": "N m/rad",
-}
+UNITS = {"gravity": "m/s2", "mass": "kg", "moments": "kg m2", "armature": "kg m2", "damping": "N m s/rad",
+         "stiffness": "N m/rad"}  # fmt: skip
 OF_BODIES = "mass", "moments"  # no convention makes these differ
 SECONDS = 5.0  # of the search for the cause of a difference
-SHOWN = [
-    "engine",
-    "quantity",
-    "unit",
-    "states",
-    "worst_difference",
-    "bar",
-    "difference_over_bar",
-    "difference_eps",
-    "mujoco_eps",
-]
+SHOWN = ["engine", "quantity", "unit", "states", "worst_difference", "bar", "difference_over_bar", "difference_eps",
+         "mujoco_eps"]  # fmt: skip
 
 
 def skipped(robot: Robot) -> Finding | None:
@@ -77,6 +62,7 @@ def rows(setup: Setup) -> Result:
     for reason in dict.fromkeys(absent.values()):
         result.find("absent", engines=[label for label, why in absent.items() if why == reason], reason=reason)
     if result.rows:
+        integrators.follow_known(result, setup)
         most = max(
             result.rows, key=lambda row: np.inf if row["difference_over_bar"] is None else row["difference_over_bar"]
         )

@@ -1,6 +1,5 @@
 """Figures of other engines: distances from the exact values; errors against the step."""
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from ...engines import COLOURS, LABELS, MARKS
@@ -35,17 +34,21 @@ def draw_distances(result: Result) -> tuple[str, Figure, Finding]:
 
 
 def draw_errors(result: Result) -> tuple[str, Figure, Finding]:
-    """The error of each integrator of fixed step against its step."""
-    rows = [row for row in result.tables["engines_methods"] if row["dt_s"] and row["worst_error_rad"]]
-    fig = Figure(figsize=(WIDTH, 4.2), layout="constrained")
-    ax = fig.subplots()
+    """The error of each integrator against its step, and the time that it takes against the error."""
+    rows = [row for row in result.tables["engines_methods"] if row["worst_error_rad"]]
+    fig = Figure(figsize=(WIDTH, 4.6), layout="constrained")
+    by_step, by_time = fig.subplots(1, 2)
     for engine, method in dict.fromkeys((row["engine"], row["method"]) for row in rows):
         of, key = [row for row in rows if (row["engine"], row["method"]) == (engine, method)], BY_LABEL[engine]
         methods = list(dict.fromkeys(row["method"] for row in rows if row["engine"] == engine))
-        points = np.array([(row["dt_s"], row["worst_error_rad"]) for row in of]).T
-        dash = DASHES[methods.index(method) % len(DASHES)]
-        ax.plot(*points, marker=MARKS[key], color=COLOURS[key], linestyle=dash, label=f"{engine} {method}")
-    ax.set(xscale="log", yscale="log", xlabel="dt, s", ylabel="largest error over the scene, rad")
-    fig.legend(loc="outside upper center", ncols=3)
+        style = {"marker": MARKS[key], "color": COLOURS[key], "linestyle": DASHES[methods.index(method) % len(DASHES)]}
+        errors = [row["worst_error_rad"] for row in of]
+        if of[0]["dt_s"]:
+            by_step.plot([1e3 * row["dt_s"] for row in of], errors, markersize=4, **style)
+        by_time.plot(errors, [1e3 * row["seconds"] for row in of], markersize=4, label=f"{engine} {method}", **style)
+    by_step.set(xscale="log", yscale="log", xlabel="dt, ms", ylabel="largest error over the scene, rad")
+    by_time.set(xscale="log", yscale="log", xlabel="largest error over the scene, rad (decreasing)", ylabel="time, ms")
+    by_time.invert_xaxis()
+    fig.legend(loc="outside upper center", ncols=4, fontsize=7)
     best = min(rows, key=lambda row: row["worst_error_rad"])
     return "engines_errors", fig, result.finding("errors", scene=best["scene"], best=best)

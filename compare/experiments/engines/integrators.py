@@ -1,5 +1,7 @@
 """The integrators of other engines: one step compared with the same scheme of tmt, errors and orders in a free scene."""
 
+import time
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -12,13 +14,15 @@ from ...judge.rounding import step_rounding
 from ...judge.run import ORDER_MARGIN
 from ...judge.scale import EPS
 from ...robots.case import Case
-from ...truth.reference import Reference, has_no_reference, reference
+from ...truth.reference import has_no_reference, reference
 from ..setup import Setup
 
 STEP = 2.0**-7  # s: of single steps, a number that float32 has
 STATES = 8  # from which single steps are compared
 FINER = (1, 2, 4, 8, 16, 32, 64)  # steps of the runs, as multiples of GRID or of the scene's own
+SHORT = 0.1  # s: a shorter run is timed once more
 LONGEST = 1.0  # s: after a run that takes longer, no finer one is made
+KNOWN = {"mujoco": ("Euler", "RK4"), "tmt": ("rk4", "dopri8_adaptive")}
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 EARLY = 1.0  # s: until then errors fall regularly
 REGULAR = 3e-2  # rad: a smaller error falls with its order
@@ -28,18 +32,28 @@ CLEAR = 100.0  # times the smallest error that rounding allows: a larger one fal
 def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
     """Single steps from random states, and the runs of the regular free scene with several steps or tolerances."""
     case = free_scene(setup)
-    truth = None if case is None or has_no_reference(setup.robot) else reference(case)
     for method in engine.methods.values():
         setup.progress(f"engines: {method.label}")
         if method.scheme in METHODS and not method.adaptive:
             compare_steps(result, setup, engine, method)
-        if truth is not None:
-            follow(result, case, truth, engine, method, setup.of(FINER, FINER[:4], FINER[:4]))
+        if case is not None:
+            rows = follow(result, case, engine, method, setup)
+            check_order(result, f"{case.name}, {method.label}", method, rows[0]["measured_order"])
+
+
+def follow_known(result: Result, setup: Setup) -> None:
+    """The runs of MuJoCo and tmt, with which those of other engines are compared in the figure."""
+    case = free_scene(setup)
+    for name, methods in KNOWN.items() if case is not None else ():
+        for method in methods:
+            follow(result, case, setup.engines[name], setup.engines[name].methods[method], setup)
 
 
 def free_scene(setup: Setup) -> Case | None:
-    """The first scene without locked joints and servos that falls regularly, or else moves freely; None if there is none."""
+    """The first scene without locked joints and servos, preferably one with regular errors; None if there is no reference."""
     cases = [case for case in setup.robot.cases_of_torque if not case.scene.locked and not case.is_held]
+    if has_no_reference(setup.robot):
+        return None
     return next((case for case in cases if "regular" in case.scene.tags), next(iter(cases), None))
 
 
@@ -59,46 +73,51 @@ def compare_steps(result: Result, setup: Setup, engine: Engine, method: Method) 
                  about=About.ENGINE)  # fmt: skip
 
 
-def follow(
-    result: Result, case: Case, truth: Reference, engine: Engine, method: Method, finer: tuple[int, ...]
-) -> None:
-    """Rows of the runs of one method, and a check of its measured order."""
-    base = GRID * -(-case.steps // GRID)
+def follow(result: Result, case: Case, engine: Engine, method: Method, setup: Setup) -> list[dict]:
+    """Rows of the runs of one method in a scene."""
+    truth, base, finer = reference(case), GRID * -(-case.steps // GRID), setup.of(FINER, FINER[:4], FINER[:4])
     settings = [Setting(case.duration, base * k) for k in finer]
     if method.adaptive:
         settings = [Setting(case.duration, tolerance=tolerance) for tolerance in TOLERANCES[: len(finer)]]
-    rows = []
+    rows, early = [], []
     for setting in settings:
         dynamics = engine.of(case)
         run, read = dynamics.prepare(*case.start, case.tau, setting, method.name)
-        motion = read(run())
+        outcome, seconds = timed(run)
+        if seconds < SHORT:  # the first run warms up
+            outcome, seconds = timed(run)
+        motion = read(outcome)
+        seconds = seconds if motion.seconds is None else motion.seconds
         error = truth.error(motion.q, range(len(case.joints)))
+        early.append(None if motion.ended or not setting.steps else float(error[truth.t <= EARLY].max()))
         row = {"scene": case.name, "engine": LABELS[engine.name], "method": method.name, "scheme": method.scheme,
                "dt_s": case.duration / setting.steps if setting.steps else None, "tolerance": setting.tolerance,
-               "worst_error_rad": None if motion.ended else float(error.max()),
-               "early": None if motion.ended else float(error[truth.t <= EARLY].max()),
-               "seconds": motion.seconds, "seconds_prepared": dynamics.seconds_prepared, "ended": motion.ended}  # fmt: skip
+               "worst_error_rad": None if motion.ended else float(error.max()), "seconds": seconds,
+               "seconds_prepared": getattr(dynamics, "seconds_prepared", None), "ended": motion.ended,
+               "order": method.order}  # fmt: skip
         rows.append(row)
-        if motion.seconds > LONGEST:
+        if seconds > LONGEST:
             break
-    order = measured_order(rows, RECORDS[engine.name].eps)
-    result.tables["engines_methods"] += [
-        {name: value for name, value in row.items() if name != "early"}
-        | {"order": method.order, "measured_order": order}
-        for row in rows
-    ]
+    order = measured_order([row["dt_s"] for row in rows], early, RECORDS[engine.name].eps)
+    rows = [row | {"measured_order": order} for row in rows]
+    result.tables["engines_methods"] += rows
+    return rows
+
+
+def timed(run: Callable) -> tuple[object, float]:
+    begin = time.perf_counter()
+    return run(), time.perf_counter() - begin
+
+
+def check_order(result: Result, where: str, method: Method, order: float | None) -> None:
     if order is not None and method.order:
-        deviation = order - method.order
-        where = f"{case.name}, {method.label}"
-        note = f"{order:.2f}"
-        result.check(where, f"deviation from order {method.order}: error", abs(deviation), ORDER_MARGIN, "", note,
-                     about=About.PREDICTION)  # fmt: skip
+        quantity, off = f"deviation from order {method.order}: error", abs(order - method.order)
+        result.check(where, quantity, off, ORDER_MARGIN, "", f"{order:.2f}", about=About.PREDICTION)
 
 
-def measured_order(rows: list[dict], eps: float) -> float | None:
+def measured_order(steps: Sequence[float], errors: Sequence[float | None], eps: float) -> float | None:
     """The order by which the error falls between the last two runs whose errors are regular, and settled before; or None."""
-    least = CLEAR * eps
-    regular = [row for row in rows if row["dt_s"] and row["early"] and least < row["early"] < REGULAR]
-    orders = [np.log(a["early"] / b["early"]) / np.log(a["dt_s"] / b["dt_s"]) for a, b in pairwise(regular)]
+    regular = [(dt, error) for dt, error in zip(steps, errors) if error and CLEAR * eps < error < REGULAR]
+    orders = [np.log(a[1] / b[1]) / np.log(a[0] / b[0]) for a, b in pairwise(regular)]
     settled = len(orders) > 1 and abs(orders[-1] - orders[-2]) <= ORDER_MARGIN
     return float(orders[-1]) if settled else None
