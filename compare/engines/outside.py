@@ -18,6 +18,7 @@ from concurrent.futures.process import BrokenProcessPool
 from functools import cache, cached_property
 from multiprocessing import get_context
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -70,6 +71,7 @@ class ReadModel:
 
     is_compiled = False  # whether the first call compiles, which may take long
     drops = ()  # numbers of the Tree that its equations do not have at all: they act as part of the torque
+    stated: Mapping = MappingProxyType({})  # before its numbers are read: numbers_of the Tree
 
     def __init__(self, file: File, precision: str):
         """Read the file; Unread if that is not possible."""
@@ -80,7 +82,9 @@ class ReadModel:
 
         gravity (3,) m/s2; mass (joints,) kg and moments (joints, 3) kg m2, ascending: of all bodies together that move with a
         joint and not with the next one, 0 if there is none, about their common centre of mass; armature, damping, stiffness
-        (nv,).
+        (nv,); rest (nq,) rad, m and quaternions: where the springs are without force. Of the same bodies com (joints, 3) m, the
+        centre of mass from the joint's anchor, and inertia (joints, 3, 3) kg m2 about it: in the world's axes at the positions
+        `reference` of `stated`.
         """
         raise NotImplementedError
 
@@ -222,6 +226,7 @@ def read(name: str, file: File, tree: tmt.Tree) -> dict:
     record = RECORDS[name]
     module = importlib.import_module(f".{record.module or name}", __package__)
     model, stated = module.Model(file, record.precision), numbers_of(tree)
+    model.stated = stated
     found = {number: np.asarray(values, float) for number, values in model.numbers().items()}
     eps = EPS_OF[record.precision]
     mended = {}
@@ -238,13 +243,10 @@ def read(name: str, file: File, tree: tmt.Tree) -> dict:
 
 def numbers_of(tree: tmt.Tree) -> dict[str, np.ndarray]:
     """The Tree's numbers in the shapes of ReadModel.numbers."""
-    joints, nv = len(tree.kind), tree.coordinates.nv
-    mass, moments = np.zeros(joints), np.zeros((joints, 3))
-    for joint in range(joints):
-        own = [b for b, at in enumerate(tree.body_hinge) if at == joint]
-        mass[joint], moments[joint] = together(
-            [(tree.mass[b], np.array(tree.com[b]), np.array(tree.inertia[b])) for b in own]
-        )
+    nv = tree.coordinates.nv
+    groups = [[(tree.mass[b], np.array(tree.com[b]), np.array(tree.inertia[b])) for b, at in enumerate(tree.body_hinge)
+               if at == joint] for joint in range(len(tree.kind))]  # fmt: skip
+    mass, com, inertia = (np.array(values) for values in zip(*map(combined, groups)))
     stiffness = [
         k for k, place in zip(tree.stiffness, tree.coordinates.joints) for _ in range(place.qd.stop - place.qd.start)
     ]
@@ -252,22 +254,27 @@ def numbers_of(tree: tmt.Tree) -> dict[str, np.ndarray]:
     each = {
         name: np.broadcast_to(np.asarray(values, float) if len(values) else 0.0, nv) for name, values in each.items()
     }
-    return {"gravity": np.array(tree.gravity, float), "mass": mass, "moments": moments} | each
+    each |= {"gravity": np.array(tree.gravity, float), "rest": np.array(tree.rest), "reference": np.array(tree.zero)}
+    return {"mass": mass, "com": com, "moments": np.linalg.eigvalsh(inertia), "inertia": inertia} | each
 
 
 def together(bodies: list[tuple[float, np.ndarray, np.ndarray]]) -> tuple[float, np.ndarray]:
-    """The mass of bodies that move as one, and the moments of inertia about their centre of mass, ascending, (3,).
+    """The mass of bodies that move as one, and the moments of inertia about their centre of mass, ascending, (3,)."""
+    mass, _, inertia = combined(bodies)
+    return mass, np.linalg.eigvalsh(inertia)
+
+
+def combined(bodies: list[tuple[float, np.ndarray, np.ndarray]]) -> tuple[float, np.ndarray, np.ndarray]:
+    """The mass of bodies that move as one, their centre of mass, and the inertia about it; of no bodies: 0.
 
     bodies: mass, kg, centre of mass, m, and inertia about it, kg m2 (3, 3), in common axes.
     """
-    mass = sum(body[0] for body in bodies)
-    if not mass:
-        return 0.0, np.zeros(3)
-    centre, tensor = sum(m * c for m, c, _ in bodies) / mass, np.zeros((3, 3))
+    mass, tensor = sum(body[0] for body in bodies), np.zeros((3, 3))
+    centre = sum((m * c for m, c, _ in bodies), np.zeros(3)) / (mass or 1.0)
     for m, c, inertia in bodies:
         d = c - centre
         tensor += inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
-    return mass, np.linalg.eigvalsh(tensor)
+    return mass, centre, tensor
 
 
 def each(name: str, file: File, quantity: str, *values: np.ndarray) -> np.ndarray:

@@ -1,0 +1,153 @@
+"""Drake's MultibodyPlant of a robot's file; only where pydrake is installed (the extra `drake`).
+
+Each hinge and slide has a rotor in place of the file's actuators, and one of Drake's springs: so Drake's own equations have the
+armature and the stiffness that its parser has dropped.
+"""
+
+import numpy as np
+
+from .. import EngineRecord
+from ..order import order_of
+from ..outside import File, ReadModel, Unread
+from .plant import bodies_of, joint_numbers, masses, parsed, set_masses
+
+ENGINE = EngineRecord(
+    order=50, label="Drake", colour="#D55E00", marker="P", package="pydrake", extra="drake", reads_file=True
+)
+SCHEMES = {"RK2": (2, "runge_kutta2"), "RK3": (3, "runge_kutta3"), "RK5": (5, "runge_kutta5"),
+           "implicit Euler": (1, "implicit_euler"), "Radau3": (3, "radau3")}  # fmt: skip
+METHODS = {name: (order, f"drake_{scheme}") for name, (order, scheme) in SCHEMES.items()}
+METHODS |= {f"{name} adaptive": (None, f"drake_{SCHEMES[name][1]}_adaptive") for name in ("RK3", "RK5", "Radau3")}
+METHODS["discrete"] = 1, "semi_implicit_euler"
+ITERATES, ITERATED = ("implicit Euler", "Radau3"), 1e-12  # relative accuracy of their iterations at fixed steps
+LONGEST = 0.1  # s, of a step of a method that chooses its own: Drake's default
+
+
+class Model(ReadModel):
+    def __init__(self, file: File, precision: str):
+        if file.kinds.count("ball") > len(file.free):
+            raise Unread("ball joints become three angles")
+        self.file, self.inertias, self.simulators = file, {}, {}
+        plant, rotors = parsed(file, 0.0)
+        plant.Finalize()
+        self.joints = joint_numbers(plant, file)
+        joints = {k: plant.get_joint(index) for index, k in self.joints.items()}
+        starts = {k: (joint.position_start(), joint.velocity_start()) for k, joint in joints.items()}
+        self.order = order_of(file, starts, (3, 4, 5, 6, 0, 1, 2), (3, 4, 5, 0, 1, 2), (), True)
+        armature, damping, stiffness = np.zeros((3, file.coordinates.nv))
+        for joint in joints.values():
+            place = self.order.v[joint.velocity_start() :][: joint.num_velocities()]
+            armature[place], damping[place] = rotors.get(joint.name(), 0.0), joint.default_damping_vector()
+        self.used = {"gravity": plant.gravity_field().gravity_vector(), "armature": armature, "damping": damping,
+                     "stiffness": stiffness}  # fmt: skip
+        self.settle()
+
+    def numbers(self):
+        found = {name: np.zeros_like(self.stated[name]) for name in ("mass", "com", "inertia")}
+        for index, k in self.joints.items():
+            found["mass"][k], found["com"][k], found["inertia"][k] = masses(self.context, *self.group(index))
+        return self.used | found | {"moments": np.linalg.eigvalsh(found["inertia"])}
+
+    def group(self, index) -> tuple[np.ndarray, list]:
+        """The anchor of a joint at the reference positions, which are set, and the bodies that it moves."""
+        self.plant.SetPositions(self.context, *self.order.engine(self.stated["reference"]))
+        anchor = self.plant.get_joint(index).frame_on_child().CalcPoseInWorld(self.context).translation()
+        return anchor, bodies_of(self.plant, self.joints)[self.joints[index]]
+
+    def mend(self, name, values):
+        if name in self.used:  # a free body has no rotor and no spring, and its damping is in other axes
+            wrong, self.used[name] = values != self.used[name], values
+            is_mended = name == "gravity" or not any(wrong[self.order.v[at]].any() for at, _ in self.order.turned)
+        else:  # all of a joint's masses are set together
+            wrong = ~np.isclose(values, self.numbers()[name], rtol=1e-13, atol=0.0).reshape(len(values), -1).all(axis=1)
+            indices = [index for index, k in self.joints.items() if wrong[k]]
+            is_mended = all(self.group(index)[1] for index in indices) and wrong.sum() == len(indices)
+            for index in indices if is_mended else ():
+                whole = [self.stated[part][self.joints[index]] for part in ("mass", "com", "inertia")]
+                self.inertias |= set_masses(self.context, *self.group(index), *whole)
+        self.settle()
+        return is_mended
+
+    def settle(self) -> None:
+        """Make the plant of single states, without damping and springs, which act as part of the force there."""
+        self.simulators.clear()
+        self.plant, self.context, self.force = self.made(0.0, acts=False)
+        self.forward_dynamics = self.plant.get_generalized_acceleration_output_port()
+
+    def made(self, dt: float, acts: bool):
+        """A plant, its context and the vector of forces in it. acts: damping and springs do."""
+        from pydrake.multibody.tree import PrismaticSpring, RevoluteSpring
+
+        (plant, _), used, places = parsed(self.file, dt), self.used, self.file.coordinates.places.joints
+        springs = {"revolute": RevoluteSpring, "prismatic": PrismaticSpring}
+        plant.mutable_gravity_field().set_gravity_vector(used["gravity"])
+        for joint, k in ((plant.get_joint(index), k) for index, k in self.joints.items() if plant.has_joint(index)):
+            if joint.type_name() in springs:
+                (_, at, by), kind = places[k], springs[joint.type_name()]
+                if inertia := used["armature"][by.start]:
+                    plant.AddJointActuator(f"rotor of {joint.name()}", joint).set_default_rotor_inertia(inertia)
+                if acts and used["stiffness"][by.start]:
+                    plant.AddForceElement(kind(joint, self.stated["rest"][at.start], used["stiffness"][by.start]))
+        plant.Finalize()
+        context, zero = plant.CreateDefaultContext(), np.zeros(len(self.order.v))
+        for joint in map(plant.get_joint, self.joints):
+            damping = used["damping"][self.order.v] if acts else zero
+            joint.SetDampingVector(context, damping[joint.velocity_start() :][: joint.num_velocities()])
+        for index, inertia in self.inertias.items():
+            plant.get_body(index).SetSpatialInertiaInBodyFrame(context, inertia)
+        force = plant.get_applied_generalized_force_input_port().FixValue(context, zero)
+        return plant, context, force.GetMutableData().get_mutable_value()
+
+    def mass_matrix(self, q):
+        self.plant.SetPositions(self.context, *self.order.engine(q))
+        return self.order.tree_matrix(q, self.plant.CalcMassMatrix(self.context))
+
+    def bias(self, q, v):
+        self.plant.SetPositionsAndVelocities(self.context, np.concatenate(self.order.engine(q, v)))
+        gravity = self.plant.CalcGravityGeneralizedForces(self.context)
+        return self.order.tree(q, self.plant.CalcBiasTerm(self.context) - gravity)
+
+    def acceleration(self, q, v, force):
+        q_drake, v_drake, force = self.order.engine(q, v, force)
+        self.plant.SetPositionsAndVelocities(self.context, np.concatenate([q_drake, v_drake]))
+        self.force.SetFromVector(force)
+        return self.order.tree(q, self.forward_dynamics.Eval(self.context))
+
+    def prepare(self, method, tau, dt, tolerance):
+        self.simulator(method, dt, tolerance)
+
+    def simulator(self, method, dt, tolerance):
+        """A simulator, the plant and the context in it, and the vector of forces in that."""
+        from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+
+        key = method, dt, tolerance
+        if key not in self.simulators:
+            plant, context, force = self.made(dt if method == "discrete" else 0.0, acts=True)
+            simulator = Simulator(plant, context)
+            if method != "discrete":
+                scheme = SCHEMES[method.removesuffix(" adaptive")][1]
+                integrator = ResetIntegratorFromFlags(simulator, scheme, dt or LONGEST)
+                integrator.set_fixed_step_mode(tolerance is None)
+                if tolerance or method in ITERATES:
+                    integrator.set_target_accuracy(tolerance or ITERATED)
+            self.simulators[key] = simulator, plant, context, force
+        return self.simulators[key]
+
+    def run(self, q, v, tau, times, steps, method, tolerance):
+        dt = times[-1] / steps if steps else None
+        simulator, plant, context, force = self.simulator(method, dt, tolerance)
+        q, v, tau = self.order.engine(q, v, tau)
+        context.SetTime(0.0)
+        plant.SetPositionsAndVelocities(context, np.concatenate([q, v]))
+        force.SetFromVector(tau)
+        simulator.get_mutable_integrator().ResetStatistics()
+        simulator.Initialize()
+        states = [np.concatenate([q, v])]
+        for t in times[1:]:
+            try:  # the last of the discrete steps up to t begins at t - dt
+                simulator.AdvanceTo(t - 0.5 * dt if method == "discrete" else t)
+            except RuntimeError:  # it finds no step, or no solution of its equations
+                break
+            states.append(plant.GetPositionsAndVelocities(context))
+        evaluations = steps if method == "discrete" else simulator.get_integrator().get_num_derivative_evaluations()
+        return self.order.tree_states(*np.split(np.array(states), [len(q)], axis=1)), evaluations
