@@ -34,6 +34,11 @@ class Order(NamedTuple):
     def tree_matrix(self, q: np.ndarray, matrix: np.ndarray) -> np.ndarray:
         return self.tree(q, self.tree(q, matrix).T)
 
+    def tree_position(self, q: np.ndarray) -> np.ndarray:
+        found = np.empty_like(q)
+        found[self.q] = q
+        return found
+
     def tree_states(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """States of the engine, (times, nq) and (times, nv), as those of the Tree, with quaternions of length 1."""
         states = np.empty((len(q), len(self.q) + len(self.v)))
@@ -65,9 +70,8 @@ def order_of(file: File, starts: Mapping[int, tuple[int, int]], free_q, free_v, 
 
 
 def rotation(w: float, x: float, y: float, z: float, is_forward: bool) -> np.ndarray:
-    """The matrix of a quaternion of length 1, from body axes to world axes; not is_forward: its inverse."""
-    if not is_forward:
-        x, y, z = -x, -y, -z
-    return np.array([[w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-                     [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
-                     [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z]])  # fmt: skip
+    """The matrix of a quaternion of any length, from body axes to world axes; not is_forward: its inverse."""
+    s, w = 2.0 / (w * w + x * x + y * y + z * z), w if is_forward else -w
+    return np.array([[1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
+                     [s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)],
+                     [s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)]])  # fmt: skip

@@ -6,6 +6,8 @@ Their modules have, beside the record with `reads_file`, two names; they import 
                                                 tolerance and chooses its own steps
     class Model(ReadModel)                      what the engine has made of a file
 
+and may have METHODS_WITH_BALLS, the same for methods that are another scheme where a ball or a free joint is.
+
 A process of its own keeps an engine's threads, its precision and a crash away from the program and from other engines.
 """
 
@@ -125,10 +127,14 @@ class Outside(Engine):
 
     def __init__(self, name: str):
         self.name, self.record = name, RECORDS[name]
-        methods = importlib.import_module(f".{self.record.module or name}", __package__).METHODS
-        self.methods = {
-            method: Method(name, method, order, scheme, order is None) for method, (order, scheme) in methods.items()
-        }
+        module = importlib.import_module(f".{self.record.module or name}", __package__)
+        self.methods, self.methods_of_balls = (
+            {method: Method(name, method, order, scheme, order is None) for method, (order, scheme) in methods.items()}
+            for methods in (module.METHODS, getattr(module, "METHODS_WITH_BALLS", {}))
+        )
+
+    def methods_in(self, case: Case) -> Mapping[str, Method]:
+        return self.methods | (self.methods_of_balls if case.coordinates.has_balls else {})
 
     def of(self, case: Case) -> "OutsideDynamics":
         return OutsideDynamics(self.name, case)

@@ -9,7 +9,7 @@ import numpy as np
 from .. import EngineRecord
 from ..order import order_of
 from ..outside import File, ReadModel, Unread
-from .plant import bodies_of, joint_numbers, masses, parsed, set_masses
+from .plant import bodies_of, finished, fixed_force, joint_numbers, masses, parsed, set_masses, with_turned_force
 
 ENGINE = EngineRecord(
     order=50, label="Drake", colour="#D55E00", marker="P", package="pydrake", extra="drake", reads_file=True
@@ -19,6 +19,7 @@ SCHEMES = {"RK2": (2, "runge_kutta2"), "RK3": (3, "runge_kutta3"), "RK5": (5, "r
 METHODS = {name: (order, f"drake_{scheme}") for name, (order, scheme) in SCHEMES.items()}
 METHODS |= {f"{name} adaptive": (None, f"drake_{SCHEMES[name][1]}_adaptive") for name in ("RK3", "RK5", "Radau3")}
 METHODS["discrete"] = 1, "semi_implicit_euler"
+METHODS_WITH_BALLS = {"discrete": (1, "drake_discrete")}  # it adds dt times the rate of a quaternion, and normalizes
 ITERATES, ITERATED = ("implicit Euler", "Radau3"), 1e-12  # relative accuracy of their iterations at fixed steps
 LONGEST = 0.1  # s, of a step of a method that chooses its own: Drake's default
 
@@ -71,32 +72,19 @@ class Model(ReadModel):
     def settle(self) -> None:
         """Make the plant of single states, without damping and springs, which act as part of the force there."""
         self.simulators.clear()
-        self.plant, self.context, self.force = self.made(0.0, acts=False)
+        self.plant = finished(self.file, 0.0, self.joints, self.used, None)
+        self.context = self.plant.CreateDefaultContext()
+        self.set_numbers(self.plant, self.context, acts=False)
+        self.force = fixed_force(self.plant, self.context)
         self.forward_dynamics = self.plant.get_generalized_acceleration_output_port()
 
-    def made(self, dt: float, acts: bool):
-        """A plant, its context and the vector of forces in it. acts: damping and springs do."""
-        from pydrake.multibody.tree import PrismaticSpring, RevoluteSpring
-
-        (plant, _), used, places = parsed(self.file, dt), self.used, self.file.coordinates.places.joints
-        springs = {"revolute": RevoluteSpring, "prismatic": PrismaticSpring}
-        plant.mutable_gravity_field().set_gravity_vector(used["gravity"])
-        for joint, k in ((plant.get_joint(index), k) for index, k in self.joints.items() if plant.has_joint(index)):
-            if joint.type_name() in springs:
-                (_, at, by), kind = places[k], springs[joint.type_name()]
-                if inertia := used["armature"][by.start]:
-                    plant.AddJointActuator(f"rotor of {joint.name()}", joint).set_default_rotor_inertia(inertia)
-                if acts and used["stiffness"][by.start]:
-                    plant.AddForceElement(kind(joint, self.stated["rest"][at.start], used["stiffness"][by.start]))
-        plant.Finalize()
-        context, zero = plant.CreateDefaultContext(), np.zeros(len(self.order.v))
+    def set_numbers(self, plant, context, acts: bool) -> None:
+        """The numbers of a context. acts: damping does."""
+        damping = self.used["damping"][self.order.v] * acts
         for joint in map(plant.get_joint, self.joints):
-            damping = used["damping"][self.order.v] if acts else zero
             joint.SetDampingVector(context, damping[joint.velocity_start() :][: joint.num_velocities()])
         for index, inertia in self.inertias.items():
             plant.get_body(index).SetSpatialInertiaInBodyFrame(context, inertia)
-        force = plant.get_applied_generalized_force_input_port().FixValue(context, zero)
-        return plant, context, force.GetMutableData().get_mutable_value()
 
     def mass_matrix(self, q):
         self.plant.SetPositions(self.context, *self.order.engine(q))
@@ -114,32 +102,38 @@ class Model(ReadModel):
         return self.order.tree(q, self.forward_dynamics.Eval(self.context))
 
     def prepare(self, method, tau, dt, tolerance):
-        self.simulator(method, dt, tolerance)
+        self.simulator(method, tau, dt, tolerance)
 
-    def simulator(self, method, dt, tolerance):
-        """A simulator, the plant and the context in it, and the vector of forces in that."""
+    def simulator(self, method, tau, dt, tolerance):
+        """A simulator, the plant, and the plant's context in it."""
         from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-        key = method, dt, tolerance
+        key = method, tuple(tau), dt, tolerance
         if key not in self.simulators:
-            plant, context, force = self.made(dt if method == "discrete" else 0.0, acts=True)
-            simulator = Simulator(plant, context)
+            of_plant = dt if method == "discrete" else 0.0
+            plant = finished(self.file, of_plant, self.joints, self.used, self.stated["rest"])
+            turns = any(tau[self.order.v[at]].any() for at, _ in self.order.turned)
+            system = with_turned_force(plant, self.order, tau) if turns else plant
+            simulator = Simulator(system)
+            context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+            self.set_numbers(plant, context, acts=True)
+            if not turns:
+                fixed_force(plant, context).SetFromVector(tau[self.order.v])
             if method != "discrete":
                 scheme = SCHEMES[method.removesuffix(" adaptive")][1]
                 integrator = ResetIntegratorFromFlags(simulator, scheme, dt or LONGEST)
                 integrator.set_fixed_step_mode(tolerance is None)
                 if tolerance or method in ITERATES:
                     integrator.set_target_accuracy(tolerance or ITERATED)
-            self.simulators[key] = simulator, plant, context, force
+            self.simulators[key] = simulator, plant, context
         return self.simulators[key]
 
     def run(self, q, v, tau, times, steps, method, tolerance):
         dt = times[-1] / steps if steps else None
-        simulator, plant, context, force = self.simulator(method, dt, tolerance)
-        q, v, tau = self.order.engine(q, v, tau)
-        context.SetTime(0.0)
+        simulator, plant, context = self.simulator(method, tau, dt, tolerance)
+        q, v = self.order.engine(q, v)
+        simulator.get_mutable_context().SetTime(0.0)
         plant.SetPositionsAndVelocities(context, np.concatenate([q, v]))
-        force.SetFromVector(tau)
         simulator.get_mutable_integrator().ResetStatistics()
         simulator.Initialize()
         states = [np.concatenate([q, v])]

@@ -34,6 +34,24 @@ def parsed(file: File, dt: float):
     return plant, rotors
 
 
+def finished(file: File, dt: float, joints: dict, numbers: dict, rest):
+    """A final plant with the gravity and armature of `numbers`, and, unless `rest` is None, with its springs."""
+    from pydrake.multibody.tree import PrismaticSpring, RevoluteSpring
+
+    plant, springs = parsed(file, dt)[0], {"revolute": RevoluteSpring, "prismatic": PrismaticSpring}
+    plant.mutable_gravity_field().set_gravity_vector(numbers["gravity"])
+    for joint in joints_of(plant):
+        if joint.type_name() not in springs:
+            continue
+        _, at, by = file.coordinates.places.joints[joints[joint.index()]]
+        if inertia := numbers["armature"][by.start]:
+            plant.AddJointActuator(f"rotor of {joint.name()}", joint).set_default_rotor_inertia(inertia)
+        if rest is not None and (stiffness := numbers["stiffness"][by.start]):
+            plant.AddForceElement(springs[joint.type_name()](joint, rest[at.start], stiffness))
+    plant.Finalize()
+    return plant
+
+
 def joints_of(plant) -> list:
     return [plant.get_joint(index) for index in plant.GetJointIndices()]
 
@@ -93,3 +111,30 @@ def set_masses(context, anchor: np.ndarray, bodies: list, mass: float, com: np.n
     tensor = RotationalInertia(*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2])
     whole = SpatialInertia.MakeFromCentralInertia(mass, com, tensor)
     return {body.index(): SpatialInertia.Zero() for body in bodies} | {bodies[0].index(): whole}
+
+
+def fixed_force(plant, context):
+    """The vector of generalized forces in a context, in Drake's order and axes."""
+    port = plant.get_applied_generalized_force_input_port()
+    return port.FixValue(context, np.zeros(plant.num_velocities())).GetMutableData().get_mutable_value()
+
+
+def with_turned_force(plant, order, force: np.ndarray):
+    """A system of the plant and of forces that turn with its free bodies: (nv,), constant as the Tree has it.
+
+    Drake's force on a free body is in world axes. These are computed in Python at each evaluation.
+    """
+    from pydrake.systems.framework import DiagramBuilder, LeafSystem
+
+    def turned(context, output):
+        q = order.tree_position(forces.get_input_port().Eval(context)[: len(order.q)])
+        output.SetFromVector(order.engine(q, force)[1])
+
+    forces, builder = LeafSystem(), DiagramBuilder()
+    forces.DeclareVectorInputPort("state", plant.num_multibody_states())
+    forces.DeclareVectorOutputPort("force", len(order.v), turned)
+    builder.AddSystem(plant)
+    builder.AddSystem(forces)
+    builder.Connect(plant.get_state_output_port(), forces.get_input_port())
+    builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
+    return builder.Build()
