@@ -32,6 +32,7 @@ LIBRARIES = {
     "mujoco": ("compare.engines.mujoco",),
     "heyoka": ("compare.engines.heyoka",),
     "pinocchio": ("compare.engines.pinocchio",),
+    "pydrake": ("compare.engines.drake",),
     "pandas": ("compare.report",),
     "matplotlib": ("compare.report.style",),
     "PIL": ("compare.report.images",),

@@ -75,3 +75,14 @@ def rotation(w: float, x: float, y: float, z: float, is_forward: bool) -> np.nda
     return np.array([[1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
                      [s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)],
                      [s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)]])  # fmt: skip
+
+
+def near(read: np.ndarray, stated: np.ndarray) -> np.ndarray:
+    """Whether numbers that an engine has read are those stated, for each joint."""
+    size = np.abs(stated).max(initial=0.0)
+    return (np.abs(read - stated) <= 1e-13 * size).reshape(len(stated), -1).all(axis=1)
+
+
+def wrong_masses(read: Mapping[str, np.ndarray], stated: Mapping[str, np.ndarray]) -> list[int]:
+    """The joints with another mass or other moments. Where only com and inertia differ, bodies are at another place."""
+    return np.flatnonzero(~near(read["mass"], stated["mass"]) | ~near(read["moments"], stated["moments"])).tolist()

@@ -85,8 +85,7 @@ class ReadModel:
         gravity (3,) m/s2; mass (joints,) kg and moments (joints, 3) kg m2, ascending: of all bodies together that move with a
         joint and not with the next one, 0 if there is none, about their common centre of mass; armature, damping, stiffness
         (nv,); rest (nq,) rad, m and quaternions: where the springs are without force. Of the same bodies com (joints, 3) m, the
-        centre of mass from the joint's anchor, and inertia (joints, 3, 3) kg m2 about it: in the world's axes at the positions
-        `reference` of `stated`.
+        centre of mass, and inertia (joints, 3, 3) kg m2 about it: in the world, at the positions `reference` of `stated`.
         """
         raise NotImplementedError
 
@@ -250,8 +249,13 @@ def read(name: str, file: File, tree: tmt.Tree) -> dict:
 def numbers_of(tree: tmt.Tree) -> dict[str, np.ndarray]:
     """The Tree's numbers in the shapes of ReadModel.numbers."""
     nv = tree.coordinates.nv
-    groups = [[(tree.mass[b], np.array(tree.com[b]), np.array(tree.inertia[b])) for b, at in enumerate(tree.body_hinge)
-               if at == joint] for joint in range(len(tree.kind))]  # fmt: skip
+    origins = []  # of the joints, at the reference positions
+    for parent, offset in zip(tree.parent, tree.offset):
+        origins.append(np.array(offset) + (origins[parent] if parent >= 0 else 0.0))
+    groups = [[] for _ in tree.kind]
+    for body, joint in enumerate(tree.body_hinge):
+        if joint >= 0:
+            groups[joint].append((tree.mass[body], origins[joint] + tree.com[body], np.array(tree.inertia[body])))
     mass, com, inertia = (np.array(values) for values in zip(*map(combined, groups)))
     stiffness = [
         k for k, place in zip(tree.stiffness, tree.coordinates.joints) for _ in range(place.qd.stop - place.qd.start)

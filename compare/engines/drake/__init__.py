@@ -7,7 +7,7 @@ armature and the stiffness that its parser has dropped.
 import numpy as np
 
 from .. import EngineRecord
-from ..order import order_of
+from ..order import near, order_of, wrong_masses
 from ..outside import File, ReadModel, Unread
 from .plant import bodies_of, finished, fixed_force, joint_numbers, masses, parsed, set_masses, with_turned_force
 
@@ -45,29 +45,23 @@ class Model(ReadModel):
 
     def numbers(self):
         found = {name: np.zeros_like(self.stated[name]) for name in ("mass", "com", "inertia")}
-        for index, k in self.joints.items():
-            found["mass"][k], found["com"][k], found["inertia"][k] = masses(self.context, *self.group(index))
-        return self.used | found | {"moments": np.linalg.eigvalsh(found["inertia"])}
-
-    def group(self, index) -> tuple[np.ndarray, list]:
-        """The anchor of a joint at the reference positions, which are set, and the bodies that it moves."""
         self.plant.SetPositions(self.context, *self.order.engine(self.stated["reference"]))
-        anchor = self.plant.get_joint(index).frame_on_child().CalcPoseInWorld(self.context).translation()
-        return anchor, bodies_of(self.plant, self.joints)[self.joints[index]]
+        for k, bodies in bodies_of(self.plant, self.joints).items():
+            found["mass"][k], found["com"][k], found["inertia"][k] = masses(self.context, bodies)
+        return self.used | found | {"moments": np.linalg.eigvalsh(found["inertia"])}
 
     def mend(self, name, values):
         if name in self.used:  # a free body has no rotor and no spring, and its damping is in other axes
             wrong, self.used[name] = values != self.used[name], values
-            is_mended = name == "gravity" or not any(wrong[self.order.v[at]].any() for at, _ in self.order.turned)
-        else:  # all of a joint's masses are set together
-            wrong = ~np.isclose(values, self.numbers()[name], rtol=1e-13, atol=0.0).reshape(len(values), -1).all(axis=1)
-            indices = [index for index, k in self.joints.items() if wrong[k]]
-            is_mended = all(self.group(index)[1] for index in indices) and wrong.sum() == len(indices)
-            for index in indices if is_mended else ():
-                whole = [self.stated[part][self.joints[index]] for part in ("mass", "com", "inertia")]
-                self.inertias |= set_masses(self.context, *self.group(index), *whole)
+            self.settle()
+            return name == "gravity" or not any(wrong[self.order.v[at]].any() for at, _ in self.order.turned)
+        wrong = wrong_masses(self.numbers(), self.stated)
+        for k, bodies in bodies_of(self.plant, self.joints).items():
+            if k in wrong and bodies:
+                whole = [self.stated[part][k] for part in ("mass", "com", "inertia")]
+                self.inertias |= set_masses(self.context, bodies, *whole)
         self.settle()
-        return is_mended
+        return bool(near(self.numbers()[name], values).all())
 
     def settle(self) -> None:
         """Make the plant of single states, without damping and springs, which act as part of the force there."""

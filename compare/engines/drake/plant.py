@@ -2,9 +2,11 @@
 
 import logging
 import re
+from xml.etree import ElementTree
 
 import numpy as np
 
+from ..mjcf_text import whole_text
 from ..outside import File, Unread, combined
 
 
@@ -15,9 +17,11 @@ def parsed(file: File, dt: float):
 
     logging.getLogger("drake").setLevel(logging.CRITICAL)  # set by importing pydrake
     plant = MultibodyPlant(dt)
-    text, parser = file.path.read_text(encoding="utf-8"), Parser(plant)
-    named = re.sub(r"<mujoco\b(?![^>]*\bmodel\s*=)", '<mujoco model="robot"', text, count=1)  # Drake needs a name
-    instances = parser.AddModels(str(file.path)) if named == text else parser.AddModelsFromString(named, "xml")
+    parser = Parser(plant)
+    if lacks_names(file):
+        instances = parser.AddModelsFromString(whole_text(file.path), "xml")
+    else:
+        instances = parser.AddModels(str(file.path))
     if not file.free:  # a URDF's first body, which MuJoCo fixes to the world
         bodies = {body for instance in instances for body in plant.GetBodyIndices(instance)}
         for body in bodies - {joint.child_body().index() for joint in joints_of(plant)}:
@@ -32,6 +36,14 @@ def parsed(file: File, dt: float):
         unlimited = np.full(joint.num_positions(), np.inf)
         joint.set_position_limits(-unlimited, unlimited)
     return plant, rotors
+
+
+def lacks_names(file: File) -> bool:
+    """Whether an MJCF file has no name of the model, which Drake needs, or a joint without a name."""
+    if file.path.suffix == ".urdf":
+        return False
+    unnamed = any(re.fullmatch(r"joint \d+", name) for name in file.names)
+    return unnamed or "model" not in ElementTree.parse(file.path).getroot().attrib
 
 
 def finished(file: File, dt: float, joints: dict, numbers: dict, rest):
@@ -88,8 +100,8 @@ def bodies_of(plant, joints: dict) -> dict[int, list]:
     return bodies
 
 
-def masses(context, anchor: np.ndarray, bodies: list) -> tuple[float, np.ndarray, np.ndarray]:
-    """The mass of bodies that move as one, their centre of mass from the anchor, and the inertia about it, in world axes."""
+def masses(context, bodies: list) -> tuple[float, np.ndarray, np.ndarray]:
+    """The mass of bodies that move as one, their centre of mass, and the inertia about it, in the world."""
     parts = []
     for body in bodies:
         inertia, pose = body.CalcSpatialInertiaInBodyFrame(context), body.EvalPoseInWorld(context)
@@ -97,17 +109,17 @@ def masses(context, anchor: np.ndarray, bodies: list) -> tuple[float, np.ndarray
         about_com = inertia.CalcRotationalInertia().CopyToFullMatrix3() - mass * (
             com @ com * np.eye(3) - np.outer(com, com)
         )
-        parts.append((mass, pose.translation() - anchor + turn @ com, turn @ about_com @ turn.T))
+        parts.append((mass, pose.translation() + turn @ com, turn @ about_com @ turn.T))
     return combined(parts)
 
 
-def set_masses(context, anchor: np.ndarray, bodies: list, mass: float, com: np.ndarray, inertia: np.ndarray) -> dict:
+def set_masses(context, bodies: list, mass: float, com: np.ndarray, inertia: np.ndarray) -> dict:
     """Spatial inertias of bodies that move as one, by their indices: all of it in the first of them."""
     from pydrake.multibody.tree import RotationalInertia, SpatialInertia
 
     pose = bodies[0].EvalPoseInWorld(context)
     turn = pose.rotation().matrix()
-    com, inertia = turn.T @ (anchor + com - pose.translation()), turn.T @ inertia @ turn
+    com, inertia = turn.T @ (com - pose.translation()), turn.T @ inertia @ turn
     tensor = RotationalInertia(*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2])
     whole = SpatialInertia.MakeFromCentralInertia(mass, com, tensor)
     return {body.index(): SpatialInertia.Zero() for body in bodies} | {bodies[0].index(): whole}
