@@ -18,10 +18,8 @@ def parsed(file: File, dt: float):
     logging.getLogger("drake").setLevel(logging.CRITICAL)  # set by importing pydrake
     plant = MultibodyPlant(dt)
     parser = Parser(plant)
-    if lacks_names(file):
-        instances = parser.AddModelsFromString(whole_text(file.path), "xml")
-    else:
-        instances = parser.AddModels(str(file.path))
+    text = lacks_names(file) and whole_text(file.path)
+    instances = parser.AddModelsFromString(text, "xml") if text else parser.AddModels(str(file.path))
     if not file.free:  # a URDF's first body, which MuJoCo fixes to the world
         bodies = {body for instance in instances for body in plant.GetBodyIndices(instance)}
         for body in bodies - {joint.child_body().index() for joint in joints_of(plant)}:
