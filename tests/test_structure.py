@@ -35,6 +35,7 @@ LIBRARIES = {
     "newton": ("compare.engines.newton",),
     "warp": ("compare.engines.newton",),
     "pinocchio": ("compare.engines.pinocchio",),
+    "pydrake": ("compare.engines.drake",),
     "pandas": ("compare.report",),
     "matplotlib": ("compare.report.style",),
     "PIL": ("compare.report.images",),

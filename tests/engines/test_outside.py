@@ -133,7 +133,7 @@ def test_each_integrator_falls_as_its_order_says(engine, tmp_path):
     floor = 1e-5 if engine.record.precision == "float32" else 1e-11
     for method in engine.methods.values():
         settings = (
-            [Setting(1.0, tolerance=10.0**-k) for k in (3, 6)]
+            [Setting(1.0, tolerance=10.0**-k) for k in (3, 10)]
             if method.adaptive
             else [Setting(1.0, n) for n in (128, 256)]
         )

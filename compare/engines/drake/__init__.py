@@ -1,0 +1,141 @@
+"""Drake's MultibodyPlant of a robot's file; only where pydrake is installed (the extra `drake`).
+
+Each hinge and slide has a rotor in place of the file's actuators, and one of Drake's springs: so Drake's own equations have the
+armature and the stiffness that its parser has dropped.
+"""
+
+import numpy as np
+
+from .. import EngineRecord
+from ..outside import File, ReadModel, Unread
+from ..outside.order import near, order_of, wrong_masses
+from .plant import bodies_of, finished, fixed_force, joint_numbers, masses, parsed, set_masses, with_turned_force
+
+ENGINE = EngineRecord(
+    order=50, label="Drake", colour="#D55E00", marker="P", package="pydrake", extra="drake", reads_file=True
+)
+SCHEMES = {"RK2": (2, "runge_kutta2"), "RK3": (3, "runge_kutta3"), "RK5": (5, "runge_kutta5"),
+           "implicit Euler": (1, "implicit_euler"), "Radau3": (3, "radau3")}  # fmt: skip
+METHODS = {name: (order, f"drake_{scheme}") for name, (order, scheme) in SCHEMES.items()}
+METHODS |= {f"{name} adaptive": (None, f"drake_{SCHEMES[name][1]}_adaptive") for name in ("RK3", "RK5", "Radau3")}
+METHODS["discrete"] = 1, "semi_implicit_euler"
+METHODS_WITH_BALLS = {"discrete": (1, "drake_discrete")}  # it adds dt times the rate of a quaternion, and normalizes
+ITERATES, ITERATED = ("implicit Euler", "Radau3"), 1e-12  # relative accuracy of their iterations at fixed steps
+LONGEST = 0.1  # s, of a step of a method that chooses its own: Drake's default
+
+
+class Model(ReadModel):
+    def __init__(self, file: File, precision: str):
+        if file.kinds.count("ball") > len(file.free):
+            raise Unread("ball joints become three angles")
+        self.file, self.inertias, self.simulators = file, {}, {}
+        plant, rotors = parsed(file, 0.0)
+        plant.Finalize()
+        self.joints = joint_numbers(plant, file)
+        joints = {k: plant.get_joint(index) for index, k in self.joints.items()}
+        starts = {k: (joint.position_start(), joint.velocity_start()) for k, joint in joints.items()}
+        self.order = order_of(file, starts, (3, 4, 5, 6, 0, 1, 2), (3, 4, 5, 0, 1, 2), (), True)
+        armature, damping, stiffness = np.zeros((3, file.coordinates.nv))
+        for joint in joints.values():
+            place = self.order.v[joint.velocity_start() :][: joint.num_velocities()]
+            armature[place], damping[place] = rotors.get(joint.name(), 0.0), joint.default_damping_vector()
+        self.used = {"gravity": plant.gravity_field().gravity_vector(), "armature": armature, "damping": damping,
+                     "stiffness": stiffness}  # fmt: skip
+        self.settle()
+
+    def numbers(self):
+        found = {name: np.zeros_like(self.stated[name]) for name in ("mass", "com", "inertia")}
+        self.plant.SetPositions(self.context, *self.order.engine(self.stated["reference"]))
+        for k, bodies in bodies_of(self.plant, self.joints).items():
+            found["mass"][k], found["com"][k], found["inertia"][k] = masses(self.context, bodies)
+        return self.used | found | {"moments": np.linalg.eigvalsh(found["inertia"])}
+
+    def mend(self, name, values):
+        if name in self.used:  # a free body has no rotor and no spring, and its damping is in other axes
+            wrong, self.used[name] = values != self.used[name], values
+            self.settle()
+            return name == "gravity" or not any(wrong[self.order.v[at]].any() for at, _ in self.order.turned)
+        wrong = wrong_masses(self.numbers(), self.stated)
+        for k, bodies in bodies_of(self.plant, self.joints).items():
+            if k in wrong and bodies:
+                whole = [self.stated[part][k] for part in ("mass", "com", "inertia")]
+                self.inertias |= set_masses(self.context, bodies, *whole)
+        self.settle()
+        return bool(near(self.numbers()[name], values).all())
+
+    def settle(self) -> None:
+        """Make the plant of single states, without damping and springs, which act as part of the force there."""
+        self.simulators.clear()
+        self.plant = finished(self.file, 0.0, self.joints, self.used, None)
+        self.context = self.plant.CreateDefaultContext()
+        self.set_numbers(self.plant, self.context, acts=False)
+        self.force = fixed_force(self.plant, self.context)
+        self.forward_dynamics = self.plant.get_generalized_acceleration_output_port()
+
+    def set_numbers(self, plant, context, acts: bool) -> None:
+        """The numbers of a context. acts: damping does."""
+        damping = self.used["damping"][self.order.v] * acts
+        for joint in map(plant.get_joint, self.joints):
+            joint.SetDampingVector(context, damping[joint.velocity_start() :][: joint.num_velocities()])
+        for index, inertia in self.inertias.items():
+            plant.get_body(index).SetSpatialInertiaInBodyFrame(context, inertia)
+
+    def mass_matrix(self, q):
+        self.plant.SetPositions(self.context, *self.order.engine(q))
+        return self.order.tree_matrix(q, self.plant.CalcMassMatrix(self.context))
+
+    def bias(self, q, v):
+        self.plant.SetPositionsAndVelocities(self.context, np.concatenate(self.order.engine(q, v)))
+        gravity = self.plant.CalcGravityGeneralizedForces(self.context)
+        return self.order.tree(q, self.plant.CalcBiasTerm(self.context) - gravity)
+
+    def acceleration(self, q, v, force):
+        q_drake, v_drake, force = self.order.engine(q, v, force)
+        self.plant.SetPositionsAndVelocities(self.context, np.concatenate([q_drake, v_drake]))
+        self.force.SetFromVector(force)
+        return self.order.tree(q, self.forward_dynamics.Eval(self.context))
+
+    def prepare(self, method, tau, dt, tolerance):
+        self.simulator(method, tau, dt, tolerance)
+
+    def simulator(self, method, tau, dt, tolerance):
+        """A simulator, the plant, and the plant's context in it."""
+        from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+
+        key = method, tuple(tau), dt, tolerance
+        if key not in self.simulators:
+            of_plant = dt if method == "discrete" else 0.0
+            plant = finished(self.file, of_plant, self.joints, self.used, self.stated["rest"])
+            turns = any(tau[self.order.v[at]].any() for at, _ in self.order.turned)
+            system = with_turned_force(plant, self.order, tau) if turns else plant
+            simulator = Simulator(system)
+            context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+            self.set_numbers(plant, context, acts=True)
+            if not turns:
+                fixed_force(plant, context).SetFromVector(tau[self.order.v])
+            if method != "discrete":
+                scheme = SCHEMES[method.removesuffix(" adaptive")][1]
+                integrator = ResetIntegratorFromFlags(simulator, scheme, dt or LONGEST)
+                integrator.set_fixed_step_mode(tolerance is None)
+                if tolerance or method in ITERATES:
+                    integrator.set_target_accuracy(tolerance or ITERATED)
+            self.simulators[key] = simulator, plant, context
+        return self.simulators[key]
+
+    def run(self, q, v, tau, times, steps, method, tolerance):
+        dt = times[-1] / steps if steps else None
+        simulator, plant, context = self.simulator(method, tau, dt, tolerance)
+        q, v = self.order.engine(q, v)
+        simulator.get_mutable_context().SetTime(0.0)
+        plant.SetPositionsAndVelocities(context, np.concatenate([q, v]))
+        simulator.get_mutable_integrator().ResetStatistics()
+        simulator.Initialize()
+        states = [np.concatenate([q, v])]
+        for t in times[1:]:
+            try:  # the last of the discrete steps up to t begins at t - dt
+                simulator.AdvanceTo(t - 0.5 * dt if method == "discrete" else t)
+            except RuntimeError:  # it finds no step, or no solution of its equations
+                break
+            states.append(plant.GetPositionsAndVelocities(context))
+        evaluations = steps if method == "discrete" else simulator.get_integrator().get_num_derivative_evaluations()
+        return self.order.tree_states(*np.split(np.array(states), [len(q)], axis=1)), evaluations

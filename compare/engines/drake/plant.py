@@ -1,0 +1,150 @@
+"""A file as Drake reads it: the plant, its joints, and the masses that they move."""
+
+import logging
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ..outside import File, Unread, combined
+from ..outside.mjcf_text import whole_text
+
+
+def parsed(file: File, dt: float):
+    """A plant that is not final, without actuators and limits; and the reflected inertia of each joint that has one, by name."""
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+
+    logging.getLogger("drake").setLevel(logging.CRITICAL)  # set by importing pydrake
+    plant = MultibodyPlant(dt)
+    parser = Parser(plant)
+    text = lacks_names(file) and whole_text(file.path)
+    instances = parser.AddModelsFromString(text, "xml") if text else parser.AddModels(str(file.path))
+    if not file.free:  # a URDF's first body, which MuJoCo fixes to the world
+        bodies = {body for instance in instances for body in plant.GetBodyIndices(instance)}
+        for body in bodies - {joint.child_body().index() for joint in joints_of(plant)}:
+            plant.WeldFrames(plant.world_frame(), plant.get_body(body).body_frame())
+    rotors = {}
+    for actuator in map(plant.get_joint_actuator, plant.GetJointActuatorIndices()):
+        rotors[actuator.joint().name()] = actuator.default_reflected_inertia()  # of several the last one counts in M
+        plant.RemoveJointActuator(actuator)
+    for constraint in plant.GetConstraintIds():
+        plant.RemoveConstraint(constraint)
+    for joint in joints_of(plant):
+        unlimited = np.full(joint.num_positions(), np.inf)
+        joint.set_position_limits(-unlimited, unlimited)
+    return plant, rotors
+
+
+def lacks_names(file: File) -> bool:
+    """Whether an MJCF file has no name of the model, which Drake needs, or a joint without a name."""
+    if file.path.suffix == ".urdf":
+        return False
+    unnamed = any(re.fullmatch(r"joint \d+", name) for name in file.names)
+    return unnamed or "model" not in ElementTree.parse(file.path).getroot().attrib
+
+
+def finished(file: File, dt: float, joints: dict, numbers: dict, rest):
+    """A final plant with the gravity and armature of `numbers`, and, unless `rest` is None, with its springs."""
+    from pydrake.multibody.tree import PrismaticSpring, RevoluteSpring
+
+    plant, springs = parsed(file, dt)[0], {"revolute": RevoluteSpring, "prismatic": PrismaticSpring}
+    plant.mutable_gravity_field().set_gravity_vector(numbers["gravity"])
+    for joint in joints_of(plant):
+        if joint.type_name() not in springs:
+            continue
+        _, at, by = file.coordinates.places.joints[joints[joint.index()]]
+        if inertia := numbers["armature"][by.start]:
+            plant.AddJointActuator(f"rotor of {joint.name()}", joint).set_default_rotor_inertia(inertia)
+        if rest is not None and (stiffness := numbers["stiffness"][by.start]):
+            plant.AddForceElement(springs[joint.type_name()](joint, rest[at.start], stiffness))
+    plant.Finalize()
+    return plant
+
+
+def joints_of(plant) -> list:
+    return [plant.get_joint(index) for index in plant.GetJointIndices()]
+
+
+def joint_numbers(plant, file: File) -> dict:
+    """The number in the Tree of each of Drake's joints that move, by its index; of a free body that of its ball."""
+    joints = joints_of(plant)
+    free = [joint.index() for joint in joints if joint.num_velocities() == 6]  # called as their bodies
+    names = {joint.index(): joint.name() for joint in joints if joint.num_velocities() == 1}
+    names |= zip(free, [f"{name} turn" for name in file.free])
+    expected = {name: k for k, name in enumerate(file.names)}
+    for name in file.free:
+        for part in "xyz":
+            del expected[f"{name} {part}"]
+    if len(free) != len(file.free) or plant.num_velocities() != file.coordinates.nv:
+        raise Unread(f"Drake has {plant.num_velocities()} speeds, the compared model {file.coordinates.nv}")
+    if missing := [name for name in expected if name not in names.values()]:
+        raise Unread(f"Drake has no joint of the name {missing[0]!r}")
+    return {index: expected[name] for index, name in names.items()}
+
+
+def bodies_of(plant, joints: dict) -> dict[int, list]:
+    """The bodies with mass that move with each joint of the Tree and not with the next one."""
+    from pydrake.multibody.tree import BodyIndex
+
+    inboard = {joint.child_body().index(): joint for joint in joints_of(plant)}
+    bodies = {k: [] for k in joints.values()}
+    for body in (plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())):
+        joint = inboard.get(body.index())
+        while joint is not None and joint.index() not in joints:
+            joint = inboard.get(joint.parent_body().index())
+        if joint is not None and body.default_mass():
+            bodies[joints[joint.index()]].append(body)
+    return bodies
+
+
+def masses(context, bodies: list) -> tuple[float, np.ndarray, np.ndarray]:
+    """The mass of bodies that move as one, their centre of mass, and the inertia about it, in the world."""
+    parts = []
+    for body in bodies:
+        inertia, pose = body.CalcSpatialInertiaInBodyFrame(context), body.EvalPoseInWorld(context)
+        mass, com, turn = inertia.get_mass(), inertia.get_com(), pose.rotation().matrix()
+        about_com = inertia.CalcRotationalInertia().CopyToFullMatrix3() - mass * (
+            com @ com * np.eye(3) - np.outer(com, com)
+        )
+        parts.append((mass, pose.translation() + turn @ com, turn @ about_com @ turn.T))
+    return combined(parts)
+
+
+def set_masses(context, bodies: list, mass: float, com: np.ndarray, inertia: np.ndarray) -> dict:
+    """Spatial inertias of bodies that move as one, by their indices: all of it in the first of them."""
+    from pydrake.multibody.tree import RotationalInertia, SpatialInertia
+
+    pose = bodies[0].EvalPoseInWorld(context)
+    turn = pose.rotation().matrix()
+    com, inertia = turn.T @ (com - pose.translation()), turn.T @ inertia @ turn
+    tensor = RotationalInertia(*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2])
+    whole = SpatialInertia.MakeFromCentralInertia(mass, com, tensor)
+    return {body.index(): SpatialInertia.Zero() for body in bodies} | {bodies[0].index(): whole}
+
+
+def fixed_force(plant, context):
+    """The vector of generalized forces in a context, in Drake's order and axes."""
+    port = plant.get_applied_generalized_force_input_port()
+    return port.FixValue(context, np.zeros(plant.num_velocities())).GetMutableData().get_mutable_value()
+
+
+def with_turned_force(plant, order, force: np.ndarray):
+    """A system of the plant and of forces that turn with its free bodies: (nv,), constant as the Tree has it.
+
+    Drake's force on a free body is in world axes. These are computed in Python at each evaluation.
+    """
+    from pydrake.systems.framework import DiagramBuilder, LeafSystem
+
+    def turned(context, output):
+        q = order.tree_position(forces.get_input_port().Eval(context)[: len(order.q)])
+        output.SetFromVector(order.engine(q, force)[1])
+
+    forces, builder = LeafSystem(), DiagramBuilder()
+    forces.DeclareVectorInputPort("state", plant.num_multibody_states())
+    forces.DeclareVectorOutputPort("force", len(order.v), turned)
+    builder.AddSystem(plant)
+    builder.AddSystem(forces)
+    builder.Connect(plant.get_state_output_port(), forces.get_input_port())
+    builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
+    return builder.Build()

@@ -1,0 +1,140 @@
+"""Engines that read the robot's file themselves, each in a process of its own.
+
+Their modules have, beside the record with `reads_file`, two names; they import their package in functions only:
+
+    METHODS = {name: (order, scheme), ...}      of integration; scheme: that of tmt, or a name of its own; order None: it takes a
+                                                tolerance and chooses its own steps
+    class Model(ReadModel)                      what the engine has made of a file
+
+and may have METHODS_WITH_BALLS, the same for methods that are another scheme where a ball or a free joint is.
+
+A process of its own keeps an engine's threads, its precision and a crash away from the program and from other engines.
+"""
+
+import importlib
+from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from functools import cache, cached_property
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from ...judge.words import listed
+from ...robots.case import Case
+from .. import GRID, RECORDS, Engine, Method, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
+from .answers import answer, started
+from .model import EngineError, File, ReadModel, Unread, combined, numbers_of, passive, together
+
+__all__ = [
+    "EngineError",
+    "File",
+    "Outside",
+    "OutsideDynamics",
+    "ReadModel",
+    "Unread",
+    "combined",
+    "numbers_of",
+    "together",
+]
+
+
+class Outside(Engine):
+    """An engine in a process of its own. Nothing of its package is imported here."""
+
+    def __init__(self, name: str):
+        self.name, self.record = name, RECORDS[name]
+        module = importlib.import_module(f"..{self.record.module or name}", __package__)
+        self.methods, self.methods_of_balls = (
+            {method: Method(name, method, order, scheme, order is None) for method, (order, scheme) in methods.items()}
+            for methods in (module.METHODS, getattr(module, "METHODS_WITH_BALLS", {}))
+        )
+
+    def methods_in(self, case: Case) -> Mapping[str, Method]:
+        """None where joints are locked or the robot's own actuators act."""
+        if case.scene.locked or case.controller:
+            return {}
+        return self.methods | (self.methods_of_balls if case.coordinates.has_balls else {})
+
+    def of(self, case: Case) -> "OutsideDynamics":
+        return OutsideDynamics(self.name, case)
+
+
+class OutsideDynamics:
+    """A case in an outside engine: a robot without locked joints and without servos."""
+
+    def __init__(self, name: str, case: Case):
+        self.name, self.case, self.tree, self.coordinates = name, case, case.tree, case.coordinates
+        self.file = File(Path(case.robot.mjcf).resolve(), case.joints, case.coordinates.all_kinds)
+        self.key = hash((self.file, self.tree))
+
+    @cached_property
+    def reading(self) -> Mapping:
+        """Of the child: its numbers as read, which of them were mended, and seconds until the model was there."""
+        return self.ask("read", self.name, self.file, self.tree)
+
+    def ask(self, act: str, *arguments):
+        """The value of a function of this module in the engine's process; Unread if the process ends."""
+        try:
+            return process(self.name).submit(answer, self.key, act, arguments).result()
+        except BrokenProcessPool:
+            process.cache_clear()
+            raise EngineError("its process was killed") from None
+
+    def rows(self, quantity: str, *values) -> np.ndarray:
+        """A quantity at many states, (states, ...)."""
+        self.reading  # noqa: B018 - mends what it has read differently
+        return self.ask("each", quantity, *(np.atleast_2d(np.asarray(value, float)) for value in values))
+
+    def mass_matrix(self, q):
+        return self.rows("mass_matrix", q)
+
+    def bias(self, q, v):
+        return self.rows("bias", q, v)
+
+    def acceleration(self, q, v, tau):
+        return self.rows("acceleration", q, v, tau - passive(self.tree, q, v))
+
+    def has(self, quantity: str) -> bool:
+        return quantity in self.reading["has"]
+
+    def timed(self, q, v, tau) -> dict[int, float]:
+        """Nanoseconds of an acceleration, by the number of states of a call; {} if it has no such function."""
+        return self.ask("timed", q, v, tau - passive(self.tree, q, v)) if self.has("acceleration") else {}
+
+    def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
+        """Motions recorded at every multiple of dt."""
+        self.reading  # noqa: B018
+        t, (batch, states), ended = np.linspace(0.0, dt * steps, steps + 1), rows_of_states(q, v, tau), []
+        paths = []
+        for state in zip(*states):
+            of, _, _, why = self.ask("ran", *state, t, None if tolerance else steps, method, tolerance)
+            path, end = as_far_as_it_goes(t, of, np.concatenate(state[:2]), why)
+            paths.append(path)
+            ended.append(end)
+        q, v = np.split(np.reshape(paths, (*batch, steps + 1, -1)), [self.coordinates.nq], axis=-1)
+        return Motion(t, q, v, None, np.reshape(np.array(ended, dtype=object), batch)[()], steps)
+
+    def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
+        if different := [number for number, is_set in self.reading["mended"].items() if not is_set]:
+            raise EngineError(f"it has read another {listed(different)}, which cannot be set")
+        t = np.linspace(0.0, setting.duration, GRID + 1)
+        arguments = q, v, tau, t, setting.steps, method, setting.tolerance
+        self.seconds_prepared = self.ask("prepared", *arguments)  # of compilation, where it compiles
+
+        def run():
+            return self.ask("ran", *arguments)
+
+        def read(outcome):
+            states, evaluations, seconds, why = outcome
+            path, ended = as_far_as_it_goes(t, states, np.concatenate([q, v]), why)
+            return Motion(t, *np.split(path, [self.coordinates.nq], axis=1), evaluations, ended, setting.steps, seconds)
+
+        return run, read
+
+
+@cache
+def process(name: str) -> ProcessPoolExecutor:
+    """The process of an engine."""
+    return ProcessPoolExecutor(1, get_context("spawn"), initializer=started, initargs=(RECORDS[name].environment,))

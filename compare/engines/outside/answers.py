@@ -1,0 +1,97 @@
+"""What an engine's own process does: read a file, give quantities at states, run, time."""
+
+import importlib
+import os
+import time
+
+import numpy as np
+
+import tmt
+
+from ...judge import timing
+from ...judge.scale import FACTOR
+from ...process.crash import described
+from ...process.streams import in_one_line
+from ...process.workers import begin
+from .. import RECORDS
+from .model import EngineError, File, ReadModel, Unread, numbers_of
+
+ONE = 20  # calls of one state that are timed together
+QUANTITIES = "mass_matrix", "bias", "acceleration"
+
+
+def started(environment: tuple[tuple[str, str], ...]) -> None:
+    begin()
+    os.environ.update(environment)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):  # what engines print, their libraries of C++ too
+        os.dup2(nowhere, stream)
+
+
+models = {}  # by the key of the case: what this process has read
+
+
+def answer(key: int, act: str, arguments: tuple) -> object:
+    """What a function below returns for a case; EngineError with the reason, in one line, where it raises."""
+    try:
+        return {"read": read, "each": each, "prepared": prepared, "ran": ran, "timed": timed}[act](key, *arguments)
+    except EngineError:
+        raise
+    except Exception as error:
+        kind = Unread if act == "read" else EngineError
+        raise kind(in_one_line(" ".join(described(error).split()))) from None
+
+
+def read(key: int, name: str, file: File, tree: tmt.Tree) -> dict:
+    """The numbers that the engine has read, those of the Tree, which that differ were mended, and the seconds that it took."""
+    begin = time.perf_counter()
+    record = RECORDS[name]
+    module = importlib.import_module(f"..{record.module or name}", __package__)
+    model, stated = module.Model(file, record.precision), numbers_of(tree)
+    model.stated = stated
+    found = {number: np.asarray(values, float) for number, values in model.numbers().items()}
+    mended = {}
+    for number, values in found.items():
+        size = np.abs(stated[number]).max(initial=0.0)
+        if np.shape(values) != np.shape(stated[number]):
+            raise Unread(f"{number}: {len(values)} values, {len(stated[number])} in the compared model")
+        if not np.abs(values - stated[number]).max(initial=0.0) <= FACTOR * record.eps * size:
+            mended[number] = number in model.drops or model.mend(number, stated[number])
+    models[key] = model
+    has = {name for name in QUANTITIES if getattr(type(model), name) is not getattr(ReadModel, name)}
+    return {"read": found, "stated": stated, "mended": mended, "seconds": time.perf_counter() - begin, "has": has}
+
+
+def each(key: int, quantity: str, *values: np.ndarray) -> np.ndarray:
+    model = models[key]
+    return np.array([getattr(model, quantity)(*state) for state in zip(*values)], dtype=float)
+
+
+def prepared(key: int, q, v, tau, t, steps, method, tolerance) -> float:
+    """Seconds until a run could begin."""
+    begin = time.perf_counter()
+    models[key].prepare(method, tau, t[-1] / steps if steps else None, tolerance)
+    return time.perf_counter() - begin
+
+
+def ran(key: int, q, v, tau, t, steps, method, tolerance) -> tuple[np.ndarray, int | None, float, str]:
+    """The states at the times t, evaluations, seconds of the run alone, and why it may have ended early."""
+    model = models[key]
+    begin, why = time.perf_counter(), "a number is not finite"
+    try:
+        states, evaluations = model.run(q, v, tau, t, steps, method, tolerance)
+    except ArithmeticError as error:  # it cannot go on
+        states, evaluations, why = np.concatenate([q, v])[None], None, str(error)
+    return np.asarray(states, float), evaluations, time.perf_counter() - begin, why
+
+
+def timed(key: int, q, v, force) -> dict[int, float]:
+    """Nanoseconds of an acceleration, by the number of states of a call: of one, and of many where the engine can."""
+    model = models[key]
+    calls = {1: lambda: [model.acceleration(q[0], v[0], force[0]) for _ in range(ONE)]}
+    if type(model).many is not ReadModel.many:
+        calls[len(q)] = lambda: model.many(q, v, force)
+    for call in calls.values():
+        call()  # which may compile
+    times = timing.fastest(calls, 5)
+    return {count: 1e9 * seconds / (ONE if count == 1 else count) for count, seconds in times.items()}

@@ -1,0 +1,73 @@
+"""Files for engines that read them: URDF, includes and names; and what acts in Drake's runs."""
+
+import numpy as np
+import pytest
+
+import tmt
+from compare.engines import Setting
+from compare.engines.outside import Outside
+from compare.engines.outside.mjcf_text import whole_text
+from compare.robots.states import Sample
+from compare.run.reference import compared_with
+
+INSTALLED = [name for name in ("drake", "pinocchio") if not Outside(name).unavailable()]
+LINK = """<link name="{0}"><inertial><origin xyz="0.1 0.02 -0.3" rpy="0.3 0.1 0"/><mass value="2"/>
+<inertia ixx="0.03" iyy="0.04" izz="0.02" ixy="0.001" ixz="0.002" iyz="-0.003"/></inertial></link>"""
+JOINT = """<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/><origin xyz="0.1 0 -0.4" rpy="0.1 0.2 0.3"/>
+<axis xyz="0 0.8 0.6"/><limit lower="-3" upper="3" effort="9" velocity="9"/><dynamics damping="0.3"/></joint>"""
+URDF = f"""<robot name="crane">{"".join(map(LINK.format, ("base", "mast", "boom", "tip")))}
+{JOINT.format("turn", "revolute", "base", "mast")}{JOINT.format("lift", "continuous", "mast", "boom")}
+{JOINT.format("reach", "prismatic", "boom", "tip")}</robot>"""
+PART = """<mujocoinclude><body name="arm"><joint name="hip" axis="0 1 0" damping="0.1" stiffness="3" springref="20"/>
+<inertial pos="0 0.1 -0.5" mass="2" diaginertia="0.3 0.2 0.15"/><body pos="0 0 -1"><joint axis="1 0 0"/>
+<inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.01"/></body></body></mujocoinclude>"""
+WHOLE = """<mujoco><worldbody><include file="part.xml"/></worldbody><keyframe><key qpos="1 2"/></keyframe></mujoco>"""
+FREE = """<mujoco><worldbody><body name="top"><freejoint name="base"/>
+<inertial pos="0.1 0 0.2" mass="2" diaginertia="0.3 0.2 0.15"/>
+</body></worldbody></mujoco>"""
+
+
+def robot_of(path, text):
+    path.write_text(text)
+    return compared_with("model", str(path)).robot
+
+
+@pytest.mark.parametrize("engine", INSTALLED)
+@pytest.mark.parametrize("name", ("crane.urdf", "robot.xml"))
+def test_a_urdf_and_a_file_with_an_include(engine, name, tmp_path):
+    (tmp_path / "part.xml").write_text(PART)
+    robot = robot_of(tmp_path / name, URDF if name.endswith("urdf") else WHOLE)
+    of, rng = Outside(engine).of(robot.case()), np.random.default_rng(4)
+    q = robot.coordinates.random(rng, 3)
+    v, tau = rng.uniform(-2.0, 2.0, (2, 3, robot.coordinates.nv))
+    sample = Sample(robot.tree, "", q, v, tau, 3)
+    assert set(of.reading["mended"]) <= {"stiffness"}
+    for quantity, state in (("mass_matrix", (q,)), ("bias", (q, v)), ("acceleration", (q, v, tau))):
+        exact = sample.truth(quantity).astype(float)
+        assert np.allclose(getattr(of, quantity)(*state), exact, rtol=1e-12, atol=1e-12 * np.abs(exact).max())
+
+
+def test_includes_and_names_of_a_text(tmp_path):
+    (tmp_path / "part.xml").write_text(PART)
+    (tmp_path / "robot.xml").write_text(WHOLE)
+    text = whole_text(tmp_path / "robot.xml")
+    assert "include" not in text and "keyframe" not in text
+    assert 'name="joint 1"' in text and 'name="body 2"' in text and 'model="robot"' in text
+
+
+@pytest.mark.skipif("drake" not in INSTALLED, reason="Drake is not installed")
+@pytest.mark.parametrize("text", (PART.replace("mujocoinclude", "worldbody"), FREE), ids=("springs", "free"))
+def test_what_acts_in_drakes_runs(text, tmp_path):
+    """Damping and springs, and a torque that turns with a free body."""
+    text = text if "<mujoco>" in text else f"<mujoco>{text}</mujoco>"
+    robot = robot_of(tmp_path / "robot.xml", text)
+    of, n = Outside("drake").of(robot.case()), robot.coordinates.nv
+    q, v, tau = (
+        robot.coordinates.random(np.random.default_rng(5), 1)[0],
+        np.linspace(-0.5, 0.5, n),
+        np.linspace(0.3, -0.2, n),
+    )
+    run, read = of.prepare(q, v, tau, Setting(0.5, 256), "RK5")
+    motion, exact = read(run()), tmt.simulate(q, v, tau, 0.5 / 1024, 1024, "dopri8", robot.tree)
+    assert np.abs(robot.coordinates.difference(motion.q[-1], exact.q[-1])).max() < 1e-10
+    assert np.abs(motion.v[-1] - exact.qd[-1]).max() < 1e-10
