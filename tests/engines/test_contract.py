@@ -1,18 +1,14 @@
 """What every engine promises: another one is one more parameter."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from crane import TREE, XML
-from trees import tree_of_kinds
 
 import tmt
 from compare.engines import GRID, Setting
 from compare.engines.heyoka import Heyoka
 from compare.engines.mujoco import Mujoco, parse
 from compare.engines.mujoco.calls import BatchedCalls, MinimalCalls
-from compare.engines.pinocchio import PinocchioCalls
 from compare.engines.scipy import Scipy
 from compare.engines.tmt import Tmt
 from compare.judge import scale
@@ -175,12 +171,7 @@ def test_a_run_that_diverges_is_nan_from_there_on_and_says_why_and_when(followed
 
 def test_what_cannot_take_part_says_so(monkeypatch, tmp_path, rng):
     monkeypatch.setattr("mujoco.__file__", str(tmp_path / "mujoco" / "__init__.py"))
-    for module in ("", ".pinocchio", ".mujoco.calls"):
+    for module in ("", ".mujoco.calls"):
         monkeypatch.setattr(f"compare.engines{module}.find_spec", lambda name: None)
-    for engine in (Heyoka(), PinocchioCalls, BatchedCalls, MinimalCalls):
+    for engine in (Heyoka(), BatchedCalls, MinimalCalls):
         assert engine.unavailable()
-    driven = dataclasses.replace(tmt.ARM, position_gain=np.eye(3))
-    assert "hinges and slides" in PinocchioCalls.unfit(tree_of_kinds(rng)) and "controller" in PinocchioCalls.unfit(
-        driven
-    )
-    assert PinocchioCalls.unfit(tmt.ARM) is None

@@ -12,7 +12,6 @@ from tmt.compiled.cores import cores
 from ...engines import LABELS
 from ...engines.heyoka import Heyoka, compiled_accelerations
 from ...engines.outside import EngineError, Outside
-from ...engines.pinocchio import PinocchioCalls
 from ...judge import timing
 from ...robots.case import SEED
 from ..setup import Setup
@@ -26,7 +25,7 @@ NAMES_IN_TMT = {FORWARD: "acceleration", "mass_matrix_and_bias": "mass_matrix_an
 CALLED = "tmt.acceleration, called from Python"
 WAITING, EACH, IN_LANES = "compiled, each waits for the last", "compiled", "compiled, side by side"
 WHOLE, BATCH = "MuJoCo, mj_forward", "MuJoCo, batch"
-HEYOKA, ABA = "heyoka, compiled function", "Pinocchio, aba called from Python"
+HEYOKA = "heyoka, compiled function"
 COLUMNS = ["quantity", "implementation", "states", "threads", "ns_per_state", "operations", "operations_per_ns",
            "why_not"]  # fmt: skip
 
@@ -55,7 +54,7 @@ def compiled_evaluations(setup: Setup) -> Evaluations:
         minimal = MinimalCalls(setup.engines["mujoco"].of(setup.robot.case()))
         made.loops.update({(quantity, name, 1, 1): loop for name, (quantity, loop) in minimal.loops(*first).items()})
     if not setup.is_quick:
-        add_peers(made, setup, first, few)
+        add_peers(made, setup, few)
     for loop in made.loops.values():
         loop(1)  # its code is compiled, or loaded, on the first call
     for (_, _, count, _), call in made.of_many.items():
@@ -102,14 +101,13 @@ def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray]) -> dict[tuple, 
     return calls
 
 
-def add_peers(made: Evaluations, setup: Setup, state: list[np.ndarray], states: list[np.ndarray]) -> None:
-    """Other engines where they are installed: heyoka's function, Pinocchio's aba, MuJoCo's batches."""
+def add_peers(made: Evaluations, setup: Setup, states: list[np.ndarray]) -> None:
+    """Other engines where they are installed: heyoka's function, MuJoCo's batches."""
     from ...engines.mujoco.calls import BatchedCalls  # here, since importing MuJoCo takes long
 
     tree, heyoka = setup.robot.tree, Heyoka()
     reasons = {
         HEYOKA: heyoka.unavailable() or heyoka.too_long(tree),
-        ABA: PinocchioCalls.unavailable() or PinocchioCalls.unfit(tree),
         BATCH: BatchedCalls.unavailable(),
     }
     made.absent.update({(FORWARD, name): reason for name, reason in reasons.items() if reason})
@@ -117,8 +115,6 @@ def add_peers(made: Evaluations, setup: Setup, state: list[np.ndarray], states: 
         function, inputs = compiled_accelerations(tree), np.ascontiguousarray(np.concatenate(states, axis=1).T)
         out = np.empty(states[1].T.shape)
         made.of_many[FORWARD, HEYOKA, FEW, 1] = lambda: function(inputs, outputs=out)
-    if not reasons[ABA]:
-        made.loops[FORWARD, ABA, 1, 1] = PinocchioCalls(tree).aba_loop(*state)
     if not reasons[BATCH]:
         calls = BatchedCalls(setup.engines["mujoco"].of(setup.robot.case()), *states)
         made.of_many[FORWARD, BATCH, FEW, 1] = calls.forward
