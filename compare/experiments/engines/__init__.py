@@ -76,7 +76,7 @@ def rows(setup: Setup) -> Result:
 
 def compare_engine(result: Result, setup: Setup, engine: Engine, label: str) -> None:
     record = RECORDS[engine.name]
-    setup.progress(Finding("engines", "compiling" if record.compiles else "reading", {"engine": label}))
+    setup.progress(f"engines: {label}{' compiles' * record.compiles}")
     case = setup.robot.case()
     dynamics = engine.of(case)
     compare_numbers(result, setup.robot, label, dynamics.reading, record)
