@@ -10,7 +10,7 @@ from . import EngineRecord
 from .outside import File, ReadModel, Unread, together
 
 ENGINE = EngineRecord(
-    order=75, label="DART", colour="#882255", marker="P", package="dartpy", extra="dart", reads_file=True
+    order=75, label="DART", colour="#882255", marker="*", package="dartpy", extra="dart", reads_file=True
 )
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
 

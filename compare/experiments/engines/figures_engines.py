@@ -8,7 +8,7 @@ from ...judge.finding import Finding
 from ...judge.scale import FACTOR
 from ...report.style import RED, WIDTH
 
-DASHES = "-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1))
+DASHES = "-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 3)), (0, (8, 2)), (0, (6, 1, 1, 1, 1, 1))
 BY_LABEL = {label: name for name, label in LABELS.items()}
 
 
