@@ -6,6 +6,8 @@ Their modules have, beside the record with `reads_file`, two names; they import 
                                                 tolerance and chooses its own steps
     class Model(ReadModel)                      what the engine has made of a file
 
+and, where they differ with the Tree, methods_for(tree), of the same form as METHODS.
+
 A process of its own keeps an engine's threads, its precision and a crash away from the program and from other engines.
 """
 
@@ -121,10 +123,20 @@ class Outside(Engine):
 
     def __init__(self, name: str):
         self.name, self.record = name, RECORDS[name]
-        methods = importlib.import_module(f".{self.record.module or name}", __package__).METHODS
-        self.methods = {
-            method: Method(name, method, order, scheme, order is None) for method, (order, scheme) in methods.items()
+        self.methods = self.named(self.module.METHODS)
+
+    @property
+    def module(self):
+        return importlib.import_module(f".{self.record.module or self.name}", __package__)
+
+    def named(self, methods: Mapping) -> dict[str, Method]:
+        return {
+            name: Method(self.name, name, order, scheme, order is None) for name, (order, scheme) in methods.items()
         }
+
+    def methods_in(self, case: Case) -> Mapping[str, Method]:
+        module = self.module
+        return self.named(module.methods_for(case.tree)) if hasattr(module, "methods_for") else self.methods
 
     def of(self, case: Case) -> "OutsideDynamics":
         return OutsideDynamics(self.name, case)
