@@ -29,7 +29,8 @@ DIRECTIONS = {
 }
 # the modules, or beginnings of their names, that may import a library
 LIBRARIES = {
-    "mujoco": ("compare.engines.mujoco",),
+    "mujoco": ("compare.engines.mujoco", "compare.engines.mjx"),
+    "jax": ("compare.engines.mjx",),
     "heyoka": ("compare.engines.heyoka",),
     "dartpy": ("compare.engines.dart",),
     "newton": ("compare.engines.newton",),

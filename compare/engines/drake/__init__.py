@@ -6,6 +6,8 @@ armature and the stiffness that its parser has dropped.
 
 import numpy as np
 
+from tmt import Tree
+
 from .. import EngineRecord
 from ..outside import File, ReadModel, Unread
 from ..outside.order import near, order_of, wrong_masses
@@ -19,9 +21,13 @@ SCHEMES = {"RK2": (2, "runge_kutta2"), "RK3": (3, "runge_kutta3"), "RK5": (5, "r
 METHODS = {name: (order, f"drake_{scheme}") for name, (order, scheme) in SCHEMES.items()}
 METHODS |= {f"{name} adaptive": (None, f"drake_{SCHEMES[name][1]}_adaptive") for name in ("RK3", "RK5", "Radau3")}
 METHODS["discrete"] = 1, "semi_implicit_euler"
-METHODS_WITH_BALLS = {"discrete": (1, "drake_discrete")}  # it adds dt times the rate of a quaternion, and normalizes
 ITERATES, ITERATED = ("implicit Euler", "Radau3"), 1e-12  # relative accuracy of their iterations at fixed steps
 LONGEST = 0.1  # s, of a step of a method that chooses its own: Drake's default
+
+
+def methods_for(tree: Tree) -> dict[str, tuple[int | None, str]]:
+    """discrete adds dt times the rate of a quaternion, and normalizes."""
+    return METHODS | ({"discrete": (1, "drake_discrete")} if tree.coordinates.balls else {})
 
 
 class Model(ReadModel):

@@ -6,7 +6,7 @@ Their modules have, beside the record with `reads_file`, two names; they import 
                                                 tolerance and chooses its own steps
     class Model(ReadModel)                      what the engine has made of a file
 
-and may have METHODS_WITH_BALLS, the same for methods that are another scheme where a ball or a free joint is.
+and, where they differ with the Tree, methods_for(tree), of the same form as METHODS.
 
 A process of its own keeps an engine's threads, its precision and a crash away from the program and from other engines.
 """
@@ -18,6 +18,7 @@ from concurrent.futures.process import BrokenProcessPool
 from functools import cache, cached_property
 from multiprocessing import get_context
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
@@ -45,17 +46,23 @@ class Outside(Engine):
 
     def __init__(self, name: str):
         self.name, self.record = name, RECORDS[name]
-        module = importlib.import_module(f"..{self.record.module or name}", __package__)
-        self.methods, self.methods_of_balls = (
-            {method: Method(name, method, order, scheme, order is None) for method, (order, scheme) in methods.items()}
-            for methods in (module.METHODS, getattr(module, "METHODS_WITH_BALLS", {}))
-        )
+        self.methods = self.named(self.module.METHODS)
+
+    @property
+    def module(self) -> ModuleType:
+        return importlib.import_module(f"..{self.record.module or self.name}", __package__)
+
+    def named(self, methods: Mapping) -> dict[str, Method]:
+        return {
+            name: Method(self.name, name, order, scheme, order is None) for name, (order, scheme) in methods.items()
+        }
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         """None where joints are locked or the robot's own actuators act."""
         if case.scene.locked or case.controller:
             return {}
-        return self.methods | (self.methods_of_balls if case.coordinates.has_balls else {})
+        methods_for = getattr(self.module, "methods_for", None)
+        return self.named(methods_for(case.tree)) if methods_for else self.methods
 
     def of(self, case: Case) -> "OutsideDynamics":
         return OutsideDynamics(self.name, case)

@@ -32,7 +32,7 @@ CLEAR = 100.0  # times the smallest error that rounding allows: a larger one fal
 def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
     """Single steps from random states, and the runs of the regular free scene with several steps or tolerances."""
     case = free_scene(setup)
-    for method in engine.methods.values():
+    for method in engine.methods_in(setup.robot.case()).values():
         setup.progress(f"engines: {method.label}")
         if method.scheme in METHODS and not method.adaptive:
             compare_steps(result, setup, engine, method)

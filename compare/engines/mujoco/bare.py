@@ -1,0 +1,66 @@
+"""The model that MuJoCo compiles, for engines that take it as it is; and the numbers that they hold then."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..outside import together
+from .inventory import switch_off
+from .names import INTEGRATORS, bit, joint_places
+from .reading import carriers
+from .source import locked_model
+
+HELD = (
+    "body_parentid", "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat", "jnt_bodyid",
+    "jnt_stiffness", "dof_jntid", "dof_armature", "dof_damping",
+)  # fmt: skip
+
+
+class Bare:
+    """The compiled model of a file with all that a Tree does not have taken away or switched off.
+
+    names: of the Tree's joints. qpos (nq,), dofs (nv,): the indices of the Tree's coordinates and speeds in MuJoCo's.
+    """
+
+    def __init__(self, path: Path, names: Sequence[str]):
+        self.model = locked_model(path, {}, bare=True)
+        switch_off(self.model)
+        self.model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
+        self.model.geom_contype[:] = self.model.geom_conaffinity[:] = (
+            0  # MJX refuses pairs even if there are no contacts
+        )
+        places = joint_places(self.model)
+        self.places = {name: places[name] for name in names}
+        self.qpos = np.array([i for place in self.places.values() for i in place.qpos])
+        self.dofs = np.array([i for place in self.places.values() for i in place.dofs])
+
+    def with_integrator(self, name: str):
+        """The model, which has this integrator now."""
+        self.model.opt.integrator = INTEGRATORS[name]
+        return self.model
+
+    def numbers(self, held: Callable[[str], np.ndarray]) -> dict[str, np.ndarray]:
+        """ReadModel.numbers, except gravity, of what an engine holds by MuJoCo's names, see HELD."""
+        m = SimpleNamespace(nbody=self.model.nbody, **{name: held(name) for name in HELD})
+        carrier, has_joint = carriers(m, self.places), set(m.jnt_bodyid.tolist())
+        frames, carried = [(np.zeros(3), Rotation.identity())], {joint: [] for joint in range(len(self.places))}
+        for body in range(1, m.nbody):
+            (at, turn), is_carried = frames[m.body_parentid[body]], body not in has_joint
+            own = (at + turn.apply(m.body_pos[body]), turn * rotation(m.body_quat[body]))
+            at, turn = own if is_carried else frames[0]  # in the axes of the body that the joint moves
+            frames.append((at, turn))
+            if carrier[body] >= 0:
+                axes = (turn * rotation(m.body_iquat[body])).as_matrix()
+                tensor = axes @ np.diag(m.body_inertia[body]) @ axes.T
+                carried[carrier[body]].append((m.body_mass[body], at + turn.apply(m.body_ipos[body]), tensor))
+        mass, moments = zip(*(together(bodies) for bodies in carried.values()))
+        speeds = {"armature": m.dof_armature, "damping": m.dof_damping, "stiffness": m.jnt_stiffness[m.dof_jntid]}
+        speeds = {name: values[self.dofs] for name, values in speeds.items()}
+        return {"mass": np.array(mass), "moments": np.array(moments)} | speeds
+
+
+def rotation(quaternion: np.ndarray) -> Rotation:
+    return Rotation.from_quat(np.roll(quaternion, -1))  # w x y z: SciPy has w last
