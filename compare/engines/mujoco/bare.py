@@ -29,6 +29,10 @@ class Bare:
         self.model = locked_model(path, {}, bare=True)
         switch_off(self.model)
         self.model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
+        self.model.opt.disableflags |= bit("WARMSTART")  # its solver starts from the unconstrained acceleration
+        # with this flag MuJoCo Warp's implicitfast is explicit in the damping; actuators with armature are still there
+        self.model.opt.disableflags &= ~bit("ACTUATION")
+        self.model.actuator_gainprm[:] = self.model.actuator_biasprm[:] = 0.0
         self.model.geom_contype[:] = self.model.geom_conaffinity[:] = (
             0  # MJX refuses pairs even if there are no contacts
         )
