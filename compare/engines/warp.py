@@ -1,6 +1,7 @@
 """MuJoCo Warp: the model that MuJoCo compiles, computed by Warp's kernels, in float32, here on a CPU."""
 
 import os
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -10,10 +11,8 @@ from tmt.methods import lone_speeds
 from . import GRID, EngineRecord
 from .outside import ReadModel, Unread
 
-ENGINE = EngineRecord(
-    order=65, label="MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp", extra="warp", reads_file=True,
-    precision="float32",
-)  # fmt: skip
+ENGINE = EngineRecord(order=65, label="MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp", extra="warp",
+                      reads_file=True, precision="float32")  # fmt: skip
 METHODS = {"Euler": (1, "semi_implicit_euler"), "implicitfast": (1, "semi_implicit_euler"), "RK4": (4, "rk4")}
 
 
@@ -30,6 +29,7 @@ class Model(ReadModel):
 
         warp.config.log_level = warp.LOG_ERROR
         silently(warp.init)
+        warp.set_device("cpu")
         import mujoco_warp
 
         from .mujoco.bare import Bare
@@ -37,8 +37,7 @@ class Model(ReadModel):
         self.bare = Bare(file.path, file.names)
         self.bare.model.opt.iterations = 0  # of its solver of constraints
         try:
-            with warp.ScopedDevice("cpu"):
-                self.models = {name: mujoco_warp.put_model(self.bare.with_integrator(name)) for name in METHODS}
+            self.models = {name: mujoco_warp.put_model(self.bare.with_integrator(name)) for name in METHODS}
         except NotImplementedError as error:
             raise Unread(f"MuJoCo Warp does not have what it needs: {error}") from None
         self.worlds, self.graphs = {}, {}
@@ -49,9 +48,8 @@ class Model(ReadModel):
         return {"gravity": model.opt.gravity.numpy()[0]} | held
 
     def mend(self, name, values):
-        index = {"stiffness": self.bare.model.dof_jntid[self.bare.dofs], "gravity": slice(None)}.get(
-            name, self.bare.dofs
-        )
+        joints = self.bare.model.dof_jntid[self.bare.dofs]
+        index = {"stiffness": joints, "gravity": slice(None)}.get(name, self.bare.dofs)
         for model in self.models.values():
             fields = {"gravity": model.opt.gravity, "armature": model.dof_armature, "damping": model.dof_damping}
             if (field := (fields | {"stiffness": model.jnt_stiffness}).get(name)) is None:
@@ -64,33 +62,22 @@ class Model(ReadModel):
     @cached_property
     def model(self):
         """The model without damping and stiffness, which are part of the force."""
-        import mujoco_warp
         import warp
 
-        with warp.ScopedDevice("cpu"):
-            model = mujoco_warp.put_model(self.bare.with_integrator("RK4"))
-        model.dof_armature, model.opt.gravity = self.models["RK4"].dof_armature, self.models["RK4"].opt.gravity
-        model.dof_damping.zero_()
-        model.jnt_stiffness.zero_()
-        return model
+        model = self.models["RK4"]
+        none = [warp.zeros_like(field) for field in (model.dof_damping, model.jnt_stiffness)]
+        return replace(model, dof_damping=none[0], jnt_stiffness=none[1])
 
     def at(self, q, v, force):
         """Data of as many worlds as there are states, at these states (worlds, n)."""
         import mujoco_warp
-        import warp
 
         if len(q) not in self.worlds:  # njmax=0 is possible, but then Euler and implicitfast do not accelerate
-            with warp.ScopedDevice("cpu"):
-                self.worlds[len(q)] = mujoco_warp.make_data(self.bare.model, len(q), nconmax=0, njmax=1)
+            self.worlds[len(q)] = mujoco_warp.make_data(self.bare.model, len(q), nconmax=0, njmax=1)
         data = self.worlds[len(q)]
-        dofs = self.bare.dofs
-        for field, index, values in (
-            (data.qpos, self.bare.qpos, q),
-            (data.qvel, dofs, v),
-            (data.qfrc_applied, dofs, force),
-        ):
+        for field, values in ((data.qpos, q), (data.qvel, v), (data.qfrc_applied, force)):
             placed = np.zeros(field.shape, np.float32)
-            placed[:, index] = values
+            placed[:, self.bare.qpos if field is data.qpos else self.bare.dofs] = values
             field.assign(placed)
         return data
 
@@ -99,10 +86,9 @@ class Model(ReadModel):
         import warp
 
         if (name, data.nworld) not in self.graphs:
-            with warp.ScopedDevice("cpu"):
-                call(data)  # compiles
-                with warp.ScopedCapture(device="cpu") as capture:
-                    call(data)
+            call(data)  # compiles
+            with warp.ScopedCapture() as capture:
+                call(data)
             self.graphs[name, data.nworld] = capture.graph
         return lambda: warp.capture_launch(self.graphs[name, data.nworld])
 
@@ -144,8 +130,7 @@ class Model(ReadModel):
         for _ in times[1:]:
             for _ in range(steps // (len(times) - 1)):
                 advance()
-            state = data.qpos.numpy()[0, self.bare.qpos], data.qvel.numpy()[0, self.bare.dofs]
-            path.append(np.hstack(state))
+            path.append(np.hstack([data.qpos.numpy()[0, self.bare.qpos], data.qvel.numpy()[0, self.bare.dofs]]))
         return np.array(path), steps * (4 if method == "RK4" else 1)
 
 
