@@ -34,7 +34,7 @@ class Model(ReadModel):
 
         from .mujoco.bare import Bare
 
-        self.bare = Bare(file.path, file.names)
+        self.bare = Bare(file.path, file.names, rotors_in_joints=True)
         self.bare.model.opt.iterations = 0  # of its solver of constraints
         try:
             self.models = {name: mujoco_warp.put_model(self.bare.with_integrator(name)) for name in METHODS}
