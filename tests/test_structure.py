@@ -30,6 +30,8 @@ DIRECTIONS = {
 # the modules, or beginnings of their names, that may import a library
 LIBRARIES = {
     "mujoco": ("compare.engines.mujoco", "compare.engines.mjx"),
+    "mujoco_warp": ("compare.engines.warp",),
+    "warp": ("compare.engines.warp",),
     "jax": ("compare.engines.mjx",),
     "heyoka": ("compare.engines.heyoka",),
     "dartpy": ("compare.engines.dart",),

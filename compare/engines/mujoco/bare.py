@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ..outside import together
 from .inventory import switch_off
-from .names import INTEGRATORS, bit, joint_places
+from .names import INTEGRATORS, bit, joint_places, rotors
 from .reading import carriers
 from .source import locked_model
 
@@ -22,13 +22,21 @@ HELD = (
 class Bare:
     """The compiled model of a file with all that a Tree does not have taken away or switched off.
 
-    names: of the Tree's joints. qpos (nq,), dofs (nv,): the indices of the Tree's coordinates and speeds in MuJoCo's.
+    names: of the Tree's joints. rotors_in_joints: the armature of actuators is that of their joints.
+    qpos (nq,), dofs (nv,): the indices of the Tree's coordinates and speeds in MuJoCo's.
     """
 
-    def __init__(self, path: Path, names: Sequence[str]):
+    def __init__(self, path: Path, names: Sequence[str], rotors_in_joints: bool = False):
         self.model = locked_model(path, {}, bare=True)
         switch_off(self.model)
         self.model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
+        self.model.opt.disableflags |= bit("WARMSTART")  # its solver starts from the unconstrained acceleration
+        if rotors_in_joints and hasattr(self.model, "actuator_armature"):
+            self.model.dof_armature += rotors(self.model)
+            self.model.actuator_armature[:] = 0.0
+        # with this flag MuJoCo Warp's implicitfast is explicit in the damping; actuators with armature are still there
+        self.model.opt.disableflags &= ~bit("ACTUATION")
+        self.model.actuator_gainprm[:] = self.model.actuator_biasprm[:] = 0.0
         self.model.geom_contype[:] = self.model.geom_conaffinity[:] = (
             0  # MJX refuses pairs even if there are no contacts
         )
