@@ -12,7 +12,7 @@ from . import GRID, EngineRecord
 from .outside import ReadModel, Unread
 
 ENGINE = EngineRecord(order=65, label="MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp", extra="warp",
-                      reads_file=True, precision="float32")  # fmt: skip
+                      reads_file=True, compiles=True, precision="float32")  # fmt: skip
 METHODS = {"Euler": (1, "semi_implicit_euler"), "implicitfast": (1, "semi_implicit_euler"), "RK4": (4, "rk4")}
 
 
@@ -22,8 +22,6 @@ def methods_for(tree):
 
 
 class Model(ReadModel):
-    is_compiled = True
-
     def __init__(self, file, precision):
         import warp
 
