@@ -31,12 +31,11 @@ DIRECTIONS = {
 LIBRARIES = {
     "mujoco": ("compare.engines.mujoco", "compare.engines.mjx"),
     "mujoco_warp": ("compare.engines.warp",),
-    "warp": ("compare.engines.warp",),
+    "warp": ("compare.engines.newton", "compare.engines.warp"),
     "jax": ("compare.engines.mjx",),
     "heyoka": ("compare.engines.heyoka",),
     "dartpy": ("compare.engines.dart",),
     "newton": ("compare.engines.newton",),
-    "warp": ("compare.engines.newton",),
     "pinocchio": ("compare.engines.pinocchio",),
     "pydrake": ("compare.engines.drake",),
     "pandas": ("compare.report",),
