@@ -14,6 +14,7 @@ from ..process.workers import Clock
 
 OURS = "arm-tmt-mujoco"
 PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka")
+OF_ENGINES = ("drake", "pin", "mujoco-mjx", "jax", "mujoco-warp", "newton", "dartpy")  # named where they are installed
 PROGRAM_FILES = (":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml")  # changes elsewhere do not change the program
 
 
@@ -35,7 +36,7 @@ def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict:
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         OURS: installed(OURS),
-    } | {package: installed(package) for package in PACKAGES}
+    } | {package: found for package in (*PACKAGES, *OF_ENGINES) if (found := installed(package)) or package in PACKAGES}
 
 
 def durations(clock: Clock) -> dict:
