@@ -8,7 +8,7 @@ import numpy as np
 
 from tmt.methods import METHODS
 
-from ...engines import GRID, LABELS, RECORDS, Engine, Method, Setting
+from ...engines import GRID, LABELS, RECORDS, Engine, Method, Motion, Setting
 from ...judge.check import About, Result, closest
 from ...judge.rounding import step_rounding
 from ...judge.run import ORDER_MARGIN
@@ -20,7 +20,7 @@ from ..setup import Setup
 STEP = 2.0**-7  # s: of single steps, a number that float32 has
 STATES = 8  # from which single steps are compared
 FINER = (1, 2, 4, 8, 16, 32, 64)  # steps of the runs, as multiples of GRID or of the scene's own
-SHORT = 0.1  # s: a shorter run is timed once more
+RUNS, SHORT = 5, 0.1  # a run is timed up to 5 times, as long as these take less than 0.1 s together
 LONGEST = 1.0  # s: after a run that takes longer, no finer one is made
 KNOWN = {"mujoco": ("Euler", "RK4"), "tmt": ("rk4", "dopri8_adaptive")}
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
@@ -83,11 +83,7 @@ def follow(result: Result, case: Case, engine: Engine, method: Method, setup: Se
     for setting in settings:
         dynamics = engine.of(case)
         run, read = dynamics.prepare(*case.start, case.tau, setting, method.name)
-        outcome, seconds = timed(run)
-        if seconds < SHORT:  # the first run warms up
-            outcome, seconds = timed(run)
-        motion = read(outcome)
-        seconds = seconds if motion.seconds is None else motion.seconds
+        motion, seconds = fastest(run, read)
         error = truth.error(motion.q, range(len(case.joints)))
         early.append(None if motion.ended or not setting.steps else float(error[truth.t <= EARLY].max()))
         row = {"scene": case.name, "engine": LABELS[engine.name], "method": method.name, "scheme": method.scheme,
@@ -104,9 +100,16 @@ def follow(result: Result, case: Case, engine: Engine, method: Method, setup: Se
     return rows
 
 
-def timed(run: Callable) -> tuple[object, float]:
-    begin = time.perf_counter()
-    return run(), time.perf_counter() - begin
+def fastest(run: Callable, read: Callable) -> tuple[Motion, float]:
+    """The motion of a prepared run, and the least of its times, s: of several runs, unless one takes long."""
+    times = []
+    while len(times) < RUNS and sum(times) < SHORT:
+        begin = time.perf_counter()
+        outcome = run()
+        seconds = time.perf_counter() - begin
+        motion = read(outcome)
+        times.append(seconds if motion.seconds is None else motion.seconds)
+    return motion, min(times)
 
 
 def check_order(result: Result, where: str, method: Method, order: float | None) -> None:
