@@ -11,7 +11,7 @@ from small_runs import of_crane
 @pytest.mark.slow
 def test_all_experiments_pass_and_draw_and_the_report_is_of_this_robot(shared):
     made = shared(of_crane)
-    assert list(made.reasons) == ["published"]
+    assert [name for name in made.reasons if name != "engines"] == ["published"]
     for section in made.sections:
         assert section.name == "diagnosis" or section.result.checks
         assert [str(check) for check in section.result.checks if not check.passed] == []
