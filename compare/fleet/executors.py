@@ -63,9 +63,11 @@ def guarded(function: Callable, arguments: tuple, limit: float, memory: int, pla
         context.set_forkserver_preload([__name__, function.__module__])
     for _ in range(1 + RETRIES):
         with tempfile.TemporaryDirectory(dir=place, ignore_cleanup_errors=True) as folder:
-            pool = ProcessPool(1, max_tasks=1, context=context)
+            pool = ProcessPool(1, context=context)
             try:
-                return pool.schedule(alone, (function, arguments, folder, memory, place), timeout=limit).result()
+                with interrupt.postponed():  # a process that is just being started would complain
+                    future = pool.schedule(alone, (function, arguments, folder, memory, place), timeout=limit)
+                return future.result()
             except TimeoutError:
                 return None, f"time limit of {limit:g} s exceeded"
             except ProcessExpired as error:
