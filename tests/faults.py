@@ -22,7 +22,7 @@ from compare.diagnosis.model import OF_TERM
 from compare.engines.mujoco import reading
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
-from tmt.equations.composite import mass_matrix_and_bias
+from tmt.derivation.composite import mass_matrix_and_bias
 
 ARM6 = Path(__file__).parent / "models" / "arm6.xml"
 SECONDS = 20.0  # of one search: what else the machine does must not change the outcome

@@ -12,7 +12,7 @@ from numpy import ndarray
 from tmt import literal
 from tmt.arm import ARM
 from tmt.compiled.evaluator import SMALL, Evaluator
-from tmt.equations.quantities import QUANTITIES
+from tmt.derivation.quantities import QUANTITIES
 from tmt.model import singular
 from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree

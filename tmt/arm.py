@@ -5,8 +5,8 @@ upper arm points along -z and the forearm along +x. The same numbers stand in mj
 the two models share nothing, and a test ties them.
 """
 
-from tmt.equations.method import joint_frames
-from tmt.equations.vectors import Vector
+from tmt.derivation.method import joint_frames
+from tmt.derivation.vectors import Vector
 from tmt.model.tree import Tree
 
 G = 9.81  # m/s2, along -z

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tmt.arm import ARM
-from tmt.equations.quantities import QUANTITIES, State
+from tmt.derivation.quantities import QUANTITIES, State
 from tmt.model import singular
 from tmt.model.arguments import quantity, states
 

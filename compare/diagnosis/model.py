@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt.equations import method
-from tmt.equations.vectors import ZERO, Vector
+from tmt.derivation import method
+from tmt.derivation.vectors import ZERO, Vector
 
 from ..robots.coordinates import Coordinates
 

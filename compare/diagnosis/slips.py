@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from tmt.equations import method
-from tmt.equations.vectors import Matrix, total_vector
+from tmt.derivation import method
+from tmt.derivation.vectors import Matrix, total_vector
 
 from .cause import Change
 from .model import BODY_TERMS, TINY, Equations

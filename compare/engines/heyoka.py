@@ -8,9 +8,9 @@ import numpy as np
 
 from tmt import Tree
 from tmt.compiled import evaluator
-from tmt.equations import composite
-from tmt.equations.method import acceleration
-from tmt.equations.vectors import arctan, cos, sin, sqrt
+from tmt.derivation import composite
+from tmt.derivation.method import acceleration
+from tmt.derivation.vectors import arctan, cos, sin, sqrt
 
 from ..robots.case import Case
 from . import Engine, EngineRecord, Method, Motion, Prepared, as_far_as_it_goes

@@ -8,7 +8,7 @@ import numpy as np
 import tmt
 from tmt import literal
 from tmt.compiled import prepared
-from tmt.equations.quantities import QUANTITIES
+from tmt.derivation.quantities import QUANTITIES
 from tmt.methods import method_named
 from tmt.simulation import reasons
 

@@ -4,8 +4,8 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.equations import method
-from tmt.equations.dual import seeded
+from tmt.derivation import method
+from tmt.derivation.dual import seeded
 
 from ..engines import WHOSE
 from ..judge.check import Result

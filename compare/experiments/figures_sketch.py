@@ -5,7 +5,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tmt import literal
-from tmt.equations import method
+from tmt.derivation import method
 
 from ..judge.finding import Finding
 from ..report.style import BLUE, GREEN, GREY, RED, WIDTH, file_name, joint_lines, plain

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 import tmt
 from tmt import literal
-from tmt.equations import method
+from tmt.derivation import method
 from tmt.literal import gather
 
 EPS = float(np.finfo(float).eps)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tmt import Tree
-from tmt.equations.composite import mass_matrix_and_bias
+from tmt.derivation.composite import mass_matrix_and_bias
 from tmt.model import coordinates
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.equations.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
+from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
 from tmt.model.tree import GAINS
 
 from . import Robot

@@ -4,7 +4,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tmt.equations.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
+from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
 from tmt.exact.values import exact
 
 from ..judge.finding import Finding

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from tmt import literal
-from tmt.equations import method
+from tmt.derivation import method
 
 from . import Robot
 from .coordinates import free_joints

@@ -7,7 +7,7 @@ from functools import cached_property, partial
 import numpy as np
 
 import tmt
-from tmt.equations.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
+from tmt.derivation.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 from tmt.methods import by_speed, lone_speeds
 
 from ..robots.actuators import Rows

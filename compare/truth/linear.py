@@ -8,8 +8,8 @@ from scipy.linalg import eig
 
 import tmt
 from tmt import METHODS, literal
-from tmt.equations import composite, method
-from tmt.equations.dual import seeded
+from tmt.derivation import composite, method
+from tmt.derivation.dual import seeded
 
 from ..robots.case import SEED, Case
 from ..robots.coordinates import floats

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt.equations import method
-from tmt.equations.dual import seeded
+from tmt.derivation import method
+from tmt.derivation.dual import seeded
 from tmt.methods import by_speed
 
 

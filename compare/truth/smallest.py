@@ -16,8 +16,8 @@ import numpy as np
 
 import tmt
 from tmt.compiled.trace import Tape
-from tmt.equations import method
-from tmt.equations.vectors import solve
+from tmt.derivation import method
+from tmt.derivation.vectors import solve
 from tmt.exact.tree import exact_tree
 from tmt.exact.values import DIGITS
 

@@ -156,7 +156,9 @@ def test_the_key_ctrl_c(temporary, tmp_path):
 def test_a_signal_and_the_same_command_again(temporary, tmp_path, number):
     def cached():
         paths = (tmp_path / "out" / "files").rglob(".fleet")
-        return {path: path.stat().st_mtime_ns for path in paths if path.parent.suffix != ".part"}  # not yet in its place
+        return {
+            path: path.stat().st_mtime_ns for path in paths if path.parent.suffix != ".part"
+        }  # not yet in its place
 
     run = runs.started(*runs.command(*WORDS), cwd=tmp_path)
     assert soon(cached)

@@ -14,7 +14,7 @@ from trees import random_states, small_tree, wrist
 import tmt
 from tmt import answers, literal
 from tmt.compiled import cores
-from tmt.equations.quantities import QUANTITIES
+from tmt.derivation.quantities import QUANTITIES
 from tmt.exact.values import FIELDS, distance, exact
 
 EPS = np.finfo(float).eps

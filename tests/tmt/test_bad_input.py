@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 
 import tmt
 from tmt.compiled import evaluator, runner
-from tmt.equations.quantities import QUANTITIES
+from tmt.derivation.quantities import QUANTITIES
 from tmt.methods import METHODS
 
 REST = np.zeros(3)

@@ -17,9 +17,9 @@ from tmt.compiled.evaluator import TERMS
 from tmt.compiled.ir import POINTER, Code, module
 from tmt.compiled.sine import LIMIT
 from tmt.compiled.straight import functions, trace
-from tmt.equations import composite, method
-from tmt.equations.dual import jacobian
-from tmt.equations.vectors import cos, sin
+from tmt.derivation import composite, method
+from tmt.derivation.dual import jacobian
+from tmt.derivation.vectors import cos, sin
 from tmt.methods import METHODS
 
 EPS = np.finfo(float).eps

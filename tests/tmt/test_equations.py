@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from trees import random_state, small_tree, tree_of_kinds
 
 import tmt
-from tmt.equations import articulated, composite, method
+from tmt.derivation import articulated, composite, method
 from tmt.exact.values import distance, exact
 
 EPS = np.finfo(float).eps

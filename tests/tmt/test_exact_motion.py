@@ -11,8 +11,8 @@ from trees import exact_swing, random_state, small_tree, tree_of_kinds
 
 import tmt
 from compare.engines.mujoco import read
-from tmt.equations import composite
-from tmt.equations.method import acceleration
+from tmt.derivation import composite
+from tmt.derivation.method import acceleration
 from tmt.exact import motion as reference_run
 from tmt.exact.motion import trajectory, truth
 from tmt.exact.tree import exact_tree, of_length_1

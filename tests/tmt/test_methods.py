@@ -10,7 +10,7 @@ from trees import random_state, random_states, small_tree, tree_of_kinds
 
 import tmt
 from tmt.compiled import runner
-from tmt.equations import method
+from tmt.derivation import method
 from tmt.exact.motion import trajectory
 from tmt.methods import METHODS, amplification, derivatives, dop853, one_step
 

@@ -7,7 +7,7 @@ import pytest
 
 import tmt
 from tmt.compiled import forms
-from tmt.equations import method
+from tmt.derivation import method
 from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler, amplification, derivatives, method_named, one_step
 from tmt.methods.stepping import FIELDS, Method, advance
 

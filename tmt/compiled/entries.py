@@ -6,7 +6,7 @@ of length 1. rows(q, qd, tau, out, count, of_q, of_qd, of_tau): states one after
 same state so often, each time after the last.
 """
 
-from tmt.equations.quantities import QUANTITIES
+from tmt.derivation.quantities import QUANTITIES
 from tmt.model.lock import CLOSE_TO_ONE
 
 from . import forms, linear

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from tmt.equations.quantities import QUANTITIES, shape_of
+from tmt.derivation.quantities import QUANTITIES, shape_of
 from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree
 from tmt.model.values import shown

@@ -7,9 +7,9 @@ beyond, those in the axes of the world (articulated.py), whose number grows with
 from collections.abc import Callable
 from functools import lru_cache, partial
 
-from tmt.equations import articulated, composite
-from tmt.equations.dual import seeded
-from tmt.equations.quantities import QUANTITIES, State
+from tmt.derivation import articulated, composite
+from tmt.derivation.dual import seeded
+from tmt.derivation.quantities import QUANTITIES, State
 from tmt.methods.stepping import Completed, Method
 from tmt.model.values import shown
 

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable
 from numbers import Real
 
-from tmt.equations.vectors import arctan, cos, sin, sqrt
+from tmt.derivation.vectors import arctan, cos, sin, sqrt
 
 FOLD = {
     "+": operator.add,

@@ -14,7 +14,7 @@ import mpmath
 import numpy as np
 
 from tmt.compiled.trace import Tape
-from tmt.equations import composite, method
+from tmt.derivation import composite, method
 from tmt.exact import series
 from tmt.exact.pairs import pair
 from tmt.exact.tree import exact_tree, of_length_1

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import mpmath
 
-from tmt.equations.vectors import Vector, sqrt
+from tmt.derivation.vectors import Vector, sqrt
 from tmt.model.coordinates import Coordinates, normalized
 from tmt.model.tree import Tree
 

@@ -5,7 +5,7 @@ from collections import namedtuple
 import mpmath
 import numpy as np
 
-from tmt.equations.quantities import QUANTITIES, State
+from tmt.derivation.quantities import QUANTITIES, State
 from tmt.exact.tree import exact_tree
 
 DIGITS = 50

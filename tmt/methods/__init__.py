@@ -6,7 +6,7 @@ code, see tmt.compiled). METHODS may be given further ones, and objects of a use
 
 from dataclasses import dataclass, field
 
-from tmt.equations.method import mass_matrix_and_bias, reduced_force
+from tmt.derivation.method import mass_matrix_and_bias, reduced_force
 from tmt.methods import dop853
 from tmt.methods.derivatives import amplification as amplification
 from tmt.methods.derivatives import one_step as one_step

@@ -6,8 +6,8 @@ a, with A = dresidual/da. Then dual numbers need not go through the solution, no
 
 import numpy as np
 
-from tmt.equations import composite
-from tmt.equations.dual import Dual, seeded
+from tmt.derivation import composite
+from tmt.derivation.dual import Dual, seeded
 from tmt.methods.stepping import Completed, stepped
 
 FEW_SPEEDS = 4  # up to which dual numbers go through the solution of the linear system too

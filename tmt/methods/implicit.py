@@ -13,8 +13,8 @@ from functools import partial
 
 import numpy as np
 
-from tmt.equations.dual import Dual, jacobian, seeded, unit_vectors
-from tmt.equations.vectors import solve_any
+from tmt.derivation.dual import Dual, jacobian, seeded, unit_vectors
+from tmt.derivation.vectors import solve_any
 from tmt.methods.stepping import Method, checked_sums, checked_tableau
 from tmt.model.coordinates import FLAT, normalized, product
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from functools import lru_cache
 
-from tmt.equations import articulated
-from tmt.equations.method import bias_rates, mass_matrix_and_bias, reduced_force
-from tmt.equations.vectors import solve_any
+from tmt.derivation import articulated
+from tmt.derivation.method import bias_rates, mass_matrix_and_bias, reduced_force
+from tmt.derivation.vectors import solve_any
 from tmt.methods.stepping import Method, advance, increments, left_over
 from tmt.model.coordinates import FLAT
 

@@ -8,8 +8,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from tmt.equations import articulated
-from tmt.equations.method import acceleration, mass_matrix_and_bias, reduced_force
+from tmt.derivation import articulated
+from tmt.derivation.method import acceleration, mass_matrix_and_bias, reduced_force
 from tmt.model.values import real_numbers, shown
 
 

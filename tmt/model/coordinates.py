@@ -12,7 +12,7 @@ with the body: omega + u x omega / 2 + c u x (u x omega), c = (1 - (s / 2) cot(s
 from functools import lru_cache
 from typing import NamedTuple
 
-from tmt.equations.vectors import Vector, arctan, cos, sin, sqrt
+from tmt.derivation.vectors import Vector, arctan, cos, sin, sqrt
 
 KINDS = {"hinge": (1, 1), "slide": (1, 1), "ball": (4, 3)}  # how many numbers of q and of qd
 TINY = 1e-300  # under a root: its own square root is far below any rounding, and no direction is undefined

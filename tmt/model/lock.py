@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tmt.equations.vectors import IDENTITY, ZERO, Matrix, Vector, rotation, turn_of
+from tmt.derivation.vectors import IDENTITY, ZERO, Matrix, Vector, rotation, turn_of
 from tmt.model.values import numbers_of, shown
 
 CLOSE_TO_ONE = 1e-6  # how far the length of a quaternion may be from 1

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tmt.equations import method
+from tmt.derivation import method
 
 ZERO_BELOW = 64 * np.finfo(float).eps  # an eigenvalue of the scaled Mbar, for each hinge
 CLEAR = 1e-6  # a share of the inertia that is carried, far above rounding

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import mpmath
 
-from tmt.equations.vectors import IDENTITY, ZERO, Matrix, Vector, rotation, total_vector, turn_of
+from tmt.derivation.vectors import IDENTITY, ZERO, Matrix, Vector, rotation, total_vector, turn_of
 
 
 class Distribution(NamedTuple):

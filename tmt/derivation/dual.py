@@ -7,7 +7,7 @@ a number of another level is a constant to it.
 
 from itertools import count
 
-from tmt.equations.vectors import arctan, cos, sin, sqrt
+from tmt.derivation.vectors import arctan, cos, sin, sqrt
 
 levels = count()
 

@@ -21,8 +21,8 @@ of them, qd and tau of nv. Vectors are in the inertial frame unless they are sai
 
 from typing import NamedTuple
 
-from tmt.equations.dual import jacobian
-from tmt.equations.vectors import IDENTITY, ZERO, Matrix, Vector, rotation, solve, total, total_vector, turn_of
+from tmt.derivation.dual import jacobian
+from tmt.derivation.vectors import IDENTITY, ZERO, Matrix, Vector, rotation, solve, total, total_vector, turn_of
 
 
 class Frame(NamedTuple):
