@@ -39,6 +39,8 @@ The functions of states answer the first few hundred with NumPy (literal.py), an
 disk, see compiled/store.py. Without MuJoCo, `pip install numpy llvmlite mpmath && pip install --no-deps .` is enough.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -51,7 +53,7 @@ from tmt.simulation import Motion, simulate
 
 __all__ = [
     "ARM", "METHODS", "Motion", "Tree", "acceleration", "angular_velocities", "bias", "com_positions", "convective_terms",
-    "energy", "gravity_balance", "jacobians", "mass_matrix", "potential_energy", "prepare", "simulate", "spring_torque",
+    "energy", "equations", "gravity_balance", "jacobians", "mass_matrix", "potential_energy", "prepare", "simulate", "spring_torque",
 ]  # fmt: skip
 
 
@@ -184,3 +186,28 @@ def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     -9.3121
     """
     return _answered("energy", model, q, qd)
+
+
+def equations(
+    model: Tree = ARM,
+    language: str = "c",
+    quantities: Sequence[str] = ("mass_matrix", "bias", "acceleration"),
+    *,
+    name: str = "robot",
+    single: bool = False,
+    head: Sequence[str] = ("Not checked: compare with the model before use.",),
+) -> str:
+    """The equations of a model as text in another language, with the model's numbers, for use without this package.
+
+    language: "c" (C99 with math.h alone, no allocation) and "c header"; "python" (NumPy alone, any batch); "matlab" (and Octave,
+    one file, states as columns); "latex", "html" and "sympy": simplified, with a symbol for each parameter, for some six hinges
+    and slides (needs SymPy). quantities: functions of this package of those names; units, signs and shapes are theirs; with
+    symbols: mass_matrix, bias, gravity_balance. name: of the file, which begins the names of C functions. single: float in C.
+    head: lines that begin the comment at its head. Raises ValueError for anything else.
+
+    >>> print(tmt.equations(language="python", quantities=["gravity_balance"]).splitlines()[-1].strip())
+    return out.reshape(*batch, 3)
+    """
+    from tmt.export import text  # loads the compiler
+
+    return text(model, language, quantities, name, single, head)

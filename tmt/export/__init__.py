@@ -1,0 +1,104 @@
+"""The equations of a Tree as text in another language; see `tmt.equations`."""
+
+import hashlib
+import keyword
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from tmt.compiled import forms
+from tmt.compiled.straight import Traced
+from tmt.derivation.quantities import QUANTITIES
+from tmt.model.arguments import checked_model
+from tmt.model.tree import Tree
+from tmt.model.values import shown
+
+from . import c, matlab, python
+
+LANGUAGES = {"c": c.source, "c header": c.header, "python": python.source, "matlab": matlab.source}
+SYMBOLIC = {"latex": "latex", "html": "page", "sympy": "python_source"}  # functions of symbols.py
+OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
+UNITS = {"hinge": "rad, rad/s, N m", "slide": "m, m/s, N", "ball": "quaternion w x y z, rad/s in its own axes, N m"}
+WORDS = frozenset(  # of C, C++ and MATLAB, in which a file of that name could not be used
+    """auto bool break case catch char class const continue default delete do double else elseif end enum extern float for
+    friend function global goto if inline int long namespace new operator otherwise parfor persistent private public register
+    restrict return short signed sizeof spmd static struct switch template this throw try typedef typename union unsigned using
+    virtual void volatile while main sin cos sqrt atan solve""".split()
+)
+
+
+class Function(NamedTuple):
+    """A quantity that is written as a function."""
+
+    name: str
+    title: str  # what it returns, with units
+    takes: tuple  # of "q", "qd", "tau"
+    sizes: tuple  # of these
+    shape: tuple  # of a result
+    results: tuple  # names of the results
+    traced: Traced
+
+    @property
+    def inputs(self) -> list[tuple[str, int]]:
+        """The name and the place of each number that is taken, in the order of the traced inputs."""
+        return [(name, k) for name, size in zip(("q", "qd", "tau"), self.sizes) for k in range(size)]
+
+
+def text(model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str]) -> str:
+    """See `tmt.equations`."""
+    checked_model(model)
+    known = [*LANGUAGES, *SYMBOLIC]
+    if language not in known:
+        raise ValueError(f"language is {shown(language)}; expected one of {', '.join(known)}")
+    quantities = (quantities,) if isinstance(quantities, str) else tuple(quantities)
+    choices = OF_SYMBOLS if language in SYMBOLIC else tuple(QUANTITIES)
+    if wrong := [quantity for quantity in quantities if quantity not in choices] or [()][: not quantities]:
+        raise ValueError(f"quantity is {shown(wrong[0])}; expected some of {', '.join(choices)}")
+    if not (isinstance(name, str) and name.isidentifier() and name.isascii()) or is_word(name):
+        raise ValueError(f"name is {shown(name)}; expected an identifier that is no word of C, Python or MATLAB")
+    if single and not language.startswith("c"):
+        raise ValueError(f"single precision is written in C only, not in {language}")
+    lines = [*head, "", *conventions(model)]
+    if language in SYMBOLIC:
+        from . import symbols  # SymPy takes long
+
+        return getattr(symbols, SYMBOLIC[language])(symbols.symbolic(model, quantities), lines)
+    functions = [function_of(model, quantity) for quantity in dict.fromkeys(quantities)]
+    return LANGUAGES[language](name, lines, functions, *[single] * language.startswith("c"))
+
+
+def is_word(name: str) -> bool:
+    return keyword.iskeyword(name) or name in WORDS
+
+
+def conventions(model: Tree) -> list[str]:
+    """Equation, joints and units in words."""
+    lines = [
+        "M(q) qdd + h(q, qd) = tau - damping qd - stiffness (q - rest), by the TMT method.",
+        "M: mass_matrix, with armature; h: bias, MuJoCo's qfrc_bias: Coriolis, centrifugal and gravity terms.",
+        "Vectors are in the inertial frame, those of a body or a ball in its own axes. SI units, angles in rad.",
+        f"Numbers of the model: sha256 {digest(model)}.",
+        "Joint, kind, place in q, place in qd and tau (from 0); units of q, qd, tau:",
+    ]
+    for name, (kind, at, by) in zip(model.hinge_names, model.coordinates.joints):
+        places = [f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}" for part in (at, by)]
+        lines.append(f"  {name}, {kind}, {', '.join(places)}; {UNITS[kind]}")
+    return lines
+
+
+def digest(model: Tree) -> str:
+    """The first digits of a hash of a Tree's names and numbers."""
+    return hashlib.sha256(repr(model).encode()).hexdigest()[:16]
+
+
+def function_of(model: Tree, quantity: str) -> Function:
+    import tmt  # for the docstring
+
+    of, nv = QUANTITIES[quantity], model.coordinates.nv
+    sizes = {"m": len(model.mass), "nv": nv}
+    shape = tuple(sizes.get(size, size) for size in of.shape)
+    title = getattr(tmt, quantity).__doc__.splitlines()[0]
+    taken = (model.coordinates.nq, nv, nv)
+    results = of.parts or ("out",)
+    return Function(
+        quantity, title, of.takes, taken, shape[1:] if of.parts else shape, results, forms.quantity(model, quantity)
+    )
