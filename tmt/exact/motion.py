@@ -49,10 +49,10 @@ class Path(NamedTuple):
 
 
 class Equations(NamedTuple):
-    """Those of one tree under one torque, as series.py reads them."""
+    """Operations and numbers as series.py reads them."""
 
     code: np.ndarray  # (operations, 4)
-    numbers: np.ndarray  # (2, numbers), in the rows after the state
+    numbers: np.ndarray  # (2, numbers), in the rows after the inputs
     rows: int
 
 
@@ -129,28 +129,33 @@ def equations(tree, tau, form: str) -> Equations:
         exact = exact_tree(tree, mpmath.mpf)
         qdd = method.acceleration(exact, q, qd, [mpmath.mpf(float(v)) for v in tau], FORMS[form])
         rates = [tape.lift(rate) for rate in (*coordinates.component_rates(q, qd), *qdd)]
+        found, row = program(tape, (*q, *qd), rates)
+        more = [(series.RATE, k, row[rate.i], 0) for k, rate in enumerate(rates)]
+    return found._replace(code=np.array([*found.code, *more]))
 
-        order, is_number = tape.needed(rates), lambda i: tape.nodes[i][0] == "number"
-        row = {x.i: k for k, x in enumerate((*q, *qd))}
-        constant = [i for i in order if is_number(i)]
-        row |= {i: k for k, i in enumerate(constant, start=len(row))}
-        code, rows = [], len(row)
-        for i in order:
-            operation, arguments = tape.nodes[i]
-            if operation == "item":
-                row[i] = row[arguments[0]] + 1 + arguments[1]
-            elif i not in row:
-                if operation == "*":  # by a number, if it is one of the two: then the second
-                    arguments = sorted(arguments, key=is_number)
-                a, b = row[arguments[0]], row[arguments[-1]]
-                made = [series.SLOPE, series.SINE, series.COSINE]
-                if operation != "sincos":
-                    made = [series.SCALE if operation == "*" and is_number(arguments[1]) else OPERATIONS[operation]]
-                code += [(act, rows + k, a, b) for k, act in enumerate(made)]
-                row[i], rows = rows, rows + len(made)
-        numbers = np.array([pair(tape.nodes[i][1][0]) for i in constant]).reshape(-1, 2)
-        code += [(series.RATE, k, row[rate.i], 0) for k, rate in enumerate(rates)]
-    return Equations(np.array(code), numbers.T.copy(), rows)
+
+def program(tape: Tape, inputs, results) -> tuple[Equations, dict[int, int]]:
+    """The operations that make results of inputs, which stand in the first rows; and the row of each node of the tape."""
+    order, is_number = tape.needed(results), lambda i: tape.nodes[i][0] == "number"
+    row = {x.i: k for k, x in enumerate(inputs)}
+    constant = [i for i in order if is_number(i)]
+    row |= {i: k for k, i in enumerate(constant, start=len(row))}
+    code, rows = [], len(row)
+    for i in order:
+        operation, arguments = tape.nodes[i]
+        if operation == "item":
+            row[i] = row[arguments[0]] + 1 + arguments[1]
+        elif i not in row:
+            if operation == "*":  # by a number, if it is one of the two: then the second
+                arguments = sorted(arguments, key=is_number)
+            a, b = row[arguments[0]], row[arguments[-1]]
+            made = [series.SLOPE, series.SINE, series.COSINE]
+            if operation != "sincos":
+                made = [series.SCALE if operation == "*" and is_number(arguments[1]) else OPERATIONS[operation]]
+            code += [(act, rows + k, a, b) for k, act in enumerate(made)]
+            row[i], rows = rows, rows + len(made)
+    numbers = np.array([pair(tape.nodes[i][1][0]) for i in constant]).reshape(-1, 2)
+    return Equations(np.array(code, dtype=np.int64).reshape(-1, 4), numbers.T.copy(), rows), row
 
 
 def first_state(coordinates, q, qd) -> np.ndarray:
