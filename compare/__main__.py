@@ -16,7 +16,7 @@ if __name__ == "__main__":
 import shlex
 import sys
 
-from .cli.command_line import FLEET, request
+from .cli.command_line import EQUATIONS, FLEET, request
 from .process.crash import Refused, described
 
 
@@ -36,6 +36,10 @@ def status_of(arguments: Sequence[str]) -> int:
         from .fleet.command import fleet_status
 
         return fleet_status(arguments[1:])
+    if arguments[:1] == [EQUATIONS]:
+        from .export.command import equations_status
+
+        return equations_status(arguments[1:], shlex.join(["python", "-m", "compare", *arguments]))
     options = request(arguments)
     if options.version:
         from .report.provenance import OURS, installed

@@ -25,11 +25,12 @@ DIRECTIONS = {
     "run": "tmt robots engines judge process report experiments",
     "cli": "experiments process report",
     "fleet": "tmt robots engines judge process report experiments run cli",
-    "__main__": "tmt robots engines judge process report experiments run cli fleet",
+    "export": "tmt robots engines judge process report experiments run cli",
+    "__main__": "tmt robots engines judge process report experiments run cli fleet export",
 }
 # the modules, or beginnings of their names, that may import a library
 LIBRARIES = {
-    "mujoco": ("compare.engines.mujoco", "compare.engines.mjx"),
+    "mujoco": ("compare.engines.mujoco", "compare.engines.mjx", "compare.export.checks"),
     "mujoco_warp": ("compare.engines.warp",),
     "warp": ("compare.engines.newton", "compare.engines.warp"),
     "jax": ("compare.engines.mjx",),

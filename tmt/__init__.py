@@ -53,7 +53,8 @@ from tmt.simulation import Motion, simulate
 
 __all__ = [
     "ARM", "METHODS", "Motion", "Tree", "acceleration", "angular_velocities", "bias", "com_positions", "convective_terms",
-    "energy", "equations", "gravity_balance", "jacobians", "mass_matrix", "potential_energy", "prepare", "simulate", "spring_torque",
+    "energy", "equations",
+    "gravity_balance", "jacobians", "mass_matrix", "potential_energy", "prepare", "simulate", "spring_torque",
 ]  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from ..experiments import EXPERIMENTS
 from ..process.streams import PROGRAM, in_one_line
 from ..report.text import block
 
-FLEET = "fleet"  # the command for many files
+FLEET, EQUATIONS = "fleet", "equations"  # further commands, with options of their own
 LINE_WIDTH = 80
 TEXT = "command_line"  # the template
 EXAMPLES = block(TEXT, "examples")
@@ -151,10 +151,10 @@ def refuse_words(whole: Parser, options: argparse.Namespace, unknown: Sequence[s
             whole.refuse_option(word, list(OPTIONS))
     if name is None and not (options.help or options.version):
         whole.error(f"expected an experiment: {choices}, as in {PROGRAM} all {given}")
-    if name == FLEET:
-        whole.error(f"{FLEET} must come first, before its options, as in {PROGRAM} {FLEET} models")
+    if name in (FLEET, EQUATIONS):
+        whole.error(f"{name} must come first, before its options, as in {PROGRAM} {name} --help")
     if name not in (None, "all", *EXPERIMENTS):
-        words = {word: word for word in (*EXPERIMENTS, "all", FLEET)} | {"help": "--help"}
+        words = {word: word for word in (*EXPERIMENTS, "all", FLEET, EQUATIONS)} | {"help": "--help"}
         whole.error(f"{name!r} is not an experiment; {expected(name, words, choices)}")
     if unknown:
         whole.error(f"unexpected argument {unknown[0]!r}: expected one experiment, or all")

@@ -40,6 +40,7 @@ QUANTITIES = {
     "w_conv": Quantity("convective_terms", ("q", "qd"), ("rad/s2",), "w_conv", "w_conv", 1),
     "Mbar": Quantity("mass_matrix", ("q",), ("kg m2", "kg", "kg m"), "mass_matrix", "mass_matrix"),
     "holding torque": Quantity("gravity_balance", ("q",), ("N m", "N"), "weight", "gravity_balance"),
+    "spring torque": Quantity("spring_torque", ("q",), ("N m", "N"), "springs", "spring_torque"),
     "bias": Quantity("bias", ("q", "qd"), ("N m", "N"), "bias", "bias"),
     "qdd": Quantity("acceleration", ("q", "qd", "tau"), ("rad/s2", "m/s2"), "acceleration", "acceleration"),
     "energy": Quantity("energy", ("q", "qd"), ("J",), "energy", "energy"),

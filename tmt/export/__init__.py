@@ -18,12 +18,10 @@ LANGUAGES = {"c": c.source, "c header": c.header, "python": python.source, "matl
 SYMBOLIC = {"latex": "latex", "html": "page", "sympy": "python_source"}  # functions of symbols.py
 OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
 UNITS = {"hinge": "rad, rad/s, N m", "slide": "m, m/s, N", "ball": "quaternion w x y z, rad/s in its own axes, N m"}
-WORDS = frozenset(  # of C, C++ and MATLAB, in which a file of that name could not be used
-    """auto bool break case catch char class const continue default delete do double else elseif end enum extern float for
-    friend function global goto if inline int long namespace new operator otherwise parfor persistent private public register
-    restrict return short signed sizeof spmd static struct switch template this throw try typedef typename union unsigned using
-    virtual void volatile while main sin cos sqrt atan solve""".split()
-)
+WORDS = """auto bool break case catch char class const continue default delete do double else elseif end enum extern float for
+friend function global goto if inline int long namespace new operator otherwise parfor persistent private public register restrict
+return short signed sizeof spmd static struct switch template this throw try typedef typename union unsigned using virtual void
+volatile while main solve arrays"""  # of C, C++ and MATLAB, and what the files have: names that a file could not have
 
 
 class Function(NamedTuple):
@@ -53,8 +51,10 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
     choices = OF_SYMBOLS if language in SYMBOLIC else tuple(QUANTITIES)
     if wrong := [quantity for quantity in quantities if quantity not in choices] or [()][: not quantities]:
         raise ValueError(f"quantity is {shown(wrong[0])}; expected some of {', '.join(choices)}")
-    if not (isinstance(name, str) and name.isidentifier() and name.isascii()) or is_word(name):
-        raise ValueError(f"name is {shown(name)}; expected an identifier that is no word of C, Python or MATLAB")
+    if not (isinstance(name, str) and name.isidentifier() and name.isascii() and name[0].isalpha()) or is_word(name):
+        raise ValueError(
+            f"name is {shown(name)}; expected an identifier, no word of C, Python or MATLAB and no quantity"
+        )
     if single and not language.startswith("c"):
         raise ValueError(f"single precision is written in C only, not in {language}")
     lines = [*head, "", *conventions(model)]
@@ -67,7 +67,7 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
 
 
 def is_word(name: str) -> bool:
-    return keyword.iskeyword(name) or name in WORDS
+    return keyword.iskeyword(name) or name in WORDS.split() or name in QUANTITIES
 
 
 def conventions(model: Tree) -> list[str]:
@@ -80,7 +80,9 @@ def conventions(model: Tree) -> list[str]:
         "Joint, kind, place in q, place in qd and tau (from 0); units of q, qd, tau:",
     ]
     for name, (kind, at, by) in zip(model.hinge_names, model.coordinates.joints):
-        places = [f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}" for part in (at, by)]
+        places = [
+            f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}" for part in (at, by)
+        ]
         lines.append(f"  {name}, {kind}, {', '.join(places)}; {UNITS[kind]}")
     return lines
 

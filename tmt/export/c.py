@@ -1,13 +1,19 @@
 """Functions in C99: a source file that needs math.h alone, and its header."""
 
+import math
 from collections.abc import Sequence
 from math import prod
 
 from .statements import Assignment, Syntax, Writer
 
 DOUBLE = Syntax()
-SINGLE = Syntax(number=lambda value: f"{value!r}f", sqrt="sqrtf", arctan="atanf")
-SOLVE = """/* The solution of n equations in place of the right-hand side, by L U without pivots; a: n rows of n, then the right-hand side. */
+LEAST = 1.2e-38  # of floats: what keeps a root from zero must not become zero
+SINGLE = Syntax(
+    number=lambda value: f"{math.copysign(max(abs(value), LEAST), value) if value else 0.0!r}f",
+    sqrt="sqrtf",
+    arctan="atanf",
+)
+SOLVE = """/* The solution of n equations, by L U without pivots, in place of the right-hand side, after the n x n numbers. */
 static void solve(int n, {kind} *a)
 {{
     {kind} *b = a + n * n;

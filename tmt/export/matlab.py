@@ -21,13 +21,19 @@ def source(name: str, head: Sequence[str], functions: Sequence) -> str:
     """The file: a function that is called with the name of a quantity."""
     lines = [f"function varargout = {name}(quantity, varargin)"]
     lines += [f"% {line}".rstrip() for line in head]
-    lines += ["%", "% States are columns: q (nq, N), qd and tau (nv, N). The last dimension of each result is that of the states."]
+    lines += [
+        "%",
+        "% States are columns: q (nq, N), qd and tau (nv, N). The last dimension of each result is that of the states.",
+    ]
     for function in functions:
         call = f"{name}('{function.name}', {', '.join(function.takes)})"
         lines += [f"% [{', '.join(function.results)}] = {call}", f"%   {function.title}"]
     lines.append("  switch quantity")
     for function in functions:
-        lines += [f"    case '{function.name}'", f"      [varargout{{1:{len(function.results)}}}] = {function.name}(varargin{{:}});"]
+        lines += [
+            f"    case '{function.name}'",
+            f"      [varargout{{1:{len(function.results)}}}] = {function.name}(varargin{{:}});",
+        ]
     lines += ["    otherwise", "      error('unknown quantity %s', quantity);", "  end", "end"]
     texts = [text(function) for function in functions]
     solve = SOLVE if any(" = solve(" in text for text in texts) else ""

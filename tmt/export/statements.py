@@ -23,7 +23,7 @@ class Syntax:
 
 
 class Assignment(NamedTuple):
-    """Values by their names: one "value" of an expression, the "sincos" of an angle, or the solution ("solve") of a linear system.
+    """Values by their names: the "value" of an expression, the "sincos" of an angle, or the solution of a linear system, "solve".
 
     expressions of a linear system: its n rows of n numbers, then the right-hand side.
     """

@@ -87,6 +87,10 @@ class MujocoDynamics:
         """N m, (..., nv): qfrc_bias at rest."""
         return self.bias(q, 0.0)
 
+    def spring_torque(self, q) -> np.ndarray:
+        """N m, (..., nv): -qfrc_spring."""
+        return self._each(lambda d: -d.qfrc_spring[self.dofs], q)
+
     def acceleration(self, q, v, tau) -> np.ndarray:
         """a, rad/s2, (..., nv): qacc."""
         return self._each(lambda d: d.qacc[self.dofs], q, v, self.applied(tau))

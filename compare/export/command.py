@@ -1,0 +1,134 @@
+"""The command: write the equations, run what was written, compare, and say the outcome in the files and on the terminal."""
+
+import argparse
+import hashlib
+import re
+import time
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import tmt
+
+from ..cli.command_line import EQUATIONS, PROGRAM, Option, Parser, expected
+from ..process.crash import Refused
+from ..report.terminal import Terminal
+from ..report.text import block
+
+FILES = {  # of each language: the endings of the files, and what tmt.equations calls their languages
+    "c": {".c": "c", ".h": "c header"},
+    "python": {".py": "python"},
+    "matlab": {".m": "matlab"},
+    "latex": {".tex": "latex", ".html": "html", ".py": "sympy"},
+}
+QUANTITIES = {"latex": "mass_matrix,bias,gravity_balance"}
+OF_MOST = "mass_matrix,bias,acceleration"
+STATES = 1000
+OPTIONS = {
+    "--to": Option(metavar="LANGUAGE", default="c"),
+    "--mjcf": Option(metavar="FILE"),
+    "--quantity": Option(metavar="LIST"),
+    "--name": Option(metavar="NAME"),
+    "--float": Option(None),
+    "--out": Option(metavar="DIR"),
+}
+
+
+def equations_parser() -> Parser:
+    made = Parser(
+        prog=f"{PROGRAM} {EQUATIONS}", usage=f"{PROGRAM} {EQUATIONS} --out DIR [options]",
+        description=block("export", "help"), epilog=block("export", "examples") + "\n",
+        formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False,
+    )  # fmt: skip
+    for name, option in OPTIONS.items():
+        made.add_option(name, option, "export")
+    made.add_argument("-h", "--help", action="store_true", help="this text")
+    return made
+
+
+def equations_status(arguments: Sequence[str], command: str) -> int:
+    """Run the command; the exit status. SystemExit for help and wrong arguments. Refused: it cannot be carried out."""
+    made = equations_parser()
+    options, unknown = made.parse_known_args(arguments)
+    if options.help:
+        made.print_help()
+        raise SystemExit(0)
+    if unknown and unknown[0].startswith("-"):
+        made.refuse_option(unknown[0], [*OPTIONS, "--help"])
+    if unknown:
+        made.error(f"unexpected argument {unknown[0]!r}")
+    if options.to not in FILES:
+        made.error(
+            f"--to: {options.to!r} is not a language; {expected(options.to, dict(zip(FILES, FILES)), ', '.join(FILES))}"
+        )
+    if not options.out:
+        made.error("expected a new folder: --out DIR")
+    if Path(options.out).exists():
+        made.error(f"--out: {options.out} exists; expected the name of a new folder")
+    return write_equations(options, command)
+
+
+def write_equations(options: argparse.Namespace, command: str) -> int:
+    """Write and check the files; the exit status."""
+    started, terminal = time.perf_counter(), Terminal()
+    from ..engines.mujoco import ModelError  # imports are slow
+    from ..run.reference import compared_with
+    from . import checks, programs
+
+    try:
+        compared = compared_with("model" if options.mjcf else None, options.mjcf)
+    except ModelError as error:
+        raise Refused(error) from None
+    robot, name = compared.robot, options.name or identifier(Path(options.mjcf or "arm").stem)
+    for line in compared.reference.lines if options.mjcf else ():
+        terminal.say(line)
+    quantities = (options.quantity or QUANTITIES.get(options.to, OF_MOST)).replace(" ", "").split(",")
+
+    def written(*head: str) -> dict[str, str]:
+        try:
+            return {
+                f"{name}{ending}": tmt.equations(
+                    robot.tree, language, quantities, name=name, single=options.float, head=head
+                )
+                for ending, language in FILES[options.to].items()
+            }
+        except ValueError as error:
+            raise Refused(error) from None
+
+    with terminal.progress("writes the equations"), TemporaryDirectory() as folder:
+        texts = written()
+        size = sum(map(len, texts.values()))
+        terminal.say(
+            block("export", "written", names=list(texts), kilobytes=size / 1000, seconds=time.perf_counter() - started)
+        )
+        for file, text in texts.items():
+            Path(folder, file).write_text(text, encoding="utf-8")
+        terminal.show(f"runs what was written, at {STATES} states")
+        make = partial(programs.PROGRAMS[options.to], Path(folder), name, robot.tree, quantities, options.float)
+        outcome, program = checks.checked(compared, make, quantities, STATES, options.float)
+        times = checks.times(compared, program, quantities, STATES)
+    of = {
+        "outcome": outcome, "name": robot.name, "states": STATES, "command": command, "features": robot.features,
+        "sha256": hashlib.sha256(Path(robot.mjcf).read_bytes()).hexdigest()[:16], "mujoco": checks.version(),
+    }  # fmt: skip
+    texts = written(*block("export", "head", **of).splitlines())
+    out = Path(options.out)
+    try:
+        out.mkdir(parents=True)
+        for file, text in texts.items():
+            (out / file).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise Refused(f"cannot write to {out}: {error.strerror}") from None
+    for line in block("export", "table", outcome=outcome, times=times).splitlines():
+        terminal.say(line)
+    style = "bold green" if outcome.passed else "bold" if outcome.not_run else "bold red"
+    terminal.say(block("export", "verdict", outcome=outcome, states=STATES), style)
+    terminal.say(f"Files: {', '.join(str(out / file) for file in texts)} ({time.perf_counter() - started:.1f} s)")
+    return 0 if outcome.passed or outcome.not_run else 1
+
+
+def identifier(stem: str) -> str:
+    """The name of a file as an identifier."""
+    name = re.sub(r"\W", "_", stem, flags=re.ASCII).strip("_")
+    return name if name[:1].isalpha() else f"robot_{name}".rstrip("_")

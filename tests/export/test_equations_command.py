@@ -1,0 +1,153 @@
+"""python -m compare equations: what is written is run and judged; the outcome stands in the files and decides the status."""
+
+import re
+import shutil
+from functools import partial
+
+import numpy as np
+import pytest
+from models import PATHS
+
+import compare
+import tmt
+from compare.__main__ import main
+from compare.export import checks
+from compare.export.command import FILES, identifier
+from compare.export.programs import NotRun, Program, PythonProgram, WrongProgram
+from compare.process.crash import Refused
+from compare.run.reference import compared_with
+from tmt.derivation.quantities import QUANTITIES
+
+HAS_C, HAS_OCTAVE = (bool(shutil.which(name)) for name in ("gcc", "octave-cli"))
+COUNT = 20
+
+
+@pytest.mark.parametrize(
+    "language", ["c", "python", pytest.param("matlab", marks=pytest.mark.skipif(not HAS_OCTAVE, reason="no Octave"))]
+)
+def test_the_arm_in_a_language(language, tmp_path, capsys):
+    if language == "c" and not HAS_C:
+        pytest.skip("no C compiler")
+    out = tmp_path / "new" / "folder"
+    assert main(["equations", "--to", language, "--out", str(out)]) == 0
+    shown = capsys.readouterr().out
+    assert {path.name for path in out.iterdir()} == {f"arm{ending}" for ending in FILES[language]}
+    for path in out.iterdir():
+        text = path.read_text(encoding="utf-8")
+        assert "Checked at 1,000 random states" in text and "alpha, hinge, 0, 0" in text
+        assert len(re.findall(r"largest difference from MuJoCo", text)) == 3
+    assert all(name in shown for name in ("mass_matrix", "bias", "acceleration")) and str(out) in shown
+
+
+def test_what_is_exported_to_python_can_be_checked_as_a_users_equations(tmp_path):
+    out = tmp_path / "mixed"
+    assert main(["equations", "--mjcf", str(PATHS["mixed"]), "--to", "python", "--out", str(out)]) == 0
+    found = {}
+    exec((out / "mixed.py").read_text(encoding="utf-8"), found)
+    functions = {name: found[name] for name in ("mass_matrix", "bias", "acceleration")}
+    compare.assert_agrees(str(PATHS["mixed"]), **functions)
+
+
+class Altered(Program):
+    """tmt's own values, of which one entry is off by a multiple of its tolerance."""
+
+    def __init__(self, tree, quantity, share, eps=2.0**-52):
+        self.tree, self.quantity, self.share, self.eps = tree, quantity, share, eps
+
+    def values(self, quantity, *states):
+        found = getattr(tmt, quantity)(*states[: len(QUANTITIES[quantity].takes)], model=self.tree)
+        found = [part.copy() for part in found] if isinstance(found, tuple) else [found.copy()]
+        if quantity == self.quantity:
+            scale = checks.Entries(self.tree, states[0], states[1]).mass_matrix
+            found[0][3, 1, 1] += self.share * 64 * self.eps * scale[3, 1, 1]
+        return found
+
+
+@pytest.mark.parametrize(("share", "passes"), [(0.9, True), (1.1, False), (np.nan, False)])
+@pytest.mark.parametrize("single", [False, True])
+def test_a_difference_is_judged_by_the_tolerance_of_its_entry(share, passes, single):
+    compared = compared_with(None, None)
+    eps = 2.0 ** (-23 if single else -52)
+    make = partial(Altered, compared.robot.tree, "mass_matrix", share, eps)
+    outcome, _ = checks.checked(compared, make, ["mass_matrix", "bias"], COUNT, single)
+    assert [row.passed for row in outcome.rows] == [passes, True] and outcome.passed is passes
+
+
+@pytest.mark.parametrize("name", QUANTITIES)
+def test_each_quantity_has_a_counterpart_in_mujoco(name):
+    compared = compared_with("model", str(PATHS["mixed"]))
+    outcome, _ = checks.checked(compared, partial(Altered, compared.robot.tree, "", 0.0), [name], COUNT, False)
+    assert outcome.passed and len(outcome.rows) == max(1, len(QUANTITIES[name].parts))
+
+
+def test_a_wrong_value_is_a_failed_check_with_status_1_and_stands_in_the_file(tmp_path, monkeypatch, capsys):
+    def start(self):
+        text = (self.folder / "arm.py").read_text(encoding="utf-8")
+        (self.folder / "arm.py").write_text(text.replace("9.81", "9.8100001"), encoding="utf-8")
+        started(self)
+
+    started = PythonProgram.start
+    monkeypatch.setattr(PythonProgram, "start", start)
+    assert main(["equations", "--to", "python", "--out", str(tmp_path / "out")]) == 1
+    head = (tmp_path / "out" / "arm.py").read_text(encoding="utf-8")[:400]
+    assert "Failed at 1,000 random states" in head and "bias" in head and "acceleration" in head
+    assert "Checked" not in head + capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "said"), [(NotRun, 0, "Not checked: no such thing"), (WrongProgram, 1, "Failed: no such thing")]
+)
+def test_what_cannot_be_run_is_written_and_says_so(error, status, said, tmp_path, monkeypatch):
+    def start(self):
+        raise error("no such thing")
+
+    monkeypatch.setattr(PythonProgram, "start", start)
+    assert main(["equations", "--to", "python", "--out", str(tmp_path / "out")]) == status
+    assert said in (tmp_path / "out" / "arm.py").read_text(encoding="utf-8")
+
+
+def test_without_a_compiler_the_files_are_not_checked(tmp_path, monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler -O1")
+    assert main(["equations", "--out", str(tmp_path / "out")]) == 0
+    assert "Not checked: no C compiler" in (tmp_path / "out" / "arm.h").read_text(encoding="utf-8")
+
+
+@pytest.mark.skipif(not HAS_C, reason="no C compiler")
+def test_a_text_that_does_not_compile_has_failed(tmp_path):
+    from compare.export.programs import CProgram
+
+    (tmp_path / "arm.h").write_text("void arm_bias(const double q[3], const double qd[3], double out[3]);")
+    (tmp_path / "arm.c").write_text("void arm_bias(const float q[3], const double qd[3], double out[3]) {}")
+    with pytest.raises(WrongProgram, match="arm_bias"):
+        CProgram(tmp_path, "arm", tmt.ARM, ["bias"], False)
+
+
+@pytest.mark.parametrize(("words", "why"), [
+    (["--to", "fortran", "--out", "new"], "fortran"),
+    (["--to", "pyton", "--out", "new"], "did you mean python"),
+    (["--name", "2nd", "--out", "new"], "2nd"),
+    (["--name", "double", "--out", "new"], "double"),
+    (["--name", "bias", "--out", "new"], "bias"),
+    (["--quantity", "mass", "--out", "new"], "mass"),
+    (["--to", "python", "--float", "--out", "new"], "single precision"),
+    (["--out", "."], "exists"),
+    ([], "--out"),
+    (["--mjcf", "missing.xml", "--out", "new"], "missing.xml"),
+    (["--outt", "x"], "--outt"),
+    (["more", "--out", "new"], "more"),
+])  # fmt: skip
+def test_a_wrong_request_gets_one_line_and_status_2(words, why, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    try:
+        status = main(["equations", *words])
+    except (SystemExit, Refused) as stop:
+        status = getattr(stop, "code", 2)
+    error = capsys.readouterr().err
+    assert status == 2 and why in error and error.count("\n") == 1 and not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    ("stem", "name"), [("arm", "arm"), ("my robot-2", "my_robot_2"), ("2dof", "robot_2dof"), ("ü", "robot")]
+)
+def test_the_name_of_a_file_becomes_an_identifier(stem, name):
+    assert identifier(stem) == name

@@ -1,0 +1,132 @@
+"""tmt.equations: what is written in Python and C gives the values of tmt's functions."""
+
+import ctypes
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from trees import random_tree, tree_of_kinds
+
+import tmt
+from tmt.compiled import forms
+from tmt.derivation.quantities import QUANTITIES
+
+HAS_C = bool(shutil.which("gcc"))
+
+
+def states_of(tree, count=5, seed=1):
+    rng, coordinates = np.random.default_rng(seed), tree.coordinates
+    q = rng.uniform(-1.0, 1.0, (count, coordinates.nq))
+    for joint in coordinates.balls:
+        q[:, joint.q] /= np.linalg.norm(q[:, joint.q], axis=1, keepdims=True)
+    return q, *rng.uniform(-1.0, 1.0, (2, count, coordinates.nv))
+
+
+def module(tree, *quantities):
+    found = {}
+    exec(tmt.equations(tree, "python", quantities), found)
+    return found
+
+
+def near(values, expected):
+    return all(np.allclose(a, b, rtol=1e-11, atol=1e-12) for a, b in zip(values, expected, strict=True))
+
+
+TREES = {
+    "arm": tmt.ARM,
+    "kinds": tree_of_kinds(np.random.default_rng(3)),
+    "many": random_tree(np.random.default_rng(1), bodies=8, damping=1.0),
+}
+
+
+@pytest.mark.parametrize("name", QUANTITIES)
+@pytest.mark.parametrize("tree", TREES.values(), ids=TREES)
+def test_python_gives_the_same_values(tree, name):
+    states = states_of(tree)[: len(QUANTITIES[name].takes)]
+    found, expected = module(tree, name)[name](*states), getattr(tmt, name)(*states, model=tree)
+    assert near(*((x if isinstance(x, tuple) else (x,)) for x in (found, expected)))
+
+
+def test_python_takes_any_batch_and_refuses_other_shapes():
+    found = module(tmt.ARM, "bias")["bias"]
+    q, qd = np.linspace(-1.0, 1.0, 12).reshape(2, 2, 3), np.array([0.1, 0.2, 0.3])
+    assert near([found(q, qd)], [tmt.bias(q, qd)]) and found(q[0, 0], qd).shape == (3,)
+    with pytest.raises(ValueError, match="expected"):
+        found(q[..., :2], qd)
+
+
+def test_a_linear_system_is_solved_by_a_function():
+    tree = random_tree(np.random.default_rng(4), bodies=6)
+    traced = forms.trace("quantity", (len(tree.axis),) * 3, lambda q, qd, tau: forms.Terms(tree).called_solution(
+        tmt.derivation.composite.mass_matrix_and_bias(tree, q, qd)[0], tau))  # fmt: skip
+    from tmt.export import Function, c, python
+
+    n = len(tree.axis)
+    function = Function("acceleration", "", ("q", "qd", "tau"), (n, n, n), (n,), ("out",), traced)
+    found, (q, qd, tau) = {}, states_of(tree)
+    exec(python.source("robot", [""], [function]), found)
+    expected = np.linalg.solve(tmt.mass_matrix(q, tree), tau[..., None])[..., 0]
+    assert near([found["acceleration"](q, qd, tau)], [expected])
+    assert "static void solve" in c.source("robot", [""], [function], False)
+
+
+@pytest.mark.skipif(not HAS_C, reason="no C compiler")
+@pytest.mark.parametrize("single", [False, True])
+def test_c_compiles_without_a_warning_and_gives_the_same_values(single, tmp_path):
+    tree = TREES["kinds"]
+    names = ["mass_matrix", "acceleration", "energy"]
+    (tmp_path / "robot.c").write_text(tmt.equations(tree, "c", names, single=single))
+    (tmp_path / "robot.h").write_text(tmt.equations(tree, "c header", names, single=single))
+    flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-pedantic", "-Werror", "-fPIC", "-shared", "-include", "robot.h"]
+    subprocess.run(["gcc", *flags, "robot.c", "-o", "robot.so", "-lm"], cwd=tmp_path, check=True)
+    library, kind = ctypes.CDLL(str(tmp_path / "robot.so")), np.float32 if single else np.float64
+    for name in names:
+        states = [x[0].astype(kind) for x in states_of(tree)[: len(QUANTITIES[name].takes)]]
+        expected = np.asarray(getattr(tmt, name)(*(x.astype(float) for x in states), model=tree))
+        out = np.empty(max(1, expected.size), dtype=kind)
+        library[f"robot_{name}"](*(ctypes.c_void_p(x.ctypes.data) for x in (*states, out)))
+        assert np.allclose(out, expected.ravel(), rtol=2e-3 if single else 1e-11, atol=1e-4 if single else 1e-12)
+
+
+@pytest.mark.parametrize("joint", ["*/ int x; /*", '"""', "\\", "100 %", "ä", "'''"])
+def test_no_name_of_a_joint_leaves_the_comment(joint, tmp_path):
+    tree = tmt.Tree(**{**{f: getattr(tmt.ARM, f) for f in ("parent", "offset", "axis", "damping", "body_names", "body_hinge",
+                       "mass", "com", "inertia", "gravity")}, "hinge_names": ("alpha", "beta", joint)})  # fmt: skip
+    assert near(
+        [module(tree, "bias")["bias"]([0.1, 0.2, 0.3], [1.0, 2.0, 3.0])], [tmt.bias([0.1, 0.2, 0.3], [1.0, 2.0, 3.0])]
+    )
+    text = tmt.equations(tree, "c", ["mass_matrix"])
+    before, _, after = text.partition("#include")
+    assert before.count("*/") == 1 and before.rstrip().endswith("*/") and "int x" not in after
+    lines = tmt.equations(tree, "matlab", ["bias"]).splitlines()
+    assert all(line.startswith("%") for line in lines[1 : next(k for k, line in enumerate(lines) if "switch" in line)])
+
+
+@pytest.mark.parametrize(("given", "why"), [
+    ({"language": "fortran"}, "language"), ({"language": None}, "language"), ({"quantities": []}, "quantity"),
+    ({"quantities": ["mass"]}, "mass"), ({"quantities": "energie"}, "energie"), ({"name": "2"}, "name"),
+    ({"name": "_x"}, "name"), ({"name": "while"}, "name"), ({"name": "energy"}, "name"), ({"name": None}, "name"),
+    ({"language": "python", "single": True}, "single"), ({"model": "arm"}, "model"),
+    ({"language": "latex", "quantities": ["jacobians"]}, "jacobians"),
+])  # fmt: skip
+def test_what_is_wrong_is_a_value_error(given, why):
+    with pytest.raises(ValueError, match=why):
+        tmt.equations(**given)
+
+
+@pytest.mark.parametrize("name", QUANTITIES)
+@pytest.mark.parametrize("tree", [TREES["arm"], TREES["kinds"]], ids=["arm", "kinds"])
+def test_the_exact_values_of_many_states_are_those_of_single_ones(tree, name):
+    from tmt.exact.many import exact_of_many
+    from tmt.exact.values import FIELDS, exact
+
+    q, qd, tau = states_of(tree, 2)
+    high, low = exact_of_many(tree, name, q, qd, tau)
+    truth = exact(tree, q[1], qd[1], tau[1])
+    fields = FIELDS[name]
+    parts = [(high[1], low[1])] if len(fields) == 1 else list(zip(high[1], low[1]))
+    for field, (h, l) in zip(fields, parts, strict=True):
+        expected = getattr(truth, field)
+        off = np.abs((np.asarray(h).astype(object) - expected) + l)
+        assert np.max(off) <= 1e-28 * max(1.0, float(np.max(np.abs(h))))
