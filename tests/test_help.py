@@ -15,6 +15,7 @@ from shown import blocks, command_lines
 from compare.__main__ import main
 from compare.cli.command_line import LINE_WIDTH, OPTIONS, help_of, request
 from compare.experiments import EXPERIMENTS, skipped
+from compare.export.command import equations_parser
 from compare.fleet.command import experiments_of, fleet_parser
 from compare.report.provenance import OURS, installed
 from compare.robots.arm import ARM
@@ -71,13 +72,15 @@ def test_a_command_line_that_is_shown_can_be_given(line, capsys):
         made = fleet_parser()
         options = made.parse_intermixed_args(words[1:])
         assert options.help or (options.paths and experiments_of(made, options.only))
+    elif words[:1] == ["equations"] and "--help" not in words:
+        assert equations_parser().parse_args(words[1:]).out
     elif "--help" in words or not words:
         assert answered(words, capsys)[0] == 0
     else:
         assert request(words).experiment == words[0]
 
 
-TAKES_SECONDS = ("mass --out /tmp/mass", "parameters --mjcf my_arm.xml --reference arm")
+TAKES_SECONDS = ("equations --out arm_c", "mass --out /tmp/mass", "parameters --mjcf my_arm.xml --reference arm")
 
 
 def lines_to_run():
@@ -113,7 +116,7 @@ def test_a_command_line_that_is_shown_runs(inside, line, tmp_path, monkeypatch, 
         Path(name).write_text(text, encoding="utf-8")
     Path("submissions/b.xml").write_text(text.replace('mass="1.5"', 'mass="1.6"'), encoding="utf-8")
     words = shlex.split(line.replace("/tmp/mass", "mass"))
-    quick = [] if words[0] == "fleet" or "--quick" in words else ["--quick"]
+    quick = [] if words[0] in ("fleet", "equations") or "--quick" in words else ["--quick"]
     status = main([*words, *quick])
     is_absent = words[0] == "engines" and skipped("engines", ARM)  # none is installed
     assert status == (1 if "submissions" in words else 2 if is_absent else 0), capsys.readouterr()

@@ -25,6 +25,7 @@ FILES = {  # of each language: the endings of the files, and what tmt.equations 
 QUANTITIES = {"latex": "mass_matrix,bias,gravity_balance"}
 OF_MOST = "mass_matrix,bias,acceleration"
 STATES = 1000
+EPILOG = block("export", "examples") + "\n"
 OPTIONS = {
     "--to": Option(metavar="LANGUAGE", default="c"),
     "--mjcf": Option(metavar="FILE"),
@@ -38,7 +39,7 @@ OPTIONS = {
 def equations_parser() -> Parser:
     made = Parser(
         prog=f"{PROGRAM} {EQUATIONS}", usage=f"{PROGRAM} {EQUATIONS} --out DIR [options]",
-        description=block("export", "help"), epilog=block("export", "examples") + "\n",
+        description=block("export", "help"), epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False,
     )  # fmt: skip
     for name, option in OPTIONS.items():
