@@ -1,0 +1,1 @@
+"""The equations of a Tree as text to take away."""
