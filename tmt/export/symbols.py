@@ -93,7 +93,9 @@ def derived(tree, quantities, names: "Names", deadline, note) -> Symbolic:
     symbols = sorted(names.parameters, key=str)
     masses = [symbol for symbol in symbols if names.parameters[symbol].unit == "kg"]
     angles = [from_reference[i] for i in hinges]
-    ring = Ring([*symbols, *places.values()], masses, angles, parallel, names.is_exact, deadline)
+    ring = Ring(
+        [*symbols, *places.values(), *names.qd], [masses, names.qd], angles, parallel, names.is_exact, deadline
+    )
     zero, joints = ring.scalar(0), range(len(tree.kind))
     variables = [ring.scalar(places[i]) if i in places else ring.angle(hinges.index(i)) for i in joints]
     state = State(names.tree(ring.scalar), variables)
@@ -112,11 +114,11 @@ def derived(tree, quantities, names: "Names", deadline, note) -> Symbolic:
     if "bias" in quantities:
         M = [[zero + entry for entry in row] for row in state.mass_matrix]
         rates = [[[M[i][j].derivative(variables[k]) for k in joints] for j in joints] for i in joints]
+        qd = [ring.scalar(symbol) for symbol in names.qd]
         h = list(entries["gravity_balance"])
         for i in joints:  # h_i = sum over j, k of (dM_ij/dq_k - dM_jk/dq_i / 2) qd_j qd_k, and gravity
-            for j, k in itertools.combinations_with_replacement(joints, 2):
-                factor = rates[i][j][k] + rates[i][k][j] - rates[j][k][i]
-                h[i] += names.qd[j] * names.qd[k] * expression(factor * (0.5 if j == k else 1.0))
+            terms = [qd[j] * qd[k] * (rates[i][j][k] - rates[j][k][i] * 0.5) for j in joints for k in joints]
+            h[i] += expression(sum(terms, zero))
         entries["bias"] = sympy.Matrix(h)
     entries = {name: entries[name] for name in quantities}
     used = set().union(*(matrix.free_symbols for matrix in entries.values()))

@@ -7,6 +7,7 @@ polynomials; `Ring.shortest` then looks for the form that a textbook would print
 import itertools
 import time
 from collections import Counter, defaultdict
+from functools import reduce
 
 from tmt.derivation.vectors import Vector, cos, sin
 
@@ -23,19 +24,20 @@ class TooLong(Exception):
 class Ring:
     """Polynomials in symbols and in sines and cosines of angles, until a deadline (of time.monotonic).
 
-    symbols: SymPy symbols. masses: those of them that are taken out of sums. angles: SymPy expressions.
+    symbols: SymPy symbols. first: lists of those that may be taken out of sums; the others are only where they are in all terms.
+    angles: SymPy expressions.
     parallel: {i: (j, sign)} where the hinge of angle i turns, on that of angle j, about sign times its axis.
     exact: whether all numbers are integers; else coefficients have PRECISION bits.
     """
 
-    def __init__(self, symbols, masses, angles, parallel, exact, deadline):
+    def __init__(self, symbols, first, angles, parallel, exact, deadline):
         from sympy import QQ, Dummy, RealField
         from sympy.polys.rings import PolyRing
 
         n = len(angles)
         generators = [*symbols, *(Dummy() for _ in range(2 * n))]
         self.ring = PolyRing(generators, QQ if exact else RealField(prec=PRECISION), "lex")
-        self.symbols, self.masses, self.angles, self.parallel = symbols, masses, angles, parallel
+        self.symbols, self.first, self.angles, self.parallel = symbols, first, angles, parallel
         self.exact, self.deadline, self.forms = exact, deadline, {}
         self.pairs = [(len(symbols) + i, len(symbols) + n + i) for i in range(n)]  # places of sine and cosine
 
@@ -73,14 +75,17 @@ class Ring:
         for monomial, number in poly.items():
             parts[monomial[:count]][(0,) * count + monomial[count:]] = number
         for monomial, part in parts.items():
-            number = part.content() * (1 if part.LC > 0 else -1) if self.exact else self.ring.domain.one
-            part = part.quo_ground(number)
-            if part not in self.forms:
-                self.forms[part] = min(self.candidates(part), key=lambda form: form.count_ops())
+            number = part.content() if self.exact else self.ring.domain.one
             factors = {s: power for s, power in zip(self.symbols, monomial) if power}
-            terms.append(term(self.number(number), self.forms[part], factors))
-        lengths = set(self.symbols) - set(self.masses)  # and the like: taken out of a sum only where they are in all of it
-        return min((grouped(terms, first, lengths) for first in (self.masses, ())), key=lambda form: form.count_ops())
+            terms.append(term(self.number(number), self.form(part.quo_ground(number)), factors))
+        last = set(self.symbols).difference(*self.first)
+        return min((grouped(terms, first, last) for first in (*self.first, ())), key=cost)
+
+    def form(self, poly):
+        """The shortest form of a polynomial in sines and cosines alone."""
+        if poly not in self.forms:
+            self.forms[poly] = min(self.candidates(poly), key=cost)
+        return self.forms[poly]
 
     def candidates(self, poly):
         """Forms of a polynomial in sines and cosines alone: in the angles, in sums of parallel hinges' angles, as waves."""
@@ -104,7 +109,9 @@ class Ring:
         yield self.expression(poly, angles)
         if self.exact and few:
             number, factors = poly.factor_list()
-            yield Mul(self.number(number), *(self.expression(factor, angles) ** power for factor, power in factors))
+            if len(factors) > 1 and angles is self.angles:
+                forms = [self.form(self.reduced(factor, self.pairs)) ** power for factor, power in factors]
+                yield Mul(self.number(number), *forms)
 
     def expression(self, poly, angles):
         from sympy import cos, sin
@@ -225,6 +232,11 @@ sin.register(Angle, lambda angle: angle.sine)
 cos.register(Angle, lambda angle: angle.cosine)
 
 
+def cost(form) -> int:
+    """The number of operations in an expression; a minus in front of it is free."""
+    return min(form.count_ops(), (-form).count_ops())
+
+
 def term(number, form, factors):
     """A term of a sum, (number, {factor: power}), of a number, an expression and further factors."""
     from sympy import Mul
@@ -252,7 +264,16 @@ def grouped(terms, first, last):
     if not shared:
         return Add(*(Mul(number, *(base**power for base, power in factors.items())) for number, factors in terms))
     base, power = max(shared, key=shared.get)
-    inside = [(number, {b: p for b, p in fs.items() if b != base}) for number, fs in terms if fs.get(base) == power]
+    size = content([number for number, factors in terms if factors.get(base) == power])
+    inside = [(n / size, {b: p for b, p in fs.items() if b != base}) for n, fs in terms if fs.get(base) == power]
     outside = [(number, factors) for number, factors in terms if factors.get(base) != power]
     rest = [grouped(outside, first, last)] if outside else []
-    return Add(Mul(base**power, grouped(inside, first, last)), *rest)
+    return Add(Mul(size, base**power, grouped(inside, first, last)), *rest)
+
+
+def content(numbers):
+    """What is taken out of a sum with these coefficients: their common divisor, with the sign of most of them."""
+    from sympy import Integer, gcd
+
+    size = reduce(gcd, numbers) if all(number.is_Rational for number in numbers) else Integer(1)
+    return size if sum(1 if number > 0 else -1 for number in numbers) >= 0 else -size
