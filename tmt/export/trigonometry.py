@@ -14,7 +14,7 @@ from tmt.derivation.vectors import Vector, cos, sin
 PRECISION = 120  # bits of coefficients that are not rational: the rounding of a sum is far below that of its doubles
 NOISE = 1e-25  # of the largest coefficient of a polynomial
 LARGEST_PRODUCT = 3_000_000  # pairs of terms in one product: some seconds
-FEW_TERMS = 40  # of a polynomial of which every form is tried
+FEW_TERMS, FEW_FACTORED = 40, 6  # of a polynomial of which every form is tried, of one that is factored
 
 
 class TooLong(Exception):
@@ -34,12 +34,14 @@ class Ring:
         from sympy import QQ, Dummy, RealField
         from sympy.polys.rings import PolyRing
 
-        n = len(angles)
-        generators = [*symbols, *(Dummy() for _ in range(2 * n))]
-        self.ring = PolyRing(generators, QQ if exact else RealField(prec=PRECISION), "lex")
+        n, domain = len(angles), QQ if exact else RealField(prec=PRECISION)
+        functions = [Dummy() for _ in range(2 * n)]  # sines, then cosines
+        self.ring, self.functions = PolyRing([*symbols, *functions], domain, "lex"), PolyRing(functions, domain, "lex")
         self.symbols, self.first, self.angles, self.parallel = symbols, first, angles, parallel
         self.exact, self.deadline, self.forms = exact, deadline, {}
-        self.pairs = [(len(symbols) + i, len(symbols) + n + i) for i in range(n)]  # places of sine and cosine
+        self.places = [(i, n + i) for i in range(n)]  # of sine and cosine in self.functions
+        self.pairs = [(len(symbols) + s, len(symbols) + c) for s, c in self.places]  # and in self.ring
+        self.multiples = {(): (self.functions.one, self.functions.zero)}
 
     def check_time(self) -> None:
         if time.monotonic() > self.deadline:
@@ -56,24 +58,24 @@ class Ring:
         """The polynomial with squares of the first generator of each pair replaced by 1 - the square of the second."""
         for first, second in pairs:
             if any(monomial[first] > 1 for monomial in poly):
-                low, high = self.ring.zero, self.ring.zero
+                low, high, cosine = poly.ring.zero, poly.ring.zero, poly.ring.gens[second]
                 for monomial, number in poly.items():
                     power = monomial[first]
                     rest = (*monomial[:first], power - 2 * (power > 1), *monomial[first + 1 :])
                     (high if power > 1 else low)[rest] = number
-                poly = low + self.reduced(high * (1 - self.ring.gens[second] ** 2), [(first, second)])
+                poly = low + self.reduced(high * (1 - cosine**2), [(first, second)])
         return poly if self.exact else self.without_noise(poly, NOISE)
 
     def without_noise(self, poly, noise):
         """The polynomial without coefficients below `noise` times the largest."""
         least = noise * max(map(abs, poly.values()), default=0)
-        return self.ring.from_dict({monomial: number for monomial, number in poly.items() if abs(number) > least})
+        return poly.ring.from_dict({monomial: number for monomial, number in poly.items() if abs(number) > least})
 
     def shortest(self, poly):
         """The shortest expression that is found for a polynomial."""
-        count, parts, terms = len(self.symbols), defaultdict(lambda: self.ring.zero), []
+        count, parts, terms = len(self.symbols), defaultdict(lambda: self.functions.zero), []
         for monomial, number in poly.items():
-            parts[monomial[:count]][(0,) * count + monomial[count:]] = number
+            parts[monomial[:count]][monomial[count:]] = number
         for monomial, part in parts.items():
             number = part.content() if self.exact else self.ring.domain.one
             factors = {s: power for s, power in zip(self.symbols, monomial) if power}
@@ -95,28 +97,28 @@ class Ring:
         few, waves = len(poly) <= FEW_TERMS, self.waves(poly)
         spaces = [(poly, self.angles), (self.of_sums(waves), sums)]
         for poly, angles in spaces[: 2 if self.parallel else 1]:
-            squared = [pair for pair in self.pairs if few and any(monomial[pair[1]] > 1 for monomial in poly)]
+            squared = [pair for pair in self.places if few and any(monomial[pair[1]] > 1 for monomial in poly)]
             for turned in itertools.product([False, True], repeat=len(squared)):
                 self.check_time()
                 pairs = [pair[::-1] for pair, turn in zip(squared, turned) if turn]
-                yield from self.expressions(self.reduced(poly, pairs), angles, few)
+                yield from self.expressions(self.reduced(poly, pairs), angles)
         yield self.of_waves(waves)
 
-    def expressions(self, poly, angles, few):
+    def expressions(self, poly, angles):
         """A polynomial with its common factors taken out, and as a product of polynomials."""
         from sympy import Mul
 
         yield self.expression(poly, angles)
-        if self.exact and few:
+        if self.exact and len(poly) <= FEW_FACTORED:
             number, factors = poly.factor_list()
             if len(factors) > 1 and angles is self.angles:
-                forms = [self.form(self.reduced(factor, self.pairs)) ** power for factor, power in factors]
+                forms = [self.form(self.reduced(factor, self.places)) ** power for factor, power in factors]
                 yield Mul(self.number(number), *forms)
 
     def expression(self, poly, angles):
         from sympy import cos, sin
 
-        functions = {place: of(angle) for pair, angle in zip(self.pairs, angles) for place, of in zip(pair, (sin, cos))}
+        functions = {place: of(angle) for pair, angle in zip(self.places, angles) for place, of in zip(pair, (sin, cos))}
         terms = []
         for monomial, number in poly.items():
             factors = {of: monomial[place] for place, of in functions.items() if monomial[place]}
@@ -134,9 +136,9 @@ class Ring:
         """A polynomial as a sum of waves, {(is_sine, k): number}: sines and cosines of sums of k_i times angle i."""
         waves = defaultdict(lambda: self.ring.domain.zero)
         for monomial, number in poly.items():
-            sines = sum(monomial[place] for place, _ in self.pairs)
+            sines = sum(monomial[place] for place, _ in self.places)
             parts = {(): number * (-1) ** (sines // 2)}  # of exp(i k q), times i where the number of sines is odd
-            for s, c in self.pairs:
+            for s, c in self.places:
                 own = {0: self.ring.domain.one}
                 for sign in [-1] * monomial[s] + [1] * monomial[c]:  # 2 i sin = z - 1/z, 2 cos = z + 1/z with z = exp(i q)
                     turned = defaultdict(lambda: self.ring.domain.zero)
@@ -162,18 +164,24 @@ class Ring:
 
     def of_sums(self, waves):
         """A sum of waves as a polynomial in sines and cosines of the sums of angles of parallel hinges."""
-        result = self.ring.zero
+        result = self.functions.zero
         for (is_sine, k), number in waves.items():
             k = list(k)
             for i, (j, sign) in self.parallel.items():
                 k[j] -= sign * k[i]
-            cosine, sine = self.ring.one, self.ring.zero
-            for (s, c), count in zip(self.pairs, k):
-                s, c = self.ring.gens[s] * (1 if count > 0 else -1), self.ring.gens[c]
-                for _ in range(abs(count)):
-                    cosine, sine = cosine * c - sine * s, sine * c + cosine * s
-            result += (sine if is_sine else cosine) * number
-        return self.reduced(result, self.pairs)
+            result += self.multiple(tuple(k))[is_sine] * number
+        return self.reduced(result, self.places)
+
+    def multiple(self, k):
+        """Cosine and sine of a sum of k_i times angle i."""
+        if k not in self.multiples:
+            cosine, sine = self.multiple(k[:-1])
+            s, c = (self.functions.gens[place] for place in self.places[len(k) - 1])
+            s = s if k[-1] > 0 else -s
+            for _ in range(abs(k[-1])):
+                cosine, sine = cosine * c - sine * s, sine * c + cosine * s
+            self.multiples[k] = self.reduced(cosine, self.places), self.reduced(sine, self.places)
+        return self.multiples[k]
 
 
 class Trig:
@@ -233,8 +241,8 @@ cos.register(Angle, lambda angle: angle.cosine)
 
 
 def cost(form) -> int:
-    """The number of operations in an expression; a minus in front of it is free."""
-    return min(form.count_ops(), (-form).count_ops())
+    """The number of operations in an expression; a minus in front of a product is free."""
+    return form.count_ops() - bool(form.as_coeff_Mul()[0].is_negative)
 
 
 def term(number, form, factors):
