@@ -27,16 +27,21 @@ def tokens(expr, display) -> list[Token]:
     """A formula as a list, its factors in the order of textbooks; brackets are tokens too, so that a line may break in them."""
     import sympy
 
+    places = {symbol: i for i, symbol in enumerate(display)}
+
     def rank(factor):
         base = factor.as_base_exp()[0]
         name = display.get(base, "")
         of_symbol = 0 if name.startswith("m_") else 1 if name.startswith("g") else 3 if name.startswith("\\dot") else 2
-        return (5 if base.is_Add else 4 if base.is_Function else of_symbol), str(base)
+        return (5 if base.is_Add else 4 if base.is_Function else of_symbol), order(base), base.is_Function and base.func == sympy.cos
+
+    def order(term):
+        return sorted(places[symbol] for symbol in term.free_symbols)
 
     def sum_of(terms):
         result = []
-        order = sorted(terms, key=lambda t: (minus(t), t.has(sympy.sin, sympy.cos), t.count_ops(), str(t)))
-        for i, term in enumerate(order):
+        terms = sorted(terms, key=lambda t: (minus(t), t.has(sympy.sin, sympy.cos), t.count_ops(), order(t)))
+        for i, term in enumerate(terms):
             sign = [Token("-" if minus(term) else "+", "operator")] * (i > 0 or minus(term))
             result += sign + tokens(-term if minus(term) else term, display)
         return result
@@ -110,11 +115,11 @@ def fits(rows) -> bool:
     return sum(max(map(width, column)) for column in zip(*rows)) + 4 * len(rows[0]) <= WIDTH and len(rows[0]) > 1
 
 
-def head(symbolic: Symbolic, formula) -> list[str]:
-    """The conventions in sentences; formula: writes LaTeX of a few symbols."""
+def head(symbolic: Symbolic) -> list[str]:
+    """The conventions in sentences."""
     sizes = "; ".join(f"{letter}: {title}" for letter, title, _ in formulas(symbolic))
     note = [f"{symbolic.note[0].upper()}{symbolic.note[1:]}."] if symbolic.note else []
-    return [f"{formula} with {sizes}.", "Forces of dampers D and springs K are not in h.", *note]
+    return [f"{sizes}.", "Forces of dampers D and springs K are not in h.", *note]
 
 
 # LaTeX
@@ -161,7 +166,7 @@ def latex(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     ]
     parts = {
         "comment": "\n% ".join(head_lines) or "Equations of motion",
-        "text": f"$${MOTION}$$\n" + " ".join(map(escaped, head(symbolic, ""))),
+        "text": f"$${MOTION}$$\n" + " ".join(map(escaped, head(symbolic))),
         "tables": tabular("ll", joints) + "\n\n" + tabular("lrll", rows),
         "equations": "\n\n".join(equations),
     }
@@ -187,3 +192,138 @@ def escaped(text: str) -> str:
 def tabular(columns, rows) -> str:
     body = " \\\\\n".join(" & ".join(row) for row in rows)
     return f"\\begin{{tabular}}{{{columns}}}\n{body}\n\\end{{tabular}}" if rows else ""
+
+
+# HTML
+
+HTML = """<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>Equations of motion</title>
+<!-- {comment} -->
+<style>
+body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }}
+td {{ padding: 0 1rem 0 0; }} td.value {{ text-align: right; }} h2 {{ font-size: 1.1rem; margin-top: 1.5rem; }}
+.entry {{ padding-left: 2rem; text-indent: -2rem; margin: .5rem 0; line-height: 1.9; }} math {{ font-size: 1.05em; }}
+</style></head><body>
+<h1>Equations of motion</h1>
+<p>{motion}</p><p>{text}</p>
+{tables}
+{equations}
+</body></html>
+"""
+
+
+def page(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
+    """An HTML page with MathML that needs no network: what `latex` shows."""
+    equations = []
+    for letter, title, entries in formulas(symbolic):
+        equations.append(f"<h2>{html.escape(title[0].upper() + title[1:])}</h2>")
+        if fits(entries):
+            rows = "".join(f"<mtr>{''.join(f'<mtd>{mathml(e)}</mtd>' for e in row)}</mtr>" for row in entries)
+            matrix = f"<mi>{letter}</mi><mo>=</mo><mo>(</mo><mtable>{rows}</mtable><mo>)</mo>"
+            equations.append(f"<p><math>{matrix}</math></p>")
+        else:
+            equations += [
+                f'<p class="entry"><math>{in_mathml(Token(name))}<mo>=</mo></math> {in_lines(formula)}</p>'
+                for name, formula in labelled(letter, entries)
+            ]
+    joints = [(mathml_of(symbolic.display[q]), html.escape(text)) for q, text in zip(symbolic.q, symbolic.joints)]
+    rows = [
+        (mathml_of(symbolic.display[symbol]), f"{row.value:.6g}", row.unit.replace("2", "²"), html.escape(row.meaning))
+        for symbol, row in symbolic.parameters.items()
+    ]
+    tables = [
+        f"<table>{''.join('<tr>' + ''.join(f'<td>{cell}</td>' for cell in row) + '</tr>' for row in part)}</table>"
+        for part in (joints, rows)
+        if part
+    ]
+    return HTML.format(
+        comment=html.escape("\n".join(head_lines)).replace("--", "- -"),
+        motion=MOTION_IN_HTML,
+        text=html.escape(" ".join(head(symbolic))),
+        tables="\n".join(tables),
+        equations="\n".join(equations),
+    )
+
+
+MOTION_IN_HTML = "<i>M</i>(<i>q</i>) <i>q̈</i> + <i>h</i>(<i>q</i>, <i>q̇</i>) = <i>τ</i> − <i>D q̇</i> − <i>K</i> (<i>q − q</i><sub>0</sub>)"
+
+
+def mathml_of(display: str) -> str:
+    return f"<math>{in_mathml(Token(display))}</math>"
+
+
+def mathml(formula) -> str:
+    return f"<mrow>{''.join(map(in_mathml, formula)) or '<mn>0</mn>'}</mrow>"
+
+
+def in_lines(formula) -> str:
+    """A formula in pieces that end where a line may be broken: before an operator."""
+    pieces = [[]]
+    for token in formula:
+        if token.kind == "operator" and pieces[-1]:
+            pieces.append([])
+        pieces[-1].append(token)
+    return " ".join(f"<math>{mathml(piece)}</math>" for piece in pieces)
+
+
+def in_mathml(token) -> str:
+    """A token; symbols are read from their LaTeX, such as \\dot{q}_{1}."""
+    if token.kind == "symbol":
+        dot, name, index = re.fullmatch(r"(\\dot)?[{\\]*(\w+?)}?(?:_\{?(.*?)\}?)?", token.text).groups()
+        text = f"<mi>{f'&{name};' if len(name) > 1 else name}</mi>"
+        text = f'<mover accent="true">{text}<mo>˙</mo></mover>' if dot else text
+        text = f"<msub>{text}<mrow><mi mathvariant='normal'>{index}</mi></mrow></msub>" if index else text
+    elif token.kind == "function":
+        text = f"<mi>{token.text}</mi>"
+    elif token.kind == "number":
+        text = f"<mn>{token.text}</mn>"
+    else:
+        sign = token.text.replace("-", "−")
+        text = f'<mo form="infix">{sign}</mo>' if token.kind == "operator" else f'<mo stretchy="false">{sign}</mo>'
+    text = f"<msup>{text}<mn>{token.power}</mn></msup>" if token.power else text
+    return text + "<mspace width='0.17em'/>" * (token.kind != "operator")
+
+
+# Python
+
+PYTHON = """{comment}
+import sympy
+from sympy import cos, sin
+
+q = {q} = sympy.symbols({q_names!r}, seq=True)
+qd = {qd} = sympy.symbols({qd_names!r}, seq=True)
+joint_names = {joint_names!r}
+{parameters}
+{matrices}
+"""
+
+
+def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
+    """Python text with SymPy: the symbols, `parameters` {{symbol: value}}, the matrices M, h and G with the symbols, and pairs of
+    a matrix with numbers and the list of its symbols, as compare.assert_agrees takes them: mass_matrix, bias, gravity."""
+    from sympy.printing.str import StrPrinter
+
+    class Printer(StrPrinter):
+        def _print_Float(self, expr):
+            return repr(float(expr))
+
+    lines = [f"{symbol} = sympy.Symbol({str(symbol)!r})  # {row.meaning}, {row.unit}" for symbol, row in symbolic.parameters.items()]
+    values = ", ".join(f"{symbol}: {row.value!r}" for symbol, row in symbolic.parameters.items())
+    lines.append(f"parameters = {{{values}}}")
+    matrices = []
+    for name, matrix in symbolic.entries.items():
+        letter, title = TITLES[name]
+        rows = [",\n".join(f"    [{', '.join(Printer().doprint(entry) for entry in row)}]" for row in matrix.tolist())]
+        symbols = "[*q, *qd]" if name == "bias" else "[*q]"
+        own = {"gravity_balance": "gravity"}.get(name, name)
+        matrices.append(f"# {title}\n{letter} = sympy.Matrix([\n{rows[0]},\n])\n{own} = ({letter}.subs(parameters), {symbols})")
+    return PYTHON.format(
+        comment="\n".join(f"# {line}" for line in head_lines),
+        q=", ".join(map(str, symbolic.q)) + ",",
+        qd=", ".join(map(str, symbolic.qd)) + ",",
+        q_names=" ".join(map(str, symbolic.q)),
+        qd_names=" ".join(map(str, symbolic.qd)),
+        joint_names=list(symbolic.joint_names),
+        parameters="\n".join(lines),
+        matrices="\n".join(matrices),
+    )

@@ -31,13 +31,14 @@ class Parameter(NamedTuple):
 class Symbolic(NamedTuple):
     """Equations of a Tree in SymPy.
 
-    q, qd: symbols of the joints and their speeds, in order. joints: what each of them is, as Parameters without a value.
+    q, qd: symbols of the joints and their speeds, in order. joint_names: as the Tree has them. joints: what each q is, in words.
     parameters: {symbol: (value, unit, meaning)}; {} where all numbers are in the expressions, then `named` is False.
     entries: {quantity: Matrix}. display: {symbol: LaTeX}. note: "", or why parameters have no names.
     """
 
     q: list
     qd: list
+    joint_names: tuple
     joints: list
     parameters: dict
     named: bool
@@ -94,7 +95,7 @@ def derived(tree, quantities, names: "Names", deadline, note) -> Symbolic:
     masses = [symbol for symbol in symbols if names.parameters[symbol].unit == "kg"]
     angles = [from_reference[i] for i in hinges]
     ring = Ring(
-        [*symbols, *places.values(), *names.qd], [masses, names.qd], angles, parallel, names.is_exact, deadline
+        [*symbols, *places.values(), *names.qd], masses, names.qd, angles, parallel, names.is_exact, deadline
     )
     zero, joints = ring.scalar(0), range(len(tree.kind))
     variables = [ring.scalar(places[i]) if i in places else ring.angle(hinges.index(i)) for i in joints]
@@ -124,7 +125,7 @@ def derived(tree, quantities, names: "Names", deadline, note) -> Symbolic:
     used = set().union(*(matrix.free_symbols for matrix in entries.values()))
     parameters = {symbol: row for symbol, row in names.parameters.items() if symbol in used}
     display = names.joint_display | {s: names.display[s] for s in parameters}
-    return Symbolic(names.q, names.qd, names.joints, parameters, names.named, entries, display, note)
+    return Symbolic(names.q, names.qd, tree.hinge_names, names.joints, parameters, names.named, entries, display, note)
 
 
 class Names:

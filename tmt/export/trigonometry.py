@@ -24,20 +24,20 @@ class TooLong(Exception):
 class Ring:
     """Polynomials in symbols and in sines and cosines of angles, until a deadline (of time.monotonic).
 
-    symbols: SymPy symbols. first: lists of those that may be taken out of sums; the others are only where they are in all terms.
-    angles: SymPy expressions.
+    symbols: SymPy symbols, among them masses and speeds, which are taken out of sums; others only of sums that have them in all
+    terms. angles: SymPy expressions.
     parallel: {i: (j, sign)} where the hinge of angle i turns, on that of angle j, about sign times its axis.
     exact: whether all numbers are integers; else coefficients have PRECISION bits.
     """
 
-    def __init__(self, symbols, first, angles, parallel, exact, deadline):
+    def __init__(self, symbols, masses, speeds, angles, parallel, exact, deadline):
         from sympy import QQ, Dummy, RealField
         from sympy.polys.rings import PolyRing
 
         n, domain = len(angles), QQ if exact else RealField(prec=PRECISION)
         functions = [Dummy() for _ in range(2 * n)]  # sines, then cosines
         self.ring, self.functions = PolyRing([*symbols, *functions], domain, "lex"), PolyRing(functions, domain, "lex")
-        self.symbols, self.first, self.angles, self.parallel = symbols, first, angles, parallel
+        self.symbols, self.masses, self.speeds, self.angles, self.parallel = symbols, masses, speeds, angles, parallel
         self.exact, self.deadline, self.forms = exact, deadline, {}
         self.places = [(i, n + i) for i in range(n)]  # of sine and cosine in self.functions
         self.pairs = [(len(symbols) + s, len(symbols) + c) for s, c in self.places]  # and in self.ring
@@ -73,15 +73,21 @@ class Ring:
 
     def shortest(self, poly):
         """The shortest expression that is found for a polynomial."""
+        from sympy import Mul
+
         count, parts, terms = len(self.symbols), defaultdict(lambda: self.functions.zero), []
+        products = set()
         for monomial, number in poly.items():
             parts[monomial[:count]][monomial[count:]] = number
         for monomial, part in parts.items():
             number = part.content() if self.exact else self.ring.domain.one
-            factors = {s: power for s, power in zip(self.symbols, monomial) if power}
+            powers = [(s, power) for s, power in zip(self.symbols, monomial) if power]
+            speeds = Mul(*(s**power for s, power in powers if s in self.speeds))  # one factor, as in textbooks
+            factors = dict(power for power in powers if power[0] not in self.speeds) | ({speeds: 1} if speeds != 1 else {})
+            products.add(speeds)
             terms.append(term(self.number(number), self.form(part.quo_ground(number)), factors))
-        last = set(self.symbols).difference(*self.first)
-        return min((grouped(terms, first, last) for first in (*self.first, ())), key=cost)
+        last = set(self.symbols).difference(self.masses)
+        return min((grouped(terms, first, last) for first in (self.masses, products, ())), key=cost)
 
     def form(self, poly):
         """The shortest form of a polynomial in sines and cosines alone."""
