@@ -33,7 +33,11 @@ def tokens(expr, display) -> list[Token]:
         base = factor.as_base_exp()[0]
         name = display.get(base, "")
         of_symbol = 0 if name.startswith("m_") else 1 if name.startswith("g") else 3 if name.startswith("\\dot") else 2
-        return (5 if base.is_Add else 4 if base.is_Function else of_symbol), order(base), base.is_Function and base.func == sympy.cos
+        return (
+            (5 if base.is_Add else 4 if base.is_Function else of_symbol),
+            order(base),
+            base.is_Function and base.func == sympy.cos,
+        )
 
     def order(term):
         return sorted(places[symbol] for symbol in term.free_symbols)
@@ -64,7 +68,10 @@ def tokens(expr, display) -> list[Token]:
     power = "" if power == 1 else str(power)
     if base.is_Function:
         argument = tokens(base.args[0], display)
-        return [Token(base.func.__name__, "function", power), *(argument if len(argument) == 1 else in_brackets(argument))]
+        return [
+            Token(base.func.__name__, "function", power),
+            *(argument if len(argument) == 1 else in_brackets(argument)),
+        ]
     if base.is_Symbol:
         return [Token(display[base], "symbol", power)]
     return in_brackets(tokens(base, display), power)
@@ -253,7 +260,12 @@ def mathml_of(display: str) -> str:
 
 
 def mathml(formula) -> str:
-    return f"<mrow>{''.join(map(in_mathml, formula)) or '<mn>0</mn>'}</mrow>"
+    """A formula with a narrow space between factors."""
+    text = ""
+    for token, before in zip(formula, [Token("", "open"), *formula]):
+        factors = token.kind not in ("operator", "close") and before.kind not in ("operator", "open")
+        text += "<mspace width='0.17em'/>" * factors + in_mathml(token)
+    return f"<mrow>{text or '<mn>0</mn>'}</mrow>"
 
 
 def in_lines(formula) -> str:
@@ -263,7 +275,7 @@ def in_lines(formula) -> str:
         if token.kind == "operator" and pieces[-1]:
             pieces.append([])
         pieces[-1].append(token)
-    return " ".join(f"<math>{mathml(piece)}</math>" for piece in pieces)
+    return "<wbr>".join(f"<math>{mathml(piece)}</math>" for piece in pieces)
 
 
 def in_mathml(token) -> str:
@@ -278,10 +290,10 @@ def in_mathml(token) -> str:
     elif token.kind == "number":
         text = f"<mn>{token.text}</mn>"
     else:
-        sign = token.text.replace("-", "−")
-        text = f'<mo form="infix">{sign}</mo>' if token.kind == "operator" else f'<mo stretchy="false">{sign}</mo>'
-    text = f"<msup>{text}<mn>{token.power}</mn></msup>" if token.power else text
-    return text + "<mspace width='0.17em'/>" * (token.kind != "operator")
+        space = 0.25 * (token.kind == "operator")
+        sign = token.text.replace("-", "\N{MINUS SIGN}")
+        text = f'<mo stretchy="false" lspace="{space}em" rspace="{space}em">{sign}</mo>'
+    return f"<msup>{text}<mn>{token.power}</mn></msup>" if token.power else text
 
 
 # Python
@@ -307,7 +319,10 @@ def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
         def _print_Float(self, expr):
             return repr(float(expr))
 
-    lines = [f"{symbol} = sympy.Symbol({str(symbol)!r})  # {row.meaning}, {row.unit}" for symbol, row in symbolic.parameters.items()]
+    lines = [
+        f"{symbol} = sympy.Symbol({str(symbol)!r})  # {row.meaning}, {row.unit}"
+        for symbol, row in symbolic.parameters.items()
+    ]
     values = ", ".join(f"{symbol}: {row.value!r}" for symbol, row in symbolic.parameters.items())
     lines.append(f"parameters = {{{values}}}")
     matrices = []
@@ -316,7 +331,9 @@ def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
         rows = [",\n".join(f"    [{', '.join(Printer().doprint(entry) for entry in row)}]" for row in matrix.tolist())]
         symbols = "[*q, *qd]" if name == "bias" else "[*q]"
         own = {"gravity_balance": "gravity"}.get(name, name)
-        matrices.append(f"# {title}\n{letter} = sympy.Matrix([\n{rows[0]},\n])\n{own} = ({letter}.subs(parameters), {symbols})")
+        matrices.append(
+            f"# {title}\n{letter} = sympy.Matrix([\n{rows[0]},\n])\n{own} = ({letter}.subs(parameters), {symbols})"
+        )
     return PYTHON.format(
         comment="\n".join(f"# {line}" for line in head_lines),
         q=", ".join(map(str, symbolic.q)) + ",",

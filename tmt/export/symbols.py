@@ -14,7 +14,9 @@ from tmt.model.tree import Tree
 from .trigonometry import Ring, TooLong, Trig
 
 QUANTITIES = ("mass_matrix", "bias", "gravity_balance")
-GREEK = frozenset("alpha beta gamma delta epsilon zeta eta theta kappa mu nu xi rho sigma tau phi chi psi omega".split())
+GREEK = frozenset(
+    "alpha beta gamma delta epsilon zeta eta theta kappa mu nu xi rho sigma tau phi chi psi omega".split()
+)
 EPS = 2.0**-52
 ROUND = 16 * EPS  # relative: a number this close to one of 10 digits is meant to be that
 TINY = 1e-12  # of the largest component of a vector or tensor: meant to be zero
@@ -94,9 +96,7 @@ def derived(tree, quantities, names: "Names", deadline, note) -> Symbolic:
     symbols = sorted(names.parameters, key=str)
     masses = [symbol for symbol in symbols if names.parameters[symbol].unit == "kg"]
     angles = [from_reference[i] for i in hinges]
-    ring = Ring(
-        [*symbols, *places.values(), *names.qd], masses, names.qd, angles, parallel, names.is_exact, deadline
-    )
+    ring = Ring([*symbols, *places.values(), *names.qd], masses, names.qd, angles, parallel, names.is_exact, deadline)
     zero, joints = ring.scalar(0), range(len(tree.kind))
     variables = [ring.scalar(places[i]) if i in places else ring.angle(hinges.index(i)) for i in joints]
     state = State(names.tree(ring.scalar), variables)
@@ -153,7 +153,9 @@ class Names:
             origin = tree.hinge_names[before]
             meaning = f"from {origin} to {tree.hinge_names[i]}"
             nothing = (0, 0, 0)
-            self.offsets.append(self.vector(offset, f"l_{lengths}", f"l_{{{lengths}}}", "m", meaning) if moved else nothing)
+            self.offsets.append(
+                self.vector(offset, f"l_{lengths}", f"l_{{{lengths}}}", "m", meaning) if moved else nothing
+            )
         self.mass, self.com, self.inertia = [], [], []
         for b, (name, body) in enumerate(zip(bodies, tree.body_names)):
             at = b + 1
@@ -193,7 +195,9 @@ class Names:
             length = self.symbol(abs(values[along]), name, tex, unit, f"{meaning}, along {direction}")
             return [0 if not value else length if value > 0 else -length for value in values]
         return [
-            self.symbol(value, f"{name}_{x}", f"{tex[:-1]}{x}}}" if tex[-1] == "}" else f"{tex}_{x}", unit, f"{meaning}, {x}")
+            self.symbol(
+                value, f"{name}_{x}", f"{tex[:-1]}{x}}}" if tex[-1] == "}" else f"{tex}_{x}", unit, f"{meaning}, {x}"
+            )
             for x, value in zip("xyz", values)
         ]
 

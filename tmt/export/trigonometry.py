@@ -83,7 +83,9 @@ class Ring:
             number = part.content() if self.exact else self.ring.domain.one
             powers = [(s, power) for s, power in zip(self.symbols, monomial) if power]
             speeds = Mul(*(s**power for s, power in powers if s in self.speeds))  # one factor, as in textbooks
-            factors = dict(power for power in powers if power[0] not in self.speeds) | ({speeds: 1} if speeds != 1 else {})
+            factors = dict(power for power in powers if power[0] not in self.speeds) | (
+                {speeds: 1} if speeds != 1 else {}
+            )
             products.add(speeds)
             terms.append(term(self.number(number), self.form(part.quo_ground(number)), factors))
         last = set(self.symbols).difference(self.masses)
@@ -124,7 +126,9 @@ class Ring:
     def expression(self, poly, angles):
         from sympy import cos, sin
 
-        functions = {place: of(angle) for pair, angle in zip(self.places, angles) for place, of in zip(pair, (sin, cos))}
+        functions = {
+            place: of(angle) for pair, angle in zip(self.places, angles) for place, of in zip(pair, (sin, cos))
+        }
         terms = []
         for monomial, number in poly.items():
             factors = {of: monomial[place] for place, of in functions.items() if monomial[place]}
@@ -136,7 +140,8 @@ class Ring:
 
         if self.exact:
             return Rational(int(value.numerator), int(value.denominator))
-        return Integer(int(value)) if float(value).is_integer() else Float(float(value))
+        value = float(value)
+        return Integer(int(value)) if value.is_integer() else Float(value)
 
     def waves(self, poly) -> dict:
         """A polynomial as a sum of waves, {(is_sine, k): number}: sines and cosines of sums of k_i times angle i."""
@@ -146,7 +151,9 @@ class Ring:
             parts = {(): number * (-1) ** (sines // 2)}  # of exp(i k q), times i where the number of sines is odd
             for s, c in self.places:
                 own = {0: self.ring.domain.one}
-                for sign in [-1] * monomial[s] + [1] * monomial[c]:  # 2 i sin = z - 1/z, 2 cos = z + 1/z with z = exp(i q)
+                for sign in [-1] * monomial[s] + [1] * monomial[
+                    c
+                ]:  # 2 i sin = z - 1/z, 2 cos = z + 1/z with z = exp(i q)
                     turned = defaultdict(lambda: self.ring.domain.zero)
                     for k, part in own.items():
                         turned[k + 1] += part / 2
