@@ -3,6 +3,7 @@
 import hashlib
 import keyword
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 from tmt.compiled import forms
@@ -15,7 +16,7 @@ from tmt.model.values import shown
 from . import c, matlab, python
 
 LANGUAGES = {"c": c.source, "c header": c.header, "python": python.source, "matlab": matlab.source}
-SYMBOLIC = {"latex": "latex", "html": "page", "sympy": "python_source"}  # functions of symbols.py
+SYMBOLIC = {"latex": "latex", "html": "page", "sympy": "python_source"}  # functions of latex.py
 OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
 UNITS = {"hinge": "rad, rad/s, N m", "slide": "m, m/s, N", "ball": "quaternion w x y z, rad/s in its own axes, N m"}
 WORDS = """auto bool break case catch char class const continue default delete do double else elseif end enum extern float for
@@ -59,11 +60,19 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
         raise ValueError(f"single precision is written in C only, not in {language}")
     lines = [*head, "", *conventions(model)]
     if language in SYMBOLIC:
-        from . import symbols  # SymPy takes long
+        from . import latex
 
-        return getattr(symbols, SYMBOLIC[language])(symbols.symbolic(model, quantities), lines)
+        return getattr(latex, SYMBOLIC[language])(symbols_of(model, quantities), lines)
     functions = [function_of(model, quantity) for quantity in dict.fromkeys(quantities)]
     return LANGUAGES[language](name, lines, functions, *[single] * language.startswith("c"))
+
+
+@lru_cache(maxsize=4)
+def symbols_of(model: Tree, quantities: tuple[str, ...]):
+    """The symbolic equations, derived once for all files."""
+    from .symbols import symbolic
+
+    return symbolic(model, quantities)
 
 
 def is_word(name: str) -> bool:

@@ -1,0 +1,152 @@
+"""Symbolic equations: their numbers, their forms, and the texts in which they are handed out."""
+
+import shutil
+import subprocess
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import sympy
+from trees import random_tree, small_tree, tree_of_kinds
+
+import compare
+import tmt
+from compare.engines.mujoco import read
+from compare.judge.entries import Entries
+from compare.run.reference import compared_with
+from tmt import Tree
+from tmt.export.latex import latex, page, python_source
+from tmt.export.symbols import symbolic
+
+EPS = np.finfo(float).eps
+SCALES = {"mass_matrix": "mass_matrix", "bias": "bias", "gravity_balance": "weight"}
+DOUBLE = """<mujoco><worldbody><body name="upper"><joint name="hip" axis="0 1 0"/>
+  <inertial pos="0 0 -0.25" mass="1.2" diaginertia="0.02 0.021 0.003"/>
+  <body name="lower" pos="0 0 -0.5"><joint name="knee" axis="0 1 0"/>
+  <inertial pos="0 0 -0.21" mass="0.8" diaginertia="0.01 0.011 0.002"/></body></body></worldbody></mujoco>"""
+
+
+def tree_of(name) -> Tree:
+    return compared_with("model", f"tests/models/{name}.xml").robot.tree
+
+
+def planar(n) -> Tree:
+    """A pendulum of n links."""
+    inertia = [np.diag([0.02, 0.021, 0.003])] * n
+    return Tree(
+        [f"joint{i}" for i in range(n)], range(-1, n - 1), [(0, 0, -0.5 * (i > 0)) for i in range(n)], [(0, 1, 0)] * n, [0.0] * n,
+        [f"link{i}" for i in range(n)], range(n), [1.0] * n, [(0, 0, -0.25)] * n, inertia, (0, 0, -9.81),
+    )  # fmt: skip
+
+
+def cart_pole(reference=0.0) -> Tree:
+    return Tree(
+        ["slider", "hinge"], (-1, 0), np.zeros((2, 3)), ((1, 0, 0), (0, 1, 0)), (0.0, 0.0), ["cart", "pole"], (0, 1), (1.0, 0.1),
+        ((0, 0, 0), (0, 0, 0.5)), np.zeros((2, 3, 3)), (0, 0, -9.81), ["slide", "hinge"], (0.0, 0.02), reference=(0.1, reference),
+    )  # fmt: skip
+
+
+def assert_right(symbols, tree, rng, states=100):
+    """The expressions with their numbers are tmt's at random states, within the tolerance of the comparison."""
+    q, qd = rng.uniform(-3.0, 3.0, (2, states, len(tree.axis)))
+    scale = Entries(tree, q, qd)
+    for name in symbols.entries:
+        state = (q, qd)[: 2 if name == "bias" else 1]
+        matrix, variables = symbols.pair(name)
+        columns = [*q.T, *qd.T][: len(variables)]
+        values = sympy.lambdify(variables, list(matrix), "numpy", cse=True)(*columns)
+        expected = getattr(tmt, name)(*state, tree)
+        found = np.stack([np.broadcast_to(value, states) for value in values], axis=-1).reshape(expected.shape)
+        assert (np.abs(found - expected) <= 64 * EPS * getattr(scale, SCALES[name])).all(), name
+
+
+@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda rng: tmt.ARM,
+        lambda rng: planar(2),
+        lambda rng: cart_pole(0.4),
+        lambda rng: random_tree(rng, bodies=1),
+        lambda rng: tree_of_kinds(rng, bodies=2, kinds=("hinge", "slide")),
+    ],
+)
+def test_the_numbers_are_those_of_the_tree(make, named, rng):
+    tree = make(rng)
+    symbols = symbolic(tree, named=named)
+    assert symbols.named == named and bool(symbols.parameters) == named and not symbols.note
+    assert_right(symbols, tree, rng)
+
+
+def test_a_double_pendulum_has_the_form_of_textbooks():
+    symbols = symbolic(planar(2))
+    m1, m2, l1, c1, c2, I1, I2, q2, qd1, qd2 = sympy.symbols(
+        "m_link0 m_link1 l_1 c_link0 c_link1 I_link0_yy I_link1_yy q_joint1 qd_joint0 qd_joint1"
+    )
+    M, h = symbols.entries["mass_matrix"], symbols.entries["bias"] - symbols.entries["gravity_balance"]
+    assert M[0] == m1 * c1**2 + I1 + I2 + m2 * (l1**2 + c2**2 + 2 * l1 * c2 * sympy.cos(q2))
+    assert h[0] == -m2 * l1 * c2 * sympy.sin(q2) * (2 * qd1 * qd2 + qd2**2)
+    gravity = symbols.entries["gravity_balance"][1]
+    assert gravity == m2 * sympy.Symbol("g") * c2 * sympy.sin(sympy.Symbol("q_joint0") + q2)
+    assert symbols.parameters[l1] == (0.5, "m", "from joint0 to joint1, along -z")
+
+
+def test_a_cart_pole_has_no_term_that_vanishes():
+    symbols = symbolic(cart_pole())
+    cart, pole, c, rotor, q = sympy.symbols("m_cart m_pole c_pole J_hinge q_hinge")
+    expected = [[cart + pole, pole * c * sympy.cos(q)], [pole * c * sympy.cos(q), pole * c**2 + rotor]]
+    assert symbols.entries["mass_matrix"] == sympy.Matrix(expected)
+
+
+def test_rounding_of_a_compiled_model_makes_no_terms(rng):
+    """Axes and offsets that are a few eps off."""
+    tree, clean = planar(3), symbolic(planar(3))
+    noisy = Tree(
+        tree.hinge_names, tree.parent, np.array(tree.offset) * (1 + 2 * EPS) + 1e-17, np.array(tree.axis) + [1e-16, 0, -3e-16],
+        tree.damping, tree.body_names, tree.body_hinge, tree.mass, np.array(tree.com) + 1e-17, tree.inertia, tree.gravity,
+    )  # fmt: skip
+    symbols = symbolic(noisy)
+    assert symbols.entries == clean.entries and symbols.parameters == clean.parameters
+    assert_right(symbols, noisy, rng)
+
+
+def test_a_large_robot_has_numbers_and_says_so(rng):
+    tree = tree_of("arm6")
+    symbols = symbolic(tree, ("mass_matrix", "gravity_balance"), seconds=20.0)
+    assert not symbols.named and symbols.note and not symbols.parameters
+    assert_right(symbols, tree, rng, states=10)
+
+
+def test_what_cannot_be_derived_is_one_line():
+    for tree, words in ((small_tree(), "is a ball"), (tree_of("arm7"), "take more than 0.2 s")):
+        with pytest.raises(ValueError, match=words) as error:
+            symbolic(tree, seconds=0.2)
+        assert "\n" not in str(error.value)
+    with pytest.raises(ValueError, match="unknown quantity 'energy'"):
+        symbolic(tmt.ARM, ("energy",))
+
+
+def test_python_text_is_accepted_by_the_comparison():
+    tree = read(DOUBLE).tree
+    own = {}
+    exec(python_source(symbolic(tree), ["a head"]), own)
+    compare.assert_agrees(DOUBLE, **{name: own[name] for name in ("mass_matrix", "bias", "gravity")})
+    assert own["joint_names"] == ["hip", "knee"] and own["parameters"][sympy.Symbol("m_lower")] == 0.8
+
+
+@pytest.mark.parametrize("make", [lambda: tmt.ARM, lambda: cart_pole(0.4)])
+def test_the_page_is_well_formed_and_needs_no_network(make):
+    text = page(symbolic(make()), ["from a < b & c"])
+    body = text.partition("<body>")[2].partition("</body>")[0].replace("<wbr>", "")
+    for name in ("alpha", "beta", "gamma"):
+        body = body.replace(f"&{name};", name)
+    assert ElementTree.fromstring(f"<body>{body}</body>").findall(".//math")
+    assert "http" not in text and "src=" not in text
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no pdflatex")
+def test_the_arm_in_latex_is_one_page(tmp_path):
+    (tmp_path / "arm.tex").write_text(latex(symbolic(), ["50% of a_b & c"]), encoding="utf-8")
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "arm.tex"]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert result.returncode == 0 and "(1 page" in result.stdout, result.stdout
