@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import tmt
+from tmt.compiled import evaluator
 from tmt.derivation.quantities import QUANTITIES, shape_of
 
 from ..engines.own.functions import functions_of
@@ -45,6 +46,10 @@ class Program:
 
     def takes(self, quantity: str, *states: np.ndarray) -> list[np.ndarray]:
         return list(states[: len(QUANTITIES[quantity].takes)])
+
+    def operations(self, quantity: str) -> int:
+        """+ - * / of an evaluation; a sine, a cosine, a root count as one each."""
+        return evaluator(self.tree, quantity).operations
 
     def parts(self, quantity: str) -> int:
         return max(1, len(QUANTITIES[quantity].parts))
@@ -145,9 +150,15 @@ class SymbolicProgram(Program):
     """The matrices of SymPy, as functions of states."""
 
     def start(self):
-        found = runpy.run_path(str(self.folder / f"{self.name}.py"))
+        self.found = runpy.run_path(str(self.folder / f"{self.name}.py"))
         robot = Robot("", Path(), self.tree, {}, ())
-        self.functions = functions_of(found, robot.coordinates, ())
+        self.functions = functions_of(self.found, robot.coordinates, ())
+
+    def operations(self, quantity):
+        import sympy
+
+        matrix, _ = self.found[quantity.removesuffix("_balance")]
+        return int(sum(sympy.count_ops(entry) for entry in matrix))
 
     def values(self, quantity, q, qd, tau):
         function = self.functions[quantity.removesuffix("_balance")]

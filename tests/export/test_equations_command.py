@@ -36,7 +36,7 @@ def test_the_arm_in_a_language(language, tmp_path, capsys):
         text = path.read_text(encoding="utf-8")
         assert "Checked at 1,000 random states" in text and "alpha, hinge, 0, 0" in text
         assert len(re.findall(r"largest difference from MuJoCo", text)) == 3
-    assert all(name in shown for name in ("mass_matrix", "bias", "acceleration")) and str(out) in shown
+    assert all(name in shown for name in ("mass_matrix", "bias", str(out)))
 
 
 def test_what_is_exported_to_python_can_be_checked_as_a_users_equations(tmp_path):

@@ -11,11 +11,11 @@ from tmt.arm import ARM
 from tmt.derivation.quantities import State
 from tmt.model.tree import Tree
 
-from .trigonometry import Ring, TooLong, Trig
+from .trigonometry import Ring, TooLong
 
 QUANTITIES = ("mass_matrix", "bias", "gravity_balance")
 GREEK = frozenset(
-    "alpha beta gamma delta epsilon zeta eta theta kappa mu nu xi rho sigma tau phi chi psi omega".split()
+    ["alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "mu", "nu", "xi", "rho", "sigma", "tau", "phi", "chi", "psi", "omega"]
 )
 EPS = 2.0**-52
 ROUND = 16 * EPS  # relative: a number this close to one of 10 digits is meant to be that
