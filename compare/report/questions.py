@@ -11,9 +11,10 @@ from .verdict import Section
 
 
 def answers(sections: Sequence[Section], robot) -> pd.DataFrame:
-    """For each part: its letter, the question, where it is answered, the answer."""
+    """For each part that a run has answered: its letter, the question, where it is answered, the answer."""
     results = {section.name: section.result for section in sections}
-    rows = [(q.part, q.question, q.answered_in, say(answer(results, *q.answer))) for q in robot.questions]
+    asked = [q for q in robot.questions if results.keys() & set(q.answered_in.split(", "))]
+    rows = [(q.part, q.question, q.answered_in, say(answer(results, *q.answer))) for q in asked]
     return pd.DataFrame(rows, columns=["part", "question", "answered in", "answer"])
 
 
