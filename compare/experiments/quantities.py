@@ -27,24 +27,23 @@ class Quantity(NamedTuple):
     arguments: tuple[str, ...]  # of a Sample
     units: tuple[str, ...]  # for hinges and balls, for slides, for one of each; a single one for all
     scale: str  # of judge.entries
-    truth: str  # a field of tmt.exact.values.Truth
     part: int | None = None  # of a function that returns several arrays
 
 
 QUANTITIES = {
-    "x_b": Quantity("com_positions", ("q",), ("m",), "positions", "com_positions"),
-    "omega_b": Quantity("angular_velocities", ("q", "qd"), ("rad/s",), "angular_velocities", "angular_velocities"),
-    "T_b": Quantity("jacobians", ("q",), ("m/rad", "m/m"), "T", "T", 0),
-    "B_b": Quantity("jacobians", ("q",), ("",), "B", "B", 1),
-    "v_conv": Quantity("convective_terms", ("q", "qd"), ("m/s2",), "v_conv", "v_conv", 0),
-    "w_conv": Quantity("convective_terms", ("q", "qd"), ("rad/s2",), "w_conv", "w_conv", 1),
-    "Mbar": Quantity("mass_matrix", ("q",), ("kg m2", "kg", "kg m"), "mass_matrix", "mass_matrix"),
-    "holding torque": Quantity("gravity_balance", ("q",), ("N m", "N"), "weight", "gravity_balance"),
-    "spring torque": Quantity("spring_torque", ("q",), ("N m", "N"), "springs", "spring_torque"),
-    "bias": Quantity("bias", ("q", "qd"), ("N m", "N"), "bias", "bias"),
-    "qdd": Quantity("acceleration", ("q", "qd", "tau"), ("rad/s2", "m/s2"), "acceleration", "acceleration"),
-    "energy": Quantity("energy", ("q", "qd"), ("J",), "energy", "energy"),
-    "potential energy": Quantity("potential_energy", ("q",), ("J",), "potential_energy", "potential_energy"),
+    "x_b": Quantity("com_positions", ("q",), ("m",), "positions"),
+    "omega_b": Quantity("angular_velocities", ("q", "qd"), ("rad/s",), "angular_velocities"),
+    "T_b": Quantity("jacobians", ("q",), ("m/rad", "m/m"), "T", 0),
+    "B_b": Quantity("jacobians", ("q",), ("",), "B", 1),
+    "v_conv": Quantity("convective_terms", ("q", "qd"), ("m/s2",), "v_conv", 0),
+    "w_conv": Quantity("convective_terms", ("q", "qd"), ("rad/s2",), "w_conv", 1),
+    "Mbar": Quantity("mass_matrix", ("q",), ("kg m2", "kg", "kg m"), "mass_matrix"),
+    "holding torque": Quantity("gravity_balance", ("q",), ("N m", "N"), "weight"),
+    "spring torque": Quantity("spring_torque", ("q",), ("N m", "N"), "springs"),
+    "bias": Quantity("bias", ("q", "qd"), ("N m", "N"), "bias"),
+    "qdd": Quantity("acceleration", ("q", "qd", "tau"), ("rad/s2", "m/s2"), "acceleration"),
+    "energy": Quantity("energy", ("q", "qd"), ("J",), "energy"),
+    "potential energy": Quantity("potential_energy", ("q",), ("J",), "potential_energy"),
 }
 
 
@@ -82,7 +81,8 @@ class Comparison:
             if name == "qdd":
                 size = size(self.scale.force(self.sample.tau), self.acceleration_size())
             named = units[0] if len(units) == 1 else unit(self.robot.tree, *units)
-            result.agree(self.sample, name, named, ours, theirs, size, truth=quantity.truth)
+            exact = self.sample.exact(quantity.function, quantity.part)
+            result.agree(self.sample, name, named, ours, theirs, size, exact)
             for values in compiled:
                 result.agree(self.sample, f"{name}, compiled", named, values, theirs, size)
 

@@ -92,13 +92,13 @@ def rows_of(
             values = convective_accelerations(theirs, *taken)
         else:
             values = getattr(theirs, name)(*taken)
-        high, low = exact if part is None else (x[:, part] for x in exact)
+        right = exact.part(part)
         scale = getattr(scales, of.scale)
         if name == "acceleration":
-            scale = scale(scales.force(states[2]), high)
-        tolerance = np.broadcast_to(factor * np.asarray(scale), high.shape)
+            scale = scale(scales.force(states[2]), right.high)
+        tolerance = np.broadcast_to(factor * np.asarray(scale), right.high.shape)
         mine = np.asarray(own[part or 0], dtype=float)
-        from_mujoco, from_exact = mine - (values if part is None else values[part]), (mine - high) - low
+        from_mujoco, from_exact = mine - (values if part is None else values[part]), right.distance(mine)
         units = of.units[0] if len(of.units) == 1 else unit(tree, *of.units)
         worst = [worst_of(difference, tolerance) for difference in (from_mujoco, from_exact)]
         rows.append(Row(symbol if part is not None else name, units, operations, *worst[0], *worst[1]))

@@ -7,7 +7,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tmt.exact.values import distance
+from tmt.exact.many import Pairs
 
 from .finding import Finding
 from .scale import EPS, FACTOR
@@ -108,18 +108,17 @@ class Result:
         self.checks.append(check)
         return check
 
-    def agree(self, sample, quantity, unit, values, mujoco_values, scale, truth=None) -> None:
+    def agree(self, sample, quantity, unit, values, mujoco_values, scale, exact: Pairs | None = None) -> None:
         """Add a row and a check: of the differences between two engines over the states, the one closest to its tolerance.
 
         values, mujoco_values: (states, ...). scale: a number or (states,), or with as many dimensions as the values for a
-        scale of each entry; the tolerance is 64 eps x scale. truth: a field of tmt.exact.values.Truth; with it, one more check
-        for each engine of its distance from the exact values.
+        scale of each entry; the tolerance is 64 eps x scale. exact: at the first states; one more check for each engine of its
+        distance from them.
         """
-        between, exact = f"{self.label} to MuJoCo", sample.truth(truth) if truth else ()
+        between, exact_states = f"{self.label} to MuJoCo", None if exact is None else len(exact.high)
         differences = {between: np.abs(np.subtract(values, mujoco_values))}
-        for engine, computed in ((self.label, values), ("MuJoCo", mujoco_values)) if len(exact) else ():
-            with np.errstate(invalid="ignore"):  # a user's own equations may give NaN
-                differences[f"{engine} to exact"] = distance(computed[: len(exact)], exact)
+        for engine, computed in ((self.label, values), ("MuJoCo", mujoco_values)) if exact_states else ():
+            differences[f"{engine} to exact"] = exact.distance(computed[:exact_states])
         worst_of_states = {name: worst_of_each(values, scale) for name, values in differences.items()}
         in_eps = {name: over(d, EPS * s) for name, (d, s) in worst_of_states.items()}
         difference, scale = worst_of_states[between]
@@ -144,9 +143,9 @@ class Result:
             "difference_over_bar": check.over_tolerance,
             "scale": scale[worst],
             "difference_eps": in_eps[between].max(),
-            f"{self.label.lower()}_from_exact_eps": in_eps[f"{self.label} to exact"].max() if len(exact) else None,
-            "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if len(exact) else None,
-            "exact_states": len(exact) if truth else None,
+            f"{self.label.lower()}_from_exact_eps": in_eps[f"{self.label} to exact"].max() if exact_states else None,
+            "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if exact_states else None,
+            "exact_states": exact_states,
             "worst_state": check.note,
         }
         for name in ("q", "qd", "tau"):

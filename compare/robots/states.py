@@ -1,17 +1,15 @@
 """The states at which engines are compared: named postures and random states."""
 
-from functools import cached_property
-
 import numpy as np
 
 from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
-from tmt.exact.values import exact
+from tmt.exact.many import Pairs, exact_of_many
 
 from ..judge.finding import Finding
 from . import Robot
 from .case import SEED
 
-SECONDS_OF_EXACT = 5.0  # for all exact values of a report, about
+MOST_SPEEDS = 120  # of a robot that has exact values
 SHOWN_NUMBERS = 8  # maximum size of q in a sentence
 MOST_NUMBERS = 2_000_000  # maximum size of T_b of all random states
 
@@ -25,16 +23,14 @@ class Sample:
     def __init__(self, tree, name, q, qd, tau, exact_states, states=(), notes=()):
         self.tree, self.name, self.q, self.qd, self.tau = tree, name, q, qd, tau
         self.exact_states, self.states, self.notes = exact_states, states, notes
+        self.found = {}
 
-    @cached_property
-    def truths(self) -> list:
-        """A tmt.exact.values.Truth for each of the first states."""
-        columns = (values[: self.exact_states] for values in (self.q, self.qd, self.tau))
-        return [exact(self.tree, *state) for state in zip(*columns)]
-
-    def truth(self, quantity: str) -> np.ndarray:
-        """A field of the exact values, (exact_states, ...) mpmath numbers."""
-        return np.array([getattr(truth, quantity) for truth in self.truths])
+    def exact(self, function: str, part: int | None = None) -> Pairs:
+        """The exact values of a function of tmt, or of one of its arrays, at the first states."""
+        if function not in self.found:
+            states = (values[: self.exact_states] for values in (self.q, self.qd, self.tau))
+            self.found[function] = exact_of_many(self.tree, function, *states)
+        return self.found[function].part(part)
 
     def describe(self, i: int) -> str:
         """The name of state i, or its q."""
@@ -58,41 +54,29 @@ def named(robot: Robot) -> Sample:
     most = largest_speeds_and_torques(robot)[:, None]
     speeds, torques = rng.uniform(-most, most, (2, len(q), robot.coordinates.nv))
     name = "named postures" if robot.postures or robot.positions else "a posture"
-    exact_states = of_named(robot)
-    values = {"count": exact_states, "sample": f"{len(q)} {name}", "seconds": seconds(robot)}
-    notes = (Finding("shared", "exact_values", values),) if exact_states < len(q) else ()
-    return Sample(robot.tree, name, q, speeds, torques, exact_states, tuple(robot.poses), notes)
+    exact_states = len(q) if robot.coordinates.nv <= MOST_SPEEDS else 0
+    return Sample(robot.tree, name, q, speeds, torques, exact_states, tuple(robot.poses))
 
 
 def random(robot: Robot, states: int, exact_states: int, seed: int = SEED) -> Sample:
     """Random states: positions within the ranges of the joints; see `largest_speeds_and_torques`. Large robots have fewer."""
-    rng, wanted, exact_wanted = np.random.default_rng(seed), states, exact_states
-    states = min(wanted, max(1, MOST_NUMBERS // (3 * len(robot.tree.mass) * robot.coordinates.nv)))
-    exact_states = min(exact_wanted, states, affordable(robot) - of_named(robot))
+    rng, wanted, nv = np.random.default_rng(seed), states, robot.coordinates.nv
+    states = min(wanted, max(1, MOST_NUMBERS // (3 * len(robot.tree.mass) * nv)))
     notes = [Finding("shared", "fewer_states", {"count": states, "states": wanted, "seconds": None})] * (
         states < wanted
     )
-    if exact_states < min(exact_wanted, states):
-        values = {"count": exact_states, "sample": f"{exact_wanted} random states", "seconds": seconds(robot)}
-        notes.append(Finding("shared", "exact_values", values))
+    if nv > MOST_SPEEDS:
+        exact_states = 0
+        notes.append(Finding("shared", "no_exact_values", {"speeds": nv, "most": MOST_SPEEDS}))
     q = robot.coordinates.random(rng, states, robot.ranges)
     most = largest_speeds_and_torques(robot)[:, None]
-    speeds, torques = rng.uniform(-most, most, (2, states, robot.coordinates.nv))
-    return Sample(robot.tree, "random states", q, speeds, torques, exact_states, notes=tuple(notes))
+    speeds, torques = rng.uniform(-most, most, (2, states, nv))
+    return Sample(robot.tree, "random states", q, speeds, torques, min(exact_states, states), notes=tuple(notes))
 
 
 def seconds(robot: Robot) -> float:
-    """Duration of an exact state, s; measured for 3 to 35 speeds, within a third."""
+    """Duration of all quantities of a state with 50 digits, s; measured for 3 to 35 speeds, within a third."""
     return 3e-3 + 3.4e-5 * robot.coordinates.nv**2 * len(robot.tree.mass)
-
-
-def affordable(robot: Robot) -> int:
-    return int(SECONDS_OF_EXACT / seconds(robot))
-
-
-def of_named(robot: Robot) -> int:
-    """The number of named postures with exact values, in at most half of that time."""
-    return min(len(robot.poses), affordable(robot) // 2)
 
 
 def largest_speeds_and_torques(robot: Robot) -> np.ndarray:

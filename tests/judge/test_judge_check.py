@@ -1,12 +1,12 @@
 """What turns two sets of values into a verdict: rules, which state is judged, and by which tolerance."""
 
-import mpmath
 import numpy as np
 import pytest
 
 from compare.judge.check import Result, closest, worst_of_each
 from compare.robots.arm import ARM
 from compare.robots.states import Sample
+from tmt.exact.many import Pairs
 
 EPS = 2.0**-52
 
@@ -20,9 +20,8 @@ def sample(states=4, exact=2):
 def agreed(ours, theirs, scale, exact=None):
     """The checks and the row of one quantity, (states, ...)."""
     result, of = Result("mass"), sample(len(ours), exact=0 if exact is None else 2)
-    if exact is not None:
-        of.truths = [type("Truth", (), {"value": np.array([mpmath.mpf(v)])}) for v in exact]
-    result.agree(of, "Mbar", "kg m2", np.array(ours), np.array(theirs), scale, "value")
+    exact = np.zeros((0, 1)) if exact is None else np.array(exact)[:, None]
+    result.agree(of, "Mbar", "kg m2", np.array(ours), np.array(theirs), scale, Pairs(exact, 0.0 * exact))
     return result.checks, result.rows[0]
 
 

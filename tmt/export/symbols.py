@@ -15,7 +15,27 @@ from .trigonometry import Ring, TooLong
 
 QUANTITIES = ("mass_matrix", "bias", "gravity_balance")
 GREEK = frozenset(
-    ["alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "mu", "nu", "xi", "rho", "sigma", "tau", "phi", "chi", "psi", "omega"]
+    [
+        "alpha",
+        "beta",
+        "gamma",
+        "delta",
+        "epsilon",
+        "zeta",
+        "eta",
+        "theta",
+        "kappa",
+        "mu",
+        "nu",
+        "xi",
+        "rho",
+        "sigma",
+        "tau",
+        "phi",
+        "chi",
+        "psi",
+        "omega",
+    ]
 )
 EPS = 2.0**-52
 ROUND = 16 * EPS  # relative: a number this close to one of 10 digits is meant to be that

@@ -5,8 +5,6 @@ from functools import partial
 
 import numpy as np
 
-from tmt.exact.values import distance
-
 from ...diagnosis import Values, diagnose_stated
 from ...engines import LABELS, RECORDS, Engine, EngineRecord
 from ...engines.outside import EngineError, Outside, OutsideDynamics, Unread
@@ -133,13 +131,13 @@ def compare_quantities(
         if not dynamics.has(quantity.function):
             result.find("no_function", engine=label, quantity=name)
             continue
-        states, exact = [getattr(sample, argument) for argument in quantity.arguments], sample.truth(quantity.truth)
+        states, exact = [getattr(sample, argument) for argument in quantity.arguments], sample.exact(quantity.function)
         values = found[name] = getattr(dynamics, quantity.function)(*states)
         size = getattr(scale, quantity.scale)
         if name == "qdd":
-            size = size(scale.force(sample.tau), exact.astype(float))
+            size = size(scale.force(sample.tau), exact.high)
         size = np.broadcast_to(size, values.shape)
-        difference, tolerance = distance(values, exact), FACTOR * eps * size
+        difference, tolerance = exact.distance(values), FACTOR * eps * size
         worst = closest(difference, tolerance)
         units = unit(sample.tree, *quantity.units)
         in_full = {of: ", ".join(repr(float(x)) for x in getattr(sample, of)[worst[0]]) for of in quantity.arguments}
@@ -147,7 +145,7 @@ def compare_quantities(
         check = result.check(
             label, f"{name} to exact", difference[worst], tolerance[worst], units, note, True, about=About.ENGINE
         )
-        theirs = distance(getattr(mujoco, quantity.function)(*states), exact)
+        theirs = exact.distance(getattr(mujoco, quantity.function)(*states))
         row = {"engine": label, "precision": record.precision, "quantity": name, "unit": units, "states": len(sample.q),
                "worst_difference": check.value, "bar": check.tolerance, "difference_over_bar": check.over_tolerance,
                "difference_eps": float(over(difference, eps * size).max()),
