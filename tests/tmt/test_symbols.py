@@ -15,8 +15,9 @@ from compare.engines.mujoco import read
 from compare.judge.entries import Entries
 from compare.run.reference import compared_with
 from tmt import Tree
-from tmt.export.latex import latex, page, python_source
-from tmt.export.symbols import symbolic
+from tmt.export.latex import latex
+from tmt.export.page import page
+from tmt.export.symbols import python_source, symbolic
 
 EPS = np.finfo(float).eps
 SCALES = {"mass_matrix": "mass_matrix", "bias": "bias", "gravity_balance": "weight"}
