@@ -187,7 +187,8 @@ def in_latex(formula) -> str:
 
 def escaped(text: str) -> str:
     """Text in LaTeX."""
-    return re.sub(r"([_&%$#{}])", r"\\\1", text).replace("~", r"\textasciitilde{}").replace("^", r"\textasciicircum{}")
+    named = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+    return re.sub(r"[_&%$#{}\\~^]", lambda found: named.get(found[0], f"\\{found[0]}"), text)
 
 
 def tabular(columns, rows) -> str:

@@ -69,12 +69,11 @@ def symbolic(tree: Tree = ARM, quantities=QUANTITIES, seconds: float = 60.0, nam
         try:
             return derived(tree, quantities, Names(tree, True), start + seconds / 2, note)
         except TooLong:
-            note = f"numbers in place of named parameters: with names it takes more than {seconds / 2:g} s"
+            note = f"numbers in place of named parameters, which would take more than {seconds / 2:g} s"
     try:
         return derived(tree, quantities, Names(tree, False), start + seconds, note)
     except TooLong:
-        joints = f"{len(tree.parent)} joints"
-        raise ValueError(f"the symbolic equations of this model ({joints}) take more than {seconds:g} s") from None
+        raise ValueError(f"symbolic equations of these {len(tree.kind)} joints take more than {seconds:g} s") from None
 
 
 def derived(tree, quantities, names: Names, deadline, note) -> Symbolic:
