@@ -13,10 +13,10 @@ from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree
 from tmt.model.values import shown
 
-from . import c, matlab, python
+from . import c, latex, matlab, page, python, symbols
 
 LANGUAGES = {"c": c.source, "c header": c.header, "python": python.source, "matlab": matlab.source}
-SYMBOLIC = {"latex": "latex", "html": "page", "sympy": "python_source"}  # functions of latex.py
+SYMBOLIC = {"latex": latex.latex, "html": page.page, "sympy": symbols.python_source}
 OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
 UNITS = {"hinge": "rad, rad/s, N m", "slide": "m, m/s, N", "ball": "quaternion w x y z, rad/s in its own axes, N m"}
 WORDS = """auto bool break case catch char class const continue default delete do double else elseif end enum extern float for
@@ -60,9 +60,7 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
         raise ValueError(f"single precision is written in C only, not in {language}")
     lines = [*head, "", *conventions(model)]
     if language in SYMBOLIC:
-        from . import latex
-
-        return getattr(latex, SYMBOLIC[language])(symbols_of(model, quantities), lines)
+        return SYMBOLIC[language](symbols_of(model, quantities), lines)
     functions = [function_of(model, quantity) for quantity in dict.fromkeys(quantities)]
     return LANGUAGES[language](name, lines, functions, *[single] * language.startswith("c"))
 
@@ -70,9 +68,7 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
 @lru_cache(maxsize=4)
 def symbols_of(model: Tree, quantities: tuple[str, ...]):
     """The symbolic equations, derived once for all files."""
-    from .symbols import symbolic
-
-    return symbolic(model, quantities)
+    return symbols.symbolic(model, quantities)
 
 
 def is_word(name: str) -> bool:

@@ -1,18 +1,12 @@
-"""Symbolic equations as a LaTeX document, an HTML page with MathML, and Python text with SymPy."""
+"""Symbolic equations as a LaTeX document."""
 
-import html
 import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from .symbols import Symbolic
+from .symbols import TITLES, Symbolic
 
 WIDTH = 75  # characters of a formula that fit on a line
-TITLES = {
-    "mass_matrix": ("M", "mass matrix"),
-    "bias": ("h", "bias: Coriolis, centrifugal and gravity terms"),
-    "gravity_balance": ("G", "torque or force that balances gravity"),
-}
 
 
 class Token(NamedTuple):
@@ -193,154 +187,10 @@ def in_latex(formula) -> str:
 
 def escaped(text: str) -> str:
     """Text in LaTeX."""
-    return re.sub(r"([_&%$#{}])", r"\\\1", text).replace("~", r"\textasciitilde{}").replace("^", r"\textasciicircum{}")
+    named = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+    return re.sub(r"[_&%$#{}\\~^]", lambda found: named.get(found[0], f"\\{found[0]}"), text)
 
 
 def tabular(columns, rows) -> str:
     body = " \\\\\n".join(" & ".join(row) for row in rows)
     return f"\\begin{{tabular}}{{{columns}}}\n{body}\n\\end{{tabular}}" if rows else ""
-
-
-# HTML
-
-HTML = """<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>Equations of motion</title>
-<!-- {comment} -->
-<style>
-body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }}
-td {{ padding: 0 1rem 0 0; }} td.value {{ text-align: right; }} h2 {{ font-size: 1.1rem; margin-top: 1.5rem; }}
-.entry {{ padding-left: 2rem; text-indent: -2rem; margin: .5rem 0; line-height: 1.9; }} math {{ font-size: 1.05em; }}
-</style></head><body>
-<h1>Equations of motion</h1>
-<p>{motion}</p><p>{text}</p>
-{tables}
-{equations}
-</body></html>
-"""
-
-
-def page(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
-    """An HTML page with MathML that needs no network: what `latex` shows."""
-    equations = []
-    for letter, title, entries in formulas(symbolic):
-        equations.append(f"<h2>{html.escape(title[0].upper() + title[1:])}</h2>")
-        if fits(entries):
-            rows = "".join(f"<mtr>{''.join(f'<mtd>{mathml(e)}</mtd>' for e in row)}</mtr>" for row in entries)
-            matrix = f"<mi>{letter}</mi><mo>=</mo><mo>(</mo><mtable>{rows}</mtable><mo>)</mo>"
-            equations.append(f"<p><math>{matrix}</math></p>")
-        else:
-            equations += [
-                f'<p class="entry"><math>{in_mathml(Token(name))}<mo>=</mo></math> {in_lines(formula)}</p>'
-                for name, formula in labelled(letter, entries)
-            ]
-    joints = [(mathml_of(symbolic.display[q]), html.escape(text)) for q, text in zip(symbolic.q, symbolic.joints)]
-    rows = [
-        (mathml_of(symbolic.display[symbol]), f"{row.value:.6g}", row.unit.replace("2", "²"), html.escape(row.meaning))
-        for symbol, row in symbolic.parameters.items()
-    ]
-    tables = [
-        f"<table>{''.join('<tr>' + ''.join(f'<td>{cell}</td>' for cell in row) + '</tr>' for row in part)}</table>"
-        for part in (joints, rows)
-        if part
-    ]
-    return HTML.format(
-        comment=html.escape("\n".join(head_lines)).replace("--", "- -"),
-        motion=MOTION_IN_HTML,
-        text=html.escape(" ".join(head(symbolic))),
-        tables="\n".join(tables),
-        equations="\n".join(equations),
-    )
-
-
-MOTION_IN_HTML = "<i>M</i>(<i>q</i>) <i>q̈</i> + <i>h</i>(<i>q</i>, <i>q̇</i>) = <i>τ</i> − <i>D q̇</i> − <i>K</i> (<i>q − q</i><sub>0</sub>)"
-
-
-def mathml_of(display: str) -> str:
-    return f"<math>{in_mathml(Token(display))}</math>"
-
-
-def mathml(formula) -> str:
-    """A formula with a narrow space between factors."""
-    text = ""
-    for token, before in zip(formula, [Token("", "open"), *formula]):
-        factors = token.kind not in ("operator", "close") and before.kind not in ("operator", "open")
-        text += "<mspace width='0.17em'/>" * factors + in_mathml(token)
-    return f"<mrow>{text or '<mn>0</mn>'}</mrow>"
-
-
-def in_lines(formula) -> str:
-    """A formula in pieces that end where a line may be broken: before an operator."""
-    pieces = [[]]
-    for token in formula:
-        if token.kind == "operator" and pieces[-1]:
-            pieces.append([])
-        pieces[-1].append(token)
-    return "<wbr>".join(f"<math>{mathml(piece)}</math>" for piece in pieces)
-
-
-def in_mathml(token) -> str:
-    """A token; symbols are read from their LaTeX, such as \\dot{q}_{1}."""
-    if token.kind == "symbol":
-        dot, name, index = re.fullmatch(r"(\\dot)?[{\\]*(\w+?)}?(?:_\{?(.*?)\}?)?", token.text).groups()
-        text = f"<mi>{f'&{name};' if len(name) > 1 else name}</mi>"
-        text = f'<mover accent="true">{text}<mo>˙</mo></mover>' if dot else text
-        text = f"<msub>{text}<mrow><mi mathvariant='normal'>{index}</mi></mrow></msub>" if index else text
-    elif token.kind == "function":
-        text = f"<mi>{token.text}</mi>"
-    elif token.kind == "number":
-        text = f"<mn>{token.text}</mn>"
-    else:
-        space = 0.25 * (token.kind == "operator")
-        sign = token.text.replace("-", "\N{MINUS SIGN}")
-        text = f'<mo stretchy="false" lspace="{space}em" rspace="{space}em">{sign}</mo>'
-    return f"<msup>{text}<mn>{token.power}</mn></msup>" if token.power else text
-
-
-# Python
-
-PYTHON = """{comment}
-import sympy
-from sympy import cos, sin
-
-q = {q} = sympy.symbols({q_names!r}, seq=True)
-qd = {qd} = sympy.symbols({qd_names!r}, seq=True)
-joint_names = {joint_names!r}
-{parameters}
-{matrices}
-"""
-
-
-def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
-    """Python text with SymPy: the symbols, `parameters` {{symbol: value}}, the matrices M, h and G with the symbols, and pairs of
-    a matrix with numbers and the list of its symbols, as compare.assert_agrees takes them: mass_matrix, bias, gravity."""
-    from sympy.printing.str import StrPrinter
-
-    class Printer(StrPrinter):
-        def _print_Float(self, expr):
-            return repr(float(expr))
-
-    lines = [
-        f"{symbol} = sympy.Symbol({str(symbol)!r})  # {row.meaning}, {row.unit}"
-        for symbol, row in symbolic.parameters.items()
-    ]
-    values = ", ".join(f"{symbol}: {row.value!r}" for symbol, row in symbolic.parameters.items())
-    lines.append(f"parameters = {{{values}}}")
-    matrices = []
-    for name, matrix in symbolic.entries.items():
-        letter, title = TITLES[name]
-        rows = [",\n".join(f"    [{', '.join(Printer().doprint(entry) for entry in row)}]" for row in matrix.tolist())]
-        symbols = "[*q, *qd]" if name == "bias" else "[*q]"
-        own = {"gravity_balance": "gravity"}.get(name, name)
-        matrices.append(
-            f"# {title}\n{letter} = sympy.Matrix([\n{rows[0]},\n])\n{own} = ({letter}.subs(parameters), {symbols})"
-        )
-    return PYTHON.format(
-        comment="\n".join(f"# {line}" for line in head_lines),
-        q=", ".join(map(str, symbolic.q)) + ",",
-        qd=", ".join(map(str, symbolic.qd)) + ",",
-        q_names=" ".join(map(str, symbolic.q)),
-        qd_names=" ".join(map(str, symbolic.qd)),
-        joint_names=list(symbolic.joint_names),
-        parameters="\n".join(lines),
-        matrices="\n".join(matrices),
-    )
