@@ -31,7 +31,7 @@ class Pairs(NamedTuple):
 
 
 def exact_of_many(tree, name: str, q, qd, tau) -> Pairs:
-    """A quantity at q (states, nq), qd, tau (states, nv), taken as what their doubles are exactly; shapes and units as in `tmt`."""
+    """A quantity at q (states, nq), qd, tau (states, nv): doubles, taken as exact. Shapes and units as in `tmt`."""
     states, shape = np.concatenate([q, qd, tau], axis=1), shape_of(name, tree)
     if not len(states):
         return Pairs(*np.empty((2, 0, *shape)))

@@ -9,17 +9,18 @@ from .symbols import Symbolic
 
 HTML = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>Equations of motion</title>
-<!-- {comment} -->
 <style>
 body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }}
 td {{ padding: 0 1rem 0 0; }} td.value {{ text-align: right; }} h2 {{ font-size: 1.1rem; margin-top: 1.5rem; }}
-.entry {{ padding-left: 2rem; text-indent: -2rem; margin: .5rem 0; line-height: 1.9; }} math {{ font-size: 1.05em; }}
+.entry {{ padding-left: 2rem; text-indent: -2rem; margin: .5rem 0; line-height: 1.9; }}
+pre {{ font-size: .75rem; color: #555; white-space: pre-wrap; margin-top: 3rem; }} math {{ font-size: 1.05em; }}
 </style></head><body>
 <h1>Equations of motion</h1>
 <p><i>M</i>(<i>q</i>) <i>q̈</i> + <i>h</i>(<i>q</i>, <i>q̇</i>) = <i>τ − D q̇ − K</i> (<i>q − q</i><sub>0</sub>)</p>
 <p>{text}</p>
 {tables}
 {equations}
+<pre>{lines}</pre>
 </body></html>
 """
 
@@ -49,7 +50,7 @@ def page(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
         if part
     ]
     return HTML.format(
-        comment=html.escape("\n".join(head_lines)).replace("--", "- -"),
+        lines=html.escape("\n".join(head_lines)),
         text=html.escape(" ".join(head(symbolic))),
         tables="\n".join(tables),
         equations="\n".join(equations),

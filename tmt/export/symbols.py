@@ -9,8 +9,8 @@ from tmt.arm import ARM
 from tmt.derivation.quantities import State
 from tmt.model.tree import Tree
 
-from .forms import Forms
 from .names import EPS, Names, number
+from .shortest import Forms
 from .trigonometry import Ring, TooLong
 
 QUANTITIES = ("mass_matrix", "bias", "gravity_balance")
