@@ -3,14 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tmt.exact.many import Pairs
-
 from .finding import Finding
 from .scale import EPS, FACTOR
+
+if TYPE_CHECKING:
+    from tmt.exact.many import Pairs
 
 RULES = {  # which values pass
     "at most": lambda value, tolerance: value <= tolerance,
@@ -108,7 +110,7 @@ class Result:
         self.checks.append(check)
         return check
 
-    def agree(self, sample, quantity, unit, values, mujoco_values, scale, exact: Pairs | None = None) -> None:
+    def agree(self, sample, quantity, unit, values, mujoco_values, scale, exact: "Pairs | None" = None) -> None:
         """Add a row and a check: of the differences between two engines over the states, the one closest to its tolerance.
 
         values, mujoco_values: (states, ...). scale: a number or (states,), or with as many dimensions as the values for a

@@ -1,13 +1,17 @@
 """The states at which engines are compared: named postures and random states."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
-from tmt.exact.many import Pairs, exact_of_many
 
 from ..judge.finding import Finding
 from . import Robot
 from .case import SEED
+
+if TYPE_CHECKING:
+    from tmt.exact.many import Pairs
 
 MOST_SPEEDS = 120  # of a robot that has exact values
 SHOWN_NUMBERS = 8  # maximum size of q in a sentence
@@ -25,8 +29,10 @@ class Sample:
         self.exact_states, self.states, self.notes = exact_states, states, notes
         self.found = {}
 
-    def exact(self, function: str, part: int | None = None) -> Pairs:
+    def exact(self, function: str, part: int | None = None) -> "Pairs":
         """The exact values of a function of tmt, or of one of its arrays, at the first states."""
+        from tmt.exact.many import exact_of_many  # loads the compiler
+
         if function not in self.found:
             states = (values[: self.exact_states] for values in (self.q, self.qd, self.tau))
             self.found[function] = exact_of_many(self.tree, function, *states)
