@@ -15,6 +15,7 @@ from compare.export import checks
 from compare.export.command import FILES, identifier
 from compare.export.programs import NotRun, Program, PythonProgram, WrongProgram
 from compare.process.crash import Refused
+from compare.robots.arm import ARM
 from compare.run.reference import compared_with
 from tmt.derivation.quantities import QUANTITIES
 
@@ -151,3 +152,18 @@ def test_a_wrong_request_gets_one_line_and_status_2(words, why, tmp_path, monkey
 )
 def test_the_name_of_a_file_becomes_an_identifier(stem, name):
     assert identifier(stem) == name
+
+
+@pytest.mark.parametrize("from_mujoco", [True, False])
+def test_values_are_compared_with_mujoco_and_with_the_exact_value(from_mujoco, tmp_path):
+    heavy = tmp_path / "heavy.xml"
+    heavy.write_text(text_of_arm().replace('mass="1.5"', 'mass="1.6"'), encoding="utf-8")
+    compared = compared_with("arm", str(heavy))  # the stated numbers, and MuJoCo with another mass
+    tree = compared.robot.tree if from_mujoco else compared_with("model", str(heavy)).robot.tree
+    outcome, _ = checks.checked(compared, partial(Altered, tree, "", 0.0), ["mass_matrix"], COUNT, False)
+    (row,) = outcome.rows
+    assert not row.passed and (row.of_mujoco > 1.0, row.of_exact > 1.0) == (from_mujoco, not from_mujoco)
+
+
+def text_of_arm():
+    return ARM.mjcf.read_text(encoding="utf-8")
