@@ -252,7 +252,10 @@ def page(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     )
 
 
-MOTION_IN_HTML = "<i>M</i>(<i>q</i>) <i>q̈</i> + <i>h</i>(<i>q</i>, <i>q̇</i>) = <i>τ</i> − <i>D q̇</i> − <i>K</i> (<i>q − q</i><sub>0</sub>)"
+MOTION_IN_HTML = (
+    "<i>M</i>(<i>q</i>) <i>q̈</i> + <i>h</i>(<i>q</i>, <i>q̇</i>) = "
+    "<i>τ</i> − <i>D q̇</i> − <i>K</i> (<i>q − q</i><sub>0</sub>)"
+)
 
 
 def mathml_of(display: str) -> str:

@@ -14,9 +14,10 @@ from tmt.model.tree import Tree
 from .trigonometry import Ring, TooLong
 
 QUANTITIES = ("mass_matrix", "bias", "gravity_balance")
-GREEK = frozenset(
-    ["alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "mu", "nu", "xi", "rho", "sigma", "tau", "phi", "chi", "psi", "omega"]
-)
+GREEK = frozenset([
+    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "mu", "nu", "xi", "rho", "sigma", "tau",
+    "phi", "chi", "psi", "omega",
+])  # fmt: skip
 EPS = 2.0**-52
 ROUND = 16 * EPS  # relative: a number this close to one of 10 digits is meant to be that
 TINY = 1e-12  # of the largest component of a vector or tensor: meant to be zero
