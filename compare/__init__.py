@@ -11,10 +11,15 @@ number of Mbar where a linear system is solved; of a trajectory a band, the roun
 present by the exact Jacobians of the method's own steps. Each section of a report states its own.
 """
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .agreement import assert_agrees, differences
+
 __all__ = ["assert_agrees", "differences"]
 
 
-def __getattr__(name: str):
+def __getattr__(name: str) -> object:
     """The two functions when they are asked for: whoever starts `python -m compare` need not wait for them."""
     if name in __all__:
         from . import agreement

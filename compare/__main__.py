@@ -55,7 +55,7 @@ if __name__ == "__main__":
     try:
         status = main()
     except SystemExit as stop:  # --help, or a wrong word
-        status = stop.code
+        status = int(stop.code or 0)
     interrupt.settle()
     interrupt.clear_up()
     for stream in (sys.stdout, sys.stderr):

@@ -3,23 +3,24 @@
 For test_command_line, test_help, and the tests of fleet, process and report.
 """
 
-import fcntl
 import os
-import pty
 import re
 import select
 import signal
 import struct
 import subprocess
 import sys
-import termios
 import time
 from pathlib import Path
 from types import SimpleNamespace
 
+import pytest
+
 ROOT = Path(__file__).resolve().parent.parent
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
 SECOND = 1.0  # an interrupt is answered within
+IS_POSIX = os.name == "posix"
+posix = pytest.mark.skipif(not IS_POSIX, reason="needs POSIX: its signals, limits or shell")
 
 
 def command(*arguments):
@@ -34,12 +35,15 @@ def compare(*arguments, cwd, env=None, **options):
 
 def in_shell(text, cwd):
     """A line of a shell, in which `compare` stands for the command line; its exit status is that of `compare`."""
+    if not IS_POSIX:
+        pytest.skip("needs bash")
     text = text.replace("compare", f"{sys.executable} -m compare")
     return subprocess.run(["bash", "-c", text], cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True)
 
 
 def on_terminal(arguments, columns, term, cwd, interrupt_at=None):
     """A run on a pseudo-terminal: status, output. interrupt_at: what stands in the output when the key Ctrl-C is pressed."""
+    fcntl, pty, termios = map(pytest.importorskip, ("fcntl", "pty", "termios"))
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
 
@@ -85,6 +89,9 @@ def readable_lines(run) -> list[str]:
 def started(*arguments, cwd, env=None):
     """A run in a process group of its own, as a terminal's, that hears Ctrl-C."""
 
+    if not IS_POSIX:
+        pytest.skip("needs process groups")
+
     def hearing():  # a shell starts what runs in its background deaf to Ctrl-C
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
@@ -93,10 +100,10 @@ def started(*arguments, cwd, env=None):
     return subprocess.Popen(arguments, cwd=cwd, env=environment, start_new_session=True, preexec_fn=hearing, **pipes)
 
 
-def ended(run, number):
+def ended(run, name):
     """A run that gets this signal: status, lines on stderr, seconds until it ended; all of its processes end with it."""
     sent = time.perf_counter()
-    os.killpg(run.pid, number)
+    os.killpg(run.pid, getattr(signal, name))
     status = run.wait(timeout=60)
     seconds = time.perf_counter() - sent
     lines = run.communicate()[1].splitlines()

@@ -11,6 +11,7 @@ import pytest
 from mutations.__main__ import main
 from mutations.edit import DoesNotApply, Edit, applied
 from mutations.edits import EDITS
+from runs import posix
 
 PROJECT = Path(__file__).resolve().parent.parent
 
@@ -98,6 +99,7 @@ def runs(pid) -> bool:
 
 
 @pytest.mark.slow
+@posix
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_ends_it_and_leaves_nothing(toy, tmp_path, number):
     asleep, scratch = tmp_path / "asleep", tmp_path / "scratch"

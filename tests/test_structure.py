@@ -1,15 +1,11 @@
 """The parts of the project and the directions of their imports."""
 
-import ast
 import re
 import sys
-from functools import cache
 from graphlib import TopologicalSorter
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-FILES = sorted((ROOT / "compare").rglob("*.py"))
-OF_TMT = sorted((ROOT / "tmt").rglob("*.py"))
+import architecture
+from architecture import FILES, OF_TMT, ROOT, dotted, imports, modules_imported
 
 # what each part of compare may import of the others; of its own part: anything that makes no circle
 DIRECTIONS = {
@@ -48,38 +44,12 @@ LIBRARIES = {
 DRAWING = ("matplotlib", "PIL")  # for modules whose name begins with figures, too
 
 
-def dotted(path) -> str:
-    """The name of a file as a module."""
-    parts = path.relative_to(ROOT).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-MODULES = {dotted(file) for file in FILES}
-
-
-@cache
-def imports(path) -> frozenset[str]:
-    """Full names of what a file imports, wherever in it: a module, or a name in one."""
-    package = dotted(path) if path.name == "__init__.py" else dotted(path).rpartition(".")[0]
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            base = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
-            start = ".".join([*base, *filter(None, [node.module])])
-            found |= {f"{start}.{alias.name}" for alias in node.names}
-    return frozenset(found)
-
-
 def libraries(path) -> set[str]:
     return {name.split(".")[0] for name in imports(path)}
 
 
-@cache
-def modules_imported(path) -> set[str]:
-    """The modules of compare that a file imports."""
-    return {name if name in MODULES else name.rpartition(".")[0] for name in imports(path)} & MODULES - {dotted(path)}
+def modules_of_compare(path) -> set[str]:
+    return {name for name in modules_imported(path) if name.startswith("compare")}
 
 
 def part(module) -> str:
@@ -98,7 +68,7 @@ def test_imports_keep_their_directions():
     for path in FILES:
         mine, own = part(dotted(path)), dotted(path).split(".")[:3]
         allowed = {mine, *DIRECTIONS.get(mine, "").split()}
-        for name in modules_imported(path):
+        for name in modules_of_compare(path):
             said = f"{dotted(path)} imports {name}"
             is_style = path.stem.startswith("figures") and name == "compare.report.style"
             assert part(name) in allowed or is_style or name == "compare.report.text", said
@@ -113,7 +83,20 @@ def test_imports_keep_their_directions():
 
 
 def test_there_is_no_circle():
-    TopologicalSorter({dotted(path): modules_imported(path) for path in FILES}).prepare()
+    TopologicalSorter({dotted(path): modules_of_compare(path) for path in FILES}).prepare()
+
+
+def test_the_picture_shows_the_imports_of_all_folders():
+    """An import that has no arrow follows from arrows; and no arrow is without an import."""
+    counts = architecture.folder_imports()
+    pairs, boxes = architecture.arrows(counts), architecture.BOXES.keys()
+    assert boxes == {folder for pair in counts for folder in pair} and counts.keys() >= {*pairs}
+    assert all(architecture.reached(pairs, folder) == architecture.reached(counts, folder) for folder in boxes)
+    (ax,) = architecture.draw().axes
+    drawn = [tuple(patch.get_gid().split()) for patch in ax.patches if patch.get_gid()]
+    both = [(other, one) for one, other in drawn if (other, one) in pairs]
+    assert sorted(drawn + both) == sorted(pairs)
+    assert architecture.PICTURE.stat().st_size < 60_000
 
 
 def test_ci_runs_the_commands_of_the_readme():

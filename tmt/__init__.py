@@ -61,8 +61,20 @@ __all__ = [
 def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Positions x_b of the centres of mass in the inertial frame, m, shape (..., m, 3).
 
-    q: joint positions (..., nq), rad. Assignment, part b, equation (1).
+    Assignment, part b, equation (1).
 
+    Parameters
+    ----------
+    q : (..., nq), rad
+        Joint positions.
+    model : Tree, default ARM
+
+    Returns
+    -------
+    (..., m, 3), m
+
+    Examples
+    --------
     >>> print(tmt.com_positions([0.0, 0.0, 0.0]))  # the upper arm hangs, the forearm points ahead
     [[ 0.    0.   -0.15]
      [ 0.15  0.   -0.3 ]]
@@ -73,8 +85,20 @@ def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 def angular_velocities(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Angular velocities omega_b = B_b qd in body axes, rad/s, shape (..., m, 3).
 
-    q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Assignment, part d.
+    Assignment, part d.
 
+    Parameters
+    ----------
+    q, qd : (..., nq) and (..., nv), rad and rad/s
+        Joint positions and speeds.
+    model : Tree, default ARM
+
+    Returns
+    -------
+    (..., m, 3), rad/s
+
+    Examples
+    --------
     >>> print(tmt.angular_velocities([0.0, 0.0, 0.0], [1.0, 0.0, 2.0]))  # alpha and gamma both turn about y
     [[0. 1. 0.]
      [0. 3. 0.]]
@@ -85,8 +109,20 @@ def angular_velocities(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.nda
 def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     """T_b = dx_b/dq in the inertial frame, m/rad, and B_b with omega_b = B_b qd in body axes; both (..., m, 3, nv).
 
-    q: joint positions (..., nq), rad. Assignment, parts d and e.
+    Assignment, parts d and e.
 
+    Parameters
+    ----------
+    q : (..., nq), rad
+        Joint positions.
+    model : Tree, default ARM
+
+    Returns
+    -------
+    T, B : (..., m, 3, nv), m/rad and 1
+
+    Examples
+    --------
     >>> T, B = tmt.jacobians([0.0, 0.0, 0.0])
     >>> print(T[1, :, 2], B[1, :, 2])  # gamma lowers the forearm, 0.15 m ahead of the elbow
     [ 0.    0.   -0.15] [0. 1. 0.]
@@ -97,9 +133,20 @@ def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
 def convective_terms(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     """v_conv = d(T_b qd)/dq qd, m/s2, inertial frame, and w_conv = d(B_b qd)/dq qd, rad/s2, body axes.
 
-    q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Both results are (..., m, 3).
     h_b and g_b in the assignment, part e.
 
+    Parameters
+    ----------
+    q, qd : (..., nq) and (..., nv), rad and rad/s
+        Joint positions and speeds.
+    model : Tree, default ARM
+
+    Returns
+    -------
+    v_conv, w_conv : (..., m, 3), m/s2 and rad/s2
+
+    Examples
+    --------
     >>> v_conv, w_conv = tmt.convective_terms([0.0, 0.0, 0.0], [0.0, 0.0, 2.0])
     >>> print(v_conv[1])  # towards the elbow: 0.15 m times (2 rad/s)^2
     [-0.6  0.   0. ]
@@ -110,8 +157,20 @@ def convective_terms(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> tuple[np
 def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Reduced mass matrix Mbar = sum T' m T + B' I B, kg m2, shape (..., nv, nv), symmetric positive definite.
 
-    q: joint positions (..., nq), rad. Assignment, part e.
+    Assignment, part e.
 
+    Parameters
+    ----------
+    q : (..., nq), rad
+        Joint positions.
+    model : Tree, default ARM
+
+    Returns
+    -------
+    (..., nv, nv), kg m2
+
+    Examples
+    --------
     >>> print(tmt.mass_matrix([0.0, 0.0, 0.0])[2, 2].round(9))  # of the elbow: 0.019 + 1.5 kg (0.15 m)^2
     0.05275
     """
@@ -121,9 +180,20 @@ def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 def bias(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Bias h = Coriolis, centrifugal and gravity terms, N m, shape (..., nv): Mbar qdd + h = tau - D qd.
 
-    q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. It is -Qbar at tau = 0 (assignment, part e)
-    without the joint damping D, and MuJoCo's qfrc_bias.
+    It is -Qbar at tau = 0 (assignment, part e) without the joint damping D, and MuJoCo's qfrc_bias.
 
+    Parameters
+    ----------
+    q, qd : (..., nq) and (..., nv), rad and rad/s
+        Joint positions and speeds.
+    model : Tree, default ARM
+
+    Returns
+    -------
+    (..., nv), N m
+
+    Examples
+    --------
     >>> print(tmt.bias([0.0, 0.0, np.pi / 2], [0.0, 0.0, 5.0]).round(9) + 0.0)  # the arm hangs, the elbow turns
     [0. 0. 0.]
     """
@@ -133,8 +203,20 @@ def bias(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
 def gravity_balance(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Torque +dV/dq that holds the model at rest, N m, shape (..., nv).
 
-    q: joint positions (..., nq), rad. Assignment, parts c and h; MuJoCo's qfrc_bias at rest.
+    Assignment, parts c and h; MuJoCo's qfrc_bias at rest.
 
+    Parameters
+    ----------
+    q : (..., nq), rad
+        Joint positions.
+    model : Tree, default ARM
+
+    Returns
+    -------
+    (..., nv), N m
+
+    Examples
+    --------
     >>> print(tmt.gravity_balance([0.0, 0.0, np.pi / 2]).round(9) + 0.0)  # the arm hangs
     [0. 0. 0.]
     """
@@ -144,8 +226,20 @@ def gravity_balance(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 def spring_torque(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Torque k (q - rest) that holds the springs of the joints, N m, shape (..., nv): of a ball k times the turn from its rest.
 
-    q: joint positions (..., nq), rad. With `gravity_balance` it is the torque that holds the model at rest.
+    With `gravity_balance` it is the torque that holds the model at rest.
 
+    Parameters
+    ----------
+    q : (..., nq), rad
+        Joint positions.
+    model : Tree, default ARM
+
+    Returns
+    -------
+    (..., nv), N m
+
+    Examples
+    --------
     >>> sprung = dataclasses.replace(tmt.ARM, stiffness=(0.0, 0.0, 4.0))
     >>> print(tmt.spring_torque([0.0, 0.0, 0.5], sprung))
     [0. 0. 2.]
@@ -156,9 +250,20 @@ def spring_torque(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Accelerations qdd from Mbar qdd = tau - D qd - k (q - rest) - P q - S qd - h, rad/s2, shape (..., nv).
 
-    q, qd, tau: joint positions (..., nq), speeds and torques (..., nv), rad, rad/s, N m. P and S: the model's position_gain and
-    speed_gain. Assignment, parts e and f.
+    P and S: the model's position_gain and speed_gain. Assignment, parts e and f.
 
+    Parameters
+    ----------
+    q, qd, tau : (..., nq), (..., nv) and (..., nv), rad, rad/s and N m
+        Joint positions, speeds and torques.
+    model : Tree, default ARM
+
+    Returns
+    -------
+    (..., nv), rad/s2
+
+    Examples
+    --------
     >>> q, rest = np.array([0.5, 0.3, 1.0]), np.zeros(3)
     >>> print(tmt.acceleration(q, rest, tmt.gravity_balance(q)).round(9) + 0.0)  # it is held
     [0. 0. 0.]
@@ -169,8 +274,18 @@ def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM)
 def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Potential energy V, J, shape (...), zero with every centre of mass at the height of the origin, and springs at rest.
 
-    q: joint positions (..., nq), rad.
+    Parameters
+    ----------
+    q : (..., nq), rad
+        Joint positions.
+    model : Tree, default ARM
 
+    Returns
+    -------
+    (...), J
+
+    Examples
+    --------
     >>> print(tmt.potential_energy([0.0, 0.0, np.pi / 2]).round(9))  # -9.81 (1.9 0.15 + 1.5 (0.3 + 0.15))
     -9.4176
     """
@@ -180,9 +295,20 @@ def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Total energy, kinetic and potential, J, shape (...); infinite where it is beyond the largest double.
 
-    q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Its zero is that of `potential_energy`; the model's
-    position_gain adds nothing to it.
+    Its zero is that of `potential_energy`; the model's position_gain adds nothing to it.
 
+    Parameters
+    ----------
+    q, qd : (..., nq) and (..., nv), rad and rad/s
+        Joint positions and speeds.
+    model : Tree, default ARM
+
+    Returns
+    -------
+    (...), J
+
+    Examples
+    --------
     >>> print(tmt.energy([0.0, 0.0, np.pi / 2], [0.0, 0.0, 2.0]).round(9))  # -9.4176 + 0.05275 2^2 / 2
     -9.3121
     """
@@ -200,12 +326,33 @@ def equations(
 ) -> str:
     """The equations of a model as text in another language, with the model's numbers, for use without this package.
 
-    language: "c" (C99 with math.h alone, no allocation) and "c header"; "python" (NumPy alone, any batch); "matlab" (and Octave,
-    one file, states as columns); "latex", "html" and "sympy": simplified, with a symbol for each parameter, for some six hinges
-    and slides (needs SymPy). quantities: functions of this package of those names; units, signs and shapes are theirs; with
-    symbols: mass_matrix, bias, gravity_balance. name: of the file, which begins the names of C functions. single: float in C.
-    head: lines that begin the comment at its head. Raises ValueError for anything else.
+    Parameters
+    ----------
+    model : Tree, default ARM
+    language : {"c", "c header", "python", "matlab", "latex", "html", "sympy"}
+        C99 with math.h alone, no allocation; Python with NumPy alone, any batch; MATLAB and Octave, one file, states as columns.
+        The last three are simplified, with a symbol for each parameter, for some six hinges and slides (needs SymPy).
+    quantities : sequence of str
+        Functions of this package of those names; units, signs and shapes are theirs. With symbols: mass_matrix, bias,
+        gravity_balance.
+    name : str
+        Of the file, which begins the names of C functions.
+    single : bool
+        float in C.
+    head : sequence of str
+        Lines that begin the comment at its head.
 
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ValueError
+        For a language, quantity or name that is not one.
+
+    Examples
+    --------
     >>> print(tmt.equations(language="python", quantities=["gravity_balance"]).splitlines()[-1].strip())
     return out.reshape(*batch, 3)
     """

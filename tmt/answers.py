@@ -5,9 +5,12 @@ answers where nothing is wrong with what is given; whatever is, the literal form
 """
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy import ndarray
+from numpy.typing import ArrayLike
 
 from tmt import literal
 from tmt.arm import ARM
@@ -20,16 +23,15 @@ from tmt.model.values import real_numbers
 
 MOST = 64  # models that are held
 DOUBLE = np.dtype(float)
-known = {}
+known: dict[int, "Answers"] = {}
 
 
-def answered(quantity: str, model: Tree, *given):
+def answered(quantity: str, model: Tree, *given: ArrayLike) -> Any:
     """The quantity of states of any batch shape: what the function of that name in literal.py returns.
 
     given: q, or q and qd, or q, qd and tau, as that function takes them.
     """
-    answers = known.get(id(model)) or (isinstance(model, Tree) and answers_of(model))
-    if answers:
+    if answers := known.get(id(model)) or (answers_of(model) if isinstance(model, Tree) else None):
         found = answers.of_one(quantity, given)
         if found is None:
             found = answers.of_any(quantity, given)
@@ -48,9 +50,21 @@ def answers_of(model: Tree) -> "Answers":
 def prepare(model: Tree = ARM, *quantities: str) -> None:
     """Have machine code answer for a model from now on, so that no call of up to some hundred states waits: in a controller.
 
-    quantities: names of functions of `tmt`; all without any. The first time on a machine all take about a second for an arm and
-    several for a humanoid. ValueError if the model is no Tree or there is no such quantity.
+    The first time on a machine all take about a second for an arm and several for a humanoid.
 
+    Parameters
+    ----------
+    model : Tree, default ARM
+    *quantities : str
+        Names of functions of `tmt`; all without any.
+
+    Raises
+    ------
+    ValueError
+        If the model is no Tree or there is no such quantity.
+
+    Examples
+    --------
     >>> forearm = tmt.ARM.lock({"alpha": 0.0, "beta": 0.0})
     >>> tmt.prepare(forearm)
     >>> print(tmt.gravity_balance([0.0], forearm).round(9))  # -1.5 9.81 0.15
@@ -70,16 +84,16 @@ class Answers:
         self.tree = tree  # held, so that no other has its id
         self.compiled = {name: Evaluator(tree, name) for name in QUANTITIES}
         self.asked = dict.fromkeys(QUANTITIES, 0)
-        self.ready = {}  # those of one state that are compiled
+        self.ready: dict[str, Callable[..., Any]] = {}  # those of one state that are compiled
         self.shapes = [(tree.coordinates.nq,), (tree.coordinates.nv,), (tree.coordinates.nv,)]
         self.may_be_singular = not tree.never_singular
 
-    def get(self, quantity) -> None:
+    def get(self, quantity: str) -> None:
         """Have machine code answer for single states."""
         if quantity not in self.ready:
             self.ready[quantity] = self.compiled[quantity].single()
 
-    def of_one(self, quantity, given):
+    def of_one(self, quantity: str, given: tuple[Any, ...]) -> Any:
         """The quantity of one state that is given in plain arrays; None where nothing is compiled, or something is wrong."""
         evaluate = self.ready.get(quantity)
         if evaluate is None or (self.may_be_singular and quantity == "acceleration"):
@@ -89,13 +103,12 @@ class Answers:
                 return None
         return evaluate(*given)
 
-    def of_any(self, quantity, given):
+    def of_any(self, quantity: str, given: tuple[Any, ...]) -> Any:
         """The quantity of states of any batch shape; None where the literal form is to answer."""
         with np.errstate(all="ignore"):  # of numbers beyond the largest double, which the literal form refuses
-            arrays = [x if type(x) is ndarray and x.dtype is DOUBLE else real_numbers(x) for x in given]
-        if any(
-            array is None or not array.ndim or array.shape[-1:] != shape for array, shape in zip(arrays, self.shapes)
-        ):
+            found = [x if type(x) is ndarray and x.dtype is DOUBLE else real_numbers(x) for x in given]
+        arrays = [x for x, shape in zip(found, self.shapes) if x is not None and x.ndim and x.shape[-1:] == shape]
+        if len(arrays) < len(given):
             return None
         try:
             batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
@@ -115,7 +128,7 @@ class Answers:
         except MemoryError:
             return None
 
-    def is_singular(self, q) -> bool:
+    def is_singular(self, q: ndarray) -> bool:
         """Whether Mbar may be singular at a position among these, or cannot be told here."""
         q = q.reshape(-1, q.shape[-1])
         M = self.compiled["mass_matrix"].of_rows(np.ascontiguousarray(q))

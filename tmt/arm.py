@@ -5,9 +5,11 @@ upper arm points along -z and the forearm along +x. The same numbers stand in mj
 the two models share nothing, and a test ties them.
 """
 
+from collections.abc import Sequence
+
 from tmt.derivation.method import joint_frames
 from tmt.derivation.vectors import Vector
-from tmt.model.tree import Tree
+from tmt.model.tree import Rows, Tree
 
 G = 9.81  # m/s2, along -z
 D = 0.3  # m, upper arm, shoulder to elbow
@@ -20,7 +22,7 @@ I1 = (0.015, 0.014, 0.002)  # kg m2, about the CoM, principal axes = body axes
 I2 = (0.001, 0.019, 0.019)  # kg m2
 
 
-def _diagonal(moments):
+def _diagonal(moments: tuple[float, float, float]) -> Rows:
     x, y, z = moments
     return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
 
@@ -40,7 +42,7 @@ ARM = Tree(
 )
 
 
-def points(q) -> list:
+def points(q: Sequence[float]) -> list[Vector]:
     """Shoulder, elbow and finger tips in the world, three Vectors in m, at hinge angles q (3 scalars, rad)."""
     frames = joint_frames(ARM, q)
     elbow, turn = frames[2].origin, frames[2].turn

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,27 +20,42 @@ DOUBLE = np.dtype(float)
 
 
 class _Path(NamedTuple):
-    t: np.ndarray  # (records,) s
-    q: np.ndarray  # (..., records, nq) rad
-    qd: np.ndarray  # (..., records, nv) rad/s
+    t: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
 
 
 class Motion(_Path):
-    """The t, q, qd of a simulation, and what else is known of it.
+    """The t, q, qd of a simulation, which it unpacks into, and what else is known of it.
 
-    ended: why a run ended early, a line that says when, or None; for a batch an array of its shape. Its states are NaN from
-    there on. evaluations: of the dynamics, of all runs; those of an implicit method with their Jacobian.
+    Attributes
+    ----------
+    t : (records,), s
+    q, qd : (..., records, nq) and (..., records, nv), rad and rad/s
+        NaN from where a run ended early.
+    ended : str, None, or array of them in the shape of the batch
+        Why a run ended early, a line that says when.
+    evaluations : int
+        Of the dynamics, of all runs; those of an implicit method with their Jacobian.
+
+    Examples
+    --------
+    >>> motion = tmt.simulate([0.0] * 3, [0.0] * 3, [0.0] * 3, dt=0.01, steps=10)
+    >>> print(motion.ended, motion.evaluations)  # four stages in each step
+    None 40
     """
 
     ended: str | np.ndarray | None
     evaluations: int
 
-    def __new__(cls, t, q, qd, ended, evaluations):
+    def __new__(
+        cls, t: np.ndarray, q: np.ndarray, qd: np.ndarray, ended: str | np.ndarray | None, evaluations: int
+    ) -> "Motion":
         motion = super().__new__(cls, t, q, qd)
         motion.ended, motion.evaluations = ended, evaluations
         return motion
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         """How a copy is made, in this process or another."""
         return type(self), (*self, self.ended, self.evaluations)
 
@@ -51,16 +66,36 @@ def simulate(
 ) -> Motion:  # fmt: skip
     """Motion under constant torque: t (records,) s, q (..., records, nq) and qd (..., records, nv), rad and rad/s.
 
-    q (..., nq), qd (..., nv): state at t = 0; tau (..., nv): torque. dt: step in s, above 0; steps: how many, at least 1; every:
-    every n-th state alone is kept, n a divisor of steps: records = steps / every + 1. method: a key of METHODS,
-    or "taylor". An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of each, in units of
-    1 + |value|. "taylor" is the true motion, rounded once (default tolerance 1e-33): a Taylor series in pairs of doubles, whose
-    evaluations are its steps.
-
     A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad, Mbar is singular,
     Newton's method does not find the stages of an implicit method, an adaptive method would need steps below 1e-9 dt, or series
     take too many: `ended` of the result says which. Assignment, part i.
 
+    Parameters
+    ----------
+    q, qd : (..., nq) and (..., nv), rad and rad/s
+        State at t = 0.
+    tau : (..., nv), N m
+        Torque.
+    dt : float, s
+        Step, above 0.
+    steps : int
+        How many, at least 1.
+    method : str, default "rk4"
+        A key of METHODS, or "taylor": the true motion, rounded once, a Taylor series in pairs of doubles, whose evaluations are
+        its steps. An adaptive method takes its own steps between those.
+    model : Tree, default ARM
+    tolerance : float, default 1e-9, of "taylor" 1e-33
+        Of adaptive methods: the error of each step, in units of 1 + |value|.
+    every : int, default 1
+        Every n-th state alone is kept, n a divisor of steps: records = steps / every + 1.
+
+    Returns
+    -------
+    Motion
+        Unpacks into t, q, qd.
+
+    Examples
+    --------
     >>> start = np.array([0.5, 0.3, 1.0])
     >>> t, q, qd = tmt.simulate(start, [0.0] * 3, tmt.gravity_balance(start), dt=0.01, steps=100)
     >>> print(t[-1], q.shape, abs(q - start).max() < 1e-12)  # it is held
@@ -83,19 +118,18 @@ def simulate(
     path_q, path_qd = given.paths(runs, steps, every, model.coordinates.nq, model.coordinates.nv)
     if steps * dt == np.inf:
         raise ValueError(f"dt is {dt:g} and steps is {shown(steps)}; their product is beyond the largest double")
-    path_q[:, 0], path_qd[:, 0], tau = start
+    path_q[:, 0], path_qd[:, 0], torque = start
     if taylor:
-        ended, evaluations = by_series(model, path_q, path_qd, tau, dt, steps, every, tolerance)
+        ended, evaluations = by_series(model, path_q, path_qd, torque, dt, steps, every, tolerance)
     else:
-        codes, evaluations = runner.follow(path_q, path_qd, tau, dt, tolerance, every)
+        codes, evaluations = runner.follow(path_q, path_qd, torque, dt, tolerance, every)
 
-        def between(run, record):
+        def between(run: int, record: int) -> list[np.ndarray]:
             """The states of a run from a record to the next, (every + 1, nq and nv)."""
-            paths = [
-                np.repeat(path[run : run + 1, record : record + 1], every + 1, axis=1) for path in (path_q, path_qd)
-            ]
-            runner.follow(*paths, tau[run : run + 1], dt, tolerance, 1)
-            return [path[0] for path in paths]
+            part = slice(run, run + 1), slice(record, record + 1)
+            run_q, run_qd = (np.repeat(path[part], every + 1, axis=1) for path in (path_q, path_qd))
+            runner.follow(run_q, run_qd, torque[part[0]], dt, tolerance, 1)
+            return [run_q[0], run_qd[0]]
 
         ended = reasons(model, path_q, path_qd, codes, dt, tolerance, every, between)
     t = dt * np.arange(0, steps + 1, every)
@@ -103,7 +137,7 @@ def simulate(
     return Motion(t, q, qd, ended.reshape(batch)[()], evaluations)
 
 
-def starts(model, q, qd, tau) -> tuple:
+def starts(model: Tree, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
     """The batch shape, and q (runs, nq), qd and tau (runs, nv), contiguous, after all checks of given.states."""
     if type(q) is type(qd) is type(tau) is np.ndarray and q.dtype is qd.dtype is tau.dtype is DOUBLE:
         nq, nv, batch = model.coordinates.nq, model.coordinates.nv, q.shape[:-1]
@@ -117,7 +151,9 @@ def starts(model, q, qd, tau) -> tuple:
     return batch, *(np.stack(part, axis=-1).reshape(math.prod(batch), len(part)) for part in state)
 
 
-def by_series(tree, q, qd, tau, dt, steps, every, tolerance) -> tuple[np.ndarray, int]:
+def by_series(
+    tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, steps: int, every: int, tolerance: float
+) -> tuple[np.ndarray, int]:
     """Write the true motions to the paths (runs, records, nq and nv), which hold the starts: why each ended, and the steps."""
     from tmt.exact.motion import followed  # here, so that `import tmt` need not wait for it
 
@@ -132,8 +168,9 @@ def by_series(tree, q, qd, tau, dt, steps, every, tolerance) -> tuple[np.ndarray
 
 
 def reasons(
-    tree, q, qd, codes, dt, tolerance, every: int = 1, between: Callable[[int, int], list[np.ndarray]] | None = None
-) -> np.ndarray:
+    tree: Tree, q: np.ndarray, qd: np.ndarray, codes: np.ndarray, dt: float, tolerance: float, every: int = 1,
+    between: Callable[[int, int], list[np.ndarray]] | None = None,
+) -> np.ndarray:  # fmt: skip
     """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
 
     q, qd: the paths (runs, records, nq and nv); codes (runs, 2): why the compiled loop ended each, 0: it did not, and after how
@@ -157,7 +194,7 @@ def reasons(
     hinges = [joint for joint in tree.coordinates.joints if joint.kind == "hinge"]
     for run in (run for run in range(len(codes)) if codes[run] or why[run]):
         record, last = divmod(int(steps[run]), every)
-        path, speeds = between(run, record) if last else (q[run, record:], qd[run, record:])
+        path, speeds = between(run, record) if last and between else (q[run, record:], qd[run, record:])
         code = int(codes[run])
         reach = max((max(abs(path[last, at][0]), dt * abs(speeds[last, by][0])) for _, at, by in hinges), default=0.0)
         if code in (OVERFLOW, NEWTON) and reach > 2.0**48:
@@ -168,13 +205,15 @@ def reasons(
     return why
 
 
-def singular_step(tree, q, qd, every, between) -> tuple[int, str] | None:
+def singular_step(
+    tree: Tree, q: np.ndarray, qd: np.ndarray, every: int, between: Callable[[int], list[np.ndarray]] | None
+) -> tuple[int, str] | None:
     """The first step of a run after which Mbar is singular, as far as `singular_in` looks, and the words for it.
 
     Where each so-manyth state is kept alone it also looks at those before the last record and where the rates change most.
     """
     found = singular_in(tree, q, qd)
-    if every == 1:
+    if every == 1 or between is None:
         return found
     last = int(np.isfinite(q[:, 0]).sum()) - 1
     change = np.abs(np.diff(qd[: last + 1], axis=0)).max(axis=1)
@@ -183,7 +222,7 @@ def singular_step(tree, q, qd, every, between) -> tuple[int, str] | None:
     return min(((first + stride * found[0], found[1]) for first, stride, found in looked if found), default=None)
 
 
-def singular_in(tree, q, qd) -> tuple[int, str] | None:
+def singular_in(tree: Tree, q: np.ndarray, qd: np.ndarray) -> tuple[int, str] | None:
     """The first state of a run at which Mbar is singular, among those where it would show; and the words for it.
 
     They are its start, its last, and the one before the largest change of the rates.

@@ -9,7 +9,7 @@ from __future__ import annotations  # so that help() shows the short names of ty
 
 from collections.abc import Callable, Sequence
 from os import PathLike
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,8 +22,10 @@ from .why import Why, cause_of
 
 __all__ = ["Difference", "State", "assert_agrees", "differences"]
 
-Model = str | PathLike | object  # a path, MJCF text or an MjModel
-Quantity = Callable | ArrayLike | tuple | None  # a function, values, or a SymPy matrix and its symbols
+Model = str | PathLike[str] | object  # a path, MJCF text or an MjModel
+Quantity = (
+    Callable[..., Any] | ArrayLike | tuple[Any, Any] | None
+)  # a function, values, or a SymPy matrix and its symbols
 Values = ArrayLike | None
 Names = Sequence[str] | None
 LEAST_DIGITS = 2  # in common: then the constants may be rounded
@@ -32,14 +34,23 @@ LEAST_DIGITS = 2  # in common: then the constants may be rounded
 class Difference(NamedTuple):
     """One entry at one state, in your joints.
 
-    quantity: "mass_matrix", "bias", "gravity" or "acceleration".
-    entry: such as "M[hip][knee]" or "h[hip]".
-    state: number, q, qd and tau, in the joints of your equations.
-    yours, mujoco: both values: kg m2 (M), N m (h, gravity), rad/s2 (acceleration), of slides kg, N and m/s2.
-    difference: yours - mujoco.
-    tolerance: (64 eps + rtol) times the scale of the entry.
-    ratio: of the difference to its tolerance, at most 1 if they agree; inf where yours is not a finite number.
-    cause: the probable cause of all differences, in a sentence; "" where the entry agrees.
+    Attributes
+    ----------
+    quantity : {"mass_matrix", "bias", "gravity", "acceleration"}
+    entry : str
+        Such as "M[hip][knee]" or "h[hip]".
+    state : State
+        Its number, q, qd and tau, in the joints of your equations.
+    yours, mujoco : float
+        Both values: kg m2 (M), N m (h, gravity), rad/s2 (acceleration), of slides kg, N and m/s2.
+    difference : float
+        yours - mujoco.
+    tolerance : float
+        (64 eps + rtol) times the scale of the entry.
+    ratio : float
+        Of the difference to its tolerance, at most 1 if they agree; inf where yours is not a finite number.
+    cause : str
+        The probable cause of all differences, in a sentence; "" where the entry agrees.
     """
 
     quantity: str
@@ -70,16 +81,45 @@ def assert_agrees(
 ) -> None:
     """Compare equations of your own with MuJoCo; raise AssertionError with the worst entry and the probable cause if they differ.
 
-    mjcf: a path, MJCF text or an MjModel; contacts, limits, actuators and equalities are switched off.
-    mass_matrix(q), bias(q, qd), gravity(q), acceleration(q, qd, tau): a function of one state or a batch, or the array of its
-    values at the given q (N, nq), qd, tau (N, nv), or a pair of a SymPy matrix and the list of its symbols.
-    Mbar qdd + h = tau - D qd - k (q - rest); damping D and springs k of the joints are in acceleration alone. Units: rad and N m,
-    for slides m and N.
-    q, qd, tau: the states, in your joints; None: `states` random states from `seed`, within the joints' ranges. A UserWarning
-    is issued if the number of states is not `states`: because q is given, or because the functions take too long.
-    joints: the joints as your equations take them, such as ["knee", "-hip", "ankle+90deg"]; None: those of the model.
-    rtol: added to the tolerance, relative to the scale of each entry, for equations with rounded constants.
-    Raises ValueError for a model or shape that cannot be compared, or a function that raises at the first state.
+    The signs: Mbar qdd + h = tau - D qd - k (q - rest); damping D and springs k of the joints are in acceleration alone.
+    Units: rad and N m, for slides m and N.
+
+    Parameters
+    ----------
+    mjcf : path, MJCF text or MjModel
+        Its contacts, limits, actuators and equalities are switched off.
+    mass_matrix, bias, gravity, acceleration : optional, at least one
+        mass_matrix(q), bias(q, qd), gravity(q), acceleration(q, qd, tau): a function of one state or a batch, or the array of
+        its values at the given q, qd, tau, or a pair of a SymPy matrix and the list of its symbols.
+    q, qd, tau : (N, nq), (N, nv), (N, nv), optional
+        The states, in your joints; None: `states` random states from `seed`, within the joints' ranges.
+    joints : sequence of str, optional
+        The joints as your equations take them, such as ["knee", "-hip", "ankle+90deg"]; None: those of the model.
+    rtol : float, default 0
+        Added to the tolerance, relative to the scale of each entry, for equations with rounded constants.
+    states, seed : int, default 100 and 0
+        Number and seed of the random states.
+
+    Raises
+    ------
+    AssertionError
+        If an entry differs by more than its tolerance.
+    ValueError
+        For a model or shape that cannot be compared, or a function that raises at the first state.
+
+    Warns
+    -----
+    UserWarning
+        If the number of states is not `states`: because q is given, or because the functions take too long.
+
+    Examples
+    --------
+    >>> inertia = '<inertial pos="0 0 -0.5" mass="2" diaginertia="0.1 0.1 0.01"/>'
+    >>> mjcf = f'<mujoco><worldbody><body><joint name="hip" axis="0 1 0"/>{inertia}</body></worldbody></mujoco>'
+    >>> compare.assert_agrees(mjcf, gravity=lambda q: 9.81 * np.sin(q))
+    >>> compare.assert_agrees(mjcf, gravity=lambda q: 9.81 * np.cos(q))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    AssertionError: Not equal to MuJoCo to tolerance (64 eps) x the scale of each entry...
     """
     __tracebackhide__ = True  # pytest shows the line of the test
     given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
@@ -104,7 +144,22 @@ def differences(
 ) -> list[Difference]:
     """Every entry of every quantity at every state, the largest ratio first; they agree if all ratios are at most 1.
 
-    The same arguments and errors as `assert_agrees`.
+    Parameters
+    ----------
+    mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed
+        As of `assert_agrees`, which also says what is raised.
+
+    Returns
+    -------
+    list of Difference
+
+    Examples
+    --------
+    >>> inertia = '<inertial pos="0 0 -0.5" mass="2" diaginertia="0.1 0.1 0.01"/>'
+    >>> mjcf = f'<mujoco><worldbody><body><joint name="hip" axis="0 1 0"/>{inertia}</body></worldbody></mujoco>'
+    >>> worst, *_ = compare.differences(mjcf, mass_matrix=[[[0.5]]], q=[[0.0]])  # it is 0.1 + 2 kg (0.5 m)^2
+    >>> print(worst.entry, worst.yours, round(worst.mujoco, 9), worst.ratio > 1.0)
+    M[hip][hip] 0.5 0.6 True
     """
     given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
     return rows(given, cause_of(given).text if given.fails else "")
@@ -116,16 +171,17 @@ def rows(given: Given, cause: str) -> list[Difference]:
     for name, comparison in given.compared.items():
         entries = given.entries(name)
         columns = comparison.own, comparison.right, comparison.tolerance, comparison.ratio
-        for at, own, right, tolerance, ratio in zip(np.ndindex(comparison.own.shape), *(part.flat for part in columns)):
-            numbers = map(float, (own, right, own - right, tolerance, ratio))
-            why = cause if ratio > 1.0 else ""
-            found.append(Difference(name, entries[at[1:]], given.states[at[0]], *numbers, why))
+        places = np.ndindex(comparison.own.shape)
+        for at, own, right, tolerance, ratio in zip(places, *(part.ravel().tolist() for part in columns)):
+            where, why = (name, entries[at[1:]], given.states[at[0]]), cause if ratio > 1.0 else ""
+            found.append(Difference(*where, own, right, own - right, tolerance, ratio, why))
     return sorted(found, key=lambda row: -row.ratio)
 
 
 def message(given: Given) -> str:
     """Which entries of which quantity are off, the worst of them, the probable cause, and what can be stated."""
-    why, quantities = cause_of(given) if given.fails else Why("", False), {}
+    why = cause_of(given) if given.fails else Why("", False)
+    quantities: dict[str, list[Difference]] = {}
     for row in rows(given, why.text):
         if row.ratio > 1.0:
             quantities.setdefault(row.quantity, []).append(row)

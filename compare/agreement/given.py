@@ -1,10 +1,11 @@
 """The arguments of assert_agrees, validated: the model, the states, each quantity of the user and of MuJoCo."""
 
 import warnings
+from collections.abc import Sequence
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,7 +56,10 @@ class Compared(NamedTuple):
 class Given:
     """The arguments of `assert_agrees` and `differences`, and MuJoCo's values."""
 
-    def __init__(self, mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed):
+    def __init__(
+        self, mjcf: Any, mass_matrix: Any, bias: Any, gravity: Any, acceleration: Any, q: Any, qd: Any, tau: Any,
+        joints: Sequence[str] | None, rtol: float, states: int, seed: int,
+    ) -> None:  # fmt: skip
         brought = dict(zip(SYMBOLS_OF, (mass_matrix, bias, gravity, acceleration)))
         self.brought = brought = {name: value for name, value in brought.items() if value is not None}
         if not brought:
@@ -79,12 +83,12 @@ class Given:
                 raise ValueError(f"{name} is {shown(value)}, but not q is given; expected {expected}")
         self.take_random(states, seed)
 
-    def read(self, mjcf) -> None:
+    def read(self, mjcf: Any) -> None:
         from ..engines.mujoco import engine, read  # here, so that `import compare` need not wait for it
 
         if isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<"):
             mjcf = Path(mjcf)
-        reading = read(mjcf)
+        reading: Any = read(mjcf)
         self.robot = robot_of(reading, "the model")
         self.mujoco = engine(reading).of(self.robot.case())
         self.tree, self.coordinates = reading.tree, Coordinates(reading.tree.hinge_names, reading.tree.kind)
@@ -97,6 +101,7 @@ class Given:
         sample = random(self.robot, states, 0, seed)
         for note in sample.notes:
             warnings.warn(say(note), stacklevel=4)
+        assert self.own is not None  # all that was brought are functions
         self.own.try_at(sample.q, sample.qd, sample.tau)
         count = self.own.affordable(len(sample.q), OWN_SECONDS)
         if count < len(sample.q):
@@ -104,7 +109,7 @@ class Given:
             warnings.warn(text, stacklevel=4)
         self.q, self.qd, self.tau = sample.q[:count], sample.qd[:count], sample.tau[:count]
 
-    def take_states(self, q, qd, tau) -> None:
+    def take_states(self, q: Any, qd: Any, tau: Any) -> None:
         """The given states, in the user's joints."""
         nq, nv = self.coordinates.nq, self.coordinates.nv
         own = {"q": rows_given("q", q, nq, None)}
@@ -149,7 +154,7 @@ class Given:
         shape = (count, nv, nv) if name == "mass_matrix" else (count, nv)
         if array is None:
             raise ValueError(f"{name} is {shown(brought)}; expected real numbers of shape {shape}, or a function")
-        accepted = [shape, (count, nv * nv)] if name == "mass_matrix" else [shape]
+        accepted: list[tuple[int, ...]] = [shape, (count, nv * nv)] if name == "mass_matrix" else [shape]
         accepted += [shape[1:]] * (count == 1) + [(count,)] * (nv == 1)
         if array.shape not in accepted:
             raise ValueError(f"{name} has shape {array.shape}; expected {shape}, its values at the given q")
@@ -174,7 +179,7 @@ class Given:
             comparisons[name] = Compared(turned(own), turned(right), size, self.rounding * size)
         return comparisons
 
-    def entries(self, name: str) -> dict[tuple, str]:
+    def entries(self, name: str) -> dict[tuple[int, ...], str]:
         """The names of the entries of a quantity, by their place."""
         names = [self.coordinates.speeds[i] for i in self.joints.v]
         symbol = SYMBOLS_OF[name]
@@ -192,7 +197,7 @@ class Given:
         return [problem.text for problem in self.own.problems] if self.own is not None else []
 
 
-def rows_given(name: str, values: object, size: int, count: int | None) -> np.ndarray:
+def rows_given(name: str, values: Any, size: int, count: int | None) -> np.ndarray:
     """States as rows, (states, size); a number is used for all. ValueError for anything else. count: of states, None: any."""
     array = real_numbers(values)
     expected = f"({'states' if count is None else count}, {size})"

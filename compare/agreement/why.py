@@ -1,5 +1,6 @@
 """The probable cause of a difference: what the diagnosis finds in Mbar and h, and what can only be in the accelerations."""
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -56,23 +57,19 @@ def of_equations(given: Given, values: Values) -> Why:
     mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), given.coordinates.speeds)
     if np.isfinite(M).all() and not mirrored.is_met:
         return Why(mirrored.text, False)
-
-    def bias(qd: np.ndarray) -> np.ndarray:
-        return own.bias(values.q, qd)
-
-    is_quick = own is not None and own.seconds <= QUICK
-    of_speeds = bias if is_quick and own.has("bias") else None
+    is_quick = own is not None and own.seconds <= QUICK and own.has("bias")
+    of_speeds = partial(own.bias, values.q) if own is not None and is_quick else None
     diagnosis = diagnose_stated(given.tree, given.joints, values, SECONDS_OF_CAUSE, of_speeds)
     if not diagnosis.differs:
         return Why()
     text = diagnosis.sentence()
-    if not diagnosis.causes and of_speeds and own.has("mass_matrix") and values.are_finite:
+    if not diagnosis.causes and own is not None and is_quick and own.has("mass_matrix") and values.are_finite:
         every = conditions(own.mass_matrix, own.bias, given.coordinates, values.q, values.qd)
         text = " ".join([*[one.text for one in every if not one.is_met][:1], text])
     return Why(text, not diagnosis.causes or any("number" in cause.kind for cause in diagnosis.causes))
 
 
-def of_accelerations(given: Given, q, qd, tau, own: dict[str, np.ndarray]) -> Why:
+def of_accelerations(given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, own: dict[str, np.ndarray]) -> Why:
     """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right."""
     tree, qdd, h = given.tree, own["acceleration"], literal.bias(q, qd, given.tree)
     acting, allowed = force_left_over(tree, q, qd, tau, literal.mass_matrix(q, tree), h, qdd, given.rounding)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..process import interrupt
 from ..process.crash import ROOT, Refused
-from ..report.folder import lock, what_is_wrong
+from ..report.folder import fcntl, lock, what_is_wrong
 from ..report.provenance import installed
 from .models import unpacked
 
@@ -41,7 +41,7 @@ def locked(out: Path) -> Iterator[None]:
         held = lock(out / FILES, wait=False)
     except OSError as error:
         raise Refused(f"cannot write to {out}: {what_is_wrong(out, error)}; expected a writable folder") from None
-    if held is None and os.name == "posix":
+    if held is None and fcntl is not None:
         raise Refused(f"another fleet is writing to {out}; use another folder (--out), or wait until it has ended")
     interrupt.Now.line = f"interrupted; {RESUME}"
     try:

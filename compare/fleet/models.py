@@ -27,15 +27,15 @@ class Model(NamedTuple):
 
     @property
     def shown(self) -> str:
-        """The path as given, printable."""
-        return in_one_line(os.fspath(self.path))
+        """The path as given, printable, with the same separators on every system."""
+        return in_one_line(self.path.as_posix())
 
 
 def bundle(model: Model) -> dict[str, bytes]:
     """The files of a model for another machine: {path below a common folder: content}, the model first."""
     parts = [Path(os.path.abspath(part)) for part in model.parts]
     top = os.path.commonpath([part.parent for part in parts])
-    return {os.path.relpath(part, top): part.read_bytes() for part in parts}
+    return {Path(os.path.relpath(part, top)).as_posix(): part.read_bytes() for part in parts}
 
 
 def unpacked(files: dict[str, bytes], folder: Path) -> Path:
@@ -62,10 +62,10 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
     for file, (path, is_named) in files.items():
         if file in users and not is_named:
             models.pop(file, None)
-            left_out.append((in_one_line(os.fspath(path)), f"included by {users[file]}"))
+            left_out.append((in_one_line(path.as_posix()), f"included by {users[file]}"))
         elif file not in models:
             left_out.append(
-                (in_one_line(os.fspath(path)), f"root element <{in_one_line(kinds[file])}>, not <mujoco> or <robot>")
+                (in_one_line(path.as_posix()), f"root element <{in_one_line(kinds[file])}>, not <mujoco> or <robot>")
             )
     if not models:
         raise Refused(f"no MJCF or URDF file in {', '.join(map(in_one_line, words))}")
@@ -153,7 +153,8 @@ def existing(names: Iterable[str], folders: Iterable[Path], directories: Iterabl
 
 def place_of_report(shown: str) -> str:
     """The folder of a model's report, relative to that of the fleet; unique, and not inside that of another model."""
-    parts = [part for part in Path(readable(shown)).parts if part not in (os.sep, os.pardir)]
+    path = Path(readable(shown))
+    parts = [part for part in path.parts if part not in (path.anchor, os.pardir)]
     if os.path.isabs(shown) or os.pardir in Path(shown).parts:  # the shortened path may be that of another file
         parts[-1] += f"-{hashlib.sha256(shown.encode()).hexdigest()[:8]}"
     return "/".join(["files", *parts])

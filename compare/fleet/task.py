@@ -1,6 +1,7 @@
 """The task of a fleet: compare one file, and give its row of the table and its report."""
 
 import hashlib
+import os
 import shlex
 import shutil
 import time
@@ -49,7 +50,7 @@ def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) ->
         reference = "arm" if options.reference == "arm" else SOLUTION
         return row | {"verdict": DIFFER, "reason": error.why, "reference": reference}, {}
     except ModelError as error:
-        reason = str(error).replace(str(path), shown).replace(f"{path.parent}/", "")
+        reason = str(error).replace(str(path), shown).replace(os.path.join(path.parent, ""), "")
         return row | {"verdict": REFUSED, "reason": reason.removeprefix(f"{shown} cannot be compared: ")}, {}
     reasons = {name: say(reason) for name in options.names if (reason := skipped(name, compared.robot))}
     names = [name for name in options.names if name not in reasons]

@@ -1,7 +1,8 @@
 """Ctrl-C, SIGTERM and SIGHUP end a run with status 2 within a second.
 
 A Python signal handler waits until C code returns, for seconds in a compilation or a run in MuJoCo. So the signals are blocked,
-in worker processes too, and a thread waits for them. Only `python -m compare` uses this.
+in worker processes too, and a thread waits for them; where signals cannot be blocked (Windows), a handler has to do. Only
+`python -m compare` uses this.
 """
 
 import os
@@ -10,6 +11,7 @@ import threading
 from contextlib import suppress
 from multiprocessing import resource_tracker
 
+CAN_BLOCK = hasattr(signal, "pthread_sigmask")
 undo = []  # functions to call before the process ends, last first
 turn = threading.RLock()  # held while a thread decides how the run ends
 
@@ -23,7 +25,10 @@ def listen() -> None:
     """From now on an interrupt ends the process. Ignored signals (nohup, background of a script) stay ignored."""
     numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
     numbers = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
-    if numbers and hasattr(signal, "pthread_sigmask"):  # not on Windows
+    if not CAN_BLOCK:
+        for number in numbers:  # a thread: the main one may be in a block that postpones interrupts
+            signal.signal(number, lambda *_: threading.Thread(target=end, daemon=True).start())
+    elif numbers:
         before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # the tracker inherits this: it ends after the run
         resource_tracker.ensure_running()  # unblocks signals where it starts
         signal.signal(signal.SIGHUP, before)
@@ -44,6 +49,10 @@ def settle() -> None:
 
 def end_when_asked(numbers: list[int]) -> None:
     signal.sigwait(numbers)
+    end()
+
+
+def end() -> None:
     with turn:
         if not Now.settled:
             clear_up()

@@ -4,6 +4,7 @@ import importlib
 import logging
 import os
 import shutil
+import signal
 import threading
 import time
 from collections.abc import Iterator
@@ -101,6 +102,8 @@ def begin() -> None:  # in a worker
 
 def end_with_parent(folder: str | None = None) -> None:
     """From now on this process ends when its parent does, and deletes a folder."""
+    if not interrupt.CAN_BLOCK:  # else the parent has blocked it here too
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch():
         parent_process().join()

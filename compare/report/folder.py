@@ -210,7 +210,7 @@ def save(path: Path, text: str) -> None:
 def files(folder: Path) -> list[str]:
     """The files of a report in a folder, as relative paths."""
     found = [path for name in OWN for path in [folder / name, *(folder / name).rglob("*")]]
-    return sorted(str(path.relative_to(folder)) for path in found if path.is_file() or path.is_symlink())
+    return sorted(path.relative_to(folder).as_posix() for path in found if path.is_file() or path.is_symlink())
 
 
 def refuse_foreign(out: Path) -> None:

@@ -20,11 +20,13 @@ from compare.process.crash import Refused
 HERE = Path(__file__).resolve().parent
 
 
+@runs.posix
 def test_outcomes_on_this_machine():
     with closing(Pool(2, toy.LIMIT)) as pool:
         toy.check_all(pool)
 
 
+@runs.posix
 @pytest.mark.parametrize("times, outcome", [(1, (4, "")), (9, (None, "killed by SIGKILL, 4 times"))])
 def test_a_call_whose_process_is_killed_is_made_again_three_times(times, outcome, tmp_path):
     with closing(Pool(1, 60.0)) as pool:
@@ -65,6 +67,8 @@ class Machines:
 @pytest.fixture
 def machines(tmp_path):
     pytest.importorskip("distributed")
+    if not runs.IS_POSIX:
+        pytest.skip("needs process groups")
     (tmp_path / "machines").mkdir()
     made = Machines(tmp_path / "machines")
     yield made

@@ -5,7 +5,6 @@ import json
 import os
 import re
 import shutil
-import signal
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -152,8 +151,8 @@ def test_the_key_ctrl_c(temporary, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
-def test_a_signal_and_the_same_command_again(temporary, tmp_path, number):
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGKILL"])
+def test_a_signal_and_the_same_command_again(temporary, tmp_path, name):
     def cached():
         paths = (tmp_path / "out" / "files").rglob(".fleet")
         return {
@@ -162,12 +161,12 @@ def test_a_signal_and_the_same_command_again(temporary, tmp_path, number):
 
     run = runs.started(*runs.command(*WORDS), cwd=tmp_path)
     assert soon(cached)
-    end = runs.ended(run, number)
-    assert number == signal.SIGKILL or (end.status == 2 and len(end.lines) == 1 and "interrupted" in end.lines[0])
+    end = runs.ended(run, name)
+    assert name == "SIGKILL" or (end.status == 2 and len(end.lines) == 1 and "interrupted" in end.lines[0])
     assert soon(lambda: not is_left_at_work(temporary))
     known = cached()
     run = runs.compare(*WORDS, cwd=tmp_path)  # nobody has the lock
     assert (run.returncode, run.stderr) == (0, ""), run.stdout
     assert {path: when for path, when in cached().items() if path in known} == known  # not computed again
     assert len(cached()) == 2 > len(known)
-    assert number == signal.SIGKILL or not list(temporary.iterdir())
+    assert name == "SIGKILL" or not list(temporary.iterdir())

@@ -43,7 +43,8 @@ def test_a_folder_gives_its_mjcf_at_any_depth_and_nothing_else(here):
     here(["m/robot.urdf.xacro", "m/world.sdf.xml"], "<sdf/>")
     here("m/part.xml", "<mujocoinclude><body>")
     here(["m/none.xml", "m/words.xml"], "alpha turns")  # these are refused
-    os.mkfifo("m/pipe.xml")
+    if hasattr(os, "mkfifo"):
+        os.mkfifo("m/pipe.xml")
     found = ["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/folder.xml/h.xml", "m/none.xml", "m/robot.urdf",
              "m/robot.urdf.xml", "m/words.xml"]  # fmt: skip
     assert names("m") == found and "<sdf>" in left_out("m")["m/world.sdf.xml"]

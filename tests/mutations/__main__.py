@@ -46,7 +46,7 @@ def main(arguments=None, project=PROJECT, edits=EDITS) -> int:
         for edit in chosen:
             console.print(edit.name + (f" (harmless: {edit.harmless})" if edit.harmless else ""))
         return 0
-    signals = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+    signals = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
     before = [signal.signal(number, signal.default_int_handler) for number in signals]
     try:
         with closing(tried_edits(project, places, options.jobs)) as tried:

@@ -7,7 +7,7 @@ import sys
 import time
 
 import pytest
-from runs import ENVIRONMENT, SECOND, command, ended, started
+from runs import ENVIRONMENT, SECOND, command, ended, posix, started
 
 from compare.__main__ import main
 
@@ -26,21 +26,21 @@ LISTENING = "from compare.process import interrupt; interrupt.listen()\n"
 
 ALL = command("all", "--quick", "--out", "report")
 RUNS = {  # what runs, what it is sent, and when
-    "workers start": (ALL, signal.SIGTERM, lambda run: time.sleep(0.8)),
-    "a line": (ALL, signal.SIGHUP, lambda run: run.stdout.readline()),
-    "a rollout": ([sys.executable, "-c", LISTENING + ROLLOUT], signal.SIGINT, lambda run: run.stdout.readline()),
+    "workers start": (ALL, "SIGTERM", lambda run: time.sleep(0.8)),
+    "a line": (ALL, "SIGHUP", lambda run: run.stdout.readline()),
+    "a rollout": ([sys.executable, "-c", LISTENING + ROLLOUT], "SIGINT", lambda run: run.stdout.readline()),
 }
 
 
 @pytest.mark.parametrize("name", RUNS)
 def test_an_interrupt_is_answered_within_a_second(tmp_path, name):
-    what, number, moment = RUNS[name]
+    what, name_of_signal, moment = RUNS[name]
     for attempt in range(2):  # the machine may be busy
         (place := tmp_path / f"{attempt}").mkdir()
         run = started(*what, cwd=place, env={"TMT_CACHE": str(tmp_path / "cache")})
         moment(run)
         assert run.poll() is None
-        end = ended(run, number)
+        end = ended(run, name_of_signal)
         assert end.status == 2 and len(end.lines) == 1 and "Traceback" not in end.lines[0]
         assert list(place.iterdir()) == []
         if end.seconds < SECOND:
@@ -54,9 +54,10 @@ def test_the_processes_of_a_run_that_is_killed_end_with_it(tmp_path):
     while not list(tmp_path.glob("report/.new-*")):
         time.sleep(0.01)
     time.sleep(0.5)  # its workers are there
-    assert ended(run, signal.SIGKILL).status == -signal.SIGKILL
+    assert ended(run, "SIGKILL").status == -signal.SIGKILL
 
 
+@posix
 def test_a_signal_that_is_ignored_stays_ignored():
     text = LISTENING + "import os, signal; os.kill(os.getpid(), signal.SIGINT); print('well')"
     line = ["bash", "-c", "trap '' INT; exec \"$@\"", "-", sys.executable, "-c", text]

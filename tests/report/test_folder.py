@@ -1,7 +1,6 @@
 """A report takes the old one's place when it is complete, and nothing else is touched."""
 
 import json
-import resource
 import signal
 import subprocess
 import sys
@@ -9,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 from matplotlib.figure import Figure
-from runs import ENVIRONMENT
+from runs import ENVIRONMENT, posix
 
 from compare.report.folder import FolderError, new_report
 from compare.run.drawing import draw
@@ -27,7 +26,7 @@ def fill(work, text):
 
 def files(folder):
     """What is in a folder; of results.json only the text of `fill`."""
-    found = {str(p.relative_to(folder)): p.read_text() for p in folder.rglob("*") if p.is_file()}
+    found = {p.relative_to(folder).as_posix(): p.read_text() for p in folder.rglob("*") if p.is_file()}
     return {name: json.loads(text)["text"] if name == "results.json" else text for name, text in found.items()}
 
 
@@ -105,6 +104,7 @@ def run(out, number=0, at=-1):
     return subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True)
 
 
+@posix
 def test_after_kill_9_in_the_exchange_the_next_run_finds_the_old_report_whole(tmp_path):
     for at in range(20):
         out = tmp_path / str(at)
@@ -121,6 +121,7 @@ def test_after_kill_9_in_the_exchange_the_next_run_finds_the_old_report_whole(tm
     assert at == 7  # three moved in, two names of a folder changed, and what was moved away
 
 
+@posix
 @pytest.mark.parametrize("number, at", [(signal.SIGTERM, 0), (signal.SIGINT, 6)])
 def test_an_exchange_that_has_begun_is_finished_and_the_run_ends_well(tmp_path, number, at):
     old_report(tmp_path)
@@ -177,6 +178,7 @@ def test_what_stands_in_a_folders_place_is_named_and_stays(tmp_path, name, word)
 def test_a_full_disk_while_a_figure_is_drawn_is_said_with_the_name_of_the_file(tmp_path, monkeypatch):
     module = SimpleNamespace(figures=lambda result, robot: iter([lambda: ("plot", Figure(), "")]))
     monkeypatch.setitem(sys.modules, "compare.experiments.plain", module)
+    resource = pytest.importorskip("resource")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))  # no file may be longer, as on a disk that is full
     try:

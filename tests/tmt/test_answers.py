@@ -1,11 +1,10 @@
 """The public functions: NumPy answers few states and machine code all others, with what the literal form returns and raises."""
 
 import dataclasses
-import doctest
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from inspect import isfunction, signature
+from inspect import signature
 
 import numpy as np
 import pytest
@@ -175,10 +174,3 @@ def test_who_cannot_wait_has_it_prepared(monkeypatch):
 def test_a_short_question_never_waits_for_a_compiler():
     program = "import sys, tmt; tmt.acceleration([0.1] * 3, [0.0] * 3, [0.0] * 3); print('llvmlite' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout == "False\n"
-
-
-@pytest.mark.parametrize("name", [name for name in tmt.__all__ if isfunction(getattr(tmt, name))])
-def test_the_example_in_the_docstring_of_a_public_function_is_right(name):
-    names = {"tmt": tmt, "np": np, "dataclasses": dataclasses}
-    (found,) = doctest.DocTestFinder(recurse=False).find(getattr(tmt, name), name, globs=names)
-    assert found.examples and doctest.DocTestRunner().run(found).failed == 0

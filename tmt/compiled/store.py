@@ -123,8 +123,8 @@ def check_own(path, on_the_way=False) -> None:
 
     on_the_way: a parent folder; it may be root's, and in it others may make entries of their own (as in /tmp).
     """
-    if os.name != "posix":
-        return  # elsewhere these bits say nothing
+    if not hasattr(os, "geteuid"):
+        return  # not POSIX: these bits say nothing
     about = os.lstat(path)
     if about.st_uid != os.geteuid() and not (on_the_way and about.st_uid == 0):
         raise NotOwn(f"{path} belongs to user {about.st_uid}")

@@ -2,9 +2,9 @@
 
 import hashlib
 import keyword
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from tmt.compiled import forms
 from tmt.compiled.straight import Traced
@@ -15,8 +15,13 @@ from tmt.model.values import shown
 
 from . import c, latex, matlab, page, python, symbols
 
-LANGUAGES = {"c": c.source, "c header": c.header, "python": python.source, "matlab": matlab.source}
-SYMBOLIC = {"latex": latex.latex, "html": page.page, "sympy": symbols.python_source}
+LANGUAGES: dict[str, Callable[..., str]] = {
+    "c": c.source,
+    "c header": c.header,
+    "python": python.source,
+    "matlab": matlab.source,
+}
+SYMBOLIC: dict[str, Callable[..., str]] = {"latex": latex.latex, "html": page.page, "sympy": symbols.python_source}
 OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
 UNITS = {"hinge": "rad, rad/s, N m", "slide": "m, m/s, N", "ball": "quaternion w x y z, rad/s in its own axes, N m"}
 WORDS = """auto bool break case catch char class const continue default delete do double else elseif end enum extern float for
@@ -30,10 +35,10 @@ class Function(NamedTuple):
 
     name: str
     title: str  # what it returns, with units
-    takes: tuple  # of "q", "qd", "tau"
-    sizes: tuple  # of these
-    shape: tuple  # of a result
-    results: tuple  # names of the results
+    takes: tuple[str, ...]  # of "q", "qd", "tau"
+    sizes: tuple[int, ...]  # of these
+    shape: tuple[int, ...]  # of a result
+    results: tuple[str, ...]  # names of the results
     traced: Traced
 
     @property
@@ -66,7 +71,7 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
 
 
 @lru_cache(maxsize=4)
-def symbols_of(model: Tree, quantities: tuple[str, ...]):
+def symbols_of(model: Tree, quantities: tuple[str, ...]) -> Any:
     """The symbolic equations, derived once for all files."""
     return symbols.symbolic(model, quantities)
 

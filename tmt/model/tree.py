@@ -3,8 +3,10 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tmt.model import singular
 from tmt.model.coordinates import KINDS, Coordinates, coordinates_of
@@ -15,6 +17,10 @@ OPTIONAL = ("reference", "armature", "stiffness", "rest")  # fields that may be 
 GAINS = ("position_gain", "speed_gain")  # and those of a controller, which are () where there is none
 
 
+Numbers = tuple[float, ...]
+Rows = tuple[Numbers, ...]
+
+
 @dataclass(frozen=True)
 class Tree:
     """A tree of n joints and m rigid bodies; at their reference positions every frame is parallel to the inertial frame.
@@ -22,37 +28,87 @@ class Tree:
     A joint is a hinge, a slide or a ball; a free joint is three slides and a ball. Each has a frame that moves with it, with
     its origin on the axis of a hinge, at the centre of a ball. Several joints in one body are joints in a row with no body
     between them. There are nv speeds, one of a hinge or slide and three of a ball, and nq numbers in a position: see
-    coordinates.py. All fields are nested tuples; arrays and lists are converted. `dataclasses.replace(tree, mass=(2.0, 1.5))`
-    makes another model. Raises ValueError where the numbers cannot be a tree or a rigid body.
+    coordinates.py. All fields are nested tuples; arrays and lists are converted.
+
+    Parameters
+    ----------
+    hinge_names : (n,)
+        Of all joints.
+    parent : (n,)
+        Index of the joint before this one, always a smaller one; -1: fixed to the world.
+    offset : (n, 3), m
+        From the origin of the parent's frame to this joint, in the parent's frame.
+    axis : (nv, 3)
+        Direction of each speed, scaled to length 1; a ball has three at right angles, which turn with it.
+    damping : (nv,), N m s/rad or N s/m
+        Force -damping * qd.
+    body_names : (m,)
+    body_hinge : (m,)
+        Index of the last joint that moves the body; -1: fixed to the world.
+    mass : (m,), kg
+    com : (m, 3), m
+        Centre of mass in the frame of its joint.
+    inertia : (m, 3, 3), kg m2
+        About the centre of mass, in the frame of its joint.
+    gravity : (3,), m/s2
+        Inertial frame.
+    kind : (n,), optional
+        "hinge", "slide" or "ball"; (): all are hinges.
+    armature : (nv,), kg m2 or kg, optional
+        Inertia of a rotor, on the diagonal of Mbar alone.
+    stiffness : (n,), N m/rad or N/m, optional
+        Of a spring at each joint.
+    rest : (nq,), rad, m and quaternions, optional
+        Where the springs are without force; (): at the reference.
+    reference : (n,), rad or m, optional
+        Where the joint leaves frames parallel; 0 for a ball.
+    position_gain, speed_gain : (nv, nv), N m/rad or N/m, and N m s/rad or N s/m, optional
+        Of a linear controller of hinges and slides: torque = tau - position_gain @ q - speed_gain @ qd, q as it stands.
+
+    Raises
+    ------
+    ValueError
+        If the numbers cannot be a tree or a rigid body.
+
+    Examples
+    --------
+    >>> pendulum = tmt.Tree(
+    ...     hinge_names=["hip"], parent=[-1], offset=[(0, 0, 0)], axis=[(0, 1, 0)], damping=[0.1],
+    ...     body_names=["rod"], body_hinge=[0], mass=[1.0], com=[(0, 0, -0.5)], inertia=[np.diag([0.1, 0.1, 0.01])],
+    ...     gravity=(0, 0, -9.81),
+    ... )
+    >>> print(tmt.mass_matrix([0.0], pendulum))  # 0.1 + 1 kg (0.5 m)^2
+    [[0.35]]
+    >>> dataclasses.replace(pendulum, mass=[2.0]).mass
+    (2.0,)
     """
 
-    hinge_names: tuple  # (n,) of all joints
-    parent: tuple  # (n,) index of the joint before this one, always a smaller one; -1: fixed to the world
-    offset: tuple  # (n, 3) m, from the origin of the parent's frame to this joint, in the parent's frame
-    axis: tuple  # (nv, 3) direction of each speed, scaled to length 1; a ball has three at right angles, which turn with it
-    damping: tuple  # (nv,) N m s/rad or N s/m, force -damping * qd
-    body_names: tuple  # (m,)
-    body_hinge: tuple  # (m,) index of the last joint that moves the body; -1: fixed to the world
-    mass: tuple  # (m,) kg
-    com: tuple  # (m, 3) m, centre of mass in the frame of its joint
-    inertia: tuple  # (m, 3, 3) kg m2, about the centre of mass, in the frame of its joint
-    gravity: tuple  # (3,) m/s2, inertial frame
-    kind: tuple = ()  # (n,) of "hinge", "slide", "ball"; (): all are hinges
-    armature: tuple = ()  # (nv,) kg m2 or kg, inertia of a rotor, on the diagonal of Mbar alone; (): none
-    stiffness: tuple = ()  # (n,) N m/rad or N/m, of a spring at each joint; (): none
-    rest: tuple = ()  # (nq,) rad, m and quaternions: where the springs are without force; (): at the reference
-    reference: tuple = ()  # (n,) rad or m, where the joint leaves frames parallel; 0 for a ball; (): all 0
-    # of a linear controller of hinges and slides: torque = tau - position_gain @ q - speed_gain @ qd; (): none
-    position_gain: tuple = ()  # (nv, nv) N m/rad or N/m, q in rad and m as it stands
-    speed_gain: tuple = ()  # (nv, nv) N m s/rad or N s/m
+    hinge_names: tuple[str, ...]
+    parent: tuple[int, ...]
+    offset: Rows
+    axis: Rows
+    damping: Numbers
+    body_names: tuple[str, ...]
+    body_hinge: tuple[int, ...]
+    mass: Numbers
+    com: Rows
+    inertia: tuple[Rows, ...]
+    gravity: Numbers
+    kind: tuple[str, ...] = ()
+    armature: Numbers = ()
+    stiffness: Numbers = ()
+    rest: Numbers = ()
+    reference: Numbers = ()
+    position_gain: Rows = ()
+    speed_gain: Rows = ()
 
-    def __new__(cls, *values, **named):
+    def __new__(cls, *values: Any, **named: Any) -> "Tree":
         known = [field.name for field in fields(cls)]
         if unknown := [name for name in named if name not in known]:
             raise ValueError(f"a Tree has no field {unknown[0]!r}; its fields are {', '.join(known)}")
         return super().__new__(cls)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("hinge_names", "body_names"):
             object.__setattr__(self, name, names(name, getattr(self, name)))
         n, m = len(self.hinge_names), len(self.body_names)
@@ -97,7 +153,7 @@ class Tree:
                 raise ValueError(f"{kind} {name!r} moves nothing that has mass or inertia; Mbar would be singular")
         singular.check_tree(self)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         """The fields, without those that may be left out and say nothing."""
         n, nv = len(self.parent), len(self.axis)
         nothing, plain = (0.0,) * n, {"kind": ("hinge",) * n, "armature": (0.0,) * nv, "rest": self.zero}
@@ -119,7 +175,7 @@ class Tree:
         return bool(self.position_gain or self.speed_gain)
 
     @property
-    def zero(self) -> tuple:
+    def zero(self) -> Numbers:
         """The reference position, (nq,): every frame is parallel to the inertial frame."""
         return tuple(
             value
@@ -132,13 +188,33 @@ class Tree:
         """Whether Mbar is known to be regular at every q; else it may be singular at some."""
         return singular.never(self)
 
-    def lock(self, angles: Mapping) -> "Tree":
-        """The tree without the joints that are named in `angles`, {name: position}: they stay there, at rest.
+    def lock(self, angles: Mapping[str, ArrayLike]) -> "Tree":
+        """The tree without the joints that are named in `angles`: they stay there, at rest.
 
-        A position is in rad, of a slide in m, of a ball a quaternion. What hangs on a locked joint is carried by the joint
-        before it, its vectors turned so that all frames are again parallel to the inertial frame where the free joints are at
-        their reference. A joint locked there rounds nothing. Raises ValueError for an unknown joint, a position that is none,
-        if no joint is left, or if a controller takes the position of a locked joint for the torque at a free one.
+        What hangs on a locked joint is carried by the joint before it, its vectors turned so that all frames are again parallel
+        to the inertial frame where the free joints are at their reference. A joint locked there rounds nothing.
+
+        Parameters
+        ----------
+        angles : {name: position}
+            In rad, of a slide in m, of a ball a quaternion.
+
+        Returns
+        -------
+        Tree
+            Of the other joints, and all bodies.
+
+        Raises
+        ------
+        ValueError
+            For an unknown joint, a position that is none, if no joint is left, or if a controller takes the position of a
+            locked joint for the torque at a free one.
+
+        Examples
+        --------
+        >>> forearm = tmt.ARM.lock({"alpha": 0.0, "beta": 0.0})
+        >>> print(forearm.hinge_names, tmt.mass_matrix([0.0], forearm).round(9))
+        ('gamma',) [[0.05275]]
         """
         return locked(self, angles)
 
@@ -152,7 +228,7 @@ class Tree:
         return on_path
 
 
-def _kinds(values, n) -> tuple:
+def _kinds(values: Any, n: int) -> tuple[str, ...]:
     """The kinds of the joints; hinges where none is given."""
     listed = isinstance(values, (list, tuple)) or (isinstance(values, np.ndarray) and values.ndim == 1)
     kinds = tuple(values) if listed else (None,)
@@ -163,7 +239,7 @@ def _kinds(values, n) -> tuple:
     return tuple(map(str, kinds))
 
 
-def _gain(name, values, coordinates) -> tuple:
+def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows:
     """The rows of a gain, (nv, nv); () where nothing is fed back."""
     if isinstance(values, tuple | list) and not values:
         return ()
@@ -177,7 +253,7 @@ def _gain(name, values, coordinates) -> tuple:
     return rows if fed.any() else ()
 
 
-def _check_ball(i, axes, reference, rest):
+def _check_ball(i: int, axes: np.ndarray, reference: float, rest: Numbers) -> None:
     """Raise ValueError unless joint i can be a ball."""
     if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0.0:
         raise ValueError(f"the axes of joint {i}, a ball, are {axes.tolist()}; a right-handed frame is expected")
@@ -187,17 +263,17 @@ def _check_ball(i, axes, reference, rest):
         raise ValueError(f"Tree.rest of joint {i}, a ball, is {rest}; a quaternion of length 1 is expected")
 
 
-def _direction(i, axis) -> tuple:
+def _direction(i: int, axis: Numbers) -> Numbers:
     """The axis of speed i at length 1, however long it is."""
     exponent = math.frexp(max(map(abs, axis)))[1]
-    axis = [math.ldexp(a, -exponent) for a in axis]  # exact, and the squares neither overflow nor vanish
+    axis = tuple(math.ldexp(a, -exponent) for a in axis)  # exact, and the squares neither overflow nor vanish
     length = float(np.linalg.norm(axis))
     if length == 0.0:
         raise ValueError(f"Tree.axis[{i}] is zero; a direction is expected")
     return tuple(a / length for a in axis)
 
 
-def _check_inertia(name, inertia):
+def _check_inertia(name: str, inertia: np.ndarray) -> None:
     """Raise ValueError unless the 3 x 3 tensor can belong to a rigid body."""
     scale = np.abs(inertia).max()
     if np.abs(inertia - inertia.T).max() > 1e-12 * scale:

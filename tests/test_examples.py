@@ -1,0 +1,44 @@
+"""The scripts in examples: each runs in a folder of its own, says what is expected, and writes nothing elsewhere."""
+
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+from runs import ENVIRONMENT, ROOT
+
+EXAMPLES = sorted((ROOT / "tests" / "examples").glob("*.py"))
+SLOW = ("many_files", "stable_step")  # which start runs
+TABLE = ROOT / "reports" / "example" / "tables" / "speed.csv"
+# what is printed, and the files that are left
+EXPECTED = {
+    "controller": (r"after 2 s: 0\.00\d* deg", set()),
+    "exported_c": (r"difference from tmt: \d(\.\d)?e-1\d|difference from tmt: 0$", {"arm.c", "arm.h", "arm.so"}),
+    "many_files": (
+        r"status 1.*\n.*ben.xml: differ com z of rod.*\n.*anna.xml: agree$", {"class", "solution.xml", "submissions"}
+    ),
+    "own_equations": (r"equations agree; .* h\[pole\] is .*\nprobable cause: sign of gravity", set()),
+    "stable_step": (r"0\.01 s: not stable \(status 1\)\n.*Euler: 0\.00\d+ s, elbow\n.*fast: 0\.0[56]", {"robot.xml", "report"}),
+    "time_against_error": ("6 methods", {"time_against_error.png"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "path", [pytest.param(path, marks=[pytest.mark.slow] * (path.stem in SLOW), id=path.stem) for path in EXAMPLES]
+)
+def test_an_example_runs_and_says_what_it_finds(path, tmp_path):
+    if path.stem == "exported_c" and not shutil.which("gcc"):
+        pytest.skip("needs gcc")
+    words = [sys.executable, path, *[TABLE] * (path.stem == "time_against_error")]
+    run = subprocess.run(words, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
+    printed, left = EXPECTED[path.stem]
+    assert run.returncode == 0 and run.stderr == ""
+    assert re.search(printed, run.stdout, re.MULTILINE), run.stdout
+    assert {file.name for file in tmp_path.iterdir()} == left
+    text = path.read_text(encoding="utf-8")
+    assert len(text.partition('"""\n')[0].splitlines()) == 2 and len(text.splitlines()) <= 40
+
+
+def test_there_is_an_expectation_for_each_example():
+    assert [path.stem for path in EXAMPLES] == sorted(EXPECTED)
