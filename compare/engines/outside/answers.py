@@ -57,7 +57,7 @@ def read(key: int, name: str, file: File, tree: tmt.Tree) -> dict:
     module = importlib.import_module(f"..{record.module or name}", __package__)
     model, stated = module.Model(file, record.precision), numbers_of(tree)
     model.stated = stated
-    found = {number: np.asarray(values, float) for number, values in model.numbers().items()}
+    found = {number: np.array(values, float) for number, values in model.numbers().items()}
     mended = {}
     for number, values in found.items():
         if np.shape(values) != np.shape(stated[number]):
