@@ -98,6 +98,8 @@ def test_a_robot_against_the_exact_values(engine, robot):
     bound = FACTOR * RECORDS[engine].eps
     assert (distance(of.mass_matrix(q), sample.truth("mass_matrix")) <= bound * scales.mass_matrix).all()
     assert (distance(of.bias(q, v), sample.truth("bias")) <= bound * scales.bias).all()
+    if not of.has("acceleration"):
+        return
     exact = sample.truth("acceleration")
     size = scales.acceleration(scales.force(tau), exact.astype(float))
     assert (distance(of.acceleration(q, v, tau), exact) <= bound * size).all()

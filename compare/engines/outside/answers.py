@@ -66,6 +66,7 @@ def read(key: int, name: str, file: File, tree: tmt.Tree) -> dict:
             mended[number] = number in model.drops or model.mend(number, stated[number])
     models[key] = model
     has = {name for name in QUANTITIES if getattr(type(model), name) is not getattr(ReadModel, name)}
+    has -= set(model.lacks)
     return {"read": found, "stated": stated, "mended": mended, "seconds": time.perf_counter() - begin, "has": has}
 
 

@@ -51,6 +51,7 @@ class ReadModel:
     """
 
     drops = ()  # numbers of the Tree that its equations do not have at all: they act as part of the torque
+    lacks = ()  # quantities that it cannot give for this robot
     stated: Mapping = MappingProxyType({})  # before its numbers are read: numbers_of the Tree
 
     def __init__(self, file: File, precision: str):
