@@ -225,9 +225,11 @@ def test_an_order_is_taken_from_regular_errors_above_the_floor(order):
     steps = [0.1 / 2**k for k in range(4)]
     errors = [2e-2 / 2 ** (order * k) for k in range(4)]
     assert integrators.measured_order(steps, errors, 2.2e-16) == pytest.approx(order)
-    assert integrators.measured_order(steps[:2], errors[:2], 2.2e-16) is None  # one order has not settled
-    assert integrators.measured_order(steps[:3], [*errors[:2], 1e-14], 2.2e-16) is None  # rounding
+    assert integrators.measured_order(steps[:3], errors[:3], 2.2e-16) is None  # two orders have not settled
+    assert integrators.measured_order(steps, [*errors[:3], 1e-14], 2.2e-16) is None  # rounding
     assert integrators.measured_order(steps, errors, 1e-2) is None
+    finer = [2.0**-k for k in range(7, 14)]
+    assert integrators.measured_order(finer, [2e-16 / dt for dt in finer], 2.2e-16) is None  # an eps of each step
 
 
 def test_a_step_is_compared_with_the_same_scheme():
