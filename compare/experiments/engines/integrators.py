@@ -34,7 +34,7 @@ def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
     """Single steps from random states, and the runs of the regular free scene with several steps or tolerances."""
     case = free_scene(setup)
     for method in engine.methods_in(setup.robot.case()).values():
-        setup.progress(f"engines: {method.label}")
+        setup.progress(f"engines: {method.label}{' compiles' * RECORDS[engine.name].compiles}")
         try:
             if method.scheme in METHODS and not method.adaptive:
                 compare_steps(result, setup, engine, method)
