@@ -57,7 +57,7 @@ def rows(setup: Setup) -> Result:
             compare_engine(result, setup, engine, label)
         except Unread as error:
             result.tables["engines_read"].append({"engine": label, "why_not": str(error)})
-            result.find("unread", engine=label, reason=str(error))
+            result.find("unread", engine=label, reason=str(error).rstrip("."))
         except TooLong as error:
             result.find("too_long", what=label, reason=str(error))
         except EngineError as error:
