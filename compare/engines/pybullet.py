@@ -27,7 +27,7 @@ def methods_for(tree):
 
 
 class Model(OfUrdf):
-    def load(self, text, names):
+    def load(self, text, file):
         import pybullet
         from pybullet_utils.bullet_client import BulletClient
 
@@ -38,13 +38,13 @@ class Model(OfUrdf):
             self.robot = self.bullet.loadURDF(f"{folder}/robot.urdf", useFixedBase=True, flags=flags)
         self.infos = [self.bullet.getJointInfo(self.robot, k) for k in range(self.bullet.getNumJoints(self.robot))]
         by_name = {info[1].decode(): info for info in self.infos}
-        self.links = [by_name[name][0] for name in names]
+        self.links = [by_name[name][0] for name in file.names]
         self.order = np.argsort(self.links)  # the Tree's joints in PyBullet's vectors
         for link in range(len(self.infos)):
             self.bullet.changeDynamics(self.robot, link, linearDamping=0.0, angularDamping=0.0)
             self.bullet.changeDynamics(self.robot, link, maxJointVelocity=1e9)
-        self.apply(pybullet.VELOCITY_CONTROL, np.zeros(len(names)))
-        return np.array([by_name[name][6] for name in names])
+        self.apply(pybullet.VELOCITY_CONTROL, np.zeros(len(file.names)))
+        return np.array([by_name[name][6] for name in file.names])
 
     def apply(self, mode, forces):
         """Set the torques of the joints, or the largest ones of the motors that they have by default."""

@@ -8,6 +8,8 @@ from .model import File, ReadModel, Unread, together
 class OfUrdf(ReadModel):
     """A URDF has no gravity, springs or armature; these are set afterwards."""
 
+    has_free_bodies = False
+
     def __init__(self, file: File, precision: str):
         from ..mujoco.names import joint_places
         from ..mujoco.source import compiled
@@ -15,16 +17,19 @@ class OfUrdf(ReadModel):
 
         try:
             model, _ = compiled(file.path)
-            text = urdf(model)
+            text = urdf(model, self.has_free_bodies)
         except ValueError as error:
             raise Unread(str(error)) from None
-        self.armature, self.stiffness = np.zeros((2, len(file.names)))
-        places = joint_places(model)
-        self.rest = np.array([model.qpos_spring[places[name].qpos.start] for name in file.names])
-        self.damping = self.load(text, file.names)
+        self.file, (self.armature, self.stiffness) = file, np.zeros((2, file.coordinates.nv))
+        places, free = joint_places(model), [f"{name} {part}" for name in file.free for part in ("x", "y", "z", "turn")]
+        speeds = [(k, name) for k, name in enumerate(file.names) for _ in places[name].dofs]
+        self.at = np.array([file.coordinates.places.joints[k].q.start for k, _ in speeds])  # in q, of each speed
+        self.rest = np.array([model.qpos_spring[places[name].qpos.start] for _, name in speeds])
+        self.is_free = np.array([name in free for _, name in speeds])
+        self.damping = self.load(text, file)
 
-    def load(self, text: str, names: tuple[str, ...]) -> np.ndarray:
-        """Read the text; the damping of the joints of these names, (joints,)."""
+    def load(self, text: str, file: File) -> np.ndarray:
+        """Read the text; the damping of the joints, (nv,)."""
         raise NotImplementedError
 
     def bodies(self) -> list[list[tuple[float, np.ndarray, np.ndarray]]]:
@@ -49,7 +54,7 @@ class OfUrdf(ReadModel):
         every, states = steps // (len(times) - 1), [np.concatenate([q, v])]
         self.start(q, v, times[-1] / steps, self.damping)
         for step in range(1, steps + 1):
-            q, v = self.step(tau - self.stiffness * (q - self.rest), v)
+            q, v = self.step(tau - self.stiffness * (q[self.at] - self.rest), v)
             if step % every == 0:
                 states.append(np.concatenate([q, v]))
         return np.array(states), steps
@@ -64,4 +69,5 @@ class OfUrdf(ReadModel):
             self.set_gravity(values)
         elif name in ("armature", "damping", "stiffness"):
             setattr(self, name, np.array(values))
-        return name not in ("mass", "moments")
+            return not values[self.is_free].any()
+        return name == "gravity"
