@@ -59,7 +59,7 @@ def rows(setup: Setup) -> Result:
             result.tables["engines_read"].append({"engine": label, "why_not": str(error)})
             result.find("unread", engine=label, reason=str(error).rstrip("."))
         except TooLong as error:
-            result.find("too_long", what=label, reason=str(error))
+            result.find("left_out", what=label, reason=str(error))
         except EngineError as error:
             result.check(label, ENDS, None, 0.0, "", str(error), rule="equal", about=About.ENGINE)
     for reason in dict.fromkeys(absent.values()):

@@ -9,7 +9,7 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...engines import GRID, LABELS, RECORDS, Engine, Method, Motion, Setting
-from ...engines.outside import TooLong
+from ...engines.outside import TooLong, Unread
 from ...judge.check import About, Result, closest
 from ...judge.rounding import step_rounding
 from ...judge.run import ORDER_MARGIN
@@ -41,8 +41,8 @@ def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
             if case is not None:
                 rows = follow(result, case, engine, method, setup)
                 check_order(result, f"{case.name}, {method.label}", method, rows[0]["measured_order"])
-        except TooLong as error:
-            result.find("too_long", what=method.label, reason=str(error))
+        except (TooLong, Unread) as error:
+            result.find("left_out", what=method.label, reason=str(error))
             break
 
 
