@@ -32,6 +32,7 @@ LIBRARIES = {
     "jax": ("compare.engines.mjx",),
     "heyoka": ("compare.engines.heyoka",),
     "dartpy": ("compare.engines.dart",),
+    "pybullet": ("compare.engines.pybullet",),
     "newton": ("compare.engines.newton",),
     "pinocchio": ("compare.engines.pinocchio",),
     "pydrake": ("compare.engines.drake",),

@@ -1,13 +1,16 @@
 """DART, through a URDF text of the model that MuJoCo compiled: its reader of MJCF makes every moving body 1 kg.
 
 A URDF has no gravity, springs or armature. DART itself has no armature, but its dampers are implicit: of a coefficient c they
-give (M + dt c) a = force - h - c v. A damper with c = armature / dt and the force c v together are the armature.
+give (M + dt c) a = force - h - c v. A damper with c = armature / dt and the force c v together are the armature. A free body has
+a rotation vector, and its angular velocity in world axes.
 """
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from . import EngineRecord
-from .outside import File, ReadModel, Unread, together
+from .outside.of_urdf import OfUrdf
+from .outside.order import Order
 
 ENGINE = EngineRecord(
     order=75, label="DART", colour="#882255", marker="*", package="dartpy", extra="dart", reads_file=True
@@ -15,21 +18,19 @@ ENGINE = EngineRecord(
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
 
 
-class Model(ReadModel):
-    """A Skeleton with a fixed base, alone in a World that never lets bodies sleep, as it does by default."""
+def methods_for(tree):
+    """Its step adds to the angular velocity of a free body in world axes."""
+    return {"semi-implicit Euler": (1, "dart_semi_implicit_euler")} if tree.coordinates.balls else METHODS
 
-    def __init__(self, file: File, precision: str):
+
+class Model(OfUrdf):
+    """A Skeleton alone in a World that never lets bodies sleep, as it does by default."""
+
+    has_free_bodies = True
+
+    def load(self, text, file):
         import dartpy
 
-        from .mujoco.names import joint_places
-        from .mujoco.source import compiled
-        from .mujoco.urdf import urdf
-
-        try:
-            model, _ = compiled(file.path)
-            text = urdf(model)
-        except ValueError as error:
-            raise Unread(str(error)) from None
         loader, options = dartpy.utils.DartLoader(), dartpy.utils.DartLoaderOptions()
         options.mDefaultRootJointType = dartpy.utils.DartLoaderRootJointType.FIXED
         loader.setOptions(options)
@@ -38,72 +39,81 @@ class Model(ReadModel):
         never = self.world.getDeactivationOptions()
         never.mEnabled = False
         self.world.setDeactivationOptions(never)
-        self.joints = [self.skeleton.getJoint(name) for name in file.names]
-        self.dofs = [joint.getIndexInSkeleton(0) for joint in self.joints]  # in DART's vectors
-        self.order = np.argsort(self.dofs)  # DART's vectors of those of the Tree
-        self.damping = np.array([joint.getDampingCoefficient(0) for joint in self.joints])
-        self.armature, self.stiffness = np.zeros((2, len(self.joints)))
-        places = joint_places(model)
-        self.rest = np.array([model.qpos_spring[places[name].qpos.start] for name in file.names])
+        q, v = np.zeros((2, file.coordinates.nv), int)  # the places in the Tree of DART's numbers
+        self.joints, self.free = {}, {}  # by their numbers in the Tree; quaternions by the first of DART's numbers
+        for k, (name, (kind, at, by)) in enumerate(zip(file.names, file.coordinates.places.joints)):
+            joint = self.skeleton.getJoint(name.removesuffix(" turn") if kind == "ball" else name)
+            if joint is None:  # a part of a free joint
+                continue
+            self.joints[k], own = joint, joint.getIndexInSkeleton(0)
+            q[own], v[own] = at.start, by.start
+            if kind == "ball":
+                self.free[own] = at
+                q[own : own + 6] = np.r_[at.start : at.start + 3, at.start - 3 : at.start]
+                v[own : own + 6] = np.r_[by, by.start - 3 : by.start]
+        turned = tuple((slice(own, own + 3), at) for own, at in self.free.items())
+        self.order = Order(q, v, turned, in_world=True)
+        self.dampers = {
+            own: joint for joint in self.joints.values() if (own := joint.getIndexInSkeleton(0)) not in self.free
+        }
+        damping = np.zeros(len(v))
+        damping[v[list(self.dampers)]] = [joint.getDampingCoefficient(0) for joint in self.dampers.values()]
+        return damping
 
-    def numbers(self):
-        bodies = {joint.getName(): [] for joint in self.joints}
+    def bodies(self):
+        bodies, numbers = [[] for _ in self.file.names], {joint.getName(): k for k, joint in self.joints.items()}
         moved_by = {None: None}  # the joint that moves a body, by the body's name
         for body in self.skeleton.getBodyNodes():
-            joint, parent = body.getParentJoint().getName(), body.getParentBodyNode()
-            moved_by[body.getName()] = joint if joint in bodies else moved_by[parent and parent.getName()]
-            if moved_by[body.getName()]:
+            parent = body.getParentBodyNode()
+            k = numbers.get(body.getParentJoint().getName(), moved_by[parent and parent.getName()])
+            moved_by[body.getName()] = k
+            if k is not None:
                 R, inertia = body.getWorldTransform().rotation(), body.getInertia()
-                moment = R @ inertia.getMoment() @ R.T
-                bodies[moved_by[body.getName()]].append((inertia.getMass(), body.getCOM(), moment))
-        mass, moments = zip(*(together(own) for own in bodies.values()))
-        numbers = {"gravity": self.world.getGravity(), "mass": np.array(mass), "moments": np.array(moments)}
-        return numbers | {name: getattr(self, name) for name in ("armature", "damping", "stiffness")}
+                bodies[k].append((inertia.getMass(), body.getCOM(), R @ inertia.getMoment() @ R.T))
+        return bodies
 
-    def mend(self, name, values):
-        if name == "gravity":
-            self.world.setGravity(values)
-        elif name in ("armature", "damping", "stiffness"):
-            setattr(self, name, np.array(values))
-        return name not in ("mass", "moments")
+    def gravity(self):
+        return self.world.getGravity()
 
-    def set_state(self, q, v=None):
-        self.skeleton.setPositions(q[self.order])
-        if v is not None:
-            self.skeleton.setVelocities(v[self.order])
+    def set_gravity(self, gravity):
+        self.world.setGravity(gravity)
 
-    def set_step(self, dt, damping):
-        """Set the length of a step, s, and the dampers; the coefficients of those that are armature."""
-        rotors = self.armature / dt
+    def set_state(self, q, v):
+        self.q, (x, speeds) = q, self.order.engine(q, v)
+        for own, at in self.free.items():
+            x[own : own + 3] = Rotation.from_quat(np.roll(q[at], -1)).as_rotvec()
+        self.skeleton.setPositions(x)
+        self.skeleton.setVelocities(speeds)
+
+    def start(self, q, v, dt, damping):
         self.world.setTimeStep(dt)
-        for joint, coefficient in zip(self.joints, damping + rotors):
-            joint.setDampingCoefficient(0, coefficient)
-        return rotors
+        self.rotors = self.armature / dt  # coefficients of the dampers that are armature
+        for own, joint in self.dampers.items():
+            joint.setDampingCoefficient(0, (damping + self.rotors)[self.order.v[own]])
+        self.set_state(q, v)
+
+    def set_force(self, force, v):
+        self.skeleton.setForces(self.order.engine(self.q, force + self.rotors * v)[1])
+
+    def step(self, force, v):
+        self.set_force(force, v)
+        self.world.step()
+        x, self.q = self.skeleton.getPositions(), self.q.copy()
+        self.q[self.order.q] = x
+        for own, at in self.free.items():
+            self.q[at] = np.roll(Rotation.from_rotvec(x[own : own + 3]).as_quat(), 1)
+        return self.q, self.order.tree(self.q, self.skeleton.getVelocities())
 
     def mass_matrix(self, q):
-        self.set_state(q)
-        return self.skeleton.getMassMatrix()[np.ix_(self.dofs, self.dofs)] + np.diag(self.armature)
+        self.set_state(q, np.zeros(len(self.armature)))
+        return self.order.tree_matrix(q, self.skeleton.getMassMatrix()) + np.diag(self.armature)
 
     def bias(self, q, v):
         self.set_state(q, v)
-        return self.skeleton.getCoriolisAndGravityForces()[self.dofs]
+        return self.order.tree(q, self.skeleton.getCoriolisAndGravityForces())
 
     def acceleration(self, q, v, force):
-        rotors = self.set_step(1.0, 0.0)
-        self.set_state(q, v)
-        self.skeleton.setForces((force + rotors * v)[self.order])
+        self.start(q, v, 1.0, 0.0)
+        self.set_force(force, v)
         self.skeleton.computeForwardDynamics()
-        return self.skeleton.getAccelerations()[self.dofs]
-
-    def run(self, q, v, tau, times, steps, method, tolerance):
-        every, states = steps // (len(times) - 1), [np.concatenate([q, v])]
-        rotors = self.set_step(times[-1] / steps, self.damping)
-        self.set_state(q, v)
-        for step in range(1, steps + 1):
-            springs = self.stiffness * (q - self.rest)
-            self.skeleton.setForces((tau - springs + rotors * v)[self.order])
-            self.world.step()
-            q, v = self.skeleton.getPositions()[self.dofs], self.skeleton.getVelocities()[self.dofs]
-            if step % every == 0:
-                states.append(np.concatenate([q, v]))
-        return np.array(states), steps
+        return self.order.tree(q, self.skeleton.getAccelerations())

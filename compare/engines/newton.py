@@ -19,8 +19,6 @@ OFF = ("target_ke", "target_kd", "limit_ke", "limit_kd")  # actuators and limits
 
 
 class Model(ReadModel):
-    is_compiled = True
-
     def __init__(self, file: File, precision: str):
         import newton
         import warp
@@ -29,7 +27,8 @@ class Model(ReadModel):
         from .mujoco.source import compiled
 
         builder, warp.config.enable_backward = newton.ModelBuilder(), False
-        builder.add_mjcf(str(file.path), skip_equality_constraints=True)
+        is_urdf, mjcf = file.path.suffix == ".urdf", {"skip_equality_constraints": True}
+        builder.add_urdf(str(file.path), floating=False) if is_urdf else builder.add_mjcf(str(file.path), **mjcf)
         self.newton, self.model = newton, builder.finalize(device="cpu")
         for name in OFF:
             getattr(self.model, f"joint_{name}").zero_()

@@ -39,7 +39,8 @@ class Model(ReadModel):
                 name = file.names[min(k + 1, len(file.names) - 1)]  # of the next one of a composite joint
         self.circles = np.array(circles, int)
         if self.model.nv != file.coordinates.nv:
-            raise Unread(f"Pinocchio has {self.model.nv} speeds, the compared model {file.coordinates.nv}")
+            why = f"Pinocchio has {self.model.nv} speeds, the compared model {file.coordinates.nv}"
+            raise Unread(f"{why}; of several root bodies it reads the first one")
         self.order = order_of(file, starts, (0, 1, 2, 4, 5, 6, 3), range(6), (1, 2, 3, 0), in_world=False)
         self.data = self.model.createData()
 

@@ -15,7 +15,7 @@ from edited import setup_of
 
 from compare import engines
 from compare.engines import EngineRecord, Method
-from compare.engines.outside import numbers_of, together
+from compare.engines.outside import numbers_of, size_of, together
 from compare.engines.tmt import TmtDynamics
 from compare.experiments.engines import compare_numbers, compare_quantities, integrators
 from compare.judge.check import About, Result
@@ -52,7 +52,7 @@ class Model(ReadModel):
         self.tree = dataclasses.replace(tree, {wrong})
 
     def numbers(self):
-        return {{name: values for name, values in numbers_of(self.tree).items() if name != "{untold}"}}
+        return {{name: values for name, values in numbers_of(self.tree).items() if name not in ("about_origin", "{untold}")}}
 
     def mend(self, name, values):
         if name == "gravity":
@@ -83,6 +83,7 @@ ENGINES = {
     "bare": {"label": "Bare", "wrong": "armature=[0.0, 0.0]", "untold": "armature"},
     "later": {"label": "Later", "euler": "explicit_euler"},
     "blind": {"label": "Blind", "wrong": "**{}[0]"},
+    "slow": {"label": "Slow", "wrong": "mass=__import__('time').sleep(60.0)"},
 }
 
 
@@ -97,6 +98,8 @@ def report(tmp_path_factory):
         (root / "compare/engines" / f"{name}.py").unlink(missing_ok=True)
     for name, of in ENGINES.items():
         (root / "compare/engines" / f"{name}.py").write_text(AGAIN.format(**(RIGHT | of)))
+    answers = root / "compare/engines/outside/answers.py"
+    answers.write_text(answers.read_text().replace("LIMIT = 120.0", "LIMIT = 6.0"))
     (root / "robot.xml").write_text(TWO_LINKS)
     run = subprocess.run(
         [sys.executable, "-m", "compare", "engines", "--quick", "--mjcf", "robot.xml", "--out", "report"], cwd=root,
@@ -131,6 +134,10 @@ def test_what_is_read_differently_is_a_row_and_says_whether_it_was_set(report):
     assert (float(heavy["read"]), float(heavy["compared"])) == (1.001, 1.0) and heavy["set_by_this_program"] == "false"
     assert ("Blind", "", "") in rows and rows["Blind", "", ""]["why_not"]  # it cannot read the file
     assert {engine for engine, *_ in rows} == {"Upside", "Heavy", "Blind"}
+
+
+def test_an_engine_that_does_not_answer_is_left_out(report):
+    assert "Slow: no answer within 6 s" in (report[0] / "report.md").read_text()
 
 
 def test_orders_are_measured_and_what_cannot_be_set_does_not_run(report):
@@ -192,7 +199,7 @@ def test_a_number_as_read_just_inside_and_just_outside(number):
     for off, differs in ((60.0, False), (70.0, True)):
         result, read = Result("engines"), {name: values.copy() for name, values in stated.items()}
         result.tables["engines_read"] = []
-        size = np.abs(stated[number]).max() or 1.0
+        size = size_of(stated, number) or 1.0
         read[number][..., -1] += off * RECORDS["float64"].eps * size * (1.0 if stated[number].any() else differs)
         reading = {"read": read, "stated": stated, "mended": {number: True} if differs else {}}
         compare_numbers(result, ARM, "Other", reading, RECORDS["float64"])
@@ -218,9 +225,11 @@ def test_an_order_is_taken_from_regular_errors_above_the_floor(order):
     steps = [0.1 / 2**k for k in range(4)]
     errors = [2e-2 / 2 ** (order * k) for k in range(4)]
     assert integrators.measured_order(steps, errors, 2.2e-16) == pytest.approx(order)
-    assert integrators.measured_order(steps[:2], errors[:2], 2.2e-16) is None  # one order has not settled
-    assert integrators.measured_order(steps[:3], [*errors[:2], 1e-14], 2.2e-16) is None  # rounding
+    assert integrators.measured_order(steps[:3], errors[:3], 2.2e-16) is None  # two orders have not settled
+    assert integrators.measured_order(steps, [*errors[:3], 1e-14], 2.2e-16) is None  # rounding
     assert integrators.measured_order(steps, errors, 1e-2) is None
+    finer = [2.0**-k for k in range(7, 14)]
+    assert integrators.measured_order(finer, [2e-16 / dt for dt in finer], 2.2e-16) is None  # an eps of each step
 
 
 def test_a_step_is_compared_with_the_same_scheme():

@@ -18,7 +18,7 @@ def parsed(file: File, dt: float):
     logging.getLogger("drake").setLevel(logging.CRITICAL)  # set by importing pydrake
     plant = MultibodyPlant(dt)
     parser = Parser(plant)
-    text = lacks_names(file) and whole_text(file.path)
+    text = needs_text(file) and whole_text(file.path)
     instances = parser.AddModelsFromString(text, "xml") if text else parser.AddModels(str(file.path))
     if not file.free:  # a URDF's first body, which MuJoCo fixes to the world
         bodies = {body for instance in instances for body in plant.GetBodyIndices(instance)}
@@ -36,12 +36,12 @@ def parsed(file: File, dt: float):
     return plant, rotors
 
 
-def lacks_names(file: File) -> bool:
-    """Whether an MJCF file has no name of the model, which Drake needs, or a joint without a name."""
+def needs_text(file: File) -> bool:
+    """Whether an MJCF file has no name of the model, which Drake needs, joints without a name, or meshes or includes."""
     if file.path.suffix == ".urdf":
         return False
-    unnamed = any(re.fullmatch(r"joint \d+", name) for name in file.names)
-    return unnamed or "model" not in ElementTree.parse(file.path).getroot().attrib
+    unnamed, root = any(re.fullmatch(r"joint \d+", name) for name in file.names), ElementTree.parse(file.path).getroot()
+    return unnamed or "model" not in root.attrib or any(part.tag in ("mesh", "include") for part in root.iter())
 
 
 def finished(file: File, dt: float, joints: dict, numbers: dict, rest):

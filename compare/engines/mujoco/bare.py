@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -31,6 +32,7 @@ class Bare:
         switch_off(self.model)
         self.model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
         self.model.opt.disableflags |= bit("WARMSTART")  # its solver starts from the unconstrained acceleration
+        self.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # of constraints, which are off; both refuse PGS
         if rotors_in_joints and hasattr(self.model, "actuator_armature"):
             self.model.dof_armature += rotors(self.model)
             self.model.actuator_armature[:] = 0.0

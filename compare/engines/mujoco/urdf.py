@@ -15,8 +15,10 @@ KINDS = {"hinge": "continuous", "slide": "prismatic"}
 FAR = "1e9"  # limits that nothing reaches: a prismatic joint has to state some
 
 
-def urdf(source: mujoco.MjModel | Path | str) -> str:
-    """A URDF text of a compiled model, an MJCF file (a Path) or MJCF text, with a fixed base; ValueError where it cannot be one.
+def urdf(source: mujoco.MjModel | Path | str, has_free_bodies: bool = False) -> str:
+    """A URDF text of a compiled model, an MJCF file (a Path) or MJCF text; ValueError where it cannot be one.
+
+    Its base is fixed; has_free_bodies: with free joints, of type floating, of which readers make what they like.
 
     Numbers have 17 significant digits; positions are those of the file (`ref` included), joints have its names. The frame of a
     link has its origin on the axis of its hinge. Of several joints in one body all but the last move a link without mass, and a
@@ -26,7 +28,7 @@ def urdf(source: mujoco.MjModel | Path | str) -> str:
     take_away(model)  # what a flag of the file disables is zero
     names = [joint_name(model, j) for j in range(model.njnt)]
     for j, name in enumerate(names):
-        if (kind := kind_of(model, j)) not in KINDS:
+        if (kind := kind_of(model, j)) not in KINDS and not (has_free_bodies and kind == "free"):
             raise ValueError(f"joint {name!r} is of type {kind}; a URDF with a fixed base has only hinges and slides")
     robot = Element("robot", name="robot")
     SubElement(robot, "link", name="link0")
@@ -39,6 +41,8 @@ def urdf(source: mujoco.MjModel | Path | str) -> str:
             is_last, anchor, moved, turned = j == joints[-1], np.zeros(3), np.zeros(3), np.eye(3)
             if j is None:
                 joint = Element("joint", name=unused(f"fixed{body}", names), type="fixed")
+            elif kind_of(model, j) == "free":
+                joint, position, turn = Element("joint", name=names[j], type="floating"), np.zeros(3), np.eye(3)
             else:
                 kind, axis, reference = kind_of(model, j), model.jnt_axis[j], model.qpos0[model.jnt_qposadr[j]]
                 joint = Element("joint", name=names[j], type=KINDS[kind])

@@ -12,6 +12,7 @@ A process of its own keeps an engine's threads, its precision and a crash away f
 """
 
 import importlib
+import time
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -25,8 +26,8 @@ import numpy as np
 from ...judge.words import listed
 from ...robots.case import Case
 from .. import GRID, RECORDS, Engine, Method, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
-from .answers import answer, started
-from .model import EngineError, File, ReadModel, Unread, combined, numbers_of, passive, together
+from .answers import LIMIT, answer, started
+from .model import EngineError, File, ReadModel, TooLong, Unread, combined, numbers_of, passive, size_of, together
 
 __all__ = [
     "EngineError",
@@ -34,9 +35,11 @@ __all__ = [
     "Outside",
     "OutsideDynamics",
     "ReadModel",
+    "TooLong",
     "Unread",
     "combined",
     "numbers_of",
+    "size_of",
     "together",
 ]
 
@@ -82,11 +85,14 @@ class OutsideDynamics:
         return self.ask("read", self.name, self.file, self.tree)
 
     def ask(self, act: str, *arguments):
-        """The value of a function of this module in the engine's process; Unread if the process ends."""
+        """The value of a function of answers.py in the engine's process; EngineError if it fails or the process ends."""
+        begin = time.monotonic()
         try:
             return process(self.name).submit(answer, self.key, act, arguments).result()
         except BrokenProcessPool:
             process.cache_clear()
+            if time.monotonic() - begin > LIMIT:
+                raise TooLong(f"no answer within {LIMIT:g} s") from None
             raise EngineError("its process was killed") from None
 
     def rows(self, quantity: str, *values) -> np.ndarray:

@@ -1,5 +1,6 @@
 """What an engine's own process does: read a file, give quantities at states, run, time."""
 
+import faulthandler
 import importlib
 import os
 import time
@@ -14,8 +15,9 @@ from ...process.crash import described
 from ...process.streams import in_one_line
 from ...process.workers import begin
 from .. import RECORDS
-from .model import EngineError, File, ReadModel, Unread, numbers_of
+from .model import EngineError, File, ReadModel, Unread, numbers_of, size_of
 
+LIMIT = 120.0  # s, of an answer: compiling a large model may take hours
 ONE = 20  # calls of one state that are timed together
 QUANTITIES = "mass_matrix", "bias", "acceleration"
 
@@ -32,7 +34,11 @@ models = {}  # by the key of the case: what this process has read
 
 
 def answer(key: int, act: str, arguments: tuple) -> object:
-    """What a function below returns for a case; EngineError with the reason, in one line, where it raises."""
+    """What a function below returns for a case; EngineError with the reason, in one line, where it raises.
+
+    After the time limit the process ends, whatever its libraries do.
+    """
+    faulthandler.dump_traceback_later(LIMIT, exit=True)
     try:
         return {"read": read, "each": each, "prepared": prepared, "ran": ran, "timed": timed}[act](key, *arguments)
     except EngineError:
@@ -40,6 +46,8 @@ def answer(key: int, act: str, arguments: tuple) -> object:
     except Exception as error:
         kind = Unread if act == "read" else EngineError
         raise kind(in_one_line(" ".join(described(error).split()))) from None
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
 def read(key: int, name: str, file: File, tree: tmt.Tree) -> dict:
@@ -49,16 +57,16 @@ def read(key: int, name: str, file: File, tree: tmt.Tree) -> dict:
     module = importlib.import_module(f"..{record.module or name}", __package__)
     model, stated = module.Model(file, record.precision), numbers_of(tree)
     model.stated = stated
-    found = {number: np.asarray(values, float) for number, values in model.numbers().items()}
+    found = {number: np.array(values, float) for number, values in model.numbers().items()}
     mended = {}
     for number, values in found.items():
-        size = np.abs(stated[number]).max(initial=0.0)
         if np.shape(values) != np.shape(stated[number]):
             raise Unread(f"{number}: {len(values)} values, {len(stated[number])} in the compared model")
-        if not np.abs(values - stated[number]).max(initial=0.0) <= FACTOR * record.eps * size:
+        if not np.abs(values - stated[number]).max(initial=0.0) <= FACTOR * record.eps * size_of(stated, number):
             mended[number] = number in model.drops or model.mend(number, stated[number])
     models[key] = model
     has = {name for name in QUANTITIES if getattr(type(model), name) is not getattr(ReadModel, name)}
+    has -= set(model.lacks)
     return {"read": found, "stated": stated, "mended": mended, "seconds": time.perf_counter() - begin, "has": has}
 
 

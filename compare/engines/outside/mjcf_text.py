@@ -3,24 +3,54 @@
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
+
+from .model import Unread
+
+FROM_FILES = "mesh", "hfield"  # of geoms
+
 
 def whole_text(path: Path) -> str:
     """The text of a file: its includes in their places, no keyframes, and a name for the model, each body and each joint.
 
-    A joint without a name is `joint 3`, as it is in the compared model: its number in MuJoCo. ParseError if it is no XML.
+    A joint without a name is `joint 3`, as it is in the compared model: its number in MuJoCo. Meshes and height fields are left
+    out: a body whose mass is that of meshes has the inertia that MuJoCo has computed. ParseError if it is no XML.
     """
     root = included(ElementTree.parse(path).getroot(), path.parent)
     for keyframe in root.findall("keyframe"):
         root.remove(keyframe)
     root.attrib.setdefault("model", "robot")
-    bodies, joints = [], []
-    for world in root.findall("worldbody"):
-        visit(world, bodies, joints)
+    bodies = [body for world in root.findall("worldbody") for body in world.iter("body")]
+    if root.find(".//mesh") is not None:
+        state_inertias(bodies, path)
+    for parent in list(root.iter()):
+        for child in [child for child in parent if child.tag in FROM_FILES or is_from_file(child)]:
+            parent.remove(child)
     for number, body in enumerate(bodies, start=1):
         body.attrib.setdefault("name", f"body {number}")
+    joints = [part for body in bodies for part in body if part.tag in ("joint", "freejoint")]
     for number, joint in enumerate(joints):
         joint.attrib.setdefault("name", f"joint {number}")
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def is_from_file(part: ElementTree.Element) -> bool:
+    return part.tag == "geom" and any(name in part.attrib for name in FROM_FILES)
+
+
+def state_inertias(bodies: list[ElementTree.Element], path: Path) -> None:
+    """Add the inertia that MuJoCo has computed to bodies with meshes and without one. It has vertices in float32."""
+    from ..mujoco.source import compiled
+
+    model, _ = compiled(path)
+    if model.nbody != len(bodies) + 1:
+        raise Unread("its bodies are not all in the text")
+    for number, body in enumerate(bodies, start=1):
+        if any(map(is_from_file, body)) and body.find("inertial") is None:
+            names = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}  # in MJCF, in the model
+            numbers = {name: np.ravel(getattr(model, f"body_{of}")[number]).tolist() for name, of in names.items()}
+            numbers = {name: " ".join(map(repr, values)) for name, values in numbers.items()}
+            ElementTree.SubElement(body, "inertial", numbers)
 
 
 def included(element: ElementTree.Element, folder: Path) -> ElementTree.Element:
@@ -34,12 +64,3 @@ def included(element: ElementTree.Element, folder: Path) -> ElementTree.Element:
         else:
             element.append(included(child, folder))
     return element
-
-
-def visit(parent: ElementTree.Element, bodies: list, joints: list) -> None:
-    """Add the bodies and joints below an element in MuJoCo's order: the joints of a body, then those of its children."""
-    for child in parent:
-        if child.tag == "body":
-            bodies.append(child)
-            joints += [part for part in child if part.tag in ("joint", "freejoint")]
-            visit(child, bodies, joints)

@@ -38,6 +38,10 @@ class Unread(EngineError):
     """An engine cannot read a file."""
 
 
+class TooLong(EngineError):
+    """An engine does not answer within the time limit."""
+
+
 class ReadModel:
     """What an engine has made of a file; a base class.
 
@@ -47,6 +51,7 @@ class ReadModel:
     """
 
     drops = ()  # numbers of the Tree that its equations do not have at all: they act as part of the torque
+    lacks = ()  # quantities that it cannot give for this robot
     stated: Mapping = MappingProxyType({})  # before its numbers are read: numbers_of the Tree
 
     def __init__(self, file: File, precision: str):
@@ -96,7 +101,7 @@ class ReadModel:
 
 
 def numbers_of(tree: tmt.Tree) -> dict[str, np.ndarray]:
-    """The Tree's numbers in the shapes of ReadModel.numbers."""
+    """The Tree's numbers in the shapes of ReadModel.numbers; and about_origin (joints,): mass x com^2 from the joint, kg m2."""
     nv = tree.coordinates.nv
     origins = []  # of the joints, at the reference positions
     for parent, offset in zip(tree.parent, tree.offset):
@@ -113,8 +118,15 @@ def numbers_of(tree: tmt.Tree) -> dict[str, np.ndarray]:
     each = {
         name: np.broadcast_to(np.asarray(values, float) if len(values) else 0.0, nv) for name, values in each.items()
     }
+    each["about_origin"] = mass * ((com - origins) ** 2).sum(axis=1)
     each |= {"gravity": np.array(tree.gravity, float), "rest": np.array(tree.rest), "reference": np.array(tree.zero)}
     return {"mass": mass, "com": com, "moments": np.linalg.eigvalsh(inertia), "inertia": inertia} | each
+
+
+def size_of(stated: Mapping[str, np.ndarray], number: str) -> float:
+    """The size of what is added where an engine reads a number: it may keep inertias about the origin of a joint."""
+    size = np.abs(stated[number]).max(initial=0.0)
+    return size + (stated["about_origin"].max(initial=0.0) if number in ("moments", "inertia") else 0.0)
 
 
 def together(bodies: list[tuple[float, np.ndarray, np.ndarray]]) -> tuple[float, np.ndarray]:

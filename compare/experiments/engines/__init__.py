@@ -7,7 +7,7 @@ import numpy as np
 
 from ...diagnosis import Values, diagnose_stated
 from ...engines import LABELS, RECORDS, Engine, EngineRecord
-from ...engines.outside import EngineError, Outside, OutsideDynamics, Unread
+from ...engines.outside import EngineError, Outside, OutsideDynamics, TooLong, Unread, size_of
 from ...judge.check import ENDS, About, Result, closest, over
 from ...judge.entries import Entries, unit
 from ...judge.finding import Finding
@@ -22,9 +22,10 @@ from . import integrators
 
 EXPERIMENT = Experiment(order=65, serves_own=False, in_quick=False)
 COMPARED = ("Mbar", "bias", "qdd")
-UNITS = {"gravity": "m/s2", "mass": "kg", "moments": "kg m2", "armature": "kg m2", "damping": "N m s/rad",
-         "stiffness": "N m/rad"}  # fmt: skip
+UNITS = {"gravity": "m/s2", "mass": "kg", "moments": "kg m2", "com": "m", "inertia": "kg m2", "armature": "kg m2",
+         "damping": "N m s/rad", "stiffness": "N m/rad"}  # fmt: skip
 OF_BODIES = "mass", "moments"  # no convention makes these differ
+ENTRIES = {"mass": 1, "moments": 3, "com": 3, "inertia": 9}  # of a joint
 SECONDS = 5.0  # of the search for the cause of a difference
 SHOWN = ["engine", "quantity", "unit", "states", "worst_difference", "bar", "difference_over_bar", "difference_eps",
          "mujoco_eps"]  # fmt: skip
@@ -54,7 +55,9 @@ def rows(setup: Setup) -> Result:
             compare_engine(result, setup, engine, label)
         except Unread as error:
             result.tables["engines_read"].append({"engine": label, "why_not": str(error)})
-            result.find("unread", engine=label, reason=str(error))
+            result.find("unread", engine=label, reason=str(error).rstrip("."))
+        except TooLong as error:
+            result.find("left_out", what=label, reason=str(error))
         except EngineError as error:
             result.check(label, ENDS, None, 0.0, "", str(error), rule="equal", about=About.ENGINE)
     for reason in dict.fromkeys(absent.values()):
@@ -87,12 +90,11 @@ def compare_numbers(result: Result, robot: Robot, label: str, reading: dict, rec
     """A row for each number that the engine has read differently, and a check of the masses and moments of inertia."""
     for number, values in reading["read"].items():
         stated = reading["stated"][number]
-        size = np.abs(stated).max(initial=0.0)
-        tolerance = FACTOR * record.eps * size
+        tolerance = FACTOR * record.eps * size_of(reading["stated"], number)
         if number in OF_BODIES:
             most = np.abs(values - stated).max(initial=0.0)
             result.check(label, f"{number} as read", most, tolerance, UNITS[number], rounding=True, about=About.ENGINE)
-        if number not in reading["mended"]:
+        if number not in reading["mended"] or (number == "inertia" and "moments" in reading["mended"]):
             continue
         names = named_after(robot, number)
         rows = [
@@ -110,12 +112,12 @@ def named_after(robot: Robot, number: str) -> list[str]:
     if number == "gravity":
         return list("xyz")
     joints, tree = robot.joints, robot.tree
-    if number in OF_BODIES:
+    if number in ENTRIES:
         names = [
             some_of([body for body, at in zip(tree.body_names, tree.body_hinge) if at == k]) or joints[k]
             for k in range(len(joints))
         ]
-        return [name for name in names for _ in range(3 if number == "moments" else 1)]
+        return [name for name in names for _ in range(ENTRIES[number])]
     return list(robot.coordinates.speeds)
 
 

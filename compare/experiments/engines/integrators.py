@@ -9,6 +9,7 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...engines import GRID, LABELS, RECORDS, Engine, Method, Motion, Setting
+from ...engines.outside import TooLong, Unread
 from ...judge.check import About, Result, closest
 from ...judge.rounding import step_rounding
 from ...judge.run import ORDER_MARGIN
@@ -26,19 +27,23 @@ KNOWN = {"mujoco": ("Euler", "RK4"), "tmt": ("rk4", "dopri8_adaptive")}
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 EARLY = 1.0  # s: until then errors fall regularly
 REGULAR = 3e-2  # rad: a smaller error falls with its order
-CLEAR = 100.0  # times the smallest error that rounding allows: a larger one falls with its order
+CLEAR = 100.0  # eps, and an eps of each step: a larger error falls with its order
 
 
 def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
     """Single steps from random states, and the runs of the regular free scene with several steps or tolerances."""
     case = free_scene(setup)
     for method in engine.methods_in(setup.robot.case()).values():
-        setup.progress(f"engines: {method.label}")
-        if method.scheme in METHODS and not method.adaptive:
-            compare_steps(result, setup, engine, method)
-        if case is not None:
-            rows = follow(result, case, engine, method, setup)
-            check_order(result, f"{case.name}, {method.label}", method, rows[0]["measured_order"])
+        setup.progress(f"engines: {method.label}{' compiles' * RECORDS[engine.name].compiles}")
+        try:
+            if method.scheme in METHODS and not method.adaptive:
+                compare_steps(result, setup, engine, method)
+            if case is not None:
+                rows = follow(result, case, engine, method, setup)
+                check_order(result, f"{case.name}, {method.label}", method, rows[0]["measured_order"])
+        except (TooLong, Unread) as error:
+            result.find("left_out", what=method.label, reason=str(error))
+            break
 
 
 def follow_known(result: Result, setup: Setup) -> None:
@@ -119,8 +124,10 @@ def check_order(result: Result, where: str, method: Method, order: float | None)
 
 
 def measured_order(steps: Sequence[float], errors: Sequence[float | None], eps: float) -> float | None:
-    """The order by which the error falls between the last two runs whose errors are regular, and settled before; or None."""
-    regular = [(dt, error) for dt, error in zip(steps, errors) if error and CLEAR * eps < error < REGULAR]
+    """The order by which the error falls between the last two of at least four runs with regular errors; None: not settled."""
+    regular = [
+        (dt, error) for dt, error in zip(steps, errors) if error and max(CLEAR, EARLY / dt) * eps < error < REGULAR
+    ]
     orders = [np.log(a[1] / b[1]) / np.log(a[0] / b[0]) for a, b in pairwise(regular)]
-    settled = len(orders) > 1 and abs(orders[-1] - orders[-2]) <= ORDER_MARGIN
+    settled = len(orders) > 2 and abs(orders[-1] - orders[-2]) <= ORDER_MARGIN
     return float(orders[-1]) if settled else None

@@ -1,0 +1,100 @@
+"""PyBullet, through a URDF text of the model that MuJoCo compiled: its reader of MJCF loses joints.
+
+It has no forward dynamics but its step, and no armature, which can only be added to M: a robot with armature has no accelerations
+and no runs here.
+"""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from . import EngineRecord
+from .outside.of_urdf import OfUrdf
+
+ENGINE = EngineRecord(
+    order=80, label="PyBullet", colour="#661100", marker="d", package="pybullet", extra="pybullet", reads_file=True
+)
+METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
+
+
+def methods_for(tree):
+    """Its damping is explicit."""
+    if any(tree.armature):
+        return {}
+    return {"semi-implicit Euler": (1, "explicit_damping_euler")} if any(tree.damping) else METHODS
+
+
+class Model(OfUrdf):
+    def load(self, text, file):
+        import pybullet
+        from pybullet_utils.bullet_client import BulletClient
+
+        self.bullet = BulletClient(pybullet.DIRECT)
+        with TemporaryDirectory() as folder:
+            (Path(folder) / "robot.urdf").write_text(text)
+            flags = self.bullet.URDF_USE_INERTIA_FROM_FILE
+            self.robot = self.bullet.loadURDF(f"{folder}/robot.urdf", useFixedBase=True, flags=flags)
+        self.infos = [self.bullet.getJointInfo(self.robot, k) for k in range(self.bullet.getNumJoints(self.robot))]
+        by_name = {info[1].decode(): info for info in self.infos}
+        self.links = [by_name[name][0] for name in file.names]
+        self.order = np.argsort(self.links)  # the Tree's joints in PyBullet's vectors
+        for link in range(len(self.infos)):
+            self.bullet.changeDynamics(self.robot, link, linearDamping=0.0, angularDamping=0.0)
+            self.bullet.changeDynamics(self.robot, link, maxJointVelocity=1e9)
+        self.apply(pybullet.VELOCITY_CONTROL, np.zeros(len(file.names)))
+        return np.array([by_name[name][6] for name in file.names])
+
+    def apply(self, mode, forces):
+        """Set the torques of the joints, or the largest ones of the motors that they have by default."""
+        self.bullet.setJointMotorControlArray(self.robot, self.links, mode, forces=forces.tolist())
+
+    def bodies(self):
+        moved_by, bodies, joints = {-1: None}, [[] for _ in self.links], {link: k for k, link in enumerate(self.links)}
+        for link, info in enumerate(self.infos):
+            joint = moved_by[link] = joints.get(link, moved_by[info[16]])
+            if joint is not None:
+                mass, _, moments, *_ = self.bullet.getDynamicsInfo(self.robot, link)
+                centre, turn, *_ = self.bullet.getLinkState(self.robot, link, computeForwardKinematics=True)
+                R = Rotation.from_quat(turn).as_matrix()
+                bodies[joint].append((mass, np.array(centre), R @ np.diag(moments) @ R.T))
+        return bodies
+
+    def gravity(self):
+        engine = self.bullet.getPhysicsEngineParameters()
+        return np.array([engine[f"gravityAcceleration{axis}"] for axis in "XYZ"])
+
+    def set_gravity(self, gravity):
+        self.bullet.setGravity(*gravity)
+
+    @property
+    def lacks(self):
+        return ("acceleration",) * bool(self.armature.any())
+
+    def mass_matrix(self, q):
+        M = np.empty((len(q), len(q)))
+        M[np.ix_(self.order, self.order)] = self.bullet.calculateMassMatrix(self.robot, q[self.order].tolist())
+        return M + np.diag(self.armature)
+
+    def bias(self, q, v):
+        h, zero = np.empty_like(q), [0.0] * len(q)
+        state = q[self.order].tolist(), v[self.order].tolist()
+        h[self.order] = self.bullet.calculateInverseDynamics(self.robot, *state, zero)
+        return h
+
+    def start(self, q, v, dt, damping):
+        self.bullet.setTimeStep(dt)
+        for link, coefficient, *state in zip(self.links, damping, q, v):
+            self.bullet.changeDynamics(self.robot, link, jointDamping=coefficient)
+            self.bullet.resetJointState(self.robot, link, *state)
+
+    def step(self, force, v):
+        self.apply(self.bullet.TORQUE_CONTROL, force)
+        self.bullet.stepSimulation()
+        states = self.bullet.getJointStates(self.robot, self.links)
+        return np.array([state[:2] for state in states]).T
+
+    def acceleration(self, q, v, force):
+        self.start(q, v, 1.0, np.zeros_like(v))
+        return self.step(force, v)[1] - v
