@@ -5,7 +5,7 @@ from ..edit import Edit
 EDITS = (
     Edit("experiments.engines", "compare_quantities", "FACTOR * eps * size", "100 * FACTOR * eps * size", "tolerance x 100"),
     Edit("experiments.engines", "compare_quantities", "record.eps", "1.2e-07", "every engine is judged as float32"),
-    Edit("experiments.engines", "compare_numbers", "FACTOR * record.eps * size_of(_1, number)", "1e9 * record.eps * size_of(_1, number)",
+    Edit("experiments.engines", "compare_numbers", "FACTOR * record.eps", "1e9 * record.eps",
          "numbers as read: 64 -> 1e9"),
     Edit("experiments.engines", "OF_BODIES", "('mass', 'moments')", "('moments',)", "a mass that is read wrongly is only listed"),
     Edit("engines.integrators", "compare_steps", "_1 * record.eps / EPS", "_1 * 1e9", "one step: tolerance x 1e9"),
