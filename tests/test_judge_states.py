@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+import tmt
 from compare.robots import states
 from compare.robots.arm import ARM
 from compare.robots.states import Sample
@@ -49,3 +50,11 @@ def test_the_first_states_of_a_sample_are_a_sample():
     first = sample.first(2)
     assert first.q.tolist() == sample.q[:2].tolist() and first.qd.tolist() == sample.qd[:2].tolist()
     assert first.describe(1) == "b" and sample.first(3) is sample
+
+
+def test_exact_values_are_those_of_the_first_states_in_their_order():
+    sample = states.random(ARM, 10, 4)
+    for function, arguments in (("mass_matrix", (sample.q,)), ("acceleration", (sample.q, sample.qd, sample.tau))):
+        expected = getattr(tmt, function)(*(x[:4] for x in arguments))
+        assert np.allclose(sample.exact(function).high, expected, rtol=1e-12)
+    assert np.allclose(sample.exact("jacobians", 1).high, tmt.jacobians(sample.q[:4])[1], atol=1e-14)

@@ -13,7 +13,7 @@ import tmt
 from compare.__main__ import main
 from compare.export import checks
 from compare.export.command import FILES, identifier
-from compare.export.programs import NotRun, Program, PythonProgram, WrongProgram
+from compare.export.programs import PROGRAMS, NotRun, Program, PythonProgram, WrongProgram
 from compare.process.crash import Refused
 from compare.robots.arm import ARM
 from compare.run.reference import compared_with
@@ -50,7 +50,7 @@ def test_what_is_exported_to_python_can_be_checked_as_a_users_equations(tmp_path
 
 
 class Altered(Program):
-    """tmt's own values, of which one entry is off by a multiple of its tolerance."""
+    """tmt's own values, of which one entry of the last state is off by a multiple of its tolerance."""
 
     def __init__(self, tree, quantity, share, eps=2.0**-52):
         self.tree, self.quantity, self.share, self.eps = tree, quantity, share, eps
@@ -59,19 +59,77 @@ class Altered(Program):
         found = getattr(tmt, quantity)(*states[: len(QUANTITIES[quantity].takes)], model=self.tree)
         found = [part.copy() for part in found] if isinstance(found, tuple) else [found.copy()]
         if quantity == self.quantity:
-            scale = checks.Entries(self.tree, states[0], states[1]).mass_matrix
-            found[0][3, 1, 1] += self.share * 64 * self.eps * scale[3, 1, 1]
+            scales = checks.Entries(self.tree, states[0], states[1])
+            scale = getattr(scales, quantity)
+            scale = scale(scales.force(states[2]), found[0]) if quantity == "acceleration" else scale
+            found[0][-1, ..., 1] += self.share * 64 * self.eps * scale[-1, ..., 1]
         return found
 
 
-@pytest.mark.parametrize(("share", "passes"), [(0.9, True), (1.1, False), (np.nan, False)])
+@pytest.mark.parametrize("quantity", ["mass_matrix", "bias", "acceleration"])
+@pytest.mark.parametrize(("share", "passes"), [(0.7, True), (1.3, False), (np.nan, False)])
 @pytest.mark.parametrize("single", [False, True])
-def test_a_difference_is_judged_by_the_tolerance_of_its_entry(share, passes, single):
+def test_a_difference_is_judged_by_the_tolerance_of_its_entry(quantity, share, passes, single):
     compared = compared_with(None, None)
-    eps = 2.0 ** (-23 if single else -52)
-    make = partial(Altered, compared.robot.tree, "mass_matrix", share, eps)
-    outcome, _ = checks.checked(compared, make, ["mass_matrix", "bias"], COUNT, single)
+    make = partial(Altered, compared.robot.tree, quantity, share, 2.0 ** (-23 if single else -52))
+    outcome, _ = checks.checked(compared, make, [quantity, "gravity_balance"], COUNT, single)
     assert [row.passed for row in outcome.rows] == [passes, True] and outcome.passed is passes
+
+
+def test_states_are_spread_within_the_ranges_and_those_of_floats_are_floats():
+    seen = []
+
+    class Seen(Altered):
+        def values(self, quantity, *states):
+            seen.append(states)
+            return super().values(quantity, *states)
+
+    compared = compared_with("model", str(PATHS["arm7"]))
+    for single in (False, True):
+        checks.checked(compared, partial(Seen, compared.robot.tree, "", 0.0), ["acceleration"], COUNT, single)
+    for states, kind in zip(seen, (np.float64, np.float32)):
+        for x in states:
+            assert x.shape == (COUNT, 7) and (np.ptp(x, axis=0) > 0.5 * np.abs(x).max(axis=0)).all()
+            assert (x == x.astype(kind)).all()
+    assert any((x != x.astype(np.float32)).any() for x in seen[0])
+    assert all((low <= q).all() and (q <= high).all() for q, (low, high) in zip(seen[0][0].T, compared.robot.ranges))
+
+
+NEEDS = {"c": HAS_C, "matlab": HAS_OCTAVE, "python": True, "latex": True}
+
+
+@pytest.mark.parametrize("language", [name for name, is_there in NEEDS.items() if is_there])
+def test_what_is_judged_is_what_was_written(language, tmp_path):
+    """A wrong number in the text is found in the language's own values; and only in what it changes."""
+    quantities = ["mass_matrix", "gravity_balance"]
+    for ending, kind in FILES[language].items():
+        text = tmt.equations(tmt.ARM, kind, quantities, name="arm")
+        (tmp_path / f"arm{ending}").write_text(text.replace("9.81", "9.8100001"), encoding="utf-8")
+    make = partial(PROGRAMS[language], tmp_path, "arm", tmt.ARM, quantities, False)
+    outcome, _ = checks.checked(compared_with(None, None), make, quantities, COUNT, False)
+    assert [row.passed for row in outcome.rows] == [True, False] and outcome.rows[0].operations > 10
+
+
+@pytest.mark.skipif(not HAS_OCTAVE, reason="no Octave")
+def test_arrays_of_matlab_are_stored_by_rows(tmp_path):
+    (tmp_path / "arm.m").write_text(tmt.equations(tmt.ARM, "matlab", ["jacobians"], name="arm"), encoding="utf-8")
+    make = partial(PROGRAMS["matlab"], tmp_path, "arm", tmt.ARM, ["jacobians"], False)
+    assert checks.checked(compared_with(None, None), make, ["jacobians"], COUNT, False)[0].passed
+
+
+@pytest.mark.skipif(not HAS_C, reason="no C compiler")
+def test_single_precision_is_written_and_checked_at_all_states(tmp_path, monkeypatch):
+    asked = []
+
+    def values(self, quantity, q, qd, tau):
+        asked.append((len(q), self.single))
+        return of_c(self, quantity, q, qd, tau)
+
+    of_c = PROGRAMS["c"].values
+    monkeypatch.setattr(PROGRAMS["c"], "values", values)
+    assert main(["equations", "--float", "--quantity", "bias", "--out", str(tmp_path / "out")]) == 0
+    assert asked == [(1000, True)]
+    assert all("float out[3]" in (tmp_path / "out" / f"arm.{e}").read_text(encoding="utf-8") for e in "ch")
 
 
 @pytest.mark.parametrize("name", QUANTITIES)

@@ -9,8 +9,9 @@ import pytest
 from trees import random_tree, tree_of_kinds
 
 import tmt
-from tmt.compiled import forms
+from tmt.compiled import forms, straight
 from tmt.derivation.quantities import QUANTITIES
+from tmt.export.statements import Syntax, Writer
 
 HAS_C = bool(shutil.which("gcc"))
 
@@ -56,7 +57,7 @@ def test_python_takes_any_batch_and_refuses_other_shapes():
         found(q[..., :2], qd)
 
 
-def test_a_linear_system_is_solved_by_a_function():
+def test_a_linear_system_is_solved_by_a_function(tmp_path):
     tree = random_tree(np.random.default_rng(4), bodies=6)
     traced = forms.trace("quantity", (len(tree.axis),) * 3, lambda q, qd, tau: forms.Terms(tree).called_solution(
         tmt.derivation.composite.mass_matrix_and_bias(tree, q, qd)[0], tau))  # fmt: skip
@@ -68,7 +69,34 @@ def test_a_linear_system_is_solved_by_a_function():
     exec(python.source("robot", [""], [function]), found)
     expected = np.linalg.solve(tmt.mass_matrix(q, tree), tau[..., None])[..., 0]
     assert near([found["acceleration"](q, qd, tau)], [expected])
-    assert "static void solve" in c.source("robot", [""], [function], False)
+    if HAS_C:
+        (tmp_path / "robot.c").write_text(c.source("robot", [""], [function], False))
+        flags = ["-std=c99", "-O1", "-fPIC", "-shared", "-o", "robot.so"]
+        subprocess.run(["gcc", *flags, "robot.c", "-lm"], cwd=tmp_path, check=True)
+        out = np.empty(n)
+        places = [ctypes.c_void_p(x.ctypes.data) for x in (q[0], qd[0], tau[0], out)]
+        ctypes.CDLL(str(tmp_path / "robot.so")).robot_acceleration(*places)
+        assert near([out], [expected[0]])
+
+
+def test_brackets_keep_the_order_of_operations():
+    def function(x):
+        a, b, c, d = x
+        return [a - (b - c), a / (b * c), a / (b / c), (a - b) * (c - d), -(a * b) - c, -(a - b), (a + b) / (c + d),
+                a * (b + c) - d * (a - c), -2.0 * a - -3.0 / b, 1.0 / (a - b)]  # fmt: skip
+
+    traced, values = straight.trace("f", (4,), function), [1.3, -0.7, 2.1, 0.9]
+    for syntax in (Syntax(), Syntax(number=lambda x: f"({x!r})")):
+        writer, names = Writer(traced, list("abcd"), syntax), dict(zip("abcd", values))
+        for assignment in writer.assignments:
+            names[assignment.names[0]] = eval(assignment.expressions[0], {}, names)
+        assert np.allclose([eval(text, {}, names) for text in writer.results], function(values), rtol=1e-14)
+
+
+def test_the_header_has_the_sizes():
+    text = tmt.equations(TREES["kinds"], "c header", ["bias"])
+    sizes = TREES["kinds"].coordinates
+    assert f"robot_nq = {sizes.nq}, robot_nv = {sizes.nv} " in text and sizes.nq != sizes.nv
 
 
 @pytest.mark.skipif(not HAS_C, reason="no C compiler")
@@ -130,3 +158,13 @@ def test_the_exact_values_of_many_states_are_those_of_single_ones(tree, name):
         expected = getattr(truth, field)
         off = np.abs((np.asarray(h).astype(object) - expected) + l)
         assert np.max(off) <= 1e-28 * max(1.0, float(np.max(np.abs(h))))
+
+
+def test_the_distance_from_exact_values_has_all_their_digits():
+    from tmt.exact.many import Pairs
+
+    exact = Pairs(np.array([[1.0, 1.0], [2.0, 3.0]]), np.array([[1e-20, -2e-20], [0.0, 4e-20]]))
+    assert exact.distance(exact.high).tolist() == [[1e-20, 2e-20], [0.0, 4e-20]]
+    assert exact.distance(exact.high - 1.0).tolist() == [[1.0, 1.0], [1.0, 1.0]]
+    assert exact.part(1).distance(exact.high[:, 1]).tolist() == [2e-20, 4e-20] and exact.part(None) is exact
+    assert np.isnan(exact.distance(np.full((2, 2), np.nan))).all()

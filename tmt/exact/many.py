@@ -54,9 +54,7 @@ def traced(tree, name: str) -> tuple[Equations, list[int]]:
         sizes = tree.coordinates.nq, n, n
         inputs = [tape.inputs(*(f"{of}{i}" for i in range(size))) for of, size in zip(("q", "qd", "tau"), sizes)]
         state = State(exact_tree(tree, mpmath.mpf), *inputs)
-        state.mass_matrix, moving = FORMS["composite"](state.tree, state.q, state.qd)
-        if name != "gravity_balance":
-            state.bias = moving
+        state.mass_matrix, state.bias = FORMS["composite"](state.tree, state.q, state.qd)
         results = [tape.lift(x) for x in flat(QUANTITIES[name].of(state))]
         found, row = program(tape, [x for part in inputs for x in part], results)
     return found, [row[x.i] for x in results]
