@@ -64,7 +64,10 @@ def checked(
         for name in dict.fromkeys(quantities):
             own = program.values(name, q, qd, tau)
             count = program.operations(name)
-            rows += rows_of(compared.robot.tree, name, count, own, theirs, scales, (q, qd, tau), FACTOR * eps)
+            new = rows_of(compared.robot.tree, name, count, own, theirs, scales, (q, qd, tau), FACTOR * eps)
+            if not new:
+                raise WrongProgram(f"{name} has no counterpart in compare.experiments.quantities")
+            rows += new
     except NotRun as error:
         return Outcome(not_run=str(error)), None
     except WrongProgram as error:

@@ -35,7 +35,19 @@ for package in (compare, tmt):
         except ImportError as error:
             assert error.name and error.name.split(".")[0] in OPTIONAL, (module.name, error)
 """
-OPTIONAL = {"dartpy", "heyoka", "jax", "mujoco_warp", "newton", "pinocchio", "pydrake", "sympy", "warp", "distributed"}
+OPTIONAL = {
+    "dartpy",
+    "heyoka",
+    "jax",
+    "mujoco_warp",
+    "newton",
+    "pinocchio",
+    "pybullet",
+    "pydrake",
+    "sympy",
+    "warp",
+    "distributed",
+}
 
 pytestmark = [pytest.mark.slow, posix]  # the others have no need of it
 

@@ -61,13 +61,13 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
         raise ValueError(
             f"name is {shown(name)}; expected an identifier, no word of C, Python or MATLAB and no quantity"
         )
-    if single and not language.startswith("c"):
+    if single and language not in ("c", "c header"):
         raise ValueError(f"single precision is written in C only, not in {language}")
     lines = [*head, "", *conventions(model)]
     if language in SYMBOLIC:
         return SYMBOLIC[language](symbols_of(model, quantities), lines)
     functions = [function_of(model, quantity) for quantity in dict.fromkeys(quantities)]
-    return LANGUAGES[language](name, lines, functions, *[single] * language.startswith("c"))
+    return LANGUAGES[language](name, lines, functions, *[single] * (language in ("c", "c header")))
 
 
 @lru_cache(maxsize=4)
