@@ -97,6 +97,8 @@ def test_the_distance_of_each_engine_from_the_exact_value_is_checked(eps, passes
     assert list(by_name) == ["Mbar", "Mbar, TMT to exact", "Mbar, MuJoCo to exact"]
     assert by_name[f"Mbar, {engine} to exact"].passed is passes and by_name[f"Mbar, {other} to exact"].value == 0.0
     assert (row[f"{engine.lower()}_from_exact_eps"], row[f"{other.lower()}_from_exact_eps"]) == (eps, 0.0)
+    in_order = agreed([[1.0], [5.0]], [[1.0], [5.0]], 1.0, exact=[1.0, 5.0])[0]
+    assert all(check.value == 0.0 for check in in_order)
     checks, row = agreed(off, right, 1.0)  # without an exact state nothing is compared with one
     assert [check.quantity for check in checks] == ["Mbar"]
     assert row["tmt_from_exact_eps"] is None and row["exact_states"] == 0

@@ -166,5 +166,7 @@ def test_the_distance_from_exact_values_has_all_their_digits():
     exact = Pairs(np.array([[1.0, 1.0], [2.0, 3.0]]), np.array([[1e-20, -2e-20], [0.0, 4e-20]]))
     assert exact.distance(exact.high).tolist() == [[1e-20, 2e-20], [0.0, 4e-20]]
     assert exact.distance(exact.high - 1.0).tolist() == [[1.0, 1.0], [1.0, 1.0]]
+    near = 1.0 + 2.0**-52  # its distance is not a double plus the low part of the other sign
+    assert exact.distance(np.full((2, 2), near))[0].tolist() == [2.0**-52 - 1e-20, 2.0**-52 + 2e-20]
     assert exact.part(1).distance(exact.high[:, 1]).tolist() == [2e-20, 4e-20] and exact.part(None) is exact
     assert np.isnan(exact.distance(np.full((2, 2), np.nan))).all()
