@@ -230,5 +230,5 @@ def pairs_of_terms(right: dict[str, float], off: dict[str, float]) -> Iterator[t
 def with_factor(value: float, term: str) -> str:
     """A coefficient with its term."""
     if term == "1":
-        return f"a constant {value:.6g}"
-    return term if abs(value - 1.0) <= SAME_FACTOR else f"{value:.6g} {term}"
+        return f"a constant {value:.10g}"
+    return term if abs(value - 1.0) <= SAME_FACTOR else f"{value:.10g} {term}"

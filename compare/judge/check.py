@@ -20,7 +20,8 @@ RULES = {  # which values pass
     "equal": lambda value, tolerance: value == tolerance,
 }
 SHOWN = 8  # columns of a comparison, the first ones; the others are in its file
-ENDS, AT_OWN_STEP = "runs to its end", "stable at its own step"  # names of checks
+ENDS = "runs to its end"  # names of checks
+AT_OWN_STEP, AT_REQUESTED_STEP = "stable at its own step", "stable at the requested step"
 
 
 class About(Enum):

@@ -4,6 +4,7 @@ import hashlib
 import keyword
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from textwrap import wrap
 from typing import Any, NamedTuple
 
 from tmt.compiled import forms
@@ -82,10 +83,14 @@ def is_word(name: str) -> bool:
 
 def conventions(model: Tree) -> list[str]:
     """Equation, joints and units in words."""
+    sizes = f"nq = {model.coordinates.nq} numbers in q, nv = {model.coordinates.nv} in qd and tau, m = {len(model.mass)} bodies"
     lines = [
-        "M(q) qdd + h(q, qd) = tau - damping qd - stiffness (q - rest), by the TMT method.",
-        "M: mass_matrix, with armature; h: bias, MuJoCo's qfrc_bias: Coriolis, centrifugal and gravity terms.",
-        "Vectors are in the inertial frame, those of a body or a ball in its own axes. SI units, angles in rad.",
+        "M(q) qdd + h(q, qd) = tau - D qd - k (q - rest) - P q - S qd, by the TMT method; Mbar is M, with armature.",
+        "h: bias, MuJoCo's qfrc_bias: Coriolis, centrifugal and gravity terms. D: damping, k and rest: springs of the joints,",
+        "P and S: gains of a linear controller. All numbers of the model are in the functions.",
+        "T_b, B_b: Jacobians of the centre of mass of body b, inertial frame, and of its angular velocity, body axes.",
+        "SI units, angles in rad. Shapes are those of one state; ... stands for any batch, where there is one.",
+        *wrap(f"{sizes}: {', '.join(model.body_names)}.", 120),
         f"Numbers of the model: sha256 {digest(model)}.",
         "Joint, kind, place in q, place in qd and tau (from 0); units of q, qd, tau:",
     ]

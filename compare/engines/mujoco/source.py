@@ -68,11 +68,11 @@ def compiled(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
 
 def text_of(path: Path) -> str:
     if path.exists() and not (path.is_file() or path.is_dir()):  # a pipe cannot be read twice
-        raise ModelError(f"{path} is not a regular file; expected an MJCF file")
+        raise ModelError(f"{path} is not a regular file; expected an MJCF or URDF file")
     try:
         return path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
-        raise ModelError(f"cannot read {path}: {error.strerror}; expected an MJCF file") from None
+        raise ModelError(f"cannot read {path}: {error.strerror}; expected an MJCF or URDF file") from None
 
 
 def without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:

@@ -26,6 +26,7 @@ UNITS = {"gravity": "m/s2", "mass": "kg", "moments": "kg m2", "com": "m", "inert
          "damping": "N m s/rad", "stiffness": "N m/rad"}  # fmt: skip
 OF_BODIES = "mass", "moments"  # no convention makes these differ
 ENTRIES = {"mass": 1, "moments": 3, "com": 3, "inertia": 9}  # of a joint
+AS_READ = "as read"  # checks of numbers
 SECONDS = 5.0  # of the search for the cause of a difference
 SHOWN = ["engine", "quantity", "unit", "states", "worst_difference", "bar", "difference_over_bar", "difference_eps",
          "mujoco_eps"]  # fmt: skip
@@ -64,12 +65,13 @@ def rows(setup: Setup) -> Result:
         result.find("absent", engines=[label for label, why in absent.items() if why == reason], reason=reason)
     if result.rows:
         integrators.follow_known(result, setup)
-        most = max(
-            result.rows, key=lambda row: np.inf if row["difference_over_bar"] is None else row["difference_over_bar"]
-        )
-        names = list(dict.fromkeys(row["engine"] for row in result.rows))
+        largest, names = {}, list(dict.fromkeys(row["engine"] for row in result.rows))
+        for row in result.rows:
+            largest[row["engine"]] = max(largest.get(row["engine"], 0.0), row["difference_eps"])
         differing = list(dict.fromkeys(row["engine"] for row in result.rows if not row["passed"]))
-        values = {"engines": names, "differing": differing, "most": most}
+        failed = {check.scene for check in result.checks if check.quantity.endswith(AS_READ) and not check.passed}
+        values = {"engines": names, "differing": differing, "misread": [name for name in names if name in failed]}
+        values["largest"] = largest
         result.headline = result.finding("headline", **values)
         result.top.append(result.finding("answer", **values))
     return result
@@ -93,7 +95,9 @@ def compare_numbers(result: Result, robot: Robot, label: str, reading: dict, rec
         tolerance = FACTOR * record.eps * size_of(reading["stated"], number)
         if number in OF_BODIES:
             most = np.abs(values - stated).max(initial=0.0)
-            result.check(label, f"{number} as read", most, tolerance, UNITS[number], rounding=True, about=About.ENGINE)
+            result.check(
+                label, f"{number} {AS_READ}", most, tolerance, UNITS[number], rounding=True, about=About.ENGINE
+            )
         if number not in reading["mended"] or (number == "inertia" and "moments" in reading["mended"]):
             continue
         names = named_after(robot, number)

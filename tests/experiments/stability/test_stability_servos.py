@@ -67,7 +67,7 @@ def test_the_spectral_radius_near_a_limit(result, apart, passes):
     ({"limit": "saddle", "predicted_dt_s": None}, []),
 ])  # fmt: skip
 def test_a_step_is_stable_up_to_its_limit_where_one_counts(result, more, passed):
-    servos.check_own_step(result, [row(**more)])
+    servos.check_step(result, [row(**more)], "stable at its own step")
     assert [check.passed for check in result.checks] == passed
 
 

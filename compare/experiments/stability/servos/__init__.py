@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from ....engines.mujoco.names import INTEGRATORS
-from ....judge.check import AT_OWN_STEP, About, Result
+from ....judge.check import AT_OWN_STEP, AT_REQUESTED_STEP, About, Result
 from ....truth.linear import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from ...setup import Setup
@@ -74,7 +74,7 @@ def add(result: Result, setup: Setup, work: dict) -> None:
     for (at, name), run in zip(*work["full"]):
         by_place[at.name, name].update(run)
     if setup.robot.drive.feeds_back:
-        check_own_step(result, rows)
+        check_step(result, rows, AT_OWN_STEP)
     result.tables["step_limits"] = rows
     findings.find_answer(result, rows, predictions)
     if setup.step:
@@ -84,6 +84,8 @@ def add(result: Result, setup: Setup, work: dict) -> None:
             if row["stable_at_file_dt"]:
                 row["step_response_error"] = response.response_error(by_name[row["posture"]], name, reading, dt)
         findings.find_answer(result, requested, predictions, requested=True)
+        if setup.robot.drive.feeds_back:
+            check_step(result, requested, AT_REQUESTED_STEP)
     for (at, name), changes in zip(*work["lifts"]):
         result.find("changes", "servos", dt=reading.dt, posture=at.name, integrator=name, **changes)
     findings.find_notes(result, rows, predictions)
@@ -122,9 +124,9 @@ def limits_in_use(rows: Sequence[dict]) -> list[dict]:
     return known
 
 
-def check_own_step(result: Result, rows: Sequence[dict]) -> None:
-    """Whether the file's own step is stable under its own integrator, where that is known."""
+def check_step(result: Result, rows: Sequence[dict], quantity: str) -> None:
+    """Whether the step of these rows is stable under their integrator, where that is known."""
     for row in findings.known(rows, rows[0]["file_integrator"]):
         limit = row["predicted_dt_s"] or LIMIT_UP_TO
         note = ", ".join(filter(None, (f"under {row['file_integrator']}", row["limiting_joint"])))
-        result.check(row["posture"], AT_OWN_STEP, row["file_dt_s"], limit, "s", note, about=About.STEP)
+        result.check(row["posture"], quantity, row["file_dt_s"], limit, "s", note, about=About.STEP)
