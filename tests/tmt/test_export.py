@@ -9,7 +9,7 @@ import pytest
 from trees import random_tree, tree_of_kinds
 
 import tmt
-from tmt.compiled import forms, straight
+from tmt.compiled import straight
 from tmt.derivation.quantities import QUANTITIES
 from tmt.export.statements import Syntax, Writer
 
@@ -57,28 +57,6 @@ def test_python_takes_any_batch_and_refuses_other_shapes():
         found(q[..., :2], qd)
 
 
-def test_a_linear_system_is_solved_by_a_function(tmp_path):
-    tree = random_tree(np.random.default_rng(4), bodies=6)
-    traced = forms.trace("quantity", (len(tree.axis),) * 3, lambda q, qd, tau: forms.Terms(tree).called_solution(
-        tmt.derivation.composite.mass_matrix_and_bias(tree, q, qd)[0], tau))  # fmt: skip
-    from tmt.export import Function, c, python
-
-    n = len(tree.axis)
-    function = Function("acceleration", "", ("q", "qd", "tau"), (n, n, n), (n,), ("out",), traced)
-    found, (q, qd, tau) = {}, states_of(tree)
-    exec(python.source("robot", [""], [function]), found)
-    expected = np.linalg.solve(tmt.mass_matrix(q, tree), tau[..., None])[..., 0]
-    assert near([found["acceleration"](q, qd, tau)], [expected])
-    if HAS_C:
-        (tmp_path / "robot.c").write_text(c.source("robot", [""], [function], False))
-        flags = ["-std=c99", "-O1", "-fPIC", "-shared", "-o", "robot.so"]
-        subprocess.run(["gcc", *flags, "robot.c", "-lm"], cwd=tmp_path, check=True)
-        out = np.empty(n)
-        places = [ctypes.c_void_p(x.ctypes.data) for x in (q[0], qd[0], tau[0], out)]
-        ctypes.CDLL(str(tmp_path / "robot.so")).robot_acceleration(*places)
-        assert near([out], [expected[0]])
-
-
 def test_brackets_keep_the_order_of_operations():
     def function(x):
         a, b, c, d = x
@@ -89,7 +67,7 @@ def test_brackets_keep_the_order_of_operations():
     for syntax in (Syntax(), Syntax(number=lambda x: f"({x!r})")):
         writer, names = Writer(traced, list("abcd"), syntax), dict(zip("abcd", values))
         for assignment in writer.assignments:
-            names[assignment.names[0]] = eval(assignment.expressions[0], {}, names)
+            names[assignment.name] = eval(assignment.expression, {}, names)
         assert np.allclose([eval(text, {}, names) for text in writer.results], function(values), rtol=1e-14)
 
 

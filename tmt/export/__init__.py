@@ -2,6 +2,7 @@
 
 import hashlib
 import keyword
+import re
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from textwrap import wrap
@@ -25,10 +26,11 @@ LANGUAGES: dict[str, Callable[..., str]] = {
 SYMBOLIC: dict[str, Callable[..., str]] = {"latex": latex.latex, "html": page.page, "sympy": symbols.python_source}
 OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
 UNITS = {"hinge": "rad, rad/s, N m", "slide": "m, m/s, N", "ball": "quaternion w x y z, rad/s in its own axes, N m"}
+# names that a file could not have: words of C, C++ and MATLAB, functions and modules that the files use
 WORDS = """auto bool break case catch char class const continue default delete do double else elseif end enum extern float for
 friend function global goto if inline int long namespace new operator otherwise parfor persistent private public register restrict
 return short signed sizeof spmd static struct switch template this throw try typedef typename union unsigned using virtual void
-volatile while main solve arrays"""  # of C, C++ and MATLAB, and what the files have: names that a file could not have
+volatile while main arrays sin cos sqrt atan size zeros permute reshape assert error math numpy sympy"""
 
 
 class Function(NamedTuple):
@@ -47,6 +49,12 @@ class Function(NamedTuple):
         """The name and the place of each number that is taken, in the order of the traced inputs."""
         return [(name, k) for name, size in zip(("q", "qd", "tau"), self.sizes) for k in range(size)]
 
+    @property
+    def used(self) -> set[tuple[str, int]]:
+        """Those of the inputs on which a result depends."""
+        nodes = set(self.traced.nodes)
+        return {place for place, x in zip(self.inputs, self.traced.inputs) if x.i in nodes}
+
 
 def text(model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str]) -> str:
     """See `tmt.equations`."""
@@ -58,7 +66,9 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
     choices = OF_SYMBOLS if language in SYMBOLIC else tuple(QUANTITIES)
     if wrong := [quantity for quantity in quantities if quantity not in choices] or [()][: not quantities]:
         raise ValueError(f"quantity is {shown(wrong[0])}; expected some of {', '.join(choices)}")
-    if not (isinstance(name, str) and name.isidentifier() and name.isascii() and name[0].isalpha()) or is_word(name):
+    if isinstance(head, str):
+        raise ValueError(f"head is {shown(head)}; a sequence of lines is expected")
+    if not (isinstance(name, str) and re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name)) or is_word(name):
         raise ValueError(
             f"name is {shown(name)}; expected an identifier, no word of C, Python or MATLAB and no quantity"
         )

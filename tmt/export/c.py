@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from math import prod
 
-from .statements import Assignment, Syntax, Writer
+from .statements import Syntax, Writer
 
 DOUBLE = Syntax()
 LEAST = 1.2e-38  # of floats: what keeps a root from zero must not become zero
@@ -13,34 +13,14 @@ SINGLE = Syntax(
     sqrt="sqrtf",
     arctan="atanf",
 )
-SOLVE = """/* The solution of n equations, by L U without pivots, in place of the right-hand side, after the n x n numbers. */
-static void solve(int n, {kind} *a)
-{{
-    {kind} *b = a + n * n;
-    for (int k = 0; k < n; k++) {{
-        for (int i = k + 1; i < n; i++) {{
-            const {kind} factor = a[n * i + k] / a[n * k + k];
-            for (int j = k + 1; j < n; j++)
-                a[n * i + j] -= factor * a[n * k + j];
-            b[i] -= factor * b[k];
-        }}
-    }}
-    for (int i = n - 1; i >= 0; i--) {{
-        for (int j = i + 1; j < n; j++)
-            b[i] -= a[n * i + j] * b[j];
-        b[i] /= a[n * i + i];
-    }}
-}}"""
 
 
 def source(name: str, head: Sequence[str], functions: Sequence, single: bool) -> str:
     """The source file: all functions, and what they need."""
     parts = [comment(head), "#include <math.h>"]
-    bodies = [body(function, single) for function in functions]
-    if any(" solve(" in text for text in bodies):
-        parts.append(SOLVE.format(kind=kind(single)))
-    for function, text in zip(functions, bodies):
-        parts.append(f"{comment([function.title])}\n{declaration(name, function, single)}\n{{\n{text}\n}}")
+    for function in functions:
+        begin = f"{comment([function.title])}\n{declaration(name, function, single)}"
+        parts.append(f"{begin}\n{{\n{body(function, single)}\n}}")
     return "\n\n".join(parts) + "\n"
 
 
@@ -78,19 +58,11 @@ def declaration(name: str, function, single: bool) -> str:
 def body(function, single: bool) -> str:
     """The lines of a function, whose results are written last."""
     writer = Writer(function.traced, [f"{x}[{k}]" for x, k in function.inputs], SINGLE if single else DOUBLE)
-    lines = [line for assignment in writer.assignments for line in statements(assignment, single)]
+    used = {x for x, k in function.inputs if (x, k) in function.used}
+    lines = [f"(void){x};" for x in function.takes if x not in used]
+    for name, text, of in writer.assignments:
+        value = f"{of}{'f' * single}({text})" if of else text
+        lines.append(f"const {kind(single)} {name} = {value};")
     size = prod(function.shape)
     lines += [f"{function.results[k // size]}[{k % size}] = {text};" for k, text in enumerate(writer.results)]
     return "\n".join(f"    {line}" for line in lines)
-
-
-def statements(assignment: Assignment, single: bool) -> list[str]:
-    names, values, number = assignment.names, assignment.expressions, f"const {kind(single)}"
-    if assignment.kind == "sincos":
-        sine, cosine = ("sinf", "cosf") if single else ("sin", "cos")
-        return [f"{number} {names[0]} = {sine}({values[0]}), {names[1]} = {cosine}({values[0]});"]
-    if assignment.kind == "solve":
-        array, n = f"a{names[0]}", len(names)
-        found = ", ".join(f"{name} = {array}[{n * n + k}]" for k, name in enumerate(names))
-        return [f"{kind(single)} {array}[] = {{{', '.join(values)}}};", f"solve({n}, {array});", f"{number} {found};"]
-    return [f"{number} {names[0]} = {values[0]};"]

@@ -23,14 +23,11 @@ class Syntax:
 
 
 class Assignment(NamedTuple):
-    """Values by their names: the "value" of an expression, the "sincos" of an angle, or the solution of a linear system, "solve".
+    """The value of an expression, or of a function ("sin" or "cos") of it."""
 
-    expressions of a linear system: its n rows of n numbers, then the right-hand side.
-    """
-
-    kind: str
-    names: list[str]
-    expressions: list[str]
+    name: str
+    expression: str
+    function: str = ""
 
 
 class Writer:
@@ -43,7 +40,7 @@ class Writer:
         for i in traced.nodes:
             self.uses.update(self.tape.operands(i))
         self.known = {x.i: (name, ATOM) for x, name in zip(traced.inputs, inputs)}  # by node: (text, how it is bound)
-        self.items = {}  # of a node with several results: [(which, node)]
+        self.items = {}  # of a sine and cosine: [(which, node)]
         for i in traced.nodes:
             kind, arguments = self.tape.nodes[i]
             if kind == "item":
@@ -57,20 +54,16 @@ class Writer:
             if kind == "number":
                 self.known[i] = self.syntax.number(float(arguments[0])), SUM if arguments[0] < 0.0 else ATOM
             elif kind == "sincos":
-                yield self.several(i, kind, [f"s{i}", f"c{i}"], arguments)
-            elif kind == "call":  # "solution" of n (n + 1) numbers
-                n = int(len(arguments[1:]) ** 0.5)
-                yield self.several(i, "solve", [f"x{i}_{k}" for k in range(n)], arguments[1:])
+                for which, item in self.items[i]:
+                    name = f"{'sc'[which]}{i}"
+                    self.known[item] = name, ATOM
+                    yield Assignment(name, self.text(arguments[0]), ("sin", "cos")[which])
             elif kind not in ("input", "item"):
                 text, bound = self.expression(kind, arguments)
                 if self.uses[i] > 1 or len(text) > LONGEST:
-                    yield Assignment("value", [f"x{i}"], [text])
+                    yield Assignment(f"x{i}", text)
                     text, bound = f"x{i}", ATOM
                 self.known[i] = text, bound
-
-    def several(self, i: int, kind: str, names: list[str], operands: tuple) -> Assignment:
-        self.known |= {item: (names[which], ATOM) for which, item in self.items[i]}
-        return Assignment(kind, names, [self.text(a) for a in operands])
 
     def text(self, i: int, least: int = SUM) -> str:
         """The expression of a node, in brackets where it is bound less than `least`."""
