@@ -8,8 +8,7 @@ from textwrap import dedent
 import tmt
 from compare.cli.command_line import EXAMPLES, help_of
 from compare.experiments import EXPERIMENTS
-from compare.export.command import EPILOG as OF_EQUATIONS
-from compare.fleet.command import EPILOG
+from compare.report.text import block
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -41,6 +40,7 @@ def command_lines() -> list[str]:
     """All command lines of compare that are shown, without `python -m compare`; each once."""
     of_readme = [text for name, text in BLOCKS if name == "sh"] + re.findall(r"`[^`\n]+`", README)
     of_helps = [text for name in EXPERIMENTS for kind, text in indented(help_of(name)) if kind == "sh"]
-    beside_text = "\n".join(re.findall(r"^  python.*", f"{EXAMPLES}\n{EPILOG}\n{OF_EQUATIONS}", re.MULTILINE))
+    examples = [EXAMPLES, *(block(of, "examples") for of in ("fleet", "export"))]
+    beside_text = "\n".join(re.findall(r"^  python.*", "\n".join(examples), re.MULTILINE))
     found = COMPARE.findall("\n".join([*of_readme, *of_helps, beside_text]))
     return list(dict.fromkeys(shlex.join(shlex.split(re.split(r" {2,}| &&", line)[0])) for line in found))

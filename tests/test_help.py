@@ -13,9 +13,9 @@ from runs import ENVIRONMENT
 from shown import blocks, command_lines
 
 from compare.__main__ import main
-from compare.cli.command_line import LINE_WIDTH, OPTIONS, help_of, request
+from compare.cli.command_line import LINE_WIDTH, OPTIONS, command_parser, help_of, request
 from compare.experiments import EXPERIMENTS, skipped
-from compare.export.command import equations_parser
+from compare.export.command import OPTIONS as OF_EQUATIONS
 from compare.fleet.command import experiments_of, fleet_parser
 from compare.report.provenance import OURS, installed
 from compare.robots.arm import ARM
@@ -73,7 +73,7 @@ def test_a_command_line_that_is_shown_can_be_given(line, capsys):
         options = made.parse_intermixed_args(words[1:])
         assert options.help or (options.paths and experiments_of(made, options.only))
     elif words[:1] == ["equations"] and "--help" not in words:
-        assert equations_parser().parse_args(words[1:]).out
+        assert command_parser("", "", "export", OF_EQUATIONS).parse_args(words[1:]).out
     elif "--help" in words or not words:
         assert answered(words, capsys)[0] == 0
     else:

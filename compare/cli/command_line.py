@@ -110,6 +110,22 @@ def parser(experiment: str | None = None) -> Parser:
     return made
 
 
+def command_parser(name: str, usage: str, template: str, options: dict[str, Option]) -> Parser:
+    """The parser of a command that is no experiment; its texts are macros of its template."""
+    made = Parser(
+        prog=f"{PROGRAM} {name}",
+        usage=f"{PROGRAM} {name} {usage} [options]",
+        description=block(template, "help"),
+        epilog=block(template, "examples") + "\n",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        add_help=False,
+    )
+    for option in options:
+        made.add_option(option, options[option], template)
+    made.add_argument("-h", "--help", action="store_true", help="this text")
+    return made
+
+
 def help_of(experiment: str) -> str:
     first, *rest = block(experiment, "help").split("\n")
     return "\n".join([fill(first, LINE_WIDTH), *rest])

@@ -46,6 +46,7 @@ class Outcome(NamedTuple):
     rows: tuple[Row, ...] = ()
     not_run: str = ""  # why it was not run
     wrong: str = ""  # why it cannot run
+    of: str = ""  # the file that was run, where there are others with the same expressions
 
     @property
     def passed(self) -> bool:
@@ -72,7 +73,7 @@ def checked(
         return Outcome(not_run=str(error)), None
     except WrongProgram as error:
         return Outcome(wrong=str(error)), None
-    return Outcome(tuple(rows)), program
+    return Outcome(tuple(rows), of=program.of), program
 
 
 def random_states(robot: Robot, count: int) -> list[np.ndarray]:

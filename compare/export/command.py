@@ -3,6 +3,7 @@
 import argparse
 import hashlib
 import re
+import shutil
 import time
 from collections.abc import Sequence
 from functools import partial
@@ -10,9 +11,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import tmt
+from tmt.export import is_word
 
-from ..cli.command_line import EQUATIONS, PROGRAM, Option, Parser, expected
+from ..cli.command_line import EQUATIONS, Option, command_parser, expected
+from ..process import interrupt
 from ..process.crash import Refused
+from ..process.streams import in_one_line
 from ..report.terminal import Terminal
 from ..report.text import block
 
@@ -25,7 +29,6 @@ FILES = {  # of each language: the endings of the files, and what tmt.equations 
 QUANTITIES = {"latex": "mass_matrix,bias,gravity_balance"}
 OF_MOST = "mass_matrix,bias,acceleration"
 STATES = 1000
-EPILOG = block("export", "examples") + "\n"
 OPTIONS = {
     "--to": Option(metavar="LANGUAGE", default="c"),
     "--mjcf": Option(metavar="FILE"),
@@ -36,21 +39,9 @@ OPTIONS = {
 }
 
 
-def equations_parser() -> Parser:
-    made = Parser(
-        prog=f"{PROGRAM} {EQUATIONS}", usage=f"{PROGRAM} {EQUATIONS} --out DIR [options]",
-        description=block("export", "help"), epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False,
-    )  # fmt: skip
-    for name, option in OPTIONS.items():
-        made.add_option(name, option, "export")
-    made.add_argument("-h", "--help", action="store_true", help="this text")
-    return made
-
-
 def equations_status(arguments: Sequence[str], command: str) -> int:
     """Run the command; the exit status. SystemExit for help and wrong arguments. Refused: it cannot be carried out."""
-    made = equations_parser()
+    made = command_parser(EQUATIONS, "--out DIR", "export", OPTIONS)
     options, unknown = made.parse_known_args(arguments)
     if options.help:
         made.print_help()
@@ -73,6 +64,7 @@ def equations_status(arguments: Sequence[str], command: str) -> int:
 def write_equations(options: argparse.Namespace, command: str) -> int:
     """Write and check the files; the exit status."""
     started, terminal = time.perf_counter(), Terminal()
+    interrupt.Now.line = "interrupted; nothing was written"
     from ..engines.mujoco import ModelError  # imports are slow
     from ..run.reference import compared_with
     from . import checks, programs
@@ -98,6 +90,7 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
             raise Refused(error) from None
 
     with terminal.progress("writes the equations"), TemporaryDirectory() as folder:
+        interrupt.undo.append(partial(shutil.rmtree, folder, ignore_errors=True))
         texts = written()
         size = sum(map(len, texts.values()))
         terminal.say(
@@ -110,7 +103,8 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
         outcome, program = checks.checked(compared, make, quantities, STATES, options.float)
         times = checks.times(compared, program, quantities, STATES)
     of = {
-        "outcome": outcome, "name": robot.name, "states": STATES, "command": command, "features": robot.features,
+        "outcome": outcome, "name": in_one_line(robot.name), "states": STATES, "features": robot.features,
+        "command": in_one_line(command),
         "sha256": hashlib.sha256(Path(robot.mjcf).read_bytes()).hexdigest()[:16], "mujoco": checks.version(),
     }  # fmt: skip
     texts = written(*block("export", "head", **of).splitlines())
@@ -131,5 +125,5 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
 
 def identifier(stem: str) -> str:
     """The name of a file as an identifier."""
-    name = re.sub(r"\W", "_", stem, flags=re.ASCII).strip("_")
-    return name if name[:1].isalpha() else f"robot_{name}".rstrip("_")
+    name = re.sub(r"\W", "_", stem, flags=re.ASCII).strip("_")[:50]
+    return name if name[:1].isalpha() and not is_word(name) else f"robot_{name}".rstrip("_")

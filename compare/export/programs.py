@@ -3,6 +3,7 @@
 import ctypes
 import os
 import runpy
+import shlex
 import shutil
 import subprocess
 from collections.abc import Sequence
@@ -33,6 +34,8 @@ class WrongProgram(RuntimeError):
 class Program:
     """The files of a folder, for a Tree; `values` runs a function of them."""
 
+    of = ""  # the file that is run, where there are others with the same expressions
+
     def __init__(self, folder: Path, name: str, tree: tmt.Tree, quantities: Sequence[str], single: bool):
         self.folder, self.name, self.tree, self.quantities, self.single = folder, name, tree, quantities, single
         self.start()
@@ -62,7 +65,7 @@ class Program:
                 stdin=subprocess.DEVNULL, check=False,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
-            raise WrongProgram(f"{command[0]} takes more than {MOST_SECONDS:g} s") from None
+            raise NotRun(f"{command[0]} takes more than {MOST_SECONDS:g} s") from None
         except OSError as error:
             raise NotRun(f"{command[0]}: {error.strerror}") from None
         if done.returncode:
@@ -77,25 +80,22 @@ class CProgram(Program):
     """Compiled with -O2, called for many states by a loop in C."""
 
     def start(self):
-        compiler = os.environ.get("CC") or next(filter(shutil.which, ("gcc", "cc", "clang")), None)
-        if compiler is None or not shutil.which(compiler.split()[0]):
-            raise NotRun(f"no C compiler was found ({compiler or 'gcc, cc, clang'})")
+        compiler = shlex.split(os.environ.get("CC", "")) or list(filter(shutil.which, ("gcc", "cc", "clang")))[:1]
+        if not compiler or not shutil.which(compiler[0]):
+            raise NotRun(f"no C compiler was found ({' '.join(compiler) or 'gcc, cc, clang'})")
         driver = [f'#include "{self.name}.h"', *map(self.loop, self.quantities)]
-        Path(self.folder, "driver_of_states.c").write_text("\n".join(driver) + "\n", encoding="utf-8")
+        Path(self.folder, "_states.c").write_text("\n".join(driver) + "\n", encoding="utf-8")
+        Path(self.folder, "_none.c").write_text("#include <math.h>\nint none;\n", encoding="utf-8")
         flags = ["-std=c99", "-O2", "-Wall", "-fPIC", "-shared"]
+        try:
+            self.run(*compiler, *flags, "_none.c", "-o", "_none.so", "-lm")
+            ctypes.CDLL(str(self.folder / "_none.so"))
+        except (WrongProgram, OSError) as error:  # of the compiler or the folder, not of the equations
+            raise NotRun(f"a C library cannot be made or loaded: {error}") from None
         # the header before the source: the declarations must be those of the functions
-        self.run(
-            *compiler.split(),
-            *flags,
-            "-include",
-            f"{self.name}.h",
-            f"{self.name}.c",
-            "driver_of_states.c",
-            "-o",
-            "library.so",
-            "-lm",
-        )
-        self.library = ctypes.CDLL(str(self.folder / "library.so"))
+        files = ["-include", f"{self.name}.h", f"{self.name}.c", "_states.c"]
+        self.run(*compiler, *flags, *files, "-o", "_states.so", "-lm")
+        self.library = ctypes.CDLL(str(self.folder / "_states.so"))
 
     def loop(self, quantity: str) -> str:
         """A function for many states."""
@@ -150,7 +150,8 @@ class SymbolicProgram(Program):
     """The matrices of SymPy, as functions of states."""
 
     def start(self):
-        self.found = runpy.run_path(str(self.folder / f"{self.name}.py"))
+        self.of = f"{self.name}.py"
+        self.found = runpy.run_path(str(self.folder / self.of))
         robot = Robot("", Path(), self.tree, {}, ())
         self.functions = functions_of(self.found, robot.coordinates, ())
 
@@ -182,8 +183,8 @@ class MatlabProgram(Program):
         results = [f"r{k}" for k in range(parts)]
         lines.append(f"[{', '.join(results)}] = {self.name}('{quantity}', {', '.join(takes)});")
         lines += [f"f = fopen('{r}.bin', 'w'); fwrite(f, {r}, 'double'); fclose(f);" for r in results]
-        (self.folder / "driver_of_states.m").write_text("\n".join(["1;", *lines]) + "\n", encoding="utf-8")
-        self.run(self.octave, "--norc", "--quiet", "driver_of_states.m")
+        (self.folder / "_states.m").write_text("\n".join(["1;", *lines]) + "\n", encoding="utf-8")
+        self.run(self.octave, "--norc", "--quiet", "_states.m")
         shape = shape_of(quantity, self.tree)[parts > 1 :]
         arrays = [np.fromfile(self.folder / f"{r}.bin").reshape((*shape, len(q)), order="F") for r in results]
         return [np.moveaxis(array, -1, 0) for array in arrays]

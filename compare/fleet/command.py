@@ -14,6 +14,7 @@ from ..cli.command_line import (
     PROGRAM,
     Option,
     Parser,
+    command_parser,
     expected,
     not_empty,
     process_count,
@@ -24,12 +25,10 @@ from ..experiments import EXPERIMENTS, TIMED
 from ..process.crash import Refused
 from ..process.streams import in_one_line
 from ..report.terminal import Terminal
-from ..report.text import block
 
 SENT = "reference of the fleet"  # folder of the solution in a bundle
 TIMING = "timing"  # resource of Dask's workers on which nothing else runs
 PERIOD = 10.0  # s between two lines of the progress where it cannot be shown
-EPILOG = block("fleet", "examples") + "\n"
 
 
 def fleet_reference(text: str) -> str:
@@ -52,15 +51,8 @@ FLEET_OPTIONS = {
 
 
 def fleet_parser() -> Parser:
-    made = Parser(
-        prog=f"{PROGRAM} {FLEET}", usage=f"{PROGRAM} {FLEET} PATH... [options]",
-        description=block("fleet", "help"), epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False,
-    )  # fmt: skip
-    for name, option in FLEET_OPTIONS.items():
-        made.add_option(name, option, "fleet")
+    made = command_parser(FLEET, "PATH...", FLEET, FLEET_OPTIONS)
     made.add_argument("paths", nargs="*", type=not_empty, metavar="PATH", help=argparse.SUPPRESS)
-    made.add_argument("-h", "--help", action="store_true", help="this text")
     return made
 
 

@@ -27,8 +27,8 @@ def tokens(expr, display) -> list[Token]:
         base = factor.as_base_exp()[0]
         name = display.get(base, "")
         of_symbol = 0 if name.startswith("m_") else 1 if name.startswith("g") else 3 if name.startswith("\\dot") else 2
-        return (
-            (5 if base.is_Add else 4 if base.is_Function else of_symbol),
+        return (  # a sum before a function: cos q (a + b) could be the cosine of a product
+            (4 if base.is_Add else 5 if base.is_Function else of_symbol),
             order(base),
             base.is_Function and base.func == sympy.cos,
         )
@@ -54,7 +54,7 @@ def tokens(expr, display) -> list[Token]:
     if expr.is_Mul:
         number, rest = expr.as_coeff_Mul()
         factors = sorted(sympy.Mul.make_args(rest), key=rank)
-        result = [] if number == 1 else tokens(number, display)
+        result = [] if float(number) == 1.0 else tokens(number, display)
         return result + [token for factor in factors for token in bracketed(factor, display)]
     if expr.is_Number:
         return [Token(str(expr) if expr.is_Rational else f"{float(expr):.6g}", "number")]
@@ -120,7 +120,7 @@ def head(symbolic: Symbolic) -> list[str]:
     """The conventions in sentences."""
     sizes = "; ".join(f"{letter}: {title}" for letter, title, _ in formulas(symbolic))
     note = [f"{symbolic.note[0].upper()}{symbolic.note[1:]}."] if symbolic.note else []
-    return [f"{sizes}.", "Forces of dampers D and springs K are not in h.", *note]
+    return [f"{sizes}.", "Forces of dampers D and springs K are not in h.", "Numbers are shown with six digits.", *note]
 
 
 # LaTeX
@@ -128,7 +128,9 @@ def head(symbolic: Symbolic) -> list[str]:
 LATEX = r"""% {comment}
 \documentclass[10pt]{article}
 \usepackage[a4paper, margin=18mm]{geometry}
-\usepackage{amsmath}
+\usepackage{amsmath, longtable}
+\setlength{\LTpre}{3pt}
+\setlength{\LTpost}{0pt}
 \setlength{\parindent}{0pt}
 \setlength{\parskip}{3pt}
 \pagestyle{empty}
@@ -166,21 +168,20 @@ def latex(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
         for symbol, row in symbolic.parameters.items()
     ]
     parts = {
-        "comment": "\n% ".join(head_lines) or "Equations of motion",
+        "comment": "\n% ".join(head_lines),
         "text": f"$${MOTION}$$\n" + " ".join(map(escaped, head(symbolic))),
         "tables": tabular("ll", joints) + "\n\n" + tabular("lrll", rows),
         "equations": "\n\n".join(equations),
     }
-    text = LATEX
-    for name, part in parts.items():
-        text = text.replace(f"{{{name}}}", part)
-    return text
+    return re.sub(r"\{(comment|text|tables|equations)\}", lambda found: parts[found[1]], LATEX)
 
 
 def in_latex(formula) -> str:
     parts = []
     for token in formula:
         text = rf"\{token.text}" if token.kind == "function" else token.text
+        if token.kind == "number":
+            text = re.sub(r"e([+-]\d+)", lambda found: rf" \cdot 10^{{{int(found[1])}}}", text)
         parts.append(f"{text}^{{{token.power}}}" if token.power else text)
     return " ".join(parts) or "0"
 
@@ -188,9 +189,10 @@ def in_latex(formula) -> str:
 def escaped(text: str) -> str:
     """Text in LaTeX."""
     named = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
-    return re.sub(r"[_&%$#{}\\~^]", lambda found: named.get(found[0], f"\\{found[0]}"), text)
+    plain = text.encode("latin-1", "replace").decode("latin-1")  # what pdflatex has letters for
+    return re.sub(r"[_&%$#{}\\~^]", lambda found: named.get(found[0], f"\\{found[0]}"), plain)
 
 
 def tabular(columns, rows) -> str:
     body = " \\\\\n".join(" & ".join(row) for row in rows)
-    return f"\\begin{{tabular}}{{{columns}}}\n{body}\n\\end{{tabular}}" if rows else ""
+    return f"\\begin{{longtable}}[l]{{{columns}}}\n{body}\n\\end{{longtable}}" if rows else ""

@@ -7,27 +7,13 @@ from typing import NamedTuple
 
 from tmt.model.tree import Tree
 
-GREEK = {
-    "alpha",
-    "beta",
-    "gamma",
-    "delta",
-    "epsilon",
-    "zeta",
-    "eta",
-    "theta",
-    "kappa",
-    "mu",
-    "nu",
-    "xi",
-    "rho",
-    "sigma",
-    "tau",
-}
-GREEK |= {"phi", "chi", "psi", "omega"}
+GREEK = frozenset((
+    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "mu", "nu", "xi", "rho", "sigma", "tau", "phi",
+    "chi", "psi", "omega",
+))  # fmt: skip
 EPS = 2.0**-52
 ROUND = 16 * EPS  # relative: a number this close to one of 10 digits is meant to be that
-TINY = 1e-12  # of the largest component of a vector or tensor: meant to be zero
+TINY = 4 * EPS  # of the largest component of a vector or tensor: meant to be zero
 DIGITS = 34  # of directions that are not along an axis
 
 
@@ -116,6 +102,8 @@ class Names:
         if not self.named or not value:
             return number(value)
         symbol = sympy.Symbol(name)
+        while symbol in self.parameters:  # of a body whose name ends like a component
+            symbol = sympy.Symbol(f"{symbol}_")
         self.parameters[symbol], self.display[symbol] = Parameter(value, unit, meaning), tex
         return symbol
 
@@ -145,11 +133,12 @@ class Names:
 
 
 def identifiers(names) -> list[str]:
-    """The names as parts of identifiers, each different."""
+    """The names as parts of identifiers in ASCII, each different."""
     result = []
     for name in names:
-        plain = re.sub(r"\W", "_", name)
-        result.append(plain if plain not in result else f"{plain}_{len(result) + 1}")
+        plain = re.sub(r"\W", "_", name, flags=re.ASCII)
+        others = (f"{plain}_{k}" for k in itertools.count(2))
+        result.append(next(x for x in itertools.chain([plain], others) if x not in result))
     return result
 
 

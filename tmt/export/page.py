@@ -90,7 +90,9 @@ def in_mathml(token) -> str:
     elif token.kind == "function":
         text = f"<mi>{token.text}</mi>"
     elif token.kind == "number":
-        text = f"<mn>{token.text}</mn>"
+        number, _, power = token.text.partition("e")
+        text = f"<mn>{number}</mn>"
+        text += f"<mo>·</mo><msup><mn>10</mn><mn>{int(power)}</mn></msup>" if power else ""
     else:
         space = 0.25 * (token.kind == "operator")
         sign = token.text.replace("-", "\N{MINUS SIGN}")
