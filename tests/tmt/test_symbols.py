@@ -1,7 +1,11 @@
 """Symbolic equations: their numbers, their forms, and the texts in which they are handed out."""
 
+import html
+import re
 import shutil
 import subprocess
+import unicodedata
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -154,3 +158,115 @@ def test_the_arm_in_latex_is_one_page(tmp_path):
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "arm.tex"]
     result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
     assert result.returncode == 0 and "(1 page" in result.stdout, result.stdout
+
+
+def entries_in_latex(text) -> dict:
+    """{(letter, row, column): formula} of a document, as lists of its tokens."""
+    found = {}
+    for letter, i, j, formula in re.findall(r"\\entry\{(\w)_\{(\d)(\d?)\} = (.*)\}$", text, re.MULTILINE):
+        found[letter, int(i), int(j or 1)] = formula.split()
+    for letter, body in re.findall(r"\\\[ (\w) = \\begin\{pmatrix\} (.*) \\end\{pmatrix\} \\\]", text):
+        for i, row in enumerate(body.split(r" \\ "), 1):
+            found |= {(letter, i, j): cell.split() for j, cell in enumerate(row.split(" & "), 1)}
+    return found
+
+
+def entries_in_page(text) -> dict:
+    """The same of a page."""
+
+    def tex(element):
+        parts = [tex(child) for child in element if child.tag != "mspace"]
+        text = (element.text or "").strip()
+        if element.tag == "mi":
+            if text > "\x7f":  # a Greek letter
+                return "\\" + unicodedata.name(text).split()[-1].lower()
+            return f"\\{text}" if text in ("sin", "cos") else text
+        if element.tag == "msub":
+            return "{}_{{{}}}".format(*parts)
+        if element.tag == "msup":
+            return "{}^{{{}}}".format(*parts)
+        if element.tag == "mover":
+            return f"\\dot{{{parts[0]}}}"
+        return {"−": "-", "·": "\\cdot"}.get(text, text) if element.tag in ("mo", "mn") else " ".join(parts)
+
+    body = text[text.index("<body>") : text.index("<pre>")].replace("<wbr>", "")
+    found, root = {}, ElementTree.fromstring(html.unescape(body) + "</body>")
+    for paragraph in root.iter("p"):
+        formulas = [tex(formula) for formula in paragraph.iter("math")]
+        if paragraph.get("class") == "entry":
+            letter, i, j = re.fullmatch(r"(\w)_\{(\d)(\d?)\} =", formulas[0]).groups()
+            found[letter, int(i), int(j or 1)] = " ".join(formulas[1:]).split()
+        for table in paragraph.iter("mtable"):
+            letter = formulas[0][0]
+            found |= {
+                (letter, i, j): tex(cell).split() for i, row in enumerate(table, 1) for j, cell in enumerate(row, 1)
+            }
+    return found
+
+
+def value_of(formula, known) -> float:
+    """The value of a formula, {symbol of LaTeX: value}."""
+    formula = [*formula, ")"]
+
+    def power(text):
+        base, _, exponent = text.partition("^")
+        return base, int(exponent.strip("{}") or 1)
+
+    def factor():
+        base, exponent = power(formula.pop(0))
+        if base == "(":
+            value = total()
+            return value ** power(formula.pop(0))[1]
+        if base in ("\\sin", "\\cos"):
+            return getattr(np, base[1:])(factor()) ** exponent
+        return (known[base] if base in known else float(base)) ** exponent
+
+    def product():
+        value = factor()
+        while formula[0] not in ("+", "-") and not formula[0].startswith(")"):
+            if formula[0] == "\\cdot":
+                formula.pop(0)
+            value *= factor()
+        return value
+
+    def total():
+        value = -product() if formula[0] == "-" and formula.pop(0) else product()
+        while formula[0] in ("+", "-"):
+            value += product() if formula.pop(0) == "+" else -product()
+        return value
+
+    return total()
+
+
+OBLIQUE = replace(planar(2), axis=((0, 0, 1), (1, 0, 2e-5)))
+
+
+@pytest.mark.parametrize("tree, rtol", [(tmt.ARM, 0.0), (planar(2), 0.0), (cart_pole(), 0.0), (OBLIQUE, 1e-4)])
+def test_what_is_printed_in_latex_and_on_the_page_has_the_values(tree, rtol, rng):
+    symbols = symbolic(tree)
+    found = entries_in_latex(latex(symbols))
+    assert entries_in_page(page(symbols)) == found
+    n, (q, qd) = len(tree.axis), rng.uniform(-2.0, 2.0, (2, len(tree.axis)))
+    known = {symbols.display[symbol]: row.value for symbol, row in symbols.parameters.items()}
+    known |= {symbols.display[symbol]: x for symbol, x in zip(symbols.q + symbols.qd, [*q, *qd])}
+    G, h, M = tmt.gravity_balance(q, tree), tmt.bias(q, qd, tree), tmt.mass_matrix(q, tree)
+    known |= {f"G_{{{i + 1}}}": value for i, value in enumerate(G)}
+    expected = {("M", i + 1, j + 1): M[i, j] for i in range(n) for j in range(n)}
+    expected |= {("h", i + 1, 1): h[i] for i in range(n)} | {("G", i + 1, 1): G[i] for i in range(n)}
+    assert {key for key in expected if key[0] != "M" or key[2] >= key[1]} <= found.keys()
+    for key, formula in found.items():
+        assert abs(value_of(formula, known) - expected[key]) <= (1e-13 + rtol) * max(1.0, abs(expected[key])), key
+
+
+def test_symbols_of_names_that_are_alike_are_different(tmp_path):
+    names = {"hinge_names": ("p q", "p_q", "p-q"), "body_names": ("a", "a_x", "a b")}
+    tree = replace(planar(3), com=((0.1, 0.2, 0.3), (0.4, 0, 0), (0, 0.1, 0.2)), **names)
+    assert_right(symbolic(tree), tree, np.random.default_rng(0), 5)
+    for joints in (("µ", "μ", "x²"), ("{text}", "a_{b}", "%")):
+        tree = replace(planar(3), hinge_names=joints)
+        found = {}
+        exec(python_source(symbolic(tree)), found)
+        assert len(set(found["q"])) == 3
+        text = latex(symbolic(tree), [joints[0]])
+        assert text.count("\\begin{document}") == 1 and "\n\\begin{document}" in text
+        assert entries_in_latex(text).keys() == entries_in_page(page(symbolic(tree))).keys()

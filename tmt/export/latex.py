@@ -54,7 +54,7 @@ def tokens(expr, display) -> list[Token]:
     if expr.is_Mul:
         number, rest = expr.as_coeff_Mul()
         factors = sorted(sympy.Mul.make_args(rest), key=rank)
-        result = [] if float(number) == 1.0 else tokens(number, display)
+        result = [token for token in tokens(number, display) if token.text != "1"]
         return result + [token for factor in factors for token in bracketed(factor, display)]
     if expr.is_Number:
         return [Token(str(expr) if expr.is_Rational else f"{float(expr):.6g}", "number")]
