@@ -64,7 +64,9 @@ class Workers(ThreadPoolExecutor):
     def ask(self, task, *call):
         """The result or exception of a call in one of the processes."""
         try:
-            value, error, seconds = self.processes.submit(timed, *call).result()
+            with interrupt.postponed():  # a process that is half started would complain
+                future = self.processes.submit(timed, *call)
+            value, error, seconds = future.result()
         except RuntimeError:  # a broken pool, or shut down
             raise WorkerEnded("a worker process was killed; the earlier report is unchanged") from None
         self.clock.taken.append((task, seconds))
