@@ -120,7 +120,7 @@ def slope(tree, stepping: Method, name: str = "slope", with_step: bool = True) -
 
     forms = [in_terms]
     if is_articulated(stepping, tree):
-        forms = [in_terms] * (n <= DENSE) + [in_bodies] * (n > FEW)
+        forms = [in_terms] * (n < MANY) + [in_bodies] * (n > FEW)
     traced = (trace(name, (nq, n, n, *[1] * with_step), form) for form in forms)
     return min(traced, key=lambda one: one.length)
 
