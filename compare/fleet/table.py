@@ -41,7 +41,7 @@ def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Seque
 
     An unstable step of the file and joints that are matched by other names do not change the verdict; the reason names them.
     """
-    differing, broke, unstable, unconfirmed, _ = failures(sections)
+    differing, broke, unstable, unconfirmed, *_ = failures(sections)
     unfinished = [*(f"{check.experiment}: {check.note}" for check in broke), *lost]
     top = worst(sections)
     stable, limit = own_step(sections)

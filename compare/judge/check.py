@@ -36,9 +36,10 @@ class About(Enum):
 
 @dataclass(frozen=True)
 class Check:
-    """One verdict: the value is at most, at least or equal to the tolerance.
+    """One verdict: the value is at most, at least or equal to the tolerance, or it was not judged.
 
-    value: None where a run diverged or a value is not finite; that never passes.
+    value: None where a run diverged or a value is not finite; that never passes. judged: False where the comparison could
+    not have failed, or could not be made; the note says why. It is neither passed nor failed.
     """
 
     experiment: str
@@ -51,6 +52,7 @@ class Check:
     rounding: bool = False  # whether the tolerance is a bound of rounding errors
     rule: str = "at most"
     about: About = About.MODELS
+    judged: bool = True
 
     def __post_init__(self):
         if self.rule not in RULES or not np.isfinite(self.tolerance):
@@ -58,7 +60,11 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        return self.value is not None and bool(RULES[self.rule](self.value, self.tolerance))
+        return self.judged and self.value is not None and bool(RULES[self.rule](self.value, self.tolerance))
+
+    @property
+    def failed(self) -> bool:
+        return self.judged and not self.passed
 
     @property
     def over_tolerance(self) -> float | None:
@@ -66,11 +72,13 @@ class Check:
         return self.value / self.tolerance if self.rounding and self.tolerance and self.value is not None else None
 
     def record(self) -> dict:
-        names = ("experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "passed", "note")
+        names = ("experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "judged", "passed", "note")
         return {name: getattr(self, name) for name in names}
 
     def __str__(self):
         where = f"{self.experiment}: {self.quantity}" + (f", {self.scene}" if self.scene else "")
+        if not self.judged:
+            return f"{where}: not judged, {self.note}"
         if self.rule == "equal" and self.value is None and self.note:  # only the reason matters
             return f"{where}: no, {self.note}"
         value = "no number" if self.value is None else f"{self.value:.3g} {self.unit}".rstrip()
@@ -108,6 +116,12 @@ class Result:
         """Add a check; a value that is None or not finite fails."""
         value = None if value is None or not np.isfinite(value) else float(value)
         check = Check(self.experiment, scene, quantity, value, float(tolerance), unit, note, rounding, rule, about)
+        self.checks.append(check)
+        return check
+
+    def not_judged(self, scene, quantity, reason: str, unit="", about=About.MODELS) -> Check:
+        """Add a check that was not judged: it neither passes nor fails, and no verdict says that the models agree."""
+        check = Check(self.experiment, scene, quantity, None, 0.0, unit, reason, about=about, judged=False)
         self.checks.append(check)
         return check
 

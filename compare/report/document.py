@@ -11,6 +11,7 @@ import pandas as pd
 from markdown_it import MarkdownIt
 
 from ..experiments import EXPERIMENTS, Experiment
+from ..judge.check import Check
 from ..judge.words import capital
 from .images import embedded
 from .motion import motion_in_html
@@ -127,7 +128,7 @@ class Document:
         """The line of one experiment: what it asks, whether it passes, its headline."""
         good, words = standing(section)
         named = {"name": section.name, "title": section.title, "outcome": words, "headline": headline(section)}
-        if 0 < sum(not check.passed for check in section.result.checks) == len(explained(section, self.report.causes)):
+        if 0 < sum(check.failed for check in section.result.checks) == len(explained(section, self.report.causes)):
             named["headline"] = block("verdict", "consequence")
         return named | {"good": good, "kind": kind(good)}
 
@@ -165,7 +166,8 @@ class Document:
         """One experiment: what was found, figures, tolerance, and the details."""
         result, (good, _) = section.result, standing(section)
         consequences = explained(section, self.report.causes)
-        failed = [check for check in result.checks if not check.passed and check not in consequences]
+        failed = [check for check in result.checks if check.failed and check not in consequences]
+        not_judged = [check for check in result.checks if not check.judged]
         few = MOST_ROWS if self.page else max(1, self.rows // 2)
         most = FIRST_NOTES if self.page else None if self.rows == MOST_ROWS else max(1, self.rows // 2)
         notes, figures = section.notes, [one for one in figures_of(section) if not (self.page and one["moves"])]
@@ -180,8 +182,9 @@ class Document:
             headline=headline(section) if result.headline else "",
             claim=section.claim,
             tolerance=section.tolerance,
-            failing={"count": len(failed), "rows": table_of(records(failed[:few]))},
-            explained={"count": len(consequences), "rows": table_of(records(consequences[:MOST_ROWS]))},
+            failing=listing(failed, few),
+            not_judged=listing(not_judged, few),
+            explained=listing(consequences, MOST_ROWS),
             notes=notes[:most],
             further=notes[most:] if most else [],
             tables=[self.table(section, name, rows) for name, rows in section.tables.items()],
@@ -214,6 +217,11 @@ def kind(good: bool | None) -> str:
 
 def table_of(table: pd.DataFrame) -> dict:
     return {"columns": list(table.columns), "cells": table.astype(str).to_numpy().tolist()}
+
+
+def listing(checks: Sequence[Check], most: int) -> dict:
+    """How many checks there are, and the first of them as a table."""
+    return {"count": len(checks), "rows": table_of(records(checks[:most]))}
 
 
 def figures_of(section: Section) -> list[dict]:

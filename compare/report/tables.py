@@ -54,12 +54,13 @@ def of_causes(causes: Sequence[dict]) -> pd.DataFrame:
 
 
 def records(checks: Sequence[Check]) -> pd.DataFrame:
-    names = [field for field in Check.__annotations__ if field not in ("rounding", "about")]
-    return shown(pd.DataFrame([check.record() for check in checks], columns=names))
+    names = [field for field in Check.__annotations__ if field not in ("rounding", "about", "judged")]
+    found = [check.record() if check.judged else check.record() | {"value": "not judged"} for check in checks]
+    return shown(pd.DataFrame(found, columns=names))
 
 
 def closest_checks(section: Section, most: int) -> pd.DataFrame:
-    """The checks of a section that fail, then those with the largest share of a rounding tolerance, at most `most`, as text."""
+    """The checks of a section that do not pass, then those with the largest share of a rounding tolerance, at most `most`, as text."""
     checks = section.result.checks
     order = sorted(range(len(checks)), key=lambda k: (checks[k].passed, -(checks[k].over_tolerance or 0.0)))
     kept = [checks[k] for k in sorted(order[:most])]

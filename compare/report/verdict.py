@@ -68,13 +68,18 @@ class Failures(NamedTuple):
     unstable: list[Check]
     unconfirmed: list[Check]
     of_engines: list[Check]
+    not_judged: list[Check]
 
 
 def failures(sections: Sequence[Section]) -> Failures:
-    """The failed checks: of the models, of broken experiments, the step, predictions that no run confirms, other engines."""
-    failed = [check for section in sections for check in section.result.checks if not check.passed]
+    """The failed checks: of the models, of broken experiments, the step, predictions that no run confirms, other engines.
+
+    And the checks that were not judged.
+    """
+    checks = [check for section in sections for check in section.result.checks]
     kinds = About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION, About.ENGINE
-    return Failures(*([check for check in failed if check.about == kind] for kind in kinds))
+    failed = ([check for check in checks if check.failed and check.about == kind] for kind in kinds)
+    return Failures(*failed, [check for check in checks if not check.judged])
 
 
 def explained(section: Section, causes: Sequence[dict]) -> list[Check]:
@@ -99,8 +104,9 @@ def depends_on(experiment: str, quantity: str | None) -> bool:
 
 
 def passed(sections: Sequence[Section]) -> bool:
-    """Whether something was compared, and no check fails."""
-    return any(section.result.checks for section in sections) and not any(failures(sections))
+    """Whether something was compared, no check fails, and all were judged."""
+    is_compared = any(check.judged for section in sections for check in section.result.checks)
+    return is_compared and not any(failures(sections))
 
 
 def worst(sections: Sequence[Section]) -> Check | None:
@@ -123,9 +129,9 @@ def verdict(
     checked = [section for section in sections if section.result.checks]
     consequences = [check for section in sections for check in explained(section, causes)]
     also = failures(checked)
-    failed = sum(map(len, also))
+    checks = [check for section in checked for check in section.result.checks if check.judged]
+    failed = sum(check.failed for check in checks)
     also = also._replace(unconfirmed=[check for check in also.unconfirmed if check not in consequences])
-    checks = [check for section in checked for check in section.result.checks]
     top = worst(checked)
     named = {check.experiment for check in also.differing} - {SEEKS_CAUSES}
     names = [section.name for section in checked if not named or section.name in named]
@@ -151,17 +157,18 @@ def verdict(
 
 def outcome(section: Section, causes: Sequence[dict] = ()) -> str:
     """Whether a section passes, in a sentence."""
-    checks, of_kinds = section.result.checks, failures([section])
-    numbers = {"checks": len(checks), "failed": sum(map(len, of_kinds)), "explained": len(explained(section, causes))}
-    return say(Finding("verdict", "outcome", {**numbers, "also": of_kinds}))
+    checks = [check for check in section.result.checks if check.judged]
+    numbers = {"checks": len(checks), "failed": sum(check.failed for check in checks)}
+    numbers["explained"] = len(explained(section, causes))
+    return say(Finding("verdict", "outcome", {**numbers, "also": failures([section])}))
 
 
 def standing(section: Section) -> tuple[bool | None, str]:
-    """Whether a section passes, and that in two or three words; None where nothing was compared."""
-    checks = section.result.checks
-    differing, broke, unstable, unconfirmed, of_engines = failures([section])
+    """Whether a section passes, and that in two or three words; None where something was not judged."""
+    checks = [check for check in section.result.checks if check.judged]
+    differing, broke, unstable, unconfirmed, of_engines, not_judged = failures([section])
     if differing:
-        return False, f"{sum(not check.passed for check in checks)} of {len(checks)} fail"
+        return False, f"{sum(check.failed for check in checks)} of {len(checks)} fail"
     if broke:
         return False, "broke off" if any(check.quantity == ENDS for check in broke) else "incomplete"
     if of_engines:
@@ -170,6 +177,8 @@ def standing(section: Section) -> tuple[bool | None, str]:
         return False, f"{len(unconfirmed)} not confirmed"
     if unstable:
         return False, "unstable step"
+    if not_judged:
+        return None, f"{len(not_judged)} not judged"
     return (True, "pass") if checks else (None, "nothing compared")
 
 
@@ -177,7 +186,7 @@ def headline(section: Section) -> str:
     """The number of a section for the first screen; how many checks pass where it has none."""
     if section.result.headline:
         return say(section.result.headline)
-    checks = section.result.checks
+    checks = [check for check in section.result.checks if check.judged]
     shares = [check.over_tolerance for check in checks if check.over_tolerance is not None and check.passed]
     numbers = {"passed": sum(check.passed for check in checks), "checks": len(checks)}
     return say(Finding("verdict", "checks_passed", {**numbers, "share": max(shares, default=None)})) if checks else ""

@@ -188,20 +188,24 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, new: Seque
     seconds: of the processor, for the experiment itself; causes: all that are known.
     """
     checks, of_cause = section.result.checks, explained(section, causes)
-    failed = [check for check in checks if not check.passed]
+    failed, open_checks = [check for check in checks if check.failed], [check for check in checks if not check.judged]
     used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
     most = f"{len(of_cause)} explained by the cause" if of_cause else ""
     if any(used) and not failed:
         most = f"at most {100.0 * max(used):.2g} % of tolerance"
     many = f"{len(checks):>3} check{' ' if len(checks) == 1 else 's'}"
     fails = "DIFFER" if section.name in STATES_CAUSES else "FAILED"
-    word = f"{len(failed)} {fails}" if failed else "ok" if checks else "nothing"
-    terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<27} {seconds:5.1f} s CPU", "red" * bool(failed))
+    word = "ok" if checks else "nothing"
+    if failed or open_checks:
+        word = f"{len(failed)} {fails}" if failed else "NOT JUDGED"
+    style = "red" if failed else "yellow" if open_checks else ""
+    terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<27} {seconds:5.1f} s CPU", style)
     for text in section.result.top:
         terminal.say(f"  {say(text)}")
     lines = [f"  CAUSE {cause['text']}" for cause in new]
     if not (causes and section.name in STATES_CAUSES):  # there the causes are the checks
         lines += [f"  FAIL {check}" for check in failed if check not in of_cause]
+    lines += [f"  {check}" for check in open_checks]
     lines[SHOWN:] = [f"  and {len(lines) - SHOWN} more: in the report"] * (len(lines) > SHOWN)
     for line in lines:
         terminal.say(line, "red")

@@ -36,7 +36,7 @@ def test_one_failing_check_among_many_fails_the_verdict(place):
     assert passed([section("mass", *checks)])
     checks[place] = BAD
     sections = [section("gravity", GOOD), section("mass", *checks)]
-    assert not passed(sections) and counts(*sections) == [1, 0, 0, 0, 0]
+    assert not passed(sections) and counts(*sections) == [1, 0, 0, 0, 0, 0]
     assert "1 of 201 checks" in verdict(sections, 2) and "1 of 200 checks" in outcome(sections[-1])
 
 
@@ -89,13 +89,30 @@ def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagr
     for k, about in enumerate((About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION, About.ENGINE)):
         of = section("mass", GOOD, ("what", 2.0, 1.0, "at most", False, about))
         assert not passed([of]) and standing(of)[0] is False
-        assert counts(of) == [int(k == one) for one in range(5)]
+        assert counts(of) == [int(k == one) for one in range(6)]
         assert (differs in verdict([of], 1)) == (about == About.MODELS) and "1 of 2 checks" in verdict([of], 1)
         assert differs in verdict([of, section("gravity", BAD)], 2)
         said.add(standing(of)[1])
     assert len(said) == 4 and standing(section("mass", GOOD))[0] is True and standing(section("mass"))[0] is None
-    assert counts(section("trajectory", ("open loop", None, 1.0, "at most", True))) == [1, 0, 0, 0, 0]  # it diverged
+    assert counts(section("trajectory", ("open loop", None, 1.0, "at most", True))) == [1, 0, 0, 0, 0, 0]  # it diverged
     assert passed([section("stability", (*OWN_STEP[:2], 0.002, *OWN_STEP[3:]))])  # just stable
+
+
+def test_what_was_not_judged_is_neither_passed_nor_failed_and_nothing_is_said_to_agree():
+    some, none = section("mass", GOOD), section("gravity")
+    for result in (some.result, none.result):
+        check = result.not_judged("held", "qdd", "the tolerance exceeds every value")
+        assert (check.judged, check.passed, check.failed) == (False, False, False) and not check.record()["judged"]
+    for one, passed_checks in ((some, "1 check"), (none, None)):
+        text = verdict([one, section("kinematics")], 2)
+        assert not passed([one]) and standing(one)[0] is None and "agree:" not in text and "differ:" not in text
+        assert "the tolerance exceeds every value" in text and (passed_checks or "Nothing was compared") in text
+        said = Lines()
+        say_outcome(said, one, 1.0, [])
+        assert "NOT JUDGED" in said[0] and len(said) == 2
+    failing = section("mass", GOOD, BAD)
+    failing.result.not_judged("held", "qdd", "why")
+    assert standing(failing) == (False, "1 of 2 fail") and "1 of 2 checks" in verdict([failing], 1)
 
 
 def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():

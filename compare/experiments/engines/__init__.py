@@ -69,7 +69,7 @@ def rows(setup: Setup) -> Result:
         for row in result.rows:
             largest[row["engine"]] = max(largest.get(row["engine"], 0.0), row["difference_eps"])
         differing = list(dict.fromkeys(row["engine"] for row in result.rows if not row["passed"]))
-        failed = {check.scene for check in result.checks if check.quantity.endswith(AS_READ) and not check.passed}
+        failed = {check.scene for check in result.checks if check.quantity.endswith(AS_READ) and check.failed}
         values = {"engines": names, "differing": differing, "misread": [name for name in names if name in failed]}
         values["largest"] = largest
         result.headline = result.finding("headline", **values)

@@ -84,7 +84,7 @@ def check_forces(result: Result, setup: Setup, causes: Sequence[dict] = ()) -> l
         allowed = FACTOR * EPS * float(largest) if source == "fluid and tendons" else 0.0
         most = float(np.abs(force).max())
         check = result.check(sample.name, f"no forces of {source}", most, allowed, "N m", rounding=bool(allowed))
-        if not check.passed and not any(cause["quantity"] in OF_FORCES for cause in causes):
+        if check.failed and not any(cause["quantity"] in OF_FORCES for cause in causes):
             place = f"forces of {source}"
             if source == "actuators":
                 place += f" ({', '.join(dynamics.acting_actuators(sample.q, sample.qd))})"

@@ -29,7 +29,7 @@ class SceneRun(NamedTuple):
 def scene_runs(result: Result, robot: Robot) -> list[SceneRun]:
     """The scenes in their order."""
     names = {row["scene"] for row in result.rows}
-    failing = [check.scene for check in result.checks if not check.passed and check.about == About.MODELS]
+    failing = [check.scene for check in result.checks if check.failed and check.about == About.MODELS]
     scenes = []
     for case in (case for case in robot.cases if case.name in names):
         rows = [row for row in result.rows if row["scene"] == case.name]
