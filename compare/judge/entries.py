@@ -1,15 +1,16 @@
 """Scales of the tolerances of every quantity, one for each entry.
 
 Entries differ in unit (kg and kg m2, N and N m) and size: one number for all would hide errors of small ones. The scale of an
-entry is the sum of the absolute values of the terms that are added in it, each at its maximum. With L the largest possible
-distance of a centre of mass from the origin at that state:
+entry is the sum of the absolute values of the terms that are added in it, each at its maximum. With L_i the largest possible
+distance of the centre of mass of a body from the axis or anchor of joint i at that state:
 
-    a column of T_b     t = L of a hinge or ball, 1 of a slide, 0 if the joint does not move the body
-    of B_b              u = 1 of a hinge or ball, 0 of a slide
-    speeds              S = sum of |rates| that turn the body, V of those that slide it, w = L S + V
+    a column of T_b     t_i = L_i + R / 64 of a hinge or ball, 1 of a slide, 0 if the joint does not move the body
+    of B_b              u_i = 1 of a hinge or ball, 0 of a slide
+    speeds              S = sum of |rates| that turn the body, V of those that slide it, w = V + sum of L_i |rates|
     Mbar_ij             sum of m t_i t_j + |I| u_i u_j, and the armature
     h_i                 sum of t_i m (2 S w + g) + u_i (m V^2 + |I| S^2)
 
+R is the largest distance of the body from the world's origin: its position is rounded by eps R, and so is each of its levers.
 Every term of a body is multiplied by k, the number of hinges and balls that turn it, at least 1: each turn passes on the
 rounding of those before it and adds its own. Where a system is solved, errors of eps in Mbar and in the forces are multiplied by
 |Mbar^-1|, entry by entry: a condition number would depend on the units.
@@ -24,7 +25,7 @@ from numpy.typing import ArrayLike
 import tmt
 from tmt.model.singular import mass_matrices
 
-from .scale import reaches, spring_scale
+from .scale import FACTOR, levers, spring_scale
 
 
 def unit(tree: tmt.Tree, of_hinge: str, of_slide: str, of_both: str = "") -> str:
@@ -40,37 +41,43 @@ class Entries:
     def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: ArrayLike = 0.0):
         self.tree, self.q = tree, q
         self.qd = np.broadcast_to(qd, (len(q), tree.coordinates.nv))
-        self.length = reaches(tree, q).max(axis=1)  # (states,)
+        from_joints, self.reach = levers(tree, q)
         by_joint = np.array([tree.moves(b) for b in range(len(tree.mass))])
         turns = np.array(tree.kind) != "slide"
         self.count = np.maximum(1, (by_joint & turns).sum(axis=1))  # k, (m,)
         moved, turns = np.array([per_speed(tree, joints) for joints in by_joint]), np.array(per_speed(tree, turns))
         self.slides, self.turns = moved & ~turns, moved & turns  # (m, nv)
+        of_speeds = per_speed(tree, range(len(tree.kind)))
+        arms = from_joints[..., of_speeds] + self.reach.max(axis=0, initial=0.0)[:, None] / FACTOR
+        self.t = (self.slides + self.turns * arms).reshape(-1, *moved.shape)  # (1 or states, m, nv)
         self.mass = self.count * np.array(tree.mass)
         self.inertia = self.count * np.linalg.norm(tree.inertia, 2, axis=(1, 2))
-        self.spin, self.slip = np.abs(self.qd) @ self.turns.T, np.abs(self.qd) @ self.slides.T  # S and V, (states, m)
-        self.speed = self.length[:, None] * self.spin + self.slip
-        self.positions, self.B = (self.count * self.length[:, None])[:, :, None], self.count[None, :, None, None]
+        rates = np.abs(self.qd)
+        self.spin, self.slip = rates @ self.turns.T, rates @ self.slides.T  # S and V, (states, m)
+        self.speed = np.einsum("sbi,si->sb", self.t, rates)  # w
+        self.positions, self.B = (self.count * self.reach)[:, :, None], self.count[None, :, None, None]
         self.angular_velocities, self.w_conv = ((self.count * self.spin**k)[:, :, None] for k in (1, 2))
         self.v_conv = (self.count * 2.0 * self.spin * self.speed)[:, :, None]
 
     @cached_property
     def T(self) -> np.ndarray:
-        return (self.count[:, None] * (self.slides + self.length[:, None, None] * self.turns))[:, :, None, :]
+        return (self.count[:, None] * self.t)[:, :, None, :]
 
     @cached_property
     def mass_matrix(self) -> np.ndarray:
-        m, I, s, u = self.mass[:, None], self.inertia[:, None], self.slides.astype(float), self.turns.astype(float)
-        L = self.length[:, None, None]
-        fixed = s.T @ (m * s) + u.T @ (I * u) + np.diag(self.tree.armature)
-        crossed = s.T @ (m * u)
-        return fixed + L * (crossed + crossed.T) + L**2 * (u.T @ (m * u))
+        translation = np.einsum("b,sbi,sbj->sij", self.mass, self.t, self.t, optimize=True)
+        rotation = np.einsum("b,bi,bj->ij", self.inertia, self.turns, self.turns)
+        return self.of_states(translation + rotation + np.diag(self.tree.armature))
 
     @cached_property
     def weight(self) -> np.ndarray:
         """Of the torque that balances gravity, N m or N, (states, nv)."""
         g = float(np.linalg.norm(self.tree.gravity))
-        return g * (self.mass @ self.slides + self.length[:, None] * (self.mass @ self.turns))
+        return self.of_states(g * np.einsum("b,sbi->si", self.mass, self.t))
+
+    def of_states(self, scale: np.ndarray) -> np.ndarray:
+        """A scale that may be one for all states, for each of them."""
+        return np.broadcast_to(scale, (len(self.q), *scale.shape[1:]))
 
     @cached_property
     def springs(self) -> np.ndarray:
@@ -80,15 +87,14 @@ class Entries:
     def bias(self) -> np.ndarray:
         newton = self.mass * 2.0 * self.spin * self.speed
         euler = self.mass * self.slip**2 + self.inertia * self.spin**2
-        turned = self.length[:, None] * (newton @ self.turns) + euler @ self.turns
-        return newton @ self.slides + turned + self.weight
+        return np.einsum("sb,sbi->si", newton, self.t) + euler @ self.turns + self.weight
 
     @cached_property
     def potential_energy(self) -> np.ndarray:
         """J, (states,): m g L, and k (|q| + |rest|)^2 / 2."""
         stiffness = np.array(per_speed(self.tree, self.tree.stiffness))
         stretched = np.divide(self.springs**2, stiffness, out=np.zeros_like(self.springs), where=stiffness > 0.0)
-        return np.linalg.norm(self.tree.gravity) * self.length * self.mass.sum() + stretched.sum(axis=1) / 2.0
+        return np.linalg.norm(self.tree.gravity) * (self.reach @ self.mass) + stretched.sum(axis=1) / 2.0
 
     @cached_property
     def energy(self) -> np.ndarray:

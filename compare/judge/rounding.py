@@ -6,7 +6,8 @@ from tmt import Tree
 from tmt.methods.derivatives import FEW_SPEEDS, amplification, has_residual, linear_system
 from tmt.methods.stepping import Method, stepped
 
-from .scale import EPS, FACTOR, bias_scale, gain_scale, spring_scale
+from .entries import Entries
+from .scale import EPS, FACTOR, gain_scale, motion_scale
 
 SAMPLED = 16  # states of a block at which the bound of a step is computed
 NARROW = 1e-3  # rad, m: a run is judged while the band of its positions is narrower
@@ -16,9 +17,10 @@ OF_A_BALL = 32 * EPS
 
 
 def slope_rounding(stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> tuple:
-    """a, |a| and the bound of the rounding error of a, rad/s2; (states,) each: A a = force, with the method's matrix A.
+    """a, |a| and the bound of the rounding error of a, rad/s2; (states, nv) each: A a = force, with the method's matrix A.
 
-    The bound is |A^-1| (64 eps |A| |a| + 64 eps S), with singular values of A and S the sum of the absolute terms of the force.
+    The bound is |A^-1| (64 eps R |a| + 64 eps S), entry by entry, because entries have different units. S is the sum of the
+    absolute terms of the force; R_ij = sqrt(A_ii A_jj) bounds the terms of A_ij and of its factorization, where A is Mbar.
     """
     shape = q.shape[:1]
     if len(tree.axis) > FEW_SPEEDS and has_residual(stepping):
@@ -28,14 +30,14 @@ def slope_rounding(stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, 
         a = stepping.slope(tree, list(q.T), list(qd.T), tau, dt)
         rows = stepping.matrix(tree, list(q.T), list(qd.T), dt)
         A = np.array([[np.broadcast_to(entry, shape) for entry in row] for row in rows]).transpose(2, 0, 1)
-    values = np.linalg.svd(A, compute_uv=False)
-    size = np.abs([np.broadcast_to(component, shape) for component in a]).max(axis=0)
-    force = bias_scale(tree, q, qd) + np.abs(tau).max() + np.max(tree.damping) * np.abs(qd).max(axis=1)
-    if tree.has_springs:
-        force = force + spring_scale(tree, q).max(axis=1)
+    size = np.stack([np.broadcast_to(np.abs(component), shape) for component in a], axis=-1)
+    force = motion_scale(tree, q, qd) + Entries(tree, q).force(tau) + np.array(tree.damping) * np.abs(qd)
     if tree.has_gains:
-        force = force + gain_scale(tree, q, qd).max(axis=1)
-    return a, size, FACTOR * EPS * (values[:, 0] * size + force) / values[:, -1]
+        force = force + gain_scale(tree, q, qd)
+    root = np.sqrt(np.abs(np.einsum("sii->si", A)))
+    terms = np.maximum(np.abs(A), root[:, :, None] * root[:, None, :])
+    errors = FACTOR * EPS * (np.einsum("sij,sj->si", terms, size) + force)
+    return a, size, np.einsum("sij,sj->si", np.abs(np.linalg.inv(A)), errors)
 
 
 def step_rounding(
@@ -55,7 +57,7 @@ def step_rounding(
         return a
 
     stepped(stepping, tree, slope, list(q.T), list(qd.T), dt)
-    size, rounding = np.max(stages, axis=0)[..., None]
+    size, rounding = np.max(stages, axis=0)
     rates = dt * rounding + 8 * EPS * (np.abs(qd) + dt * size)
     angles = 8 * EPS * (of_positions(tree, q) + dt * np.abs(qd)) + dt * rates
     return np.concatenate([angles, rates], axis=1)

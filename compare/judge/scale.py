@@ -16,30 +16,41 @@ EPS = float(np.finfo(float).eps)
 FACTOR = 64
 
 
-def reaches(tree: tmt.Tree, q: ArrayLike | None = None) -> np.ndarray:
-    """Largest possible distance of each centre of mass from the origin, m, (m,): lengths added along the tree.
+def levers(tree: tmt.Tree, q: ArrayLike | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Largest possible distances of each centre of mass, m: from each hinge's axis or ball, and from the world's origin.
 
-    q: positions (..., nq): the displacements of slides are added, and the shape is (..., m).
+    Lengths added along the tree, (..., m, joints), 0 for a joint that does not turn the body, and (..., m). q: positions
+    (..., nq), of which the displacements of slides are added; None: none are displaced. The first have no leading shape where
+    no slide comes after a hinge.
     """
     q = np.array(tree.zero) if q is None else np.asarray(q, float)
-    to_joint = []
-    for i, (kind, at, _) in enumerate(tree.coordinates.joints):
-        moved = np.abs(q[..., at.start] - tree.reference[i]) if kind == "slide" else np.zeros(q.shape[:-1])
-        before = to_joint[tree.parent[i]] if tree.parent[i] >= 0 else 0.0
-        to_joint.append(before + np.linalg.norm(tree.offset[i]) + moved)
-    to_joint.append(np.zeros(q.shape[:-1]))  # of the world, joint -1
-    bodies = zip(tree.body_hinge, tree.com)
-    return np.stack([to_joint[joint] + np.linalg.norm(com) for joint, com in bodies], axis=-1)
+    lengths = []  # of each joint, from the joint before it
+    for i, joint in enumerate(tree.coordinates.joints):
+        moved = np.abs(q[..., joint.q.start] - tree.reference[i]) if joint.kind == "slide" else 0.0
+        lengths.append(np.linalg.norm(tree.offset[i]) + moved)
+    from_joints = [[0.0] * len(lengths) for _ in tree.mass]
+    from_origin = np.zeros((*q.shape[:-1], len(tree.mass)))
+    for b, (joint, com) in enumerate(zip(tree.body_hinge, tree.com)):
+        distance = np.linalg.norm(com)
+        while joint >= 0:
+            if tree.kind[joint] != "slide":
+                from_joints[b][joint] = distance
+            distance = distance + lengths[joint]
+            joint = tree.parent[joint]
+        from_origin[..., b] = distance
+    shape = np.broadcast_shapes(*(np.shape(distance) for row in from_joints for distance in row))
+    columns = [[np.broadcast_to(distance, shape) for distance in row] for row in from_joints]
+    return np.moveaxis(np.array(columns), (0, 1), (-2, -1)), from_origin
 
 
 def gravity_scale(tree: tmt.Tree, q: ArrayLike | None = None) -> float | np.ndarray:
-    """Sum of m g reach, N m or J; with q (..., nq) the reach at these positions of the slides, (...)."""
-    sums = np.linalg.norm(tree.gravity) * (reaches(tree, q) @ np.array(tree.mass))
+    """Sum of m g times the largest distance from the origin, N m or J; with q (..., nq) that of these positions, (...)."""
+    sums = np.linalg.norm(tree.gravity) * (levers(tree, q)[1] @ np.array(tree.mass))
     return float(sums) if q is None else sums
 
 
-def bias_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """Convective + Euler + gravity terms of the bias, each by its absolute value, N m, (states,)."""
+def motion_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+    """Convective and Euler terms of each entry of the bias, by their absolute values, N m or N, (states, nv)."""
     parts, shape = method.bodies(tree, list(q.T), list(qd.T)), q.shape[:1]
     T, B = (gather((zip(*columns) for columns in both), shape) for both in zip(*((b.T, b.B) for b in parts)))
     v_conv, w_conv, omega = (
@@ -50,7 +61,7 @@ def bias_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     moments += np.abs(np.cross(omega, np.einsum("bij,sbj->sbi", inertia, omega)))
     newton = np.einsum("sbci,b,sbc->si", np.abs(T), tree.mass, np.abs(v_conv))
     euler = np.einsum("sbci,sbc->si", np.abs(B), moments)
-    return (newton + euler).max(axis=1) + gravity_scale(tree, q)
+    return newton + euler
 
 
 def mass_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:

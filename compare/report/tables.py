@@ -60,7 +60,7 @@ def records(checks: Sequence[Check]) -> pd.DataFrame:
 
 
 def closest_checks(section: Section, most: int) -> pd.DataFrame:
-    """The checks of a section that do not pass, then those with the largest share of a rounding tolerance, at most `most`, as text."""
+    """At most `most` checks of a section as text: those that do not pass, then the largest shares of a rounding tolerance."""
     checks = section.result.checks
     order = sorted(range(len(checks)), key=lambda k: (checks[k].passed, -(checks[k].over_tolerance or 0.0)))
     kept = [checks[k] for k in sorted(order[:most])]

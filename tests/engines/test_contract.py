@@ -59,7 +59,8 @@ def test_quantities_are_those_of_50_digits(engine, name, engines, rng):
     n, tree = len(case.joints), case.tree
     q, v, tau = rng.uniform(-3.0, 3.0, (3, 5, n))
     truth = [exact(tree, *state) for state in zip(q, v, tau)]
-    force, weight, reach = scale.bias_scale(tree, q, v), scale.gravity_scale(tree), scale.reaches(tree).max()
+    weight, reach = scale.gravity_scale(tree), scale.levers(tree)[1].max()
+    force = scale.motion_scale(tree, q, v).max(axis=1) + weight
     speed = np.abs(v).sum(axis=1)
     with_torque = force + np.abs(tau).max(axis=1) + max(tree.damping) * np.abs(v).max(axis=1)
     kinetic = scale.mass_scale(tree, q) * speed**2

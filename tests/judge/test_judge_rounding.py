@@ -41,22 +41,35 @@ def test_what_a_controller_feeds_back_is_rounded_too():
     fed = 50.0 * np.abs(q) + 4.0 * np.abs(qd)
     assert gain_scale(driven, q, qd) == pytest.approx(fed) and not gain_scale(TURN, q, qd).any()
     _, size, bound = slope_rounding(METHODS["rk4"], driven, q, qd, TORQUE, 0.1)
-    assert size == pytest.approx(np.abs(3.0 - 50.0 * q - 4.0 * qd)[:, 0] / M)
-    assert bound == pytest.approx(64 * EPS * (M * size + 3.0 + fed[:, 0]) / M, rel=1e-9)
+    assert size == pytest.approx(np.abs(3.0 - 50.0 * q - 4.0 * qd) / M)
+    assert bound == pytest.approx(64 * EPS * (M * size + 3.0 + fed) / M, rel=1e-9)
 
 
 def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
-    """Elbow alone, damped: gravity of both links, the centripetal term, torque and damping."""
+    """Elbow alone, damped: gravity of the link that it moves, the centripetal term, torque and damping."""
     tree = ARM.case("elbow", posture=(0.0, 0.0, 30.0), locked=("alpha", "beta"), damping=0.5).tree
     q, qd, tau, dt, M = 0.3, -4.0, 2.0, 0.01, 0.05275
     (h,) = tmt.bias(np.array([q]), np.array([qd]), tree)
     a = (tau - 0.5 * qd - h) / M
-    S = 9.81 * (1.9 * 0.15 + 1.5 * 0.45) + 1.5 * 0.15**2 * abs(np.sin(2 * q)) * qd**2 + tau + 0.5 * 4.0
+    S = 9.81 * 1.5 * (0.15 + 0.45 / 64) + 1.5 * 0.15**2 * abs(np.sin(2 * q)) * qd**2 + tau + 0.5 * 4.0
     rates = dt * (64 * EPS * M * abs(a) + 64 * EPS * S) / M + 8 * EPS * (4.0 + dt * abs(a))
     expected = [8 * EPS * (q + dt * 4.0) + dt * rates, rates]
     at = tree, np.array([[q]]), np.array([[qd]]), np.array([tau]), dt
     assert step_rounding(METHODS["explicit_euler"], *at)[0] == pytest.approx(expected, rel=1e-9)
     assert 0.85 < step_rounding(EULER, *at)[0, 1] / rates < 1.0  # the same with Mbar + dt D in Mbar's place
+
+
+def test_a_bound_is_of_one_joint_in_its_unit():
+    """A heavy free body with a light link: |A^-1| mixes kg with kg m2; the body's bound knows nothing of the link's."""
+    link = dataclasses.replace(
+        TURN, hinge_names=("rail", "turn"), parent=(-1, 0), offset=((0.0, 0.0, 0.0),) * 2, kind=("slide", "hinge"),
+        axis=((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), damping=(0.0, 0.0), body_names=("cart", "disc"), body_hinge=(0, 1),
+        mass=(50.0, 0.0), com=((0.0, 0.0, 0.0),) * 2, inertia=(TURN.inertia[0], tuple(map(tuple, 1e-12 * np.eye(3)))),
+        armature=(), stiffness=(), rest=(), reference=(),
+    )  # fmt: skip
+    q, qd, tau = np.zeros((1, 2)), np.zeros((1, 2)), np.array([5.0, 0.0])
+    _, size, bound = slope_rounding(METHODS["rk4"], link, q, qd, tau, 0.1)
+    assert np.allclose(size, [[0.1, 0.0]]) and np.allclose(bound, [[64 * EPS * 10.0 / 50.0, 0.0]], rtol=1e-9, atol=1e-30)
 
 
 @pytest.mark.parametrize("every", [1, 64])

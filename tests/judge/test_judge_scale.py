@@ -1,5 +1,7 @@
 """The scales of tolerances: of the stated arm from its numbers written out, of any robot each entry's own, body by body."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -32,48 +34,69 @@ COUNT = (1, 2, 1)  # of hinges and balls on the way to each body, at least 1
 LARGEST = (0.04, 0.002, 0.02)  # moments of inertia
 Q = np.array([[-0.7, 0.4, *np.array([1.0, 2.0, 0.0, 2.0]) / 3.0, 1.0], [0.05, -1.0, 1.0, 0.0, 0.0, 0.0, 0.0]])
 QD = np.array([[0.5, -1.0, 2.0, 0.0, 1.0, -3.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
-LENGTH = np.array([0.3 + 0.75 + 0.2 + 0.4 + 0.2, 0.3 + 0.2 + 0.4 + 0.2])  # of the bob, the farthest
+REACH = np.array([[0.3 + 0.75 + 0.1, 0.3 + 0.75 + 0.2 + 0.4 + 0.2, 0.6 + 0.3], [0.3 + 0.1, 0.3 + 0.2 + 0.4 + 0.2, 0.9]])
+LEVERS = np.array(
+    [[0, 0, 0, 0, 0, 0], [0, 0.4 + 0.2, 0.2, 0.2, 0.2, 0], [0, 0, 0, 0, 0, 0.3]]
+)  # of each body and speed
+MOVES = SLIDES + LEVERS + TURNS * np.max(REACH, axis=0)[:, None] / 64
 OF = entries.Entries(TREE, Q, QD)
 
 
 def summed(of_body) -> np.ndarray:
-    """The sum over states and bodies of what a body's number and L give, each k times."""
-    return np.array([sum(COUNT[b] * of_body(b, s, L) for b in range(3)) for s, L in enumerate(LENGTH)])
+    """The sum over states and bodies of what a body's number gives, each k times."""
+    return np.array([sum(COUNT[b] * of_body(b, s) for b in range(3)) for s in range(2)])
 
 
-def test_lengths_have_what_slides_have_moved():
-    assert np.allclose(scale.reaches(TREE, Q)[0], [0.3 + 0.75 + 0.1, LENGTH[0], 0.6 + 0.3], rtol=1e-14)
-    assert np.allclose(scale.reaches(TREE), [0.4, LENGTH[1], 0.9], rtol=1e-14)
-    assert scale.gravity_scale(TREE, Q)[0] == pytest.approx(5.0 * np.dot(TREE.mass, [1.15, LENGTH[0], 0.9]), rel=1e-14)
-    assert np.allclose(OF.length, LENGTH, rtol=1e-14)
+def moving_of(b, s):
+    """S, V and w of a body at a state."""
+    rates = np.abs(QD[s])
+    return rates @ TURNS[b], rates @ SLIDES[b], rates @ MOVES[b]
+
+
+def test_lengths_are_from_the_joint_and_have_what_slides_have_moved():
+    from_joints, from_origin = scale.levers(TREE, Q)
+    assert np.allclose(from_origin, REACH, rtol=1e-14) and np.allclose(scale.levers(TREE)[1], REACH[1], rtol=1e-14)
+    assert np.allclose(from_joints, LEVERS[:, [0, 1, 2, 5]], rtol=1e-14)
+    turned = dataclasses.replace(
+        TREE, kind=("hinge", "slide", "ball", "hinge")
+    )  # a slide after a hinge lengthens its lever
+    assert scale.levers(turned, Q)[0][:, 1, 0] == pytest.approx(
+        [0.4 + 0.2 + 0.2 + 0.4, 0.4 + 0.2 + 0.2 + 1.0], rel=1e-14
+    )
+    assert scale.gravity_scale(TREE, Q) == pytest.approx(5.0 * REACH @ TREE.mass, rel=1e-14)
     for b, T in enumerate(np.broadcast_to(OF.T, (2, 3, 3, 6))[0]):
-        assert np.allclose(T[1], COUNT[b] * (SLIDES[b] + LENGTH[0] * TURNS[b]))
-        spin, slip = np.abs(QD) @ TURNS[b], np.abs(QD) @ SLIDES[b]
-        assert np.allclose(OF.v_conv[:, b, 0], COUNT[b] * 2.0 * spin * (LENGTH * spin + slip))
-        assert np.allclose(OF.w_conv[:, b, 0], COUNT[b] * spin**2)
-        assert np.allclose(OF.B[0, b], COUNT[b]) and np.allclose(OF.positions[:, b, 0], COUNT[b] * LENGTH)
+        assert np.allclose(T[1], COUNT[b] * MOVES[b])
+        for s in range(2):
+            S, _, w = moving_of(b, s)
+            assert np.allclose(OF.v_conv[s, b, 0], COUNT[b] * 2.0 * S * w)
+            assert np.allclose(OF.w_conv[s, b, 0], COUNT[b] * S**2)
+        assert np.allclose(OF.B[0, b], COUNT[b]) and np.allclose(OF.positions[:, b, 0], COUNT[b] * REACH[:, b])
+
+
+def test_a_base_elsewhere_adds_the_rounding_of_positions_and_nothing_else():
+    """A door of 0.3 m that hangs 10 m farther away: 64 eps of its lever, and eps of its distance."""
+    moved = dataclasses.replace(TREE, offset=(*TREE.offset[:3], (0.0, -10.6, 0.0)))
+    before, after = (entries.Entries(tree, Q, QD).mass_matrix[0, 5, 5] for tree in (TREE, moved))
+    assert [before, after] == pytest.approx(0.02 + 1.5 * (0.3 + np.array([0.9, 10.9]) / 64) ** 2, rel=1e-13)
+    assert after < 2.2 * before
 
 
 def test_the_mass_matrix_sums_every_term_where_it_is_largest():
-    expected = summed(
-        lambda b, s, L: (
-            TREE.mass[b] * np.outer(SLIDES[b] + L * TURNS[b], SLIDES[b] + L * TURNS[b])
-            + LARGEST[b] * np.outer(TURNS[b], TURNS[b])
-        )
-    ) + np.diag(TREE.armature)
-    assert np.allclose(OF.mass_matrix, expected, rtol=1e-13)
+    def of_body(b, s):
+        return TREE.mass[b] * np.outer(MOVES[b], MOVES[b]) + LARGEST[b] * np.outer(TURNS[b], TURNS[b])
+
+    assert np.allclose(OF.mass_matrix, summed(of_body)[:1] + np.diag(TREE.armature), rtol=1e-13)
 
 
 def test_forces_sum_weight_springs_and_what_moves():
-    weight = summed(lambda b, s, L: 5.0 * TREE.mass[b] * (SLIDES[b] + L * TURNS[b]))
-    assert np.allclose(OF.weight, weight, rtol=1e-14)
+    weight = summed(lambda b, s: 5.0 * TREE.mass[b] * MOVES[b])
+    assert np.allclose(OF.weight, weight[:1], rtol=1e-14)
     springs = np.array([[20.0 * 0.8, 5.0 * 0.7, 2 * np.pi, 2 * np.pi, 2 * np.pi, 0.0]])
     assert np.allclose(OF.springs[0], springs[0], rtol=1e-14)
 
-    def moving(b, s, L):
-        S, V = np.abs(QD[s]) @ TURNS[b], np.abs(QD[s]) @ SLIDES[b]
-        newton = 2 * TREE.mass[b] * S * (L * S + V)
-        return newton * (SLIDES[b] + L * TURNS[b]) + (TREE.mass[b] * V**2 + LARGEST[b] * S**2) * TURNS[b]
+    def moving(b, s):
+        S, V, w = moving_of(b, s)
+        return 2 * TREE.mass[b] * S * w * MOVES[b] + (TREE.mass[b] * V**2 + LARGEST[b] * S**2) * TURNS[b]
 
     assert np.allclose(OF.bias, summed(moving) + weight, rtol=1e-13)
     tau, drag = np.full(6, 3.0), np.array(TREE.damping) * np.abs(QD)
@@ -81,7 +104,7 @@ def test_forces_sum_weight_springs_and_what_moves():
 
 
 def test_energies_have_the_springs():
-    g = 5.0 * np.dot(COUNT, TREE.mass) * LENGTH[0]
+    g = 5.0 * np.dot(np.multiply(COUNT, TREE.mass), REACH[0])
     springs = 20.0 * 0.8**2 / 2 + 5.0 * 0.7**2 / 2 + 3 * 2.0 * np.pi**2 / 2
     assert OF.potential_energy[0] == pytest.approx(g + springs, rel=1e-14)
     speeds = np.abs(QD[0])
@@ -101,9 +124,9 @@ def test_errors_go_through_the_inverse_entry_by_entry():
 ANGLES, RATES = np.random.default_rng(3).uniform(-4, 4, (2, 20, 3))
 
 
-def test_the_scale_of_the_bias_is_the_sum_of_its_absolute_terms():
+def test_what_moves_is_the_sum_of_its_absolute_terms():
     """State by state and body by body, without the sums of the code under test."""
-    for q, qd, size in zip(ANGLES, RATES, scale.bias_scale(tmt.ARM, ANGLES, RATES)):
+    for q, qd, sizes in zip(ANGLES, RATES, scale.motion_scale(tmt.ARM, ANGLES, RATES)):
         T, B = tmt.jacobians(q)
         v, w = tmt.convective_terms(q, qd)
         terms = np.zeros(3)
@@ -111,7 +134,7 @@ def test_the_scale_of_the_bias_is_the_sum_of_its_absolute_terms():
             inertia, omega = np.array(tmt.ARM.inertia[b]), B[b] @ qd
             moment = np.abs(inertia @ w[b]) + np.abs(np.cross(omega, inertia @ omega))
             terms += np.abs(T[b]).T @ (tmt.ARM.mass[b] * np.abs(v[b])) + np.abs(B[b]).T @ moment
-        assert size == pytest.approx(terms.max() + 9.4176, rel=1e-12)
+        assert sizes == pytest.approx(terms, rel=1e-12)
 
 
 def test_the_scales_of_mass_and_acceleration():

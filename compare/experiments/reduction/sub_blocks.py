@@ -94,7 +94,7 @@ def sub_block_differences(
     blocks = {"Mbar": np.ix_(range(len(q)), free, free), "bias": np.ix_(range(len(q)), free)}
     of_scale = {"Mbar": scale.mass_matrix, "bias": scale.bias}
     for quantity, block in blocks.items():
-        scale = of_scale[quantity][block] if np.ndim(of_scale[quantity]) > 1 else of_scale[quantity]
+        scale = of_scale[quantity][block]
         values = {}
         for name in ("tmt", "mujoco"):
             if quantity == "Mbar":

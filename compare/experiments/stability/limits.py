@@ -130,7 +130,7 @@ def is_shown(at: Held, tolerance: float, duration: float = np.inf, rate: float =
     """
     modes = at.modes[0][~at.without_stiffness]
     slow = np.isclose(np.abs(modes), rate)[~is_seen(modes, at.small, duration)].any()
-    pushed = slope_rounding(METHODS["rk4"], at.tree, at.q[None], np.zeros((1, at.nv)), at.tau, 1.0)[2][0] / FACTOR
+    pushed = slope_rounding(METHODS["rk4"], at.tree, at.q[None], np.zeros((1, at.nv)), at.tau, 1.0)[2].max() / FACTOR
     lost = pushed > GROWTH_MARGIN * LINEAR_DEVIATION * np.abs(modes).min(initial=np.inf) ** 2
     return not (tolerance > MOST_TOLERANCE or slow or lost)
 

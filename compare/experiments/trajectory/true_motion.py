@@ -83,17 +83,19 @@ def find_departures(result: Result, robot: Robot, engines: Mapping[str, Engine])
 def departures(case: Case, engines: Mapping[str, Engine], left: Mapping, farthest: Mapping) -> dict:
     """The initial acceleration of each engine under the torque that should hold, and what rounding can cause, rad/s2.
 
+    Both of the joint whose acceleration is the largest share of what rounding can cause in it.
+
     left: of each engine the time when it left, s, None: it stays; farthest: its largest movement, rad or m.
     """
     dt, ((name, ours), (other, theirs)) = case.duration / case.steps, compared(engines, case).items()
-    allowed = float(slope_rounding(METHODS["rk4"], case.tree, case.q[None], case.v[None], case.tau, dt)[2][0])
+    allowed = slope_rounding(METHODS["rk4"], case.tree, case.q[None], case.v[None], case.tau, dt)[2][0]
     initial = {
         name: ours.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
         other: theirs.acceleration(*case.start, case.tau),
     }
-    each = []
+    each, joint = [], int(np.argmax(np.max(np.abs([*initial.values()]), axis=0) / allowed))
     for engine, acceleration in initial.items():
-        push = number_or_none(np.abs(acceleration).max())
+        push = number_or_none(np.abs(acceleration[joint]))
         about = {"label": LABELS[engine], "left": left[engine], "farthest": farthest[engine], "push": push}
-        each.append(about | {"holds": push is not None and push <= allowed})
-    return {"allowed": allowed, "engines": each}
+        each.append(about | {"holds": push is not None and push <= allowed[joint]})
+    return {"allowed": float(allowed[joint]), "engines": each}

@@ -150,5 +150,7 @@ def test_a_torque_that_does_not_hold_is_not_rounding(engines):
     )
     pushes = [[engine["push"] for engine in of["engines"]] for of in (earth, moon)]
     assert max(pushes[0]) <= earth["allowed"] < 1e-11
-    assert pushes[1] == [pushes[0][0], pytest.approx(38, rel=0.02)]
+    q, left_over = HELD.q, 1.0 - 1.62 / 9.81
+    falls = np.abs(np.linalg.solve(tmt.mass_matrix(q), left_over * tmt.gravity_balance(q)))
+    assert pushes[1][0] <= moon["allowed"] and np.isclose(pushes[1][1], falls, rtol=1e-9).any()
     assert [[engine["holds"] for engine in of["engines"]] for of in (earth, moon)] == [[True, True], [True, False]]
