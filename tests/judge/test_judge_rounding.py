@@ -60,7 +60,7 @@ def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
 
 
 def test_a_bound_is_of_one_joint_in_its_unit():
-    """A heavy free body with a light link: |A^-1| mixes kg with kg m2; the body's bound knows nothing of the link's."""
+    """A heavy cart with a light disc: the cart's bound in m/s2 knows nothing of the disc's in rad/s2."""
     link = dataclasses.replace(
         TURN, hinge_names=("rail", "turn"), parent=(-1, 0), offset=((0.0, 0.0, 0.0),) * 2, kind=("slide", "hinge"),
         axis=((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), damping=(0.0, 0.0), body_names=("cart", "disc"), body_hinge=(0, 1),
@@ -69,7 +69,8 @@ def test_a_bound_is_of_one_joint_in_its_unit():
     )  # fmt: skip
     q, qd, tau = np.zeros((1, 2)), np.zeros((1, 2)), np.array([5.0, 0.0])
     _, size, bound = slope_rounding(METHODS["rk4"], link, q, qd, tau, 0.1)
-    assert np.allclose(size, [[0.1, 0.0]]) and np.allclose(bound, [[64 * EPS * 10.0 / 50.0, 0.0]], rtol=1e-9, atol=1e-30)
+    expected = 64 * EPS * np.array([[10.0 / 50.0, np.sqrt(50.0 * 1e-12) * 0.1 / 1e-12]])
+    assert np.allclose(size, [[0.1, 0.0]]) and np.allclose(bound, expected, rtol=1e-9, atol=0.0)
 
 
 @pytest.mark.parametrize("every", [1, 64])
