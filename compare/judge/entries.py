@@ -4,13 +4,15 @@ Entries differ in unit (kg and kg m2, N and N m) and size: one number for all wo
 entry is the sum of the absolute values of the terms that are added in it, each at its maximum. With L_i the largest possible
 distance of the centre of mass of a body from the axis or anchor of joint i at that state:
 
-    a column of T_b     t_i = L_i + R / 64 of a hinge or ball, 1 of a slide, 0 if the joint does not move the body
+    a column of T_b     t_i = L_i + W / 8 + R / 64 of a hinge or ball, 1 of a slide, 0 if the joint does not move the body
     of B_b              u_i = 1 of a hinge or ball, 0 of a slide
-    speeds              S = sum of |rates| that turn the body, V of those that slide it, w = V + sum of L_i |rates|
+    speeds              S = sum of |rates| that turn the body, V of those that slide it, w = V + sum of t_i |rates|
     Mbar_ij             sum of m t_i t_j + |I| u_i u_j, and the armature
     h_i                 sum of t_i m (2 S w + g) + u_i (m V^2 + |I| S^2)
 
-R is the largest distance of the body from the world's origin: its position is rounded by eps R, and so is each of its levers.
+W is the largest of all L_i: MuJoCo adds moments about the centre of mass of the whole tree, where terms of up to m W^2 leave
+m L_i^2, and each is rounded by eps: 64 eps (W / 8)^2. R is the largest distance of the body from the world's origin: its
+position, and so each of its levers, is rounded by eps R.
 Every term of a body is multiplied by k, the number of hinges and balls that turn it, at least 1: each turn passes on the
 rounding of those before it and adds its own. Where a system is solved, errors of eps in Mbar and in the forces are multiplied by
 |Mbar^-1|, entry by entry: a condition number would depend on the units.
@@ -48,7 +50,8 @@ class Entries:
         moved, turns = np.array([per_speed(tree, joints) for joints in by_joint]), np.array(per_speed(tree, turns))
         self.slides, self.turns = moved & ~turns, moved & turns  # (m, nv)
         of_speeds = per_speed(tree, range(len(tree.kind)))
-        arms = from_joints[..., of_speeds] + self.reach.max(axis=0, initial=0.0)[:, None] / FACTOR
+        arms = from_joints[..., of_speeds] + from_joints.max(initial=0.0) / 8
+        arms = arms + self.reach.max(axis=0, initial=0.0)[:, None] / FACTOR
         self.t = (self.slides + self.turns * arms).reshape(-1, *moved.shape)  # (1 or states, m, nv)
         self.mass = self.count * np.array(tree.mass)
         self.inertia = self.count * np.linalg.norm(tree.inertia, 2, axis=(1, 2))

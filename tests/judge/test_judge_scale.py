@@ -38,7 +38,7 @@ REACH = np.array([[0.3 + 0.75 + 0.1, 0.3 + 0.75 + 0.2 + 0.4 + 0.2, 0.6 + 0.3], [
 LEVERS = np.array(
     [[0, 0, 0, 0, 0, 0], [0, 0.4 + 0.2, 0.2, 0.2, 0.2, 0], [0, 0, 0, 0, 0, 0.3]]
 )  # of each body and speed
-MOVES = SLIDES + LEVERS + TURNS * np.max(REACH, axis=0)[:, None] / 64
+MOVES = SLIDES + LEVERS + TURNS * (0.6 / 8 + np.max(REACH, axis=0)[:, None] / 64)
 OF = entries.Entries(TREE, Q, QD)
 
 
@@ -77,7 +77,7 @@ def test_a_base_elsewhere_adds_the_rounding_of_positions_and_nothing_else():
     """A door of 0.3 m that hangs 10 m farther away: 64 eps of its lever, and eps of its distance."""
     moved = dataclasses.replace(TREE, offset=(*TREE.offset[:3], (0.0, -10.6, 0.0)))
     before, after = (entries.Entries(tree, Q, QD).mass_matrix[0, 5, 5] for tree in (TREE, moved))
-    assert [before, after] == pytest.approx(0.02 + 1.5 * (0.3 + np.array([0.9, 10.9]) / 64) ** 2, rel=1e-13)
+    assert [before, after] == pytest.approx(0.02 + 1.5 * (0.3 + 0.6 / 8 + np.array([0.9, 10.9]) / 64) ** 2, rel=1e-13)
     assert after < 2.2 * before
 
 
