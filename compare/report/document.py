@@ -18,7 +18,7 @@ from .motion import motion_in_html
 from .questions import answers
 from .tables import TITLES, closest_checks, of_causes, origins, records, shortened, shown
 from .text import block, count, environment, sentence
-from .verdict import Parts, Report, Section, explained, failures, headline, outcome, passed, standing
+from .verdict import Parts, Report, Section, failures, headline, outcome, passed, standing
 
 MOST_LINES = 300  # of report.md
 SIZES = 40, 16, 12, 8, 4, 2, 0  # rows of each table in report.md: the first with which it has so few lines
@@ -128,7 +128,7 @@ class Document:
         """The line of one experiment: what it asks, whether it passes, its headline."""
         good, words = standing(section)
         named = {"name": section.name, "title": section.title, "outcome": words, "headline": headline(section)}
-        if 0 < sum(check.failed for check in section.result.checks) == len(explained(section, self.report.causes)):
+        if 0 < sum(check.failed for check in section.result.checks) == len(section.explained):
             named["headline"] = block("verdict", "consequence")
         return named | {"good": good, "kind": kind(good)}
 
@@ -165,7 +165,7 @@ class Document:
     def section(self, section: Section) -> str:
         """One experiment: what was found, figures, tolerance, and the details."""
         result, (good, _) = section.result, standing(section)
-        consequences = explained(section, self.report.causes)
+        consequences = section.explained
         failed = [check for check in result.checks if check.failed and check not in consequences]
         not_judged = [check for check in result.checks if not check.judged]
         few = MOST_ROWS if self.page else max(1, self.rows // 2)
@@ -178,7 +178,7 @@ class Document:
             title=section.title,
             good=good,
             kind=kind(good),
-            outcome=outcome(section, self.report.causes),
+            outcome=outcome(section),
             headline=headline(section) if result.headline else "",
             claim=section.claim,
             tolerance=section.tolerance,

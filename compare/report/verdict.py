@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeVar
 
-from ..experiments import EXPERIMENTS, Experiment
 from ..judge.check import ENDS, About, Check, Result
 from ..judge.finding import Finding
 from ..process.crash import described
@@ -14,13 +13,6 @@ Value = TypeVar("Value")
 
 SEEKS_CAUSES = "diagnosis"  # it compares nothing of its own: it says why others fail
 STATES_CAUSES = "parameters", SEEKS_CAUSES  # experiments whose failing checks are the causes
-GEOMETRY = "order", "parent", "ref", "axis", "anchor", "com"
-# the numbers on which all quantities of an experiment depend; experiments that are not here depend on all numbers
-DEPENDS_ON = {
-    "kinematics": GEOMETRY,
-    "mass": (*GEOMETRY, "mass", "inertia", "armature"),
-    "gravity": (*GEOMETRY, "mass", "gravity", "flag gravity"),
-}
 
 
 @dataclass
@@ -31,6 +23,7 @@ class Section:
     tolerance: str
     result: Result
     figures: list = field(default_factory=list)  # (file name, caption)
+    explained: list = field(default_factory=list)  # failing checks that are gone when the causes are mended
 
     @property
     def notes(self) -> list[str]:
@@ -82,27 +75,6 @@ def failures(sections: Sequence[Section]) -> Failures:
     return Failures(*failed, [check for check in checks if not check.judged])
 
 
-def explained(section: Section, causes: Sequence[dict]) -> list[Check]:
-    """The failing checks that a known cause explains, in and after the experiment that shows it.
-
-    They are comparisons of the models, and predictions, which are computed for the stated numbers. A cause explains an experiment
-    if it is one option, convention or number (rank 1 or 2) on which the experiment depends. It explains nothing that broke off,
-    and no unstable step.
-    """
-    order = EXPERIMENTS.get(section.name, Experiment(0)).order
-    for cause in causes if section.name not in STATES_CAUSES else ():
-        is_earlier = EXPERIMENTS.get(cause.get("experiment"), Experiment(0)).order <= order
-        if cause.get("rank", 3) <= 2 and is_earlier and depends_on(section.name, cause.get("quantity")):
-            failed = failures([section])
-            return failed.differing + failed.unconfirmed
-    return []
-
-
-def depends_on(experiment: str, quantity: str | None) -> bool:
-    """Whether a cause acts on an experiment; quantity None: the diagnosis found it in Mbar, h or the accelerations."""
-    return quantity in DEPENDS_ON.get(experiment, (quantity,)) if quantity else experiment != "kinematics"
-
-
 def passed(sections: Sequence[Section]) -> bool:
     """Whether something was compared, no check fails, and all were judged."""
     is_compared = any(check.judged for section in sections for check in section.result.checks)
@@ -127,7 +99,7 @@ def verdict(
     experiments: how many there are in all; compared: what agrees or differs; robot: its name.
     """
     checked = [section for section in sections if section.result.checks]
-    consequences = [check for section in sections for check in explained(section, causes)]
+    consequences = [check for section in sections for check in section.explained]
     also = failures(checked)
     checks = [check for section in checked for check in section.result.checks if check.judged]
     failed = sum(check.failed for check in checks)
@@ -149,17 +121,26 @@ def verdict(
         also=also,
         top=top if top and top.value and not any(also) else None,
         causes=causes,
-        consequences=len(consequences),
+        consequences={
+            "explained": len(consequences),
+            "stating": sum(check.experiment in STATES_CAUSES for check in checks if check.failed),
+            "first": next((check for check in checks if stands(check, consequences)), None),
+        },
         first=also.differing[0] if also.differing else None,
     )
     return "\n".join(filter(None, map(str.strip, lines.split("\n"))))
 
 
-def outcome(section: Section, causes: Sequence[dict] = ()) -> str:
+def stands(check: Check, consequences: Sequence[Check]) -> bool:
+    """Whether a check fails, states no cause, and no cause explains it."""
+    return check.failed and check.experiment not in STATES_CAUSES and check not in consequences
+
+
+def outcome(section: Section) -> str:
     """Whether a section passes, in a sentence."""
     checks = [check for check in section.result.checks if check.judged]
     numbers = {"checks": len(checks), "failed": sum(check.failed for check in checks)}
-    numbers["explained"] = len(explained(section, causes))
+    numbers["explained"] = len(section.explained)
     return say(Finding("verdict", "outcome", {**numbers, "also": failures([section])}))
 
 

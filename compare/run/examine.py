@@ -13,14 +13,17 @@ from ..process.crash import described
 from ..process.workers import Clock, WorkerEnded, Workers, load_modules
 from ..report.terminal import Terminal
 from ..report.text import block, say
-from ..report.verdict import GEOMETRY, STATES_CAUSES, Section, explained, failures
+from ..report.verdict import STATES_CAUSES, Section, failures
 from .drawing import draw, quiet, results_needed
+from .explained import explained
 from .reference import Compared
 
 START, END = "start", "figures"  # tasks of the clock: what comes before the first experiment and after the last
 DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers on which Mbar and h depend, by their names in `parameters`
-IN_EQUATIONS = (*GEOMETRY, "mass", "inertia", "gravity", "armature", "flag gravity")
+IN_EQUATIONS = (
+    "order", "parent", "ref", "axis", "anchor", "com", "mass", "inertia", "gravity", "armature", "flag gravity",
+)  # fmt: skip
 SHOWN = 5  # lines on the terminal about an experiment that fails
 
 
@@ -69,6 +72,8 @@ def examine(
                 add_problems(sections[-1].result, own.equations.problems, reported)
             new = [{"experiment": name, **cause} for cause in new_causes(setup, sections, causes)]
             causes = new + causes
+            if causes:
+                sections[-1].explained = attempt("explained", partial(explained, section=sections[-1]), setup)[0] or []
         clock.ends(name)
         if section:
             few = setup.is_quick and not setup.alone and not any(failures([section]))
@@ -79,7 +84,7 @@ def examine(
                     waiting.append((section, drawing))
                 else:
                     drawings.append((section, workers.submit(*drawing)))
-        say_outcome(terminal, sections[-1], clock.seconds_of(name), new, causes)
+        say_outcome(terminal, sections[-1], clock.seconds_of(name), new, bool(causes))
     with clock.of(END):
         setup.progress("figures")
         drawings += [(section, workers.submit(*drawing)) for section, drawing in waiting]
@@ -182,12 +187,12 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
     result.check("", quantity, None, 0.0, "", described(error), rule="equal", about=About.PROGRAM)
 
 
-def say_outcome(terminal: Terminal, section: Section, seconds: float, new: Sequence, causes: Sequence = ()) -> None:
+def say_outcome(terminal: Terminal, section: Section, seconds: float, new: Sequence, known: bool = False) -> None:
     """One line for an experiment, then its answer, the causes that are new, and the first failing checks that no cause explains.
 
-    seconds: of the processor, for the experiment itself; causes: all that are known.
+    seconds: of the processor, for the experiment itself; known: whether there are causes, new ones or others.
     """
-    checks, of_cause = section.result.checks, explained(section, causes)
+    checks, of_cause = section.result.checks, section.explained
     failed, open_checks = [check for check in checks if check.failed], [check for check in checks if not check.judged]
     used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
     most = f"{len(of_cause)} explained by the cause" if of_cause else ""
@@ -203,7 +208,7 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, new: Seque
     for text in section.result.top:
         terminal.say(f"  {say(text)}")
     lines = [f"  CAUSE {cause['text']}" for cause in new]
-    if not (causes and section.name in STATES_CAUSES):  # there the causes are the checks
+    if not (known and section.name in STATES_CAUSES):  # there the causes are the checks
         lines += [f"  FAIL {check}" for check in failed if check not in of_cause]
     lines += [f"  {check}" for check in open_checks]
     lines[SHOWN:] = [f"  and {len(lines) - SHOWN} more: in the report"] * (len(lines) > SHOWN)

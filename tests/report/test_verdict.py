@@ -17,7 +17,7 @@ from compare.judge.check import About, Result
 from compare.report.questions import answers
 from compare.report.style import BLUE, ORANGE, RED
 from compare.report.text import say
-from compare.report.verdict import explained, failures, headline, outcome, passed, standing, verdict
+from compare.report.verdict import failures, headline, outcome, passed, standing, verdict
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.run.examine import say_outcome, with_headline
@@ -68,19 +68,17 @@ def cause(rank=2, experiment="parameters", **more):
     return {"rank": rank, "experiment": experiment, "text": "mass of forearm: stated 1"} | more
 
 
-@pytest.mark.parametrize("name, found, count", [
-    ("mass", cause(quantity="mass"), 1), ("mass", cause(), 1), ("mass", cause(3), 0),
-    ("mass", cause(quantity="gravity"), 0), ("kinematics", cause(quantity="mass"), 0), ("kinematics", cause(quantity="com"), 1),
-    ("kinematics", cause(), 0), ("gravity", cause(quantity="inertia"), 0), ("trajectory", cause(quantity="damping"), 1),
-    ("mass", cause(experiment="mass"), 1), ("mass", cause(experiment="gravity"), 0), ("parameters", cause(quantity="mass"), 0),
-    ("diagnosis", cause(quantity="mass"), 0),
-])  # fmt: skip
-def test_a_cause_explains_comparisons_that_depend_on_it_from_its_experiment_on_and_nothing_else(name, found, count):
-    of = section(
-        name, GOOD, BAD, *(("what", 2.0, 1.0, "at most", False, about) for about in About if about != About.MODELS)
-    )
-    assert [check.about for check in explained(of, [found])] == [About.MODELS, About.PREDICTION] * count
-    assert explained(of, []) == [] and len(explained(of, [cause(3), found])) == 2 * count
+def test_the_verdict_counts_what_the_cause_explains_what_states_it_and_what_stands():
+    of = section("mass", GOOD, BAD, ("other", 2.0, 1.0, "at most", False))
+    of.explained = of.result.checks[1:2]
+    stating = section("parameters", ("mass of forearm", 1.0, 0.0, "at most", False))
+    text = verdict([stating, of], 2, [cause()])
+    assert "explains 1 of them, 1 states it; 1 remains without a cause, first: mass: other" in " ".join(text.split())
+    assert outcome(of).startswith("Failed: 2 of 3") and "1 of them explained" in outcome(of)
+    of.explained = of.result.checks[1:]
+    assert "explains 2 of them, 1 states it." in verdict([stating, of], 2, [cause()])
+    of.explained = []
+    assert "explains none of the other 2 failing checks" in verdict([stating, of], 2, [cause()])
 
 
 def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagree():
@@ -127,7 +125,9 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
     assert [line.startswith("  FAIL mass: Mbar, zero: 2 kg m2") for line in said[4:]] == [True] * 4 + [False]
     wrong = ("what", 2.0, 1.0, "at most", False, About.PROGRAM)
     del said[:]
-    say_outcome(said, section("mass", *[BAD] * 7, wrong), 1.0, [], [cause()])
+    of = section("mass", *[BAD] * 7, wrong)
+    of.explained = of.result.checks[:7]
+    say_outcome(said, of, 1.0, [], True)
     assert [line.startswith("  FAIL mass: what") for line in said] == [False, True] and " 7 explained" in said[0]
 
 

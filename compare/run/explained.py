@@ -1,0 +1,107 @@
+"""Which failing checks are gone when the causes are mended; a second, independent error is not hidden behind the first."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+from ..engines.mujoco import engine, read
+from ..engines.own import OwnDynamics
+from ..experiments import module
+from ..experiments.setup import Setup, engines
+from ..judge.check import Check, Result
+from ..judge.entries import Entries
+from ..judge.scale import EPS, FACTOR
+from ..report.verdict import STATES_CAUSES, Section, failures
+
+AT_STATES = ("kinematics", "mass", "gravity", "acceleration")  # what compares models directly, with little work
+NODES = 24  # of the integral of a force at rest, which is smooth
+
+
+def explained(setup: Setup, section: Section) -> list[Check]:
+    """The failing checks of a section that are gone when the causes are mended: comparisons of the models, and predictions.
+
+    A user's own M and h are explained where the diagnosis reproduces them; what else is the user's must then follow from M and h.
+    Of a file, `parameters` lists all numbers that differ: it is compared once more with tmt's equations for its own numbers.
+    Nothing explains a part that broke off, an unstable step, or a value of a user's own that is no number.
+    """
+    failed = failures([section])
+    checks = failed.differing + failed.unconfirmed
+    if section.name in STATES_CAUSES or not checks:
+        return []
+    if setup.robot.own:
+        follows = what_follows(setup)
+        return [check for check in checks if check.value is not None and follows[kind_of(check)]]
+    mended = of_own_numbers(setup)
+    if mended is None:
+        return []
+    if section.name in (*AT_STATES, "trajectory"):
+        still = {(check.scene, check.quantity) for check in compared_again(mended, section.name).checks if check.failed}
+        return [check for check in checks if (check.scene, check.quantity) not in still]
+    if any(check.failed for name in AT_STATES for check in compared_again(mended, name).checks):
+        return []
+    # the printed numbers are those of the stated robot, which tmt has
+    return [check for check in checks if not check.quantity.startswith(("TMT", "exact"))]
+
+
+def of_own_numbers(setup: Setup) -> Setup | None:
+    """The same with the file's own numbers in tmt's equations, without the forces that these do not have; None: not possible."""
+    reading = setup.reading or read(Path(setup.robot.mjcf))
+    stated, tree = setup.robot.tree, reading.tree
+    if (tree.hinge_names, tree.kind, tree.parent) != (stated.hinge_names, stated.kind, stated.parent):
+        return None
+    robot = dataclasses.replace(setup.robot, tree=tree)
+    return dataclasses.replace(setup, robot=robot, engines=engines(engine(reading)), reading=reading, background={})
+
+
+def compared_again(mended: Setup, name: str) -> Result:
+    """The result of an experiment, computed once."""
+    if name not in mended.background:
+        mended.background[name] = module(name).rows(mended)
+    return mended.background[name]
+
+
+def kind_of(check: Check) -> str:
+    """What a check of a user's own equations depends on: their geometry, M and h, or what is computed from these."""
+    if check.experiment == "kinematics":
+        return "geometry"
+    if check.quantity.startswith(("energy", "potential energy")):
+        return "energy"
+    if check.experiment in ("mass", "gravity") or check.quantity.startswith("bias"):
+        return check.experiment if check.experiment == "gravity" else "equations"
+    return "motion"
+
+
+def what_follows(setup: Setup) -> dict[str, bool]:
+    """What of a user's own equations is explained by the causes of M and h, by the kinds of `kind_of`.
+
+    Accelerations follow where the diagnosis finds no other force in them, or explains it; own gravity and energy where they are
+    those of the own M and h, at some random states.
+    """
+    found, own = module("diagnosis").diagnosed(setup), setup.engines["own"]
+    equations = found.ratio <= 1.0 or bool(found.diagnosis.causes)
+    motion = equations and (found.force_ratio <= 1.0 or bool(found.of_forces))
+    follows = {"geometry": False, "equations": equations, "motion": motion, "gravity": equations, "energy": equations}
+    sample, given = setup.random.first(found.states), own.of(setup.robot.case())
+    scale = Entries(setup.robot.tree, sample.q, sample.qd)
+    at_rest = np.zeros_like(sample.qd)
+    if equations and given.has("gravity"):
+        off = np.abs(given.gravity_balance(sample.q) - given.bias(sample.q, at_rest))
+        follows["gravity"] = bool((off <= FACTOR * EPS * scale.weight).all())
+    if equations and given.has("energy"):
+        kinetic = given.energy(sample.q, sample.qd) - given.energy(sample.q, at_rest)
+        kinetic = kinetic - np.einsum("si,sij,sj->s", sample.qd, given.mass_matrix(sample.q), sample.qd) / 2.0
+        off = np.maximum(np.abs(kinetic), np.abs(lifted_less_work(given, sample.q)))
+        follows["energy"] = bool((off <= 2.0 * FACTOR * EPS * scale.energy).all())
+    return follows
+
+
+def lifted_less_work(given: OwnDynamics, q: np.ndarray) -> np.ndarray:
+    """Energy at rest above that at q = 0 minus the integral of the bias at rest along a line, J, (states,); NaN for balls."""
+    if given.coordinates.has_balls:
+        return np.full(len(q), np.nan)
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    rest, work = np.zeros_like(q), 0.0
+    for node, weight in zip((1.0 + nodes) / 2.0, weights / 2.0):
+        work = work + weight * np.einsum("si,si->s", given.bias(node * q, rest), q)
+    return given.energy(q, rest) - given.energy(0.0 * q, rest) - work
