@@ -15,6 +15,8 @@ from ..engines.tmt import Compiled
 from ..judge.check import Result
 from ..judge.entries import Entries, unit
 from ..judge.finding import Finding
+from ..judge.scale import EPS, FACTOR
+from ..report.text import say
 from ..robots import Robot
 from ..robots.states import Sample
 from .setup import Setup
@@ -83,8 +85,21 @@ class Comparison:
             named = units[0] if len(units) == 1 else unit(self.robot.tree, *units)
             exact = self.sample.exact(quantity.function, quantity.part)
             result.agree(self.sample, name, named, ours, theirs, size, exact)
+            if name == "qdd":
+                self.check_wide(result, np.fmax(np.abs(ours), np.abs(theirs)), FACTOR * EPS * size)
             for values in compiled:
                 result.agree(self.sample, f"{name}, compiled", named, values, theirs, size)
+
+    def check_wide(self, result: Result, sizes: np.ndarray, tolerance: np.ndarray) -> None:
+        """Accelerations of a joint, (states, nv), are not judged if rounding can be more than the largest of them."""
+        largest, least = np.nanmax(sizes, axis=0), tolerance.min(axis=0)
+        for joint in np.flatnonzero((least >= largest) & (largest > 0.0)):
+            values = {
+                "joint": self.robot.coordinates.speeds[joint],
+                "tolerance": least[joint],
+                "largest": largest[joint],
+            }
+            result.not_judged(self.sample.name, "qdd", say(Finding("shared", "wide", values)))
 
 
 def compared(setup: Setup, experiment: str, *names: str) -> tuple[Result, list[Comparison]]:

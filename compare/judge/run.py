@@ -13,6 +13,9 @@ from .scale import EPS, FACTOR, gravity_scale
 LEFT = 0.1  # rad or m: the distance at which a held model has left its posture
 MOVES = 0.1  # rad or m: the least movement of a run without a holding torque that tests anything
 ORDER_MARGIN = 0.15  # of a measured order
+LEAST_JUDGED = 0.1  # of a scene that states no minimum: the share of its time for which its runs must be judged
+RESTS = 1e-9  # rad or m, and per s: what moves less only rounds
+STILL = 1e-3  # of the largest movement of its unit: a joint that moves less is not what a run tests
 COARSE_STEP, STABLE_TIME = 0.01, 0.3  # s: from this step on, methods other than RK4 may be unstable after this time
 
 
@@ -22,9 +25,28 @@ def step_in_words(case: Case, steps: int) -> str:
 
 
 def required_time(case: Case, scheme: str, dt: float) -> float:
-    """The shortest time, s, over which a run of a case by a scheme must be judged."""
+    """The shortest time, s, over which a run of a case by a scheme must be judged; 0: the scene states none."""
     judged = case.duration if case.scene.judged is None else case.scene.judged
     return judged if scheme == "rk4" or dt < COARSE_STEP else min(judged, STABLE_TIME)
+
+
+def widest_judged(case: Case, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """The width of the band from which on it judges a movement or a speed no more, (2 nv,) rad or m, then per s.
+
+    NARROW for movements; and never more than what itself moves in the run q (times, nq), v (times, nv). Where a robot is held,
+    nothing has to move. A joint that hardly moves beside others of its unit has the widths of the joint that moves most.
+    """
+    nv, scene = case.coordinates.nv, case.scene
+    if scene.torque in ("hold", "servos") and not np.any(scene.speed) and not np.any(scene.targets):
+        return np.concatenate([np.full(nv, NARROW), np.full(nv, np.inf)])
+    limits, units = [], np.array(case.coordinates.units)
+    for sizes, most in ((moved_from(q, q[0], case.coordinates), NARROW), (np.abs(v), np.inf)):
+        largest = np.nanmax(sizes, axis=0)
+        of_unit = np.array([largest[units == unit].max() for unit in units])
+        widest = np.where(largest >= STILL * of_unit, largest, of_unit)
+        moves = of_unit > RESTS if largest.max() > RESTS else np.ones(nv, bool)  # else another unit is what moves
+        limits.append(np.where(moves, np.minimum(widest, most), most))
+    return np.concatenate(limits)
 
 
 def movement_unit(coordinates: Coordinates) -> str:

@@ -1,11 +1,13 @@
 """Each quantity is compared with what the other engine and the compiled code say of it: one that is off fails its own checks."""
 
+import numpy as np
 import pytest
 from edited import setup_of
 
 import tmt
 from compare.experiments import acceleration, gravity, kinematics, mass
-from compare.experiments.quantities import QUANTITIES
+from compare.experiments.quantities import QUANTITIES, Comparison
+from compare.judge.check import Result
 from compare.run.examine import Setup
 from tmt import literal
 
@@ -66,6 +68,16 @@ def failing(experiment, mujoco) -> set:
 def test_a_quantity_of_mujoco_that_is_off_fails_its_own_checks(mujoco, experiment, quantity, which, expected):
     compiled = {f"{name}, compiled" for name in expected & QUANTITIES.keys()}
     assert failing(experiment, Off(mujoco, quantity, **which)) == expected | compiled
+
+
+def test_a_joint_whose_accelerations_are_all_smaller_than_their_tolerance_is_not_judged(setup):
+    comparison, result = Comparison(setup, setup.named), Result("acceleration")
+    sizes, tolerance = np.array([[3.0, 1.0, 0.0], [2.0, np.nan, 0.0]]), np.array([[4.0, 0.999, 1.0], [2.999, 2.0, 1.0]])
+    comparison.check_wide(result, sizes, tolerance)
+    assert result.checks == []
+    comparison.check_wide(result, sizes, tolerance + 0.001)
+    assert [check.judged for check in result.checks] == [False, False]
+    assert ["alpha" in check.note for check in result.checks] == [True, False]
 
 
 def test_accelerations_of_tmt_that_are_off_fail_their_own_checks(mujoco, monkeypatch):

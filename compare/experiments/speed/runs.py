@@ -94,7 +94,7 @@ def row_of_run(
     return {
         "scene": case.name, "engine": method.engine, "method": method.name,
         "dt_s": setting.duration / setting.steps if setting.steps else None, "tolerance": setting.tolerance,
-        "steps": motion.steps, "evaluations": motion.evaluations, "seconds": seconds,
+        "steps": motion.steps, "evaluations": motion.evaluations, "seconds": seconds, "timed_steps": motion.steps,
         "error_rad": None if ended else float(error[-1]), "worst_error_rad": None if ended else float(error.max()),
         "energy_error_J": None if ended else float(off), "diverged": ended,
         "early": float(error[reference.t <= accuracy.EARLY].max()), "run": (case, method, setting),
@@ -146,3 +146,4 @@ def take_times(rows: Sequence[dict], runs: Sequence[tuple], setup: Setup) -> Non
     times = timing.in_turns([run for run, _ in runs], rounds=5)
     for row, (_, factor), of_row in zip(rows, runs, times):
         row["seconds"] = factor * min(of_row)
+        row["timed_steps"] = row["steps"] and round(row["steps"] / factor)

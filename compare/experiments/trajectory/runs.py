@@ -12,6 +12,7 @@ from ...engines import LABELS, Dynamics, Engine, Method, compared, methods_in
 from ...judge.check import About, Result, closest
 from ...judge.rounding import NARROW, band, step_rounding
 from ...judge.run import (
+    LEAST_JUDGED,
     check_movement,
     departure,
     deviation_alive,
@@ -19,7 +20,9 @@ from ...judge.run import (
     movement_unit,
     required_time,
     step_in_words,
+    widest_judged,
 )
+from ...report.text import say
 from ...robots.case import Case, Coordinates
 
 STEPS_AT_MOST = 8192  # of a run that is finer than the scene's own
@@ -34,6 +37,7 @@ class TmtSide(NamedTuple):
     q: np.ndarray  # (steps + 1, nq) rad
     v: np.ndarray  # (steps + 1, nv)
     width: np.ndarray  # (recorded, 2 nv): the band of rounding, of movements first
+    widest: np.ndarray  # (2 nv,): the width of the band from which on it judges no more
     ended: float | None  # s: when it diverged
     at: np.ndarray  # (states,) s: recorded times from which a single step is compared
     states: list  # q and v at these times
@@ -90,7 +94,8 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide
     single = slow & (t[::every] < (np.inf if ended is None else ended))
     states = [path[::every][single] for path in (q, v)]
     stepped, tolerance = one_step(dynamics, states, tau, dt, scheme), step_rounding(stepping, tree, *states, tau, dt)
-    return TmtSide(t, q, v, width, ended, t[::every][single], states, stepped, tolerance)
+    widest = widest_judged(case, q, v)
+    return TmtSide(t, q, v, width, widest, ended, t[::every][single], states, stepped, tolerance)
 
 
 def one_step(dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str) -> list:
@@ -109,7 +114,7 @@ def compare_runs(
     for method in methods:
         _, *theirs = dynamics.run(*case.start, tau, dt, steps, method.name)[:3]
         ends = {name: mine.ended, "mujoco": diverged_at(case, t, *theirs)}
-        count = judged(times, width, ends)
+        count = judged(times, mine.width < mine.widest, ends)
         where = f"{case.name}, {method.name}, {step_in_words(case, steps)}"
         until, required = float(times[count - 1]), required_time(case, method.scheme, dt)
         about = {"scene": case.name, "engine_integrator": method.name, "twin": method.scheme, "dt_s": dt}
@@ -127,8 +132,9 @@ def compare_runs(
         for level, ours, other, tolerance, at in levels:
             difference = state_difference(coordinates, ours, other)
             check_level(result, where, about | {"level": level}, coordinates, difference, tolerance, at, ending)
-        if required:  # a scene may not state it
-            result.check(where, "time judged", until, required, "s", rule="at least", about=About.PREDICTION)
+        if len(mine.at) and (mine.step_tolerance.min(axis=0) >= mine.widest).any():
+            result.not_judged(where, "one step", say(result.finding("wide_step")))
+        check_time_judged(result, where, case, until, required, times[times < ends_first(ends)][-1])
         check_divergence(result, where, ends, dt, steps, width)
         if case.is_free and "own" not in case.scene.tags:
             before = t < ends_first(ends)
@@ -160,10 +166,26 @@ def ends_first(ends: Mapping[str, float | None]) -> float:
     return min((end for end in ends.values() if end is not None), default=np.inf)
 
 
-def judged(times: np.ndarray, width: np.ndarray, ends: Mapping[str, float | None]) -> int:
-    """The number of recorded states that are judged: those before the band is wide or a run has diverged, and the start."""
+def judged(times: np.ndarray, narrow: np.ndarray, ends: Mapping[str, float | None]) -> int:
+    """The number of recorded states that are judged: those before the band is wide or a run has diverged, and the start.
+
+    narrow: whether the band still judges each movement and speed, (recorded, 2 nv).
+    """
     alive = times < ends_first(ends)
-    return max(1, int(np.argmin(np.append((width < NARROW) & alive, False))))
+    return max(1, int(np.argmin(np.append(narrow.all(axis=1) & alive, False))))
+
+
+def check_time_judged(result: Result, where: str, case: Case, until: float, required: float, alive: float) -> None:
+    """A run is judged for the time that its scene states, or for a tenth of it while it is alive; else it is not judged.
+
+    until: when it is no more judged; alive: the last recorded time before one of both runs diverges, s.
+    """
+    least = required or min(LEAST_JUDGED * case.duration, alive)
+    if until < least:
+        reason = say(result.finding("wide", until=until, least=least))
+        result.not_judged(where, "time judged", reason, "s")
+    elif required:
+        result.check(where, "time judged", until, required, "s", rule="at least", about=About.PREDICTION)
 
 
 def check_divergence(

@@ -146,7 +146,7 @@ def test_a_row_gets_the_least_of_its_times(setup, monkeypatch):
 def test_what_is_timed_in_part_counts_as_the_whole(setup, monkeypatch):
     now, case, theirs = [0.0], setup.robot.cases[0], Method("mujoco", "RK4", 4, "rk4")
     monkeypatch.setattr(time, "perf_counter", lambda: now[0])
-    rows = [{"run": (case, method, Setting(5.0, 16384))} for method in (theirs, RK4)]
+    rows = [{"run": (case, method, Setting(5.0, 16384)), "steps": 16384} for method in (theirs, RK4)]
 
     def call():
         now[0] += 0.5
@@ -154,6 +154,7 @@ def test_what_is_timed_in_part_counts_as_the_whole(setup, monkeypatch):
     ready = [(call, longer) for _, longer in runs.prepared(rows, setup)]
     runs.take_times(rows, ready, setup)
     assert [r["seconds"] for r in rows] == pytest.approx([16.0, 0.5])
+    assert [r["timed_steps"] for r in rows] == [512, 16384]
 
 
 def test_nanoseconds_of_a_state():

@@ -1,6 +1,7 @@
 """The rules of runs and of the drift of energy, just inside and just outside; errors and departures."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import tmt
 from compare.engines.mujoco import parse
 from compare.experiments.trajectory import energy, runs, true_motion
 from compare.judge.check import Result
-from compare.judge.run import check_movement, required_time
+from compare.judge.run import check_movement, required_time, widest_judged
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
 from compare.truth.reference import reference
@@ -27,13 +28,49 @@ def verdicts(check, *arguments) -> dict:
     return {check.quantity: check.passed for check in result.checks}
 
 
-def test_a_run_is_judged_while_its_band_is_below_a_thousandth_of_a_radian_and_nothing_has_diverged():
+def test_a_run_is_judged_while_its_band_is_narrow_and_nothing_has_diverged():
     times, never = np.arange(5.0), {"tmt": None, "mujoco": None}
-    narrow, wide = np.full(5, 0.999e-3), np.array([0.0, 0.999e-3, 1.001e-3, 0.0, 0.0])
+    narrow = np.ones((5, 2), bool)
+    wide = narrow & np.array([[True], [True], [False], [True], [True]])
     assert runs.judged(times, narrow, never) == 5
-    assert runs.judged(times, wide, never) == 2
+    assert runs.judged(times, wide, never) == runs.judged(times, narrow & wide[:, :1], never) == 2
     assert runs.judged(times, narrow, {"tmt": 2.5, "mujoco": 4.0}) == 3
-    assert runs.judged(times, wide + 1.0, never) == 1
+    assert runs.judged(times, ~narrow, never) == 1
+
+
+def test_a_band_judges_nothing_that_moves_less():
+    """Of a slide and a ball: at most 1e-3 rad or m, and at most what moves; a joint that hardly moves is not what counts."""
+    nv, free = 4, SimpleNamespace(coordinates=LIFT_AND_HEAD, is_held=False)
+    q, v = np.array([[0.0, 1.0, 0.0, 0.0, 0.0]] * 2), np.zeros((2, nv))
+
+    def widest(scene="free", lift=0.0, turn=0.0, speeds=(0.0,) * 4, targets=0.0):
+        free.scene = SimpleNamespace(torque=scene, speed=(), targets=targets)
+        q[1] = [lift, np.cos(turn / 2), np.sin(turn / 2), 0.0, 0.0]
+        v[1] = speeds
+        return widest_judged(free, q, v)
+
+    assert np.allclose(widest(lift=2e-4, speeds=(3.0, 0, 0, 0)), [2e-4, 1e-3, 1e-3, 1e-3, 3.0, *[np.inf] * 3])
+    assert np.allclose(widest(lift=0.5, turn=1.0, speeds=(3.0, 2.0, 1e-9, 0)), [*[1e-3] * 4, 3.0, 2.0, 2.0, 2.0])
+    assert np.allclose(
+        widest(turn=4e-4, lift=1.0, speeds=(1.0, 2e-2, 1e-3, 0)), [1e-3, *[4e-4] * 3, 1.0, 2e-2, 1e-3, 2e-2]
+    )
+    assert np.allclose(
+        widest(lift=2.0, turn=1e-12, speeds=(1.0, 1e-12, 0, 0)), [*[1e-3] * 4, 1.0, *[np.inf] * 3]
+    )  # rounding
+    assert not widest().any() and not widest("servos", targets=6.0)[:nv].any()  # nothing moves: nothing is judged
+    for rests in ("hold", "servos"):
+        assert np.array_equal(widest(rests), [*[1e-3] * 4, *[np.inf] * 4])
+
+
+@pytest.mark.parametrize("required, until, alive, judged", [
+    (2.0, 2.0, 5.0, True), (2.0, 1.99, 5.0, False), (0.0, 0.5, 5.0, True), (0.0, 0.49, 5.0, False), (0.0, 0.2, 0.2, True),
+    (0.0, 0.0, 0.0, True),
+])  # fmt: skip
+def test_a_run_that_is_judged_too_short_is_not_judged(required, until, alive, judged):
+    result, case = Result("trajectory"), SimpleNamespace(duration=5.0)
+    runs.check_time_judged(result, "x", case, until, required, alive)
+    assert [check.passed for check in result.checks] == [judged] * (required > 0.0 or not judged)
+    assert all(check.judged == judged for check in result.checks)
 
 
 def level(difference, bar):

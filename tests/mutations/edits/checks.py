@@ -22,7 +22,7 @@ CHECKS = (
     ("needs", "check_smaller", '"time judged"'),
     ("reduction", "add_not_lockable", "quantity"),
     ("sub_blocks", "check_blocks", "name"),
-    ("trajectory", "compare_runs", '"time judged"'),
+    ("trajectory", "check_time_judged", '"time judged"'),
     ("trajectory", "check_divergence", 'f"step of divergence, MuJoCo\'s, is {whose}"'),
     ("judge.run", "check_movement", '"movement"'),
     ("trajectory", "check_level", "quantity"),
