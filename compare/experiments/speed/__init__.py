@@ -22,8 +22,8 @@ from .runs import FIRST_STEPS, measured, prepared, rows_of_scene, take_times
 from .settings import followed, left_out, regular_of, scenes_of
 
 EXPERIMENT = Experiment(order=90, serves_own=False, options=("--scenes",), timed=True, overview="times")
-COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "timed_steps", "evaluations", "seconds", "error_rad", "worst_error_rad",
-           "energy_error_J", "diverged", "why_not"]  # fmt: skip
+COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "timed_steps", "evaluations", "seconds", "error_rad",
+           "worst_error_rad", "energy_error_J", "diverged", "why_not"]  # fmt: skip
 
 
 def claim_values(robot: Robot) -> dict:
