@@ -69,20 +69,10 @@ def integrator(tree: Tree, tau: tuple[float, ...], tolerance: float):
     return heyoka.taylor_adaptive([*zip(q, rates), *zip(qd, qdd)], [0.0] * (len(q) + len(qd)), tol=tolerance)
 
 
-@lru_cache(maxsize=8)
-def compiled_accelerations(tree: Tree):
-    """heyoka's compiled function of many states, f(states, outputs=qdd): states (nq + 2 nv, N), of q, qd, tau; qdd (nv, N)."""
-    import heyoka
-
-    q, qd, tau = variables(tree, "q", "qd", "tau")
-    qdd = acceleration(tree, q, qd, tau, composite.mass_matrix_and_bias)
-    return heyoka.cfunc(qdd, vars=[*q, *qd, *tau])
-
-
 def variables(tree: Tree, *names: str) -> list:
     import heyoka
 
     for function, own in ((sin, heyoka.sin), (cos, heyoka.cos), (sqrt, heyoka.sqrt), (arctan, heyoka.atan)):
         function.register(heyoka.expression, own)
-    sizes = {"q": tree.coordinates.nq, "qd": tree.coordinates.nv, "tau": tree.coordinates.nv}
+    sizes = {"q": tree.coordinates.nq, "qd": tree.coordinates.nv}
     return [[heyoka.make_vars(f"{name}{i}") for i in range(sizes[name])] for name in names]

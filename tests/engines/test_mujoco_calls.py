@@ -7,7 +7,7 @@ from models import PATHS
 from trees import random_states
 
 from compare.engines.mujoco import calls, engine, read
-from compare.engines.mujoco.calls import TINY_STEP, BatchedCalls, MinimalCalls
+from compare.engines.mujoco.calls import TINY_STEP, MinimalCalls
 from compare.engines.mujoco.linear import transition
 from compare.robots.arm import ARM
 
@@ -37,19 +37,6 @@ def test_a_loop_repeats_its_calls_at_the_current_state(mujoco, rng):
     assert np.array_equal(minimal.data.qpos, run.q[1]) and np.array_equal(minimal.data.qvel, run.v[1])
     loops["MuJoCo, mj_forward"](1)
     assert np.allclose(minimal.data.qacc, dynamics.acceleration(run.q[1], run.v[1], nothing), rtol=1e-12)
-
-
-@pytest.mark.skipif(BatchedCalls.unavailable() is not None, reason="this MuJoCo has no batches")
-def test_a_batch_has_the_accelerations_of_mj_forward(mujoco, rng):
-    dynamics = mujoco.of(ARM.case())
-    q, v, tau = rng.uniform(-2.0, 2.0, (3, 7, 3))
-    calls, expected = BatchedCalls(dynamics, q, v, tau, threads=2), dynamics.acceleration(q, v, tau)
-    assert np.array_equal(calls.forward(), expected) and np.abs(expected).max() > 1.0
-    calls.batch.bind("qvel")[:] = 0.0
-    assert np.array_equal(calls.forward(), dynamics.acceleration(q, 0.0 * v, tau))
-    for _ in range(3):
-        calls.step()
-    assert np.allclose(calls.batch.bind("time"), 3 * TINY_STEP, rtol=1e-12)
 
 
 # of models with quaternions

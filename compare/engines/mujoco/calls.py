@@ -1,4 +1,4 @@
-"""MuJoCo's own functions for timing: called from a compiled loop, with no Python between two calls, or by mujoco.batch.
+"""MuJoCo's own functions for timing: called from a compiled loop, with no Python between two calls.
 
 The C library that the Python package brings is called by its functions' addresses from a few lines of LLVM's text.
 """
@@ -6,7 +6,6 @@ The C library that the Python package brings is called by its functions' address
 import ctypes
 from collections.abc import Callable
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 
 import mujoco
@@ -97,31 +96,3 @@ done:
 }}
 """
     return Library(text).function("run", None, *[ctypes.c_void_p] * 4, ctypes.c_int64)
-
-
-class BatchedCalls:
-    """N states of a case in one batch, their contact and constraint stages off; q (N, nq), v and tau (N, nv)."""
-
-    def __init__(self, dynamics: MujocoDynamics, q, v, tau, threads: int = 1):
-        from mujoco.batch import Batch
-
-        model = dynamics.own_copy(TINY_STEP, "RK4")[0]
-        model.opt.disableflags |= bit("CONTACT", "CONSTRAINT")
-        self.batch, self.dofs = Batch(model, len(q), threads), dynamics.dofs
-        state = self.batch.bind("qpos"), self.batch.bind("qvel"), self.batch.bind("qfrc_applied")
-        for part, values, places in zip(state, (q, v, tau), (dynamics.qpos, dynamics.dofs, dynamics.dofs)):
-            part[:, places] = values
-        self.qacc = self.batch.bind("qacc")
-
-    @staticmethod
-    def unavailable() -> str | None:
-        return None if find_spec("mujoco.batch") else f"MuJoCo {mujoco.__version__} has no mujoco.batch; it needs 4.0"
-
-    def forward(self) -> np.ndarray:
-        """rad/s2, (N, nv): mj_forward of each state."""
-        self.batch.forward()
-        return self.qacc[:, self.dofs]
-
-    def step(self) -> None:
-        """mj_step of each state, with a step so short that the state stays."""
-        self.batch.step()

@@ -10,7 +10,6 @@ from tmt.compiled import evaluator, runner
 from tmt.compiled.cores import cores
 
 from ...engines import LABELS
-from ...engines.heyoka import Heyoka, compiled_accelerations
 from ...engines.outside import EngineError, Outside
 from ...judge import timing
 from ...robots.case import SEED
@@ -24,8 +23,7 @@ FORWARD, RK4_STEP = "forward_dynamics", "rk4_step"
 NAMES_IN_TMT = {FORWARD: "acceleration", "mass_matrix_and_bias": "mass_matrix_and_bias"}  # of tmt.compiled
 CALLED = "tmt.acceleration, called from Python"
 WAITING, EACH, IN_LANES = "compiled, each waits for the last", "compiled", "compiled, side by side"
-WHOLE, BATCH = "MuJoCo, mj_forward", "MuJoCo, batch"
-HEYOKA = "heyoka, compiled function"
+WHOLE = "MuJoCo, mj_forward"
 COLUMNS = ["quantity", "implementation", "states", "threads", "ns_per_state", "operations", "operations_per_ns",
            "why_not"]  # fmt: skip
 
@@ -53,8 +51,6 @@ def compiled_evaluations(setup: Setup) -> Evaluations:
     else:
         minimal = MinimalCalls(setup.engines["mujoco"].of(setup.robot.case()))
         made.loops.update({(quantity, name, 1, 1): loop for name, (quantity, loop) in minimal.loops(*first).items()})
-    if not setup.is_quick:
-        add_peers(made, setup, few)
     for loop in made.loops.values():
         loop(1)  # its code is compiled, or loaded, on the first call
     for (_, _, count, _), call in made.of_many.items():
@@ -99,26 +95,6 @@ def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray]) -> dict[tuple, 
     paths = [np.stack([part, part], axis=1) for part in (q, qd)]
     calls[RK4_STEP, IN_LANES, count, cores()] = lambda: run(*paths, tau, 1e-3)
     return calls
-
-
-def add_peers(made: Evaluations, setup: Setup, states: list[np.ndarray]) -> None:
-    """Other engines where they are installed: heyoka's function, MuJoCo's batches."""
-    from ...engines.mujoco.calls import BatchedCalls  # here, since importing MuJoCo takes long
-
-    tree, heyoka = setup.robot.tree, Heyoka()
-    reasons = {
-        HEYOKA: heyoka.unavailable() or heyoka.too_long(tree),
-        BATCH: BatchedCalls.unavailable(),
-    }
-    made.absent.update({(FORWARD, name): reason for name, reason in reasons.items() if reason})
-    if not reasons[HEYOKA]:
-        function, inputs = compiled_accelerations(tree), np.ascontiguousarray(np.concatenate(states, axis=1).T)
-        out = np.empty(states[1].T.shape)
-        made.of_many[FORWARD, HEYOKA, FEW, 1] = lambda: function(inputs, outputs=out)
-    if not reasons[BATCH]:
-        calls = BatchedCalls(setup.engines["mujoco"].of(setup.robot.case()), *states)
-        made.of_many[FORWARD, BATCH, FEW, 1] = calls.forward
-        made.of_many[RK4_STEP, BATCH, FEW, 1] = calls.step
 
 
 def costs(setup: Setup, made: Evaluations) -> list[dict]:

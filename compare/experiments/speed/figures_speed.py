@@ -1,5 +1,7 @@
 """Figures of speed: error against time, of each scene and on the first screen."""
 
+from itertools import cycle
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
@@ -8,29 +10,26 @@ from ...engines import COLOURS, LABELS, MARKS
 from ...judge.check import Result
 from ...judge.finding import Finding
 from ...judge.units import value
-from ...report.style import GREY, WIDTH, file_name, name_ends
+from ...report.style import GREY, WIDTH, file_name
 from ..figures_overview import chart
 from .first_screen import TARGET, best_curves, cheapest, front, target
 
+METHOD_MARKERS = "osD^v<>PX*hp"  # of the methods of an engine, whose colour they have
 COARSE_END, FINE_END = 3.0, 3e-16  # rad: ends of the axis of errors
 
 
 def draw_times(result: Result, scene: str, beginning: str = "") -> tuple:
     """Worst error against time of one scene, a curve for each method, the Pareto front marked."""
-    fig = Figure(figsize=(WIDTH, 5.6))  # no automatic layout, since labels are placed by position
-    fig.subplots_adjust(left=0.085, right=0.985, bottom=0.085, top=0.905)
+    fig = Figure(figsize=(WIDTH, 5.6), layout="constrained")
     ax, unit = fig.subplots(), result.curves.get("unit", "rad")
     ran = [row for row in result.rows if row["scene"] == scene and row["why_not"] is None]
     good = [row for row in ran if not row["diverged"] and value(row, "worst_error") <= COARSE_END]
-    ends, engines = [], set()
+    markers = {}
     for engine, method in dict.fromkeys((row["engine"], row["method"]) for row in good):
         errors, times = drawn([row for row in good if (row["engine"], row["method"]) == (engine, method)])
-        label = f"_{method}" if engine in engines else LABELS.get(engine, engine)
-        engines.add(engine)
-        look = {"color": COLOURS.get(engine, GREY), "marker": MARKS.get(engine, "v"), "markersize": 3.5}
-        ax.plot(errors, times, linewidth=1.2, label=label, **look)
-        k = int(np.argmin(errors))
-        ends.append((errors[k], times[k], method, look["color"]))
+        marker = next(markers.setdefault(engine, cycle(METHOD_MARKERS)))
+        look = {"color": COLOURS.get(engine, GREY), "marker": marker, "markersize": 4.5, "linewidth": 1.0}
+        ax.plot(errors, times, label=f"{LABELS.get(engine, engine)} {method}", **look)
     ax.plot(*drawn(front(good)), "ko", markersize=9, markerfacecolor="none", label="Pareto front")
     ax.axvline(
         result.curves["floors"][scene], color=GREY, linestyle=":", label="rounding, or accuracy of the reference"
@@ -38,8 +37,7 @@ def draw_times(result: Result, scene: str, beginning: str = "") -> tuple:
     ax.set(xscale="log", yscale="log", xlim=(2.0 * COARSE_END, FINE_END / 30), ylabel="time of the run, ms")
     ax.set(xlabel=f"maximum error, {unit} (decreasing)", xticks=[10.0**k for k in range(0, -17, -2)])
     ax.minorticks_off()
-    name_ends(ax, ends)
-    fig.legend(loc="upper center", ncols=4, fontsize=8)
+    fig.legend(loc="outside right upper", fontsize=7, handlelength=1.6)
     values = {"diverged": sum(row["diverged"] for row in ran), "missing": len(ran) - len(good)}
     caption = result.finding("times", begins=beginning or scene, unit=unit, end=COARSE_END, **values)
     return file_name("speed", scene), fig, caption
