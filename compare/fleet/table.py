@@ -152,10 +152,10 @@ def write_table(
 def fleet_page(rows: Sequence[dict], **values: object) -> str:
     """The page as HTML. values: summary, left_out, changed and origin, as in write_table."""
     title, good = "A fleet of models compared", not any(row["verdict"] in BAD_VERDICTS for row in rows)
-    pages = environment().overlay(autoescape=True)
+    pages = environment()
     values |= {"rows": list(map(shown_row, rows)), "heads": HEADS, "title": title, "good": good}
     body = pages.get_template("fleet.html.jinja").render(values)
-    return pages.get_template("page.html.jinja").render(title=title, links=(), good=good, body=Markup(body))
+    return pages.get_template("page.html.jinja").render(title=title, links=(), good=good, script="", body=Markup(body))
 
 
 def shown_row(row: dict) -> dict:

@@ -10,6 +10,7 @@ import pandas as pd
 
 from .document import Document, joined
 from .folder import files, save
+from .text import escaped
 from .verdict import Parts, Report, passed
 
 
@@ -34,7 +35,7 @@ def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
     for document, body in bodies.items():
         text = parts.attempt(f"the head of {document.file}", None, document.text, body)
         if text is not None or document is markdown:
-            save(folder / document.file, joined([*parts.lines, *body]) if text is None else text)
+            save(folder / document.file, joined([*map(escaped, parts.lines), *body]) if text is None else text)
     reference = report.reference
     results = {
         "passed": passed(report.sections) and not parts.broken,
@@ -58,9 +59,13 @@ def records(parts: Parts, name: str, found: Sequence[dict]) -> list[dict]:
     return written
 
 
-def csv(rows: Sequence[dict]) -> str:
+def csv(rows: Sequence[dict], columns: Sequence[str] | None = None) -> str:
     """A table with true and false in lower case, and integers also in columns with empty cells."""
-    table = pd.DataFrame(rows, dtype=object)
-    return table.map(lambda value: str(value).lower() if isinstance(value, bool | np.bool_) else value).to_csv(
-        index=False
-    )
+    return pd.DataFrame(rows, columns=columns, dtype=object).map(cell).to_csv(index=False, lineterminator="\n")
+
+
+def cell(value: object) -> object:
+    """What stands in a file for a value; a text that a spreadsheet would compute begins with an apostrophe."""
+    if isinstance(value, bool | np.bool_):
+        return str(value).lower()
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
