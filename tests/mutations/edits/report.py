@@ -30,9 +30,9 @@ EDITS = (
     Edit("experiment", "say_outcome", "max(used)", "min(used)", "the terminal gives the best check as the worst"),
     # files
     Edit("report.files", "write", "passed(_1)", "True", "results.json says passed whatever fails"),
-    Edit("report.files", "csv", "_1.to_csv(*_2)", "_1.to_csv(*_2, float_format='%.4g')", "digits of the tables are rounded"),
-    Edit("report.files", "csv", "pd.DataFrame(rows, dtype=object)", "pd.DataFrame(rows[:1], dtype=object)",
-         "tables have one row"),
+    Edit("report.files", "cell", "return _1 if _2 else value", "return _1 if _2 else f'{value:.4g}' if isinstance(value, float) else value",
+         "digits of the tables are rounded"),
+    Edit("report.files", "csv", "for row in rows:\n _1", "for row in rows[:1]:\n _1", "tables have one row"),
     Edit("report.files", "write", "[check.record() for check in made]",
          "[check.record() for check in made if check.passed]", "results.json has the checks that pass"),
     Edit("judge.check", "Check.record", "getattr(self, name)", "True if name == 'passed' else getattr(self, name)",
