@@ -15,6 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
 from matplotlib.textpath import TextPath
 
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#666666"
@@ -37,6 +38,7 @@ STYLE = {
     "savefig.dpi": 150,
 }
 WIDTH = 7.5  # inches, a page
+NUMBER = re.compile(r"\$(\\mathdefault\{)?[-0-9.^{}]*(\\times10)?[-0-9.^{}]*\$")  # of an axis, as a formula
 matplotlib.rcParams.update(STYLE)
 
 
@@ -48,10 +50,6 @@ def joint_lines(robot) -> dict[str, tuple]:
 def file_name(*parts: str) -> str:
     """The name of a figure: letters, digits, minus signs and underscores, no more than a file's name may have."""
     return "_".join(re.sub(r"[^\w-]+", "_", part) for part in parts)[:60]
-
-
-def plain(text: str) -> str:
-    return text.replace("$", r"\$")
 
 
 def zero_at_the_end(axis: Axis, end: float, far: float, most: int) -> None:
@@ -131,7 +129,12 @@ def on_paper(ax: Axes) -> np.ndarray:
 
 
 def pixels(figure: Figure) -> np.ndarray:
-    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more to find its places."""
+    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more to find its places.
+
+    A text with a $ is no formula, unless it is a number of an axis.
+    """
+    for text in figure.findobj(Text):
+        text.set_parse_math("$" not in text.get_text() or NUMBER.fullmatch(text.get_text()) is not None)
     figure.set_dpi(STYLE["savefig.dpi"])
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
