@@ -4,6 +4,7 @@ A function that draws returns (file name, figure, caption), and computes nothing
 """
 
 import re
+import warnings
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -40,6 +41,7 @@ STYLE = {
 WIDTH = 7.5  # inches, a page
 NUMBER = re.compile(r"\$(\\mathdefault\{)?[-0-9.^{}]*(\\times10)?[-0-9.^{}]*\$")  # of an axis, as a formula
 matplotlib.rcParams.update(STYLE)
+warnings.filterwarnings("ignore", "constrained_layout not applied")  # names that leave no room for what is drawn
 
 
 def joint_lines(robot) -> dict[str, tuple]:
