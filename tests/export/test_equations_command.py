@@ -2,7 +2,6 @@
 
 import re
 import shutil
-import subprocess
 from functools import partial
 
 import numpy as np
@@ -19,7 +18,6 @@ from compare.process.crash import Refused
 from compare.robots.arm import ARM
 from compare.run.reference import compared_with
 from tmt.derivation.quantities import QUANTITIES
-from tmt.export import LANGUAGES, SYMBOLIC
 
 HAS_C, HAS_OCTAVE = (bool(shutil.which(name)) for name in ("gcc", "octave-cli"))
 COUNT = 20
@@ -227,35 +225,3 @@ def test_values_are_compared_with_mujoco_and_with_the_exact_value(from_mujoco, t
 
 def text_of_arm():
     return ARM.mjcf.read_text(encoding="utf-8")
-
-
-NAMES = ("*/ int run; /*", "x??/", 'end\\"""', "`<img src=x onerror=run()>``")
-LINE = "first\nimport run\n\\input{run}\n#include <run>\rrun()\u2028run()"  # of the head
-
-
-@pytest.fixture(scope="module")
-def texts():
-    """A robot whose names are pieces of programs, in each language."""
-    pole = {"parent": [-1, 0], "offset": [(0, 0, 0), (0, 0, 1)], "axis": [(0, 1, 0)] * 2, "damping": [0.0] * 2}
-    rods = {"body_hinge": [0, 1], "mass": [1.0] * 2, "com": [(0, 0, -0.5)] * 2, "inertia": [np.diag([0.1, 0.1, 0.01])] * 2}
-    tree = tmt.Tree(hinge_names=NAMES[:2], body_names=NAMES[2:], gravity=(0, 0, -9.81), **pole, **rods)
-    head = [LINE, *NAMES]
-    return {of: tmt.equations(tree, of, ["mass_matrix"], name="robot", head=head) for of in (*LANGUAGES, *SYMBOLIC)}
-
-
-@pytest.mark.parametrize("language, comment", [
-    ("c", r"(?s)/\*.*?\*/"), ("c header", r"(?s)/\*.*?\*/"), ("matlab", "(?m)^%.*$"), ("python", '(?s)^""".*?"""'),
-    ("sympy", r"(?m)#.*$|'\*/ int run; /\*'|\w+_run_\w*"), ("latex", r"(?m)^%.*$|\*/ int run; /\*|onerror=run"),
-    ("html", r"<pre>[^<]*</pre>|\*/ int run; /\*|onerror=run"),
-])  # fmt: skip
-def test_names_stay_in_comments_and_texts(texts, language, comment):
-    rest, count = re.subn(comment, "", texts[language])
-    assert count and "run" not in rest and (language != "html" or "<img" not in rest)
-
-
-@pytest.mark.skipif(not HAS_C, reason="no C compiler")
-def test_c_with_any_names_compiles_without_a_warning(texts, tmp_path):
-    (tmp_path / "robot.h").write_text(texts["c header"])
-    (tmp_path / "robot.c").write_text(f'#include "robot.h"\n{texts["c"]}')
-    command = ["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-c", "robot.c"]
-    subprocess.run(command, cwd=tmp_path, check=True)

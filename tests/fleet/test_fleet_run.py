@@ -127,8 +127,9 @@ def test_what_lies_in_the_folder_of_a_report_is_data_and_a_row_or_computed_anew(
     mark = report(tmp_path, "a.xml") / ".fleet"
     key, row = json.loads(mark.read_text())
     assert fleet({}, answer=ANSWER).executor.calls == []
-    wrong = [row | more for more in ({"verdict": "fine"}, {"worst_ratio": "1"}, {"reason": [1]}, {"other": 1})]
-    for poison in (*(json.dumps((key, other)).encode() for other in (*wrong, [row], None)), pickle.dumps((key, Touch()))):
+    others = [row | more for more in ({"verdict": "fine"}, {"worst_ratio": "1"}, {"reason": [1]}, {"other": 1})]
+    poisons = [json.dumps((key, other)).encode() for other in (*others, [row])] + [pickle.dumps((key, Touch()))]
+    for poison in poisons:
         mark.write_bytes(poison)
         assert fleet({}, answer=ANSWER).executor.calls == ["m/a.xml"], poison
     assert not Path("ran").exists()

@@ -113,7 +113,9 @@ def test_a_large_robot_has_fewer_pictures_and_then_fewer_scenes(rng):
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="there is no Chromium to run the script")
 def test_the_script_draws_each_engine_where_it_is(tmp_path):
-    values = {"title": "", "good": True, "links": (), "script": motion.SCRIPT, "body": Markup(page_of(drawn(apart=0.3)))}
+    values = {"title": "", "good": True, "links": (), "script": motion.SCRIPT}
+    attack = "<img src=x onerror=document.title=1><script>document.title=1</script>"  # as if nothing were escaped
+    values["body"] = Markup(page_of(drawn(apart=0.3)) + attack)
     text = environment().get_template("page.html.jinja").render(values)  # whose policy allows the script
     script = text.index("<script")
     page = tmp_path / "page.html"
@@ -123,7 +125,7 @@ def test_the_script_draws_each_engine_where_it_is(tmp_path):
     run = subprocess.run(["chromium", *asked], capture_output=True, text=True, timeout=120)
     for name, pictures in zip(("ours", "theirs"), pictures_of(data_of(text)["scenes"][0])):
         assert f'class="{name}" d="{motion.outline(pictures[-1], [(0, 1), (1, 2)])}"' in run.stdout, name
-    assert all(part in run.stdout for part in ("5.00 s", "0.3 rad", '<div class="controls">'))
+    assert all(part in run.stdout for part in ("5.00 s", "0.3 rad", '<div class="controls">', "<title></title>"))
 
 
 # figures

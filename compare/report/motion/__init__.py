@@ -43,7 +43,13 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
     first, second = (outline(on_page(drawn[0], path)[still], links) for path in drawn[0].points.values())
     few = len(links) <= FEW_STICKS
     values = {"ours": engines[0], "theirs": engines[1], "width": WIDE, "height": HIGH, "wide": 20 if few else 9}
-    values |= {"ring": 16 if few else 7, "base": scenes[0]["base"], "first": first, "second": second, "data": Markup(data)}
+    values |= {
+        "ring": 16 if few else 7,
+        "base": scenes[0]["base"],
+        "first": first,
+        "second": second,
+        "data": Markup(data),
+    }
     values |= {"scenes": scenes, "noun": robot.noun, "stride": stride}
     values["left_out"] = [one.scene for one in drawn[len(scenes) :]]
     text = environment().get_template("motion.html.jinja").render(values)
