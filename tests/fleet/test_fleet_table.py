@@ -60,8 +60,7 @@ def row_of(*checks, limits=(), causes=(), lost=(), reference=("arm",)):
     (AGREE, [good(1.0)], {}, ""),
     (AGREE, [good(), OWN], {}, "2 ms"),  # its own step is not stable: the reason says so
     (ITSELF, [good()], {"reference": ("model",)}, ""),
-    (NOT_JUDGED, [good(), STILL], {"reference": ("model",)}, "nothing moves"),
-    (NOT_JUDGED, [STILL], {}, "nothing moves"),
+    (NOT_JUDGED, [good(), STILL], {}, "nothing moves"),
     (DIFFER, [good(2.0), STILL], {"causes": CAUSES}, "mass of upper"),
     (DIFFER, [good(1.0 + 1e-9), OWN, OFF], {"causes": CAUSES}, "mass of upper"),
     (DIFFER, [good(1.0 + 1e-9), BROKEN], {"causes": CAUSES, "lost": ["the table"]}, "SIGKILL, 4 times, and 1 more"),

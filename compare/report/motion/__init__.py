@@ -41,17 +41,10 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
     data, stride, scenes = inlined(drawn, engines)
     links, still = scenes[0]["links"], stride * scenes[0]["still"]
     first, second = (outline(on_page(drawn[0], path)[still], links) for path in drawn[0].points.values())
-    few = len(links) <= FEW_STICKS
-    values = {"ours": engines[0], "theirs": engines[1], "width": WIDE, "height": HIGH, "wide": 20 if few else 9}
-    values |= {
-        "ring": 16 if few else 7,
-        "base": scenes[0]["base"],
-        "first": first,
-        "second": second,
-        "data": Markup(data),
-    }
-    values |= {"scenes": scenes, "noun": robot.noun, "stride": stride}
-    values["left_out"] = [one.scene for one in drawn[len(scenes) :]]
+    wide, ring = (20, 16) if len(links) <= FEW_STICKS else (9, 7)
+    values = {"ours": engines[0], "theirs": engines[1], "scenes": scenes, "data": Markup(data), "noun": robot.noun}
+    values |= {"width": WIDE, "height": HIGH, "wide": wide, "ring": ring, "first": first, "second": second}
+    values |= {"stride": stride, "left_out": [one.scene for one in drawn[len(scenes) :]]}
     text = environment().get_template("motion.html.jinja").render(values)
     return re.sub(r"\n\s*\n", "\n", text)  # an empty line would end the HTML inside of Markdown
 
