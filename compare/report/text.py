@@ -23,7 +23,7 @@ from ..process.streams import in_one_line
 # what Markdown, GitHub's kind of it or HTML take for markup: anywhere, at the edge of a word, at the beginning of a text
 MARKUP = re.compile(
     r"[`*<>&\"$~@]|\\(?![^\W_])|(?<![^\W_])_|_(?![^\W_])|\](?=\()|:(?=//)|(?<=www)\."
-    r"|\A[#\[ ]|\A[-+=](?=[-=\s]*\Z|\s)|\A\d(?=\d*[.)](?:\s|\Z))"
+    r"|(?<!\S)#|\A[\[ ]|\A[-+=](?=[-=\s]*\Z|\s)|\A\d(?=\d*[.)](?:\s|\Z))"
 )
 DOCUMENTS = "document.md.jinja", ".html.jinja"  # how their names end; the other templates are text
 ROOT = Path(__file__).resolve().parents[1]
