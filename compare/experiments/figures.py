@@ -7,7 +7,7 @@ from matplotlib.patches import Patch
 from ..judge.check import Result, largest_known
 from ..judge.finding import Finding
 from ..judge.scale import EPS, FACTOR
-from ..report.style import BLUE, GREEN, GREY, ORANGE, RED, WIDTH, plain, zero_at_the_end
+from ..report.style import BLUE, GREEN, GREY, ORANGE, RED, WIDTH, zero_at_the_end
 
 ZERO_AT = 1e-3  # eps: where differences of exactly zero are drawn
 MOST_DRAWN = 600  # points of a curve: more are not seen
@@ -60,7 +60,7 @@ def draw_nearest(result: Result) -> tuple[str, Figure, Finding]:
     ax = fig.subplots()
     ax.barh(range(len(names)), left, color=[GREEN if one else GREY for one in explains])
     ax.set(xscale="log", xlim=(EPS / 3.0, 1.5), xlabel="remaining share of the difference", yticks=range(len(names)))
-    ax.set_yticklabels(map(plain, names))
+    ax.set_yticklabels(names)
     ax.invert_yaxis()
     looks = ((True, GREEN, "explains the difference down to rounding"), (False, GREY, "does not explain it"))
     handles = [Patch(color=colour, label=name) for one, colour, name in looks if one in explains]

@@ -8,7 +8,7 @@ from tmt import literal
 from tmt.derivation import method
 
 from ..judge.finding import Finding
-from ..report.style import BLUE, GREEN, GREY, RED, WIDTH, file_name, joint_lines, plain
+from ..report.style import BLUE, GREEN, GREY, RED, WIDTH, file_name, joint_lines
 from ..robots import Robot
 from ..robots.coordinates import free_joints
 from ..robots.stick import AZIMUTH, ELEVATION, stick_figure
@@ -33,7 +33,7 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
     fig = Figure(figsize=(WIDTH, 3.9))
     fig.subplots_adjust(left=0.0, right=0.95, bottom=0.1, top=0.93, wspace=0.05)
     for k, name in enumerate(poses, start=1):
-        ax = fig.add_subplot(1, len(poses), k, projection="3d", facecolor="none", title=plain(name))
+        ax = fig.add_subplot(1, len(poses), k, projection="3d", facecolor="none", title=name)
         for line in sticks[name]:
             ax.plot(*line.T, color=(GREY, 0.6), linewidth=6 if few else 3, solid_capstyle="round")
         draw_joints(ax, robot, arrows[name], few)
@@ -63,7 +63,7 @@ def draw_joints(ax, robot: Robot, arrows: np.ndarray, few: bool) -> None:
         if kind == "slide":
             ax.plot(*np.stack([origin - axis, origin]).T, color=colour, linewidth=1.2, linestyle="--")
         if few:
-            ax.text(*(origin + (1.3 if kind != "ball" else 0.3) * axis), plain(robot.symbol(joint)), color=colour)
+            ax.text(*(origin + (1.3 if kind != "ball" else 0.3) * axis), robot.symbol(joint), color=colour)
 
 
 def axes(robot: Robot, q: np.ndarray, length: float) -> np.ndarray:

@@ -1,8 +1,8 @@
 """The folder of a fleet: a report for each file, with its row of the table and the key of everything that both depend on."""
 
 import hashlib
+import json
 import os
-import pickle
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -53,8 +53,8 @@ def locked(out: Path) -> Iterator[None]:
 
 def saved_row(place: Path, key: str) -> dict | None:
     """The row in a folder of a report, if it depends on the same things."""
-    with suppress(Exception):
-        of_key, row = pickle.loads((place / MARK).read_bytes())
+    with suppress(Exception):  # whatever lies there, it is data
+        of_key, row = json.loads((place / MARK).read_bytes())
         return row if of_key == key else None
     return None
 

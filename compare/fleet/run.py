@@ -1,7 +1,7 @@
 """Run a fleet: submit the files whose reports are missing or old, and write the report of each as it comes."""
 
 import hashlib
-import pickle
+import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -10,7 +10,7 @@ from queue import Empty, SimpleQueue
 from .cache import MARK, program, saved_row, write_whole
 from .executors import Cluster, Pool
 from .models import Model, bundle, place_of_report
-from .table import BAD_VERDICTS, BROKE, EMPTY_ROW, REFUSED
+from .table import BAD_VERDICTS, BROKE, EMPTY_ROW, REFUSED, is_row
 from .task import FleetOptions, compare_file
 
 AHEAD = 2  # files that are submitted for each worker; they are in memory
@@ -69,7 +69,8 @@ class Run:
             return None
         inputs = repr((program(), hashes, model.shown, self.options))
         key = hashlib.sha256(inputs.encode("utf-8", "backslashreplace")).hexdigest()
-        if row := saved_row(self.out / place_of_report(model.shown), key):
+        row = saved_row(self.out / place_of_report(model.shown), key)
+        if is_row(row):
             self.end(model, row)
             return None
         return self.executor.submit(compare_file, model.shown, self.options, files), key
@@ -79,7 +80,7 @@ class Run:
         row = {"verdict": BROKE, "reason": why}
         if value is not None:
             row, written = value
-            write_whole(self.out / place_of_report(model.shown), written | {MARK: pickle.dumps((key, row))})
+            write_whole(self.out / place_of_report(model.shown), written | {MARK: json.dumps((key, row)).encode()})
         self.end(model, row)
 
     def end(self, model: Model, row: dict) -> None:

@@ -21,14 +21,15 @@ from .cache import write_whole
 from .models import place_of_report
 
 AGREE, DIFFER, REFUSED, BROKE = "agree", "differ", "refused", "broke"
-UNCONFIRMED, ITSELF = "unconfirmed", "self-consistent"
-VERDICTS = (DIFFER, BROKE, UNCONFIRMED, REFUSED, ITSELF, AGREE)  # in the order of the table
-BAD_VERDICTS = (DIFFER, BROKE, UNCONFIRMED)  # exit status 1
+NOT_JUDGED, UNCONFIRMED, ITSELF = "not judged", "unconfirmed", "self-consistent"
+VERDICTS = (DIFFER, BROKE, NOT_JUDGED, UNCONFIRMED, REFUSED, ITSELF, AGREE)  # in the order of the table
+BAD_VERDICTS = (DIFFER, BROKE, NOT_JUDGED, UNCONFIRMED)  # exit status 1
 HEADS = {  # columns of the page, after the file
     "verdict": "verdict", "reason": "reason or cause", "reference": "compared with", "joints": "joints",
     "worst_ratio": "share of tolerance", "file_integrator": "integrator", "file_dt_s": "step, ms",
     "stable_at_file_dt": "stable", "limit_s": "limit, ms", "seconds": "processor, s",
 }  # fmt: skip
+NUMBERS = "joints", "worst_ratio", "file_dt_s", "stable_at_file_dt", "limit_s", "seconds", "has_report"
 FLEET_COLUMNS = ("file", "sha256", "same_as", *HEADS)
 EMPTY_ROW = dict.fromkeys(FLEET_COLUMNS) | {"reason": "", "seconds": 0.0, "has_report": False}
 REFERENCES = {"arm": "stated numbers", SOLUTION: "the solution", "model": "itself"}
@@ -41,7 +42,7 @@ def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Seque
 
     An unstable step of the file and joints that are matched by other names do not change the verdict; the reason names them.
     """
-    differing, broke, unstable, unconfirmed, *_ = failures(sections)
+    differing, broke, unstable, unconfirmed, _, not_judged = failures(sections)
     unfinished = [*(f"{check.experiment}: {check.note}" for check in broke), *lost]
     top = worst(sections)
     stable, limit = own_step(sections)
@@ -53,7 +54,8 @@ def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Seque
         outcome, reasons = REFUSED, ["no comparison was possible"]
     else:
         outcome = UNCONFIRMED if unconfirmed else ITSELF if reference.kind == "model" else AGREE
-        said = {"unconfirmed": unconfirmed, "unstable": unstable}
+        outcome = NOT_JUDGED if not_judged else outcome
+        said = {"not_judged": not_judged, "unconfirmed": unconfirmed, "unstable": unstable}
         reasons = [say(Finding("verdict", kind, {"checks": checks})) for kind, checks in said.items() if checks]
     reasons += [f"not finished: {first_of(unfinished)}"] if unfinished else []
     return {
@@ -83,12 +85,17 @@ def order(row: dict) -> tuple:
 
 def csv_of_fleet(rows: Sequence[dict]) -> str:
     """The table with all digits; an unknown value is empty."""
-    text = StringIO()
-    table = csv.DictWriter(text, FLEET_COLUMNS, extrasaction="ignore", lineterminator="\n")
-    table.writeheader()
-    for row in rows:
-        table.writerow({name: str(value).lower() if isinstance(value, bool) else value for name, value in row.items()})
-    return text.getvalue()
+    from ..report import files  # imports are slow
+
+    return files.csv(rows, FLEET_COLUMNS)
+
+
+def is_row(row: object) -> bool:
+    """Whether what lay in the folder of a report is a row of the table."""
+    if not isinstance(row, dict) or not EMPTY_ROW.keys() >= row.keys() or row.get("verdict") not in VERDICTS:
+        return False
+    kinds = {name: float | int | None if name in NUMBERS else str | None for name in row}
+    return all(isinstance(row[name], kind) for name, kind in kinds.items())
 
 
 def earlier(folder: str) -> dict[str, dict]:
@@ -152,10 +159,10 @@ def write_table(
 def fleet_page(rows: Sequence[dict], **values: object) -> str:
     """The page as HTML. values: summary, left_out, changed and origin, as in write_table."""
     title, good = "A fleet of models compared", not any(row["verdict"] in BAD_VERDICTS for row in rows)
-    pages = environment().overlay(autoescape=True)
+    pages = environment()
     values |= {"rows": list(map(shown_row, rows)), "heads": HEADS, "title": title, "good": good}
     body = pages.get_template("fleet.html.jinja").render(values)
-    return pages.get_template("page.html.jinja").render(title=title, links=(), good=good, body=Markup(body))
+    return pages.get_template("page.html.jinja").render(title=title, links=(), good=good, script="", body=Markup(body))
 
 
 def shown_row(row: dict) -> dict:

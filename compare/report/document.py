@@ -9,15 +9,16 @@ from pathlib import Path
 
 import pandas as pd
 from markdown_it import MarkdownIt
+from markupsafe import Markup
 
 from ..experiments import EXPERIMENTS, Experiment
 from ..judge.check import Check
 from ..judge.words import capital
 from .images import embedded
-from .motion import motion_in_html
+from .motion import SCRIPT, motion_in_html
 from .questions import answers
 from .tables import TITLES, closest_checks, of_causes, origins, records, shortened, shown
-from .text import block, count, environment, sentence
+from .text import block, count, environment
 from .verdict import Parts, Report, Section, failures, headline, outcome, passed, standing
 
 MOST_LINES = 300  # of report.md
@@ -36,7 +37,7 @@ class Document:
 
     def __init__(self, report: Report, parts: Parts, folder: Path | None = None):
         self.report, self.parts, self.folder = report, parts, folder
-        self.page = folder is not None
+        self.page, self.motion = folder is not None, ""
         self.file = "index.html" if self.page else "report.md"
         data = {"page": self.page, "embedded": self.embedded}
         self.template = environment().get_template("document.md.jinja").make_module(data)
@@ -62,9 +63,9 @@ class Document:
         report = self.report
         texts = [self.made("the first screen", self.first_screen)]
         if self.page:
-            texts.append(
-                self.parts.attempt("the motion in index.html", "", motion_in_html, report.sections, report.robot)
-            )
+            what = "the motion in index.html"
+            self.motion = self.parts.attempt(what, "", motion_in_html, report.sections, report.robot)
+            texts.append(self.motion)
         texts.append(self.made("the introduction", self.introduction))
         if report.causes:
             texts.append(self.template.causes(table_of(of_causes(report.causes))))
@@ -88,16 +89,9 @@ class Document:
         head = self.template.head(title, reference, lines, self.parts.lines, report.top, good)
         if not self.page:
             return joined([head, *body])
-        return (
-            environment()
-            .get_template("page.html.jinja")
-            .render(
-                title=title,
-                good=good,
-                links=self.links(),
-                body=MarkdownIt("commonmark", {"html": True}).render(joined([head, *body])),
-            )
-        )
+        html = Markup(MarkdownIt("commonmark", {"html": True}).render(joined([head, *body])))
+        values = {"title": title, "good": good, "links": self.links(), "script": SCRIPT if self.motion else ""}
+        return environment().get_template("page.html.jinja").render(values, body=html)
 
     def links(self) -> list[tuple[str, bool]]:
         names = [("questions", False)] if self.answers is not None and len(self.answers) else []
@@ -160,7 +154,7 @@ class Document:
     def introduction(self) -> str:
         robot = self.report.robot
         joints = joints_of(robot)
-        return sentence(" ".join(self.template.introduction(robot, robot.described or robot.name, joints).split()))
+        return " ".join(self.template.introduction(robot, robot.described or robot.name, joints).split())
 
     def section(self, section: Section) -> str:
         """One experiment: what was found, figures, tolerance, and the details."""

@@ -1,16 +1,21 @@
 """Results to files: CSV, JSON, Markdown and HTML."""
 
 import json
+import math
 from collections.abc import Sequence
+from csv import DictWriter
 from functools import partial
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from .document import Document, joined
 from .folder import files, save
+from .text import escaped
 from .verdict import Parts, Report, passed
+
+COMPUTED = "=", "+", "-", "@", "\t", "\r"  # how the texts begin that a spreadsheet would compute
 
 
 def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
@@ -34,7 +39,7 @@ def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
     for document, body in bodies.items():
         text = parts.attempt(f"the head of {document.file}", None, document.text, body)
         if text is not None or document is markdown:
-            save(folder / document.file, joined([*parts.lines, *body]) if text is None else text)
+            save(folder / document.file, joined([*map(escaped, parts.lines), *body]) if text is None else text)
     reference = report.reference
     results = {
         "passed": passed(report.sections) and not parts.broken,
@@ -58,9 +63,20 @@ def records(parts: Parts, name: str, found: Sequence[dict]) -> list[dict]:
     return written
 
 
-def csv(rows: Sequence[dict]) -> str:
-    """A table with true and false in lower case, and integers also in columns with empty cells."""
-    table = pd.DataFrame(rows, dtype=object)
-    return table.map(lambda value: str(value).lower() if isinstance(value, bool | np.bool_) else value).to_csv(
-        index=False
-    )
+def csv(rows: Sequence[dict], columns: Sequence[str] = ()) -> str:
+    """A table with these or all columns: true and false in lower case, nothing for what is unknown or not a number."""
+    text, known = StringIO(), dict.fromkeys(name for row in rows for name in row)
+    table = DictWriter(text, columns or known, extrasaction="ignore", lineterminator="\n")
+    table.writeheader()
+    for row in rows:
+        table.writerow({name: cell(value) for name, value in row.items()})
+    return text.getvalue()
+
+
+def cell(value: object) -> object:
+    """What stands in a file for a value; a text that a spreadsheet would compute begins with an apostrophe."""
+    if isinstance(value, bool | np.bool_):
+        return str(value).lower()
+    if isinstance(value, float) and math.isnan(value):
+        return ""
+    return f"'{value}" if isinstance(value, str) and value.startswith(COMPUTED) else value

@@ -4,6 +4,7 @@ import base64
 from pathlib import Path
 
 import numpy as np
+from markupsafe import Markup
 from PIL import Image
 
 PALETTE = 255  # colours, and white: a chart has fewer that the eye tells apart
@@ -29,4 +30,4 @@ def embedded(path: Path) -> tuple[str, int, int]:
     """A figure inside a page: the address with all its data, its width and height in pixels. OSError if there is none."""
     with Image.open(path) as image:
         width, height = image.size
-    return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}", width, height
+    return Markup(f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"), width, height

@@ -4,12 +4,14 @@ A function that draws returns (file name, figure, caption), and computes nothing
 """
 
 import re
+import warnings
 
 import matplotlib
 import numpy as np
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#666666"
 PINK, SKY = "#CC79A7", "#56B4E9"
@@ -31,7 +33,9 @@ STYLE = {
     "savefig.dpi": 150,
 }
 WIDTH = 7.5  # inches, a page
+NUMBER = re.compile(r"\$(\\mathdefault\{)?[-0-9.^{}]*(\\times10)?[-0-9.^{}]*\$")  # of an axis, as a formula
 matplotlib.rcParams.update(STYLE)
+warnings.filterwarnings("ignore", "constrained_layout not applied")  # names that leave no room for what is drawn
 
 
 def joint_lines(robot) -> dict[str, tuple]:
@@ -44,10 +48,6 @@ def file_name(*parts: str) -> str:
     return "_".join(re.sub(r"[^\w-]+", "_", part) for part in parts)[:60]
 
 
-def plain(text: str) -> str:
-    return text.replace("$", r"\$")
-
-
 def zero_at_the_end(axis: Axis, end: float, far: float, most: int) -> None:
     """Ticks at powers of ten on a logarithmic axis, at most `most`; the first is labelled 0."""
     first, last = round(np.log10(end)), int(np.ceil(np.log10(far)))
@@ -57,7 +57,12 @@ def zero_at_the_end(axis: Axis, end: float, far: float, most: int) -> None:
 
 
 def pixels(figure: Figure) -> np.ndarray:
-    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more to find its places."""
+    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more to find its places.
+
+    A text with a $ is no formula, unless it is a number of an axis.
+    """
+    for text in figure.findobj(Text):
+        text.set_parse_math("$" not in text.get_text() or NUMBER.fullmatch(text.get_text()) is not None)
     figure.set_dpi(STYLE["savefig.dpi"])
     canvas = FigureCanvasAgg(figure)
     canvas.draw()

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from ..process import interrupt
-from ..process.streams import Stream, readable
+from ..process.streams import Stream, in_one_line
 
 EMPTY_LINE, SHOW_CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the cursor that was hidden
 
@@ -30,7 +30,7 @@ class Terminal:
 
     def say(self, text="", style="") -> None:
         """Print a line; on a narrower terminal without wide gaps, wrapped between words."""
-        text, columns = readable(text), self.out.columns()
+        text, columns = in_one_line(text), self.out.columns()
         if columns and len(text) > columns:
             indent = " " * (len(text) - len(text.lstrip()))
             text = indent + re.sub(" {2,}", "  ", text.strip())
@@ -77,7 +77,7 @@ class Terminal:
         """The progress, as far as there is room, no name twice."""
         self.screen.width = max(self.err.columns() or 80, 20)
         space = self.screen.width - 6  # the spinner, and what a terminal shows of Ctrl-C
-        parts, text = self.how_far(), self.text
+        parts, text = self.how_far(), in_one_line(self.text)
         if len(parts) > 2 and len(", ".join(parts)) > space:
             parts = [parts[0], *parts[2:]]
         for part in parts:

@@ -4,21 +4,50 @@ Templates are found by name, NAME.md.jinja, in the folders of compare. Each is a
 the filters below or Python's `format`.
 """
 
-import html
+import base64
+import hashlib
 import re
 from functools import cache
+from html.entities import codepoint2name
 from math import isfinite
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_eval_context
+from jinja2.nodes import EvalContext
+from markupsafe import Markup
 
 from ..judge.finding import Finding
 from ..judge.words import capital, listed, milliseconds, some_of
+from ..process.streams import in_one_line
 
-MARKUP = re.compile(  # code, which stays; signs that Markdown would take for markup
-    r"(`[^`\n]*`)|\\(?=[!-/:-@\[-`{-~])|\*|(?<![^\W_])_|_(?![^\W_])|\[(?=[^\n]*\]\()|&(?=#?\w+;)|<(?=[A-Za-z/!?])|~(?=~)"
+# what Markdown, GitHub's kind of it or HTML take for markup: anywhere, at the edge of a word, at the beginning of a text
+MARKUP = re.compile(
+    r"[`*<>&\"$~@]|\\(?![^\W_])|(?<![^\W_])_|_(?![^\W_])|\](?=\()|:(?=//)|(?<=www)\."
+    r"|(?<!\S)#|\A[\[ ]|\A[-+=](?=[-=\s]*\Z|\s)|\A\d(?=\d*[.)](?:\s|\Z))"
 )
+DOCUMENTS = "document.md.jinja", ".html.jinja"  # how their names end; the other templates are text
 ROOT = Path(__file__).resolve().parents[1]
+
+
+@pass_eval_context
+def markup(context: EvalContext, value: object) -> object:
+    """A value as it stands in a template: in a document, whatever is not a piece of the document is escaped."""
+    return escaped(value) if context.autoescape and not isinstance(value, Markup) else value
+
+
+def escaped(value: object) -> Markup:
+    """A value in one line of Markdown or HTML in which nothing is markup: signs that might be become character references."""
+    return Markup(MARKUP.sub(reference, in_one_line(str(value))))
+
+
+def reference(sign: re.Match) -> str:
+    number = ord(sign[0])
+    return f"&{codepoint2name.get(number, f'#{number}')};"
+
+
+def cell(value: object) -> Markup:
+    """A value in a cell of a table in Markdown."""
+    return Markup(str(escaped(value)).replace("|", "&#124;"))
 
 
 def count(number: int, one: str, many: str = "") -> str:
@@ -31,31 +60,9 @@ def rounded(value: float) -> str:
     return f"{float(f'{value:.2g}'):g}"
 
 
-def sentence(text: str) -> str:
-    """A sentence in Markdown in which nothing is markup except code between backticks."""
-    begins_block = "\\" if text[:1] in ("#", ">", "+", "-", "~") else ""
-    return begins_block + inline(text)
-
-
-def name(text: str) -> str:
-    """A text in Markdown in which nothing is markup."""
-    return "\\`".join(inline(part) for part in text.split("`"))
-
-
-def inline(text: str) -> str:
-    return MARKUP.sub(lambda match: match[1] or f"\\{match[0]}", text)
-
-
-def words(text: str) -> str:
-    """A sentence in HTML in which nothing is markup except code between backticks."""
-    return re.sub("`([^`]+)`", r"<code>\1</code>", html.escape(text))
-
-
 FILTERS = {
-    "sentence": sentence,
-    "words": words,
-    "name": name,
-    "cell": lambda text: inline(text).replace("|", "\\|"),
+    "cell": cell,
+    "hash": lambda text: base64.b64encode(hashlib.sha256(text.encode()).digest()).decode(),
     "g": lambda value, digits=3: f"{value:.{digits}g}",
     "percent": lambda share, digits=2: f"{100.0 * share:.{digits}g} %",
     "degrees": lambda angle, digits=4: f"{angle * 57.29577951308232:.{digits}g} deg",
@@ -71,10 +78,15 @@ FILTERS = {
 
 @cache
 def environment() -> Environment:
-    """Jinja2 with the folders of all templates."""
+    """Jinja2 with the folders of all templates; no value that a document is given can be markup."""
     folders = sorted({str(file.parent) for file in ROOT.rglob("*.jinja")})
     made = Environment(
-        loader=FileSystemLoader(folders), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(folders),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=lambda name: str(name).endswith(DOCUMENTS),
+        finalize=markup,
     )
     made.filters |= FILTERS
     made.tests["finite"] = isfinite

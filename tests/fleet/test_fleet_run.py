@@ -1,7 +1,10 @@
 """A fleet is run in the process of the test: rows, reports, what is computed again, and what becomes of files that break."""
 
+import json
 import os
+import pickle
 from concurrent.futures import Future
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -110,6 +113,26 @@ def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
         (tmp_path / "solution.xml").write_text(solution)
         found = fleet({}, answer=ANSWER, paths=["m/a.xml"], reference="solution.xml")
         assert len(found.executor.calls) == computed
+
+
+class Touch:
+    """What a pickle of it runs."""
+
+    def __reduce__(self):
+        return Path.touch, (Path("ran"),)
+
+
+def test_what_lies_in_the_folder_of_a_report_is_data_and_a_row_or_computed_anew(fleet, tmp_path):
+    fleet(ONE, answer=ANSWER)
+    mark = report(tmp_path, "a.xml") / ".fleet"
+    key, row = json.loads(mark.read_text())
+    assert fleet({}, answer=ANSWER).executor.calls == []
+    others = [row | more for more in ({"verdict": "fine"}, {"worst_ratio": "1"}, {"reason": [1]}, {"other": 1})]
+    poisons = [json.dumps((key, other)).encode() for other in (*others, [row])] + [pickle.dumps((key, Touch()))]
+    for poison in poisons:
+        mark.write_bytes(poison)
+        assert fleet({}, answer=ANSWER).executor.calls == ["m/a.xml"], poison
+    assert not Path("ran").exists()
 
 
 def test_a_copy_has_the_row_of_the_first_file_and_is_not_computed(fleet):

@@ -17,6 +17,7 @@ from compare.fleet.table import (
     DIFFER,
     FLEET_COLUMNS,
     ITSELF,
+    NOT_JUDGED,
     REFUSED,
     UNCONFIRMED,
     changes,
@@ -34,6 +35,7 @@ from compare.run.reference import Reference
 CAUSES = [{"text": "mass of upper: stated 1 kg, compiled 2 kg"}, {"text": "another"}]
 BROKEN = ENDS, None, 0.0, "ended by SIGKILL, 4 times", "equal", About.PROGRAM
 OFF = "limit, observed / predicted - 1", 0.01, 0.001, "", "at most", About.PREDICTION
+STILL = "motion", None, 0.0, "nothing moves", "not judged", About.MODELS
 OWN = AT_OWN_STEP, 0.002, 0.001, "with Euler", "at most", About.STEP
 
 
@@ -45,6 +47,9 @@ def row_of(*checks, limits=(), causes=(), lost=(), reference=("arm",)):
     """The row of one section with checks: (quantity, value, tolerance, note, rule, about)."""
     result = Result("stability", tables={"step_limits": list(limits)})
     for quantity, value, tolerance, note, rule, about in checks:
+        if rule == "not judged":
+            result.not_judged("home", quantity, note)
+            continue
         result.check("home", quantity, value, tolerance, "s", note, about == About.MODELS, rule, about)
     kind, *renamed = reference
     section = Section("stability", "", "", "", result)
@@ -55,6 +60,8 @@ def row_of(*checks, limits=(), causes=(), lost=(), reference=("arm",)):
     (AGREE, [good(1.0)], {}, ""),
     (AGREE, [good(), OWN], {}, "2 ms"),  # its own step is not stable: the reason says so
     (ITSELF, [good()], {"reference": ("model",)}, ""),
+    (NOT_JUDGED, [good(), STILL], {}, "nothing moves"),
+    (DIFFER, [good(2.0), STILL], {"causes": CAUSES}, "mass of upper"),
     (DIFFER, [good(1.0 + 1e-9), OWN, OFF], {"causes": CAUSES}, "mass of upper"),
     (DIFFER, [good(1.0 + 1e-9), BROKEN], {"causes": CAUSES, "lost": ["the table"]}, "SIGKILL, 4 times, and 1 more"),
     (BROKE, [good(), BROKEN, OWN, OFF], {}, "SIGKILL, 4 times"),
@@ -92,7 +99,8 @@ def test_the_own_step_is_that_of_the_own_integrator_at_all_postures(limits, stab
 
 def test_what_needs_a_look_comes_first():
     right = [
-        (DIFFER, None, 1e9, "a"), (DIFFER, True, 2.0, "a"), (BROKE, None, None, "a"), (UNCONFIRMED, None, 0.5, "a"),
+        (DIFFER, None, 1e9, "a"), (DIFFER, True, 2.0, "a"), (BROKE, None, None, "a"), (NOT_JUDGED, None, 0.5, "a"),
+        (UNCONFIRMED, None, 0.5, "a"),
         (REFUSED, None, None, "a"), (ITSELF, False, 0.1, "a"), (ITSELF, True, 0.9, "a"), (AGREE, False, 0.1, "a"),
         (AGREE, None, 0.9, "a"), (AGREE, True, 0.9, "b"), (AGREE, True, 0.0, "c"), (AGREE, None, None, "d"),
     ]  # fmt: skip

@@ -69,6 +69,6 @@ def test_a_small_report_md_is_whole_and_names_are_no_markup_in_it():
     text = text_of(of)
     assert "45 of 405" in text and text.count("| 8 | 0.08 |") == 45 and "| 1.25 |" in text
     assert all(f"- Note {k}." in text for k in range(30))
-    assert r"\<script> \| b" in text and r"In `<option>`, 1 < 2 and a\<b." in text and r"**Worst in \<i>.**" in text
+    assert "&lt;script&gt; &#124; b" in text and "**Worst in &lt;i&gt;.**" in text
     of.result.filed = ("what_should_i_use",)  # in its file alone
     assert "1.25" not in text_of(of) and "(tables/what_should_i_use.csv)" in text_of(of)

@@ -1,8 +1,10 @@
 """tmt.equations: what is written in Python and C gives the values of tmt's functions."""
 
 import ctypes
+import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,18 +97,27 @@ def test_c_compiles_without_a_warning_and_gives_the_same_values(single, tmp_path
         assert np.allclose(out, expected.ravel(), rtol=2e-3 if single else 1e-11, atol=1e-4 if single else 1e-12)
 
 
-@pytest.mark.parametrize("joint", ["*/ int x; /*", '"""', "\\", "100 %", "ä", "'''"])
-def test_no_name_of_a_joint_leaves_the_comment(joint, tmp_path):
-    tree = tmt.Tree(**{**{f: getattr(tmt.ARM, f) for f in ("parent", "offset", "axis", "damping", "body_names", "body_hinge",
-                       "mass", "com", "inertia", "gravity")}, "hinge_names": ("alpha", "beta", joint)})  # fmt: skip
-    assert near(
-        [module(tree, "bias")["bias"]([0.1, 0.2, 0.3], [1.0, 2.0, 3.0])], [tmt.bias([0.1, 0.2, 0.3], [1.0, 2.0, 3.0])]
-    )
-    text = tmt.equations(tree, "c", ["mass_matrix"])
-    before, _, after = text.partition("#include")
-    assert before.count("*/") == 1 and before.rstrip().endswith("*/") and "int x" not in after
-    lines = tmt.equations(tree, "matlab", ["bias"]).splitlines()
-    assert all(line.startswith("%") for line in lines[1 : next(k for k, line in enumerate(lines) if "switch" in line)])
+NAMES = ('*/ int run; /*"""', "x??/", "'''end\\", "`<img src=x onerror=run()>`` 100 %ä")
+LINE = "first\nimport run\n\\input{run}\n#include <run>\rrun()\u2028run()"  # of the head
+COMMENTS = {  # and where names are text
+    "c": r"(?s)/\*.*?\*/", "c header": r"(?s)/\*.*?\*/", "matlab": "(?m)^%.*$", "python": '(?s)^""".*?"""',
+    "sympy": r"(?m)#.*$|'\*/ int run.*?'|\w+_run_\w*", "latex": r"(?m)^%.*$|\*/ int run|<img src=x onerror=run",
+    "html": r"<pre>[^<]*</pre>|\*/ int run|onerror=run",
+}  # fmt: skip
+
+
+def test_names_that_are_pieces_of_programs_stay_in_comments_and_texts(tmp_path):
+    tree = replace(tmt.ARM.lock({"alpha": 0.0}), hinge_names=NAMES[:2], body_names=NAMES[2:])
+    for language, comment in COMMENTS.items():
+        text = tmt.equations(tree, language, ["mass_matrix"], head=[LINE, *NAMES])
+        (tmp_path / language).write_text(text)
+        rest, count = re.subn(comment, "", text)
+        assert count and "run" not in rest and "<img" not in rest, language
+        if language in ("python", "sympy"):
+            compile(text, language, "exec")
+    if HAS_C:
+        command = ["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-x", "c", "-include", "c header", "-c", "c"]
+        subprocess.run(command, cwd=tmp_path, check=True)
 
 
 @pytest.mark.parametrize(("given", "why"), [

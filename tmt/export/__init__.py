@@ -74,7 +74,8 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
         )
     if single and language not in ("c", "c header"):
         raise ValueError(f"single precision is written in C only, not in {language}")
-    lines = [*head, "", *conventions(model)]
+    lines = [line for text in head for line in str(text).splitlines() or [""]]  # a comment each
+    lines += ["", *conventions(model)]
     if language in SYMBOLIC:
         return SYMBOLIC[language](symbols_of(model, quantities), lines)
     functions = [function_of(model, quantity) for quantity in dict.fromkeys(quantities)]

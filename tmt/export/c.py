@@ -1,6 +1,7 @@
 """Functions in C99: a source file that needs math.h alone, and its header."""
 
 import math
+import re
 from collections.abc import Sequence
 from math import prod
 
@@ -44,8 +45,8 @@ def kind(single: bool) -> str:
 
 
 def comment(lines: Sequence[str]) -> str:
-    """A comment, which no name of a joint can end."""
-    text = "\n * ".join(line.replace("*/", "* /").replace("/*", "/ *") for line in lines)
+    """A comment, which no name of a joint can end: neither by its signs nor by a trigraph."""
+    text = "\n * ".join(re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", line) for line in lines)
     return "/* " + "\n".join(line.rstrip() for line in text.split("\n")) + " */"
 
 

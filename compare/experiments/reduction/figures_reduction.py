@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 from ...engines import COLOURS, LABELS, MARKS
 from ...judge.check import Result
 from ...judge.words import capital
-from ...report.style import BLUE, GREY, ORANGE, WIDTH, file_name, plain
+from ...report.style import BLUE, GREY, ORANGE, WIDTH, file_name
 from ...robots import Robot
 from .times import largest_gain
 
@@ -32,9 +32,9 @@ def draw_needs(result: Result, robot: Robot) -> tuple:
             style = KINDS_OF_JOINT[kind_of_joint(joint, need)]
             left.plot(x, y, markersize=4 if many else 9, linestyle="none", **style)
     left.set(xlim=(-0.6, len(joints) - 0.4), ylim=(len(scenes) - 0.5, -0.5))
-    left.set_xticks(range(len(joints)), [plain(robot.symbol(joint)) for joint in joints])
+    left.set_xticks(range(len(joints)), [robot.symbol(joint) for joint in joints])
     left.tick_params(axis="x", labelrotation=90 if len(joints) > 3 else 0, labelsize=6 if many else 8)
-    left.set_yticks(range(len(scenes)), [plain(name) for name in scenes])
+    left.set_yticks(range(len(scenes)), scenes)
     left.tick_params(length=0)
     for y, name in enumerate(scenes):
         mark_times(right, result, name, y)

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from ...judge.check import About, Result, largest_known
 from ...judge.finding import Finding
 from ...judge.words import scene_of
-from ...report.style import BLUE, GREY, ORANGE, RED, plain
+from ...report.style import BLUE, GREY, ORANGE, RED
 from ...robots import Robot
 from ..figures_overview import MOST_ROWS, beyond_tolerance, chart, named_rows
 
@@ -73,7 +73,7 @@ def draw_scenes(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     left.set_xticks([1e-4, 1e-2, 1.0])
     left.minorticks_off()
     right.set(xlabel="time, s", xlim=(0, 1.04 * max(scene.duration for scene in shown)))
-    named_rows(left, [plain(scene.name) for scene in shown], [scene.passed for scene in shown])
+    named_rows(left, [scene.name for scene in shown], [scene.passed for scene in shown])
     left.tick_params(axis="y", labelsize=8)
     right.grid(axis="y", visible=False)
     bars = ((BLUE, "judged"), ((BLUE, 0.4), "judged at some dt"), ((GREY, 0.2), "not judged"))

@@ -13,7 +13,7 @@ from ...judge.check import Result, largest_known
 from ...judge.finding import Finding
 from ...judge.run import LEFT, moved_from, movement_unit, step_in_words
 from ...judge.words import scene_begins
-from ...report.style import GREY, LINES, ORANGE, WIDTH, file_name, plain, zero_at_the_end
+from ...report.style import GREY, LINES, ORANGE, WIDTH, file_name, zero_at_the_end
 from ...robots.case import Case
 from .true_motion import difference_while_judged
 
@@ -138,7 +138,7 @@ def over_time(
     few = len(all_names) <= MOST_LINES  # then a joint looks the same in every figure
     for k, i in enumerate(range(len(names)) if shown is None else shown):
         colour, dash = LINES[all_names.index(names[i]) if few else k]
-        ax.plot(t, ours[:, i], linestyle=dash, color=colour, label=f"{plain(case.robot.symbol(names[i]))}, {label}")
+        ax.plot(t, ours[:, i], linestyle=dash, color=colour, label=f"{case.robot.symbol(names[i])}, {label}")
         ax.plot(t[every], theirs[every, i], color=colour, clip_on=False, **marks)
     ax.plot([], [], color="black", label="MuJoCo", **marks)
 

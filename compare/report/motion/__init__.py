@@ -1,17 +1,16 @@
 """The motion in the page: stick figures of both engines over each other, with a slider; it fetches nothing."""
 
-import html
 import json
 import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from string import Template
 
 import numpy as np
+from markupsafe import Markup
 
 from ...judge.words import scene_of
-from ..text import block, say
+from ..text import environment, say
 from ..verdict import Section, failures
 
 MOST_BYTES = 280_000  # of the motion in the page
@@ -19,13 +18,14 @@ STICK_BYTES = 48  # of a stick in the picture without script
 LARGEST_STRIDE = 8  # every eighth picture of each scene is shown before scenes are left out
 DRAWN_IN = "trajectory"  # the experiment whose scenes are drawn
 WIDE, HIGH, BORDER = 1000, 480, 45  # of the drawing, in its own units
+SCRIPT = Markup((Path(__file__).parent / "motion.js").read_text(encoding="utf-8"))  # the only one that the page may run
 FEW_STICKS = 6  # up to which they are drawn wide
 SHOWN_FOR = 5.0  # s, at least about: a shorter scene is shown slower
 UNDER = 0.9  # of motion shown at its own speed
 
 
 def motion_in_html(sections: Sequence[Section], robot: object) -> str:
-    """A <figure> with its style, script and data, at most 300 kB; "" where no scene is drawn.
+    """A <figure> with its style and data, for SCRIPT, at most 300 kB; "" where no scene is drawn.
 
     It opens on a scene in which the engines differ, if there is one. To stay small, it leaves out every second, fourth ...
     picture, then the last scenes, with a note.
@@ -41,26 +41,11 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
     data, stride, scenes = inlined(drawn, engines)
     links, still = scenes[0]["links"], stride * scenes[0]["still"]
     first, second = (outline(on_page(drawn[0], path)[still], links) for path in drawn[0].points.values())
-    left_out = [one.scene for one in drawn[len(scenes) :]]
-    note = block("document", "motion_note", noun=robot.noun, stride=stride, left_out=left_out)
-    few = len(links) <= FEW_STICKS
-    here = Path(__file__).parent
-    text = Template((here / "motion.html").read_text(encoding="utf-8")).substitute(
-        ours=html.escape(engines[0]),
-        theirs=engines[1],
-        width=WIDE,
-        height=HIGH,
-        wide=20 if few else 9,
-        ring=16 if few else 7,
-        base=scenes[0]["base"],
-        first=first,
-        second=second,
-        options="".join(f"<option>{html.escape(scene['name'])}</option>" for scene in scenes),
-        seen=html.escape(scenes[0]["seen"]),
-        note=html.escape(" ".join(note.split())),
-        data=data,
-        script=(here / "motion.js").read_text(encoding="utf-8"),
-    )
+    wide, ring = (20, 16) if len(links) <= FEW_STICKS else (9, 7)
+    values = {"ours": engines[0], "theirs": engines[1], "scenes": scenes, "data": Markup(data), "noun": robot.noun}
+    values |= {"width": WIDE, "height": HIGH, "wide": wide, "ring": ring, "first": first, "second": second}
+    values |= {"stride": stride, "left_out": [one.scene for one in drawn[len(scenes) :]]}
+    text = environment().get_template("motion.html.jinja").render(values)
     return re.sub(r"\n\s*\n", "\n", text)  # an empty line would end the HTML inside of Markdown
 
 

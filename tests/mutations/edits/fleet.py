@@ -16,6 +16,8 @@ EDITS = (
     Edit("fleet.table", "own_step", 'row["integrator"] == row["file_integrator"]', "True", "limits of any integrator"),
     Edit("fleet.table", "order", "VERDICTS.index", "VERDICTS[::-1].index", "what agrees comes first"),
     Edit("fleet.table", "row_of_file", 'reference.kind == "model"', "False", "what was compared with itself agrees"),
+    Edit("fleet.table", "row_of_file", "NOT_JUDGED if not_judged else outcome", "outcome", "what was not judged agrees"),
+    Edit("fleet.run", "Run.start", "if is_row(row):\n _1\n _2", "if row:\n _1\n _2", "what lies in a folder is a row"),
     Edit("fleet.table", "row_of_file", "UNCONFIRMED if unconfirmed else _1", "_1", "what no run confirms agrees"),
     Edit("fleet.run", "Run.start", "hashlib.sha256(content)", "hashlib.sha256(name.encode())",
          "changes of models and meshes are forgotten"),
