@@ -21,10 +21,8 @@ from .tables import TITLES, closest_checks, of_causes, origins, records, shorten
 from .text import block, count, environment
 from .verdict import Parts, Report, Section, failures, headline, outcome, passed, standing
 
-MOST_LINES = 300  # of report.md
-SIZES = 40, 16, 12, 8, 4, 2, 0  # rows of each table in report.md: the first with which it has so few lines
-MOST_ROWS, MOST_OF_RUNS = 40, 60  # of a table in the page; its file has all
-FIRST_NOTES = 3  # of a section of the page that are not folded
+MOST_ROWS, MOST_IN_MARKDOWN = 40, 6  # of a table; its file has all
+FIRST_NOTES, MOST_NOTES = 3, 12  # of a section: of the page, which folds the others; of report.md
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
 OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
@@ -41,25 +39,13 @@ class Document:
         self.file = "index.html" if self.page else "report.md"
         data = {"page": self.page, "embedded": self.embedded}
         self.template = environment().get_template("document.md.jinja").make_module(data)
-        self.rows, self.answers = (
-            MOST_ROWS,
-            parts.attempt("the questions", None, answers, report.sections, report.robot),
-        )
+        self.answers = parts.attempt("the questions", None, answers, report.sections, report.robot)
 
     def embedded(self, file: str) -> tuple[str, int, int]:
         return embedded(self.folder / "figures" / f"{file}.png")
 
     def body(self) -> list[str]:
-        """All parts below the verdict; those that break are left out. Of report.md, as much as MOST_LINES allow."""
-        if self.page:
-            return self.made_body()
-        for self.rows in SIZES:
-            body = self.made_body()
-            if len(joined(body).splitlines()) + len(self.report.top) + 12 <= MOST_LINES:
-                break
-        return body
-
-    def made_body(self) -> list[str]:
+        """All parts below the verdict; those that break are left out."""
         report = self.report
         texts = [self.made("the first screen", self.first_screen)]
         if self.page:
@@ -162,8 +148,7 @@ class Document:
         consequences = section.explained
         failed = [check for check in result.checks if check.failed and check not in consequences]
         not_judged = [check for check in result.checks if not check.judged]
-        few = MOST_ROWS if self.page else max(1, self.rows // 2)
-        most = FIRST_NOTES if self.page else None if self.rows == MOST_ROWS else max(1, self.rows // 2)
+        few, most = (MOST_ROWS, FIRST_NOTES) if self.page else (MOST_IN_MARKDOWN, MOST_NOTES)
         notes, figures = section.notes, [one for one in figures_of(section) if not (self.page and one["moves"])]
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
         first = [one for one in figures if one in first or one["file"].endswith(LINKED)]
@@ -180,7 +165,7 @@ class Document:
             not_judged=listing(not_judged, few),
             explained=listing(consequences, MOST_ROWS),
             notes=notes[:most],
-            further=notes[most:] if most else [],
+            further=notes[most:],
             tables=[self.table(section, name, rows) for name, rows in section.tables.items()],
             checks={"count": len(result.checks), "rows": table_of(closest_checks(section, MOST_ROWS))},
             open_figures=first,
@@ -192,11 +177,10 @@ class Document:
         title = TITLES.get(name, capital(name.replace("_", " ")))
         about = {"name": name, "title": title, "count": len(rows), "which": "", "rows": None}
         columns = section.result.shown if name == section.name else None
-        is_main = self.page or (self.rows and (name == section.name or name in MAIN_TABLES))
+        is_main = self.page or name == section.name or name in MAIN_TABLES
         if columns == [] or name in section.result.filed or not is_main:
             return about
-        most = (MOST_ROWS, MOST_OF_RUNS) if self.page else (self.rows, self.rows * MOST_OF_RUNS // MOST_ROWS)
-        few, about["which"] = shortened(rows, *most)
+        few, about["which"] = shortened(rows, MOST_ROWS if self.page else MOST_IN_MARKDOWN)
         about["rows"] = table_of(shown(pd.DataFrame(few), columns if few else None))
         return about
 

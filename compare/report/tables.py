@@ -1,12 +1,11 @@
 """Tables of a report as text, and the rows of a long table that a reader needs."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
 from ..judge.check import Check
-from ..judge.words import listed
 from .verdict import Section
 
 DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled", "found"), 7)  # of a column; else 3
@@ -17,19 +16,6 @@ TITLES = {"what_should_i_use": "What should I use?"}  # of tables whose name is 
 IN_WORDS = {"seconds_of": "CPU seconds", "ended_after_s": "seconds from the start to the end"}
 LISTS = ("names", "hinges", "locked")  # columns with many names of joints
 LONGEST_LIST = 80  # characters of a list in a report; its file has all
-GROUPS = (  # columns by which rows are grouped: the first that a table has and that give few enough groups
-    ("scene", "engine_integrator"),
-    ("scene", "target_rad"),
-    ("scene", "target"),
-    ("scene", "engine", "method"),
-    ("engine", "method"),
-    ("scene", "integrator"),
-    ("quantity",),
-    ("item",),
-    ("scene",),
-)
-RUNS = GROUPS[0]  # a row for each of these groups is shown even where other tables are cut shorter
-FEWEST = 4  # groups: fewer say too little
 
 
 def shown(table: pd.DataFrame, columns: Sequence[str] | None = None) -> pd.DataFrame:
@@ -75,63 +61,19 @@ def origins(origin: dict) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["what", "value"])
 
 
-def shortened(rows: Sequence[dict], most: int, most_of_runs: int | None = None) -> tuple[list[dict], str]:
-    """The rows to show, in their order, at most `most`; and which these are, in words ('' if all of them).
+def shortened(rows: Sequence[dict], most: int) -> tuple[list[dict], str]:
+    """The rows to show, in their order, at most `most`, and how many of how many these are ('' if all of them).
 
-    The worst row of each group, by what the table measures. most_of_runs: the maximum where each row is for a scene and an
-    integrator; None: `most`. Of a long table of stated and compiled numbers the rows that differ.
+    Those that fail or differ come first, then those with the largest share of a tolerance.
     """
     rows = list(rows)
     if len(rows) <= most:
         return rows, ""
-    if {"stated", "compiled"} <= set(rows[0]):
-        off = [row for row in rows if row.get("difference")]
-        words = f"{len(off)} of {len(rows)} rows differ" if off else f"none of {len(rows)} rows differs"
-        if off and all(
-            f"{row['stated']:.{DIGITS['stated']}g}" == f"{row['compiled']:.{DIGITS['stated']}g}" for row in off
-        ):
-            words += ", in digits that are not shown"
-        return off[:most], words + (f", the first {most}" if len(off) > most else "")
-    measure = next((measure for measure in MEASURES if any(measure(row) is not None for row in rows)), None)
-    size = pd.Series([badness(row, measure) if measure else 0.0 for row in rows])
-    which = "worst" if measure else "first"
-    for columns in GROUPS:
-        if set(columns) <= set(rows[0]):
-            kept = size.groupby([[str(row[column]) for row in rows] for column in columns], sort=False).idxmax()
-            if FEWEST <= len(kept) <= (most_of_runs or most if columns == RUNS else most):
-                names = listed([column.replace("_", " ") for column in columns])
-                return [rows[k] for k in sorted(kept)], f"the {which} of each {names}, {len(kept)} of {len(rows)} rows"
-    kept = sorted(size.nlargest(most).index)
-    return [rows[k] for k in kept], f"the {which} {most} of {len(rows)} rows"
+    nearest = sorted(range(len(rows)), key=lambda k: distance_from_failure(rows[k]))
+    return [rows[k] for k in sorted(nearest[:most])], f"{most} of {len(rows):,} rows"
 
 
-def badness(row: Mapping, measure: Callable) -> float:
-    """How bad a row is: inf for one that fails, or has no number where that fails; -1 where nothing was measured."""
-    value = measure(row)
-    if row.get("passed") is False and (value is None or not math.isfinite(value)):
-        return math.inf
-    return -1.0 if value is None else math.inf if math.isnan(value) else float(value)
-
-
-def share(row: Mapping) -> float | None:
-    value = row.get("difference_over_band", row.get("difference_over_bar"))
-    return None if value is None else abs(value)
-
-
-def from_printed(row: Mapping) -> float | None:
-    """How much of its tolerance the farther engine is from a printed number."""
-    if not row.get("tolerance") or "published" not in row:
-        return None
-    return max(abs(row[name] - row["published"]) for name in ("tmt", "mujoco")) / row["tolerance"]
-
-
-def from_predicted(row: Mapping) -> float | None:
-    """How far, relative, what is observed is from what is predicted."""
-    for unit in ("dt_s", "s"):
-        predicted, observed = row.get(f"predicted_{unit}"), row.get(f"observed_{unit}")
-        if predicted and observed is not None:
-            return abs(observed / predicted - 1.0)
-    return None
-
-
-MEASURES = (share, from_printed, from_predicted)
+def distance_from_failure(row: Mapping) -> tuple[bool, bool, float]:
+    """A key to sort rows: those that fail, that differ from a stated number, that use most of a tolerance."""
+    share = row.get("difference_over_band", row.get("difference_over_bar"))
+    return row.get("passed", True), not row.get("difference"), math.inf if share is None else -share

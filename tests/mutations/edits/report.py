@@ -64,9 +64,8 @@ EDITS = (
     Edit("judge.check", "largest_known", "max(known)", "min(known)", "the picture has the least distance"),
     Edit("stability.limits", "summary", "max(_1, default=0.0)", "min(_1, default=0.0)",
          "the nearest limit is told as the farthest"),
-    Edit("report.tables", "shortened", "size.groupby(_1, sort=False).idxmax()", "size.groupby(_1, sort=False).idxmin()",
-         "the best row of each group is shown"),
-    Edit("report.document", "Document.body", "_1 <= MOST_LINES", "False", "report.md is always as short as can be"),
+    Edit("report.tables", "distance_from_failure", "row.get('passed', True)", "True", "a row that fails may be left out"),
+    Edit("report.tables", "distance_from_failure", "-share", "share", "the rows that use least of their tolerance are shown"),
     # what is drawn, and said of it
     Edit("experiments.figures", "draw_distances", "max(maxima)", "min(maxima)", "the least distance is told as the largest"),
     Edit("figures_runs", "draw_held", "curve['left']['tmt']", "curve['left']['mujoco']", "MuJoCo's departure is told of TMT"),
