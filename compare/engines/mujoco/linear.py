@@ -8,9 +8,11 @@ import numpy as np
 from ...robots.actuators import Drive
 from .actuators import control_of
 from .dynamics import MujocoDynamics
-from .names import INTEGRATORS, bit
+from .names import INTEGRATORS, bit, element_name, output_of
 
 NUDGE = 1e-6  # of central differences, rad and rad/s
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
+BAD = [int(getattr(mujoco.mjtWarning, f"mjWARN_BADQ{what}")) for what in ("POS", "VEL", "ACC")]
 
 
 def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str) -> np.ndarray:
@@ -41,38 +43,52 @@ def left_to_itself(dynamics: MujocoDynamics, q, qd, tau, dt: float, steps: int, 
 class WholeRun(NamedTuple):
     """A run of a file's model as it is."""
 
-    rms_speed: float  # root mean square of all speeds in the last part, rad/s and m/s; NaN: it is not finite
+    speeds: np.ndarray  # root mean square of all speeds in each part, rad/s and m/s; NaN from the part in which it fails
+    failed_at: float | None  # s: a number is bad, and MuJoCo resets the run if the file lets it; None: it runs to its end
     warnings: int  # of MuJoCo's own
     resets: int  # to the reference position, by MuJoCo itself
 
 
-def whole_run(model: mujoco.MjModel, drive: Drive, q, u, dt, integrator: str, lasts, last, speed=0.0) -> WholeRun:
-    """A run from q under constant u of each actuator, with contacts, limits, friction and force ranges.
+def start_of(model: mujoco.MjModel, drive: Drive, key: str = "", q=None, u=None, push=0.0) -> np.ndarray:
+    """The state from which a whole run starts: a keyframe, else qpos0; or the position q (nq,) under u of each actuator.
 
-    lasts: its duration, s; last: the duration of the part at its end that is judged, s. After a reset by MuJoCo the controls and
-    the speed are set again.
+    push: (nv,) rad/s and m/s, added to the speeds. Where no controls are stated the targets of servos are the posture.
     """
+    data = mujoco.MjData(model)
+    if key:
+        mujoco.mj_resetDataKeyframe(
+            model, data, next(k for k in range(model.nkey) if element_name(model, "key", k) == key)
+        )
+    data.qpos[:] = data.qpos if q is None else q
+    data.qvel[:] += push
+    if u is None:
+        mujoco.mj_fwdPosition(model, data)
+        lengths = [data.actuator_length[output_of(model, i)] for i in range(len(drive.actuators))]
+        u = drive.control(key, lengths)
+    for i, (actuator, value) in enumerate(zip(drive.actuators, u)):
+        place, inputs = control_of(model, i)
+        if inputs == 1:
+            data.ctrl[place] = 0.0 if actuator.dynamics == "integrator" else value
+        if actuator.dynamics != "none":
+            data.act[model.actuator_actadr[i]] = value
+    state = np.zeros(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, state, STATE)
+    return state
+
+
+def whole_run(model: mujoco.MjModel, start: np.ndarray, dt: float, integrator: str, lasts: float, parts: int) -> WholeRun:
+    """A run from start_of a model, with contacts, limits, friction, fluid and force ranges, for `lasts` s or until it fails."""
     m = mujoco.MjModel.__copy__(model)
     m.opt.timestep, m.opt.integrator = dt, INTEGRATORS[integrator]
-    data, controls = mujoco.MjData(m), np.zeros(m.nu)
-    data.qpos[:], data.qvel[:] = q, speed
-    for i, (one, value) in enumerate(zip(drive.actuators, u)):
-        place, inputs = control_of(m, i)
-        if inputs == 1:
-            controls[place] = 0.0 if one.dynamics == "integrator" else value
-        if one.dynamics != "none":
-            data.act[m.actuator_actadr[i]] = value
-    steps, squares, warnings, resets, counted = max(1, round(lasts / dt)), [], 0, 0, 0
-    judged = steps - max(1, round(last / dt))
-    for step in range(steps):
+    data, speeds, count = mujoco.MjData(m), np.full(parts, np.nan), max(1, round(lasts / parts / dt))
+    mujoco.mj_setState(m, data, start, STATE)
+    for step in range(parts * count):
         before = data.time
-        data.ctrl[:] = controls
         mujoco.mj_step(m, data)
-        number = int(data.warning.number.sum())
-        if data.time <= before:  # it starts to count again
-            resets, counted = resets + 1, 0
-            data.qvel[:] = speed
-        warnings, counted = warnings + number - counted, number
-        if step >= judged:
-            squares.append(data.qvel @ data.qvel / m.nv)
-    return WholeRun(float(np.sqrt(np.mean(squares))), warnings, resets)
+        square, warnings = data.qvel @ data.qvel / m.nv, data.warning.number
+        if not np.isfinite(square) or warnings[BAD].any():
+            speeds[step // count :], resets = np.nan, int(data.time <= before)  # the clock starts again
+            return WholeRun(speeds, (step + 1) * dt, int(warnings.sum()), resets)
+        squares = square if step % count == 0 else squares + square
+        speeds[step // count] = np.sqrt(squares / (step % count + 1))
+    return WholeRun(speeds, None, int(data.warning.number.sum()), 0)

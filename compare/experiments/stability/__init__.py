@@ -12,7 +12,7 @@ from ...robots.case import Case
 from ...truth.linear import held
 from .. import Experiment
 from ..setup import Setup
-from . import claims, departure, failure, limits, servos
+from . import claims, departure, failure, limits, own_run, servos
 from .equilibria import check_equilibria
 from .subjects import DAMPINGS, SCHEMES, Subjects, coarsest_case, methods_of, subjects_of, unit_of_movements
 
@@ -62,6 +62,7 @@ def begin(setup: Setup) -> None:
         return setup.map(partial(function, engines=engines, **more), items)
 
     setup.background["stability"] = {
+        "own run": own_run.begin(setup),
         "servos": servos.begin(setup),
         "limits": start(limits.limit_rows, at, methods=methods, steps=steps),
         "departure": start(departure.departures, dts if saddles else (), at=saddle, methods=few),
@@ -81,6 +82,7 @@ def rows(setup: Setup) -> Result:
     robot = subjects.robot
     methods = methods_of(setup.engines, robot)
     result.curves |= {"centres": subjects.centres, "schemes": {(m.engine, m.name): m.scheme for m in methods}}
+    own_run.add(result, work["own run"])
     if work["servos"]:
         servos.add(result, setup, work["servos"])
     limits.check_limits(result, [row for part in work["limits"] for row in part])

@@ -6,10 +6,11 @@ import numpy as np
 
 from ....engines.mujoco import Reading
 from ....engines.mujoco.acting import Acting
-from ....engines.mujoco.linear import whole_run
+from ....engines.mujoco.linear import start_of, whole_run
 from ....robots.case import SEED
 from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO, bisected
+from ..own_run import CALM, PARTS, push_of
 from .predicted import acting_at
 
 MOVED_BY, MOVED_LEAST, MOVED_MOST = 1e-6, 1e-8, 1e-5  # rad or m at the start, of a joint of middling inertia; of any
@@ -22,9 +23,7 @@ RUN_PARTS = 8  # of a run: after each it ends if the deviation has grown far
 GROWN_FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
 GROWN_STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
 NARROWED = 1e-3  # relative, between a step that holds and one that does not
-FULL_TIME, FULL_LAST = 2.0, 0.5  # s: of a run of the whole file, and of its part whose speeds count
-FULL_PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
-CALM = 1e-3  # rad/s or m/s, root of the mean square
+FULL_TIME = 2.0  # s: of a run of the whole file
 
 
 def limit(at: Posture, integrator: str, reading: Reading) -> tuple[str, float | None]:
@@ -54,6 +53,16 @@ def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps
             if not sizes[-1] <= GROWN_FAR:  # or no number
                 return True
     return max(sizes[3 * RUN_PARTS // 4 :]) > GROWN_STILL * max(1.0, *sizes[: RUN_PARTS // 2])
+
+
+def shown_beyond(at: Posture, integrator: str, dt: float | None) -> float:
+    """How far beyond a limit a run shows that something grows, relative to the limit."""
+    if dt is None or at.small.pole_limit(integrator)[0] <= dt:
+        return 0.0
+    beyond = 0.0
+    while beyond < 1.0 and at.small.growth(integrator, (1.0 + beyond) * dt) ** (NARROWED_STEPS // 2) <= GROWN_STILL:
+        beyond = max(1e-3, 1.1 * beyond)
+    return beyond
 
 
 def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[np.ndarray]:
@@ -89,13 +98,13 @@ def full_model(at: Posture, integrator: str, reading: Reading) -> dict:
 
     It starts at the posture itself, which need not be where it rests.
     """
-    speed = FULL_PUSH * np.random.default_rng(SEED).normal(size=reading.model.nv)
-    start = at.robot.drive, at.start, at.u, reading.dt, integrator
+    start = start_of(reading.model, at.robot.drive, q=at.start, u=at.u, push=push_of(reading.model.nv))
     with np.errstate(over="ignore", invalid="ignore"):
-        run = whole_run(reading.model, *start, FULL_TIME, FULL_LAST, speed)
+        run = whole_run(reading.model, start, reading.dt, integrator, FULL_TIME, PARTS)
+    speed = float(run.speeds[-1])
     return {
-        "full_model_rms_speed": run.rms_speed if np.isfinite(run.rms_speed) else None,
+        "full_model_rms_speed": speed if np.isfinite(speed) else None,
         "full_model_warnings": run.warnings,
         "full_model_resets": run.resets,
-        "full_model_calm": bool(run.rms_speed < CALM),
+        "full_model_calm": speed < CALM,
     }

@@ -1,0 +1,106 @@
+"""The file's own run: everything on, from its own starts, at one step, and at finer ones where it does not come to rest."""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from ...engines.mujoco import Reading
+from ...engines.mujoco.linear import WholeRun, start_of, whole_run
+from ...judge.check import About, Result
+from ...robots.case import SEED
+from ..setup import Setup
+
+MOST_STARTS = 6  # the first keyframes
+LASTS, LEAST_STEPS, MOST_STEPS = 2.0, 1000, 20_000  # s, and between which numbers of steps it lasts
+LONGER = 5.0  # fold: where it has not come to rest it is run so long
+PARTS = 4  # of a run: the speeds of each are averaged
+FINER = (16, 256)  # the step over a finer one; the second where a run at the first fails
+PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
+CALM = 1e-3  # rad/s or m/s, root of the mean square
+FASTER = 10.0  # fold, than at the finer step: what moves on by the step alone
+AT_OWN, AT_REQUESTED = "stable in its own run", "stable in its own run at the requested step"
+
+
+def push_of(nv: int) -> np.ndarray:
+    """A small speed by chance, (nv,) rad/s or m/s."""
+    return PUSH * np.random.default_rng(SEED).normal(size=nv)
+
+
+def begin(setup: Setup) -> list:
+    """Start the runs at the file's step, and at a requested one; none without a file's numbers."""
+    reading = setup.reading
+    if reading is None:
+        return []
+    steps = [(AT_OWN, reading.dt, reading.integrator)] + ([(AT_REQUESTED, *setup.step)] if setup.step else [])
+    starts = list(reading.keyframes)[:MOST_STARTS] or [""]
+
+    def start(dt: float, integrator: str):
+        return setup.map(partial(own_run, dt=dt, integrator=integrator, reading=reading), starts)
+
+    return [(quantity, start(*step)) for quantity, *step in steps]
+
+
+def own_run(key: str, dt: float, integrator: str, reading: Reading) -> dict:
+    """What the file does from a keyframe (or from qpos0, if the name is empty): a row of own_run.csv.
+
+    outcome: calm, it comes to rest; worse, it fails or moves on, and at a finer step it does not; alike, it moves on there
+    too; fails, it fails there too.
+    """
+    start = start_of(reading.model, reading.drive, key, push=push_of(reading.model.nv))
+    lasts = float(np.clip(LASTS, LEAST_STEPS * dt, MOST_STEPS * dt))
+
+    def run(step: float, lasts: float) -> WholeRun:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return whole_run(reading.model, start, step, integrator, lasts, PARTS)
+
+    own, finer, finer_dt = run(dt, lasts), None, None
+    if not (is_calm(own) or own.failed_at):
+        own = run(dt, LONGER * lasts)
+    if not is_calm(own):
+        for fold in FINER:
+            finer, finer_dt = run(dt / fold, lasts), dt / fold
+            if not finer.failed_at:
+                break
+        if is_worse(own, finer) and not own.failed_at:
+            finer = run(finer_dt, LONGER * lasts)
+    outcome = "calm" if finer is None else "worse" if is_worse(own, finer) else "fails" if own.failed_at else "alike"
+    return {
+        "start": key or "qpos0", "dt_s": dt, "integrator": integrator, "outcome": outcome, **columns(own, ""),
+        "finer_dt_s": finer_dt, **columns(finer, "finer_"),
+    }  # fmt: skip
+
+
+def columns(run: WholeRun | None, of: str) -> dict:
+    """When a run fails, s, and its speed at the end, rad/s and m/s."""
+    speed = None if run is None or run.failed_at else float(run.speeds[-1])
+    return {f"{of}failed_at_s": run and run.failed_at, f"{of}rms_speed": speed}
+
+
+def is_calm(run: WholeRun) -> bool:
+    return bool(run.speeds[-1] < CALM)
+
+
+def bound(finer: WholeRun) -> float:
+    """The largest speed at the end of a run that a finer step explains: of a run that moves on too, that of all its parts."""
+    return max(CALM, FASTER * float(finer.speeds[-1] if is_calm(finer) else finer.speeds.max()))
+
+
+def is_worse(own: WholeRun, finer: WholeRun) -> bool:
+    """Whether a run fails or moves on, and its step is the cause."""
+    return not finer.failed_at and not own.speeds[-1] <= bound(finer)
+
+
+def add(result: Result, work: Sequence) -> None:
+    """The rows, a check of each, and what is said of the worst start."""
+    order = ("worse", "fails", "alike", "calm")
+    for quantity, rows in work:
+        rows = sorted(rows, key=lambda row: (order.index(row["outcome"]), row["rms_speed"] is not None))
+        for row in rows:
+            note = f"{1e3 * row['dt_s']:.4g} ms with {row['integrator']}"
+            passed = row["outcome"] in ("alike", "calm")
+            result.check(row["start"], quantity, int(passed), 1, "runs", note, rule="equal", about=About.STEP)
+        result.tables.setdefault("own_run", []).extend(rows)
+        others = sum(row["outcome"] == rows[0]["outcome"] for row in rows[1:])
+        worst = result.finding("own_run", **rows[0], requested=quantity == AT_REQUESTED, others=others, calm=CALM)
+        result.top.append(worst)
