@@ -43,8 +43,12 @@ def left_to_itself(dynamics: MujocoDynamics, q, qd, tau, dt: float, steps: int, 
 class WholeRun(NamedTuple):
     """A run of a file's model as it is."""
 
-    speeds: np.ndarray  # root mean square of all speeds in each part, rad/s and m/s; NaN from the part in which it fails
-    failed_at: float | None  # s: a number is bad, and MuJoCo resets the run if the file lets it; None: it runs to its end
+    speeds: (
+        np.ndarray
+    )  # root mean square of all speeds in each part, rad/s and m/s; NaN from the part in which it fails
+    failed_at: (
+        float | None
+    )  # s: a number is bad, and MuJoCo resets the run if the file lets it; None: it runs to its end
     warnings: int  # of MuJoCo's own
     resets: int  # to the reference position, by MuJoCo itself
 
@@ -56,9 +60,8 @@ def start_of(model: mujoco.MjModel, drive: Drive, key: str = "", q=None, u=None,
     """
     data = mujoco.MjData(model)
     if key:
-        mujoco.mj_resetDataKeyframe(
-            model, data, next(k for k in range(model.nkey) if element_name(model, "key", k) == key)
-        )
+        names = [element_name(model, "key", k) for k in range(model.nkey)]
+        mujoco.mj_resetDataKeyframe(model, data, names.index(key))
     data.qpos[:] = data.qpos if q is None else q
     data.qvel[:] += push
     if u is None:
@@ -76,19 +79,21 @@ def start_of(model: mujoco.MjModel, drive: Drive, key: str = "", q=None, u=None,
     return state
 
 
-def whole_run(model: mujoco.MjModel, start: np.ndarray, dt: float, integrator: str, lasts: float, parts: int) -> WholeRun:
+def whole_run(
+    model: mujoco.MjModel, start: np.ndarray, dt: float, integrator: str, lasts: float, parts: int
+) -> WholeRun:
     """A run from start_of a model, with contacts, limits, friction, fluid and force ranges, for `lasts` s or until it fails."""
     m = mujoco.MjModel.__copy__(model)
     m.opt.timestep, m.opt.integrator = dt, INTEGRATORS[integrator]
-    data, speeds, count = mujoco.MjData(m), np.full(parts, np.nan), max(1, round(lasts / parts / dt))
+    data, squares, count = mujoco.MjData(m), np.zeros(parts), max(1, round(lasts / parts / dt))
     mujoco.mj_setState(m, data, start, STATE)
     for step in range(parts * count):
         before = data.time
         mujoco.mj_step(m, data)
-        square, warnings = data.qvel @ data.qvel / m.nv, data.warning.number
-        if not np.isfinite(square) or warnings[BAD].any():
-            speeds[step // count :], resets = np.nan, int(data.time <= before)  # the clock starts again
-            return WholeRun(speeds, (step + 1) * dt, int(warnings.sum()), resets)
-        squares = square if step % count == 0 else squares + square
-        speeds[step // count] = np.sqrt(squares / (step % count + 1))
-    return WholeRun(speeds, None, int(data.warning.number.sum()), 0)
+        squares[step // count] += data.qvel @ data.qvel / m.nv / count
+        warnings = data.warning.number
+        if not np.isfinite(squares[step // count]) or warnings[BAD].any():
+            squares[step // count :] = np.nan
+            resets = int(data.time <= before)  # the clock starts again
+            return WholeRun(np.sqrt(squares), (step + 1) * dt, int(warnings.sum()), resets)
+    return WholeRun(np.sqrt(squares), None, int(data.warning.number.sum()), 0)

@@ -76,11 +76,9 @@ def test_a_step_is_stable_up_to_its_limit_where_one_counts(result, more, passed)
     ([True, True], {"limit": "saddle"}, (True, ["q"])),
 ])  # fmt: skip
 def test_the_answer_for_the_files_step(stable, changed, answer):
-    run = {"full_model_calm": False, "full_model_rms_speed": None}
-    rows = [row(stable_at_file_dt=stable[0], **run, **changed), row(posture="q", stable_at_file_dt=stable[1], **run)]
+    rows = [row(stable_at_file_dt=stable[0], **changed), row(posture="q", stable_at_file_dt=stable[1])]
     found = verdict(rows, "Euler")
     assert (found["stable"], found["postures"]) == answer
-    assert found["speed"] == (None if found["stable"] else np.inf) and found["calm"] is found["stable"]
     assert verdict(rows, "RK4") == {"stable": None}
 
 

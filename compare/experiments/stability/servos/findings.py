@@ -30,6 +30,8 @@ def find_answer(
     if not requested and (dt, integrator) != DEFAULT_STEP:
         default = verdict(limit_rows(predictions, *DEFAULT_STEP), DEFAULT_STEP[1])
     unknown = unmodelled(at.robot)
+    if requested and (unknown or not drive.feeds_back):
+        return
     off = {actuator.name: actuator.off for actuator in drive.actuators if actuator.off}
     answer = result.finding(
         "step",

@@ -60,8 +60,10 @@ def predicted_at(robot: Robot, name: str, reading: Reading) -> Prediction:
     acting = Acting(reading.model, robot.drive)
     at = Posture(robot, name, acting.along, acting.rows if acting.is_coupled else None, reading.dt)
     why = why_unknown(at)
-    pairs = {} if why else {integrator: limit_at(at, integrator) for integrator in INTEGRATORS}
-    return Prediction(at, why, *({of: value[k] for of, value in pairs.items()} for k in (0, 1)))
+    found = {} if why else {name: limit_at(at, name) for name in INTEGRATORS if name != "implicit"}
+    if found:  # at rest the bias has no derivative by the speeds
+        found = {name: found["implicitfast" if name == "implicit" else name] for name in INTEGRATORS}
+    return Prediction(at, why, *({name: pair[k] for name, pair in found.items()} for k in (0, 1)))
 
 
 def unmodelled(robot: Robot) -> dict[str, str]:
