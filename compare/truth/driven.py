@@ -104,11 +104,9 @@ class Posture:
     @property
     def beyond(self) -> float:
         """How far the rest is beyond the range of a joint, rad or m."""
-        robot, over = self.robot, [0.0]
-        for (kind, place, _), limits in zip(robot.coordinates.places.joints, robot.ranges):
-            if limits and kind != "ball":
-                over += [limits[0] - self.q[place.start], self.q[place.start] - limits[1]]
-        return float(max(over))
+        joints = zip(self.robot.coordinates.places.joints, self.robot.ranges)
+        limited = [(self.q[at.start], limits) for (kind, at, _), limits in joints if limits and kind != "ball"]
+        return float(max((max(low - q, q - high) for q, (low, high) in limited), default=0.0))
 
     @property
     def base_kind(self) -> str:

@@ -43,32 +43,23 @@ def left_to_itself(dynamics: MujocoDynamics, q, qd, tau, dt: float, steps: int, 
 class WholeRun(NamedTuple):
     """A run of a file's model as it is."""
 
-    speeds: (
-        np.ndarray
-    )  # root mean square of all speeds in each part, rad/s and m/s; NaN from the part in which it fails
-    failed_at: (
-        float | None
-    )  # s: a number is bad, and MuJoCo resets the run if the file lets it; None: it runs to its end
-    warnings: int  # of MuJoCo's own
-    resets: int  # to the reference position, by MuJoCo itself
+    speeds: np.ndarray  # root mean square of all speeds in each part, rad/s and m/s; NaN from where it fails
+    failed_at: float | None  # s: MuJoCo warns of a bad number, and resets it where it may; None: it runs to its end
 
 
-def start_of(model: mujoco.MjModel, drive: Drive, key: str = "", q=None, u=None, push=0.0) -> np.ndarray:
-    """The state from which a whole run starts: a keyframe, else qpos0; or the position q (nq,) under u of each actuator.
+def start_of(model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray) -> np.ndarray:
+    """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) rad/s and m/s added to its speeds.
 
-    push: (nv,) rad/s and m/s, added to the speeds. Where no controls are stated the targets of servos are the posture.
+    Where no controls are stated the targets of servos are the posture.
     """
     data = mujoco.MjData(model)
     if key:
         names = [element_name(model, "key", k) for k in range(model.nkey)]
         mujoco.mj_resetDataKeyframe(model, data, names.index(key))
-    data.qpos[:] = data.qpos if q is None else q
     data.qvel[:] += push
-    if u is None:
-        mujoco.mj_fwdPosition(model, data)
-        lengths = [data.actuator_length[output_of(model, i)] for i in range(len(drive.actuators))]
-        u = drive.control(key, lengths)
-    for i, (actuator, value) in enumerate(zip(drive.actuators, u)):
+    mujoco.mj_fwdPosition(model, data)
+    lengths = [data.actuator_length[output_of(model, i)] for i in range(len(drive.actuators))]
+    for i, (actuator, value) in enumerate(zip(drive.actuators, drive.control(key, lengths))):
         place, inputs = control_of(model, i)
         if inputs == 1:
             data.ctrl[place] = 0.0 if actuator.dynamics == "integrator" else value
@@ -88,12 +79,9 @@ def whole_run(
     data, squares, count = mujoco.MjData(m), np.zeros(parts), max(1, round(lasts / parts / dt))
     mujoco.mj_setState(m, data, start, STATE)
     for step in range(parts * count):
-        before = data.time
         mujoco.mj_step(m, data)
         squares[step // count] += data.qvel @ data.qvel / m.nv / count
-        warnings = data.warning.number
-        if not np.isfinite(squares[step // count]) or warnings[BAD].any():
+        if not np.isfinite(squares[step // count]) or data.warning.number[BAD].any():
             squares[step // count :] = np.nan
-            resets = int(data.time <= before)  # the clock starts again
-            return WholeRun(np.sqrt(squares), (step + 1) * dt, int(warnings.sum()), resets)
-    return WholeRun(np.sqrt(squares), None, int(data.warning.number.sum()), 0)
+            return WholeRun(np.sqrt(squares), (step + 1) * dt)
+    return WholeRun(np.sqrt(squares), None)

@@ -87,19 +87,7 @@ def rows(setup: Setup) -> Result:
         servos.add(result, setup, work["servos"])
     if is_large(setup.robot):
         result.top.append(result.finding("large", speeds=setup.robot.coordinates.nv, most=MOST_SPEEDS))
-    else:
-        add_runs_without_servos(result, setup, work)
-    result.tables = {name: table for name, table in result.tables.items() if table}
-    return result
-
-
-def is_large(robot: Robot) -> bool:
-    """Whether a file's robot has so many speeds that compiling its equations takes minutes."""
-    return robot.is_read and robot.coordinates.nv > MOST_SPEEDS
-
-
-def add_runs_without_servos(result: Result, setup: Setup, work: Mapping) -> None:
-    """Step limits and departures of both engines' methods, without actuators."""
+        return result
     subjects = subjects_of(setup.robot)
     robot = subjects.robot
     methods = methods_of(setup.engines, robot)
@@ -121,6 +109,13 @@ def add_runs_without_servos(result: Result, setup: Setup, work: Mapping) -> None
         names=[*robot.postures, *robot.positions], has_actuators=bool(robot.drive.actuators),
         moving=setup.reading is not None and bool(setup.reading.model.key_qvel.any()),
     )  # fmt: skip
+    result.tables = {name: table for name, table in result.tables.items() if table}
+    return result
+
+
+def is_large(robot: Robot) -> bool:
+    """Whether a file's robot has so many speeds that compiling its equations takes minutes."""
+    return robot.is_read and robot.coordinates.nv > MOST_SPEEDS
 
 
 def limits_shown(result: Result) -> list[dict]:

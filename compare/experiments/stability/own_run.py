@@ -8,23 +8,19 @@ import numpy as np
 from ...engines.mujoco import Reading
 from ...engines.mujoco.linear import WholeRun, start_of, whole_run
 from ...judge.check import About, Result
+from ...judge.run import number_or_none
 from ...robots.case import SEED
 from ..setup import Setup
 
 MOST_STARTS = 6  # the first keyframes
 LASTS, LEAST_STEPS, MOST_STEPS = 2.0, 1000, 20_000  # s, and between which numbers of steps it lasts
-LONGER = 5.0  # fold: where it has not come to rest it is run so long
+LONGER = 3.0  # fold: where it has not come to rest it is run so long
 PARTS = 4  # of a run: the speeds of each are averaged
-FINER = (16, 256)  # the step over a finer one; the second where a run at the first fails
+FINER = 16  # the step over the finer one
 PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
 CALM = 1e-3  # rad/s or m/s, root of the mean square
 FASTER = 10.0  # fold, than at the finer step: what moves on by the step alone
 AT_OWN, AT_REQUESTED = "stable in its own run", "stable in its own run at the requested step"
-
-
-def push_of(nv: int) -> np.ndarray:
-    """A small speed by chance, (nv,) rad/s or m/s."""
-    return PUSH * np.random.default_rng(SEED).normal(size=nv)
 
 
 def begin(setup: Setup) -> list:
@@ -44,51 +40,42 @@ def begin(setup: Setup) -> list:
 def own_run(key: str, dt: float, integrator: str, reading: Reading) -> dict:
     """What the file does from a keyframe (or from qpos0, if the name is empty): a row of own_run.csv.
 
-    outcome: calm, it comes to rest; worse, it fails or moves on, and at a finer step it does not; alike, it moves on there
-    too; fails, it fails there too.
+    outcome: calm, it comes to rest; worse, it diverges or moves on, and at a finer step it does not; alike, it moves on there
+    too; fails, it diverges there too.
     """
-    start = start_of(reading.model, reading.drive, key, push=push_of(reading.model.nv))
+    push = PUSH * np.random.default_rng(SEED).normal(size=reading.model.nv)
+    start, finer_dt = start_of(reading.model, reading.drive, key, push), dt / FINER
     lasts = float(np.clip(LASTS, LEAST_STEPS * dt, MOST_STEPS * dt))
 
-    def run(step: float, lasts: float) -> WholeRun:
+    def run(step: float) -> WholeRun:
         with np.errstate(over="ignore", invalid="ignore"):
             return whole_run(reading.model, start, step, integrator, lasts, PARTS)
 
-    own, finer, finer_dt = run(dt, lasts), None, None
+    own, outcome, finer = run(dt), "calm", None
     if not (is_calm(own) or own.failed_at):
-        own = run(dt, LONGER * lasts)
+        lasts *= LONGER
+        own = run(dt)
     if not is_calm(own):
-        for fold in FINER:
-            finer, finer_dt = run(dt / fold, lasts), dt / fold
-            if not finer.failed_at:
-                break
-        if is_worse(own, finer) and not own.failed_at:
-            finer = run(finer_dt, LONGER * lasts)
-    outcome = "calm" if finer is None else "worse" if is_worse(own, finer) else "fails" if own.failed_at else "alike"
+        finer = run(finer_dt)
+        outcome = "worse" if is_worse(own, finer) else "fails" if own.failed_at else "alike"
     return {
-        "start": key or "qpos0", "dt_s": dt, "integrator": integrator, "outcome": outcome, **columns(own, ""),
-        "finer_dt_s": finer_dt, **columns(finer, "finer_"),
+        "start": key or "qpos0", "dt_s": dt, "integrator": integrator, "outcome": outcome, "failed_at_s": own.failed_at,
+        "rms_speed": number_or_none(own.speeds[-1]), "finer_dt_s": finer and finer_dt,
+        "finer_rms_speed": finer and number_or_none(finer.speeds[-1]),
     }  # fmt: skip
-
-
-def columns(run: WholeRun | None, of: str) -> dict:
-    """When a run fails, s, and its speed at the end, rad/s and m/s."""
-    speed = None if run is None or run.failed_at else float(run.speeds[-1])
-    return {f"{of}failed_at_s": run and run.failed_at, f"{of}rms_speed": speed}
 
 
 def is_calm(run: WholeRun) -> bool:
     return bool(run.speeds[-1] < CALM)
 
 
-def bound(finer: WholeRun) -> float:
-    """The largest speed at the end of a run that a finer step explains: of a run that moves on too, that of all its parts."""
-    return max(CALM, FASTER * float(finer.speeds[-1] if is_calm(finer) else finer.speeds.max()))
-
-
 def is_worse(own: WholeRun, finer: WholeRun) -> bool:
-    """Whether a run fails or moves on, and its step is the cause."""
-    return not finer.failed_at and not own.speeds[-1] <= bound(finer)
+    """Whether a run diverges or moves on, and its step is the cause: ten times as fast as at the finer step.
+
+    Of a run that moves on there too, as its fastest part.
+    """
+    speed = finer.speeds[-1] if is_calm(finer) else finer.speeds.max()
+    return not finer.failed_at and not own.speeds[-1] <= max(CALM, FASTER * float(speed))
 
 
 def add(result: Result, work: Sequence) -> None:

@@ -3,17 +3,16 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from ....engines.mujoco.names import INTEGRATORS
 from ....judge.check import AT_OWN_STEP, AT_REQUESTED_STEP, About, Result
 from ....truth.linear import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from ...setup import Setup
-from ..limits import MOST_TOLERANCE, apart
+from ..limits import apart
 from . import findings, lifting, observed, response
+from .observed import OBSERVED_WITHIN
 from .predicted import limit_rows, predicted_at, radii_apart
 
 MOST_POSTURES_DRIVEN = 6  # the first of the named ones
-OBSERVED_WITHIN = 0.01  # relative
 RADII_WITHIN = 1e-4  # of the spectral radius, MuJoCo's is by differences
 TOLERANCES = {"observed": OBSERVED_WITHIN, "radii": RADII_WITHIN}
 
@@ -21,8 +20,7 @@ TOLERANCES = {"observed": OBSERVED_WITHIN, "radii": RADII_WITHIN}
 def begin(setup: Setup) -> dict | None:
     """Predict the limits and start the runs; None: the robot has no actuator, or its numbers are stated.
 
-    All integrators are observed, and run in the full model, at the first posture that has a limit; at others the file's and
-    Euler. A quick run has these two alone and observes, as a run of all experiments does, at one posture; it draws nothing.
+    All integrators are observed at the first posture that has a limit; at others the file's and Euler. A quick run has these two alone and observes, as a run of all experiments does, at one posture; it draws nothing.
     """
     robot, reading = setup.robot, setup.reading
     if reading is None or not robot.drive.actuators:
@@ -39,7 +37,6 @@ def begin(setup: Setup) -> dict | None:
         for name in prediction.known
         if (prediction in shown or name in own) and not prediction.gives_way(name)
     ]
-    full = [(one.at, name) for one in resting for name in (INTEGRATORS if one in shown else own)]
     unstable = [(one, name) for name in own for one in resting if one.is_stable(name, reading.dt) is False]
     worst = {name: one.at for one, name in sorted(unstable, key=lambda pair: -pair[0].longest(pair[1]))}
     drawn = [(one.at, name, one.limits[name].dt) for one in shown for name in one.known]
@@ -53,7 +50,6 @@ def begin(setup: Setup) -> dict | None:
         "radii": start(radii_apart, [(prediction,) for prediction in resting]),
         "errors": start(response.response_error, [(one.at, name) for one in resting for name in one.known]),
         "lifts": start(lifting.lifts, [(at, name) for name, at in worst.items()]),
-        "full": start(observed.full_model, full),
         "curves": start(response.curve, drawn),
     }
 
@@ -70,9 +66,8 @@ def add(result: Result, setup: Setup, work: dict) -> None:
     for (at, name), (kind, dt) in zip(*work["observed"]):
         row = by_place[at.name, name]
         row["observed_dt_s"] = dt
-        check_observed(result, row, kind, observed.shown_beyond(at, name, row["predicted_dt_s"]))
-    for (at, name), run in zip(*work["full"]):
-        by_place[at.name, name].update(run)
+        if dt is None or not row["predicted_dt_s"] or observed.is_shown(at, name, row["predicted_dt_s"]):
+            check_observed(result, row, kind)
     if setup.robot.drive.feeds_back:
         check_step(result, rows, AT_OWN_STEP)
     result.tables["step_limits"] = rows
@@ -104,17 +99,15 @@ def check_radii(result: Result, posture: str, radii: Mapping[str, float]) -> Non
         result.check(f"{posture}, {integrator}", quantity, difference, RADII_WITHIN, "")
 
 
-def check_observed(result: Result, row: dict, kind: str, within: float = 0.0) -> None:
-    """The limit in MuJoCo's runs compared with the predicted one. within: how far beyond it runs show growth, relative."""
+def check_observed(result: Result, row: dict, kind: str) -> None:
+    """The limit in MuJoCo's runs compared with the predicted one."""
     below = kind == "always" and row["limit"] == "finite" and row["predicted_dt_s"] < observed.SOUGHT_FROM
     if kind == row["limit"] == "none" or below:  # shorter steps are not tried
         return
-    off, within = apart(row), max(OBSERVED_WITHIN, within)
-    if within > MOST_TOLERANCE:  # what grows so slowly no run shows
-        return
+    off = apart(row)
     note = f"predicted: {row['limit']}, observed: {kind}" if off is None else ""
     where, quantity = f"{row['posture']}, {row['integrator']}", "step limit with servos, observed / predicted - 1"
-    result.check(where, quantity, off, within, "", note, about=About.PREDICTION)
+    result.check(where, quantity, off, OBSERVED_WITHIN, "", note, about=About.PREDICTION)
 
 
 def limits_in_use(rows: Sequence[dict]) -> list[dict]:

@@ -6,11 +6,9 @@ import numpy as np
 
 from ....engines.mujoco import Reading
 from ....engines.mujoco.acting import Acting
-from ....engines.mujoco.linear import start_of, whole_run
 from ....robots.case import SEED
 from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO, bisected
-from ..own_run import CALM, PARTS, push_of
 from .predicted import acting_at
 
 MOVED_BY, MOVED_LEAST, MOVED_MOST = 1e-6, 1e-8, 1e-5  # rad or m at the start, of a joint of middling inertia; of any
@@ -22,8 +20,8 @@ APART = 0.01  # of a deviation at the start: what constraints do not allow, whic
 RUN_PARTS = 8  # of a run: after each it ends if the deviation has grown far
 GROWN_FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
 GROWN_STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
+OBSERVED_WITHIN = 0.01  # relative
 NARROWED = 1e-3  # relative, between a step that holds and one that does not
-FULL_TIME = 2.0  # s: of a run of the whole file
 
 
 def limit(at: Posture, integrator: str, reading: Reading) -> tuple[str, float | None]:
@@ -55,14 +53,10 @@ def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps
     return max(sizes[3 * RUN_PARTS // 4 :]) > GROWN_STILL * max(1.0, *sizes[: RUN_PARTS // 2])
 
 
-def shown_beyond(at: Posture, integrator: str, dt: float | None) -> float:
-    """How far beyond a limit a run shows that something grows, relative to the limit."""
-    if dt is None or at.small.pole_limit(integrator)[0] <= dt:
-        return 0.0
-    beyond = 0.0
-    while beyond < 1.0 and at.small.growth(integrator, (1.0 + beyond) * dt) ** (NARROWED_STEPS // 2) <= GROWN_STILL:
-        beyond = max(1e-3, 1.1 * beyond)
-    return beyond
+def is_shown(at: Posture, integrator: str, dt: float) -> bool:
+    """Whether a run shows that something grows 1 % beyond a limit."""
+    growth = at.small.growth(integrator, (1.0 + OBSERVED_WITHIN) * dt)
+    return at.small.pole_limit(integrator)[0] <= dt or growth ** (NARROWED_STEPS // 2) > GROWN_STILL
 
 
 def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[np.ndarray]:
@@ -91,20 +85,3 @@ def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: in
     for off in acting.deviations(at.q, at.u, dt, integrator, parts, movement, speed, times * MOVED_BY):
         filters = off[:, len(M) :] / (times * MOVED_BY * np.sqrt(max(1, off.shape[1] - len(M))))
         yield np.hstack([off[:, kept] @ (root / start), filters])
-
-
-def full_model(at: Posture, integrator: str, reading: Reading) -> dict:
-    """The whole file, contacts and friction on, for two seconds at its own step: columns of step_limits.csv.
-
-    It starts at the posture itself, which need not be where it rests.
-    """
-    start = start_of(reading.model, at.robot.drive, q=at.start, u=at.u, push=push_of(reading.model.nv))
-    with np.errstate(over="ignore", invalid="ignore"):
-        run = whole_run(reading.model, start, reading.dt, integrator, FULL_TIME, PARTS)
-    speed = float(run.speeds[-1])
-    return {
-        "full_model_rms_speed": speed if np.isfinite(speed) else None,
-        "full_model_warnings": run.warnings,
-        "full_model_resets": run.resets,
-        "full_model_calm": speed < CALM,
-    }

@@ -16,7 +16,6 @@ from ....truth.step_limits import LIMIT_UP_TO, Limit
 MOST_RESTS, SAME_REST = 4, 1e-3  # of limits, each at the rest with the one before; steps that are one, relative
 STILL_THERE, GIVEN_WAY = 1e-6, 0.01  # rad or m: by less nothing moves; by more the limit is that of another posture
 ASIDE_OF_LIMIT = 1e-2  # of a limit: where a step of MuJoCo is compared
-FULL_MODEL = ("full_model_rms_speed", "full_model_warnings", "full_model_resets", "full_model_calm")  # columns
 KNOWN = ("finite", "none")  # kinds of limits
 OUT_OF_RANGE = 1e-3  # rad or m: a rest farther beyond the range of a joint is one on its limit, which is off here
 ADHESION = "a transmission of type body"  # it acts in contacts alone
@@ -33,7 +32,7 @@ class Prediction(NamedTuple):
     @property
     def known(self) -> list[str]:
         """The integrators that have a limit, or are known to have none."""
-        return [name for name, limit in self.limits.items() if limit.limit in KNOWN]
+        return [name for name in INTEGRATORS if name in self.limits and self.limits[name].limit in KNOWN]
 
     def gives_way(self, integrator: str) -> bool:
         """Whether soft constraints give way at a limit to another posture: that limit is not observed."""
@@ -62,7 +61,7 @@ def predicted_at(robot: Robot, name: str, reading: Reading) -> Prediction:
     why = why_unknown(at)
     found = {} if why else {name: limit_at(at, name) for name in INTEGRATORS if name != "implicit"}
     if found:  # at rest the bias has no derivative by the speeds
-        found = {name: found["implicitfast" if name == "implicit" else name] for name in INTEGRATORS}
+        found["implicit"] = found["implicitfast"]
     return Prediction(at, why, *({name: pair[k] for name, pair in found.items()} for k in (0, 1)))
 
 
@@ -110,7 +109,7 @@ def limit_rows(predictions: Sequence[Prediction], dt: float, integrator: str) ->
                 "predicted_dt_s": limit.dt and float(limit.dt), "observed_dt_s": None, "file_dt_s": dt,
                 "file_integrator": integrator, "stable_at_file_dt": prediction.is_stable(name, dt),
                 "limiting_joint": limit.joint if limit.limit == "finite" else None, "mode_per_s": limit.rate,
-                "mode_kind": limit.kind or None, "step_response_error": None, **dict.fromkeys(FULL_MODEL),
+                "mode_kind": limit.kind or None, "step_response_error": None,
             })  # fmt: skip
     return rows
 
