@@ -27,6 +27,7 @@ def claim_values(robot: Robot) -> dict:
         "unit": unit_of_movements(robot),
         "servos": servos.TOLERANCES if robot.drive.actuators else None,
         "most": limits.MOST_TOLERANCE,
+        "run": {"push": own_run.PUSH, "calm": own_run.CALM, "faster": own_run.FASTER, "finer": own_run.FINER},
     }
 
 

@@ -36,12 +36,13 @@ def limit_rows(
         kind, predicted = at.limit(method.scheme)
         rate, tolerance, duration, tried = fastest, LIMIT_TOLERANCE, np.inf, TRIED_OF_FASTEST / fastest
         if kind != "never_fails":  # just above the limit its mode grows fastest
-            rate = at.growing_rate(method.scheme, 1.001 * predicted if predicted else 1e-2)
+            rate = at.growing_rate(method.scheme, 1.001 * predicted if predicted else tried[0])
         if predicted:
             tolerance = limit_tolerance(at, method.scheme, predicted, steps)
             duration, tried = predicted * quarter_of(at, predicted, steps), predicted * TRIED_ABOUT
-        if kind == "always_fails" and not growth_shows(at, method.scheme, tried[0], steps):
-            tolerance = np.inf
+        if kind == "always_fails":
+            duration = tried[0] * quarter_of(at, tried[0], steps)
+            tolerance = LIMIT_TOLERANCE if growth_shows(at, method.scheme, tried[0], steps) else np.inf
         seen, observed = None, None
         if not is_read or is_shown(at, tolerance, duration, rate):
             seen, observed = observed_limit(method, engines, at, steps, tried)

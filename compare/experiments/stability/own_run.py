@@ -7,9 +7,11 @@ import numpy as np
 
 from ...engines.mujoco import Reading
 from ...engines.mujoco.linear import WholeRun, start_of, whole_run
+from ...engines.mujoco.names import on
 from ...judge.check import About, Result
 from ...judge.run import number_or_none
 from ...robots.case import SEED
+from ...robots.file import names_of_keys
 from ..setup import Setup
 
 MOST_STARTS = 6  # the first keyframes
@@ -20,6 +22,7 @@ FINER = 16  # the step over the finer one
 PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
 CALM = 1e-3  # rad/s or m/s, root of the mean square
 FASTER = 10.0  # fold, than at the finer step: what moves on by the step alone
+FULL_MODEL = ("full_model_rms_speed", "full_model_warnings", "full_model_resets", "full_model_calm")  # columns
 AT_OWN, AT_REQUESTED = "stable in its own run", "stable in its own run at the requested step"
 
 
@@ -58,9 +61,11 @@ def own_run(key: str, dt: float, integrator: str, reading: Reading) -> dict:
     if not is_calm(own):
         finer = run(finer_dt)
         outcome = "worse" if is_worse(own, finer) else "fails" if own.failed_at else "alike"
+    failed = own.failed_at is not None
+    values = number_or_none(own.speeds[-1]), int(failed), int(failed and on(reading.model, "AUTORESET")), is_calm(own)
     return {
-        "start": key or "qpos0", "dt_s": dt, "integrator": integrator, "outcome": outcome, "failed_at_s": own.failed_at,
-        "rms_speed": number_or_none(own.speeds[-1]), "finer_dt_s": finer and finer_dt,
+        "start": names_of_keys(reading).get(key, "qpos0"), "dt_s": dt, "integrator": integrator, "outcome": outcome,
+        "failed_at_s": own.failed_at, **dict(zip(FULL_MODEL, values)), "finer_dt_s": finer and finer_dt,
         "finer_rms_speed": finer and number_or_none(finer.speeds[-1]),
     }  # fmt: skip
 
@@ -82,12 +87,13 @@ def add(result: Result, work: Sequence) -> None:
     """The rows, a check of each, and what is said of the worst start."""
     order = ("worse", "fails", "alike", "calm")
     for quantity, rows in work:
-        rows = sorted(rows, key=lambda row: (order.index(row["outcome"]), row["rms_speed"] is not None))
+        rows = sorted(rows, key=lambda row: (order.index(row["outcome"]), row["failed_at_s"] is None))
         for row in rows:
             note = f"{1e3 * row['dt_s']:.4g} ms with {row['integrator']}"
             passed = row["outcome"] in ("alike", "calm")
             result.check(row["start"], quantity, int(passed), 1, "runs", note, rule="equal", about=About.STEP)
         result.tables.setdefault("own_run", []).extend(rows)
         others = sum(row["outcome"] == rows[0]["outcome"] for row in rows[1:])
-        worst = result.finding("own_run", **rows[0], requested=quantity == AT_REQUESTED, others=others, calm=CALM)
-        result.top.append(worst)
+        values = {name: rows[0][name] for name in rows[0] if name not in FULL_MODEL[1:]}
+        values |= {"requested": quantity == AT_REQUESTED, "others": others, "calm": CALM}
+        result.top.append(result.finding("own_run", **values))

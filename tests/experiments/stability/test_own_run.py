@@ -6,6 +6,7 @@ from servo_models import posture_of
 
 from compare.engines.mujoco import engine, reading
 from compare.engines.mujoco.linear import WholeRun
+from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments import stability
 from compare.experiments.setup import Setup, engines
 from compare.experiments.stability import own_run
@@ -110,4 +111,8 @@ def test_constraints_of_a_sparse_jacobian_and_a_pickled_model():
 def test_a_robot_of_many_speeds_has_its_servo_limits_alone(quick):
     result = quick(hinge(actuator=STIFF))
     assert result.tables.keys() == {"own_run", "step_limits"} and not result.rows
+    calm = {
+        row["integrator"]: row["full_model_calm"] for row in result.tables["step_limits"] if row["posture"] == "aside"
+    }
+    assert calm == dict.fromkeys(INTEGRATORS) | {"Euler": False}
     assert [finding.kind for finding in result.top] == ["own_run", "step", "large"]

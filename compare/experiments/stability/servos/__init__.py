@@ -8,6 +8,7 @@ from ....truth.linear import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from ...setup import Setup
 from ..limits import apart
+from ..own_run import FULL_MODEL
 from . import findings, lifting, observed, response
 from .observed import OBSERVED_WITHIN
 from .predicted import limit_rows, predicted_at, radii_apart
@@ -20,7 +21,8 @@ TOLERANCES = {"observed": OBSERVED_WITHIN, "radii": RADII_WITHIN}
 def begin(setup: Setup) -> dict | None:
     """Predict the limits and start the runs; None: the robot has no actuator, or its numbers are stated.
 
-    All integrators are observed at the first posture that has a limit; at others the file's and Euler. A quick run has these two alone and observes, as a run of all experiments does, at one posture; it draws nothing.
+    All integrators are observed at the first posture that has a limit; at others the file's and Euler. A quick run has these
+    two alone and observes, as a run of all experiments does, at one posture; it draws nothing.
     """
     robot, reading = setup.robot, setup.reading
     if reading is None or not robot.drive.actuators:
@@ -61,6 +63,9 @@ def add(result: Result, setup: Setup, work: dict) -> None:
     by_place = {(row["posture"], row["integrator"]): row for row in rows}
     for (at, name), error in zip(*work["errors"]):
         by_place[at.name, name]["step_response_error"] = error
+    for run in result.tables.get("own_run", ()):
+        if (place := (run["start"], run["integrator"])) in by_place and run["dt_s"] == reading.dt:
+            by_place[place].update({name: run[name] for name in FULL_MODEL})
     for (prediction,), radii in zip(*work["radii"]):
         check_radii(result, prediction.at.name, radii)
     for (at, name), (kind, dt) in zip(*work["observed"]):

@@ -1,4 +1,4 @@
-"""Runs of MuJoCo under a robot's own servos: the largest stable step, and the whole file at its own step."""
+"""Runs of MuJoCo under a robot's own servos: the largest stable step."""
 
 from collections.abc import Iterator
 

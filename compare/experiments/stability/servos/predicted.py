@@ -12,6 +12,7 @@ from ....engines.mujoco.names import INTEGRATORS
 from ....robots import Robot
 from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO, Limit
+from ..own_run import FULL_MODEL
 
 MOST_RESTS, SAME_REST = 4, 1e-3  # of limits, each at the rest with the one before; steps that are one, relative
 STILL_THERE, GIVEN_WAY = 1e-6, 0.01  # rad or m: by less nothing moves; by more the limit is that of another posture
@@ -109,7 +110,7 @@ def limit_rows(predictions: Sequence[Prediction], dt: float, integrator: str) ->
                 "predicted_dt_s": limit.dt and float(limit.dt), "observed_dt_s": None, "file_dt_s": dt,
                 "file_integrator": integrator, "stable_at_file_dt": prediction.is_stable(name, dt),
                 "limiting_joint": limit.joint if limit.limit == "finite" else None, "mode_per_s": limit.rate,
-                "mode_kind": limit.kind or None, "step_response_error": None,
+                "mode_kind": limit.kind or None, "step_response_error": None, **dict.fromkeys(FULL_MODEL),
             })  # fmt: skip
     return rows
 
