@@ -23,7 +23,7 @@ PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would st
 CALM = 1e-3  # rad/s or m/s, root of the mean square
 FASTER = 10.0  # fold, than at the finer step: what moves on by the step alone
 FULL_MODEL = ("full_model_rms_speed", "full_model_warnings", "full_model_resets", "full_model_calm")  # columns
-AT_OWN, AT_REQUESTED = "stable in its own run", "stable in its own run at the requested step"
+AT_OWN, AT_REQUESTED = "stable in its own run", "stable in its run"
 
 
 def begin(setup: Setup) -> list:
