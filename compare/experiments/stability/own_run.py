@@ -33,11 +33,10 @@ def begin(setup: Setup) -> list:
         return []
     steps = [(AT_OWN, reading.dt, reading.integrator)] + ([(AT_REQUESTED, *setup.step)] if setup.step else [])
     starts = list(reading.keyframes)[:MOST_STARTS] or [""]
-
-    def start(dt: float, integrator: str):
-        return setup.map(partial(own_run, dt=dt, integrator=integrator, reading=reading), starts)
-
-    return [(quantity, start(*step)) for quantity, *step in steps]
+    return [
+        (quantity, setup.map(partial(own_run, dt=dt, integrator=name, reading=reading), starts))
+        for quantity, dt, name in steps
+    ]
 
 
 def own_run(key: str, dt: float, integrator: str, reading: Reading) -> dict:

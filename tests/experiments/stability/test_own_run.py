@@ -23,6 +23,9 @@ SPARSE = """<mujoco><option jacobian="sparse"/><worldbody>
   <body><joint name="a"/><geom size="0.1"/></body><body><joint name="b"/><geom size="0.1"/></body></worldbody>
   <equality><joint joint1="a"/><joint joint1="a" joint2="b"/></equality>
   <actuator><position joint="b" kp="50" kv="1"/></actuator></mujoco>"""
+WELDED = """<mujoco><worldbody><body name="a"><joint name="lift" type="slide"/><geom size="0.1"/></body>
+  <body name="b" pos="1 0 0"><freejoint/><geom size="0.1"/></body></worldbody><equality><weld body1="a" body2="b"/></equality>
+  <actuator><position joint="lift" kp="50"/></actuator></mujoco>"""
 STIFF = '<position joint="swing" kp="0.2" kv="1"/>'
 SATURATED = '<position joint="swing" kp="5" kv="0.01" forcerange="-0.1 0.1"/>'
 
@@ -88,6 +91,7 @@ def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step(quick):
 
 @pytest.mark.parametrize("source, why", [
     (hinge(option='viscosity="1"', actuator=STIFF), "not_judged"),
+    (WELDED, "tied"),
     (hinge('range="0 1" limited="true"', actuator=STIFF, key='<key qpos="0" ctrl="-0.5"/>'), "out_of_range"),
 ])  # fmt: skip
 def test_what_is_not_modelled_has_no_limit(quick, source, why):

@@ -34,21 +34,12 @@ def find_answer(
         return
     off = {actuator.name: actuator.off for actuator in drive.actuators if actuator.off}
     answer = result.finding(
-        "step",
-        "servos",
-        dt=dt,
-        integrator=integrator,
-        requested=requested,
-        has_servos=drive.feeds_back,
-        own=verdict(rows, integrator),
-        default=default,
-        default_dt=DEFAULT_STEP[0],
+        "step", "servos", dt=dt, integrator=integrator, requested=requested, has_servos=drive.feeds_back,
+        own=verdict(rows, integrator), default=default, default_dt=DEFAULT_STEP[0], unmodelled=unknown,
         without={row["posture"]: row["limit"] for row in rows if row["limit"] not in KNOWN},
-        unmodelled=unknown,
         left_out={name: why for name, why in (drive.refused | off).items() if name not in unknown},
-        contacts=any(feature.feature == "contact" for feature in at.robot.features),
-        floats=bool(at.base),
-    )
+        contacts=any(feature.feature == "contact" for feature in at.robot.features), floats=bool(at.base),
+    )  # fmt: skip
     result.top.append(answer)
 
 
@@ -63,13 +54,11 @@ def verdict(rows: Sequence[dict], integrator: str) -> dict:
     bad = [row for row in mine if not row["stable_at_file_dt"]]
     where = [row["posture"] for row in bad or mine]
     return {
-        "stable": not bad,
-        "postures": [] if len(where) == len(postures) else where,
-        "limit": mine[0]["predicted_dt_s"],
-        "joint": mine[0]["limiting_joint"],
+        "stable": not bad, "postures": [] if len(where) == len(postures) else where,
+        "limit": mine[0]["predicted_dt_s"], "joint": mine[0]["limiting_joint"],
         "posture": mine[0]["posture"] if len(postures) > 1 else None,
         "error": max(row["step_response_error"] or 0.0 for row in mine),
-    }
+    }  # fmt: skip
 
 
 def find_notes(result: Result, rows: Sequence[dict], predictions: Sequence[Prediction]) -> None:
