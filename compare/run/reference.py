@@ -66,8 +66,8 @@ class Compared(NamedTuple):
         """The step, s, and the integrator of --dt and --integrator, the file's where one is None; None: both are."""
         if dt is None and integrator is None:
             return None
-        if self.reading is None or not self.robot.drive.actuators:
-            raise ModelError(f"--dt and --integrator need the servos of a robot's file; {self.robot.name} has none")
+        if self.reading is None:
+            raise ModelError(f"--dt and --integrator need a robot's file; the numbers of {self.robot.name} are stated")
         try:
             return self.reading.dt if dt is None else dt, integrator_by_name(integrator or self.reading.integrator)
         except ValueError as error:

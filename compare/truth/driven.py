@@ -13,7 +13,7 @@ from tmt.methods import by_speed, lone_speeds
 from ..robots.actuators import Rows
 from .rest import carries
 from .servos import Driven, constraint_terms
-from .step_limits import Small
+from .step_limits import SYMMETRIC, Small
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,22 @@ class Posture:
         return [k for body in floating(tree) if not held[body].any() for k in body if k not in self.lone]
 
     @property
+    def is_tied(self) -> bool:
+        """Whether an equality holds a free body from outside: it is violated where the body is displaced."""
+        if self.rows is None:
+            return False
+        slides = [k for body in floating(self.robot.tree) for k in body[:3]]
+        jacobian = self.rows(self.start, self.dt, self.integrator).jacobian[:, slides]
+        return bool(np.abs(jacobian).max(initial=0.0) > SYMMETRIC)
+
+    @property
+    def beyond(self) -> float:
+        """How far the rest is beyond the range of a joint, rad or m."""
+        joints = zip(self.robot.coordinates.places.joints, self.robot.ranges)
+        limited = [(self.q[at.start], limits) for (kind, at, _), limits in joints if limits and kind != "ball"]
+        return float(max((max(low - q, q - high) for q, (low, high) in limited), default=0.0))
+
+    @property
     def base_kind(self) -> str:
         """fixed: to the world; free: it floats without gravity."""
         return "free" if self.base else "fixed"
@@ -110,10 +126,12 @@ class Posture:
         speeds = np.array(tree.damping) * (not drive.explicit_damping)
         filters = [act for act in drive.actuators if act.acts and act.dynamics in ("filter", "filterexact")]
         on_path = carries(tree) | carries(tree).T
+        turning = constraint_terms(self.driven.rows, self.robot.coordinates, self.q)[2]
+        turning[self.base] = turning[:, self.base] = 0.0  # what holds joints together turns with the base
         return Small(
             names=self.robot.coordinates.speeds,
             M=np.array(mass_matrix_and_bias(tree, self.q.tolist(), [0.0] * len(speeds))[0]),
-            K=slopes.K + constraint_terms(self.driven.rows, self.robot.coordinates, self.q)[2],
+            K=slopes.K + turning,
             D=slopes.D,
             damping=speeds,
             springs=slopes.springs,

@@ -1,7 +1,7 @@
 """Forces and their derivatives at rest under a robot's own servos: K and D of M x'' + D x' + K x = 0 for small deviations x."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -139,8 +139,17 @@ class Driven:
     def at_rest(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
         """The nearest posture at rest, by Newton's method from q, and the residual force; 0.0: it rests.
 
-        Downhill if K is symmetric, so that it does not climb to a saddle.
+        A force at the end of its range has no slope: then the search starts where the servos would rest without ranges.
         """
+        rest, left = self.sought_rest(q, u)
+        if left and self.cut(q, u):
+            actuators = tuple(replace(actuator, force_range=None) for actuator in self.drive.actuators)
+            unlimited = replace(self, drive=replace(self.drive, actuators=actuators))
+            return self.sought_rest(unlimited.sought_rest(q, u)[0], u)
+        return rest, left
+
+    def sought_rest(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
+        """See at_rest. Downhill if K is symmetric, so that it does not climb to a saddle."""
         best, left, scale = q, np.inf, 0.0
         for _ in range(REST_STEPS):
             force, largest = self.forces(q, u)

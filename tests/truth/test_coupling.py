@@ -66,6 +66,14 @@ def test_a_mimic_has_the_modes_of_both_masses_and_a_lower_limit_than_a_rigid_one
     assert small.limit("Euler").dt < 0.99 * rigid
 
 
+def test_a_floating_base_turns_with_the_constraints_that_it_carries():
+    source = FOUR_BARS.replace("<worldbody>", '<worldbody><body><freejoint/><geom fromto="0 0 0 0.2 0 0" mass="3"/>')
+    source = source.replace("</worldbody>", "</body></worldbody>").replace(
+        "</actuator>", '<position joint="rocker" kp="20" kv="1"/></actuator><keyframe><key ctrl="0.4 -0.4"/></keyframe>'
+    )  # the servos load the loop
+    assert predicted(source)[0].at.small.names == ("crank", "coupler", "rocker")
+
+
 def test_constraints_at_rest_carry_what_mujoco_says_and_are_stiff_by_turning():
     at, reading = posture_of(FOUR_BARS)
     assert at.rest[1] == 0.0

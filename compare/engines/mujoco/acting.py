@@ -1,6 +1,7 @@
 """A file's model in MuJoCo with its actuators at rest: their moments, constraints, linearized steps, and runs nearby."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from types import MappingProxyType
 
 import mujoco
@@ -66,6 +67,13 @@ class Acting:
         kinds = tuple(kind for of_joint in kinds for kind in of_joint)
         self.coordinates = Coordinates(tuple(map(str, range(len(kinds)))), kinds)
 
+    def __getstate__(self) -> dict:
+        return {name: value for name, value in self.__dict__.items() if name != "data"}
+
+    def __setstate__(self, state: dict) -> None:
+        self.__dict__.update(state)
+        self.data = mujoco.MjData(self.model)  # a pickled one with a plugin ends the process
+
     def along(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Lengths (k,) and moments (k, nv) of all actuators and then of the tendons that pull, at a posture."""
         m, d = self.model, self.data
@@ -95,10 +103,11 @@ class Acting:
         k, damping, impedance, slope = data.efc_KBIP.reshape(data.nefc, 4).T
         violation, stiffness, R = data.efc_pos - data.efc_margin, k * impedance, data.efc_R.copy()
         less = 1.0 + (dt * damping + dt * dt * stiffness) * discrete
-        jacobian = data.efc_J.reshape(data.nefc, -1).copy()
+        jacobian = np.zeros((data.nefc, model.nv))
         if mujoco.mj_isSparse(model):
-            jacobian = np.zeros((data.nefc, model.nv))
             mujoco.mju_sparse2dense(jacobian, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
+        else:
+            jacobian[:] = data.efc_J.reshape(jacobian.shape)
         return Rows(
             jacobian,
             forces=-stiffness * violation / (less * R),
@@ -170,13 +179,11 @@ class Acting:
         self, damping: Mapping[int, float] | None = None, armature: Mapping[int, float] | None = None
     ) -> "Acting":
         """A copy with other speed gains kv of actuators, by number, and more armature of speeds, kg m2 or kg."""
-        other = object.__new__(Acting)
-        other.__dict__.update(self.__dict__ | {"model": mujoco.MjModel.__copy__(self.model)})
+        other = deepcopy(self)
         for i, kv in (damping or {}).items():
             other.model.actuator_biasprm[i, 2] = -kv
         for k, more in (armature or {}).items():
             add_armature(other.model, [k], more)
-        other.data = mujoco.MjData(other.model)
         return other
 
     def transition(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> np.ndarray:

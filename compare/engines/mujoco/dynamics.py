@@ -251,7 +251,9 @@ def convective_accelerations(dynamics: MujocoDynamics, q: np.ndarray, v: np.ndar
             mujoco.mj_objectAcceleration(model, d, mujoco.mjtObj.mjOBJ_BODY, body, row, 0)
         return both[:, 3:], dynamics._to_body(both[:, :3])
 
-    model.opt.gravity[:] = 0.0
-    v_conv, w_conv = np.moveaxis(dynamics._each(terms, q, v), -3, 0)
-    model.opt.gravity[:] = gravity
+    try:
+        model.opt.gravity[:] = 0.0
+        v_conv, w_conv = np.moveaxis(dynamics._each(terms, q, v), -3, 0)
+    finally:
+        model.opt.gravity[:] = gravity
     return v_conv, w_conv

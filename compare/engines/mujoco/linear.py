@@ -8,9 +8,11 @@ import numpy as np
 from ...robots.actuators import Drive
 from .actuators import control_of
 from .dynamics import MujocoDynamics
-from .names import INTEGRATORS, bit
+from .names import INTEGRATORS, bit, element_name, output_of
 
 NUDGE = 1e-6  # of central differences, rad and rad/s
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
+BAD = [int(getattr(mujoco.mjtWarning, f"mjWARN_BADQ{what}")) for what in ("POS", "VEL", "ACC")]
 
 
 def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str) -> np.ndarray:
@@ -41,38 +43,45 @@ def left_to_itself(dynamics: MujocoDynamics, q, qd, tau, dt: float, steps: int, 
 class WholeRun(NamedTuple):
     """A run of a file's model as it is."""
 
-    rms_speed: float  # root mean square of all speeds in the last part, rad/s and m/s; NaN: it is not finite
-    warnings: int  # of MuJoCo's own
-    resets: int  # to the reference position, by MuJoCo itself
+    speeds: np.ndarray  # root mean square of all speeds in each part, rad/s and m/s; NaN from where it fails
+    failed_at: float | None  # s: MuJoCo warns of a bad number, and resets it where it may; None: it runs to its end
 
 
-def whole_run(model: mujoco.MjModel, drive: Drive, q, u, dt, integrator: str, lasts, last, speed=0.0) -> WholeRun:
-    """A run from q under constant u of each actuator, with contacts, limits, friction and force ranges.
+def start_of(model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray) -> np.ndarray:
+    """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) rad/s and m/s added to its speeds.
 
-    lasts: its duration, s; last: the duration of the part at its end that is judged, s. After a reset by MuJoCo the controls and
-    the speed are set again.
+    Where no controls are stated the targets of servos are the posture.
     """
+    data = mujoco.MjData(model)
+    if key:
+        names = [element_name(model, "key", k) for k in range(model.nkey)]
+        mujoco.mj_resetDataKeyframe(model, data, names.index(key))
+    data.qvel[:] += push
+    mujoco.mj_fwdPosition(model, data)
+    lengths = [data.actuator_length[output_of(model, i)] for i in range(len(drive.actuators))]
+    for i, (actuator, value) in enumerate(zip(drive.actuators, drive.control(key, lengths))):
+        place, inputs = control_of(model, i)
+        if inputs == 1:
+            data.ctrl[place] = 0.0 if actuator.dynamics == "integrator" else value
+        if actuator.dynamics != "none":
+            data.act[model.actuator_actadr[i]] = value
+    state = np.zeros(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, state, STATE)
+    return state
+
+
+def whole_run(
+    model: mujoco.MjModel, start: np.ndarray, dt: float, integrator: str, lasts: float, parts: int
+) -> WholeRun:
+    """A run from start_of a model, with contacts, limits, friction, fluid and force ranges, for `lasts` s or until it fails."""
     m = mujoco.MjModel.__copy__(model)
     m.opt.timestep, m.opt.integrator = dt, INTEGRATORS[integrator]
-    data, controls = mujoco.MjData(m), np.zeros(m.nu)
-    data.qpos[:], data.qvel[:] = q, speed
-    for i, (one, value) in enumerate(zip(drive.actuators, u)):
-        place, inputs = control_of(m, i)
-        if inputs == 1:
-            controls[place] = 0.0 if one.dynamics == "integrator" else value
-        if one.dynamics != "none":
-            data.act[m.actuator_actadr[i]] = value
-    steps, squares, warnings, resets, counted = max(1, round(lasts / dt)), [], 0, 0, 0
-    judged = steps - max(1, round(last / dt))
-    for step in range(steps):
-        before = data.time
-        data.ctrl[:] = controls
+    data, squares, count = mujoco.MjData(m), np.zeros(parts), max(1, round(lasts / parts / dt))
+    mujoco.mj_setState(m, data, start, STATE)
+    for step in range(parts * count):
         mujoco.mj_step(m, data)
-        number = int(data.warning.number.sum())
-        if data.time <= before:  # it starts to count again
-            resets, counted = resets + 1, 0
-            data.qvel[:] = speed
-        warnings, counted = warnings + number - counted, number
-        if step >= judged:
-            squares.append(data.qvel @ data.qvel / m.nv)
-    return WholeRun(float(np.sqrt(np.mean(squares))), warnings, resets)
+        squares[step // count] += data.qvel @ data.qvel / m.nv / count
+        if not np.isfinite(squares[step // count]) or data.warning.number[BAD].any():
+            squares[step // count :] = np.nan
+            return WholeRun(np.sqrt(squares), (step + 1) * dt)
+    return WholeRun(np.sqrt(squares), None)

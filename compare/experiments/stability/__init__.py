@@ -12,11 +12,12 @@ from ...robots.case import Case
 from ...truth.linear import held
 from .. import Experiment
 from ..setup import Setup
-from . import claims, departure, failure, limits, servos
+from . import claims, departure, failure, limits, own_run, servos
 from .equilibria import check_equilibria
 from .subjects import DAMPINGS, SCHEMES, Subjects, coarsest_case, methods_of, subjects_of, unit_of_movements
 
 EXPERIMENT = Experiment(order=100, serves_own=False, options=("--dt", "--integrator"), overview="limits")
+MOST_SPEEDS = 60  # of a file's robot: with more there are no runs without servos
 FINE_STEPS = (1e-2, 1e-3)  # s, of departures, in addition to the coarsest step
 
 
@@ -26,6 +27,7 @@ def claim_values(robot: Robot) -> dict:
         "unit": unit_of_movements(robot),
         "servos": servos.TOLERANCES if robot.drive.actuators else None,
         "most": limits.MOST_TOLERANCE,
+        "run": {"push": own_run.PUSH, "calm": own_run.CALM, "faster": own_run.FASTER, "finer": own_run.FINER},
     }
 
 
@@ -42,6 +44,10 @@ def reset_case(subjects: Subjects) -> Case | None:
 
 def begin(setup: Setup) -> None:
     """Start the runs. A quick run takes fewer methods and scenes, and no fine steps."""
+    own = {"own run": own_run.begin(setup), "servos": servos.begin(setup)}
+    if is_large(setup.robot):
+        setup.background["stability"] = own
+        return
     engines, of, subjects = setup.engines, setup.of, subjects_of(setup.robot)
     robot, centres, saddles = subjects
     few = methods_of(engines, robot, SCHEMES)
@@ -61,8 +67,7 @@ def begin(setup: Setup) -> None:
     def start(function, items, **more):
         return setup.map(partial(function, engines=engines, **more), items)
 
-    setup.background["stability"] = {
-        "servos": servos.begin(setup),
+    setup.background["stability"] = own | {
         "limits": start(limits.limit_rows, at, methods=methods, steps=steps),
         "departure": start(departure.departures, dts if saddles else (), at=saddle, methods=few),
         "torques": start(claims.holding_torques, claimed),
@@ -77,12 +82,17 @@ def rows(setup: Setup) -> Result:
     result = Result("stability")
     if "stability" not in setup.background:
         begin(setup)
-    work, subjects = setup.background.pop("stability"), subjects_of(setup.robot)
+    work = setup.background.pop("stability")
+    own_run.add(result, work["own run"])
+    if work["servos"]:
+        servos.add(result, setup, work["servos"])
+    if is_large(setup.robot):
+        result.top.append(result.finding("large", speeds=setup.robot.coordinates.nv, most=MOST_SPEEDS))
+        return result
+    subjects = subjects_of(setup.robot)
     robot = subjects.robot
     methods = methods_of(setup.engines, robot)
     result.curves |= {"centres": subjects.centres, "schemes": {(m.engine, m.name): m.scheme for m in methods}}
-    if work["servos"]:
-        servos.add(result, setup, work["servos"])
     limits.check_limits(result, [row for part in work["limits"] for row in part])
     check_equilibria(result, setup)
     departure.check_departures(result, [row for part in work["departure"] for row in part])
@@ -97,10 +107,16 @@ def rows(setup: Setup) -> Result:
         failure.check_reset(result, reset_case(subjects), run)
     result.find(
         "examined", noun=robot.noun, is_read=robot.is_read, centres=subjects.centres, saddles=subjects.saddles,
-        names=[*robot.postures, *robot.positions],
+        names=[*robot.postures, *robot.positions], has_actuators=bool(robot.drive.actuators),
+        moving=setup.reading is not None and bool(setup.reading.model.key_qvel.any()),
     )  # fmt: skip
     result.tables = {name: table for name, table in result.tables.items() if table}
     return result
+
+
+def is_large(robot: Robot) -> bool:
+    """Whether a file's robot has so many speeds that compiling its equations takes minutes."""
+    return robot.is_read and robot.coordinates.nv > MOST_SPEEDS
 
 
 def limits_shown(result: Result) -> list[dict]:
@@ -123,7 +139,7 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     rows = limits_shown(result)
     if any(result.curves.get("step response", {"lines": {}})["lines"].values()):
         yield partial(draw_step_response, result, robot)
-    if result.curves["centres"] and any(row["predicted_dt_s"] or row["observed_dt_s"] for row in rows):
+    if result.curves.get("centres") and any(row["predicted_dt_s"] or row["observed_dt_s"] for row in rows):
         yield partial(drawing.draw_limits, result, robot, rows)
     if "departure" in result.tables:
         yield partial(drawing.draw_departure, result, robot)

@@ -100,11 +100,8 @@ def draw_limits(result: Result, robot: Robot, rows: list[dict]) -> tuple[str, Fi
         ax.set_visible(False)
     fig.supxlabel("largest stable dt, s" + " (damping in N m s/rad)" * (not robot.is_read), fontsize=9)
     fig.legend(handles=handles, loc="outside upper center", ncols=3)
-    values = {
-        "deviation": LINEAR_DEVIATION,
-        "unit": unit_of_movements(robot),
-        "has_actuators": bool(robot.drive.actuators),
-    }
+    values = {"deviation": LINEAR_DEVIATION, "unit": unit_of_movements(robot)}
+    values |= {"has_actuators": bool(robot.drive.actuators)}
     first = [row for row in rows if (row["scene"], row["damping"], row["engine"]) == (*panels[0], "tmt")]
     products = {
         look(row["method"])[2]: row["predicted_dt_s"] * row["mode_per_s"] for row in first if row["predicted_dt_s"]
@@ -166,16 +163,8 @@ def draw_torques(ax: Axes, rows: list[dict], robot: Robot) -> None:
         for side, mark, word in ((1, "^", "larger"), (-1, "v", "smaller")):
             mine = [row for row in rows if (row["engine"], row["direction"]) == (engine, side)]
             pushes, times = ([row[key] for row in mine] for key in ("push_rad_per_s2", "observed_s"))
-            label = f"{LABELS[engine]}, to {word} {symbol}"
-            ax.plot(
-                np.array(pushes) * 1e14,
-                times,
-                mark,
-                color=ENGINE_COLOURS[engine],
-                fillstyle=fill,
-                markersize=5,
-                label=label,
-            )
+            looks = {"fillstyle": fill, "markersize": 5, "label": f"{LABELS[engine]}, to {word} {symbol}"}
+            ax.plot(np.array(pushes) * 1e14, times, mark, color=ENGINE_COLOURS[engine], **looks)
     predicted = sorted((row["push_rad_per_s2"] * 1e14, number_or_nan(row["predicted_s"])) for row in rows)
     ax.plot(*np.array(predicted).reshape(-1, 2).T, color="black", linewidth=0.8, label="predicted")
     ax.axvline(0.0, color="black", linewidth=0.5)

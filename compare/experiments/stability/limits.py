@@ -36,10 +36,13 @@ def limit_rows(
         kind, predicted = at.limit(method.scheme)
         rate, tolerance, duration, tried = fastest, LIMIT_TOLERANCE, np.inf, TRIED_OF_FASTEST / fastest
         if kind != "never_fails":  # just above the limit its mode grows fastest
-            rate = at.growing_rate(method.scheme, 1.001 * predicted if predicted else 1e-2)
+            rate = at.growing_rate(method.scheme, 1.001 * predicted if predicted else tried[0])
         if predicted:
             tolerance = limit_tolerance(at, method.scheme, predicted, steps)
             duration, tried = predicted * quarter_of(at, predicted, steps), predicted * TRIED_ABOUT
+        if kind == "always_fails":
+            duration = tried[0] * quarter_of(at, tried[0], steps)
+            tolerance = LIMIT_TOLERANCE if growth_shows(at, method.scheme, tried[0], steps) else np.inf
         seen, observed = None, None
         if not is_read or is_shown(at, tolerance, duration, rate):
             seen, observed = observed_limit(method, engines, at, steps, tried)
@@ -117,10 +120,14 @@ def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
     With little damping a mode hardly grows just above its limit.
     """
     for excess in np.geomspace(LIMIT_TOLERANCE, 1e3, 100):
-        dt = limit * (1.0 + excess)
-        if at.growth(scheme, dt) ** (2 * quarter_of(at, dt, steps)) > 1.0 + GROWTH_MARGIN:
+        if growth_shows(at, scheme, limit * (1.0 + excess), steps):
             break
     return float(excess)
+
+
+def growth_shows(at: Held, scheme: str, dt: float, steps: int) -> bool:
+    """Whether what grows at a step grows enough from the second to the last quarter of a run."""
+    return bool(at.growth(scheme, dt) ** (2 * quarter_of(at, dt, steps)) > 1.0 + GROWTH_MARGIN)
 
 
 def is_shown(at: Held, tolerance: float, duration: float = np.inf, rate: float = np.nan) -> bool:

@@ -76,11 +76,9 @@ def test_a_step_is_stable_up_to_its_limit_where_one_counts(result, more, passed)
     ([True, True], {"limit": "saddle"}, (True, ["q"])),
 ])  # fmt: skip
 def test_the_answer_for_the_files_step(stable, changed, answer):
-    run = {"full_model_calm": False, "full_model_rms_speed": None}
-    rows = [row(stable_at_file_dt=stable[0], **run, **changed), row(posture="q", stable_at_file_dt=stable[1], **run)]
+    rows = [row(stable_at_file_dt=stable[0], **changed), row(posture="q", stable_at_file_dt=stable[1])]
     found = verdict(rows, "Euler")
     assert (found["stable"], found["postures"]) == answer
-    assert found["speed"] == (None if found["stable"] else np.inf) and found["calm"] is found["stable"]
     assert verdict(rows, "RK4") == {"stable": None}
 
 
@@ -165,19 +163,6 @@ def test_what_is_above_the_cap_or_below_the_floor_is_named():
     assert not lifts_of(hinge(2000.0, 5.0), 0.03)["kv"]
 
 
-@pytest.mark.parametrize("joint, start, calm", [
-    ("", 'qpos="0.01"', False), ('frictionloss="5"', 'qpos="0.01"', True),  # friction calms what is unstable
-    ("", "", False),  # what is unstable and rests exactly does not pass for calm
-])  # fmt: skip
-def test_rows_of_the_full_model_say_what_it_does(joint, start, calm):
-    servo, key = '<position name="s" joint="turn" kp="20" kv="300" forcerange="-1 1"/>', f'<key {start} ctrl="0"/>'
-    source = hinge(actuator=servo, joint=joint).replace("</mujoco>", f"<keyframe>{key}</keyframe></mujoco>")
-    at, reading = posture_of(source)
-    shaken, still = (observed.full_model(at, name, reading) for name in ("Euler", "implicitfast"))
-    assert (shaken["full_model_calm"], still["full_model_calm"]) == (calm, True)
-    assert (shaken["full_model_rms_speed"] < 0.01) is calm
-
-
 def read(source, make=Setup.quick, **more):
     found = reading.read(source)
     robot = robot_of(found, "robot.xml")
@@ -200,8 +185,6 @@ def test_a_quick_run_has_every_limit_and_observes_the_files_own_integrator_and_e
     rows = result.tables["step_limits"]
     places = [(row["posture"], row["base"], row["integrator"]) for row in rows]
     assert places == [(posture, "fixed", name) for posture in ("up", "qpos0") for name in INTEGRATORS]
-    calm = {row["integrator"]: row["full_model_calm"] for row in rows if row["full_model_calm"] is not None}
-    assert calm == {"Euler": True, "implicitfast": True}
     seen = {(row["posture"], row["integrator"]) for row in rows if row["observed_dt_s"]}
     assert ("up", "Euler") in seen <= {("up", "Euler"), ("up", "implicitfast")}
     euler = rows[0]

@@ -22,7 +22,7 @@ EDITS = (
     Edit("truth.servos", "Driven.slopes", "D - lost[damping < 0.0].sum(axis=0)", "D", "discrete has implicit what speeds up"),
     Edit("mujoco.actuators", "force_range", "m.jnt_actfrcrange[j] / gear", "m.jnt_actfrcrange[j]",
          "the range of a joint has no gear"),
-    Edit("truth.servos", "Driven.at_rest", "left <= REST_FORCE * scale", "True", "every posture is called a rest"),
+    Edit("truth.servos", "Driven.sought_rest", "left <= REST_FORCE * scale", "True", "every posture is called a rest"),
     Edit("mujoco.acting", "Acting.along", "moments[outputs]", "moments[: len(outputs)]",
          "every actuator has one output"),
     Edit("truth.servos", "REST_FORCE", "1e-9", "1e-1", "a tenth of a force is none"),

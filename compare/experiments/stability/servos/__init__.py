@@ -3,17 +3,17 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from ....engines.mujoco.names import INTEGRATORS
 from ....judge.check import AT_OWN_STEP, AT_REQUESTED_STEP, About, Result
 from ....truth.linear import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from ...setup import Setup
 from ..limits import apart
+from ..own_run import FULL_MODEL
 from . import findings, lifting, observed, response
+from .observed import OBSERVED_WITHIN
 from .predicted import limit_rows, predicted_at, radii_apart
 
 MOST_POSTURES_DRIVEN = 6  # the first of the named ones
-OBSERVED_WITHIN = 0.01  # relative
 RADII_WITHIN = 1e-4  # of the spectral radius, MuJoCo's is by differences
 TOLERANCES = {"observed": OBSERVED_WITHIN, "radii": RADII_WITHIN}
 
@@ -21,8 +21,8 @@ TOLERANCES = {"observed": OBSERVED_WITHIN, "radii": RADII_WITHIN}
 def begin(setup: Setup) -> dict | None:
     """Predict the limits and start the runs; None: the robot has no actuator, or its numbers are stated.
 
-    All integrators are observed, and run in the full model, at the first posture that has a limit; at others the file's and
-    Euler. A quick run has these two alone and observes, as a run of all experiments does, at one posture; it draws nothing.
+    All integrators are observed at the first posture that has a limit; at others the file's and Euler. A quick run has these
+    two alone and observes, as a run of all experiments does, at one posture; it draws nothing.
     """
     robot, reading = setup.robot, setup.reading
     if reading is None or not robot.drive.actuators:
@@ -32,14 +32,13 @@ def begin(setup: Setup) -> dict | None:
     finite = [prediction for prediction in resting if any(limit.dt for limit in prediction.limits.values())]
     examined = resting if setup.alone and not setup.is_quick else finite[:1]
     shown = finite[:1] if not setup.is_quick else []  # where all integrators are run
-    own = tuple(dict.fromkeys((reading.integrator, findings.DEFAULT_INTEGRATOR)))
+    own = tuple(dict.fromkeys((reading.integrator, findings.DEFAULT_STEP[1])))
     tried = [
         (prediction.there[name], name)
         for prediction in examined
         for name in prediction.known
         if (prediction in shown or name in own) and not prediction.gives_way(name)
     ]
-    full = [(one.at, name) for one in resting for name in (INTEGRATORS if one in shown else own)]
     unstable = [(one, name) for name in own for one in resting if one.is_stable(name, reading.dt) is False]
     worst = {name: one.at for one, name in sorted(unstable, key=lambda pair: -pair[0].longest(pair[1]))}
     drawn = [(one.at, name, one.limits[name].dt) for one in shown for name in one.known]
@@ -53,7 +52,6 @@ def begin(setup: Setup) -> dict | None:
         "radii": start(radii_apart, [(prediction,) for prediction in resting]),
         "errors": start(response.response_error, [(one.at, name) for one in resting for name in one.known]),
         "lifts": start(lifting.lifts, [(at, name) for name, at in worst.items()]),
-        "full": start(observed.full_model, full),
         "curves": start(response.curve, drawn),
     }
 
@@ -65,14 +63,16 @@ def add(result: Result, setup: Setup, work: dict) -> None:
     by_place = {(row["posture"], row["integrator"]): row for row in rows}
     for (at, name), error in zip(*work["errors"]):
         by_place[at.name, name]["step_response_error"] = error
+    for run in result.tables.get("own_run", ()):
+        if (place := (run["start"], run["integrator"])) in by_place and run["dt_s"] == reading.dt:
+            by_place[place].update({name: run[name] for name in FULL_MODEL})
     for (prediction,), radii in zip(*work["radii"]):
         check_radii(result, prediction.at.name, radii)
     for (at, name), (kind, dt) in zip(*work["observed"]):
         row = by_place[at.name, name]
         row["observed_dt_s"] = dt
-        check_observed(result, row, kind)
-    for (at, name), run in zip(*work["full"]):
-        by_place[at.name, name].update(run)
+        if dt is None or not row["predicted_dt_s"] or observed.is_shown(at, name, row["predicted_dt_s"]):
+            check_observed(result, row, kind)
     if setup.robot.drive.feeds_back:
         check_step(result, rows, AT_OWN_STEP)
     result.tables["step_limits"] = rows

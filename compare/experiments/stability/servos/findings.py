@@ -6,10 +6,9 @@ from ....engines.mujoco.names import INTEGRATORS
 from ....judge.check import Result
 from ....truth.step_limits import LIMIT_UP_TO
 from . import response
-from .observed import FULL_PUSH
-from .predicted import KNOWN, Prediction
+from .predicted import KNOWN, Prediction, limit_rows, unmodelled
 
-DEFAULT_INTEGRATOR = "Euler"  # MuJoCo's integrator where a file states none
+DEFAULT_STEP = 0.002, "Euler"  # MuJoCo's step, s, and integrator where a file states none
 RESTS_WITHIN = 1e-6  # rad or m: a rest so near is the posture
 
 
@@ -26,49 +25,40 @@ def find_answer(
 
     requested: rows and answer are those of the step of --dt and --integrator, as if the file stated them.
     """
-    integrator, at = rows[0]["file_integrator"], predictions[0].at
-    drive, has_default = at.robot.drive, not requested and integrator != DEFAULT_INTEGRATOR
+    dt, integrator, at = rows[0]["file_dt_s"], rows[0]["file_integrator"], predictions[0].at
+    drive, default = at.robot.drive, None
+    if not requested and (dt, integrator) != DEFAULT_STEP:
+        default = verdict(limit_rows(predictions, *DEFAULT_STEP), DEFAULT_STEP[1])
+    unknown = unmodelled(at.robot)
+    if requested and (unknown or not drive.feeds_back):
+        return
+    off = {actuator.name: actuator.off for actuator in drive.actuators if actuator.off}
     answer = result.finding(
-        "step",
-        "servos",
-        dt=rows[0]["file_dt_s"],
-        integrator=integrator,
-        requested=requested,
-        has_servos=drive.feeds_back,
-        own=verdict(rows, integrator),
-        default=verdict(rows, DEFAULT_INTEGRATOR) if has_default else None,
+        "step", "servos", dt=dt, integrator=integrator, requested=requested, has_servos=drive.feeds_back,
+        own=verdict(rows, integrator), default=default, default_dt=DEFAULT_STEP[0], unmodelled=unknown,
         without={row["posture"]: row["limit"] for row in rows if row["limit"] not in KNOWN},
-        left_out=drive.refused | {actuator.name: actuator.off for actuator in drive.actuators if actuator.off},
-        contacts=any(feature.feature == "contact" for feature in at.robot.features),
-        floats=bool(at.base),
-    )
+        left_out={name: why for name, why in (drive.refused | off).items() if name not in unknown},
+        contacts=any(feature.feature == "contact" for feature in at.robot.features), floats=bool(at.base),
+    )  # fmt: skip
     result.top.append(answer)
 
 
 def verdict(rows: Sequence[dict], integrator: str) -> dict:
-    """Whether the file's step is stable with an integrator, at which postures, what limits it, what the full model does.
+    """Whether a step is stable with an integrator, at which postures, and what limits it.
 
-    stable None: unknown. postures: those that are not stable, else those that are; empty if these are all. speed: the largest
-    of the full model where the step is not stable, rad/s and m/s, infinite: it diverged; None: it was not run.
+    stable None: unknown. postures: those that are not stable, else those that are; empty if these are all.
     """
     mine, postures = known(rows, integrator), {row["posture"] for row in rows}
     if not mine:
         return {"stable": None}
     bad = [row for row in mine if not row["stable_at_file_dt"]]
     where = [row["posture"] for row in bad or mine]
-    run = [row for row in bad if row["full_model_calm"] is not None]
-    speeds = [float("inf") if row["full_model_rms_speed"] is None else row["full_model_rms_speed"] for row in run]
     return {
-        "stable": not bad,
-        "postures": [] if len(where) == len(postures) else where,
-        "limit": mine[0]["predicted_dt_s"],
-        "joint": mine[0]["limiting_joint"],
+        "stable": not bad, "postures": [] if len(where) == len(postures) else where,
+        "limit": mine[0]["predicted_dt_s"], "joint": mine[0]["limiting_joint"],
         "posture": mine[0]["posture"] if len(postures) > 1 else None,
-        "calm": all(row["full_model_calm"] for row in run),
-        "speed": max(speeds, default=None),
-        "push": FULL_PUSH,
         "error": max(row["step_response_error"] or 0.0 for row in mine),
-    }
+    }  # fmt: skip
 
 
 def find_notes(result: Result, rows: Sequence[dict], predictions: Sequence[Prediction]) -> None:

@@ -1,4 +1,4 @@
-"""Runs of MuJoCo under a robot's own servos: the largest stable step, and the whole file at its own step."""
+"""Runs of MuJoCo under a robot's own servos: the largest stable step."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,6 @@ import numpy as np
 
 from ....engines.mujoco import Reading
 from ....engines.mujoco.acting import Acting
-from ....engines.mujoco.linear import whole_run
 from ....robots.case import SEED
 from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO, bisected
@@ -21,10 +20,8 @@ APART = 0.01  # of a deviation at the start: what constraints do not allow, whic
 RUN_PARTS = 8  # of a run: after each it ends if the deviation has grown far
 GROWN_FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
 GROWN_STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
+OBSERVED_WITHIN = 0.01  # relative
 NARROWED = 1e-3  # relative, between a step that holds and one that does not
-FULL_TIME, FULL_LAST = 2.0, 0.5  # s: of a run of the whole file, and of its part whose speeds count
-FULL_PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
-CALM = 1e-3  # rad/s or m/s, root of the mean square
 
 
 def limit(at: Posture, integrator: str, reading: Reading) -> tuple[str, float | None]:
@@ -56,6 +53,12 @@ def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps
     return max(sizes[3 * RUN_PARTS // 4 :]) > GROWN_STILL * max(1.0, *sizes[: RUN_PARTS // 2])
 
 
+def is_shown(at: Posture, integrator: str, dt: float) -> bool:
+    """Whether a run shows that something grows 1 % beyond a limit."""
+    growth = at.small.growth(integrator, (1.0 + OBSERVED_WITHIN) * dt)
+    return at.small.pole_limit(integrator)[0] <= dt or growth ** (NARROWED_STEPS // 2) > GROWN_STILL
+
+
 def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[np.ndarray]:
     """Deviations in each part of a run, (steps, n), in units of that at its start.
 
@@ -82,20 +85,3 @@ def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: in
     for off in acting.deviations(at.q, at.u, dt, integrator, parts, movement, speed, times * MOVED_BY):
         filters = off[:, len(M) :] / (times * MOVED_BY * np.sqrt(max(1, off.shape[1] - len(M))))
         yield np.hstack([off[:, kept] @ (root / start), filters])
-
-
-def full_model(at: Posture, integrator: str, reading: Reading) -> dict:
-    """The whole file, contacts and friction on, for two seconds at its own step: columns of step_limits.csv.
-
-    It starts at the posture itself, which need not be where it rests.
-    """
-    speed = FULL_PUSH * np.random.default_rng(SEED).normal(size=reading.model.nv)
-    start = at.robot.drive, at.start, at.u, reading.dt, integrator
-    with np.errstate(over="ignore", invalid="ignore"):
-        run = whole_run(reading.model, *start, FULL_TIME, FULL_LAST, speed)
-    return {
-        "full_model_rms_speed": run.rms_speed if np.isfinite(run.rms_speed) else None,
-        "full_model_warnings": run.warnings,
-        "full_model_resets": run.resets,
-        "full_model_calm": bool(run.rms_speed < CALM),
-    }

@@ -12,25 +12,28 @@ from ....engines.mujoco.names import INTEGRATORS
 from ....robots import Robot
 from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO, Limit
+from ..own_run import FULL_MODEL
 
 MOST_RESTS, SAME_REST = 4, 1e-3  # of limits, each at the rest with the one before; steps that are one, relative
 STILL_THERE, GIVEN_WAY = 1e-6, 0.01  # rad or m: by less nothing moves; by more the limit is that of another posture
 ASIDE_OF_LIMIT = 1e-2  # of a limit: where a step of MuJoCo is compared
-FULL_MODEL = ("full_model_rms_speed", "full_model_warnings", "full_model_resets", "full_model_calm")  # columns
 KNOWN = ("finite", "none")  # kinds of limits
+OUT_OF_RANGE = 1e-3  # rad or m: a rest farther beyond the range of a joint is one on its limit, which is off here
+ADHESION = "a transmission of type body"  # it acts in contacts alone
 
 
 class Prediction(NamedTuple):
     """What is predicted at one posture."""
 
     at: Posture
+    why: str  # there are no limits, if there are none
     there: dict[str, Posture]  # by integrator: at rest with the step that is the limit; none where it does not rest
     limits: dict[str, Limit]  # by integrator
 
     @property
     def known(self) -> list[str]:
         """The integrators that have a limit, or are known to have none."""
-        return [name for name, limit in self.limits.items() if limit.limit in KNOWN]
+        return [name for name in INTEGRATORS if name in self.limits and self.limits[name].limit in KNOWN]
 
     def gives_way(self, integrator: str) -> bool:
         """Whether soft constraints give way at a limit to another posture: that limit is not observed."""
@@ -56,8 +59,28 @@ def predicted_at(robot: Robot, name: str, reading: Reading) -> Prediction:
     """The limits of every integrator at a posture; none where it does not rest."""
     acting = Acting(reading.model, robot.drive)
     at = Posture(robot, name, acting.along, acting.rows if acting.is_coupled else None, reading.dt)
-    pairs = {} if at.rest[1] else {integrator: limit_at(at, integrator) for integrator in INTEGRATORS}
-    return Prediction(at, *({of: value[k] for of, value in pairs.items()} for k in (0, 1)))
+    why = why_unknown(at)
+    found = {} if why else {name: limit_at(at, name) for name in INTEGRATORS if name != "implicit"}
+    if found:  # at rest the bias has no derivative by the speeds
+        found["implicit"] = found["implicitfast"]
+    return Prediction(at, why, *({name: pair[k] for name, pair in found.items()} for k in (0, 1)))
+
+
+def unmodelled(robot: Robot) -> dict[str, str]:
+    """What may brake, push or pull a robot in the air and has no law here, by name, and what it is."""
+    fluid = {name: "fluid" for feature in robot.features if feature.feature == "fluid" for name in feature.names}
+    return {name: reason for name, reason in robot.drive.refused.items() if reason != ADHESION} | fluid
+
+
+def why_unknown(at: Posture) -> str:
+    """Why a posture has no limits, or "": a kind of the column `limit`."""
+    if unmodelled(at.robot):
+        return "not_judged"
+    if at.is_tied:
+        return "tied"
+    if at.rest[1]:
+        return "not_at_rest"
+    return "out_of_range" if at.beyond > OUT_OF_RANGE else ""
 
 
 def limit_at(at: Posture, integrator: str) -> tuple[Posture, Limit]:
@@ -81,7 +104,7 @@ def limit_rows(predictions: Sequence[Prediction], dt: float, integrator: str) ->
     rows = []
     for prediction in predictions:
         for name in INTEGRATORS:
-            limit = prediction.limits.get(name, Limit("not_at_rest"))
+            limit = prediction.limits.get(name, Limit(prediction.why))
             rows.append({
                 "posture": prediction.at.name, "base": prediction.at.base_kind, "integrator": name, "limit": limit.limit,
                 "predicted_dt_s": limit.dt and float(limit.dt), "observed_dt_s": None, "file_dt_s": dt,
