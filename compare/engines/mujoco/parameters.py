@@ -167,8 +167,9 @@ def stated_inertial(spec, body, com: np.ndarray, inertia: np.ndarray) -> tuple[n
     A spec does not say in which of the body's frames the inertial is: in the one that comes closest to the compiled model.
     """
     a, b, c, d, e, f = body.fullinertia
-    own = tensor(orientation(body.iquat, body.ialt, body.compiler), body.inertia)
-    own = np.array([[a, d, e], [d, b, f], [e, f, c]]) if np.isfinite(a) else own
+    turn = matrix(orientation(body.iquat, body.ialt, body.compiler))  # beside a fullinertia only in a URDF
+    own = np.array([[a, d, e], [d, b, f], [e, f, c]]) if np.isfinite(a) else np.diag(body.inertia)
+    own = turn @ own @ turn.T
     frames = (None, *(frame for frame in spec.frames if frame.parent == body))
     placed = [in_frames(body.ipos, frame) for frame in frames]
     candidates, scale = [(pos, R @ own @ R.T) for pos, R in placed], np.abs(inertia).max() or 1.0
