@@ -1,13 +1,15 @@
 """Parameters of a robot's file, beside what the file states and beside a solution; and what is switched off."""
 
+import mujoco
 import numpy as np
 import pytest
+from edited import XML, setup_of
 from models import PATHS
 
 from compare.engines.mujoco import engine, read
-from compare.engines.mujoco.parameters import Stated
+from compare.engines.mujoco.parameters import Stated, row_of
 from compare.experiments import parameters
-from compare.experiments.parameters.file import add_inventory, tolerance_of
+from compare.experiments.parameters.file import add_inventory
 from compare.experiments.parameters.numbers import compare_number
 from compare.experiments.setup import Setup, engines
 from compare.judge.check import Result
@@ -65,16 +67,17 @@ def test_numbers_that_an_option_changes_are_no_checks_and_have_its_name():
 def compared(result, number):
     """The causes of a number that differs."""
     stated, compiled = (np.ravel(values).astype(float) for values in (number.stated, number.compiled))
-    return compare_number(result, number.place, number.quantity, stated, compiled, "", tolerance_of(number))
+    return compare_number(result, number.place, number.quantity, stated, compiled, "", number.tolerance)
 
 
 @pytest.mark.parametrize("quantity, stated, scale", [
-    ("mass", 2.0, 2.0), ("com", np.array([0.0, -3.0, 1.0]), 3.0), ("inertia", np.diag([1.0, 2.0, 2.5]), 5.5),
+    ("mass", 2.0, None), ("com", np.array([0.0, -3.0, 1.0]), 5.0), ("inertia", np.diag([1.0, 2.0, 2.5]), 5.5),
+    ("anchor", np.zeros(3), 0.7),
 ])  # fmt: skip
 @pytest.mark.parametrize("share, passes", [(0.9, True), (1.1, False)])
 def test_a_number_may_be_off_by_64_eps_of_its_scale(quantity, stated, scale, share, passes):
-    number, result = Stated("arm", quantity, stated, stated + share * 64 * EPS * scale, ""), Result("parameters")
-    assert tolerance_of(number) == pytest.approx(64 * EPS * scale)
+    off, result = share * 64 * EPS * (scale or stated), Result("parameters")
+    number = row_of("arm", quantity, stated, stated + off, {}, scale)
     causes = compared(result, number)
     assert (result.checks[0].passed, not causes) == (passes, passes)
 
@@ -85,6 +88,18 @@ def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none()
     vector, result = Stated("arm", "com", np.zeros(3), np.array([0.0, 1e-30, np.nan]), ""), Result("parameters")
     assert [cause["place"] for cause in compared(result, vector)] == ["com y of arm", "com z of arm"]
     assert failing(result) == ["com"]
+
+
+@pytest.mark.parametrize("moved, passes", [(0.0, True), (1e-13, False), (-1e-13, False)])
+def test_an_anchor_stated_as_0_may_be_off_by_rounding_of_the_lengths_that_lead_there(moved, passes):
+    """1e-13 m is about ten times the tolerance."""
+    place, R = np.array([0.1, -0.2, 0.3]), np.zeros(9)
+    mujoco.mju_quat2Mat(R, np.array([0.5, 0.1, -0.7, 0.5]))
+    back = " ".join(map(repr, (moved - place @ R.reshape(3, 3)).tolist()))
+    text = XML.replace('pos="0 0 0"', 'pos="0.1 -0.2 0.3" quat="0.5 0.1 -0.7 0.5"', 1)
+    result = parameters.rows(setup_of(text.replace('type="hinge"', f'pos="{back}"', 2)))
+    anchors = {check.scene: check for check in result.checks if check.quantity == "anchor"}
+    assert anchors["alpha"].passed == anchors["beta"].passed == passes and anchors["alpha"].value > 0.0
 
 
 # beside a solution

@@ -61,6 +61,17 @@ def parameters(dynamics: MujocoDynamics) -> dict:
     }
 
 
+def lengths(dynamics: MujocoDynamics) -> dict[str, np.ndarray]:
+    """Sums of the lengths that MuJoCo adds to place each anchor, and each centre of mass relative to its anchor, m."""
+    m, to_body = dynamics.model, np.zeros(dynamics.model.nbody)
+    for body in range(1, m.nbody):
+        to_body[body] = to_body[m.body_parentid[body]] + np.linalg.norm(m.body_pos[body])
+    to_joint = np.append(to_body[m.jnt_bodyid] + np.linalg.norm(m.jnt_pos, axis=1), 0.0)  # the last: of no joint, -1
+    before = to_joint[[last_hinge(m, body) for body in dynamics.bodies]]
+    of_bodies = (to_body + np.linalg.norm(m.body_ipos, axis=1))[dynamics.bodies]
+    return {"anchor": to_joint[dynamics.joints], "com": before + of_bodies}
+
+
 def last_hinge(m: mujoco.MjModel, body: int) -> int:
     """The last hinge that moves a body, by its number, -1: none."""
     while body and not m.body_jntnum[body]:
@@ -76,7 +87,7 @@ class Stated(NamedTuple):
     stated: np.ndarray | float | None  # kg, m, kg m2 ...; None: the file leaves it to the compiler
     compiled: np.ndarray | float
     why: str  # the options of the file that change it, "": none
-    precision: float = 0.0  # relative, of the compiler; 0.0: rounding
+    tolerance: float = 0.0  # the largest difference that is rounding
 
 
 def stated_numbers(reading: Reading) -> list[Stated]:
@@ -90,12 +101,18 @@ def stated_numbers(reading: Reading) -> list[Stated]:
     return rows + [row for joint, copy in joints for row in of_joint(model, joint, copy.id)]
 
 
-def row_of(place: str, quantity: str, stated, compiled, options: dict[str, bool], precision: float = 0.0) -> Stated:
-    """A row; of the options that are in force those count that may have changed a number that is not the stated one."""
-    size = np.trace(stated) if quantity == "inertia" else np.abs(stated).max()
-    is_same = np.abs(np.subtract(stated, compiled)).max() <= max(FACTOR * EPS, precision) * size
+def row_of(
+    place: str, quantity: str, stated, compiled, options: dict[str, bool], size: float | None = None, precision=0.0
+) -> Stated:
+    """A row; of the options that are in force those count that may have changed a number that is not the stated one.
+
+    size: the sum of what is added in the number, None: its largest entry; precision: relative, of the compiler.
+    """
+    size = float(np.abs(stated).max()) if size is None else size
+    tolerance = max(FACTOR * EPS, precision) * size
+    is_same = np.abs(np.subtract(stated, compiled)).max() <= tolerance
     why = ", ".join(name for name, is_on in options.items() if is_on and not is_same)
-    return Stated(place, quantity, stated, compiled, why, precision)
+    return Stated(place, quantity, stated, compiled, why, tolerance)
 
 
 def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body, number: int) -> list[Stated]:
@@ -107,8 +124,8 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body, number: int) -> li
     bounds = {"boundinertia": options.boundinertia > 0.0, "balanceinertia": bool(options.balanceinertia)}
     mass, com = float(model.body_mass[number]), model.body_ipos[number].copy()
     inertia = tensor(model.body_iquat[number], model.body_inertia[number])
-    pos = in_frames(body.pos, body.frame)[0]
-    rows = [row_of(place, "pos", pos, model.body_pos[number].copy(), aligned)]
+    pos, _, length = in_frames(body.pos, body.frame)
+    rows = [row_of(place, "pos", pos, model.body_pos[number].copy(), aligned, length)]
     if not body.explicitinertial:
         low, high = options.inertiagrouprange
         masses = [geom.mass for geom in body.geoms if low <= geom.group <= high]
@@ -118,14 +135,14 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body, number: int) -> li
             stated = float(np.sum(masses))
             unknown[0] = row_of(place, "mass", stated, mass, total | {"boundmass": stated < options.boundmass})
         return rows + unknown
-    stated_com, stated_inertia = stated_inertial(spec, body, com, inertia)
-    precision = TO_PRINCIPAL_AXES if np.isfinite(body.fullinertia[0]) else 0.0
+    stated_com, stated_inertia, length = stated_inertial(spec, body, com, inertia)
+    moments, precision = float(np.trace(stated_inertia)), TO_PRINCIPAL_AXES if np.isfinite(body.fullinertia[0]) else 0.0
     bounded = {"boundmass": body.mass < options.boundmass}
     return [
         *rows,
         row_of(place, "mass", float(body.mass), mass, from_geoms | total | bounded),
-        row_of(place, "com", stated_com, com, from_geoms | aligned),
-        row_of(place, "inertia", stated_inertia, inertia, from_geoms | aligned | total | bounds, precision),
+        row_of(place, "com", stated_com, com, from_geoms | aligned, length),
+        row_of(place, "inertia", stated_inertia, inertia, from_geoms | aligned | total | bounds, moments, precision),
     ]
 
 
@@ -133,9 +150,9 @@ def of_joint(model: mujoco.MjModel, joint, number: int) -> list[Stated]:
     """Anchor, axis, armature, damping and stiffness of a joint."""
     name, kind, dof = joint_name(model, number), kind_of(model, number), model.jnt_dofadr[number]
     chosen = {"springdamper": bool(np.any(joint.springdamper))}
-    pos, turn = in_frames(joint.pos, joint.frame)
+    pos, turn, length = in_frames(joint.pos, joint.frame)
     axis = turn @ joint.axis / np.linalg.norm(joint.axis)
-    rows = [row_of(name, "anchor", pos, model.jnt_pos[number].copy(), {})] if kind in ("hinge", "ball") else []
+    rows = [row_of(name, "anchor", pos, model.jnt_pos[number].copy(), {}, length)] if kind in ("hinge", "ball") else []
     rows += [row_of(name, "axis", axis, model.jnt_axis[number].copy(), {})] if kind in ("hinge", "slide") else []
     fields = {"armature": model.dof_armature[dof], "damping": model.dof_damping[dof]}
     for quantity, compiled in (fields | {"stiffness": model.jnt_stiffness[number]}).items():
@@ -144,13 +161,13 @@ def of_joint(model: mujoco.MjModel, joint, number: int) -> list[Stated]:
     return rows
 
 
-def in_frames(pos, frame) -> tuple[np.ndarray, np.ndarray]:
-    """A position, (3,), through a frame of the file and those around it, and the turn of all of them, (3, 3)."""
-    pos, turn = np.array(pos, float), np.eye(3)
+def in_frames(pos, frame) -> tuple[np.ndarray, np.ndarray, float]:
+    """A position, (3,), through a frame of the file and those around it, the turn of all, (3, 3), and the sum of lengths."""
+    pos, turn, length = np.array(pos, float), np.eye(3), float(np.linalg.norm(pos))
     while frame is not None:
-        R = matrix(orientation(frame.quat, frame.alt, frame.compiler))
+        R, length = matrix(orientation(frame.quat, frame.alt, frame.compiler)), length + np.linalg.norm(frame.pos)
         pos, turn, frame = frame.pos + R @ pos, R @ turn, frame.frame
-    return pos, turn
+    return pos, turn, float(length)
 
 
 def orientation(quat, other, options) -> np.ndarray:
@@ -161,8 +178,8 @@ def orientation(quat, other, options) -> np.ndarray:
     return quat / np.linalg.norm(quat)
 
 
-def stated_inertial(spec, body, com: np.ndarray, inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """CoM, (3,) m, and tensor, (3, 3) kg m2, that a body's inertial states, in the axes of the body.
+def stated_inertial(spec, body, com: np.ndarray, inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """CoM, (3,) m, and tensor, (3, 3) kg m2, that a body's inertial states, in the axes of the body; the sum of lengths, m.
 
     A spec does not say in which of the body's frames the inertial is: in the one that comes closest to the compiled model.
     """
@@ -172,7 +189,8 @@ def stated_inertial(spec, body, com: np.ndarray, inertia: np.ndarray) -> tuple[n
     own = turn @ own @ turn.T
     frames = (None, *(frame for frame in spec.frames if frame.parent == body))
     placed = [in_frames(body.ipos, frame) for frame in frames]
-    candidates, scale = [(pos, R @ own @ R.T) for pos, R in placed], np.abs(inertia).max() or 1.0
+    candidates = [(pos, R @ own @ R.T, length) for pos, R, length in placed]
+    scale = np.abs(inertia).max() or 1.0
     return min(candidates, key=lambda one: np.abs(one[0] - com).max() + np.abs(one[1] - inertia).max() / scale)
 
 

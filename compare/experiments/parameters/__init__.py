@@ -8,7 +8,7 @@ import numpy as np
 import tmt
 
 from ...engines.mujoco.inventory import LEFT_OUT, MODELLED
-from ...engines.mujoco.parameters import STATED_FLAGS, parameters
+from ...engines.mujoco.parameters import STATED_FLAGS, lengths, parameters
 from ...judge.check import Result
 from ...judge.finding import Finding
 from ...judge.scale import EPS, FACTOR
@@ -87,11 +87,14 @@ def rows(setup: Setup) -> Result:
         return file.rows_of_file(setup)
     result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit"])
     tree, dynamics, causes = robot.tree, setup.compared()["mujoco"], []
+    added = lengths(dynamics)
     if robot.stated_in:  # a solution: its joints and bodies are looked up in the file
         joints = [reading.tree.hinge_names.index(name) for name in tree.hinge_names]
         bodies = [reading.bodies.index(body) for body in setup.engines["mujoco"].bodies]
         numbers_stated = numbers_of(tree, range(len(joints)), range(len(bodies)))
         compiled = numbers_of(reading.tree, joints, bodies)
+        reach = max(np.abs(numbers_stated[name]).max() for name in added)  # sums of lengths of the solution
+        added = {name: values + reach for name, values in added.items()}
     else:
         numbers_stated, compiled = stated(tree), parameters(dynamics)
     slides = {joint for joint, kind in zip(tree.hinge_names, tree.kind) if kind == "slide"}
@@ -100,9 +103,10 @@ def rows(setup: Setup) -> Result:
         values = np.asarray(compiled[quantity], dtype=float)
         names = owners(tree, quantity)
         is_whole = quantity in WHOLE_NUMBERS
-        for owner, a, b in zip(names, numbers.reshape(len(names), -1), values.reshape(len(names), -1)):
-            is_of_file = robot.stated_in and quantity in ("anchor", "com")  # sums of lengths of the file
-            unit, tolerance = UNITS[quantity], FACTOR * EPS * np.abs(numbers if is_of_file else a).max()
+        numbers, values = (each.reshape(len(names), -1) for each in (numbers, values))
+        sizes = added.get(quantity, np.abs(numbers).max(axis=1))
+        for owner, a, b, size in zip(names, numbers, values, sizes):
+            unit, tolerance = UNITS[quantity], FACTOR * EPS * size
             if owner in slides and quantity not in (*OF_BODIES, "anchor"):
                 unit = OF_SLIDES.get(unit, unit)
             words = dict(enumerate(("the world", *tree.hinge_names), start=-1)) if quantity == "parent" else {}

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...engines.mujoco.parameters import Stated, stated_numbers
+from ...engines.mujoco.parameters import stated_numbers
 from ...judge.check import Result
-from ...judge.scale import EPS, FACTOR
 from ..setup import Setup
 from .numbers import check_forces, compare_number, rows_of
 
@@ -31,9 +30,8 @@ def rows_of_file(setup: Setup) -> Result:
         stated = np.ravel(number.stated).astype(float) if is_stated else [None] * len(compiled)
         result.rows += rows_of(number.place, number.quantity, stated, compiled, unit, asked_by=number.why)
         if is_stated and not number.why:
-            allowed = tolerance_of(number)
-            causes += compare_number(result, number.place, number.quantity, stated, compiled, unit, allowed)
-        elif not is_stated or np.abs(stated - compiled).max() > tolerance_of(number):
+            causes += compare_number(result, number.place, number.quantity, stated, compiled, unit, number.tolerance)
+        elif not is_stated or np.abs(stated - compiled).max() > number.tolerance:
             changed.setdefault(number.why, Counter())[number.quantity] += 1
     check_forces(result, setup)
     for name, value, unit in (("integrator", reading.integrator, ""), ("timestep", reading.dt, "s")):
@@ -43,12 +41,6 @@ def rows_of_file(setup: Setup) -> Result:
     add_inventory(result, setup.robot.features)
     result.curves["causes"] = sorted(causes, key=lambda cause: -cause["size"])
     return result
-
-
-def tolerance_of(number: Stated) -> float:
-    """The largest difference between a stated and a compiled number that is rounding."""
-    size = np.trace(number.stated) if number.quantity == "inertia" else np.abs(number.stated).max()
-    return max(FACTOR * EPS, number.precision) * float(size)
 
 
 def add_inventory(result: Result, features: Sequence) -> None:
