@@ -1,9 +1,9 @@
 """The smallest model with the same motion in a scene: which joints stay where they start for any motion of the others.
 
 A set of joints stays if their accelerations vanish for all values of the others, with these joints at their start and at
-rest. There is a largest such set: remove the joints that move from all joints until none moves. "Stays" is decided on the
-expressions of the traced method, where the acceleration must fold to the number 0; "moves" at a random state, where the
-acceleration in 50 digits of the robot's doubles is not 0. A joint for which neither is decided is kept.
+rest. There is a largest such set: remove the joints that move from all joints until none moves. "Moves" is decided at a random
+state, where the acceleration in 50 digits of the robot's doubles is not 0. That the others stay is proved where the acceleration
+folds to the number 0 in the expressions of the traced method.
 """
 
 import dataclasses
@@ -33,7 +33,8 @@ class Needed(NamedTuple):
 
     stays: tuple
     moves: dict  # name: why
-    undecided: tuple  # they move in no state that was tried, but their acceleration does not fold to 0
+    unproved: tuple = ()  # they stay in the state that was tried, but their acceleration does not fold to 0
+    undecided: tuple = ()  # no state was tried
 
 
 def needed(case: Case) -> Needed:
@@ -42,8 +43,7 @@ def needed(case: Case) -> Needed:
     joints = dict(zip(names, coordinates.places.joints))
     units = {name: coordinates.units[joint.qd.start] for name, joint in joints.items()}
     moves = {name: f"{name} has a speed at the start" for name, joint in joints.items() if any(case.v[joint.qd])}
-    undecided = ()
-    while still := tuple(name for name in names if name not in moves and name not in undecided):
+    while still := tuple(name for name in names if name not in moves):
         rng = np.random.default_rng(SEED)
         (q,), qd = coordinates.random(rng, 1), rng.uniform(-10.0, 10.0, coordinates.nv)
         largest = {name: max(map(abs, a)) for name, a in exact_accelerations(case, still, q, qd).items()}
@@ -52,11 +52,20 @@ def needed(case: Case) -> Needed:
             if a > 0.0:
                 moves[name] = f"{name} accelerates by {float(a):.2g} {units[name]}/s2 {when}"
         if not any(largest.values()):
-            unfolded = tuple(name for name, parts in folded(case, still).items() if any(n != 0.0 for n in parts))
-            if not unfolded:
-                break
-            undecided += unfolded
-    return Needed(still, moves, undecided)
+            break
+    return Needed(still, moves, unproved(case, still))
+
+
+def unproved(case: Case, stays: Sequence[str]) -> tuple[str, ...]:
+    """Those of the joints that are not in the largest set whose accelerations fold to 0 whatever the other joints do."""
+    proved = tuple(stays)
+    while proved:
+        numbers = folded(case, proved)
+        unfolded = [name for name in proved if any(number != 0.0 for number in numbers[name])]
+        if not unfolded:
+            break
+        proved = tuple(name for name in proved if name not in unfolded)
+    return tuple(name for name in stays if name not in proved)
 
 
 def forces(case: Case, tree, still: Sequence[str], start: Sequence, q: Sequence, qd: Sequence) -> tuple[list, list]:

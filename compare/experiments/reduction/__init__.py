@@ -8,6 +8,7 @@ from tmt.exact.values import DIGITS
 
 from ...engines.mujoco import ModelError
 from ...judge.check import About, Result
+from ...judge.finding import Finding
 from ...judge.rounding import NARROW
 from ...judge.run import movement_unit
 from ...judge.scale import FACTOR
@@ -56,7 +57,23 @@ def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) 
         if best and best["speedup"] >= NO_GAIN:
             values = {"speedup": best["speedup"], "joints": best["hinges"].split(), "scene": best["scene"]}
             result.headline = result.finding("headline", **values)
+    result.top += answers(result, setup.robot)
     return result
+
+
+def answers(result: Result, robot: Robot) -> list[Finding]:
+    """What scenes need, a finding for those that need the same; what can be locked comes last."""
+    groups = {}
+    for scene, need in result.curves["needs"].items():
+        groups.setdefault(tuple(need[kind] for kind in ("needed", "locked", "stays", "undecided")), []).append(scene)
+    found = []
+    for key, scenes in groups.items():
+        needed, locked, stays, undecided = key
+        apart = [value for (scene, _), value in result.curves["apart"].items() if scene in scenes]
+        values = {"needed": needed, "locked": locked, "stays": stays, "undecided": undecided, "scenes": scenes}
+        values |= {"apart": max(apart, default=None), "unit": movement_unit(robot.coordinates)}
+        found.append(result.finding("answer", joint=joint_word(robot.coordinates), **values))
+    return sorted(found, key=lambda one: bool(one.values["needed"] and one.values["stays"]))
 
 
 def untimed(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) -> tuple[Result, list[tuple] | None]:
@@ -79,7 +96,7 @@ def untimed(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = Tru
 def add_not_lockable(result: Result, robot: Robot, error: ModelError) -> None:
     """A finding for a robot from a file; a failed check for a stated one, whose joints can be locked."""
     if robot.is_read:
-        result.find("not_lockable", error=str(error))
+        result.top.append(result.finding("not_lockable", error=str(error)))
     else:
         quantity = "models whose hinges can be locked"
         result.check("every subset", quantity, 0, 1, "models", str(error), rule="equal", about=About.PROGRAM)

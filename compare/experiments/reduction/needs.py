@@ -22,19 +22,16 @@ MOST_IN_A_BAND = 12  # nv up to which runs are compared within the band of round
 def of_case(result: Result, case: Case, setup: Setup) -> list[tuple]:
     """Findings and checks of what the case needs; the models to be timed, (name, Case), None if it needs no model."""
     slow = not case.is_held and seconds(case.robot) > SECONDS_OF_STATE
-    need = Needed((), {}, case.joints) if slow else needed(case)
+    need = Needed((), {}, undecided=case.joints) if slow else needed(case)
     smaller, rests = reduced(case, need), len(need.stays) == len(case.joints)
     models = [(case.name, case.changed(locked=()))]
     if smaller or case.locked or rests:
         models.append((case.name, None if rests else smaller or case))
-    locked = case.scene.locked
-    result.curves["needs"][case.name] = {"locked": locked, "stays": need.stays, "undecided": need.undecided}
-    slow_digits = f"one evaluation with {DIGITS} digits takes about {seconds(case.robot):.0f} s" if slow else ""
-    result.find(
-        "need", scene=case.name, joint=joint_word(case.robot.coordinates), locked=list(locked), stays=list(need.stays),
-        left=[name for name in case.joints if name not in need.stays], reasons=list(need.moves.values()),
-        undecided=list(need.undecided), why_not=slow_digits or "the traced expression does not fold to 0",
-    )  # fmt: skip
+    joints = {"needed": tuple(name for name in case.joints if name in need.moves), "locked": case.scene.locked}
+    joints |= {"stays": need.stays, "unproved": need.unproved, "undecided": need.undecided}
+    result.curves["needs"][case.name] = joints
+    word, reasons = joint_word(case.robot.coordinates), list(need.moves.values())
+    result.find("need", scene=case.name, joint=word, reasons=reasons, digits=DIGITS, time=seconds(case.robot), **joints)
     if (smaller or rests) and not (case.robot.is_read and case.coordinates.nv > MOST_IN_A_BAND):
         compare_smaller(result, case, smaller, setup)
     return models

@@ -113,7 +113,7 @@ def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
     body = '<body><joint axis="0 1 0"/><geom size="0.1 0.2 0.3" type="box" pos="0.1 0.2 1"/></body>'
     aligned = f'<body><freejoint align="true"/><geom size="0.1" pos="0.05 0 0"/>{body}</body>'
     result = reduction.rows(of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"), timed=False)
-    assert any(note.kind == "not_lockable" for note in result.notes) and failed(result) == []
+    assert [note.kind for note in result.top] == ["not_lockable"] and failed(result) == []
 
 
 # what a scene needs
@@ -163,4 +163,27 @@ def test_a_robot_that_falls_does_not_bend():
     """Its accelerations are 0 with 50 digits of the very numbers of the file: a sum of masses in doubles would bend it."""
     case = next(case for case in of_file(PATHS["quadruped"]).robot.cases if case.name == "stand, let go")
     need = needed(case)
-    assert set(need.moves) == {"root z"} and len(need.undecided) == 15
+    assert set(need.moves) == {"root z"} and need.undecided == () and len(need.stays) == 15
+
+
+FALLS = """<mujoco><worldbody><body name="base"><freejoint name="base"/><geom type="box" size="0.1 0.1 0.05" mass="2"/>
+<body pos="0.1 0 0"><joint name="hip" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0.1 0 -0.3" size="0.02"/></body>
+</body></worldbody></mujoco>"""
+
+
+def test_a_body_that_only_falls_needs_one_slide_and_the_answer_says_it_last():
+    result = reduction.rows(of_file(FALLS))
+    *_, last = result.top
+    assert last.values["needed"] == ("base z",) and last.values["scenes"] == ["qpos0, let go"]
+    assert last.values["stays"] == ("base x", "base y", "base turn", "hip") and last.values["apart"] < 1e-12
+    assert failed(result) == [] and "base z" in say(last)
+
+
+def test_what_takes_too_long_to_decide_is_neither_needed_nor_locked(monkeypatch):
+    monkeypatch.setattr(needs, "SECONDS_OF_STATE", 0.0)
+    case, result = ARM.cases[0], Result("reduction", curves={"needs": {}, "apart": {}})
+    needs.of_case(result, case, None)
+    need = result.curves["needs"][case.name]
+    assert need["undecided"] == ARM.joints and not need["needed"] and not need["stays"]
+    (answer,) = reduction.answers(result, ARM)
+    assert "not decided" in say(answer)
