@@ -50,7 +50,7 @@ def test_a_model_whose_joints_cannot_be_locked_fails():
 def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_done_again(setup, monkeypatch):
     log = []
     for name, said in (("untimed", "computed"), ("time_models", "timed")):
-        given = Result("reduction"), []
+        given = Result("reduction", curves={"needs": {}}), []
         monkeypatch.setattr(reduction, name, lambda *_, said=said, given=given, **__: log.append(said) or given)
     setup = dataclasses.replace(setup, quiet=lambda: log.append("quiet"), background={})
     reduction.begin(setup)
