@@ -90,7 +90,7 @@ def test_a_file_of_any_name_stays_in_one_line_and_is_no_markup(tmp_path, monkeyp
     Path(name).write_bytes(PATHS["gripper"].read_bytes())
     reference, robot, *_ = compared_with(None, name)
     assert reference.lines[0].startswith(f"reference: model; {said} ")
-    assert reference.lines[1].endswith("equalities switched off (1): mimic") and len(reference.lines) == 2
+    assert "mimic" in reference.lines[1] and len(reference.lines) == 2
     (tmp_path / "figures").mkdir()
     write(tmp_path, Report([section("mass", GOOD)], robot, {"command": "c"}, "It holds.", reference=reference))
     assert json.loads((tmp_path / "results.json").read_text())["reference"] == {"kind": "model", "name": said}

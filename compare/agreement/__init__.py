@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..engines.own import ARGUMENTS, state_in_words
 from ..judge.check import over
-from ..report.text import block
+from ..report.text import block, say
 from .given import Given, State
 from .why import Why, cause_of
 
@@ -180,6 +180,8 @@ def rows(given: Given, cause: str) -> list[Difference]:
 
 def message(given: Given) -> str:
     """Which entries of which quantity are off, the worst of them, the probable cause, and what can be stated."""
+    from ..engines.mujoco.remarks import remarks  # here, so that `import compare` need not wait for it
+
     why = cause_of(given) if given.fails else Why("", False)
     quantities: dict[str, list[Difference]] = {}
     for row in rows(given, why.text):
@@ -199,6 +201,7 @@ def message(given: Given) -> str:
         "given": given,
         "quantities": worst,
         "why": why.text,
+        "remarks": [say(remark) for remark in remarks(given.reading, has_scenes=False)],
         "rounded": rounded(given) if why.may_be_rounded else None,
         "hinge": next((name for name, kind in zip(given.tree.hinge_names, given.tree.kind) if kind == "hinge"), ""),
     }

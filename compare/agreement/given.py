@@ -17,7 +17,6 @@ from ..judge.check import over
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..report.text import say
-from ..robots.coordinates import Coordinates
 from ..robots.file import robot_of
 from ..robots.joint_map import JointMap, joint_map
 from ..robots.states import random
@@ -88,10 +87,10 @@ class Given:
 
         if isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<"):
             mjcf = Path(mjcf)
-        reading: Any = read(mjcf)
-        self.robot = robot_of(reading, "the model")
-        self.mujoco = engine(reading).of(self.robot.case())
-        self.tree, self.coordinates = reading.tree, Coordinates(reading.tree.hinge_names, reading.tree.kind)
+        self.reading: Any = read(mjcf)
+        self.robot = robot_of(self.reading, "the model")
+        self.mujoco = engine(self.reading).of(self.robot.case())
+        self.tree, self.coordinates = self.reading.tree, self.robot.coordinates
 
     def take_random(self, states: int, seed: int) -> None:
         """Random states, fewer if the user's functions are slow."""

@@ -6,6 +6,7 @@ from typing import NamedTuple, TypeVar
 
 from ..judge.check import ENDS, About, Check, Result
 from ..judge.finding import Finding
+from ..judge.words import capital
 from ..process.crash import described
 from .text import block, say
 
@@ -171,6 +172,15 @@ def headline(section: Section) -> str:
     shares = [check.over_tolerance for check in checks if check.over_tolerance is not None and check.passed]
     numbers = {"passed": sum(check.passed for check in checks), "checks": len(checks)}
     return say(Finding("verdict", "checks_passed", {**numbers, "share": max(shares, default=None)})) if checks else ""
+
+
+def answers(sections: Sequence[Section]) -> list[str]:
+    """What the only experiment of a run answers, in sentences: what it says of the robot, else its headline; of several, none."""
+    if len(sections) != 1:
+        return []
+    result = sections[0].result
+    headlines = [f"{capital(say(result.headline))}."] if result.headline else []
+    return [say(text) for text in result.top] or headlines
 
 
 class Parts:

@@ -85,6 +85,8 @@ def examine(
                 else:
                     drawings.append((section, workers.submit(*drawing)))
         say_outcome(terminal, sections[-1], clock.seconds_of(name), new, bool(causes))
+        for text in sections[-1].result.top if len(names) > 1 else ():  # else it is the last line of the run
+            terminal.say(f"  {say(text)}")
     with clock.of(END):
         setup.progress("figures")
         drawings += [(section, workers.submit(*drawing)) for section, drawing in waiting]
@@ -188,7 +190,7 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
 
 
 def say_outcome(terminal: Terminal, section: Section, seconds: float, new: Sequence, known: bool = False) -> None:
-    """One line for an experiment, then its answer, the causes that are new, and the first failing checks that no cause explains.
+    """One line for an experiment, then the causes that are new, and the first failing checks that no cause explains.
 
     seconds: of the processor, for the experiment itself; known: whether there are causes, new ones or others.
     """
@@ -205,8 +207,6 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, new: Seque
         word = f"{len(failed)} {fails}" if failed else "NOT JUDGED"
     style = "red" if failed else "yellow" if open_checks else ""
     terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<27} {seconds:5.1f} s CPU", style)
-    for text in section.result.top:
-        terminal.say(f"  {say(text)}")
     lines = [f"  CAUSE {cause['text']}" for cause in new]
     if not (known and section.name in STATES_CAUSES):  # there the causes are the checks
         lines += [f"  FAIL {check}" for check in failed if check not in of_cause]

@@ -9,9 +9,11 @@ import numpy as np
 from ..engines import Engine
 from ..engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, load, read
 from ..engines.mujoco.names import integrator_by_name
+from ..engines.mujoco.remarks import changes, remarks
 from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import OwnFileError, aside, own_object
 from ..process.streams import in_one_line
+from ..report.text import say
 from ..robots import Robot
 from ..robots.arm import ARM
 from ..robots.case import SEED
@@ -33,7 +35,7 @@ class JointsDiffer(ModelError):
 class Reference(NamedTuple):
     kind: str  # of REFERENCES, "solution" or "own"
     file: str  # as it is given, in one line
-    open_tree: tuple[str, ...] = ()  # equalities of the file, which are switched off
+    remarks: tuple[str, ...] = ()  # what is fixed, changed or switched off, a line each
     warnings: tuple[str, ...] = ()  # of MuJoCo's compiler, one line each
     source: str = ""  # the solution, or the place of own equations, as given, in one line
     own: Engine | None = None  # of these equations
@@ -51,8 +53,7 @@ class Reference(NamedTuple):
     def lines(self) -> tuple[str, ...]:
         """The first lines of the output and of the report."""
         first = f"reference: {self.kind}; {self.file} compared with {REFERENCES.get(self.kind, self.source)}"
-        off = f"equalities switched off ({len(self.open_tree)}): {', '.join(self.open_tree)}" if self.open_tree else ""
-        lines = first, self.matched, off, *(f"MuJoCo warns: {line}" for line in self.warnings)
+        lines = first, self.matched, *self.remarks, *(f"MuJoCo warns: {line}" for line in self.warnings)
         return tuple(in_one_line(line) for line in lines if line)
 
 
@@ -88,9 +89,10 @@ def compared_with(reference, path, joints=None, shown=None, solution=None) -> Co
             names, renamed = joints_matched(ARM, read(Path(file)), shown, "the arm")
             robot = ARM.with_joints(names)
         mujoco = load(file, robot.tree)
-        return Compared(Reference("arm", shown, warnings=mujoco.warnings, renamed=renamed), robot, mujoco, None)
+        said = tuple(map(say, changes(Path(file), mujoco.model))) if path else ()
+        return Compared(Reference("arm", shown, said, mujoco.warnings, renamed=renamed), robot, mujoco, None)
     reading = read(Path(file))
-    of_file = Reference("model", shown, reading.open_tree, reading.warnings)
+    of_file = Reference("model", shown, tuple(map(say, remarks(reading, has_scenes=True))), reading.warnings)
     if is_solution(reference):
         stated = read(Path(solution or reference))
         names, renamed = joints_matched(stated, reading, shown, source)

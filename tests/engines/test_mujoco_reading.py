@@ -82,7 +82,7 @@ def test_a_urdf_is_the_same_in_both(tmp_path, rng):
 def test_a_published_file_is_the_same_in_both_and_with_joints_locked(path, rng):
     reading = compared(path, rng, states=1)
     assert_locked(reading, [name for name in reading.tree.hinge_names if rng.random() < 0.3], rng)
-    for row in stated_numbers(reading):
+    for row in stated_numbers(reading.source, reading.model):
         if row.stated is not None and not row.why:
             assert np.allclose(row.stated, row.compiled, rtol=1e-6, atol=1e-12), row
 
@@ -125,7 +125,6 @@ def test_a_feature_is_listed_and_modelled_or_switched_off(feature, rng):
     reading = compared(text, rng)
     row = next(row for row in reading.features if row.feature == feature)
     assert (row.count, row.names, row.treatment) == (len(names), names, REASONS[feature][0])
-    assert reading.open_tree == names * (feature == "equality")
     assert REASONS.keys() == {*OF_MIXED, *MORE, "other"}
 
 

@@ -18,7 +18,8 @@ def difference(row):
 
 
 def rows_of(text):
-    return {(row.place, row.quantity): row for row in stated_numbers(read(text))}
+    reading = read(text)
+    return {(row.place, row.quantity): row for row in stated_numbers(reading.source, reading.model)}
 
 
 FRAMES = """<frame pos="0.1 0.2 0.3" euler="10 20 30"><body name="b" pos="1 2 3" euler="40 50 60">

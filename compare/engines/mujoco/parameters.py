@@ -5,6 +5,7 @@ compiler to change a number, the option is named.
 """
 
 import warnings
+from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
@@ -15,7 +16,6 @@ from .dynamics import MujocoDynamics
 from .engine import FROM_4
 from .inventory import contact_pairs
 from .names import aligns, element_name, joint_name, kind_of, on
-from .reading import Reading
 from .source import FROM_GEOMS, editable_again, without_visuals
 
 # of the equations of motion
@@ -90,9 +90,9 @@ class Stated(NamedTuple):
     tolerance: float = 0.0  # the largest difference that is rounding
 
 
-def stated_numbers(reading: Reading) -> list[Stated]:
-    """Every mass, position, tensor, axis, armature, damping and stiffness that the file states."""
-    spec, numbered, model = editable_again(reading.source), editable_again(reading.source), reading.model
+def stated_numbers(source: Path | str, model: mujoco.MjModel) -> list[Stated]:
+    """Every mass, position, tensor, axis, armature, damping and stiffness that a file, or MJCF text, states for a model."""
+    spec, numbered = editable_again(source), editable_again(source)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the reading has them
         without_visuals(numbered).compile()  # elements have their numbers in the model only once compiled

@@ -12,7 +12,7 @@ import tmt
 from ...robots.actuators import Drive
 from .actuators import drive_of
 from .engine import Mujoco, methods_for
-from .inventory import Feature, features, open_equalities, refuse, take_away, usable_keys
+from .inventory import Feature, features, refuse, take_away, usable_keys
 from .names import NAMES, Place, element_name, joint_name, joint_places, kind_of, moving, rotors
 from .source import ModelError, compiled, name_of
 
@@ -25,7 +25,6 @@ class Reading:
     name: str  # of the model, "": it has none that can be printed in a line
     tree: tmt.Tree
     features: tuple[Feature, ...]  # of the file, in a fixed order
-    open_tree: tuple[str, ...]  # names of equalities that are off: the open tree is compared
     keyframes: Mapping[str, np.ndarray]  # positions of the Tree, (nq,), by the key's name or `key 0`
     qpos0: np.ndarray  # (nq,)
     # of each joint, rad or m, a ball's of the angle of its turn; None: unlimited
@@ -66,7 +65,6 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
         name=name if name.isprintable() and name != "MuJoCo Model" else "",  # MuJoCo's own for none
         tree=tree,
         features=features(model),
-        open_tree=open_equalities(model),
         keyframes={name: model.key_qpos[k].copy() for k, name in keys.items()},
         qpos0=model.qpos0.copy(),
         ranges=tuple(ranges[place.joint] if model.jnt_limited[place.joint] else None for place in joints.values()),

@@ -5,7 +5,6 @@ them: what is only drawn is left out. No bodies are fused (fusestatic gives wron
 printed as XML (which has seven digits).
 """
 
-import os
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,6 +13,7 @@ import mujoco
 import numpy as np
 
 from .names import aligns, joint_name, joint_places, kind_of, parts_of, rotors
+from .urdf_file import advice, spec_of
 
 FROM_GEOMS = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
 KINDS_OF_PARTS = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]  # of a free joint
@@ -34,7 +34,7 @@ def name_of(source: Path | str | None) -> str:
 def editable(source: Path | str) -> mujoco.MjSpec:
     """The MjSpec of a file (a Path) or of MJCF text."""
     if isinstance(source, Path):
-        return mujoco.MjSpec.from_file(os.fsencode(source))
+        return spec_of(source)
     return mujoco.MjSpec.from_string(source)
 
 
@@ -59,7 +59,7 @@ def compiled(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     except ValueError as error:
         is_model = "<mujoco" in text or "<robot" in text
         problem = f"MuJoCo cannot compile {name_of(source)}" if is_model else f"{name_of(source)} is not MJCF"
-        raise ModelError(f"{problem}: {error}") from None
+        raise ModelError(f"{problem}: {error}{advice(str(error))}") from None
     finally:
         mujoco.set_mju_user_warning(before)
     lines += [warning.message for warning in caught]

@@ -23,7 +23,7 @@ def rows_of_file(setup: Setup) -> Result:
     result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit", "asked_by"])
     causes, changed, reading = [], {}, setup.reading
     kinds = dict(zip(setup.robot.joints, setup.robot.tree.kind))
-    for number in stated_numbers(reading):
+    for number in stated_numbers(reading.source, reading.model):
         slides = kinds.get(number.place, "slide") == "slide"  # the first of a free joint is a slide
         unit = UNITS.get(number.quantity) or UNITS_OF_JOINTS.get(number.quantity, ("", ""))[slides]
         compiled, is_stated = np.ravel(number.compiled).astype(float), number.stated is not None
