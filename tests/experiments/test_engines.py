@@ -147,6 +147,7 @@ def test_orders_are_measured_and_what_cannot_be_set_does_not_run(report):
               if row["engine"] == "Right" and row["method"] == "rk4"}  # fmt: skip
     assert len(errors) > 2 and min(errors.values()) < max(errors.values()) / 100.0
     assert "Heavy" in report[1] and "1 more" not in report[1].splitlines()[0]
+    assert "gravity of Upside" in " ".join(report[1].split())  # the answer says what this program has set
 
 
 class Other(TmtDynamics):

@@ -137,7 +137,7 @@ def compare_features(result: Result, robot: Robot) -> list[dict]:
 
 
 def headline(result: Result) -> Finding | None:
-    """How many numbers are equal to the stated ones to the last bit, and the one with the largest relative difference."""
+    """What is not as stated, how many numbers are to the last bit, and the one with the largest relative difference."""
     rows = [row for row in result.rows if row.get("stated") is not None and not row.get("asked_by")]
     sizes = {}  # of each quantity of a joint or body, as for its tolerance: rounding of a stated zero is no large difference
     for row in rows:
@@ -147,7 +147,8 @@ def headline(result: Result) -> Finding | None:
     with np.errstate(divide="ignore"):
         shares = [np.divide(abs(row["difference"]), sizes[row["of"], row["quantity"]]) for row in off]
         top = off[int(np.argmax(shares))] if off else None
-    return result.finding("headline", numbers=len(rows), off=len(off), top=top) if rows else None
+    failing = [f"{check.quantity} ({check.scene})" for check in result.checks if check.failed]
+    return result.finding("headline", numbers=len(rows), off=len(off), top=top, failing=failing) if rows else None
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
