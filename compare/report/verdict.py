@@ -53,6 +53,11 @@ class Report(NamedTuple):
         """What is said of the robot below the verdict, in sentences."""
         return [say(text) for section in self.sections for text in section.result.top]
 
+    @property
+    def answer(self) -> list[str]:
+        """The last lines of a run of one experiment: what is said of the robot, else its number."""
+        return self.top or [f"{capital(headline(section))}." for section in self.sections if section.result.checks]
+
 
 class Failures(NamedTuple):
     """The checks that fail, by what they are about; only the first say that the two models differ."""
@@ -172,15 +177,6 @@ def headline(section: Section) -> str:
     shares = [check.over_tolerance for check in checks if check.over_tolerance is not None and check.passed]
     numbers = {"passed": sum(check.passed for check in checks), "checks": len(checks)}
     return say(Finding("verdict", "checks_passed", {**numbers, "share": max(shares, default=None)})) if checks else ""
-
-
-def answers(sections: Sequence[Section]) -> list[str]:
-    """What the only experiment of a run answers, in sentences: what it says of the robot, else its headline; of several, none."""
-    if len(sections) != 1:
-        return []
-    result = sections[0].result
-    headlines = [f"{capital(say(result.headline))}."] if result.headline else []
-    return [say(text) for text in result.top] or headlines
 
 
 class Parts:

@@ -9,7 +9,7 @@ import numpy as np
 from ..engines import Engine
 from ..engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, load, read
 from ..engines.mujoco.names import integrator_by_name
-from ..engines.mujoco.remarks import changes, remarks
+from ..engines.mujoco.remarks import of_source, remarks
 from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import OwnFileError, aside, own_object
 from ..process.streams import in_one_line
@@ -89,7 +89,7 @@ def compared_with(reference, path, joints=None, shown=None, solution=None) -> Co
             names, renamed = joints_matched(ARM, read(Path(file)), shown, "the arm")
             robot = ARM.with_joints(names)
         mujoco = load(file, robot.tree)
-        said = tuple(map(say, changes(Path(file), mujoco.model))) if path else ()
+        said = tuple(map(say, of_source(Path(file), mujoco.model))) if path else ()
         return Compared(Reference("arm", shown, said, mujoco.warnings, renamed=renamed), robot, mujoco, None)
     reading = read(Path(file))
     of_file = Reference("model", shown, tuple(map(say, remarks(reading, has_scenes=True))), reading.warnings)

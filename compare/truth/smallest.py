@@ -1,9 +1,8 @@
 """The smallest model with the same motion in a scene: which joints stay where they start for any motion of the others.
 
 A set of joints stays if their accelerations vanish for all values of the others, with these joints at their start and at
-rest. There is a largest such set: remove the joints that move from all joints until none moves. "Moves" is decided at a random
-state, where the acceleration in 50 digits of the robot's doubles is not 0. That the others stay is proved where the acceleration
-folds to the number 0 in the expressions of the traced method.
+rest. There is a largest such set: remove the joints that move from all joints until none moves. Whether a joint moves is decided
+at a random state, by its acceleration in 50 digits of the robot's doubles: an analytic function that is 0 there is 0 everywhere.
 """
 
 import dataclasses
@@ -15,7 +14,6 @@ import mpmath
 import numpy as np
 
 import tmt
-from tmt.compiled.trace import Tape
 from tmt.derivation import method
 from tmt.derivation.vectors import solve
 from tmt.exact.tree import exact_tree
@@ -25,16 +23,14 @@ from ..robots.case import SEED, Case
 
 # an acceleration in 50 digits that counts as 0, relative to the largest one at that state, which is taken as at least 1
 ZERO = mpmath.mpf(10) ** (10 - DIGITS)
-MOST_FOLDED = 20  # speeds up to which accelerations are traced; beyond only the forces
 
 
 class Needed(NamedTuple):
-    """Which free joints of a case stay, and why each of the others is needed."""
+    """Which free joints of a case stay, and why each of the others is needed; undecided: no state was tried."""
 
     stays: tuple
     moves: dict  # name: why
-    unproved: tuple = ()  # they stay in the state that was tried, but their acceleration does not fold to 0
-    undecided: tuple = ()  # no state was tried
+    undecided: tuple = ()
 
 
 def needed(case: Case) -> Needed:
@@ -53,19 +49,7 @@ def needed(case: Case) -> Needed:
                 moves[name] = f"{name} accelerates by {float(a):.2g} {units[name]}/s2 {when}"
         if not any(largest.values()):
             break
-    return Needed(still, moves, unproved(case, still))
-
-
-def unproved(case: Case, stays: Sequence[str]) -> tuple[str, ...]:
-    """Those of the joints that are not in the largest set whose accelerations fold to 0 whatever the other joints do."""
-    proved = tuple(stays)
-    while proved:
-        numbers = folded(case, proved)
-        unfolded = [name for name in proved if any(number != 0.0 for number in numbers[name])]
-        if not unfolded:
-            break
-        proved = tuple(name for name in proved if name not in unfolded)
-    return tuple(name for name in stays if name not in proved)
+    return Needed(still, moves)
 
 
 def forces(case: Case, tree, still: Sequence[str], start: Sequence, q: Sequence, qd: Sequence) -> tuple[list, list]:
@@ -112,21 +96,6 @@ def exact_mass_matrix(tree: tmt.Tree, q: tuple) -> list:
     """Mbar at a position in mpmath's current digits; cached, as the scenes of a robot share positions."""
     tree = exact_tree(tree, mpmath.mpf)
     return method.mass_matrix(method.bodies(tree, q), tree.armature)
-
-
-def folded(case: Case, still: Sequence[str]) -> dict:
-    """The numbers to which the traced accelerations of the joints in `still` fold; None where one remains an expression."""
-    tape, tree = Tape(), case.tree
-    sizes = {"q": tree.coordinates.nq, "qd": tree.coordinates.nv}
-    q, qd = (tape.inputs(*(f"{name}{i}" for i in range(count))) for name, count in sizes.items())
-    force, q = forces(case, tree, still, [tape.lift(float(value)) for value in case.q], q, qd)
-    numbers = [tape.lift(part).number for part in force]
-    if any(number != 0.0 for number in numbers):  # else Mbar, which is regular, has nothing to solve
-        accelerations = [None] * len(qd)
-        if len(qd) <= MOST_FOLDED:
-            accelerations = solve(method.mass_matrix(method.bodies(tree, q), tree.armature), force)
-        numbers = [None if a is None else tape.lift(a).number for a in accelerations]
-    return of_joints(case, still, numbers)
 
 
 def of_joints(case: Case, names: Sequence[str], values: Sequence) -> dict:

@@ -1,5 +1,6 @@
 """What a user has to know of how a file is compared: a base that is fixed, what the compiler changed, what is switched off."""
 
+import re
 from pathlib import Path
 
 import mujoco
@@ -7,27 +8,30 @@ import numpy as np
 
 from ...judge.finding import Finding
 from .inventory import OFF, OPEN
+from .names import element_name, moving
 from .parameters import stated_numbers
 from .reading import Reading
-from .urdf_file import fixed_base
+from .source import text_of
 
 
 def remarks(reading: Reading, has_scenes: bool) -> list[Finding]:
     """Findings, a line each. has_scenes: servos act in some of them."""
-    found = changes(reading.source, reading.model) if reading.source is not None else []
-    if reading.source is not None and (base := fixed_base(reading.source, reading.model)):
-        found.insert(0, Finding("remarks", "fixed_base", {"link": base[0], "mass": base[1]}))
+    found = of_source(reading.source, reading.model) if reading.source is not None else []
     if off := [feature for feature in reading.features if feature.treatment in (OFF, OPEN)]:
         driven = has_scenes and bool(reading.drive.actuators)
         found.append(Finding("remarks", "switched_off", {"features": off, "driven": driven}))
     return found
 
 
-def changes(source: Path | str, model: mujoco.MjModel) -> list[Finding]:
-    """A finding for each option by which the compiler changed numbers that the file states: where, by quantity."""
+def of_source(source: Path | str, model: mujoco.MjModel) -> list[Finding]:
+    """What is fixed of a URDF; for each option by which the compiler changed stated numbers, where it did, by quantity."""
+    root = re.search(r"<(robot|mujoco)\b", text := text_of(source) if isinstance(source, Path) else source)
+    fixed, found = np.flatnonzero(~moving(model) & (model.body_mass > 0.0)), []
+    if root and root[1] == "robot" and '"world"' not in text and fixed.size:
+        values = {"link": element_name(model, "body", fixed[0]), "mass": float(model.body_mass[fixed].sum())}
+        found.append(Finding("remarks", "fixed_base", values))
     changed: dict[str, dict[str, list[str]]] = {}
     for number in stated_numbers(source, model):
-        is_stated = number.stated is not None
-        if is_stated and np.abs(np.subtract(number.stated, number.compiled)).max() > number.tolerance and number.why:
+        if number.why and number.stated is not None:
             changed.setdefault(number.why, {}).setdefault(number.quantity, []).append(number.place)
-    return [Finding("remarks", "changed", {"why": why, "places": places}) for why, places in changed.items()]
+    return found + [Finding("remarks", "changed", {"why": why, "places": places}) for why, places in changed.items()]

@@ -1,12 +1,10 @@
-"""A URDF as MuJoCo can read it: meshes by their packages, a floating base; and whether its base is fixed."""
+"""A file as MuJoCo can compile it: a URDF's meshes are found by their packages, and its floating base hangs on the world."""
 
 import os
 from pathlib import Path
 from xml.etree import ElementTree
 
 import mujoco
-
-from .names import moving
 
 ADVICE = {  # by what MuJoCo says of a file that it cannot compile
     "Error opening file": "package://NAME/... is looked for in a folder NAME beside the file or above it, else beside the file",
@@ -22,13 +20,19 @@ def advice(error: str) -> str:
 
 
 def spec_of(path: Path) -> mujoco.MjSpec:
-    """The MjSpec of a file. The meshes of a URDF are found, and a joint of type floating hangs on the world."""
-    robot = robot_of_urdf(path)
-    if robot is not None and free_the_base(robot):
+    """The MjSpec of a file."""
+    spec = mujoco.MjSpec.from_file(os.fsencode(path))
+    of_free = [joint.parent.parent for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
+    for base in [body for body in of_free if body.parent == spec.worldbody]:
+        robot = ElementTree.fromstring(path.read_text(encoding="utf-8", errors="replace"))
+        for element, key in [(link, "name") for link in robot.iter("link")] + [
+            (end, "link") for end in robot.iter("parent")
+        ]:
+            if element.get(key) == base.name:
+                element.set(key, "world")
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(robot, encoding="unicode"))
         spec.modelfiledir = str(path.parent)
-    else:
-        spec = mujoco.MjSpec.from_file(os.fsencode(path))
+        break
     for mesh in spec.meshes:
         if "://" in mesh.file:
             mesh.file = str(place_of(mesh.file, path.absolute()) or mesh.file)
@@ -40,39 +44,3 @@ def place_of(address: str, path: Path) -> Path | None:
     _, _, relative = address.partition("://")
     places = [*(above / relative for above in path.parents), path.parent / Path(relative).name]
     return next((place for place in places if place.is_file()), None)
-
-
-def robot_of_urdf(source: Path | str) -> ElementTree.Element | None:
-    """The element `robot` of a URDF, a file or a text; None for MJCF and for what is no XML."""
-    try:
-        text = source.read_bytes() if isinstance(source, Path) else source.encode()
-        robot = ElementTree.fromstring(text) if b"<robot" in text else None
-    except (ElementTree.ParseError, OSError, LookupError, ValueError):  # MuJoCo says what is wrong
-        return None
-    return robot if robot is not None and robot.tag == "robot" else None
-
-
-def root_of(robot: ElementTree.Element) -> ElementTree.Element | None:
-    """The link of a URDF on which all others hang."""
-    children = {child.get("link") for child in robot.findall("joint/child")}
-    return next((link for link in robot.findall("link") if link.get("name") not in children), None)
-
-
-def free_the_base(robot: ElementTree.Element) -> bool:
-    """Call the root `world` if a joint of type floating hangs on it, as MuJoCo needs it; whether that was done."""
-    root, joints = root_of(robot), robot.findall("joint[@type='floating']/parent")
-    if root is None or root.get("name") not in [parent.get("link") for parent in joints] or root.get("name") == "world":
-        return False
-    for parent in robot.findall("joint/parent"):
-        if parent.get("link") == root.get("name"):
-            parent.set("link", "world")
-    root.set("name", "world")
-    return True
-
-
-def fixed_base(source: Path | str, model: mujoco.MjModel) -> tuple[str, float] | None:
-    """The name of a URDF's root, and the mass, kg, of what MuJoCo fixes to the world with it; None where nothing has mass."""
-    robot = robot_of_urdf(source)
-    root = root_of(robot) if robot is not None else None
-    mass = float(model.body_mass[~moving(model)].sum())
-    return (root.get("name", ""), mass) if root is not None and mass and root.get("name") != "world" else None

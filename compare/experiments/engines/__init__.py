@@ -71,20 +71,14 @@ def rows(setup: Setup) -> Result:
         differing = list(dict.fromkeys(row["engine"] for row in result.rows if not row["passed"]))
         failed = {check.scene for check in result.checks if check.quantity.endswith(AS_READ) and check.failed}
         values = {"engines": names, "differing": differing, "misread": [name for name in names if name in failed]}
-        values["mended"] = numbers_set(result)
+        values["mended"] = {}
+        for row in result.tables["engines_read"]:
+            if row.get("set_by_this_program"):
+                values["mended"].setdefault(row["engine"], {})[row["number"]] = None
         values["largest"] = largest
         result.headline = result.finding("headline", **values)
         result.top.append(result.finding("answer", **values))
     return result
-
-
-def numbers_set(result: Result) -> dict[str, list[str]]:
-    """The kinds of numbers that this program has set to MuJoCo's, by engine."""
-    numbers: dict[str, list[str]] = {}
-    for row in result.tables["engines_read"]:
-        if row.get("set_by_this_program") and row["number"] not in numbers.get(row["engine"], ()):
-            numbers.setdefault(row["engine"], []).append(row["number"])
-    return numbers
 
 
 def compare_engine(result: Result, setup: Setup, engine: Engine, label: str) -> None:

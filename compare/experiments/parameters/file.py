@@ -1,10 +1,10 @@
 """The numbers that a file states compared with those that MuJoCo compiled, and what of the file is switched off."""
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 
+from ...engines.mujoco.inventory import LEFT_OUT, MODELLED
 from ...engines.mujoco.parameters import stated_numbers
 from ...judge.check import Result
 from ..setup import Setup
@@ -19,9 +19,9 @@ UNITS_OF_JOINTS = {  # that turn, and that slide
 
 
 def rows_of_file(setup: Setup) -> Result:
-    """A row for each number, a check for each that the file states, the inventory; findings on what the compiler changed."""
+    """A row for each number, a check for each that the file states and no option changes, and the inventory."""
     result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit", "asked_by"])
-    causes, changed, reading = [], {}, setup.reading
+    causes, reading = [], setup.reading
     kinds = dict(zip(setup.robot.joints, setup.robot.tree.kind))
     for number in stated_numbers(reading.source, reading.model):
         slides = kinds.get(number.place, "slide") == "slide"  # the first of a free joint is a slide
@@ -31,13 +31,9 @@ def rows_of_file(setup: Setup) -> Result:
         result.rows += rows_of(number.place, number.quantity, stated, compiled, unit, asked_by=number.why)
         if is_stated and not number.why:
             causes += compare_number(result, number.place, number.quantity, stated, compiled, unit, number.tolerance)
-        elif not is_stated or np.abs(stated - compiled).max() > number.tolerance:
-            changed.setdefault(number.why, Counter())[number.quantity] += 1
     check_forces(result, setup)
     for name, value, unit in (("integrator", reading.integrator, ""), ("timestep", reading.dt, "s")):
         result.rows.append({"of": "file", "quantity": name, "component": "", "compiled": value, "unit": unit})
-    for why, counts in changed.items():
-        result.find("changed", why=why, counts=dict(counts))
     add_inventory(result, setup.robot.features)
     result.curves["causes"] = sorted(causes, key=lambda cause: -cause["size"])
     return result
@@ -50,5 +46,6 @@ def add_inventory(result: Result, features: Sequence) -> None:
         {name: ";".join(feature.names) if name == "names" else getattr(feature, name) for name in fields}
         for feature in features
     ]
-    for treatment in sorted({feature.treatment for feature in features}):  # each is a macro of the template
-        result.find(treatment, features=[feature for feature in features if feature.treatment == treatment])
+    for treatment in (MODELLED, LEFT_OUT):  # each is a macro of the template; the others are remarks on the file
+        if chosen := [feature for feature in features if feature.treatment == treatment]:
+            result.find(treatment, features=chosen)

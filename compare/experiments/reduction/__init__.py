@@ -58,6 +58,11 @@ def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) 
             values = {"speedup": best["speedup"], "joints": best["hinges"].split(), "scene": best["scene"]}
             result.headline = result.finding("headline", **values)
     result.top += answers(result, setup.robot)
+    result.tables["reduction_needs"] = [
+        {"scene": scene, "joint": joint, "why_needed": why}
+        for scene, need in result.curves["needs"].items()
+        for joint, why in need["needed"].items()
+    ]
     return result
 
 
@@ -65,14 +70,12 @@ def answers(result: Result, robot: Robot) -> list[Finding]:
     """What scenes need, a finding for those that need the same; what can be locked comes last."""
     groups = {}
     for scene, need in result.curves["needs"].items():
-        groups.setdefault(tuple(need[kind] for kind in ("needed", "locked", "stays", "undecided")), []).append(scene)
-    found = []
-    for key, scenes in groups.items():
-        needed, locked, stays, undecided = key
-        apart = [value for (scene, _), value in result.curves["apart"].items() if scene in scenes]
-        values = {"needed": needed, "locked": locked, "stays": stays, "undecided": undecided, "scenes": scenes}
-        values |= {"apart": max(apart, default=None), "unit": movement_unit(robot.coordinates)}
-        found.append(result.finding("answer", joint=joint_word(robot.coordinates), **values))
+        joints = {kind: tuple(names) for kind, names in need.items()}
+        groups.setdefault(tuple(joints.values()), joints | {"scenes": []})["scenes"].append(scene)
+    for group in groups.values():
+        apart = [value for (scene, _), value in result.curves["apart"].items() if scene in group["scenes"]]
+        group |= {"apart": max(apart, default=None), "unit": movement_unit(robot.coordinates)}
+    found = [result.finding("answer", joint=joint_word(robot.coordinates), **group) for group in groups.values()]
     return sorted(found, key=lambda one: bool(one.values["needed"] and one.values["stays"]))
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 
 import tmt
-from tmt.exact.values import DIGITS
 
 from ...engines import LABELS
 from ...judge.check import About, Result, closest
@@ -27,11 +26,9 @@ def of_case(result: Result, case: Case, setup: Setup) -> list[tuple]:
     models = [(case.name, case.changed(locked=()))]
     if smaller or case.locked or rests:
         models.append((case.name, None if rests else smaller or case))
-    joints = {"needed": tuple(name for name in case.joints if name in need.moves), "locked": case.scene.locked}
-    joints |= {"stays": need.stays, "unproved": need.unproved, "undecided": need.undecided}
+    reasons = {name: need.moves[name] for name in case.joints if name in need.moves}
+    joints = {"needed": reasons, "locked": case.scene.locked, "stays": need.stays, "undecided": need.undecided}
     result.curves["needs"][case.name] = joints
-    word, reasons = joint_word(case.robot.coordinates), list(need.moves.values())
-    result.find("need", scene=case.name, joint=word, reasons=reasons, digits=DIGITS, time=seconds(case.robot), **joints)
     if (smaller or rests) and not (case.robot.is_read and case.coordinates.nv > MOST_IN_A_BAND):
         compare_smaller(result, case, smaller, setup)
     return models

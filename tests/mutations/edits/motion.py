@@ -58,7 +58,6 @@ EDITS = (
     Edit("sub_blocks", "check_blocks", "closest(_1, _2)", "(0,)", "the first state is judged"),
     Edit("sub_blocks", "check_blocks", "FACTOR * EPS * scale", "100 * FACTOR * EPS * scale", "tolerance x 100"),
     Edit("smallest", "ZERO", "mpmath.mpf(10) ** _1", "mpmath.mpf(10)", "an acceleration below 10 rad/s2 is zero"),
-    Edit("smallest", "unproved", "number != 0.0", "False", "every acceleration folds to zero"),
     Edit("exact_motion", "check_falling", "np.divide(_1, _2)", "values[0] / values[1]",
          "the order is measured at the coarsest steps"),
     Edit("exact_motion", "check_falling", "clear < 2", "clear < 9", "no order is measured"),

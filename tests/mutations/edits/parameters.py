@@ -38,7 +38,7 @@ EDITS = (
     Edit("reference", "compared_with", "path is None or has_hinges(path, ARM.joints)", "True",
          "any file is that of the arm"),
     Edit("mujoco.remarks", "remarks", "feature.treatment in (OFF, OPEN)", "feature.treatment == OFF", "an open tree is not said"),
-    Edit("mujoco.remarks", "changes", "_1 > number.tolerance", "True", "an option without effect is said to change numbers"),
+    Edit("mujoco.parameters", "row_of", "is_on and not is_same", "is_on", "an option without effect is said to change numbers"),
     Edit("engines.mujoco.dynamics", "MujocoDynamics.other_forces", "d.qfrc_actuator[_1]", "0 * d.qfrc_actuator[_1]",
          "actuators exert no force"),
     Edit("engines.mujoco.dynamics", "MujocoDynamics.other_forces", "d.qfrc_constraint[_1]", "0 * d.qfrc_constraint[_1]",
