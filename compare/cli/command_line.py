@@ -18,6 +18,9 @@ EXAMPLES = block(TEXT, "examples")
 
 
 class Parser(argparse.ArgumentParser):
+    def __init__(self, **more):
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False, **more)
+
     def error(self, message):
         self.exit(2, f"{self.prog}: {in_one_line(' '.join(message.split()))}\n")
 
@@ -97,8 +100,6 @@ def parser(experiment: str | None = None) -> Parser:
         usage=f"{PROGRAM} {experiment or 'EXPERIMENT|all'} [options]",
         description=help_of(experiment) if experiment else "\n".join(of_all),
         epilog=None if experiment else EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        add_help=False,
     )
     if experiment is None:
         made.add_argument("experiment", nargs="?", help=argparse.SUPPRESS)
@@ -117,8 +118,6 @@ def command_parser(name: str, usage: str, template: str, options: dict[str, Opti
         usage=f"{PROGRAM} {name} {usage} [options]",
         description=block(template, "help"),
         epilog=block(template, "examples") + "\n",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        add_help=False,
     )
     for option in options:
         made.add_option(option, options[option], template)

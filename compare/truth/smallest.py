@@ -26,11 +26,10 @@ ZERO = mpmath.mpf(10) ** (10 - DIGITS)
 
 
 class Needed(NamedTuple):
-    """Which free joints of a case stay, and why each of the others is needed; undecided: no state was tried."""
+    """Which free joints of a case stay, and why each of the others is needed."""
 
     stays: tuple
     moves: dict  # name: why
-    undecided: tuple = ()
 
 
 def needed(case: Case) -> Needed:
@@ -53,17 +52,15 @@ def needed(case: Case) -> Needed:
 
 
 def forces(case: Case, tree, still: Sequence[str], start: Sequence, q: Sequence, qd: Sequence) -> tuple[list, list]:
-    """Mbar qdd (nv,) and the position: joints in `still` at their start and at rest, the others at q, qd.
+    """Mbar qdd (nv,) and the position: joints in `still` at their start and at rest, the others at q, qd; in mpmath's numbers.
 
-    tree: the case's, over the same number type as start (nq,), q and qd. A holding torque is the model's own bias (and springs)
-    at the start in these numbers, not its rounded value.
+    A holding torque is the model's own bias (and springs) at the start in these numbers, not its rounded value.
     """
     q, qd, joints = list(q), list(qd), dict(zip(case.joints, tree.coordinates.joints))
     for name in still:
         _, at, by = joints[name]
-        q[at], qd[by] = start[at], [0.0 * start[0]] * len(qd[by])
-    springs = [0.0] * len(qd)
-    tau = [0.0 * start[0] + float(torque) for torque in case.tau]
+        q[at], qd[by] = start[at], [mpmath.mpf(0)] * len(qd[by])
+    springs, tau = [0.0] * len(qd), [mpmath.mpf(float(torque)) for torque in case.tau]
     if tree.has_springs:
         springs = method.spring_torque(tree, q)
     if case.scene.torque == "hold":
@@ -88,7 +85,8 @@ def exact_accelerations(case: Case, still: Sequence[str], q: np.ndarray, qd: np.
             still_tree = dataclasses.replace(case.tree, damping=np.zeros(len(qd)))
             values = solve(exact_mass_matrix(still_tree, tuple(q)), values)
         zero = ZERO * max(1, *map(abs, values))
-        return of_joints(case, still, [a if abs(a) > zero else mpmath.mpf(0) for a in values])
+        joints = dict(zip(case.joints, case.tree.coordinates.joints))
+        return {name: tuple(a if abs(a) > zero else mpmath.mpf(0) for a in values[joints[name].qd]) for name in still}
 
 
 @lru_cache(maxsize=8)
@@ -96,12 +94,6 @@ def exact_mass_matrix(tree: tmt.Tree, q: tuple) -> list:
     """Mbar at a position in mpmath's current digits; cached, as the scenes of a robot share positions."""
     tree = exact_tree(tree, mpmath.mpf)
     return method.mass_matrix(method.bodies(tree, q), tree.armature)
-
-
-def of_joints(case: Case, names: Sequence[str], values: Sequence) -> dict:
-    """The values of these joints, tuples by name, from one value for each speed of a case."""
-    joints = dict(zip(case.joints, case.tree.coordinates.joints))
-    return {name: tuple(values[joints[name].qd]) for name in names}
 
 
 def reduced(case: Case, need: Needed | None = None) -> Case | None:

@@ -71,6 +71,14 @@ def test_an_option_that_asks_for_a_change_is_named_where_it_changes(option):
         assert row.why in ("", name) and (difference(row) > 0.1) == (row.quantity in quantities)
 
 
+@pytest.mark.parametrize(
+    "option", ['boundmass="0.5"', 'boundinertia="0.5"', 'balanceinertia="true"', 'settotalmass="1"']
+)
+def test_an_option_without_effect_is_not_named(option):
+    rows = rows_of(mjcf(BODY.format("1 1.5 2", ""), f"<compiler {option}/>"))
+    assert not any(row.why for row in rows.values())
+
+
 def test_the_mass_of_geoms_is_stated_where_each_has_one():
     heavy = PLAIN.replace('name="g"', 'name="g" mass="2"')
     for text, expected in (

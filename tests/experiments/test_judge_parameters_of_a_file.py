@@ -9,7 +9,6 @@ from models import PATHS
 from compare.engines.mujoco import engine, read
 from compare.engines.mujoco.parameters import Stated, row_of
 from compare.experiments import parameters
-from compare.experiments.parameters.file import add_inventory
 from compare.experiments.parameters.numbers import compare_number
 from compare.experiments.setup import Setup, engines
 from compare.judge.check import Result
@@ -138,10 +137,3 @@ def test_a_small_body_beside_a_large_one_has_its_own_tolerance(tmp_path):
     for old, new in (("1e-9 1e-9 1e-9", "1e-9 1.000001e-9 1e-9"), ('mass="1e-3"', 'mass="1.000000001e-3"')):
         assert len(failing(beside_solution(tmp_path, small.replace(old, new), small))) == 1
     assert failing(beside_solution(tmp_path, small, small)) == []
-
-
-def test_what_is_modelled_is_said():
-    features, result = read(PATHS["gripper"]).features, Result("parameters")
-    add_inventory(result, features)
-    named = {note.kind: [feature.feature for feature in note.values["features"]] for note in result.notes}
-    assert named == {"modelled": [f.feature for f in features if f.treatment == "modelled"]}

@@ -118,11 +118,10 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
     say_outcome(said, section("mass", ("a", 0.25, 1.0, "at most", True), ("b", 0.5, 1.0, "at most", True)), 1.25, [])
     assert len(said) == 1 and said[0].split()[:4] == ["mass", "ok", "2", "checks"] and " 50 %" in said[0]
     of = section("mass", *[BAD] * 7, GOOD)
-    of.result.top.append("The answer.")
     say_outcome(said, of, 1.0, [{"text": "mass of forearm: stated 1"}])
     assert said[1].split()[1:5] == ["7", "FAILED", "8", "checks"]
-    assert said[2:4] == ["  The answer.", "  CAUSE mass of forearm: stated 1"]
-    assert [line.startswith("  FAIL mass: Mbar, zero: 2 kg m2") for line in said[4:]] == [True] * 4 + [False]
+    assert said[2] == "  CAUSE mass of forearm: stated 1"
+    assert [line.startswith("  FAIL mass: Mbar, zero: 2 kg m2") for line in said[3:]] == [True] * 4 + [False]
     wrong = ("what", 2.0, 1.0, "at most", False, About.PROGRAM)
     del said[:]
     of = section("mass", *[BAD] * 7, wrong)
@@ -164,7 +163,6 @@ def test_the_largest_difference_is_the_answer_unless_a_run_diverged(rows, number
 OFF = {"of": "forearm", "quantity": "com", "component": "x", "stated": 2.0, "compiled": 2.5, "difference": 0.5,
        "unit": "m"}  # fmt: skip
 SAME = OFF | {"compiled": 2.0, "difference": 0.0}
-HEAVY = OFF | {"quantity": "mass", "component": "", "unit": "kg", "stated": 100.0, "compiled": 101.0, "difference": 1.0}
 APART = {"quantity": "Mbar", "unit": "kg m2", "worst_difference": 2e-16, "difference_over_bar": 0.1}
 STEP = {"scene": "s", "engine": "tmt", "method": "rk4", "damping": 0.0, "limit": "finite", "predicted_dt_s": 0.1,
         "observed_dt_s": 0.1001, "passed": True}  # fmt: skip
@@ -177,8 +175,7 @@ def headline_of(name, of):
 
 
 @pytest.mark.parametrize("name, rows, numbers, named", [
-    ("parameters", [SAME, OFF], "1 2 0.5", "com x of forearm"),
-    ("parameters", [OFF, HEAVY], "0 2 0.5", "com x of forearm"),  # relative to their sizes
+    ("parameters", [SAME, OFF], "1 2", "all as stated"),
     ("published", [PRINTED | {"mujoco": 0.8}], "0 1", ""),
     ("gravity", [APART, APART | {"quantity": "other", "worst_difference": 1.0, "difference_over_bar": 0.05}], "2e-16 10", "Mbar"),
     ("trajectory", [{"scene": "a", "difference_over_band": 0.04}, {"scene": "a", "difference_over_band": 12.0}], "1 12", ""),

@@ -4,10 +4,9 @@ import re
 from pathlib import Path
 
 import mujoco
-import numpy as np
 
 from ...judge.finding import Finding
-from .inventory import OFF, OPEN
+from .inventory import LEFT_OUT, OFF, OPEN
 from .names import element_name, moving
 from .parameters import stated_numbers
 from .reading import Reading
@@ -17,7 +16,7 @@ from .source import text_of
 def remarks(reading: Reading, has_scenes: bool) -> list[Finding]:
     """Findings, a line each. has_scenes: servos act in some of them."""
     found = of_source(reading.source, reading.model) if reading.source is not None else []
-    if off := [feature for feature in reading.features if feature.treatment in (OFF, OPEN)]:
+    if off := [feature for feature in reading.features if feature.treatment in (OFF, OPEN, LEFT_OUT)]:
         driven = has_scenes and bool(reading.drive.actuators)
         found.append(Finding("remarks", "switched_off", {"features": off, "driven": driven}))
     return found
@@ -26,8 +25,8 @@ def remarks(reading: Reading, has_scenes: bool) -> list[Finding]:
 def of_source(source: Path | str, model: mujoco.MjModel) -> list[Finding]:
     """What is fixed of a URDF; for each option by which the compiler changed stated numbers, where it did, by quantity."""
     root = re.search(r"<(robot|mujoco)\b", text := text_of(source) if isinstance(source, Path) else source)
-    fixed, found = np.flatnonzero(~moving(model) & (model.body_mass > 0.0)), []
-    if root and root[1] == "robot" and '"world"' not in text and fixed.size:
+    fixed, found = [body for body in range(1, model.nbody) if model.body_mass[body] and not moving(model)[body]], []
+    if root and root[1] == "robot" and '"world"' not in text and fixed:
         values = {"link": element_name(model, "body", fixed[0]), "mass": float(model.body_mass[fixed].sum())}
         found.append(Finding("remarks", "fixed_base", values))
     changed: dict[str, dict[str, list[str]]] = {}

@@ -9,8 +9,7 @@ import mujoco
 ADVICE = {  # by what MuJoCo says of a file that it cannot compile
     "Error opening file": "package://NAME/... is looked for in a folder NAME beside the file or above it, else beside the file",
     "no decoder found": "MuJoCo reads STL, OBJ and MSH; collision meshes may be deleted: contacts are not compared",
-    "mass and inertia of moving bodies": "a link without mass cannot move: give it one by boundmass and boundinertia of "
-    "<compiler>, or, in MJCF, put its joint into the next body",
+    "mass and inertia of moving bodies": "boundmass and boundinertia of <compiler> give some, or both joints in one body",
 }
 
 

@@ -17,18 +17,11 @@ from ...robots.case import Coordinates
 from .. import Experiment
 from ..setup import Setup
 from . import file
-from .numbers import ABSENT, cause, check_forces, compare_number, rows_of
+from .numbers import ABSENT, OF_BODIES, UNITS, cause, check_forces, compare_number, rows_of, unit_of
 
 EXPERIMENT = Experiment(order=10, serves_own=False)
-# numbers of the whole file, and those of bodies; the others are of joints
+# numbers of the whole file; the others are of bodies and joints
 OF_WORLD = (*STATED_FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *ABSENT)
-OF_BODIES = ("mass", "com", "inertia", "gravcomp")
-UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gravcomp", *ABSENT), "") | {
-    "ref": "rad", "anchor": "m", "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m", "stiffness": "N m/rad",
-    "mass": "kg", "com": "m", "inertia": "kg m2", "rest": "rad", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
-    "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
-}  # fmt: skip
-OF_SLIDES = {"rad": "m", "N m s/rad": "N s/m", "kg m2": "kg", "N m/rad": "N/m", "N m": "N"}  # units
 WHOLE_NUMBERS = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")
 AT_TIMES = ("limited", "contact pairs")  # these act at some states only: causes come after those that always act
 MAY_DIFFER = "contact", "limit", "clamp", "actuator"  # the equations of motion without them do not depend on these
@@ -60,14 +53,10 @@ def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> 
 
 
 def stated(tree: tmt.Tree) -> dict:
-    """The quantities of `parameters` of MuJoCo's model from the stated numbers of hinges: arrays per hinge, per body, or one."""
-    n, m = len(tree.hinge_names), len(tree.body_names)
-    absent = {"frictionloss": n, "limited": n, "gravcomp": m}
-    absent |= dict.fromkeys(("density", "viscosity", "other mass", "tendon armature", *ABSENT), 1)
-    numbers = numbers_of(tree, range(n), range(m))
+    """The quantities of `parameters` by the stated numbers of hinges, arrays per hinge, per body, or one; the others are 0."""
+    numbers = numbers_of(tree, range(len(tree.hinge_names)), range(len(tree.body_names)))
     del numbers["rest"]
-    zeros = {name: np.zeros(count) for name, count in absent.items()}
-    return zeros | dict.fromkeys(STATED_FLAGS, 1.0) | {"order": range(n)} | numbers
+    return dict.fromkeys(STATED_FLAGS, 1.0) | {"order": range(len(tree.hinge_names))} | numbers
 
 
 def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
@@ -98,17 +87,15 @@ def rows(setup: Setup) -> Result:
     else:
         numbers_stated, compiled = stated(tree), parameters(dynamics)
     slides = {joint for joint, kind in zip(tree.hinge_names, tree.kind) if kind == "slide"}
-    for quantity in (name for name in UNITS if name in numbers_stated):
-        numbers = np.asarray(numbers_stated[quantity], dtype=float)
+    for quantity in (name for name in UNITS if name in compiled):
         values = np.asarray(compiled[quantity], dtype=float)
+        numbers = np.broadcast_to(np.asarray(numbers_stated.get(quantity, 0.0), dtype=float), values.shape)
         names = owners(tree, quantity)
         is_whole = quantity in WHOLE_NUMBERS
         numbers, values = (each.reshape(len(names), -1) for each in (numbers, values))
         sizes = added.get(quantity, np.abs(numbers).max(axis=1))
         for owner, a, b, size in zip(names, numbers, values, sizes):
-            unit, tolerance = UNITS[quantity], FACTOR * EPS * size
-            if owner in slides and quantity not in (*OF_BODIES, "anchor"):
-                unit = OF_SLIDES.get(unit, unit)
+            unit, tolerance = unit_of(quantity, owner in slides), FACTOR * EPS * size
             words = dict(enumerate(("the world", *tree.hinge_names), start=-1)) if quantity == "parent" else {}
             causes += compare_number(result, owner, quantity, a, b, unit, tolerance, is_whole, words)
             result.rows += rows_of(owner, quantity, a, b, unit)
@@ -137,18 +124,10 @@ def compare_features(result: Result, robot: Robot) -> list[dict]:
 
 
 def headline(result: Result) -> Finding | None:
-    """What is not as stated, how many numbers are to the last bit, and the one with the largest relative difference."""
-    rows = [row for row in result.rows if row.get("stated") is not None and not row.get("asked_by")]
-    sizes = {}  # of each quantity of a joint or body, as for its tolerance: rounding of a stated zero is no large difference
-    for row in rows:
-        kind = row["of"], row["quantity"]
-        sizes[kind] = max(sizes.get(kind, 0.0), abs(row["stated"]))
-    off = [row for row in rows if row["difference"] != 0.0]
-    with np.errstate(divide="ignore"):
-        shares = [np.divide(abs(row["difference"]), sizes[row["of"], row["quantity"]]) for row in off]
-        top = off[int(np.argmax(shares))] if off else None
+    """What is not as stated, and how many numbers are equal to the stated ones to the last bit."""
+    off = [row["difference"] != 0.0 for row in result.rows if row.get("stated") is not None and not row.get("asked_by")]
     failing = [f"{check.quantity} ({check.scene})" for check in result.checks if check.failed]
-    return result.finding("headline", numbers=len(rows), off=len(off), top=top, failing=failing) if rows else None
+    return result.finding("headline", numbers=len(off), off=sum(off), failing=failing) if off else None
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:

@@ -4,18 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...engines.mujoco.inventory import LEFT_OUT, MODELLED
 from ...engines.mujoco.parameters import stated_numbers
 from ...judge.check import Result
 from ..setup import Setup
-from .numbers import check_forces, compare_number, rows_of
-
-UNITS = {"mass": "kg", "pos": "m", "com": "m", "inertia": "kg m2", "anchor": "m", "axis": ""}
-UNITS_OF_JOINTS = {  # that turn, and that slide
-    "armature": ("kg m2", "kg"),
-    "damping": ("N m s/rad", "N s/m"),
-    "stiffness": ("N m/rad", "N/m"),
-}
+from .numbers import check_forces, compare_number, rows_of, unit_of
 
 
 def rows_of_file(setup: Setup) -> Result:
@@ -25,7 +17,7 @@ def rows_of_file(setup: Setup) -> Result:
     kinds = dict(zip(setup.robot.joints, setup.robot.tree.kind))
     for number in stated_numbers(reading.source, reading.model):
         slides = kinds.get(number.place, "slide") == "slide"  # the first of a free joint is a slide
-        unit = UNITS.get(number.quantity) or UNITS_OF_JOINTS.get(number.quantity, ("", ""))[slides]
+        unit = unit_of(number.quantity, slides)
         compiled, is_stated = np.ravel(number.compiled).astype(float), number.stated is not None
         stated = np.ravel(number.stated).astype(float) if is_stated else [None] * len(compiled)
         result.rows += rows_of(number.place, number.quantity, stated, compiled, unit, asked_by=number.why)
@@ -46,6 +38,3 @@ def add_inventory(result: Result, features: Sequence) -> None:
         {name: ";".join(feature.names) if name == "names" else getattr(feature, name) for name in fields}
         for feature in features
     ]
-    for treatment in (MODELLED, LEFT_OUT):  # each is a macro of the template; the others are remarks on the file
-        if chosen := [feature for feature in features if feature.treatment == treatment]:
-            result.find(treatment, features=chosen)

@@ -15,6 +15,19 @@ from ..setup import Setup
 ABSENT = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
 OF_FORCES = (*ABSENT, "stiffness", "density", "viscosity", "gravcomp", "limited", "frictionloss")  # explain a force
 OPTIONS = (*STATED_FLAGS, "order", "parent", "ref", "density", "viscosity", "contact pairs")  # causes of rank 1
+OF_BODIES = ("mass", "com", "inertia", "gravcomp")
+UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gravcomp", *ABSENT), "") | {
+    "ref": "rad", "anchor": "m", "pos": "m", "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m",
+    "stiffness": "N m/rad",
+    "mass": "kg", "com": "m", "inertia": "kg m2", "rest": "rad", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
+    "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
+}  # fmt: skip
+OF_SLIDES = {"rad": "m", "N m s/rad": "N s/m", "kg m2": "kg", "N m/rad": "N/m", "N m": "N"}  # units
+
+
+def unit_of(quantity: str, slides: bool) -> str:
+    """The unit of a number of a body, or of a joint that turns or slides."""
+    return OF_SLIDES.get(UNITS[quantity], UNITS[quantity]) if slides and quantity not in OF_BODIES else UNITS[quantity]
 
 
 def component(k: int, count: int) -> str:

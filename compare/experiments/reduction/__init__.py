@@ -58,11 +58,6 @@ def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) 
             values = {"speedup": best["speedup"], "joints": best["hinges"].split(), "scene": best["scene"]}
             result.headline = result.finding("headline", **values)
     result.top += answers(result, setup.robot)
-    result.tables["reduction_needs"] = [
-        {"scene": scene, "joint": joint, "why_needed": why}
-        for scene, need in result.curves["needs"].items()
-        for joint, why in need["needed"].items()
-    ]
     return result
 
 

@@ -9,7 +9,6 @@ from ...judge.check import Result
 from ...judge.words import capital
 from ...report.style import BLUE, GREY, ORANGE, WIDTH, file_name
 from ...robots import Robot
-from .times import largest_gain
 
 KINDS_OF_JOINT = {
     "needed": {"marker": "o", "color": BLUE},
@@ -50,8 +49,7 @@ def draw_needs(result: Result, robot: Robot) -> tuple:
         for model, more in (("whole model", {"mfc": "none"}), ("smallest model", {"markersize": 3.5}))
     ]
     right.legend(handles=handles, ncols=2, **ABOVE)
-    best, nv = largest_gain(result.rows, robot.coordinates.nv), robot.coordinates.nv
-    return "reduction_needs", fig, result.finding("needs", robot=robot.name, best=best, nv=nv)
+    return "reduction_needs", fig, result.finding("needs", robot=robot.name)
 
 
 def look_of(engine: str) -> dict:

@@ -21,13 +21,20 @@ MOST_IN_A_BAND = 12  # nv up to which runs are compared within the band of round
 def of_case(result: Result, case: Case, setup: Setup) -> list[tuple]:
     """Findings and checks of what the case needs; the models to be timed, (name, Case), None if it needs no model."""
     slow = not case.is_held and seconds(case.robot) > SECONDS_OF_STATE
-    need = Needed((), {}, undecided=case.joints) if slow else needed(case)
+    need = Needed((), {}) if slow else needed(case)
     smaller, rests = reduced(case, need), len(need.stays) == len(case.joints)
     models = [(case.name, case.changed(locked=()))]
     if smaller or case.locked or rests:
         models.append((case.name, None if rests else smaller or case))
     reasons = {name: need.moves[name] for name in case.joints if name in need.moves}
-    joints = {"needed": reasons, "locked": case.scene.locked, "stays": need.stays, "undecided": need.undecided}
+    rows = [{"scene": case.name, "joint": name, "why_needed": why} for name, why in reasons.items()]
+    result.tables.setdefault("reduction_needs", []).extend(rows)
+    joints = {
+        "needed": reasons,
+        "locked": case.scene.locked,
+        "stays": need.stays,
+        "undecided": case.joints if slow else (),
+    }
     result.curves["needs"][case.name] = joints
     if (smaller or rests) and not (case.robot.is_read and case.coordinates.nv > MOST_IN_A_BAND):
         compare_smaller(result, case, smaller, setup)

@@ -90,21 +90,15 @@ def sub_block_differences(
         q[:, places[name].q], v[:, places[name].qd] = position, 0.0
     free_q = [i for name in case.joints for i in range(places[name].q.start, places[name].q.stop)]
     free = [i for name in case.joints for i in range(places[name].qd.start, places[name].qd.stop)]
-    whole, left, scale = setup.compared(), setup.compared(case), Entries(robot.tree, q, v)
-    blocks = {"Mbar": np.ix_(range(len(q)), free, free), "bias": np.ix_(range(len(q)), free)}
-    of_scale = {"Mbar": scale.mass_matrix, "bias": scale.bias}
-    for quantity, block in blocks.items():
-        scale = of_scale[quantity][block]
-        values = {}
-        for name in ("tmt", "mujoco"):
-            if quantity == "Mbar":
-                values[name] = left[name].mass_matrix(q[:, free_q]), whole[name].mass_matrix(q)[block]
-            else:
-                values[name] = left[name].bias(q[:, free_q], v[:, free]), whole[name].bias(q, v)[block]
-        pairs = {
-            "TMT, reduced to whole": values["tmt"],
-            "MuJoCo, reduced to whole": values["mujoco"],
-            "reduced, TMT to MuJoCo": (values["tmt"][0], values["mujoco"][0]),
-        }
-        for pair, (first, second) in pairs.items():
-            yield quantity, pair, *worst_of_each(first - second, scale)
+    scale = Entries(robot.tree, q, v)
+    whole, left = (
+        [engines[name] for name in ("tmt", "mujoco")] for engines in (setup.compared(), setup.compared(case))
+    )
+    block, rows = np.ix_(range(len(q)), free, free), np.ix_(range(len(q)), free)
+    masses = [(a.mass_matrix(q[:, free_q]), b.mass_matrix(q)[block]) for a, b in zip(left, whole)]
+    biases = [(a.bias(q[:, free_q], v[:, free]), b.bias(q, v)[rows]) for a, b in zip(left, whole)]
+    found = ("Mbar", masses, scale.mass_matrix[block]), ("bias", biases, scale.bias[rows])
+    for quantity, (of_tmt, of_mujoco), size in found:
+        yield quantity, "TMT, reduced to whole", *worst_of_each(np.subtract(*of_tmt), size)
+        yield quantity, "MuJoCo, reduced to whole", *worst_of_each(np.subtract(*of_mujoco), size)
+        yield quantity, "reduced, TMT to MuJoCo", *worst_of_each(of_tmt[0] - of_mujoco[0], size)

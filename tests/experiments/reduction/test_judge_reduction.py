@@ -5,7 +5,7 @@ import pytest
 from edited import XML
 
 from compare.engines.mujoco import parse
-from compare.experiments.reduction import exact_motion, figures_reduction, needs, sub_blocks, times
+from compare.experiments.reduction import exact_motion, needs, sub_blocks, times
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
 from compare.judge.check import Result
@@ -106,7 +106,7 @@ def test_a_pendulum_that_shows_nothing_is_left_out(engines, scene):
 # whose number stands where
 
 
-def test_the_table_and_the_caption_of_needs_have_the_times_of_each_engine():
+def test_the_table_has_the_times_of_each_engine_and_the_largest_gain():
     """Of a scene with a smaller model and of one that needs no run."""
     cases, seconds = {case.name: case for case in ARM.cases}, {}
     free, held, planar = cases["zero, free"], cases["bent, held"], cases["elbow swing"]  # stands for the smaller model
@@ -123,11 +123,5 @@ def test_the_table_and_the_caption_of_needs_have_the_times_of_each_engine():
         assert rows[held.name, 0, engine]["ns_per_step"] is None
     assert [rows[free.name, nv, "tmt"]["max_difference_rad"] for nv in (1, 3)] == [1e-12, None]
 
-    found = {
-        free.name: {"locked": (), "stays": ("beta",), "undecided": ()},
-        held.name: {"locked": ("alpha",), "stays": ("beta",)},
-    }
-    found[held.name]["undecided"] = ("gamma",)
-    *_, caption = figures_reduction.draw_needs(Result("reduction", rows=table, curves={"needs": found}), ARM)
-    best = caption.values["best"]
+    best = times.largest_gain(table, 3)
     assert (best["engine"], best["scene"], best["nv"], best["speedup"]) == ("tmt", "zero, free", 1, pytest.approx(3.0))
