@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -87,10 +87,10 @@ class Given:
 
         if isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<"):
             mjcf = Path(mjcf)
-        self.reading: Any = read(mjcf)
-        self.robot = robot_of(self.reading, "the model")
-        self.mujoco = engine(self.reading).of(self.robot.case())
-        self.tree, self.coordinates = self.reading.tree, self.robot.coordinates
+        self.reading = reading = cast(Any, read(mjcf))
+        self.robot = robot_of(reading, "the model")
+        self.mujoco = engine(reading).of(self.robot.case())
+        self.tree, self.coordinates = reading.tree, self.robot.coordinates
 
     def take_random(self, states: int, seed: int) -> None:
         """Random states, fewer if the user's functions are slow."""
