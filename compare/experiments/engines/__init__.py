@@ -42,7 +42,7 @@ def skipped(robot: Robot) -> Finding | None:
 
 def rows(setup: Setup) -> Result:
     """For each installed engine: what it has read, M, h and accelerations compared with exact values, its integrators."""
-    result = Result("engines", shown=SHOWN)
+    result = Result("engines", shown=SHOWN, curves={"mended": {}})
     result.tables["engines_read"], result.tables["engines_methods"] = [], []
     absent = {}
     for engine in setup.engines.values():
@@ -65,17 +65,13 @@ def rows(setup: Setup) -> Result:
         result.find("absent", engines=[label for label, why in absent.items() if why == reason], reason=reason)
     if result.rows:
         integrators.follow_known(result, setup)
-        largest, names = {}, list(dict.fromkeys(row["engine"] for row in result.rows))
-        for row in result.rows:
-            largest[row["engine"]] = max(largest.get(row["engine"], 0.0), row["difference_eps"])
+        names, largest = list(dict.fromkeys(row["engine"] for row in result.rows)), {}
+        for name in names:
+            largest[name] = max(row["difference_eps"] for row in result.rows if row["engine"] == name)
         differing = list(dict.fromkeys(row["engine"] for row in result.rows if not row["passed"]))
         failed = {check.scene for check in result.checks if check.quantity.endswith(AS_READ) and check.failed}
         values = {"engines": names, "differing": differing, "misread": [name for name in names if name in failed]}
-        values["mended"] = {}
-        for row in result.tables["engines_read"]:
-            if row.get("set_by_this_program"):
-                values["mended"].setdefault(row["engine"], {})[row["number"]] = None
-        values["largest"] = largest
+        values |= {"largest": largest, "mended": result.curves["mended"]}
         result.headline = result.finding("headline", **values)
         result.top.append(result.finding("answer", **values))
     return result
@@ -113,6 +109,8 @@ def compare_numbers(result: Result, robot: Robot, label: str, reading: dict, rec
         ]  # fmt: skip
         result.tables["engines_read"] += rows
         result.find("read_differently", engine=label, rows=rows, number=number, mended=bool(reading["mended"][number]))
+        if reading["mended"][number]:
+            result.curves.setdefault("mended", {}).setdefault(label, []).append(number)
 
 
 def named_after(robot: Robot, number: str) -> list[str]:

@@ -33,8 +33,4 @@ def rows_of_file(setup: Setup) -> Result:
 
 def add_inventory(result: Result, features: Sequence) -> None:
     """The table of the features of the file: modelled, switched off or opened."""
-    fields = ("feature", "count", "names", "treatment", "reason")
-    result.tables["inventory"] = [
-        {name: ";".join(feature.names) if name == "names" else getattr(feature, name) for name in fields}
-        for feature in features
-    ]
+    result.tables["inventory"] = [feature._asdict() | {"names": ";".join(feature.names)} for feature in features]
