@@ -76,4 +76,4 @@ def shortened(rows: Sequence[dict], most: int) -> tuple[list[dict], str]:
 def distance_from_failure(row: Mapping) -> tuple[bool, bool, float]:
     """A key to sort rows: those that fail, that differ from a stated number, that use most of a tolerance."""
     share = row.get("difference_over_band", row.get("difference_over_bar"))
-    return row.get("passed", True), not row.get("difference"), math.inf if share is None else -share
+    return row.get("passed") is not False, not row.get("difference"), math.inf if share is None else -share

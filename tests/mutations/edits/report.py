@@ -64,7 +64,7 @@ EDITS = (
     Edit("judge.check", "largest_known", "max(known)", "min(known)", "the picture has the least distance"),
     Edit("stability.limits", "summary", "max(_1, default=0.0)", "min(_1, default=0.0)",
          "the nearest limit is told as the farthest"),
-    Edit("report.tables", "distance_from_failure", "row.get('passed', True)", "True", "a row that fails may be left out"),
+    Edit("report.tables", "distance_from_failure", "row.get('passed') is not False", "True", "a row that fails may be left out"),
     Edit("report.tables", "distance_from_failure", "-share", "share", "the rows that use least of their tolerance are shown"),
     # what is drawn, and said of it
     Edit("experiments.figures", "draw_distances", "max(maxima)", "min(maxima)", "the least distance is told as the largest"),
