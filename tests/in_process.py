@@ -1,5 +1,5 @@
 """A run of the command line without its two further processes, which take 2.5 s to start: for test_command_line, test_help,
-test_own_reference and test_random_mjcf."""
+test_examine, test_own_reference and test_random_mjcf."""
 
 from concurrent.futures import Future
 from contextlib import contextmanager

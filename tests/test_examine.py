@@ -7,7 +7,7 @@ from functools import partial
 from types import SimpleNamespace
 
 import pandas as pd
-from in_process import InProcess
+from in_process import InProcess, without_workers
 from jinja2 import ChoiceLoader, DictLoader
 from matplotlib.figure import Figure
 
@@ -79,6 +79,19 @@ def test_an_experiment_that_raises_is_one_failed_check_and_a_part_of_the_report_
     for line, name in zip(err.splitlines(), ("report.md", "index.html"), strict=True):
         assert f"odd in {name}" in line and "KeyError: " in line
     assert pd.read_csv(tmp_path / "out/tables/odd.csv")["a"].tolist() == [1.5]
+
+
+def test_a_part_of_a_report_that_breaks_fails_the_run_although_all_checks_pass(tmp_path, monkeypatch):
+    def rows(setup):
+        result = Result("odd", shown=["a", "b"], rows=[{"a": 1.5}])
+        result.check("zero", "a", 0.5, 1.0, "m")
+        return result
+
+    made(monkeypatch, "odd", rows=rows)
+    only(monkeypatch, "odd")
+    with without_workers():
+        status, results = ran(tmp_path, "odd")
+    assert status == 1 and all(check["passed"] for check in results["checks"] if check["experiment"] == "odd")
 
 
 def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsys, monkeypatch):

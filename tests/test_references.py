@@ -19,9 +19,9 @@ from compare.run.reference import JointsDiffer, compared_with
 XML, ITSELF = ARM.mjcf.read_text(encoding="utf-8"), str(ARM.mjcf)
 
 
-def written(tmp_path, text):
-    (tmp_path / "other.xml").write_text(text)
-    return str(tmp_path / "other.xml")
+def written(tmp_path, text, name="other.xml"):
+    (tmp_path / name).write_text(text)
+    return str(tmp_path / name)
 
 
 def test_the_arm_and_a_file_with_its_hinges_in_any_order_are_compared_with_the_stated_numbers(tmp_path):
@@ -79,6 +79,15 @@ def test_bodies_of_a_solution_are_found_on_their_joints(tmp_path):
     reference, robot, mujoco, reading = compared_with(path, path)
     assert (reference.kind, reference.name, reference.renamed) == ("solution", path, ())
     assert mujoco.bodies == list(reading.bodies) and not robot.drive.actuators
+    a, b = (
+        f'<body name="{name}"><inertial pos="0 0 0" mass="{mass}" diaginertia="1 1 1"/></body>'
+        for name, mass in ("a1", "b2")
+    )
+    first, second = (
+        written(tmp_path, XML.replace("</body>", f"{pair}</body>", 1), f"{pair[12:14]}.xml") for pair in (a + b, b + a)
+    )
+    engines = [compared_with(first, second).mujoco, compared_with(second, first).mujoco]
+    assert [engine.model.body_mass[engine.bodies].tolist()[-2:] for engine in engines] == [[1.0, 2.0], [2.0, 1.0]]
     hand = '<body><inertial pos="0.3 0 0" mass="1" diaginertia="1 1 1"/></body></body>'
     with pytest.raises(ModelError, match="joint gamma: 2, in the solution 1"):
         compared_with(ITSELF, written(tmp_path, XML.replace("</body>", hand, 1)))

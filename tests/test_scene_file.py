@@ -49,6 +49,14 @@ def test_every_key_is_read(tmp_path):
     assert held.scene.gravity and held.duration == 5.0 and thrown.scene.locked == ()
 
 
+def test_targets_are_moved_by_degrees_and_metres(tmp_path):
+    robot = compared_with("model", str(PATHS["gripper"])).robot
+    scene = "[[scene]]\nname = '{0}'\ntorque = 'servos'\ntargets = {0}\n"
+    scenes = from_text(tmp_path, "".join(map(scene.format, ("0", "[90, 45, 0.01, 0.01]"))), robot)
+    still, moved = (np.array(Case(robot, scene).controller.controls) for scene in scenes)
+    assert moved - still == pytest.approx([np.pi / 2, np.pi / 4, 0.01])
+
+
 @pytest.mark.parametrize("text, word", [
     ("x = 1", "x is"), ("[scene]\nname = 'a'", "array"), ("[[scene]\n", "line 1"),
     ("[[scene]]\nposture = 'bent'", "scene 1: .* name"), ("[[scene]]\nname = 'bent, free'", "of arm"),

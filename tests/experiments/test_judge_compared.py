@@ -5,6 +5,7 @@ import pytest
 from edited import setup_of
 
 import tmt
+from compare.engines.mujoco.dynamics import MujocoDynamics
 from compare.experiments import acceleration, gravity, kinematics, mass
 from compare.experiments.quantities import QUANTITIES, Comparison
 from compare.judge.check import Result
@@ -78,6 +79,16 @@ def test_a_joint_whose_accelerations_are_all_smaller_than_their_tolerance_is_not
     comparison.check_wide(result, sizes, tolerance + 0.001)
     assert [check.judged for check in result.checks] == [False, False]
     assert ["alpha" in check.note for check in result.checks] == [True, False]
+
+
+@pytest.mark.parametrize("label", ["TMT", "MuJoCo"])
+def test_whose_mass_matrix_is_not_definite_is_said(mujoco, label, monkeypatch):
+    owner, right = {"TMT": (literal, literal.mass_matrix), "MuJoCo": (MujocoDynamics, MujocoDynamics.mass_matrix)}[
+        label
+    ]
+    sign = np.diag([-1.0, 1.0, 1.0])  # which keeps it symmetric
+    monkeypatch.setattr(owner, "mass_matrix", lambda *given, **named: sign @ right(*given, **named))
+    assert [name.startswith(f"{label}: ") for name in failing(mass, mujoco) if "least eigenvalue" in name] == [True]
 
 
 def test_accelerations_of_tmt_that_are_off_fail_their_own_checks(mujoco, monkeypatch):

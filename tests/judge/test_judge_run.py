@@ -81,11 +81,12 @@ def test_a_run_of_any_joint_has_diverged_with_more_energy_than_its_motion_can_ha
         assert diverged_at(case, t, q, wrong) == ends
 
 
-def test_a_servo_gives_no_more_than_it_has_stored():
+@pytest.mark.parametrize("start", [0.0, 0.3, -0.7])
+def test_a_servo_gives_no_more_than_it_has_stored(start):
     """At most 50 (0.2)^2 / 2 = 1 J beyond the 1 J that it has given when it is at its target."""
     servo = Actuator("servo", "joint", (1.0,), gain=(50.0, 0.0, 0.0), bias=(0.0, -50.0, 0.0))
     robot = Robot("ball", None, alone("slide"), {}, (), drive=Drive((servo,)))
-    case = robot.case("step", torque="servos", targets=0.2)
+    case = robot.case("step", posture=(start,), torque="servos", targets=0.2)
     for share, ends in ENDS:
         speeds = np.array([[0.0], [np.sqrt(1.0 + share)]])  # of 2 kg
         assert diverged_at(case, T, np.array([case.q, case.q + 0.2]), speeds) == ends

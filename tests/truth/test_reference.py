@@ -38,6 +38,12 @@ def test_a_scene_is_known_to_1e_30_times_the_growth_and_errors_are_taken_from_bo
     assert known.error(off, [0, 2]) == pytest.approx(1e-3) and known.error(off, [0, 1]).max() > 1e-2
 
 
+def test_a_run_in_doubles_is_made_finer_while_that_helps():
+    known, doubles = reference.reference(BENT), reference.in_doubles(BENT)
+    assert doubles.steps >= 16 * reference.first_steps(BENT)
+    assert known.error(doubles.high[:, :3], range(3)).max() < doubles.apart < 1e-12
+
+
 def test_a_changed_scene_has_another_motion_and_an_equal_one_is_not_computed_again():
     before = reference.in_pairs.cache_info()
     first, again = (reference.references([SHORT])["short"] for _ in range(2))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from edited import MOON, XML
 from models import chain, random_tree
 from trajectory_curves import CASES, DAMPED, FREE, HELD, run_of
 
@@ -44,6 +45,14 @@ def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco):
         assert {quantity for quantity, check in tight.items() if not check.passed} == (set() if passes else {name})
 
 
+def test_an_open_loop_is_judged_up_to_its_last_state(mujoco):
+    damped = side(DAMPED)
+    q, name = damped.q.copy(), "open loop, TMT to MuJoCo"
+    for share, passes in ((0.9, True), (1.1, False)):
+        q[-1] = damped.q[-1] + share * damped.width[-1, :3]
+        assert judged_with(mujoco, damped._replace(q=q))[name].passed is passes
+
+
 @pytest.mark.parametrize("rate", [100.0, 202.0])
 def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
     """Half a turn in 1/64 s is 201 rad/s."""
@@ -69,8 +78,13 @@ def test_of_a_users_own_scene_nothing_is_expected_but_agreement(mujoco):
     assert judged_with(mujoco, side(FREE), FREE).keys() == LEVELS | {"time judged", "movement"}
 
 
+def test_a_free_run_of_which_one_side_stays_tests_nothing():
+    still = parse(XML.replace("0 0 -9.81", "0 0 0"), tmt.ARM)
+    assert judged_with(still, side(FREE), FREE)["movement"].value == 0.0
+
+
 def test_what_is_kept_of_a_run_is_whose_it_says():
-    moon = parse(ARM.mjcf.read_text().replace("0 0 -9.81", "0 0 -1.62"), tmt.ARM)
+    moon = parse(MOON, tmt.ARM)
     mine, result = side(HELD), Result("trajectory")
     judged_with(moon, mine, HELD, result)
     (kept,) = result.curves.values()

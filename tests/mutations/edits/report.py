@@ -29,6 +29,8 @@ EDITS = (
     Edit("speed.first_screen", "cheapest", "min(reached, key=_1)", "max(reached, key=_1)", "the dearest is the cheapest"),
     Edit("report.document", "Document.section", "one['file'].endswith(LINKED)", "False",
          "a figure to which the first screen leads is folded"),
+    Edit("verdict", "passed", "any(section.result.checks for section in sections)", "True", "a report without a check passes"),
+    Edit("run.command", "carry_out", "not parts.broken", "True", "the exit status is 0 whatever part of the report breaks"),
     Edit("run.command", "carry_out", "0 if good else 1", "0", "the exit status is 0 whatever fails"),
     Edit("run.examine", "add_crash", "result.check(*_1)", "None", "an experiment that breaks off is no failed check"),
     Edit("experiment", "say_outcome", "check.failed", "False", "the terminal never names a check that fails"),

@@ -82,6 +82,8 @@ EDITS = (
          "the largest difference of a state is judged, whatever the tolerance of its entry"),
     Edit("judge.entries", "Entries.__init__", "self.count * 2.0", "self.count * 200.0",
          "the scale x 100"),
+    Edit("mass", "rows", "check_definiteness(result, 'MuJoCo', theirs)", "check_definiteness(result, 'MuJoCo', ours)",
+         "MuJoCo's matrix is definite if ours is"),
     Edit("mass", "check_definiteness", "(least / values[:, -1]).min()", "(least / values[:, -1]).max()",
          "the best state decides"),
     Edit("judge.entries", "Entries.mass_matrix", "translation + rotation + _1",

@@ -15,6 +15,8 @@ EDITS = (
     Edit("truth.reference", "Reference.error", "self.low[_1]", "0 * self.low[_1]", "the low part of the reference is dropped"),
     Edit("truth.reference", "Reference.error", "_1.max(axis=1)", "_1.min(axis=1)", "the best joint is judged", nth=1),
     Edit("truth.reference", "reference", "case.tree", "case.robot.tree", "the reference is of the robot without the scene"),
+    Edit("truth.reference", "in_doubles", "not runs[-1][0] < runs[-2][0] / 2.0", "True",
+         "a reference in doubles stops at its third run"),
     Edit("advice", "cheapest", "min(fit, key=_1, default=None)", "max(fit, key=_1, default=None)",
          "the dearest is advised"),
     Edit("advice", "advice", "row['worst_error_rad'] <= target", "row['worst_error_rad'] <= 10 * target",
