@@ -6,8 +6,8 @@ from contextlib import contextmanager
 
 import pytest
 
-from compare.process import workers
 from compare.process.workers import Clock
+from compare.run import command
 
 
 class InProcess:
@@ -39,7 +39,7 @@ class Inside(InProcess):
 def without_workers():
     """In this block runs start no further processes."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(workers, "start_workers", contextmanager(lambda: iter([Inside()])))
+        patch.setattr(command, "start_workers", contextmanager(lambda: iter([Inside()])))
         yield
 
 
