@@ -1,85 +1,172 @@
-"""python -m tests.mutations: make the judge wrong in some 430 ways, and list those that no test notices.
+"""python -m tests.mutations: make the program wrong in some 450 ways, and list those that no test notices.
 
 Each edit is made in a copy of the project, and meets the tests of the default stage, those first that name what is edited.
 """
 
 import argparse
+import difflib
 import os
+import re
+import shutil
 import signal
+import subprocess
 import sys
-from contextlib import closing
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import closing, suppress
+from functools import partial
+from importlib.util import cache_from_source
+from itertools import pairwise
 from pathlib import Path
+from queue import SimpleQueue
+from tempfile import TemporaryDirectory
 
-from rich.console import Console
+import psutil
 
-from .campaign import fail_without_an_edit, tried_edits
-from .edit import DoesNotApply, applied
+from .edit import DoesNotApply, Edit, Place, applied
 from .edits import EDITS
 
 PROJECT = Path(__file__).resolve().parents[2]
-STATUS = """exit status: 0 no edit survives but those declared harmless; 1 some do; 2 an edit does not apply to the sources, or
-a test that caught one fails without it too"""
+NOT_COPIED = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "latest")
+BLIND = ("test_mutations.py", "test_structure.py", "test_interrupt.py")  # they see any edit, or no edit of a judge
+SLICES = (0, 4, 16, 1000)  # the files of tests run in parts, the nearest first: most edits are caught by the first
+PATIENCE = 90.0, 20.0  # s that a part may take, and for each of its files: then an edit counts as an endless run
+STATUS = """exit status: 0 no edit survives; 1 some do; 2 an edit does not apply to the sources, or a test that caught one fails
+without it too"""
 
 
-def main(arguments=None, project=PROJECT, edits=EDITS) -> int:
+def main(arguments: list[str] | None = None, project: Path = PROJECT, edits: tuple[Edit, ...] = EDITS) -> int:
     """Run the command line; the exit status."""
     parser = argparse.ArgumentParser("python -m tests.mutations", description=__doc__, epilog=STATUS)
     parser.add_argument("words", nargs="*", metavar="WORD", help="only edits that have one of these in their name")
     parser.add_argument("--list", action="store_true", help="list the edits, run nothing")
-    some = min(2, os.cpu_count() or 1)
-    parser.add_argument("--jobs", type=int, default=some, metavar="N", help="runs side by side (%(default)s)")
+    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="runs side by side (%(default)s)")
     options = parser.parse_args(arguments)
-    console = Console(soft_wrap=True, highlight=False, markup=False, emoji=False)
     chosen = [edit for edit in edits if not options.words or any(word in edit.name for word in options.words)]
-    places, lost = {}, []
-    for edit in chosen:
-        try:
-            places[edit] = applied(project, edit)
-        except DoesNotApply as error:
-            lost.append(str(error))
-    for text in lost:
-        console.print(f"does not apply: {text}")
-    if lost or not chosen or options.jobs < 1:
-        console.print(f"{len(lost)} of {len(chosen)} edits do not apply" if lost else "nothing to do")
+    try:
+        places = {edit: applied(project, edit) for edit in chosen}
+    except DoesNotApply as error:
+        print(f"does not apply: {error}")
         return 2
     if options.list:
-        for edit in chosen:
-            console.print(edit.name + (f" (harmless: {edit.harmless})" if edit.harmless else ""))
+        print("\n".join(edit.name for edit in chosen))
         return 0
-    signals = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    before = [signal.signal(number, signal.default_int_handler) for number in signals]
-    try:
-        with closing(tried_edits(project, places, options.jobs)) as tried:
-            status, tests = campaign(console, tried)
-        if failed := fail_without_an_edit(project, tests):
-            console.print(f"fails without an edit: {failed}")
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    caught_by, survived = set(), 0
+    with TemporaryDirectory(prefix="edits-") as folder:
+        copies = [copied(project, Path(folder, str(number))) for number in range(options.jobs)]
+        with closing(outcomes(project, places, copies)) as tried:
+            for edit, seconds, caught in tried:
+                print(f"{seconds:5.1f} s  {edit.name}: {f'caught by {caught}' if caught else 'SURVIVED'}", flush=True)
+                if caught.startswith("tests"):
+                    caught_by.add(caught.split("[")[0])
+                if not caught:
+                    survived += 1
+                    print(difference(project, places[edit]))
+        print(f"{len(chosen)} edits, {survived} survived")
+        if caught_by and (failed := first_failed(copies[0], sorted(caught_by))):
+            print(f"fails without an edit: {failed}")
             return 2
-        return status
-    except KeyboardInterrupt:
-        console.print("interrupted")
-        return 2
-    finally:
-        for number, handler in zip(signals, before):
-            signal.signal(number, handler)
+    return 1 if survived else 0
 
 
-def campaign(console, tried) -> tuple[int, list[str]]:
-    """A line for each edit that was tried, then the survivors; the exit status, and the tests that caught one."""
-    survivors, count, tests = [], 0, set()
-    for one in tried:
-        count += 1
-        survivors += [] if one.caught else [one]
-        tests |= {one.caught.split("[")[0]} if one.caught.startswith("tests") else set()
-        outcome = f"caught by {one.caught}" if one.caught else "harmless" if one.edit.harmless else "SURVIVED"
-        console.print(f"{one.seconds:5.1f} s  {one.edit.name}: {outcome}")
-    for one in sorted(survivors, key=lambda one: bool(one.edit.harmless)):
-        harmless = f" (harmless: {one.edit.harmless})" if one.edit.harmless else ""
-        console.print(f"\nsurvived: {one.edit.name}{harmless}\n{one.diff}")
-    harmful = sum(not one.edit.harmless for one in survivors)
-    console.print(f"\n{count} edits: {count - len(survivors)} caught, {len(survivors) - harmful} declared harmless, "
-                  f"{harmful} survived")  # fmt: skip
-    return (1 if harmful else 0), sorted(tests)
+def copied(project: Path, folder: Path) -> Path:
+    return Path(shutil.copytree(project, folder, ignore=NOT_COPIED))
+
+
+def outcomes(project: Path, places: dict[Edit, Place], copies: list[Path]) -> Iterator[tuple[Edit, float, str]]:
+    """Each edit as it ends: its seconds, and which test caught it; empty if it survived."""
+    idle = SimpleQueue()
+    for copy in copies:
+        idle.put(copy)
+
+    def tried(edit: Edit, place: Place) -> tuple[Edit, float, str]:
+        copy, started = idle.get(), time.perf_counter()
+        name = place.path.relative_to(project)
+        files = nearest(project, edit, name)
+        write(copy / name, place.after)
+        parts = [files[start:end] for start, end in pairwise(SLICES) if files[start:end]]
+        caught = next(filter(None, map(partial(first_failed, copy), parts)), "")
+        write(copy / name, place.before)
+        idle.put(copy)
+        return edit, time.perf_counter() - started, caught
+
+    with ThreadPoolExecutor(len(copies)) as pool:
+        under_way = [pool.submit(tried, *place) for place in places.items()]
+        try:
+            yield from (done.result() for done in as_completed(under_way))
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+            while not all(one.done() for one in under_way):  # interrupted
+                end_children(os.getpid())
+                time.sleep(0.05)
+
+
+def write(file: Path, text: str) -> None:
+    """Write a source; byte code of another one of the same size would pass for its own."""
+    file.write_text(text, encoding="utf-8")
+    Path(cache_from_source(file)).unlink(missing_ok=True)
+
+
+def first_failed(copy: Path, tests: list[str]) -> str:
+    """The first of these tests (files or names) that fails in a copy of the project, empty if none does."""
+    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-rfE", *tests]
+    own = {"PYTHONPATH": copy, "TMT_CACHE": copy.parent / "store", "TMPDIR": copy.parent, "COLUMNS": "200"}
+    own["PYTHONDONTWRITEBYTECODE"] = ""  # or each run would compile all sources again
+    limit, log = PATIENCE[0] + PATIENCE[1] * len(tests), copy.with_suffix(".log")
+    with log.open("w") as output:
+        streams = {"stdin": subprocess.DEVNULL, "stdout": output, "stderr": output}
+        process = subprocess.Popen(command, cwd=copy, env=os.environ | own, start_new_session=True, **streams)
+        try:
+            process.wait(limit)
+        except subprocess.TimeoutExpired:
+            return f"no end after {limit:.0f} s"
+        finally:
+            end_children(process.pid)
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+    lines = log.read_text(errors="replace").splitlines()[-30:]
+    named = [found[1] for line in lines if (found := re.match(r"(?:FAILED|ERROR) (.*?)(?: - .*)?$", line))]
+    if named or not process.returncode:
+        return named[0] if named else ""
+    return f"status {process.returncode}: {lines[-1] if lines else 'no output'}"
+
+
+def end_children(pid: int) -> None:
+    """Kill what a process has started, in whatever group."""
+    with suppress(psutil.NoSuchProcess):
+        for child in psutil.Process(pid).children(recursive=True):
+            with suppress(psutil.NoSuchProcess):
+                child.kill()
+
+
+def nearest(project: Path, edit: Edit, name: Path) -> list[str]:
+    """The files of tests, those first that import the edited file, or are named like it, or name what is edited."""
+    parts = edit.module.split(".")
+    words = {*parts, *edit.where.split(".")}
+    *_, folder, stem = (part for part in name.with_suffix("").parts if part != "__init__")
+    imported = re.compile(rf"\b{folder}( import [\w\s,(]*|\.)\b{stem}\b")
+
+    def named(file):
+        text = file.read_text(encoding="utf-8")
+        in_name = sum(part in str(file) for part in parts)
+        score = sum(word in text for word in words) + 2 * in_name + 4 * bool(imported.search(text))
+        return score, -len(text)  # of two, the smaller file
+
+    files = [path for path in sorted(project.joinpath("tests").rglob("test_*.py")) if path.name not in BLIND]
+    return [str(file.relative_to(project)) for file in sorted(files, key=named, reverse=True)]
+
+
+def difference(project: Path, place: Place) -> str:
+    texts = (text.splitlines() for text in (place.before, place.after))
+    name = place.path.relative_to(project)
+    return "\n".join(difflib.unified_diff(*texts, f"a/{name}", f"b/{name}", n=1, lineterm=""))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit("interrupted")

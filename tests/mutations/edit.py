@@ -1,26 +1,29 @@
-"""One edit of a source file, found by module, function and expression; formatting does not matter."""
+"""One edit of a source file, found by module, function and expression; how the source is laid out does not matter."""
 
 import ast
+import copy
+import re
+import textwrap
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from .pattern import Filled, found, read
-
 PACKAGES = ("compare", "tmt")
 DEFINITIONS = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+NOT_COMPARED = ("ctx", "kind", "type_comment")
 
 
 @dataclass(frozen=True)
 class Edit:
-    """A wrong judge: in `where` of `module` stands `new` instead of `old`.
+    """A wrong program: in `where` of `module` stands `new` instead of `old`.
 
     module: a file by the end of its dotted name, "verdict" or "trajectory.rows", or the name of a folder of files;
     where: a function, Class.method, function.inner function, or a name that is assigned in the module or a class.
     old: an expression, a keyword argument (name=value) or a statement; new: what replaces it (statements: any number).
     In both _1, _2 stand for any expression (on a line of its own: statement), *_1 at the end of a call for all other arguments.
-    nth: which one, from 1, if there are several. breaks: what the edited judge does. harmless: why it may survive.
+    nth: which one, from 1, if there are several. breaks: what the edited program does.
     """
 
     module: str
@@ -29,7 +32,6 @@ class Edit:
     new: str
     breaks: str
     nth: int | None = None
-    harmless: str = ""
 
     @property
     def name(self) -> str:
@@ -41,7 +43,7 @@ class DoesNotApply(ValueError):
 
 
 class Place(NamedTuple):
-    """Where an edit applies: the file, and its text without and with the edit, both without comments."""
+    """Where an edit applies: the file, and its text without and with the edit."""
 
     path: Path
     before: str
@@ -56,17 +58,27 @@ def applied(project: Path, edit: Edit) -> Place:
     if not holding:
         raise DoesNotApply(f"{edit.name}: there is no {edit.where} below {' or '.join(PACKAGES)}")
     old = read(edit.old)
-    if len(old) != 1:
-        raise DoesNotApply(f"{edit.name}: old is one expression or statement")
-    hits = [(path, node) for path in holding for scope in scopes(path, edit.where) for node in matches(scope, old[0])]
+    hits = [(path, *hit) for path in holding for scope in scopes(path, edit.where) for hit in matches(scope, old)]
     if not 1 <= (edit.nth or 1) <= len(hits) or (edit.nth is None and len(hits) > 1):
         raise DoesNotApply(f"{edit.name}: {len(hits)} times {edit.old} in {edit.where}; one is expected, or nth")
-    path, node = hits[(edit.nth or 1) - 1]
-    body = parsed(text_of(path)).body
-    texts = [written(statement) for statement in body]
-    k = next(k for k, statement in enumerate(body) if node.lineno <= statement.end_lineno)
-    after = "\n".join([*texts[:k], edited(body[k], node, edit), *texts[k + 1 :]])
-    return Place(path, "\n".join(texts) + "\n", after + "\n")
+    path, node, holes = hits[(edit.nth or 1) - 1]
+    before = text_of(path)
+    lines = before.encode().splitlines(keepends=True)
+    start, end = (
+        sum(map(len, lines[: line - 1])) + column
+        for line, column in ((node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset))
+    )
+    new = ast.unparse(Filled(holes).visit(ast.parse(textwrap.dedent(edit.new).strip())))
+    if isinstance(node, ast.stmt):
+        new = textwrap.indent(new, " " * node.col_offset).lstrip()
+    elif isinstance(node, ast.expr) and not isinstance(node, ast.Starred):
+        new = f"({new})"
+    after = (before.encode()[:start] + new.encode() + before.encode()[end:]).decode()
+    try:
+        ast.parse(after)
+    except SyntaxError:
+        raise DoesNotApply(f"{edit.name}: {edit.old} cannot be replaced") from None
+    return Place(path, before, after)
 
 
 @cache
@@ -76,7 +88,7 @@ def sources(project: Path) -> dict[Path, str]:
     return {path: f".{'.'.join(path.relative_to(project).with_suffix('').parts)}." for path in paths}
 
 
-written, parsed = cache(ast.unparse), cache(ast.parse)
+parsed = cache(ast.parse)
 
 
 @cache
@@ -93,54 +105,85 @@ def scopes(path: Path, where: str) -> list[ast.AST]:
     return nodes
 
 
-def named_inside(node, name):
+def named_inside(node: ast.AST, name: str) -> Iterator[ast.AST]:
     """Definitions and assignments of a name in a node, not in the definitions inside it."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, DEFINITIONS):
             if child.name == name:
                 yield child
-        elif isinstance(child, ast.Assign | ast.AnnAssign) and name in assigned(child):
+        elif isinstance(child, ast.Assign | ast.AnnAssign) and assigns(child, name):
             yield child
         else:
             yield from named_inside(child, name)
 
 
-def assigned(statement) -> set[str]:
+def assigns(statement: ast.Assign | ast.AnnAssign, name: str) -> bool:
     targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
-    return {node.id for target in targets for node in ast.walk(target) if isinstance(node, ast.Name)}
+    return any(getattr(node, "id", None) == name for target in targets for node in ast.walk(target))
 
 
-def matches(node, pattern):
-    """Every node in a function or statement that matches a pattern, in the order of the source."""
-    if found(pattern, node) is not None:
-        yield node
+def read(text: str) -> ast.AST:
+    """The statement or the expression that the text is."""
+    (statement,) = ast.parse(textwrap.dedent(text).strip()).body
+    return statement.value if isinstance(statement, ast.Expr) else statement
+
+
+def matches(node: ast.AST, pattern: ast.AST) -> Iterator[tuple[ast.AST, dict]]:
+    """Every node in a function or statement that matches a pattern, in the order of the source, with what the holes stand for."""
+    holes, wanted = {}, pattern
+    if isinstance(node, ast.keyword) and isinstance(pattern, ast.Assign) and isinstance(pattern.targets[0], ast.Name):
+        wanted = ast.keyword(arg=pattern.targets[0].id, value=pattern.value)
+    if fits(wanted, node, holes):
+        yield node, holes
     for child in ast.iter_child_nodes(node):
         yield from matches(child, pattern)
 
 
-def edited(statement: ast.stmt, node: ast.AST, edit: Edit) -> str:
-    """A statement with the new expression or statements in the place of a node."""
-    new = [Filled(found(read(edit.old)[0], node)).visit(one) for one in read(edit.new)]
-    if isinstance(node, ast.keyword):
-        new = [ast.keyword(arg=new[0].targets[0].id, value=new[0].value)]
-    elif isinstance(node, ast.stmt):
-        new = [ast.Expr(one) if isinstance(one, ast.expr) else one for one in new]
-    elif len(new) != 1:
-        raise DoesNotApply(f"{edit.name}: new is one expression, as old is")
-    root = ast.Module([statement], [])
-    fields = ((parent, *field) for parent in ast.walk(root) for field in ast.iter_fields(parent))
-    parent, name, value = next(field for field in fields if any(one is node for one in listed(field[-1])))
-    changed = [other for one in listed(value) for other in (new if one is node else [one])]
-    setattr(parent, name, changed if isinstance(value, list) else changed[0])
-    try:
-        text = ast.unparse(root)
-        ast.parse(text)
-    except SyntaxError:
-        raise DoesNotApply(f"{edit.name}: {edit.old} cannot be replaced") from None
-    finally:
-        setattr(parent, name, value)
-    return text
+def fits(pattern: object, node: object, holes: dict) -> bool:
+    """Whether a node is what the pattern says; fills the holes."""
+    if (hole := hole_of(pattern)) and isinstance(node, ast.AST):
+        return ast.dump(holes.setdefault(hole, node)) == ast.dump(node)
+    if isinstance(pattern, ast.Call) and isinstance(node, ast.Call) and (rest := rest_of(pattern)):
+        first = pattern.args[:-1]
+        holes[rest] = [*node.args[len(first) :], *node.keywords]
+        return fits(pattern.func, node.func, holes) and fits(first, node.args[: len(first)], holes)
+    if isinstance(pattern, list) and isinstance(node, list):
+        return len(pattern) == len(node) and all(fits(*pair, holes) for pair in zip(pattern, node))
+    if type(pattern) is not type(node):
+        return False
+    if isinstance(pattern, ast.AST):
+        fields = [name for name in pattern._fields if name not in NOT_COMPARED]
+        return all(fits(getattr(pattern, name), getattr(node, name), holes) for name in fields)
+    return pattern == node
 
 
-def listed(value) -> list:
-    return value if isinstance(value, list) else [value]
+def hole_of(pattern: object) -> str | None:
+    """The name of the hole that an expression or a statement is."""
+    name = pattern.value if isinstance(pattern, ast.Expr) else pattern
+    return name.id if isinstance(name, ast.Name) and re.fullmatch(r"_\d+", name.id) else None
+
+
+def rest_of(call: ast.Call) -> str | None:
+    """The hole for all other arguments of a call."""
+    return hole_of(call.args[-1].value) if call.args and isinstance(call.args[-1], ast.Starred) else None
+
+
+class Filled(ast.NodeTransformer):
+    """The new expression with what the holes stand for."""
+
+    def __init__(self, holes: dict):
+        self.holes = holes
+
+    def visit_Name(self, node):
+        return copy.deepcopy(self.holes.get(node.id, node))
+
+    def visit_Expr(self, node):
+        value = self.visit(node.value)
+        return value if isinstance(value, ast.stmt) else ast.Expr(value)
+
+    def visit_Call(self, node):
+        if rest := rest_of(node):
+            others = copy.deepcopy(self.holes[rest])
+            node.args[-1:] = [one for one in others if not isinstance(one, ast.keyword)]
+            node.keywords += [one for one in others if isinstance(one, ast.keyword)]
+        return self.generic_visit(node)
