@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+import tmt
 from compare.robots.coordinates import Coordinates
-from compare.robots.joint_map import JointsError, joint_map
+from compare.robots.joint_map import JointsError, joint_map, matched_joints
 
 ARM = Coordinates(("hip", "knee", "rail"), ("hinge", "hinge", "slide"))
 MIXED = Coordinates(("rail", "turn", "knee"), ("slide", "ball", "hinge"))
@@ -50,3 +51,38 @@ def test_what_does_not_fit_is_one_line(coordinates, stated, word):
     with pytest.raises(JointsError, match=word) as error:
         joint_map(coordinates, stated)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("first", [["hip", "knee-0.1rad", "rail+0.2m"], ["-knee+170deg", "-hip+0.3rad", "-rail+5m"]])
+@pytest.mark.parametrize(
+    "second", [["rail-7m", "-knee+20deg", "hip"], ["-hip in deg", "knee+90deg in deg (rad/s)", "-rail+3m"]]
+)
+def test_two_maps_one_after_the_other_are_one(first, second, rng):
+    inner, outer = joint_map(ARM, first), joint_map(ARM, second)
+    both, q, v = outer.after(inner, ARM), ARM.random(rng, 20), rng.normal(size=(20, 3))
+    turns = (both.own_positions(q) - outer.own_positions(inner.own_positions(q))) / (2.0 * np.pi * both.of_q)
+    slides = [joint.slides for joint in both.joints]
+    assert np.allclose(turns, np.where(slides, 0.0, np.round(turns)), atol=1e-14)
+    assert np.allclose(both.own_speeds(v), outer.own_speeds(inner.own_speeds(v)))
+
+
+def tree(names, parent, places, axes) -> tmt.Tree:
+    """Hinges at these places, m, with a body of 1 kg on each."""
+    n, places = len(names), np.array(places, float)
+    offset = [place - (places[k] if k >= 0 else 0.0) for place, k in zip(places, parent)]
+    return tmt.Tree(names, parent, offset, axes, [0.0] * n, names, range(n), [1.0] * n, [(0.1, 0.2, 0.3)] * n, [np.eye(3)] * n,
+                    (0, 0, 0))  # fmt: skip
+
+
+X, Y, O, A, B = (1, 0, 0), (0, 1, 0), (0, 0, 0), (1, 0, 0), (2, 0, 0)
+
+
+@pytest.mark.parametrize("stated, found, names", [
+    ((["a", "b", "c"], (-1, -1, -1), [O, A, B], [Y] * 3), (["x", "y", "z"], (-1, -1, -1), [A, B, O], [Y] * 3), "zxy"),
+    ((["a", "b", "c"], (-1, 0, -1), [O, A, A], [Y] * 3), (["x", "y", "z"], (-1, -1, 0), [O, A, A], [Y] * 3), "xzy"),
+    ((["a", "b"], (-1, 0), [O, O], [Y, X]), (["x", "y"], (-1, 0), [O, O], [(-1, 0, 0), (0, -1, 0)]), "yx"),
+    ((["a", "b"], (-1, -1), [O, A], [Y, Y]), (["B", "x"], (-1, -1), [O, A], [Y, Y]), "xB"),  # a capital is no other name
+    ((["aa", "aA"], (-1, -1), [O, A], [Y, Y]), (["Aa", "AA"], (-1, -1), [A, O], [Y, Y]), ("AA", "Aa")),  # either of two is
+], ids=["place", "depth", "axis", "name", "two names"])  # fmt: skip
+def test_joints_are_matched_by_name_then_by_place_depth_and_axis(stated, found, names):
+    assert matched_joints(tree(*stated), tree(*found), "it").names == tuple(names)
