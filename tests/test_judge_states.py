@@ -21,6 +21,18 @@ def test_the_states_are_spread_and_the_same_in_every_run(engines):
     assert [named.describe(k) for k in range(5)] == list(ARM.postures)
 
 
+def test_random_states_fill_the_ranges_of_joints_which_a_speed_passes_in_a_second():
+    ranges = (-1.0, 2.0), None, (0.5, 0.75)
+    robot = dataclasses.replace(ARM, ranges=ranges)
+    widths = np.array([3.0, 2.0 * np.pi, 0.25])
+    for states_of, most in ((states.random(robot, 500, 0).q, widths), (states.random(robot, 500, 0).qd, 2.0 * widths)):
+        assert (np.ptp(states_of, axis=0) <= most).all() and (np.ptp(states_of, axis=0) > 0.95 * most).all()
+    q = states.random(robot, 500, 0).q[:, [0, 2]]
+    assert (q.min(axis=0) >= [-1.0, 0.5]).all() and (q.max(axis=0) <= [2.0, 0.75]).all()
+    torques = states.largest_speeds_and_torques(robot)[1]
+    assert np.allclose(torques, 10.0 * np.diag(tmt.mass_matrix(np.zeros(3))), rtol=1e-12)
+
+
 def larger(joints):
     """The arm with this many times its joints and bodies, one chain."""
     tree, n = ARM.tree, 3 * joints

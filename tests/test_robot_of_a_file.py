@@ -11,6 +11,7 @@ import tmt
 from compare.engines.mujoco import engine, read
 from compare.experiments.speed.settings import scenes_of as scenes_of_speed
 from compare.robots.actuators import Drive
+from compare.robots.coordinates import floats, free_joints
 from compare.robots.file import COARSER, DURATION, added_damping, coarsest, robot_of, scenes_from
 
 ONE = replace(tmt.ARM.lock({"alpha": 0.0, "beta": 0.0}), gravity=(0.0, 0.0, 0.0))  # one hinge, its inertia 0.0527 kg m2
@@ -60,6 +61,20 @@ def test_both_engines_start_every_scene_alike(name):
     moving = [scene.name for scene in scenes_of_speed(robot)]
     falls = name in ("free_body", "quadruped", "humanoid29_free")
     assert name not in PATHS or (f"{robot.scenes[0].posture}, let go" in moving) != falls
+
+
+@pytest.mark.parametrize("before, shift, free, floating", [
+    (-1, 0.0, [1], True), (0, 0.0, [1], False), (-1, 0.1, [], False),
+])  # fmt: skip
+def test_three_slides_and_a_ball_in_one_place_are_free_and_float_where_nothing_carries_them(
+    before, shift, free, floating
+):
+    tree = tmt.Tree(
+        [*"hxyzb"], (-1, before, 1, 2, 3), [(0, 0, 0)] * 2 + [(shift, 0, 0)] + [(0, 0, 0)] * 2, [(0, 1, 0), *np.eye(3), *np.eye(3)],
+        [0.0] * 7, ("arm", "stone"), (0, 4), (1.0, 1.0), [(0.1, 0, 0)] * 2, [np.eye(3)] * 2, (0, 0, 0),
+        ("hinge", "slide", "slide", "slide", "ball"),
+    )  # fmt: skip
+    assert (free_joints(tree), floats(tree)) == (free, floating)
 
 
 def test_what_rests_where_it_is_let_go_is_set_going():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import PATHS
+from models import PATHS, chain
 from PIL import Image
 from trajectory_curves import CASES
 
@@ -63,6 +63,14 @@ def test_a_free_body_is_a_cross_that_turns_with_it():
     before, after = points[:, -3:] - points[:, :1]
     assert links[-3:] == [(0, 2), (0, 3), (0, 4)] and np.abs(before).max() > 0.1
     np.testing.assert_allclose(after, before @ [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], atol=1e-15)
+
+
+def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_and_up_is_up():
+    robot = robot_of(reading.read(chain(3)), "chain.xml")
+    points, links = stick_figure(robot, np.zeros((1, 3)))
+    assert links == [(0, 1), (1, 2), (2, 3)] and points.shape == (1, 4, 3)
+    right, _, up = as_seen(np.eye(3))
+    assert up == pytest.approx([0.0, np.cos(np.radians(20.0))]) and right[0] > 0.9
 
 
 def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(drawn, tmp_path):
