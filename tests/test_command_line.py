@@ -19,7 +19,7 @@ from compare.run import examine as experiment
 
 XML = ARM.mjcf.read_text(encoding="utf-8")
 STATIC = ("parameters", "published", "kinematics", "diagnosis")  # which take little time
-FIELDS = {"experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "passed", "note"}
+FIELDS = {"experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "judged", "passed", "note"}
 
 
 def results_in(folder):

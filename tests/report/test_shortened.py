@@ -1,10 +1,13 @@
 """Which rows of a long table are shown, and how long report.md becomes."""
 
+import numpy as np
+import pandas as pd
+import pytest
 from sections import BAD, GOOD, section
 
 from compare.experiments import EXPERIMENTS
 from compare.report.document import Document
-from compare.report.tables import shortened
+from compare.report.tables import closest_checks, shortened, shown
 from compare.report.verdict import Parts, Report
 from compare.robots.arm import ARM
 
@@ -23,6 +26,35 @@ def test_rows_that_fail_or_differ_are_shown_then_the_largest_shares_of_a_toleran
     assert [row["at"] for row in shortened(rows, 3)[0]] == [0, 1, 7]
     rows = [{"at": k, "difference_over_bar": share} for k, share in enumerate((0.1, None, 0.9, 0.5))]
     assert [row["at"] for row in shortened(rows, 2)[0]] == [2, 3]
+
+
+@pytest.mark.parametrize("worst", [
+    {"share": np.nan}, {"share": -0.9}, {"share": None, "passed": False},
+    {"published": 1.0, "tmt": 1.0, "mujoco": 2.0, "tolerance": 1.2},
+    {"published": 1.0, "tmt": 1.2, "mujoco": 1.0, "tolerance": 0.2}, {"predicted_s": 2.0, "observed_s": 0.2},
+])  # fmt: skip
+def test_the_worst_row_is_the_farthest_by_its_own_measure_and_what_is_no_number(worst):
+    plain = (
+        {"share": 0.1} if "share" in worst else worst | {"mujoco": 1.1, "tmt": 1.0, "tolerance": 0.2, "observed_s": 1.5}
+    )
+    rows = [plain | {"at": k} for k in range(9)]
+    rows[4] = plain | worst | {"at": 4}
+    rows[6:8] = [{"at": 6}, {"at": 7, "share": None}]  # of which nothing is known
+    named = [
+        {("difference_over_band" if name == "share" else name): value for name, value in row.items()} for row in rows
+    ]
+    assert 4 in [row["at"] for row in shortened(named, 1)[0]]
+
+
+def test_the_checks_that_fail_are_listed_first_then_those_closest_to_their_tolerance():
+    checks = [(f"n{k}", 0.01 * k, 1.0, "at most", True) for k in range(9)]
+    checks[2] = ("n2", 2.0, 1.0, "at most", True)
+    assert closest_checks(section("mass", *checks), 3)["quantity"].tolist() == ["n2", "n7", "n8"]
+
+
+def test_printed_numbers_have_seven_digits_and_others_three():
+    table = shown(pd.DataFrame([{"published": 1.23456789, "other": 1.23456789, "names": "x" * 99, "no": None}]))
+    assert table.iloc[0].tolist()[:2] == ["1.234568", "1.23"] and len(table["names"][0]) == 80 and table["no"][0] == ""
 
 
 def text_of(*sections):
