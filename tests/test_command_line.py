@@ -1,5 +1,6 @@
 """python -m compare from end to end: files, exit status, first lines; bad requests get one line and status 2."""
 
+import hashlib
 import json
 import re
 
@@ -101,6 +102,7 @@ def test_results_have_their_fields(report):
     assert {check["experiment"] for check in results["checks"]} == ran
     origin = results["provenance"]
     assert origin["command"] == "python -m compare all --quick"
+    assert origin["model_sha256"] == hashlib.sha256(ARM.mjcf.read_bytes()).hexdigest()
     assert {"mujoco", "numpy", "python", "cpu", "seed", "commit", "arm-tmt-mujoco"} <= set(origin)
     assert set(origin["seconds_of"]) == {*ran, "figures"} and min(origin["seconds_of"].values()) > 0.0
     ended = origin["ended_after_s"]

@@ -70,7 +70,7 @@ def test_three_slides_and_a_ball_in_one_place_are_free_and_float_where_nothing_c
     before, shift, free, floating
 ):
     tree = tmt.Tree(
-        [*"hxyzb"], (-1, before, 1, 2, 3), [(0, 0, 0)] * 2 + [(shift, 0, 0)] + [(0, 0, 0)] * 2, 
+        [*"hxyzb"], (-1, before, 1, 2, 3), [(0, 0, 0)] * 2 + [(shift, 0, 0)] + [(0, 0, 0)] * 2,
         [(0, 1, 0), *np.eye(3), *np.eye(3)],
         [0.0] * 7, ("arm", "stone"), (0, 4), (1.0, 1.0), [(0.1, 0, 0)] * 2, [np.eye(3)] * 2, (0, 0, 0),
         ("hinge", "slide", "slide", "slide", "ball"),

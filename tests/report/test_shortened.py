@@ -35,7 +35,9 @@ def test_rows_that_fail_or_differ_are_shown_then_the_largest_shares_of_a_toleran
 ])  # fmt: skip
 def test_the_worst_row_is_the_farthest_by_its_own_measure_and_what_is_no_number(worst):
     plain = (
-        {"share": 0.1} if "share" in worst else worst | {"mujoco": 1.1, "tmt": 1.0, "tolerance": 0.2, "observed_s": 1.5}
+        {"share": 0.1}
+        if "share" in worst
+        else worst | {"mujoco": 1.5, "tmt": 1.0, "tolerance": 20.0, "observed_s": 1.5}
     )
     rows = [plain | {"at": k} for k in range(9)]
     rows[4] = plain | worst | {"at": 4}

@@ -1,0 +1,27 @@
+"""What a report says of the program that made it."""
+
+import subprocess
+
+from compare.report import provenance
+
+
+def test_the_commit_is_said_and_whether_the_program_was_changed_since(tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "__file__", str(tmp_path / "compare/report/provenance.py"))
+    assert provenance.commit() is None  # no repository
+
+    def git(*words):
+        named = ["-c", "user.name=a", "-c", "user.email=a@b"]
+        return subprocess.run(
+            ["git", *named, *words], cwd=tmp_path, check=True, capture_output=True, text=True
+        ).stdout.strip()
+
+    for name in ("compare/a", "tmt/a", "mjcf/a", "pyproject.toml"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    git("init", "-q")
+    git("add", "-A")
+    git("commit", "-qm", "a")
+    (tmp_path / "notes.md").touch()
+    assert provenance.commit() == git("rev-parse", "HEAD")
+    (tmp_path / "tmt" / "b").touch()
+    assert provenance.commit() != git("rev-parse", "HEAD") and provenance.commit().startswith(git("rev-parse", "HEAD"))
