@@ -76,6 +76,7 @@ def test_the_tree_of_another_robot_agrees(folder):
 @pytest.mark.parametrize("asked, names, where, quantity", [
     ("sign", STATIC, "acceleration", "bias"), ("doubled", STATIC, "gravity", "yours: gravity - bias at rest"),
     ("nan", ["diagnosis"], "diagnosis", "bias returns valid values"),
+    ("nan", ["acceleration"], "acceleration", "bias returns valid values"),
     ("late", ["mass", "acceleration"], "acceleration", "bias returns valid values"),
 ])  # fmt: skip
 def test_what_is_wrong_is_seen_where_it_acts(folder, asked, names, where, quantity):

@@ -8,6 +8,8 @@ from models import random_tree
 from compare.experiments import acceleration, figures_sketch, gravity, kinematics, mass
 from compare.experiments import figures as draw
 from compare.judge.check import Result
+from compare.judge.entries import Entries
+from compare.judge.scale import EPS, FACTOR
 from compare.report.text import say
 
 MODULES = (kinematics, mass, gravity, acceleration)
@@ -57,6 +59,22 @@ def test_every_quantity_of_a_robot_of_any_joints_agrees_and_every_figure_is_draw
     for module in MODULES:
         assert failing(drawn(module, setup)) == []
     figures_sketch.draw_sketch(setup.robot)
+
+
+@pytest.mark.parametrize("name, unit, force", [
+    ("slides alone", "kg", "N"), ("a ball with a spring", "kg m2", "N m"),
+    ("a slide after a ball", "kg m2 or kg m or kg", "N m or N"),
+])  # fmt: skip
+def test_units_are_those_of_the_joints_and_the_tolerance_of_springs_is_of_the_sums(name, unit, force):
+    setup = setup_between(ROBOTS[name], states=5)
+    units = {check.quantity: check.unit for module in (mass, gravity) for check in module.rows(setup).checks}
+    assert (units["Mbar"], units["holding torque"]) == (unit, force)
+    held = [check for check in gravity.rows(setup).checks if check.quantity == "holding torque, springs too"]
+    of = Entries(setup.robot.tree, setup.random.q)
+    assert len(held) == 2 * setup.robot.tree.has_springs
+    assert all(
+        np.isclose(check.tolerance, FACTOR * EPS * (of.weight + of.springs), atol=0.0).any() for check in held[1:]
+    )
 
 
 @pytest.mark.parametrize("text, old, new, expected", SEEDED.values(), ids=SEEDED)

@@ -206,7 +206,8 @@ def test_a_wrong_request_gets_one_line_and_status_2(words, why, tmp_path, monkey
 
 
 @pytest.mark.parametrize(
-    ("stem", "name"), [("arm", "arm"), ("my robot-2", "my_robot_2"), ("2dof", "robot_2dof"), ("ü", "robot")]
+    ("stem", "name"),
+    [("arm", "arm"), ("my robot-2", "my_robot_2"), ("2dof", "robot_2dof"), ("ü", "robot"), ("for", "robot_for")],
 )
 def test_the_name_of_a_file_becomes_an_identifier(stem, name):
     assert identifier(stem) == name

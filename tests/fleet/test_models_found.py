@@ -56,7 +56,7 @@ def test_patterns_and_lists(here):
     assert names("m/*.xml") == ["m/a.xml", "m/b c.xml"]
     assert names("m/**/*.xml") == ["m/a.xml", "m/b c.xml", "m/b/c.xml", "m/b/d/e.xml"] == names("m/**")
     assert names("n/a[1].xml") == ["n/a[1].xml"]  # a file of that name comes before the pattern
-    here("list.txt", "\ufeff# what is released\r\n\r\n  m/b c.xml  \r\nn/a[1].xml\r\n")
+    here("list.txt", "\ufeff# what is released\r\n\r\n  m/b c.xml  \r\nn/a[1].xml\r\n@more.txt\r\n")
     assert names("@list.txt") == ["m/b c.xml", "n/a[1].xml"]
 
 

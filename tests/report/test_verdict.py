@@ -14,7 +14,7 @@ from compare.experiments import figures_overview, module, stability
 from compare.experiments.speed import first_screen as of_speed
 from compare.experiments.speed.first_screen import Cheapest, Curve
 from compare.judge.check import About, Result
-from compare.report.questions import answers
+from compare.report.questions import answers, true_errors
 from compare.report.style import BLUE, ORANGE, RED
 from compare.report.text import say
 from compare.report.verdict import failures, headline, outcome, passed, standing, verdict
@@ -156,6 +156,14 @@ def test_answers_give_each_number_to_its_engine():
 def test_the_largest_difference_is_the_answer_unless_a_run_diverged(rows, number, scene):
     found = answer_of(section("mass", rows=rows))["e"].split(";")[0]
     assert number in found and scene in found
+
+
+def test_errors_are_those_of_the_coarsest_steps():
+    runs = {("a", "rk4", 128): {}, ("a", "rk4", 64): {}, ("b", "rk4", 64): {}, ("c", "rk4", 32): {}}
+    result = Result("trajectory", curves={"runs": runs, "errors": {"a": (1.0, 2.0), "b": (3.0, None)}})
+    assert true_errors(result) == (result.curves["errors"], 64)
+    result.curves["errors"]["c"] = (5.0, 6.0)
+    assert true_errors(result)[1] is None  # they are not the same in all scenes
 
 
 # the headline of each experiment

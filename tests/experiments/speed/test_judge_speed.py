@@ -136,6 +136,23 @@ def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
     assert table[1e-12]["mujoco"] == "none" and table[1e-12]["mujoco_ms"] is None
 
 
+def test_the_gain_is_that_of_the_integrator_times_that_of_the_kernel_times_that_of_the_method():
+    settings = ("mujoco", "RK4", 8e-3), ("mujoco", "Euler", 2e-3), ("tmt", "rk4", 4e-3), ("tmt", "dopri8", 1e-3)
+    line = advice.advice([row(*of, 1e-4, 64, seconds) for *of, seconds in settings], ["bent, free"])[0]
+    parts = [line[f"{part}_part"] for part in ("integrator", "kernel", "method")]
+    assert parts == pytest.approx([0.25, 2.0, 4.0]) and line["ratio"] == pytest.approx(np.prod(parts))
+    adaptive = {"engine": "tmt", "method": "dopri8_adaptive", "dt_s": None, "steps": 17, "tolerance": 1e-9}
+    assert "1e-09" in advice.setting(adaptive) and "17" not in advice.setting(adaptive)
+
+
+def test_operations_per_nanosecond_are_those_of_a_state_over_its_time(setup, monkeypatch):
+    made = evaluations.Evaluations({}, {(evaluations.FORWARD, evaluations.EACH, 10_000, 1): lambda: None}, {})
+    monkeypatch.setattr(evaluations.timing, "in_turns", lambda calls, rounds: [[2e-3, 1e-3]])
+    (found,) = evaluations.costs(setup, made)
+    assert found["ns_per_state"] == pytest.approx(100.0)
+    assert found["operations_per_ns"] == pytest.approx(found["operations"] / 100.0)
+
+
 def test_a_row_gets_the_least_of_its_times(setup, monkeypatch):
     rows = [row("tmt", "rk4", 1.0), row("mujoco", "RK4", 1.0)]
     monkeypatch.setattr(runs.timing, "in_turns", lambda calls, rounds: [[3e-3, 2e-3, 5e-3], [0.2]])

@@ -14,6 +14,8 @@ EDITS = (
     Edit("fleet.table", "own_step", "all(stable)", "any(stable)", "one posture at which the step is stable is enough"),
     Edit("fleet.table", "own_step", "min(limits, default=None)", "max(limits, default=None)", "the largest of the limits"),
     Edit("fleet.table", "own_step", 'row["integrator"] == row["file_integrator"]', "True", "limits of any integrator"),
+    Edit("fleet.models", "lines_of", "'#@'", "'#'", "a list names further lists"),
+    Edit("export.command", "identifier", "_1 and not is_word(name)", "_1", "a function is named like a word of its language"),
     Edit("fleet.table", "order", "VERDICTS.index", "VERDICTS[::-1].index", "what agrees comes first"),
     Edit("fleet.table", "row_of_file", 'reference.kind == "model"', "False", "what was compared with itself agrees"),
     Edit("fleet.table", "row_of_file", "NOT_JUDGED if not_judged else outcome", "outcome", "what was not judged agrees"),

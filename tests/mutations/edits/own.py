@@ -24,6 +24,13 @@ EDITS = (
     Edit("joint_map", "JointMap.own_forces", "_1 * self.sense", "_1", "a force keeps its sense"),
     Edit("joint_map", "JointMap.own_speeds", "_1 * self.of_v", "_1", "speeds stay in rad/s"),
     Edit("joint_map", "put", "np.argsort(at)", "at", "an order is taken the other way"),
+    Edit("joint_map", "JointMap.after", "stated.sign * inner.zero", "inner.zero", "of two maps the first zero keeps its sense"),
+    Edit("joint_map", "within_a_turn", "zero if slides else _1", "_1", "the zero of a slide is turned back"),
+    Edit("joint_map", "same_names", "small.count(name) == right.count(name) == 1", "small.count(name) >= 1",
+         "either of two names in other capitals is taken"),
+    Edit("joint_map", "costs_of", "np.abs(along)", "along", "joints of opposite axes are never matched"),
+    Edit("joint_map", "costs_of", "OF_PLACE * apart", "0.0 * apart", "joints are matched wherever they are"),
+    Edit("joint_map", "costs_of", "OF_DEPTH * _1", "0.0 * _1", "joints are matched whatever carries them"),
     # the comparison
     Edit("agreement.given", "Compared.ratio", "np.where(np.isfinite(off), off, np.inf)", "np.where(np.isfinite(off), off, 0.0)",
          "NaN agrees"),
