@@ -1,4 +1,4 @@
-"""Random Trees, their states, and their MJCF: for the tests of tmt, and wherever one arm is not enough (agreement, reduction)."""
+"""Random Trees and their states: for the tests of tmt, and wherever one arm is not enough."""
 
 from dataclasses import replace
 
@@ -110,44 +110,6 @@ def random_state(rng, tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def random_states(rng, tree, count) -> list[np.ndarray]:
     """Rows of q (count, nq), qd and tau (count, nv)."""
     return [np.array(rows) for rows in zip(*(random_state(rng, tree) for _ in range(count)))]
-
-
-def mjcf(tree) -> str:
-    """A Tree of hinges as MJCF text: one body for each body, its hinges in it."""
-
-    def numbers(values):
-        return " ".join(repr(float(v)) for v in values)
-
-    def hinges_of(b):
-        chain = [tree.body_hinge[b]]
-        while tree.parent[chain[0]] >= 0 and tree.parent[chain[0]] not in tree.body_hinge:
-            chain.insert(0, tree.parent[chain[0]])
-        return chain
-
-    def on(hinge, start):
-        """The bodies whose first hinge hangs on this one, in whose body it is at start."""
-        bodies = [b for b in range(len(tree.body_hinge)) if tree.parent[hinges_of(b)[0]] == hinge]
-        return "\n".join(line for b in bodies for line in body(b, start))
-
-    def body(b, start):
-        first, *_ = chain = hinges_of(b)
-        where, lines = np.zeros(3), [f'<body pos="{numbers(start + tree.offset[first])}">']
-        for i in chain:
-            where = where + (tree.offset[i] if i != first else np.zeros(3))
-            place = f'pos="{numbers(where)}" axis="{numbers(tree.axis[i])}"'
-            lines.append(f'<joint name="{tree.hinge_names[i]}" type="hinge" {place} damping="{tree.damping[i]!r}"/>')
-        # principal moments and axes: MuJoCo 3.10 turns a fullinertia only to about 1e-8
-        moments, axes = np.linalg.eigh(tree.inertia[b])
-        axes[:, 0] *= np.linalg.det(axes)
-        place = f'pos="{numbers(where + tree.com[b])}" mass="{tree.mass[b]!r}"'
-        turned = f'xyaxes="{numbers(axes[:, :2].T.ravel())}" diaginertia="{numbers(moments)}"'
-        return [*lines, f"<inertial {place} {turned}/>", on(chain[-1], where), "</body>"]
-
-    return f"""<mujoco>
-      <compiler angle="radian" inertiafromgeom="false" balanceinertia="false"/>
-      <option gravity="{numbers(tree.gravity)}"><flag contact="disable" constraint="disable"/></option>
-      <worldbody>{on(-1, np.zeros(3))}</worldbody>
-    </mujoco>"""
 
 
 def exact_swing(t: np.ndarray, q: float, qd: float, hanging: float, frequency: float) -> np.ndarray:

@@ -72,6 +72,12 @@ def test_a_file_is_the_same_in_both_and_a_change_of_the_case_reaches_mujoco(sour
     assert_the_same(engine(reading).of(case_of(tree, damping=0.4, gravity=False)), tree, rng, states=1)
 
 
+def test_a_point_mass_that_is_fixed_to_a_body_counts(rng):
+    point = '<body name="point" pos="0.5 0 0"><inertial pos="0 0 0.1" mass="2" diaginertia="0 0 0"/></body>'
+    reading = compared(mjcf(PLAIN.replace("</body>", f"{point}</body>")), rng)
+    assert reading.tree.body_names == ("b", "point") and reading.tree.mass[1] == 2.0
+
+
 def test_a_urdf_is_the_same_in_both(tmp_path, rng):
     (tmp_path / "robot.urdf").write_text(URDF)
     reading = compared(tmp_path / "robot.urdf", rng)

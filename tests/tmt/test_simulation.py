@@ -98,5 +98,7 @@ def test_taylor_is_the_true_motion_of_each_run(rng):
     assert np.array_equal(motion.q[:, 0], starts)
     second = tmt.simulate(starts[1], REST, tau[1], 0.1, 6, "taylor", every=2)
     assert np.array_equal(second.q, motion.q[1, ::2]) and second.ended is None
+    loose = tmt.simulate(starts, REST, tau, 0.5, 3, "taylor", tolerance=1e-6)
+    assert loose.evaluations < tmt.simulate(starts, REST, tau, 0.5, 3, "taylor").evaluations
     stiff = dataclasses.replace(tmt.ARM, damping=(1e6, 0.0, 0.0))
     assert "series" in tmt.simulate(BENT, REST, REST, 0.1, 5, "taylor", stiff).ended

@@ -18,6 +18,7 @@ EDITS = (
     Edit("parameters.numbers", "compare_number", "quantity in OPTIONS", "False", "an option is no cause of rank 1"),
     Edit("parameters.numbers", "compare_number", "[words.get(number, _1) for number in (a, b)]",
          "[words.get(number, _1) for number in (b, a)]", "stated and compiled are exchanged"),
+    Edit("mujoco.reading", "read", "(model.body_mass > 0.0) | _1", "(model.body_mass > 0.0) & _1", "a point mass is no body"),
     Edit("mujoco.reading", "bodies_as_in", "stated if _1 else bodies", "bodies",
          "bodies of a solution are matched by their order"),
     Edit("mujoco.parameters", "row_of", "max(FACTOR * EPS, precision)", "1e-3",

@@ -13,6 +13,7 @@ EDITS = (
     Edit("implicit", "ImplicitRungeKutta.step", "raise _1", "return self.finish(q, qd, dt, a)", "Newton's failure is not seen"),
     Edit("reference", "distance", "np.abs(_1)", "0.5 * np.abs(_1)", "the distance from 50 digits is halved"),
     Edit("tree", "_direction", "_1 == 0.0", "False", "an axis may be zero"),
+    Edit("simulation", "by_series", "tolerance=tolerance", "tolerance=1e-33", "the tolerance of series is ignored"),
     Edit("simulation", "singular_in", "alive - 1", "0", "the last state is not looked at", nth=1),
     Edit("articulated", "outward", "2.0 * qd[by.start]", "qd[by.start]", "half of Coriolis' acceleration of a slide"),
     Edit("articulated", "about_point", "J.times(omegad) + _1", "_1", "no angular acceleration in Euler's equation"),
