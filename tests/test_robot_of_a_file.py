@@ -5,14 +5,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from judged import BOTH
 from models import PATHS, random_tree
+from servo_models import INERTIA, hinge
 
 import tmt
 from compare.engines.mujoco import engine, read
 from compare.experiments.speed.settings import scenes_of as scenes_of_speed
 from compare.robots.actuators import Drive
 from compare.robots.coordinates import floats, free_joints
-from compare.robots.file import COARSER, DURATION, added_damping, coarsest, robot_of, scenes_from
+from compare.robots.file import COARSER, DURATION, SERVOS_ACT, added_damping, coarsest, robot_of, scenes_from
 
 ONE = replace(tmt.ARM.lock({"alpha": 0.0, "beta": 0.0}), gravity=(0.0, 0.0, 0.0))  # one hinge, its inertia 0.0527 kg m2
 
@@ -40,6 +42,7 @@ def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
     assert list(robot_of(reading_of(arm, keyframes=keys), "my.xml").poses) == ["key key qpos0", "key qpos0", "qpos0"]
     reading = read(PATHS["pendulum_ball"])  # quaternions of one turn are one posture
     assert list(robot_of(replace(reading, keyframes={"turned": -reading.qpos0}), "p.xml").poses) == ["turned"]
+    assert list(robot_of(replace(reading, keyframes={}, ranges=((0.0, 1.0),) * 2), "p.xml").poses) == ["qpos0"]
 
 
 @pytest.mark.parametrize("name", [*PATHS, 0, 1])
@@ -78,6 +81,11 @@ def test_three_slides_and_a_ball_in_one_place_are_free_and_float_where_nothing_c
     assert (free_joints(tree), floats(tree)) == (free, floating)
 
 
+def test_a_free_body_is_thrown_up_and_tumbles():
+    (scene,) = (scene for scene in robot_of(read(PATHS["free_body"]), "s.xml").scenes if scene.name.endswith("thrown"))
+    assert scene.speed == (0.0, 0.0, 2.0, 120.0, 60.0, -90.0)
+
+
 def test_what_rests_where_it_is_let_go_is_set_going():
     still = replace(tmt.ARM, gravity=(0.0, 0.0, 0.0))
     names = [scene.name for scene in robot_of(reading_of(still), "my.xml").scenes]
@@ -87,6 +95,22 @@ def test_what_rests_where_it_is_let_go_is_set_going():
     for share, found in ((0.99, "set going"), (1.01, "let go")):  # of what is seen to move
         tree = replace(still, gravity=(0.0, 0.0, -share * 1e-6 / fastest))
         assert scenes_from(tree, "qpos0", zero, 0.002)[-1].name == f"qpos0, {found}, damped"
+
+
+@pytest.mark.parametrize("sign, how", [(1.0, "set going"), (-1.0, "held")])
+def test_what_a_spring_holds_rests(sign, how):
+    """The forearm, whose weight is the spring's torque k (q - rest), or is beside it."""
+    forearm = tmt.ARM.lock({"alpha": 0.0, "beta": 0.0})
+    rest = sign * tmt.gravity_balance(np.zeros(1), forearm) / 2.0
+    spring = replace(forearm, stiffness=(2.0,), rest=rest)
+    assert scenes_from(spring, "qpos0", np.zeros(1), 0.002)[0].name == f"qpos0, {how}"
+
+
+@BOTH
+def test_methods_are_compared_with_servos_that_8192_steps_follow(share, passes):
+    kp = share * INERTIA * (8192 / SERVOS_ACT) ** 2
+    scenes = {scene.name: scene.tags for scene in robot_of(read(hinge(kp)), "servo.xml").scenes}
+    assert ("speed" in scenes["qpos0, step of the servos"]) is passes
 
 
 def test_added_damping_lets_every_joint_decay_at_one_rate():

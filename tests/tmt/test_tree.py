@@ -40,11 +40,11 @@ REFUSED = [  # changes of the arm, and a word of what is said
 ]
 OF_KINDS = [  # changes of a slide on a ball
     ({"kind": ("hinge", "screw")}, "kind"),
-    ({"axis": [X, X, Z, Y]}, "right-handed"),
+    *(({"axis": [*axes, Y]}, "right-handed") for axes in ((X, X, Z), (X, Z, Y))),
     ({"reference": [1.0, 0.0]}, "ball"),
     ({"rest": [1.0, 1.0, 0.0, 0.0, 0.0]}, "quaternion"),
     ({"stiffness": [0.0, -1.0]}, "at least 0"),
-    ({"position_gain": np.eye(4)[[3, 1, 2, 0]]}, "ball"),
+    *(({"position_gain": np.outer(*np.eye(4)[pair])}, "ball") for pair in ([0, 3], [3, 0])),
 ]
 SLIDE_ON_A_BALL = tmt.Tree(
     ("b", "s"), (-1, 0), ((0, 0, 0), (0, 0, 1)), (X, Y, Z, Y), (0,) * 4, ("body",), (1,), (1.0,), ((0, 0, 1),),

@@ -12,6 +12,8 @@ EDITS = (
     Edit("implicit", "CLOSE", "1e-10", "1e-2", "Newton's method stops at two digits"),
     Edit("implicit", "ImplicitRungeKutta.step", "raise _1", "return self.finish(q, qd, dt, a)", "Newton's failure is not seen"),
     Edit("reference", "distance", "np.abs(_1)", "0.5 * np.abs(_1)", "the distance from 50 digits is halved"),
+    Edit("tree", "_check_ball", "np.linalg.det(axes) < 0.0", "False", "the axes of a ball may be left-handed"),
+    Edit("tree", "_gain", "fed[by].any() or fed[:, by].any()", "fed[by].any()", "a ball may be fed back to others"),
     Edit("tree", "_direction", "_1 == 0.0", "False", "an axis may be zero"),
     Edit("simulation", "by_series", "tolerance=tolerance", "tolerance=1e-33", "the tolerance of series is ignored"),
     Edit("simulation", "singular_in", "alive - 1", "0", "the last state is not looked at", nth=1),
