@@ -10,6 +10,7 @@ import pandas as pd
 from in_process import InProcess, without_workers
 from jinja2 import ChoiceLoader, DictLoader
 from matplotlib.figure import Figure
+from sections import section
 
 from compare.__main__ import main
 from compare.cli import command_line
@@ -92,6 +93,28 @@ def test_a_part_of_a_report_that_breaks_fails_the_run_although_all_checks_pass(t
     with without_workers():
         status, results = ran(tmp_path, "odd")
     assert status == 1 and all(check["passed"] for check in results["checks"] if check["experiment"] == "odd")
+
+
+def test_a_problem_of_a_users_function_is_told_once_by_an_experiment_that_asks_it():
+    problems, reported = [SimpleNamespace(quantity=name, text="NaN") for name in ("bias", "mass_matrix")], set()
+    for name, told in (("mass", ["mass_matrix"]), ("mass", []), ("acceleration", ["bias"])):
+        result = Result(name)
+        experiment.add_problems(result, problems, reported)
+        assert [check.quantity.split()[0] for check in result.checks] == told and not any(
+            c.passed for c in result.checks
+        )
+
+
+def test_progress_counts_from_one():
+    clock = SimpleNamespace(ended={"start": 0.1, "mass": 0.5}, under_way="gravity")
+    assert experiment.progress(clock, ["mass", "gravity", "speed"]) == ["2 of 3", "gravity"]
+
+
+def test_a_picture_of_several_experiments_is_drawn_with_the_last_of_them():
+    names = [name for name, record in EXPERIMENTS.items() if record.overview == EXPERIMENTS["mass"].overview]
+    sections = [section(name, rows=[{"a": 1}]) for name in names]
+    needed = [drawing.results_needed(name, list(EXPERIMENTS), sections) for name in names]
+    assert len(names) > 1 and not any(needed[:-1]) and list(needed[-1]) == names
 
 
 def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsys, monkeypatch):
