@@ -3,6 +3,7 @@
 import hashlib
 import json
 import re
+from argparse import ArgumentTypeError
 
 import pandas as pd
 import pytest
@@ -173,6 +174,7 @@ WRONG = {  # arguments, each with what is in its line
     "mass --reference my.py": "FILE.py:OBJECT", "mass --out": "--out: expected one argument",
     # values, and options that do not go together
     "mass --mjcf=": "--mjcf: the name is empty", "stability --dt nan": "'nan'",
+    "stability --dt=-0.5": "'-0.5'", "MASS": "did you mean mass?",
     "stability --dt 5.1": "'5.1'", "mass --scenes my.toml": "mass", "mass --dask tcp://x:1": "--dask",
     "diagnosis": "--mjcf", "diagnosis --mjcf arm.xml --workers 2": "--workers",
     "all --integrator Euler": "--integrator", "mass --joints hip,knee --reference model": "--joints",
@@ -209,3 +211,12 @@ def test_a_bad_request_gets_one_line_and_status_2(arguments, capsys, monkeypatch
     out, err = capsys.readouterr()
     assert (status, out, len(err.splitlines())) == (2, "", 1) and WRONG[arguments] in err, err
     assert err.startswith("python -m compare: ") and {path.name for path in tmp_path.iterdir()} == FILES.keys()
+
+
+def test_values_at_the_edge_are_accepted_and_those_beyond_are_not():
+    options = command_line.request(["mass", "--reference", "a.py:b", "--joints", "-knee,hip"])
+    assert options.joints == "-knee,hip" and command_line.stated_reference("A.XML") == "A.XML"
+    assert [command_line.process_count(text) for text in ("1", "1024")] == [1, 1024]
+    for text in ("0", "1025", "-1", "two"):
+        with pytest.raises(ArgumentTypeError):
+            command_line.process_count(text)

@@ -13,6 +13,7 @@ from sympy.physics.mechanics import dynamicsymbols
 import tmt
 from compare.engines.mujoco import read
 from compare.engines.own import ARGUMENTS, Own, OwnEquations, OwnError
+from compare.engines.own.functions import same
 from compare.engines.tmt import Tmt
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
@@ -224,3 +225,10 @@ def test_a_run_that_diverges_ends_and_its_function_is_not_asked_of_what_is_no_nu
     assert motion.ended[0] is None and motion.ended[1].endswith("s: a number is not finite")
     assert np.isfinite(motion.q[0]).all() and np.isnan(motion.q[1, -1]).all() and np.isfinite(motion.q[1, 0]).all()
     assert own.equations.problems == []
+
+
+@pytest.mark.parametrize("off, is_same", [(0.9e-12, True), (1.1e-12, False), (-1.1e-12, False), (np.nan, False)])
+def test_a_batch_has_the_values_of_single_states_except_for_rounding_of_the_largest(off, is_same):
+    singles = np.array([[1e3, np.nan], [0.0, np.inf]])
+    assert same(singles + [[0.0, 0.0], [1e3 * off, 0.0]], singles) is is_same
+    assert not same(singles[0], singles)

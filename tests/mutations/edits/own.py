@@ -8,6 +8,7 @@ EDITS = (
     Edit("own.equations", "OwnEquations.called", "[np.array(part) for part in given]", "given", "no copies are handed over"),
     Edit("own.equations", "OwnEquations.values_of", "np.isfinite(computed)", "(computed == computed)",
          "infinite values are accepted"),
+    Edit("own.functions", "SAME", "1e-12", "1e-6", "a batch may differ by a millionth"),
     Edit("own.equations", "SKEW", "1e-9", "1e-8", "M may be ten times less symmetric"),
     Edit("own.equations", "OwnEquations.note", "_1 <= DIVERGED", "_1 <= np.inf", "a run that has diverged is a problem"),
     Edit("own.equations", "OwnEquations.each", "np.arange(len(raised)) == i", "np.arange(len(raised)) >= 0",
