@@ -1,8 +1,6 @@
 """Which rows of a long table are shown, and how long report.md becomes."""
 
-import numpy as np
 import pandas as pd
-import pytest
 from sections import BAD, GOOD, section
 
 from compare.experiments import EXPERIMENTS
@@ -26,26 +24,6 @@ def test_rows_that_fail_or_differ_are_shown_then_the_largest_shares_of_a_toleran
     assert [row["at"] for row in shortened(rows, 3)[0]] == [0, 1, 7]
     rows = [{"at": k, "difference_over_bar": share} for k, share in enumerate((0.1, None, 0.9, 0.5))]
     assert [row["at"] for row in shortened(rows, 2)[0]] == [2, 3]
-
-
-@pytest.mark.parametrize("worst", [
-    {"share": np.nan}, {"share": -0.9}, {"share": None, "passed": False},
-    {"published": 1.0, "tmt": 1.0, "mujoco": 2.0, "tolerance": 1.2},
-    {"published": 1.0, "tmt": 1.2, "mujoco": 1.0, "tolerance": 0.2}, {"predicted_s": 2.0, "observed_s": 0.2},
-])  # fmt: skip
-def test_the_worst_row_is_the_farthest_by_its_own_measure_and_what_is_no_number(worst):
-    plain = (
-        {"share": 0.1}
-        if "share" in worst
-        else worst | {"mujoco": 1.5, "tmt": 1.0, "tolerance": 20.0, "observed_s": 1.5}
-    )
-    rows = [plain | {"at": k} for k in range(9)]
-    rows[4] = plain | worst | {"at": 4}
-    rows[6:8] = [{"at": 6}, {"at": 7, "share": None}]  # of which nothing is known
-    named = [
-        {("difference_over_band" if name == "share" else name): value for name, value in row.items()} for row in rows
-    ]
-    assert 4 in [row["at"] for row in shortened(named, 1)[0]]
 
 
 def test_the_checks_that_fail_are_listed_first_then_those_closest_to_their_tolerance():
