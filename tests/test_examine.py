@@ -78,6 +78,15 @@ def test_an_experiment_that_raises_is_one_failed_check_and_a_part_of_the_report_
         assert error in check["note"] and f"FAIL {name}: {quantity}" in out
     for line, name in zip(err.splitlines(), ("report.md", "index.html"), strict=True):
         assert f"odd in {name}" in line and "KeyError: " in line
+
+
+def test_a_part_of_the_report_that_breaks_gives_status_1_where_every_check_passes(tmp_path, monkeypatch):
+    odd = Result("parameters", shown=["a", "b"], rows=[{"a": 1.5}])
+    odd.check("scene", "quantity", 0.0, 1.0, "m")
+    made(monkeypatch, "parameters", rows=lambda setup: odd)
+    only(monkeypatch, "parameters", "published")
+    status, results = ran(tmp_path, "all")
+    assert status == 1 and results["passed"]
     assert pd.read_csv(tmp_path / "out/tables/odd.csv")["a"].tolist() == [1.5]
 
 
