@@ -18,7 +18,7 @@ from ..judge.finding import Finding
 from ..judge.scale import EPS, FACTOR
 from ..report.text import say
 from ..robots import Robot
-from ..robots.states import Sample
+from ..robots.states import MOST_SPEEDS, Sample
 from .setup import Setup
 
 
@@ -55,7 +55,7 @@ class Comparison:
     def __init__(self, setup: Setup, sample: Sample):
         self.sample, self.robot = sample, setup.robot
         self.engines = list(setup.compared().values())  # MuJoCo is the second
-        if sample is setup.random and not self.robot.own:
+        if sample is setup.random and has_compiled(self.robot):
             self.engines.append(Compiled(self.robot.tree))
         self.scale = Entries(self.robot.tree, sample.q, sample.qd)
         self.returned = {}
@@ -109,9 +109,14 @@ def compared(setup: Setup, experiment: str, *names: str) -> tuple[Result, list[C
     for comparison in comparisons:
         comparison.agree(result, *names)
         result.notes += comparison.sample.notes
-    if not setup.robot.own:
+    if has_compiled(setup.robot):
         result.find("rows_compiled", of="shared")
     return result, comparisons
+
+
+def has_compiled(robot: Robot) -> bool:
+    """Whether tmt's compiled functions are compared: they take minutes to compile for a large robot."""
+    return not robot.own and robot.coordinates.nv <= MOST_SPEEDS
 
 
 def headline(result: Result) -> Finding | None:
