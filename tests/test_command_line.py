@@ -181,7 +181,7 @@ WRONG = {  # arguments, each with what is in its line
     f"trajectory --mjcf {MIXED} --scenes wrong.toml": "17",
     # files
     "gravity --mjcf cut.xml": "cut.xml", "gravity --mjcf empty.xml": "empty", "gravity --mjcf mesh.xml": "none.stl",
-    "all --mjcf still.xml": "joint", "gravity --mjcf light.xml": "mass", "gravity --mjcf heavy.xml": "finite",
+    "all --mjcf still.xml": "joint", "gravity --mjcf light.xml": "mass", "gravity --mjcf heavy.xml": "inf kg",
 }  # fmt: skip
 BODY = '<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/>{}</body></worldbody></mujoco>'
 MESH = '<asset><mesh name="m" file="none.stl"/></asset>'

@@ -13,6 +13,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from ...process.parts import is_pipe, needed_by
 from .names import aligns, joint_name, joint_places, kind_of, parts_of, rotors
 
 FROM_GEOMS = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
@@ -56,6 +57,9 @@ def compiled(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             model = without_visuals(editable(source)).compile()
+        bytes(model.names).decode()
+    except UnicodeDecodeError:
+        raise ModelError(f"{name_of(source)} has names that are not UTF-8; save it as UTF-8") from None
     except ValueError as error:
         is_model = "<mujoco" in text or "<robot" in text
         problem = f"MuJoCo cannot compile {name_of(source)}" if is_model else f"{name_of(source)} is not MJCF"
@@ -66,9 +70,15 @@ def compiled(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     return model, tuple(dict.fromkeys(" ".join(str(line).split()) for line in lines))
 
 
+def refuse_pipes(path: Path) -> None:
+    """ModelError if a file, or one that it includes or loads, is a pipe or a device: MuJoCo would wait for it."""
+    for part in needed_by(path):
+        if is_pipe(part):
+            raise ModelError(f"{part} is a pipe or a device; expected a regular file")
+
+
 def text_of(path: Path) -> str:
-    if path.exists() and not (path.is_file() or path.is_dir()):  # a pipe cannot be read twice
-        raise ModelError(f"{path} is not a regular file; expected an MJCF or URDF file")
+    refuse_pipes(path)
     try:
         return path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
