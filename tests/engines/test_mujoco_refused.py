@@ -6,7 +6,7 @@ import pytest
 from files import PLAIN, TENDON, TWO, mjcf
 from runs import posix
 
-from compare.engines.mujoco import ModelError, read
+from compare.engines.mujoco import ModelError, parse, read
 
 ALONG = '<actuator><general name="a" tendon="t" armature="1"/></actuator>'
 BALL = '<body><joint type="ball" name="w"/><geom size="0.1"/><body><joint name="w x"/><geom size="0.1"/></body></body>'
@@ -61,8 +61,10 @@ RANGES = {  # the last that is accepted and the first that is not
 def test_numbers_beyond_the_range_that_is_judged_are_refused_with_the_number(name, inside, outside):
     good = dict.fromkeys(RANGES, "1")
     assert read(NUMBERS.format(**good | {name: inside})).tree
-    with pytest.raises(ModelError, match=rf" is {float(outside):g}.*; expected".replace("+", r"\+")):
-        read(NUMBERS.format(**good | {name: outside}))
+    reading = read(NUMBERS.format(**good))
+    for act in (read, lambda source: parse(source, reading.tree)):
+        with pytest.raises(ModelError, match=rf" is {float(outside):g}.*; expected".replace("+", r"\+")):
+            act(NUMBERS.format(**good | {name: outside}))
 
 
 def test_names_that_are_not_utf8_are_refused(tmp_path):

@@ -195,6 +195,11 @@ def refuse(m: mujoco.MjModel) -> None:
     for tendon in np.flatnonzero(m.tendon_armature):
         name = element_name(m, "tendon", tendon)
         raise ValueError(f"tendon {name!r} has armature, which couples joints; only that of joints is compared")
+    refuse_numbers(m)
+
+
+def refuse_numbers(m: mujoco.MjModel) -> None:
+    """ValueError, in one line, for a number that is not finite, or beyond the range that is judged."""
     for field, (word, unit, least) in NUMBERS.items():
         for name in names_where(m, field, lambda row, least=least: number_outside(row, least) is not None):
             refuse_number(f"{word} of {name!r}", getattr(m, field), unit, least)
