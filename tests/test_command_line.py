@@ -170,7 +170,7 @@ WRONG = {  # arguments, each with what is in its line
     "mass --reference my.py": "FILE.py:OBJECT", "mass --out": "--out: expected one argument",
     # values, and options that do not go together
     "mass --mjcf=": "--mjcf: the name is empty", "stability --dt nan": "'nan'",
-    "stability --dt 5.1": "'5.1'", "stability --dt 9e-7": "'9e-7'", "mass --scenes my.toml": "mass", "mass --dask tcp://x:1": "--dask",
+    "stability --dt 9e-7": "'9e-7'", "mass --scenes my.toml": "mass", "mass --dask tcp://x:1": "--dask",
     "diagnosis": "--mjcf", "diagnosis --mjcf arm.xml --workers 2": "--workers",
     "all --integrator Euler": "--integrator", "mass --joints hip,knee --reference model": "--joints",
     # what is found only when it is looked for

@@ -55,7 +55,8 @@ class Comparison:
     def __init__(self, setup: Setup, sample: Sample):
         self.sample, self.robot = sample, setup.robot
         self.engines = list(setup.compared().values())  # MuJoCo is the second
-        if sample is setup.random and has_compiled(self.robot):
+        is_small = self.robot.coordinates.nv <= MOST_SPEEDS  # code for more takes minutes to compile
+        if sample is setup.random and is_small and not self.robot.own:
             self.engines.append(Compiled(self.robot.tree))
         self.scale = Entries(self.robot.tree, sample.q, sample.qd)
         self.returned = {}
@@ -109,14 +110,9 @@ def compared(setup: Setup, experiment: str, *names: str) -> tuple[Result, list[C
     for comparison in comparisons:
         comparison.agree(result, *names)
         result.notes += comparison.sample.notes
-    if has_compiled(setup.robot):
+    if len(comparisons[-1].engines) > 2:
         result.find("rows_compiled", of="shared")
     return result, comparisons
-
-
-def has_compiled(robot: Robot) -> bool:
-    """Whether tmt's compiled functions are compared: they take minutes to compile for a large robot."""
-    return not robot.own and robot.coordinates.nv <= MOST_SPEEDS
 
 
 def headline(result: Result) -> Finding | None:

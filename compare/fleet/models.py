@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..process.crash import Refused
-from ..process.parts import elements_of, is_a_file, is_pipe, needed_by
+from ..process.parts import elements_of, is_pipe, needed_by
 from ..process.streams import in_one_line, readable
 
 MODEL_ELEMENTS = "mujoco", "robot"  # root elements of MJCF and of URDF
@@ -28,7 +28,7 @@ class Model(NamedTuple):
 
 def bundle(model: Model) -> dict[str, bytes]:
     """The files of a model for another machine: {path below a common folder: content}, the model first."""
-    parts = [Path(os.path.abspath(part)) for part in model.parts]
+    parts = [Path(os.path.abspath(part)) for part in model.parts if not is_pipe(part)]
     top = os.path.commonpath([part.parent for part in parts])
     return {Path(os.path.relpath(part, top)).as_posix(): part.read_bytes() for part in parts}
 
@@ -52,11 +52,7 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
     roots = {file: None if is_named else next(elements_of(path), None) for file, (path, is_named) in files.items()}
     # without a root it cannot be read and counts as a model: the table shows it with the reason
     kinds = {file: MODEL_ELEMENTS[0] if root is None else root.tag for file, root in roots.items()}
-    models = {
-        file: Model(path, [*filter(is_a_file, needed_by(path))])
-        for file, (path, _) in files.items()
-        if kinds[file] in MODEL_ELEMENTS
-    }
+    models = {file: Model(path, needed_by(path)) for file, (path, _) in files.items() if kinds[file] in MODEL_ELEMENTS}
     users = {os.path.realpath(part): model.shown for model in models.values() for part in model.parts[1:]}
     for file, (path, is_named) in files.items():
         if file in users and not is_named:
@@ -77,7 +73,7 @@ def paths_of(words: Iterable[str]) -> Iterator[tuple[Path, bool]]:
         path = Path(word)
         if word.startswith("@"):
             yield from paths_of(lines_of(word[1:]))
-        elif is_a_file(path):
+        elif os.path.isfile(path):
             yield path, True
         else:
             is_pattern = has_magic(word) and "\0" not in word and not os.path.isdir(word)
@@ -86,7 +82,7 @@ def paths_of(words: Iterable[str]) -> Iterator[tuple[Path, bool]]:
                 raise Refused(f"no such file: {in_one_line(word)}; expected a file, a folder, a pattern or @LIST")
             for match in map(Path, matches):
                 yield from (
-                    (file, False) for file in (files_in(match) if match.is_dir() else [match] * is_a_file(match))
+                    (file, False) for file in (files_in(match) if match.is_dir() else [match] * os.path.isfile(match))
                 )
 
 
@@ -98,7 +94,7 @@ def files_in(folder: Path) -> Iterator[Path]:
             if (
                 name.lower().endswith((".xml", ".mjcf", ".urdf"))
                 and not name.startswith(".")
-                and is_a_file(Path(place, name))
+                and os.path.isfile(Path(place, name))
             ):
                 yield Path(place, name)
 

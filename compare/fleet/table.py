@@ -12,7 +12,6 @@ from markupsafe import Markup
 from ..judge.check import About
 from ..judge.finding import Finding
 from ..process.crash import Refused
-from ..process.parts import is_pipe
 from ..process.streams import in_one_line
 from ..report.provenance import OURS, commit, installed
 from ..report.text import block, environment, say
@@ -105,8 +104,6 @@ def earlier(folder: str) -> dict[str, dict]:
     """The columns of CHANGES of an earlier fleet, by file name. Refused if they cannot be read."""
     path = Path(folder) / "fleet.csv"
     try:
-        if is_pipe(path):
-            raise FileNotFoundError(path)
         return by_file(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, KeyError, csv.Error):
         raise Refused(f"cannot read {in_one_line(str(path))}; expected the folder of an earlier fleet") from None

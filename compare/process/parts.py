@@ -12,19 +12,9 @@ from xml.etree import ElementTree
 DIRECTORIES = ("assetdir", "meshdir", "texturedir")
 
 
-def is_a_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # not a valid name
-        return False
-
-
 def is_pipe(path: Path) -> bool:
     """Whether a path is a pipe, a device or a socket, which may be waited for without end."""
-    try:
-        return path.exists() and not path.is_file() and not path.is_dir()
-    except (OSError, ValueError):  # not a valid name
-        return False
+    return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
 
 
 def elements_of(path: Path) -> Iterator[ElementTree.Element]:
@@ -57,4 +47,4 @@ def needed_by(path: Path) -> tuple[Path, ...]:
 
 def existing(names: Iterable[str], folders: Iterable[Path], directories: Iterable[str]) -> Iterator[Path]:
     paths = (folder / directory / name for name in names for folder in folders for directory in directories)
-    return (path for path in paths if is_a_file(path) or is_pipe(path))
+    return (path for path in paths if os.path.exists(path) and not os.path.isdir(path))

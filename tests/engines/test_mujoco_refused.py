@@ -18,8 +18,8 @@ REFUSED = {  # a word of why, and the file
         '<elasticity young="1e3"/></flexcomp>'
     ),
     "mass": mjcf("<body><joint/></body>"),
-    "pos of 'far' is inf m": mjcf('<body name="far" pos="inf 0 0"><geom size="1"/></body>' + PLAIN),
-    "damping of 'j' is -1 ": mjcf(PLAIN.replace('name="j"', 'name="j" damping="-1"')),
+    "pos of 'far' is inf;": mjcf('<body name="far" pos="inf 0 0"><geom size="1"/></body>' + PLAIN),
+    "damping of 'j' is -1;": mjcf(PLAIN.replace('name="j"', 'name="j" damping="-1"')),
     "gainprm of 's'": mjcf(after='<actuator><position name="s" joint="j" kp="nan"/></actuator>'),
     "together": mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")),
     "'w x'": mjcf(BALL),
@@ -63,7 +63,7 @@ def test_numbers_beyond_the_range_that_is_judged_are_refused_with_the_number(nam
     assert read(NUMBERS.format(**good | {name: inside})).tree
     reading = read(NUMBERS.format(**good))
     for act in (read, lambda source: parse(source, reading.tree)):
-        with pytest.raises(ModelError, match=rf" is {float(outside):g}.*; expected".replace("+", r"\+")):
+        with pytest.raises(ModelError, match=rf" is {float(outside):g}.*; expected from".replace("+", r"\+")):
             act(NUMBERS.format(**good | {name: outside}))
 
 

@@ -165,15 +165,13 @@ def contact_pairs(m: mujoco.MjModel) -> np.ndarray:
 MOST = 1e30  # in size, of every number that is compared: products of several are still doubles
 STEPS = 1e-6, 5.0  # s, of the file
 MOST_SPEEDS = 1000  # of a model: Mbar of a state has the square of it
-NUMBERS = {  # of elements: in words, unit, least
-    "body_pos": ("pos", "m", -MOST), "body_quat": ("quat", "", -MOST), "body_mass": ("mass", "kg", 0.0),
-    "body_inertia": ("inertia", "kg m2", 0.0), "body_ipos": ("centre of mass", "m", -MOST),
-    "body_iquat": ("quat of the inertia", "", -MOST), "jnt_pos": ("pos", "m", -MOST), "jnt_axis": ("axis", "", -MOST),
-    "jnt_stiffness": ("stiffness", "N m/rad", 0.0), "dof_armature": ("armature", "kg m2", 0.0),
-    "dof_damping": ("damping", "N m s/rad", 0.0), "actuator_gainprm": ("gainprm", "", -MOST),
-    "actuator_biasprm": ("biasprm", "", -MOST), "actuator_gear": ("gear", "", -MOST),
-    "tendon_stiffness": ("stiffness", "N/m", -MOST), "tendon_damping": ("damping", "N s/m", -MOST),
-}  # fmt: skip
+NUMBERS = (
+    "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat", "jnt_pos", "jnt_axis", "jnt_stiffness",
+    "dof_armature", "dof_damping", "actuator_gainprm", "actuator_biasprm", "actuator_gear", "tendon_stiffness",
+    "tendon_damping",
+)  # fmt: skip
+UNITS = {"mass": " kg", "inertia": " kg m2", "armature": " kg m2", "gravity": " m/s2", "timestep": " s"}
+NOT_NEGATIVE = ("jnt_stiffness", "dof_armature", "dof_damping")
 ELASTIC = ("flex_stiffness", "flex_bending", "flex_edgestiffness", "flex_edgedamping")
 
 
@@ -200,20 +198,21 @@ def refuse(m: mujoco.MjModel) -> None:
 
 def refuse_numbers(m: mujoco.MjModel) -> None:
     """ValueError, in one line, for a number that is not finite, or beyond the range that is judged."""
-    for field, (word, unit, least) in NUMBERS.items():
-        for name in names_where(m, field, lambda row, least=least: number_outside(row, least) is not None):
-            refuse_number(f"{word} of {name!r}", getattr(m, field), unit, least)
+    for field in NUMBERS:
+        least = 0.0 if field in NOT_NEGATIVE else -MOST
+        for name in names_where(m, field, lambda row, least=least: number_outside(row, least, MOST) is not None):
+            refuse_number(field.partition("_")[2], f" of {name!r}", getattr(m, field), least, MOST)
     for word, values in (("gravity", m.opt.gravity), ("qpos0", m.qpos0), ("qpos_spring", m.qpos_spring)):
-        refuse_number(word, values, "m/s2" * (word == "gravity"), -MOST)
-    refuse_number("timestep", m.opt.timestep, "s", *STEPS)
+        refuse_number(word, "", values, -MOST, MOST)
+    refuse_number("timestep", "", m.opt.timestep, *STEPS)
 
 
-def number_outside(values, least: float, most: float = MOST) -> float | None:
+def number_outside(values, least: float, most: float) -> float | None:
     """The first of some numbers that is not in a range, or None."""
     return next((number for number in np.ravel(values).tolist() if not least <= number <= most), None)
 
 
-def refuse_number(word: str, values, unit: str, least: float, most: float = MOST) -> None:
+def refuse_number(word: str, whose: str, values, least: float, most: float) -> None:
     """ValueError, with the number, where one of some numbers is not in a range."""
     if (number := number_outside(values, least, most)) is not None:
-        raise ValueError(f"{word} is {f'{number:g} {unit}'.strip()}; expected a number from {least:g} to {most:g}")
+        raise ValueError(f"{word}{whose} is {number:g}{UNITS.get(word, '')}; expected from {least:g} to {most:g}")

@@ -70,15 +70,9 @@ def compiled(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     return model, tuple(dict.fromkeys(" ".join(str(line).split()) for line in lines))
 
 
-def refuse_pipes(path: Path) -> None:
-    """ModelError if a file, or one that it includes or loads, is a pipe or a device: MuJoCo would wait for it."""
-    for part in needed_by(path):
-        if is_pipe(part):
-            raise ModelError(f"{part} is a pipe or a device; expected a regular file")
-
-
 def text_of(path: Path) -> str:
-    refuse_pipes(path)
+    for part in filter(is_pipe, needed_by(path)):  # MuJoCo would wait for it
+        raise ModelError(f"{part} is a pipe or a device; expected a regular file")
     try:
         return path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
