@@ -28,7 +28,7 @@ class Model(NamedTuple):
 
 def bundle(model: Model) -> dict[str, bytes]:
     """The files of a model for another machine: {path below a common folder: content}, the model first."""
-    parts = [Path(os.path.abspath(part)) for part in model.parts if not is_pipe(part)]
+    parts = [Path(os.path.abspath(part)) for part in model.parts]
     top = os.path.commonpath([part.parent for part in parts])
     return {Path(os.path.relpath(part, top)).as_posix(): part.read_bytes() for part in parts}
 

@@ -29,7 +29,12 @@ def elements_of(path: Path) -> Iterator[ElementTree.Element]:
 
 
 def needed_by(path: Path) -> tuple[Path, ...]:
-    """An MJCF file and the existing files, or pipes, that it includes, attaches and loads; itself first."""
+    """An MJCF file and the existing files that it includes, attaches and loads; itself first."""
+    return path, *filter(os.path.isfile, named_by(path)[1:])
+
+
+def named_by(path: Path) -> tuple[Path, ...]:
+    """As needed_by, with pipes and devices."""
     waiting, parts, folders = [path], {os.path.abspath(path): path}, {path.parent}
     names, directories = set(), {""}  # a directory that one file states applies to all
     while waiting:

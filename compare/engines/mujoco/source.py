@@ -13,7 +13,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from ...process.parts import is_pipe, needed_by
+from ...process.parts import is_pipe, named_by
 from .names import aligns, joint_name, joint_places, kind_of, parts_of, rotors
 
 FROM_GEOMS = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
@@ -71,7 +71,7 @@ def compiled(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
 
 
 def text_of(path: Path) -> str:
-    for part in filter(is_pipe, needed_by(path)):  # MuJoCo would wait for it
+    for part in filter(is_pipe, named_by(path)):  # MuJoCo would wait for it
         raise ModelError(f"{part} is a pipe or a device; expected a regular file")
     try:
         return path.read_text(encoding="utf-8", errors="replace")
