@@ -78,6 +78,7 @@ def test_an_experiment_that_raises_is_one_failed_check_and_a_part_of_the_report_
         assert error in check["note"] and f"FAIL {name}: {quantity}" in out
     for line, name in zip(err.splitlines(), ("report.md", "index.html"), strict=True):
         assert f"odd in {name}" in line and "KeyError: " in line
+    assert pd.read_csv(tmp_path / "out/tables/odd.csv")["a"].tolist() == [1.5]
 
 
 def test_a_part_of_the_report_that_breaks_gives_status_1_where_every_check_passes(tmp_path, monkeypatch):
@@ -88,7 +89,6 @@ def test_a_part_of_the_report_that_breaks_gives_status_1_where_every_check_passe
     status, results = ran(tmp_path, "all")
     failed = {check["experiment"] for check in results["checks"] if not check["passed"]}
     assert status == 1 and failed == {"report"}  # no experiment's own
-    assert pd.read_csv(tmp_path / "out/tables/odd.csv")["a"].tolist() == [1.5]
 
 
 def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsys, monkeypatch):
