@@ -1,6 +1,7 @@
 """python -m compare: compare the two models and write a report."""
 
 import os
+import sys
 from collections.abc import Sequence
 
 from .process import interrupt, streams
@@ -12,9 +13,16 @@ if __name__ == "__main__":
     # the matrices are small, and other processes compute too: threads of a product would only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     interrupt.listen()  # before anything that takes its time
+    if not interrupt.PARENT and any(":" in word for word in sys.argv[1:]):  # perhaps a user's own equations
+        status, end = interrupt.status_of_child()
+        interrupt.settle()
+        if end:
+            streams.say_error(
+                f"the run ended before its end, perhaps by your equations: {end}; the earlier report is unchanged"
+            )
+        interrupt.leave(status)
 
 import shlex
-import sys
 
 from .cli.command_line import EQUATIONS, FLEET, request
 from .process.crash import Refused, described
@@ -24,7 +32,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit status. SystemExit after help or a wrong word: see command_line.request."""
     try:
         return status_of(sys.argv[1:] if arguments is None else arguments)
-    except Exception as error:
+    except BaseException as error:
+        if isinstance(error, SystemExit) or interrupt.is_interrupt(error):
+            raise
         interrupt.settle()
         streams.say_error(str(error) if isinstance(error, Refused) else f"cannot go on: {described(error)}")
         return 2
@@ -60,4 +70,4 @@ if __name__ == "__main__":
     interrupt.clear_up()
     for stream in (sys.stdout, sys.stderr):
         streams.Stream(stream).flush()
-    os._exit(status)  # what comes after this could end with another status
+    interrupt.leave(status)

@@ -175,7 +175,8 @@ WRONG = {  # arguments, each with what is in its line
     # values, and options that do not go together
     "mass --mjcf=": "--mjcf: the name is empty", "stability --dt nan": "'nan'",
     "stability --dt=-0.5": "'-0.5'", "MASS": "did you mean mass?",
-    "stability --dt 5.1": "'5.1'", "mass --scenes my.toml": "mass", "mass --dask tcp://x:1": "--dask",
+    "stability --dt 5.1": "'5.1'", "stability --dt 9e-7": "'9e-7'", "mass --scenes my.toml": "mass",
+    "mass --dask tcp://x:1": "--dask",
     "diagnosis": "--mjcf", "diagnosis --mjcf arm.xml --workers 2": "--workers",
     "all --integrator Euler": "--integrator", "mass --joints hip,knee --reference model": "--joints",
     # what is found only when it is looked for
@@ -186,7 +187,7 @@ WRONG = {  # arguments, each with what is in its line
     f"trajectory --mjcf {MIXED} --scenes wrong.toml": "17",
     # files
     "gravity --mjcf cut.xml": "cut.xml", "gravity --mjcf empty.xml": "empty", "gravity --mjcf mesh.xml": "none.stl",
-    "all --mjcf still.xml": "joint", "gravity --mjcf light.xml": "mass", "gravity --mjcf heavy.xml": "finite",
+    "all --mjcf still.xml": "joint", "gravity --mjcf light.xml": "mass", "gravity --mjcf heavy.xml": "inf kg",
 }  # fmt: skip
 BODY = '<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/>{}</body></worldbody></mujoco>'
 MESH = '<asset><mesh name="m" file="none.stl"/></asset>'

@@ -1,8 +1,11 @@
 """Scenes of a user's own: what a file may say; what it may not is one line with file and entry."""
 
+import os
+
 import numpy as np
 import pytest
 from models import PATHS
+from runs import posix
 
 from compare.robots.arm import ARM
 from compare.robots.case import Case
@@ -89,3 +92,20 @@ def test_a_quaternion_of_few_digits_is_made_one_of_length_1(tmp_path, length, ac
 def test_a_file_that_cannot_be_read(tmp_path):
     with pytest.raises(SceneError, match=r"no\.toml"):
         read_scenes(tmp_path / "no.toml", ARM)
+    refused(tmp_path, f"a = {'[' * 3000}{']' * 3000}", "nested")
+
+
+@posix
+def test_a_pipe_is_never_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "my.toml")
+    with pytest.raises(SceneError, match=r"my\.toml is not a regular file"):
+        read_scenes(tmp_path / "my.toml", ARM)
+
+
+@pytest.mark.parametrize("steps, accepted", [(20_000, True), (20_001, False)])
+def test_the_number_of_steps_of_a_run_is_limited(tmp_path, steps, accepted):
+    text = f"[[scene]]\nname = 'a'\nduration = 2.0\ndt = {2.0 / steps!r}\n"
+    if not accepted:
+        return refused(tmp_path, text, "20,000 steps")
+    (scene,) = from_text(tmp_path, text)
+    assert scene.steps == steps

@@ -45,11 +45,11 @@ def not_empty(text: str) -> str:
 
 
 def seconds(most: float) -> Callable[[str], float]:
-    """A type of options: a time above 0, s."""
+    """A type of options: a time, s."""
 
     def time(text: str) -> float:
-        if not 0.0 < float(text) <= most:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a time: expected seconds, above 0 and at most {most:g}")
+        if not 1e-6 <= float(text) <= most:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a time: expected seconds, from 1e-6 to {most:g}")
         return float(text)
 
     return time

@@ -10,10 +10,12 @@ from tmt import literal
 from tmt.compiled import prepared
 from tmt.derivation.quantities import QUANTITIES
 from tmt.methods import method_named
+from tmt.model.singular import mass_matrices
 from tmt.simulation import reasons
 
 from ..robots.case import Case
-from . import GRID, Engine, EngineRecord, Method, Motion, Prepared, Setting
+from ..robots.states import MOST_SPEEDS
+from . import GRID, Engine, EngineRecord, Method, Motion, Prepared, Setting, rows_of_states
 
 ENGINE = EngineRecord(order=20, label="TMT", colour="#0072B2", marker="o", in_quick_runs=True)
 # schemes of MuJoCo that differ from others only for robots with balls, springs or a free body on its own
@@ -48,10 +50,23 @@ def engine(schemes: Iterable[str]) -> Tmt:
 
 
 class TmtDynamics:
-    """A case's Tree; each quantity by the literal method."""
+    """A case's Tree; each quantity by the literal method, its sums as products of matrices where there are many speeds."""
 
     def __init__(self, case: Case):
         self.tree, self.coordinates = case.tree, case.coordinates
+        self.is_large = case.coordinates.nv > MOST_SPEEDS
+
+    def mass_matrix(self, q) -> np.ndarray:
+        if not self.is_large:
+            return literal.mass_matrix(q, self.tree)
+        batch, (q,) = rows_of_states(q)
+        return mass_matrices(self.tree, q).reshape(*batch, *2 * [self.coordinates.nv])
+
+    def acceleration(self, q, v, tau) -> np.ndarray:
+        if not self.is_large:
+            return literal.acceleration(q, v, tau, self.tree)
+        forces = tau - np.array(self.tree.damping) * v - literal.spring_torque(q, self.tree)
+        return np.linalg.solve(self.mass_matrix(q), (forces - literal.bias(q, v, self.tree))[..., None])[..., 0]
 
     def __getattr__(self, quantity: str) -> Callable:
         if quantity not in QUANTITIES:

@@ -18,7 +18,7 @@ from ..judge.finding import Finding
 from ..judge.scale import EPS, FACTOR
 from ..report.text import say
 from ..robots import Robot
-from ..robots.states import Sample
+from ..robots.states import MOST_SPEEDS, Sample
 from .setup import Setup
 
 
@@ -55,7 +55,8 @@ class Comparison:
     def __init__(self, setup: Setup, sample: Sample):
         self.sample, self.robot = sample, setup.robot
         self.engines = list(setup.compared().values())  # MuJoCo is the second
-        if sample is setup.random and not self.robot.own:
+        is_small = self.robot.coordinates.nv <= MOST_SPEEDS  # code for more takes minutes to compile
+        if sample is setup.random and is_small and not self.robot.own:
             self.engines.append(Compiled(self.robot.tree))
         self.scale = Entries(self.robot.tree, sample.q, sample.qd)
         self.returned = {}
@@ -109,7 +110,7 @@ def compared(setup: Setup, experiment: str, *names: str) -> tuple[Result, list[C
     for comparison in comparisons:
         comparison.agree(result, *names)
         result.notes += comparison.sample.notes
-    if not setup.robot.own:
+    if len(comparisons[-1].engines) > 2:
         result.find("rows_compiled", of="shared")
     return result, comparisons
 

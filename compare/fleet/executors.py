@@ -7,7 +7,6 @@ import logging
 import multiprocessing
 import os
 import shutil
-import signal
 import tempfile
 import time
 import warnings
@@ -20,7 +19,7 @@ from pathlib import Path
 from pebble import ProcessExpired, ProcessPool
 
 from ..process import interrupt
-from ..process.crash import Refused, described
+from ..process.crash import Refused, described, how_ended
 from ..process.workers import end_with_parent
 from .cache import RESUME, program
 
@@ -71,8 +70,8 @@ def guarded(function: Callable, arguments: tuple, limit: float, memory: int, pla
             except TimeoutError:
                 return None, f"time limit of {limit:g} s exceeded"
             except ProcessExpired as error:
-                if (code := error.exitcode) != KILLED:
-                    return None, f"exit status {code}" if code >= 0 else f"killed by {signal.Signals(-code).name}"
+                if error.exitcode != KILLED:
+                    return None, how_ended(error.exitcode)
             except Exception as error:  # the value cannot be sent
                 return None, described(error)
             finally:

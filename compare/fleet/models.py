@@ -1,22 +1,17 @@
-"""The models of a fleet: all MJCF and URDF files below the given paths, except files that only other files include.
-
-mju_getXMLDependencies of MuJoCo 4.0.0 searches for height fields and stripped paths where the compiler does not. So
-`needed_by` searches every folder that the compiler may use, and takes the files that exist.
-"""
+"""The models of a fleet: all MJCF and URDF files below the given paths, except files that only other files include."""
 
 import hashlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from glob import glob, has_magic
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 from typing import NamedTuple
-from xml.etree import ElementTree
 
 from ..process.crash import Refused
+from ..process.parts import elements_of, is_pipe, needed_by
 from ..process.streams import in_one_line, readable
 
 MODEL_ELEMENTS = "mujoco", "robot"  # root elements of MJCF and of URDF
-DIRECTORIES = ("assetdir", "meshdir", "texturedir")
 
 
 class Model(NamedTuple):
@@ -78,7 +73,7 @@ def paths_of(words: Iterable[str]) -> Iterator[tuple[Path, bool]]:
         path = Path(word)
         if word.startswith("@"):
             yield from paths_of(lines_of(word[1:]))
-        elif is_a_file(path):
+        elif os.path.isfile(path):
             yield path, True
         else:
             is_pattern = has_magic(word) and "\0" not in word and not os.path.isdir(word)
@@ -87,15 +82,8 @@ def paths_of(words: Iterable[str]) -> Iterator[tuple[Path, bool]]:
                 raise Refused(f"no such file: {in_one_line(word)}; expected a file, a folder, a pattern or @LIST")
             for match in map(Path, matches):
                 yield from (
-                    (file, False) for file in (files_in(match) if match.is_dir() else [match] * is_a_file(match))
+                    (file, False) for file in (files_in(match) if match.is_dir() else [match] * os.path.isfile(match))
                 )
-
-
-def is_a_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # not a valid name
-        return False
 
 
 def files_in(folder: Path) -> Iterator[Path]:
@@ -106,49 +94,20 @@ def files_in(folder: Path) -> Iterator[Path]:
             if (
                 name.lower().endswith((".xml", ".mjcf", ".urdf"))
                 and not name.startswith(".")
-                and is_a_file(Path(place, name))
+                and os.path.isfile(Path(place, name))
             ):
                 yield Path(place, name)
 
 
 def lines_of(name: str) -> list[str]:
     """The paths in a list, one a line; empty lines and lines that begin with # or @ are ignored."""
+    if is_pipe(Path(name)):
+        raise Refused(f"the list {in_one_line(name)} is not a regular file")
     try:
         lines = Path(name).read_text(encoding="utf-8-sig", errors="surrogateescape").splitlines()
     except (OSError, ValueError) as error:
         raise Refused(f"cannot read the list {in_one_line(name)}: {error}") from None
     return [line.strip() for line in lines if line.strip() and line.lstrip()[0] not in "#@"]
-
-
-def elements_of(path: Path) -> Iterator[ElementTree.Element]:
-    """The elements of a file, up to the first error."""
-    try:
-        for _, element in ElementTree.iterparse(path, events=("start",)):
-            yield element
-    except (ElementTree.ParseError, LookupError, OSError, ValueError):
-        return
-
-
-def needed_by(path: Path) -> tuple[Path, ...]:
-    """An MJCF file and the existing files that it includes, attaches and loads; itself first."""
-    waiting, parts, folders = [path], {os.path.abspath(path): path}, {path.parent}
-    names, directories = set(), {""}  # a directory that one file states applies to all
-    while waiting:
-        for element in elements_of(waiting.pop()):
-            named = {value for key, value in element.attrib.items() if key.startswith("file") and value}
-            names |= named | {PureWindowsPath(name).name for name in named}  # the last part: strippath
-            directories |= {element.get(name, "") for name in DIRECTORIES}
-            models = existing(named, folders, {""}) if element.tag in ("include", "model") else ()
-            waiting += [part for part in models if parts.setdefault(os.path.abspath(part), part) is part]
-        folders |= {part.parent for part in waiting}
-    for part in existing(names, folders, directories):
-        parts.setdefault(os.path.abspath(part), part)
-    return path, *sorted(part for part in parts.values() if part is not path)
-
-
-def existing(names: Iterable[str], folders: Iterable[Path], directories: Iterable[str]) -> Iterator[Path]:
-    paths = (folder / directory / name for name in names for folder in folders for directory in directories)
-    return (path for path in paths if is_a_file(path))
 
 
 def place_of_report(shown: str) -> str:

@@ -1,5 +1,6 @@
 """An unexpected exception in one line, for a check or the terminal."""
 
+import signal
 import textwrap
 import traceback
 from pathlib import Path
@@ -16,6 +17,11 @@ def described(error: BaseException, with_place: bool = True) -> str:
     message = textwrap.shorten(str(error), 300, placeholder=" ...")
     where = place(error) if with_place else ""
     return type(error).__name__ + (f": {message}" if message else "") + (f" ({where})" if where else "")
+
+
+def how_ended(code: int) -> str:
+    """How a process ended, by its exit code: "exit status 1", "killed by SIGKILL"."""
+    return f"exit status {code}" if code >= 0 else f"killed by {signal.Signals(-code).name}"
 
 
 def place(error: BaseException) -> str:

@@ -7,16 +7,25 @@ in worker processes too, and a thread waits for them; where signals cannot be bl
 
 import os
 import signal
+import subprocess
+import sys
 import threading
+import time
 from contextlib import suppress
 from multiprocessing import resource_tracker
+from typing import NoReturn
+
+from .crash import how_ended
 
 CAN_BLOCK = hasattr(signal, "pthread_sigmask")
 undo = []  # functions to call before the process ends, last first
 turn = threading.RLock()  # held while a thread decides how the run ends
+PARENT = int(os.environ.pop("COMPARE_PARENT", 0))  # the process that waits for this one, see status_of_child
+FINISHED = 200  # added to the exit status of such a child: no status that a user's own code ends with
 
 
 class Now:
+    listening = False  # an interrupt raises no KeyboardInterrupt
     settled = False  # the exit status is decided
     line = "interrupted; the earlier report is unchanged"
 
@@ -25,6 +34,9 @@ def listen() -> None:
     """From now on an interrupt ends the process. Ignored signals (nohup, background of a script) stay ignored."""
     numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
     numbers = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+    Now.listening = True
+    if PARENT:
+        threading.Thread(target=end_with_parent, daemon=True).start()
     if not CAN_BLOCK:
         for number in numbers:  # a thread: the main one may be in a block that postpones interrupts
             signal.signal(number, lambda *_: threading.Thread(target=end, daemon=True).start())
@@ -58,7 +70,36 @@ def end() -> None:
             clear_up()
             with suppress(OSError):
                 os.write(2, ("\r" * os.isatty(2) + Now.line + "\n").encode())  # overwrites ^C on a terminal
-            os._exit(2)
+            leave(2)
+
+
+def is_interrupt(error: BaseException) -> bool:
+    """Whether an exception is Ctrl-C; else a user's own code raised it."""
+    return isinstance(error, KeyboardInterrupt) and not Now.listening
+
+
+def end_with_parent() -> None:
+    while os.getppid() == PARENT:
+        time.sleep(0.5)
+    end()
+
+
+def leave(status: int) -> NoReturn:
+    """End this process at once; what comes after main could end with another status."""
+    os._exit(status + FINISHED * bool(PARENT))
+
+
+def status_of_child() -> tuple[int, str]:
+    """Run this command line in a child process, where a user's own code may end the process without a word.
+
+    The exit status and "", or 2 and how the child ended if not by `leave`. The child answers an interrupt.
+    """
+    child = subprocess.Popen(
+        [sys.executable, *sys.orig_argv[1:]], env=os.environ | {"COMPARE_PARENT": str(os.getpid())}
+    )
+    undo.extend([lambda: leave(2), child.wait, child.terminate])
+    code = child.wait()
+    return (code - FINISHED, "") if code >= FINISHED else (2, how_ended(code))
 
 
 def clear_up() -> None:

@@ -20,7 +20,8 @@ from .coordinates import rates_at as rates_at
 from .validation import WrongField, are_numbers, is_number, some
 
 SEED = 10  # of every random number in a report
-MAX_STEPS = 10_000_000  # of a run
+MAX_STEPS = 20_000  # of a run; the finest of an experiment takes 128 times as many
+TIMES = 1e-9, 1e6  # s, the shortest and the longest that is accepted
 TORQUES = ("free", "hold", "servos")
 
 
@@ -53,15 +54,16 @@ class Scene:
         is_torque = self.torque in TORQUES if isinstance(self.torque, str) else are_numbers(self.torque)
         self.set("torque", is_torque, "free, hold, servos, or a torque in N m for each joint")
         self.set("speed", are_numbers(self.speed), "a speed in deg/s for each joint")
+        accepted = f"a time from {TIMES[0]:g} to {TIMES[1]:g} s"
         for name in ("duration", "dt"):
-            self.set(name, is_number(getattr(self, name)) and getattr(self, name) > 0.0, "a time in s above 0")
+            self.set(name, is_number(getattr(self, name)) and TIMES[0] <= getattr(self, name) <= TIMES[1], accepted)
         accepted = "a number of at least 0 N m s/rad, or one for each joint"
         self.set("damping", is_each(self.damping) and np.min(self.damping) >= 0.0, accepted)
         self.set("targets", is_each(self.targets), "a movement in deg (m), of all joints or each")
         self.require("targets", not np.any(self.targets) or self.torque == "servos", 'torque = "servos"')
         self.require("gravity", isinstance(self.gravity, bool | np.bool_), "true or false")
         object.__setattr__(self, "gravity", bool(self.gravity))
-        accepted = f"a step that divides {self.duration:g} s into at most {MAX_STEPS:,}"
+        accepted = f"a step that divides {self.duration:g} s into at most {MAX_STEPS:,} steps"
         self.require("dt", self.duration / self.dt <= MAX_STEPS, accepted)
         left = abs(self.steps * self.dt - self.duration)
         self.require("dt", self.steps >= 1 and left <= 1e-9 * self.duration, accepted)

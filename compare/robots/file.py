@@ -115,7 +115,8 @@ def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Dri
     """
     coordinates = Coordinates(tree.hinge_names, tree.kind)
     mass_matrix, weight = map(np.array, mass_matrix_and_bias(tree, q.tolist(), [0.0] * coordinates.nv))
-    inverse = np.linalg.pinv(mass_matrix, hermitian=True)
+    root = np.sqrt(np.where(np.diag(mass_matrix) > 0.0, np.diag(mass_matrix), 1.0))  # joints of very different inertia
+    inverse = np.linalg.pinv(mass_matrix / np.outer(root, root), hermitian=True) / np.outer(root, root)
     accelerations = inverse @ -(weight + literal.spring_torque(q, tree))
     added = added_damping(inverse, accelerations)
     rests = np.abs(accelerations).max() < STILL

@@ -24,11 +24,15 @@ def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
     Units: deg, deg/s, N m, N m s/rad, s; of slides m, m/s, N. A ball has a quaternion w, x, y, z, which is normalized, and three
     speeds and torques. SceneError: the file cannot be read; unknown key, wrong value, repeated name.
     """
+    if Path(path).exists() and not Path(path).is_file():  # a pipe may be waited for without end
+        raise SceneError(f"{path} is not a regular file; expected a TOML file")
     try:
         with open(path, "rb") as file:
             content = tomllib.load(file)
     except OSError as error:
         raise SceneError(f"cannot read {path}: {error.strerror}; expected a TOML file") from None
+    except RecursionError:
+        raise SceneError(f"{path} is nested too deep; expected tables [[scene]]") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SceneError(f"{path} is not TOML: {' '.join(str(error).split())}") from None
     for key in content:
@@ -73,7 +77,7 @@ def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
         values["posture"] = with_unit_quaternions(where, values.pop("q"), robot)
     if "duration" in values and "dt" not in values:
         if not is_number(values["duration"]):
-            raise refuse("duration", "a time in s above 0")
+            raise refuse("duration", "a time in s")
         values["dt"] = values["duration"] / STEPS
     try:
         scene = Scene(**values, judged=0.0, tags=("own",))

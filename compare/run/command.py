@@ -9,6 +9,7 @@ from pathlib import Path
 from ..engines.mujoco import ModelError
 from ..engines.own.own_file import OwnFileError
 from ..experiments import EXPERIMENTS, skipped
+from ..judge.finding import Finding
 from ..process.crash import Refused
 from ..process.streams import say_error
 from ..process.workers import WorkerEnded, load_modules, start_workers
@@ -17,6 +18,7 @@ from ..report.terminal import Terminal
 from ..report.text import say
 from ..robots.case import SEED
 from ..robots.scene_file import SceneError, read_scenes
+from ..robots.states import MOST_SPEEDS
 from .reference import Compared, compared_with
 
 COMPUTING = ("compare.run.examine", "tmt.compiled.machine")  # modules that take long to load
@@ -56,6 +58,8 @@ def compute(options, command: str, compared: Compared, folder: Path, terminal: T
     step = compared.integrator_step(options.dt, options.integrator)
     for line in compared.reference.lines:
         terminal.say(line)
+    if robot.coordinates.nv > MOST_SPEEDS:
+        terminal.say(say(Finding("shared", "large", {"speeds": robot.coordinates.nv, "most": MOST_SPEEDS})))
     names = [options.experiment] if is_alone else list(EXPERIMENTS)
     with start_workers() as workers, terminal.progress("imports"):
         for modules in (DRAWING, COMPUTING)[: len(names)]:  # in further processes at the same time

@@ -14,6 +14,7 @@ from ..process.workers import Clock, WorkerEnded, Workers, load_modules
 from ..report.terminal import Terminal
 from ..report.text import block, say
 from ..report.verdict import STATES_CAUSES, Section, failures
+from ..robots.states import MOST_SPEEDS
 from .drawing import draw, quiet, results_needed
 from .explained import explained
 from .reference import Compared
@@ -50,7 +51,8 @@ def examine(
             with clock.of(name):
                 _, crashed[name] = attempt(name, module(name).begin, setup)
     clock.ends(START)
-    order = sorted(names, key=TIMED.__contains__)
+    last = ("kinematics", *TIMED) if setup.robot.coordinates.nv > MOST_SPEEDS else TIMED
+    order = sorted(names, key=last.__contains__)
     for name in order:
         is_needed = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
         needless = {"diagnosis": "nothing failed"} if len(names) > 1 and not is_needed else {}

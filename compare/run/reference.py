@@ -11,7 +11,7 @@ from ..engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, lo
 from ..engines.mujoco.names import integrator_by_name
 from ..engines.mujoco.remarks import of_source, remarks
 from ..engines.own import Own, OwnEquations, OwnError
-from ..engines.own.own_file import OwnFileError, aside, own_object
+from ..engines.own.own_file import OwnFileError, aside, own_object, raised_in
 from ..process.streams import in_one_line
 from ..report.text import say
 from ..robots import Robot
@@ -125,7 +125,7 @@ def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None)
     q = np.concatenate([robot.posture()[None], coordinates.random(rng, 2, robot.ranges)])
     try:
         stated = joint_map(coordinates, joints.split(",")) if joints else None
-        with aside():
+        with aside(), raised_in(reference.rstrip(":")):
             equations = OwnEquations(source, coordinates, stated, robot.tree)
             equations.try_at(q, *rng.uniform(-1.0, 1.0, (2, len(q), coordinates.nv)))
     except JointsError as error:

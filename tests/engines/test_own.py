@@ -15,6 +15,7 @@ from compare.engines.mujoco import read
 from compare.engines.own import ARGUMENTS, Own, OwnEquations, OwnError
 from compare.engines.own.functions import same
 from compare.engines.tmt import Tmt
+from compare.process.interrupt import Now
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
 from compare.robots.file import robot_of
@@ -126,6 +127,18 @@ def test_what_cannot_be_used_is_one_line(value, said, rng):
     with pytest.raises(OwnError, match=said) as error:
         OwnEquations({"mass_matrix": value, "bias": tmt.bias}, COORDINATES).mass_matrix(states(rng)[0])
     assert "\n" not in str(error.value) and str(error.value).startswith("mass_matrix ")
+
+
+@pytest.mark.parametrize("listening", [False, True])  # where the command line listens, Ctrl-C raises nothing
+@pytest.mark.parametrize("raised", [KeyboardInterrupt, GeneratorExit, BaseException])
+def test_whatever_is_raised_is_one_line_and_ctrl_c_interrupts(raised, listening, rng, monkeypatch):
+    def mass_matrix(q):
+        raise raised("no")
+
+    monkeypatch.setattr(Now, "listening", listening)
+    is_interrupt = raised is KeyboardInterrupt and not listening
+    with pytest.raises(KeyboardInterrupt if is_interrupt else OwnError, match="no"):
+        of_one("mass_matrix", mass_matrix).mass_matrix(states(rng)[0])
 
 
 # what can be used, with something wrong

@@ -52,7 +52,8 @@ def test_a_mass_matrix_is_definite_by_more_than_rounding(least, passes):
     c, units = (1 - small) / (1 + small), np.sqrt([1e-9, 1.0])
     M = np.array([[1.0, c], [c, 1.0]]) * np.outer(units, units)
     mass.check_definiteness(result, "TMT", np.array([np.eye(2), M]))  # the worst state decides
-    assert list(verdicts(result).values()) == [passes]
+    mass.check_definiteness(result, "of the other sign", np.array([-np.eye(2)]))
+    assert list(verdicts(result).values()) == [passes, False]
 
 
 def test_forces_that_the_equations_lack_are_zero_except_for_rounding_of_what_is_subtracted():

@@ -5,9 +5,11 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
-from runs import ENVIRONMENT, SECOND, command, ended, posix, started
+from own_equations import XML
+from runs import ENVIRONMENT, SECOND, command, compare, ended, posix, started
 
 from compare.__main__ import main
 
@@ -25,9 +27,12 @@ LISTENING = "from compare.process import interrupt; interrupt.listen()\n"
 
 
 ALL = command("all", "--quick", "--out", "report")
+OWN = command("all", "--quick", "--out", "report", "--reference", Path(__file__).parents[1] / "own_equations.py:")
+OWN += ["--mjcf", "../double.xml"]
 RUNS = {  # what runs, what it is sent, and when
     "workers start": (ALL, "SIGTERM", lambda run: time.sleep(0.8)),
     "a line": (ALL, "SIGHUP", lambda run: run.stdout.readline()),
+    "own equations": (OWN, "SIGINT", lambda run: run.stdout.readline()),
     "a rollout": ([sys.executable, "-c", LISTENING + ROLLOUT], "SIGINT", lambda run: run.stdout.readline()),
 }
 
@@ -35,6 +40,7 @@ RUNS = {  # what runs, what it is sent, and when
 @pytest.mark.parametrize("name", RUNS)
 def test_an_interrupt_is_answered_within_a_second(tmp_path, name):
     what, name_of_signal, moment = RUNS[name]
+    (tmp_path / "double.xml").write_text(XML)
     for attempt in range(2):  # the machine may be busy
         (place := tmp_path / f"{attempt}").mkdir()
         run = started(*what, cwd=place, env={"TMT_CACHE": str(tmp_path / "cache")})
@@ -46,6 +52,26 @@ def test_an_interrupt_is_answered_within_a_second(tmp_path, name):
         if end.seconds < SECOND:
             return
     raise AssertionError(f"answered after {end.seconds:.2f} s")
+
+
+LEAVING = """
+import os
+from own_equations import mass_matrix
+
+def bias(q, qd):
+    os._exit(0) if leaving else os.kill(os.getpid(), 9)
+"""
+
+
+@posix
+@pytest.mark.parametrize("leaving, how", [(True, "exit status 0"), (False, "killed by SIGKILL")])
+def test_own_equations_that_end_the_process_are_seen(tmp_path, leaving, how):
+    (tmp_path / "double.xml").write_text(XML)
+    (tmp_path / "mine.py").write_text(f"leaving = {leaving}{LEAVING}")
+    path = os.pathsep.join([ENVIRONMENT["PYTHONPATH"], str(Path(__file__).parents[1])])
+    asked = "mass", "--quick", "--mjcf", "double.xml", "--reference", "mine.py:"
+    run = compare(*asked, cwd=tmp_path, env={"PYTHONPATH": path})
+    assert (run.returncode, run.stdout, len(run.stderr.splitlines())) == (2, "", 1) and how in run.stderr
 
 
 @pytest.mark.slow

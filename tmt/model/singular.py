@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from tmt.derivation import method
+from tmt.derivation.vectors import ZERO
 
 ZERO_BELOW = 64 * np.finfo(float).eps  # an eigenvalue of the scaled Mbar, for each hinge
 CLEAR = 1e-6  # a share of the inertia that is carried, far above rounding
@@ -21,12 +22,10 @@ def scales(tree) -> np.ndarray:
     """The largest value of each Mbar_ii, kg m2, (nv,): with all that the joint carries stretched out, slides by 1 m."""
     sums, joints = np.array(tree.armature), tree.coordinates.joints
     for mass, com, inertia, joint in zip(tree.mass, tree.com, tree.inertia, tree.body_hinge):
-        reach = math.hypot(*com)
+        reach, spread = math.hypot(*com), sum(abs(inertia[i][i]) for i in range(3))
         while joint >= 0:
             slides = tree.kind[joint] == "slide"
-            sums[joints[joint].qd] += (
-                mass if slides else mass * reach * reach + sum(abs(inertia[i][i]) for i in range(3))
-            )
+            sums[joints[joint].qd] += mass if slides else mass * reach * reach + spread
             reach += math.hypot(*tree.offset[joint]) + slides
             joint = tree.parent[joint]
     return sums
@@ -82,12 +81,14 @@ def mass_matrices(tree, q) -> np.ndarray:
     count, n = len(q), len(tree.axis)
     total = np.zeros((count, n, n)) + np.diag(tree.armature)
     for body in method.bodies(tree, list(q.T)):
-        T, B = (
-            np.array([[np.broadcast_to(x, count) for x in column] for column in columns]).transpose(2, 1, 0)
-            for columns in (body.T, body.B)
-        )
+        moving = [k for k in range(n) if body.T[k] is not ZERO]
+        T, B = np.zeros((2, count, 3, len(moving)))
+        for column, k in enumerate(moving):
+            for axis, (of_T, of_B) in enumerate(zip(body.T[k], body.B[k])):
+                T[:, axis, column], B[:, axis, column] = of_T, of_B
         inertia = np.array([list(row) for row in body.inertia])
-        total += body.mass * T.transpose(0, 2, 1) @ T + B.transpose(0, 2, 1) @ inertia @ B
+        own = body.mass * T.transpose(0, 2, 1) @ T + B.transpose(0, 2, 1) @ inertia @ B
+        total[:, np.array(moving, int)[:, None], moving] += own
     return total
 
 

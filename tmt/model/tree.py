@@ -145,11 +145,12 @@ class Tree:
                 _check_ball(i, np.array(self.axis[by]), self.reference[i], self.rest[at])
         for name, inertia in zip(self.body_names, self.inertia):
             _check_inertia(name, np.array(inertia))
-        for i, name in enumerate(self.hinge_names):
-            moved = [b for b in range(m) if self.moves(b)[i]]
-            massive = any(self.mass[b] or np.any(self.inertia[b]) for b in moved)
-            if not massive and not any(self.armature[self.coordinates.joints[i].qd]):
-                kind = self.kind[i]
+        massive = [any(self.armature[joint.qd]) for joint in self.coordinates.joints]
+        for mass, inertia, joint in zip(self.mass, self.inertia, self.body_hinge):
+            while joint >= 0 and (mass or np.any(inertia)):
+                massive[joint], joint = True, self.parent[joint]
+        for kind, name, moves_mass in zip(self.kind, self.hinge_names, massive):
+            if not moves_mass:
                 raise ValueError(f"{kind} {name!r} moves nothing that has mass or inertia; Mbar would be singular")
         singular.check_tree(self)
 

@@ -95,8 +95,8 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
 
 
 def usable_keys(m: mujoco.MjModel) -> np.ndarray:
-    """Of each keyframe whether its numbers are finite, (nkey,)."""
-    return np.isfinite(np.hstack([m.key_qpos, m.key_act, m.key_ctrl])).all(axis=1)
+    """Of each keyframe whether its numbers are finite and of at most MOST, (nkey,)."""
+    return (np.abs(np.hstack([m.key_qpos, m.key_act, m.key_ctrl])) <= MOST).all(axis=1)
 
 
 def names_where(m: mujoco.MjModel, field: str, holds: Callable) -> list[str]:
@@ -162,19 +162,25 @@ def contact_pairs(m: mujoco.MjModel) -> np.ndarray:
     return np.concatenate([chosen, np.column_stack([m.pair_geom1, m.pair_geom2])]).astype(int)
 
 
-FINITE = (
+MOST = 1e30  # in size, of every number that is compared: products of several are still doubles
+STEPS = 1e-6, 5.0  # s, of the file
+MOST_SPEEDS = 1000  # of a model: Mbar of a state has the square of it
+NUMBERS = (
     "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat", "jnt_pos", "jnt_axis", "jnt_stiffness",
     "dof_armature", "dof_damping", "actuator_gainprm", "actuator_biasprm", "actuator_gear", "tendon_stiffness",
     "tendon_damping",
 )  # fmt: skip
-ELASTIC = ("flex_stiffness", "flex_bending", "flex_edgestiffness", "flex_edgedamping")
+UNITS = {"mass": " kg", "inertia": " kg m2", "armature": " kg m2", "gravity": " m/s2", "timestep": " s"}
 NOT_NEGATIVE = ("jnt_stiffness", "dof_armature", "dof_damping")
+ELASTIC = ("flex_stiffness", "flex_bending", "flex_edgestiffness", "flex_edgedamping")
 
 
 def refuse(m: mujoco.MjModel) -> None:
     """ValueError, in one line, for a model that has forces, elements or numbers that cannot be compared."""
     if not m.njnt:
         raise ValueError("it has no joint")
+    if m.nv > MOST_SPEEDS:
+        raise ValueError(f"it has {m.nv:,} speeds; robots of at most {MOST_SPEEDS:,} are compared")
     for number in range(m.njnt):
         if (kind := kind_of(m, number)) not in KINDS:
             name = element_name(m, "joint", number)
@@ -187,10 +193,26 @@ def refuse(m: mujoco.MjModel) -> None:
     for tendon in np.flatnonzero(m.tendon_armature):
         name = element_name(m, "tendon", tendon)
         raise ValueError(f"tendon {name!r} has armature, which couples joints; only that of joints is compared")
-    for field in FINITE:
-        least = 0.0 if field in NOT_NEGATIVE else -np.inf
-        for name in names_where(m, field, lambda row, least=least: not (np.isfinite(row) & (row >= least)).all()):
-            raise ValueError(f"{field} of {name!r} is not finite" + " or is negative" * (least == 0.0))
+    refuse_numbers(m)
+
+
+def refuse_numbers(m: mujoco.MjModel) -> None:
+    """ValueError, in one line, for a number that is not finite, or beyond the range that is judged."""
+    for field in NUMBERS:
+        least = 0.0 if field in NOT_NEGATIVE else -MOST
+        for name in names_where(m, field, lambda row, least=least: number_outside(row, least, MOST) is not None):
+            refuse_number(field.partition("_")[2], f" of {name!r}", getattr(m, field), least, MOST)
     for word, values in (("gravity", m.opt.gravity), ("qpos0", m.qpos0), ("qpos_spring", m.qpos_spring)):
-        if not np.isfinite(values).all():
-            raise ValueError(f"{word} is not finite")
+        refuse_number(word, "", values, -MOST, MOST)
+    refuse_number("timestep", "", m.opt.timestep, *STEPS)
+
+
+def number_outside(values, least: float, most: float) -> float | None:
+    """The first of some numbers that is not in a range, or None."""
+    return next((number for number in np.ravel(values).tolist() if not least <= number <= most), None)
+
+
+def refuse_number(word: str, whose: str, values, least: float, most: float) -> None:
+    """ValueError, with the number, where one of some numbers is not in a range."""
+    if (number := number_outside(values, least, most)) is not None:
+        raise ValueError(f"{word}{whose} is {number:g}{UNITS.get(word, '')}; expected from {least:g} to {most:g}")

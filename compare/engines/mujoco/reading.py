@@ -12,7 +12,7 @@ import tmt
 from ...robots.actuators import Drive
 from .actuators import drive_of
 from .engine import Mujoco, methods_for
-from .inventory import Feature, features, refuse, take_away, usable_keys
+from .inventory import Feature, features, refuse, refuse_numbers, take_away, usable_keys
 from .names import NAMES, Place, element_name, joint_name, joint_places, kind_of, moving, rotors
 from .source import ModelError, compiled, name_of
 
@@ -184,6 +184,10 @@ def parse(source: Path | str, tree: tmt.Tree) -> Mujoco:
     The body that a hinge moves is known by the hinge; one of several on a hinge, or fixed to the world, by its name.
     """
     (model, warnings), hinges, bodies = compiled(source), tree.hinge_names, []
+    try:
+        refuse_numbers(model)
+    except ValueError as error:
+        raise ModelError(f"cannot compare {name_of(source)}: {error}") from None
     names = {joint_name(model, j): j for j in range(model.njnt)}
     kinds = [kind_of(model, j) for j in names.values()]
     if sorted(names) != sorted(hinges) or set(kinds) != {"hinge"}:

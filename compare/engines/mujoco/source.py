@@ -12,6 +12,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from ...process.parts import is_pipe, named_by
 from .names import aligns, joint_name, joint_places, kind_of, parts_of, rotors
 from .urdf_file import advice, spec_of
 
@@ -56,6 +57,9 @@ def compiled(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             model = without_visuals(editable(source)).compile()
+        bytes(model.names).decode()
+    except UnicodeDecodeError:
+        raise ModelError(f"{name_of(source)} has names that are not UTF-8; save it as UTF-8") from None
     except ValueError as error:
         is_model = "<mujoco" in text or "<robot" in text
         problem = f"MuJoCo cannot compile {name_of(source)}" if is_model else f"{name_of(source)} is not MJCF"
@@ -67,8 +71,8 @@ def compiled(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
 
 
 def text_of(path: Path) -> str:
-    if path.exists() and not (path.is_file() or path.is_dir()):  # a pipe cannot be read twice
-        raise ModelError(f"{path} is not a regular file; expected an MJCF or URDF file")
+    for part in filter(is_pipe, named_by(path)):  # MuJoCo would wait for it
+        raise ModelError(f"{part} is a pipe or a device; expected a regular file")
     try:
         return path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:

@@ -9,6 +9,7 @@ import tmt
 from tmt import literal
 from tmt.model.values import shown
 
+from ...process.interrupt import is_interrupt
 from ...robots.case import Coordinates
 from ...robots.joint_map import JointMap, JointsError, joint_map
 from .. import rows_of_states
@@ -223,7 +224,9 @@ class OwnEquations:
         copies = [np.array(part) for part in given]
         try:
             value = self.functions[name](*copies)
-        except (Exception, SystemExit) as error:  # whatever a user's own function does
+        except BaseException as error:  # whatever a user's own function does
+            if is_interrupt(error):
+                raise
             hint = ""
             if isinstance(self.source, type) and isinstance(error, TypeError) and "missing" in str(error):
                 hint = f"; expected an object, such as {self.source.__name__}(), not the class"

@@ -192,7 +192,7 @@ def converted(name: str, value: object, expected: tuple, count: int | None) -> n
         array = None if value is None else np.asarray(value)
         if array is not None and array.dtype.kind == "O":  # of SymPy's numbers and the like
             array = array.astype(float)
-    except Exception:  # whatever the conversion of a user's own object raises
+    except (Exception, SystemExit):  # whatever the conversion of a user's own object raises
         array = None
     if array is not None and array.dtype.kind == "c":
         raise OwnError(f"{name} is complex: {shown(value)}; expected real numbers of shape {shape}")

@@ -18,6 +18,8 @@ from types import ModuleType
 
 from ...judge.words import listed
 from ...process.crash import described
+from ...process.interrupt import is_interrupt
+from .functions import OwnError
 
 FORMS_OF_REFERENCE = "FILE.py:OBJECT or MODULE:OBJECT"
 SHOWN_NAMES = 6  # names in a message where none is close
@@ -96,13 +98,15 @@ def raised_in(place: str) -> Iterator[None]:
     """An error of a user's code in this block becomes an OwnFileError of one line, with its line in the user's file."""
     try:
         yield
-    except (OwnFileError, KeyboardInterrupt):
+    except (OwnFileError, OwnError):
         raise
     except SyntaxError as error:
         text = f": {' '.join(error.text.split())[:60]}" if error.text else ""
         where = place if Path(error.filename or place).stem == Path(place).stem else error.filename
         raise OwnFileError(f"{where}, line {error.lineno}: {type(error).__name__}, {error.msg}{text}") from None
     except BaseException as error:  # also SystemExit: the file may be a script
+        if is_interrupt(error):
+            raise
         every = traceback.extract_tb(error.__traceback__)
         frames = [frame for frame in every if Path(frame.filename).stem == Path(place).stem]
         at = f", line {frames[-1].lineno}" if frames else ""

@@ -95,7 +95,7 @@ EDITS = (
     Edit("gravity", "rows", "scale.weight + scale.springs", "100 * (scale.weight + scale.springs)", "tolerance of springs x 100"),
     Edit("mass", "rows", "check_definiteness(result, 'MuJoCo', theirs)", "check_definiteness(result, 'MuJoCo', ours)",
          "MuJoCo's matrix is definite if ours is"),
-    Edit("mass", "check_definiteness", "(least / values[:, -1]).min()", "(least / values[:, -1]).max()",
+    Edit("mass", "check_definiteness", "(least / _1).min()", "(least / _1).max()",
          "the best state decides"),
     Edit("judge.entries", "Entries.mass_matrix", "translation + rotation + _1",
          "100 * (translation + rotation + _1)", "the scale x 100"),
