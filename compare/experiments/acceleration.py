@@ -11,7 +11,7 @@ from ..engines import WHOSE
 from ..judge.check import Result
 from ..judge.entries import unit
 from . import Experiment
-from .quantities import compared, figures, headline, overview
+from .quantities import check_wide, compared, figures, headline, overview
 from .setup import Setup
 
 __all__ = ["EXPERIMENT", "figures", "headline", "overview", "rows"]
@@ -25,6 +25,7 @@ def rows(setup: Setup) -> Result:
     work = "(tau - D qd).qd" if damping.any() else "tau.qd"
     energies = () if robot.own else ("energy", "potential energy")
     result, comparisons = compared(setup, "acceleration", "bias", "qdd", *energies)
+    check_wide(result, comparisons)
     for comparison in comparisons:
         sample, scale, (qdd, engine_qdd, *_) = comparison.sample, comparison.scale, comparison.values("qdd")
         q, qd, tau, drag = sample.q, sample.qd, sample.tau, damping * sample.qd

@@ -3,8 +3,8 @@
 The experiments at single states share their figures, headline and first screen too: those of this module.
 """
 
-from collections.abc import Iterator, Mapping
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -76,31 +76,21 @@ class Comparison:
         """The accelerations that scales are taken from: a user's own may be NaN."""
         return self.values("qdd")[bool(self.robot.own)]
 
+    @cached_property
+    def acceleration_scale(self) -> np.ndarray:
+        return self.scale.acceleration(self.scale.force(self.sample.tau), self.acceleration_size())
+
     def agree(self, result: Result, *names: str) -> None:
         """A row and a check for each quantity of two engines, and of MuJoCo and the compiled functions."""
         for name in names:
             quantity, (ours, theirs, *compiled) = QUANTITIES[name], self.values(name)
-            size, units = getattr(self.scale, quantity.scale), quantity.units
-            if name == "qdd":
-                size = size(self.scale.force(self.sample.tau), self.acceleration_size())
+            size = self.acceleration_scale if name == "qdd" else getattr(self.scale, quantity.scale)
+            units = quantity.units
             named = units[0] if len(units) == 1 else unit(self.robot.tree, *units)
             exact = self.sample.exact(quantity.function, quantity.part)
             result.agree(self.sample, name, named, ours, theirs, size, exact)
-            if name == "qdd":
-                self.check_wide(result, np.fmax(np.abs(ours), np.abs(theirs)), FACTOR * EPS * size)
             for values in compiled:
                 result.agree(self.sample, f"{name}, compiled", named, values, theirs, size)
-
-    def check_wide(self, result: Result, sizes: np.ndarray, tolerance: np.ndarray) -> None:
-        """Accelerations of a joint, (states, nv), are not judged if rounding can be more than the largest of them."""
-        largest, least = np.nanmax(sizes, axis=0), tolerance.min(axis=0)
-        for joint in np.flatnonzero((least >= largest) & (largest > 0.0)):
-            values = {
-                "joint": self.robot.coordinates.speeds[joint],
-                "tolerance": least[joint],
-                "largest": largest[joint],
-            }
-            result.not_judged(self.sample.name, "qdd", say(Finding("shared", "wide", values)))
 
 
 def compared(setup: Setup, experiment: str, *names: str) -> tuple[Result, list[Comparison]]:
@@ -113,6 +103,20 @@ def compared(setup: Setup, experiment: str, *names: str) -> tuple[Result, list[C
     if len(comparisons[-1].engines) > 2:
         result.find("rows_compiled", of="shared")
     return result, comparisons
+
+
+def check_wide(result: Result, comparisons: Sequence[Comparison]) -> None:
+    """Accelerations are not judged if, at all states, rounding can be more than the largest of a joint."""
+    values = [np.abs(values) for comparison in comparisons for values in comparison.values("qdd")[:2]]
+    largest = np.nanmax(np.concatenate(values), axis=0)
+    scales = np.concatenate([comparison.acceleration_scale for comparison in comparisons])
+    least = FACTOR * EPS * scales.min(axis=0)
+    wide = np.flatnonzero((least >= largest) & (largest > 0.0))
+    if len(wide):
+        worst = wide[np.argmax(least[wide] / largest[wide])]
+        joint = comparisons[0].robot.coordinates.speeds[worst]
+        found = {"joint": joint, "tolerance": least[worst], "largest": largest[worst], "others": len(wide) - 1}
+        result.not_judged("all states", "qdd", say(Finding("shared", "wide", found)))
 
 
 def headline(result: Result) -> Finding | None:

@@ -46,12 +46,13 @@ def examine(
     (folder / "figures").mkdir()
     sections, drawings, waiting, causes, reasons = [], [], [], [], {}
     own, reported, crashed = setup.engines.get("own"), set(), {}
+    is_large = setup.robot.coordinates.nv > MOST_SPEEDS  # its first answers come before any long work begins
     for name in names:
-        if hasattr(module(name), "begin"):
+        if hasattr(module(name), "begin") and not is_large:
             with clock.of(name):
                 _, crashed[name] = attempt(name, module(name).begin, setup)
     clock.ends(START)
-    last = ("kinematics", *TIMED) if setup.robot.coordinates.nv > MOST_SPEEDS else TIMED
+    last = ("kinematics", *TIMED) if is_large else TIMED
     order = sorted(names, key=last.__contains__)
     for name in order:
         is_needed = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)

@@ -1,13 +1,14 @@
 """Each quantity is compared with what the other engine and the compiled code say of it: one that is off fails its own checks."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from edited import setup_of
 
 import tmt
-from compare.engines.mujoco.dynamics import MujocoDynamics
 from compare.experiments import acceleration, gravity, kinematics, mass
-from compare.experiments.quantities import QUANTITIES, Comparison
+from compare.experiments.quantities import QUANTITIES, check_wide
 from compare.judge.check import Result
 from compare.run.examine import Setup
 from tmt import literal
@@ -72,23 +73,21 @@ def test_a_quantity_of_mujoco_that_is_off_fails_its_own_checks(mujoco, experimen
 
 
 def test_a_joint_whose_accelerations_are_all_smaller_than_their_tolerance_is_not_judged(setup):
-    comparison, result = Comparison(setup, setup.named), Result("acceleration")
-    sizes, tolerance = np.array([[3.0, 1.0, 0.0], [2.0, np.nan, 0.0]]), np.array([[4.0, 0.999, 1.0], [2.999, 2.0, 1.0]])
-    comparison.check_wide(result, sizes, tolerance)
-    assert result.checks == []
-    comparison.check_wide(result, sizes, tolerance + 0.001)
-    assert [check.judged for check in result.checks] == [False, False]
-    assert ["alpha" in check.note for check in result.checks] == [True, False]
-
-
-@pytest.mark.parametrize("label", ["TMT", "MuJoCo"])
-def test_whose_mass_matrix_is_not_definite_is_said(mujoco, label, monkeypatch):
-    owner, right = {"TMT": (literal, literal.mass_matrix), "MuJoCo": (MujocoDynamics, MujocoDynamics.mass_matrix)}[
-        label
-    ]
-    sign = np.diag([-1.0, 1.0, 1.0])  # which keeps it symmetric
-    monkeypatch.setattr(owner, "mass_matrix", lambda *given, **named: sign @ right(*given, **named))
-    assert [name.startswith(f"{label}: ") for name in failing(mass, mujoco) if "least eigenvalue" in name] == [True]
+    """At all states together: 3 rad/s2 of alpha, 1 rad/s2 of beta, whose least tolerance is just below or above; gamma rests."""
+    sizes, robot = [np.array([[3.0, 0.5, 0.0]]), np.array([[2.0, np.nan, 0.0], [0.0, 1.0, 0.0]])], setup.robot
+    for least, judged in ((0.999, True), (1.001, False)):
+        scales = [np.array([[4.0, 2.0, 1.0]]), np.array([[2.999, 3.0, 1.0], [9.0, least, 1.0]])]
+        comparisons = [
+            SimpleNamespace(
+                robot=robot,
+                values=lambda name, size=size: [size, -size, None],
+                acceleration_scale=scale / (64 * 2.0**-52),
+            )
+            for size, scale in zip(sizes, scales)
+        ]
+        result = Result("acceleration")
+        check_wide(result, comparisons)
+        assert [("beta" in check.note, check.judged) for check in result.checks] == [(True, False)] * (not judged)
 
 
 def test_accelerations_of_tmt_that_are_off_fail_their_own_checks(mujoco, monkeypatch):

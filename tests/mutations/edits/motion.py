@@ -36,7 +36,7 @@ EDITS = (
          "a joint that hardly moves ends the time that is judged"),
     Edit("trajectory.runs", "check_time_judged", "until < least", "False", "a run that is hardly judged agrees"),
     Edit("trajectory.runs", "judged", "narrow.all(axis=1)", "narrow.any(axis=1)", "one narrow band is enough"),
-    Edit("quantities", "Comparison.check_wide", "least >= largest", "least < 0.0", "tolerances may exceed all values"),
+    Edit("quantities", "check_wide", "least >= largest", "least < 0.0", "tolerances may exceed all values"),
     Edit("run", "LEFT", "0.1", "0.13", "an arm has left when it is 0.13 rad away"),
     Edit("run", "departure", "t[away][0]", "t[away][-1]", "the last time away is that of leaving"),
     Edit("run", "exchanged", "2.0 * gravity_scale(_1, _2)", "6.0 * gravity_scale(_1, _2)",
