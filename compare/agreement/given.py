@@ -66,6 +66,7 @@ class Given:
         if not is_number(rtol) or rtol < 0.0:
             raise ValueError(f"rtol is {shown(rtol)}; expected a number of at least 0")
         self.rtol, self.rounding = float(rtol), FACTOR * EPS + float(rtol)
+        self.problems: list[str] = []  # other errors of the user's functions at the states, a line each
         self.read(mjcf)
         self.joints: JointMap = joint_map(self.coordinates, joints)
         functions = {name: value for name, value in brought.items() if is_function(value)}
@@ -136,10 +137,12 @@ class Given:
     def values(self) -> dict[str, np.ndarray]:
         """The user's values of each quantity, in the model's joints, (states, ...)."""
         own = self.own
-        return {
+        values = {
             name: self.asked(own, name) if own is not None and own.has(name) else self.table(name, brought)
             for name, brought in self.brought.items()
         }
+        self.problems = [problem.text for problem in own.problems] if own is not None else []
+        return values
 
     def asked(self, source: object, name: str) -> np.ndarray:
         """A quantity of an engine at the states."""
@@ -189,11 +192,6 @@ class Given:
     @property
     def fails(self) -> bool:
         return any((comparison.ratio > 1.0).any() for comparison in self.compared.values())
-
-    @property
-    def problems(self) -> list[str]:
-        """Other errors of the user's functions, a line each."""
-        return [problem.text for problem in self.own.problems] if self.own is not None else []
 
 
 def rows_given(name: str, values: Any, size: int, count: int | None) -> np.ndarray:

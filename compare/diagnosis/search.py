@@ -21,6 +21,7 @@ from .variants import Variant, conventions, program_options, values_in
 FEW = 2  # states at which conventions are tried first
 UNCOMMON = 2  # see `order`
 SHOWN = 12  # single explanations that leave least
+AS_GOOD = 10.0  # times less left over: then a pair is nearer than a single change
 
 
 def diagnose(
@@ -55,7 +56,6 @@ def explanation(search: Search, compared: Compared, seconds: float) -> Diagnosis
         return Diagnosis(False)
     found = Diagnosis(
         True,
-        digits=float(-np.log10(np.abs(search.off).max() * EPS * FACTOR)),
         entries=tuple(entry_name(entry, equations.names) for entry, off in zip(equations.entries, differing) if off),
         compared=int(search.known.any(axis=0).sum()),
     )
@@ -67,8 +67,13 @@ def explanation(search: Search, compared: Compared, seconds: float) -> Diagnosis
     for causes in ranks(search, singles, compared):
         if causes:
             return found._replace(causes=tied(causes))
-    left = min([one.left for one in search.best], default=1.0)
-    return found._replace(left=left, details=compared.details(), seconds=None if search.is_finished else seconds)
+    possible = [fit for fit in search.best if fit.is_possible and np.isfinite(fit.left)]
+    closest = min(possible, key=lambda fit: fit.left * AS_GOOD ** len(fit.places), default=None)
+    return found._replace(
+        closest=closest and of_fitted(closest, 1 + len(closest.places), search),
+        details=compared.details(),
+        seconds=None if search.is_finished else seconds,
+    )
 
 
 def ranks(search: Search, singles: Sequence[Fitted], compared: Compared) -> Iterator[list[Cause]]:
