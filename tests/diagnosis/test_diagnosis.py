@@ -1,14 +1,16 @@
 """Which causes a diagnosis names for values of Mbar and h that differ: numbers, conventions, terms; and where it names none."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import tmt
-from compare.diagnosis import diagnose, packed
+from compare.diagnosis import diagnose, packed, search
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
+from compare.report.text import apart
 
 
 def states(tree=tmt.ARM, seed=0, count=16):
@@ -96,7 +98,7 @@ def test_what_nothing_explains_names_the_entries():
     given = added(1, np.sin(3.0 * Q[:, 0]))
     given[:, 8] += np.cos(5.0 * Q[:, 1]) * QD[:, 2] ** 3
     found = diagnosis(given, seconds=1.0)
-    assert found.differs and found.causes == () and 0.0 < found.left <= 1.0
+    assert found.differs and found.causes == () and 0.0 < found.closest.left_over <= 1.0
     assert found.entries == ("M[alpha][beta]", "h[gamma]")
 
 
@@ -216,7 +218,23 @@ def test_neither_noise_nor_numbers_at_random_have_a_culprit(size):
     noise, right = np.random.default_rng(1).normal(size=(len(RODS), 5)), values(TREE, RODS, SPEEDS)
     found = diagnosis(right * (1.0 + size * noise) if size < 1.0 else noise, TREE)
     assert found.differs and found.causes == ()
-    assert found.digits == pytest.approx(-np.log10(size), abs=1.5) if size < 1.0 else len(found.entries) == 5
+    assert size < 1.0 or len(found.entries) == 5
+
+
+@pytest.mark.parametrize("half, is_single", [(0.4, False), (0.6, True)])
+def test_of_nearest_changes_a_pair_must_leave_less_than_half_of_what_a_single_one_leaves(half, is_single, monkeypatch):
+    fit = SimpleNamespace(places=("one",), left=1e-3, is_possible=True)
+    pair = SimpleNamespace(places=("one", "other"), left=1e-3 * half, is_possible=True)
+    monkeypatch.setattr(search, "of_fitted", lambda fit, *_: len(fit.places))
+    found = SimpleNamespace(best=[pair, fit, SimpleNamespace(places=(), left=0.0, is_possible=False)])
+    assert search.closest(found) == (1 if is_single else 2)
+
+
+@pytest.mark.parametrize("values", [(3.55812, 3.55812 * (1 + 1e-9)), (1.0, 1.0 + EPS), (0.1, 0.2), (0.0, 1e-20)])
+def test_two_numbers_that_differ_are_not_printed_as_one(values):
+    texts = [apart(*pair) for pair in (values, values[::-1])]
+    assert texts[0] != texts[1] and max(map(len, texts)) <= 19
+    assert [float(text) for text in texts] == pytest.approx(values, rel=1e-5) and apart(0.1 + 0.2, 0.3, 4)[:3] == "0.3"
 
 
 def test_slides_have_powers():

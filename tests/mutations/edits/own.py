@@ -43,6 +43,12 @@ EDITS = (
     Edit("agreement.given", "Given.take_states", "self.joints.speeds(own['qd'])", "own['qd']", "speeds keep their own joints"),
     Edit("agreement", "assert_agrees", "given.fails or given.problems", "given.fails", "a changed argument agrees"),
     Edit("agreement", "rows", "-row.ratio", "row.ratio", "the smallest ratio first"),
+    Edit("agreement", "rounded", "worst <= ROUNDED and np.max(of_largest) <= ROUNDED", "worst <= ROUNDED",
+         "a slip that is small beside the terms is rounding"),
+    Edit("agreement", "message", "why.is_found or given.rtol", "given.rtol", "an rtol is advised beside a cause"),
+    Edit("agreement", "message", "why.is_found or given.rtol", "why.is_found", "a larger rtol is advised than stated"),
+    Edit("judge.entries", "Entries.mass_matrix", "root[..., :, None] * root[..., None, :]", "0.0",
+         "a structural zero has no tolerance"),
     Edit("agreement.why", "some_states", "np.flatnonzero(np.isfinite(worst))", "np.arange(len(worst))",
          "a cause is sought where there are no values"),
 )  # fmt: skip
