@@ -7,6 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+import sympy
 from models import PATHS
 from own_equations import XML as PENDULUM
 from own_equations import acceleration, bias, gravity, mass_matrix, wrong_bias
@@ -64,6 +65,10 @@ def test_values_as_arrays_at_the_given_states(given):
     )
     first = {name: part[0] for name, part in states.items()}
     compare.assert_agrees(PENDULUM, **{name: value[0] for name, value in values.items()}, **first)  # without a batch
+    column = {"mass_matrix": values["mass_matrix"][..., None], "bias": values["bias"][..., None].astype(object)}
+    compare.assert_agrees(PENDULUM, **column, **states)
+    numbers = {name: sympy.Matrix(values[name][0]) for name in ("mass_matrix", "bias")}
+    compare.assert_agrees(PENDULUM, **numbers, **first)
     flat = {"mass_matrix": values["mass_matrix"].reshape(12, 4), "bias": values["bias"]}  # as in the rows of a file
     compare.assert_agrees(PENDULUM, **flat, **states)
 
@@ -120,7 +125,9 @@ def advised(mjcf=PENDULUM, **brought):
 
 @pytest.mark.parametrize("height", [0, 20])
 @pytest.mark.parametrize("share, is_rounded", [(0.98e-6, True), (1.02e-6, False), (1e-2, False)])
-def test_constants_rounded_to_six_digits_get_an_rtol_however_far_from_the_origin(height, share, is_rounded, monkeypatch):
+def test_constants_rounded_to_six_digits_get_an_rtol_however_far_from_the_origin(
+    height, share, is_rounded, monkeypatch
+):
     """Far away the terms of each entry are large, and a slip is small compared with them."""
     monkeypatch.setattr("compare.agreement.why.SECONDS_OF_CAUSE", 0.0)
     aloft = PENDULUM.replace("<worldbody>", f'<worldbody><body pos="0 0 {height}">')
@@ -154,8 +161,11 @@ def test_no_rtol_is_advised_beside_a_cause_or_another_rtol_or_without_numbers(gi
     assert advised(mass_matrix=values["mass_matrix"], bias=bad, **states) is None
 
 
-TWO_LEGS = PENDULUM.replace("</worldbody>", """<body pos="0 1 0"><joint name="other" axis="0 1 0"/>
-  <inertial pos="0 0 -0.3" mass="0.5" diaginertia="0.1 0.1 0.1"/></body></worldbody>""")
+TWO_LEGS = PENDULUM.replace(
+    "</worldbody>",
+    """<body pos="0 1 0"><joint name="other" axis="0 1 0"/>
+  <inertial pos="0 0 -0.3" mass="0.5" diaginertia="0.1 0.1 0.1"/></body></worldbody>""",
+)
 
 
 def of_two_legs(between):
@@ -270,6 +280,8 @@ THREE = np.zeros((3, 2))
     ({"bias": bias, "q": THREE, "qd": np.eye(2)}, r"qd has shape \(2, 2\); expected \(3, 2\)"),
     ({"bias": bias, "q": [[0, np.nan]], "qd": 0.0}, "finite"), ({"bias": bias, "q": [["a", "b"]], "qd": 0.0}, "q is "),
     ({"bias": np.eye(3), "q": THREE, "qd": 0.0}, r"bias has shape \(3, 3\); expected \(3, 2\)"),
+    ({"bias": THREE.T, "q": THREE, "qd": 0.0}, r"bias has shape \(2, 3\); expected \(3, 2\)"),
+    ({"mass_matrix": np.zeros((2, 2, 3)), "q": THREE}, r"shape \(2, 2, 3\); expected \(3, 2, 2\)"),
     ({"mjcf": "nowhere.xml", "bias": bias}, "nowhere.xml"), ({"bias": bias, "joints": ["hip", "foot"]}, "'foot'"),
     ({"mjcf": PATHS["pendulum_ball"], "mass_matrix": lambda q: np.eye(6), "q": TURNED}, "length 1"),
 ])  # fmt: skip

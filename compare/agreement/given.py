@@ -12,7 +12,7 @@ import numpy as np
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.values import real_numbers, shown
 
-from ..engines.own import ARGUMENTS, OwnEquations, is_function
+from ..engines.own import ARGUMENTS, OwnEquations, in_shape, is_function, numbers_of
 from ..judge.check import over
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
@@ -152,15 +152,14 @@ class Given:
     def table(self, name: str, brought: object) -> np.ndarray:
         """An array of values in the user's joints, in the model's, (states, ...); a row may hold Mbar flattened by rows."""
         count, nv = len(self.q), self.coordinates.nv
-        array = real_numbers(brought)
+        array = numbers_of(brought)
         shape = (count, nv, nv) if name == "mass_matrix" else (count, nv)
         if array is None:
             raise ValueError(f"{name} is {shown(brought)}; expected real numbers of shape {shape}, or a function")
-        accepted: list[tuple[int, ...]] = [shape, (count, nv * nv)] if name == "mass_matrix" else [shape]
-        accepted += [shape[1:]] * (count == 1) + [(count,)] * (nv == 1)
-        if array.shape not in accepted:
+        flat = in_shape(array, (count, nv * nv)) if name == "mass_matrix" else None
+        values = in_shape(array, shape) if flat is None else flat.reshape(shape)
+        if values is None:
             raise ValueError(f"{name} has shape {array.shape}; expected {shape}, its values at the given q")
-        values = array.reshape(shape)
         return self.joints.mass_matrix(values) if name == "mass_matrix" else self.joints.forces(values)
 
     @cached_property
