@@ -19,7 +19,7 @@ from tmt.derivation.quantities import QUANTITIES
 from tmt.model import singular
 from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree
-from tmt.model.values import real_numbers
+from tmt.model.values import real_numbers, shown
 
 MOST = 64  # models that are held
 DOUBLE = np.dtype(float)
@@ -71,8 +71,8 @@ def prepare(model: Tree = ARM, *quantities: str) -> None:
     [-2.20725]
     """
     checked_model(model)
-    if unknown := [name for name in quantities if name not in QUANTITIES]:
-        raise ValueError(f"{unknown[0]!r} is no quantity; known are {', '.join(QUANTITIES)}")
+    if unknown := [name for name in quantities if not isinstance(name, str) or name not in QUANTITIES]:
+        raise ValueError(f"{shown(unknown[0])} is no quantity; known are {', '.join(QUANTITIES)}")
     for quantity in quantities or QUANTITIES:
         (known.get(id(model)) or answers_of(model)).get(quantity)
 

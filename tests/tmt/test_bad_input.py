@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import tmt
-from tmt.compiled import evaluator, runner
+from tmt.compiled import evaluator, prepared, runner
 from tmt.derivation.quantities import QUANTITIES
 from tmt.methods import METHODS
 
@@ -102,6 +102,11 @@ PLACES = {
     "tree of a runner": lambda tree: runner(tree, "rk4"),
     "method of a runner": lambda name: runner(tmt.ARM, name),
     "model of prepare": tmt.prepare,
+    "quantity of prepare": lambda name: tmt.prepare(tmt.ARM, name),
+    **{
+        f"{name} of equations": lambda value, name=name: tmt.equations(**{name: value})
+        for name in ("model", "language", "quantities", "name", "single", "head")
+    },
 }  # fmt: skip
 
 
@@ -130,10 +135,26 @@ def test_compiled_code_takes_its_own_arrays_only():
     assert "shares memory" in refused(compiled.each, rows[:40], rows[:40], rows[:40], rows[1:])
     refused(fixed, path[0], path[0], path[2], 0.1)
     for value in [*NONSENSE, None, True, Fraction(1, 2)]:
-        if not isinstance(value, float):  # a NaN is a number: the run is NaN, and says so
-            refused(fixed, *path, value)
-            refused(adaptive, *path, 0.1, value)
         refused(compiled.chain, REST, REST, REST, 1.0 if value is True else value)
+    for value in [
+        *(of for of in NONSENSE if of is not np.nan),
+        None,
+        True,
+        np.nan,
+        np.inf,
+        0,
+        0.0,
+        -0.1,
+        np.float64(-1e-9),
+    ]:
+        for call in (
+            partial(fixed, *path, value),
+            partial(adaptive, *path, value, 1e-6),
+            partial(adaptive, *path, 0.1, value),
+            partial(prepared, tmt.ARM, "dopri8_adaptive", *path, 0.1, value),
+            partial(prepared, tmt.ARM, "rk4", *path, value),
+        ):
+            refused(call)
 
 
 def test_wrong_terms_are_refused():
