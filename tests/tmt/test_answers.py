@@ -26,12 +26,10 @@ def in_parts(found):
 
 @pytest.fixture
 def compiled():
-    """Machine code answers for a Tree and a quantity from now on, which takes more than a few questions."""
+    """Machine code answers for a Tree and a quantity from now on."""
 
     def got(tree, *quantities):
-        for quantity in quantities or ("acceleration",):
-            answers.answers_of(tree).get(quantity)
-            answers.answers_of(tree).asked[quantity] = answers.SMALL
+        tmt.prepare(tree, *quantities or ("acceleration",))
         return tree
 
     return got
@@ -63,17 +61,26 @@ def test_machine_code_answers_what_the_literal_form_returns(quantity, compiled, 
     assert quantity == "spring_torque" or not all(map(np.array_equal, whole, expected))  # so it was machine code
 
 
-def test_few_states_are_answered_by_the_literal_form(rng, monkeypatch):
-    monkeypatch.setattr(answers, "MOST", 1)  # of models the last ones are held
-    tmt.mass_matrix(np.zeros(3))
-    tree = dataclasses.replace(tmt.ARM, mass=(1.75, 1.5))
-    q, qd, tau = rng.uniform(-2, 2, (3, 400, 3))
-    known, few = answers.answers_of(tree), (q[:90], qd[:90], tau[:90])
-    assert np.array_equal(tmt.acceleration(*few, tree), literal.acceleration(*few, tree))
-    assert known.asked["acceleration"] == 90 and not known.ready and len(answers.known) == 1
-    late = tmt.acceleration(np.tile(q, (2, 1)), np.tile(qd, (2, 1)), np.tile(tau, (2, 1)), tree)
-    assert "together" in vars(known.compiled["acceleration"])
-    assert late[:400] == pytest.approx(literal.acceleration(q, qd, tau, tree), rel=1e-10, abs=1e-10)
+@pytest.mark.parametrize("quantity", ["mass_matrix", "acceleration", "jacobians"])
+def test_a_call_gives_the_same_bits_whatever_was_asked_before(quantity, rng):
+    """Up to 500 states have the literal form's, more of them those of machine code."""
+    tree, function = dataclasses.replace(tmt.ARM, mass=(1.75, 1.5)), getattr(tmt, quantity)
+    states = rng.uniform(-2, 2, (3, 501, 3))[: len(QUANTITIES[quantity].takes)]
+
+    def bits(part):
+        return [x.tobytes() for x in in_parts(function(*states[:, part], tree))]
+
+    parts = 0, slice(1), slice(90), slice(500), slice(501)
+    first, again = ([bits(part) for part in parts] for _ in range(2))
+    assert [bits(part) for part in parts[::-1]][::-1] == first == again
+    few, many = ([x.tobytes() for x in in_parts(getattr(literal, quantity)(*states[:, :n], tree))] for n in (500, 501))
+    assert first[3] == few and first[4] != many
+    tmt.prepare(tree, quantity)
+    assert bits(slice(500)) != few
+    prepared = bits(0)
+    for mass in range(1, answers.MOST + 2):  # of other models the last ones are held
+        tmt.mass_matrix(np.zeros(3), dataclasses.replace(tmt.ARM, mass=(mass, 1.5)))
+    assert bits(0) == prepared and len([one for one in answers.known.values() if not one.ready]) <= answers.MOST
 
 
 def test_threads_change_no_bit(compiled, monkeypatch, rng):
