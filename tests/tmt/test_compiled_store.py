@@ -4,6 +4,7 @@ import ctypes
 import dataclasses
 import hashlib
 import os
+import shutil
 import stat
 import subprocess
 import sys
@@ -69,18 +70,41 @@ def test_each_question_has_a_file_of_its_own(folder):
     assert len(files(folder)) == len(questions)
 
 
-def test_another_version_of_tmt_or_another_processor_has_other_files(folder, tmp_path, monkeypatch):
+def test_another_version_of_tmt_or_another_processor_has_other_files(folder, monkeypatch):
     for count, name in enumerate(("own_sources", "versions"), start=2):
         asked()
         monkeypatch.setattr(store, name, lambda: "another")
         asked()
         assert len(files(folder)) == count
-    monkeypatch.undo()
-    monkeypatch.setattr(store, "__file__", str(tmp_path / "tmt" / "compiled" / "store.py"))
-    empty = store.own_sources.__wrapped__()
-    (tmp_path / "tmt" / "model").mkdir(parents=True)
-    (tmp_path / "tmt" / "model" / "tree.py").write_text("a = 1")
-    assert store.own_sources.__wrapped__() != empty
+
+
+COPIED = '''import os, sys, tmt
+from pathlib import Path
+from tmt.compiled import sources, store
+
+first = sources.own_sources()
+tmt.prepare(tmt.ARM, "mass_matrix")
+kept = len(list(Path(os.environ["TMT_CACHE"]).glob("*.o")))
+file = Path(tmt.__file__).parent / "model" / "lock.py"
+exec(sys.argv[1])
+tmt.prepare(tmt.ARM, "bias")
+print(first, sources.own_sources(), kept, len(list(Path(os.environ["TMT_CACHE"]).glob("*.o"))))
+'''
+
+
+@pytest.mark.parametrize("change, is_kept", [
+    ("", True), ("file.write_bytes(file.read_bytes() + b'# more')", False), ("file.unlink()", False),
+    ("os.utime(file, ns=(0, 0))", False), ("tmt.model.lock.__loader__ = None", False),
+])  # fmt: skip
+def test_what_is_compiled_is_kept_under_the_name_of_what_was_imported(change, is_kept, folder, tmp_path):
+    """Of sources that are others by now, or gone, nothing is kept: the next process would run another version's code."""
+    shutil.copytree(ROOT / "tmt", tmp_path / "tmt", ignore=shutil.ignore_patterns("__pycache__"))
+    command = [sys.executable, "-c", COPIED, change]
+    environment = os.environ | {"PYTHONPATH": str(tmp_path), "TMT_CACHE": str(folder)}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=tmp_path, check=True)
+    first, later, before, after = done.stdout.split()
+    assert len(first) == 64 and later == (first if is_kept else "None")
+    assert int(before) == 1 and int(after) == (2 if is_kept else 1)
 
 
 def to_another_group(path):
