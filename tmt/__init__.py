@@ -36,7 +36,8 @@ Methods of `simulate`: "rk4"; "semi_implicit_euler" (MuJoCo's Euler, implicitfas
 
 NumPy (literal.py) answers calls of up to 500 states, compiled code larger ones and, after `prepare`, all calls of a model, which
 suits loops over single states; see answers.py. Both differ in the last bits, and say what is wrong in the same words. Compiled
-code is kept on disk, see compiled/store.py. Without MuJoCo, `pip install numpy llvmlite mpmath && pip install --no-deps .` is enough.
+code is kept on disk, see compiled/store.py. Without MuJoCo, `pip install numpy llvmlite mpmath && pip install --no-deps .` is
+enough.
 """
 
 from collections.abc import Sequence

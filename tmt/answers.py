@@ -51,7 +51,8 @@ def answers_of(model: Tree) -> "Answers":
 def prepare(model: Tree = ARM, *quantities: str) -> None:
     """Have machine code answer all calls of a model from now on: for many calls of one state, in a loop or a controller.
 
-    Without it NumPy answers those of up to 500 states, ten times as slowly; the last bits differ. The first time on a machine all take about a second for an arm and several for a humanoid.
+    Without it NumPy answers those of up to 500 states, ten times as slowly; the last bits differ. The first time on a machine all
+    take about a second for an arm and several for a humanoid.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Object files on disk: $TMT_CACHE, else $XDG_CACHE_HOME/tmt, else ~/.cache/tmt.
 
-The name of a file is the hash of all that its machine code depends on: tmt's sources as imported, the versions of llvmlite and LLVM, the
-processor, the tree and what is compiled for it. What lies there is run, so the folder must be the user's own: others may neither
-write to it nor put another in its place. Without such a folder, with a damaged file or a full disk, the code is compiled anew: it
-only costs time. To clear it is to delete the folder.
+The name of a file is the hash of all that its machine code depends on: tmt's sources as imported, the versions of llvmlite and
+LLVM, the processor, the tree and what is compiled for it. What lies there is run, so the folder must be the user's own: others
+may neither write to it nor put another in its place. Without such a folder, with a damaged file or a full disk, the code is
+compiled anew: it only costs time. To clear it is to delete the folder.
 """
 
 import hashlib
