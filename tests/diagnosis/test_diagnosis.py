@@ -39,6 +39,7 @@ def diagnosis(given, tree=tmt.ARM, seed=0, **more):
 
 
 ARM = tmt.ARM
+DAMPED = replace(ARM, damping=(0.1, 0.2, 0.4))
 HEAVY = replace(ARM, mass=(1.9, 1.52))
 Q, QD = states()
 
@@ -65,6 +66,8 @@ CAUSES = {  # the given values, or the tree whose values these are: rank, place 
     "a factor of both": (added(slice(None), 0.0, 1.25), 2, "all of M and h", 1.25, False),
     "a factor of a row": (added(7, 0.0, 1.25), 2, "h[beta]", 1.25, False),
     "a row in another": (added(6, -tmt.gravity_balance(Q)[:, 1]), 2, "h[beta] at rest in h[alpha]", -1.0, False),
+    "damping D qd in h": (added(slice(6, None), QD * DAMPED.damping), 1, "damping D qd", "in h", True),
+    "-D qd in h": (added(slice(6, None), -QD * DAMPED.damping), 1, "damping D qd", "in h, of the other sign", True),
     "no bias": (added(slice(6, None), 0.0, 0.0), 1, "bias", "left out", False),
     "an armature": (added(5, 0.1), 2, "armature of gamma", 0.1, False),
     "two numbers": (
@@ -75,7 +78,7 @@ CAUSES = {  # the given values, or the tree whose values these are: rank, place 
 
 @pytest.mark.parametrize("given, rank, place, explains, alone", CAUSES.values(), ids=CAUSES)
 def test_a_cause_is_named_with_its_value_and_its_rank(given, rank, place, explains, alone):
-    causes = diagnosis(given).causes
+    causes = diagnosis(given, DAMPED if "D qd" in place else ARM).causes
     assert {cause.rank for cause in causes} == {rank} and {cause.tied for cause in causes} == {len(causes) - 1}
     assert len(causes) == 1 or not alone
     (cause,) = (cause for cause in causes if cause.place == place)

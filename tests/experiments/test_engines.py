@@ -211,7 +211,7 @@ def test_a_number_as_read_just_inside_and_just_outside(number):
         assert [row["number"] for row in result.tables["engines_read"][:1]] == [number] * differs
 
 
-ASKED = '''import numpy as np
+ASKED = """import numpy as np
 from compare.engines import outside
 from compare.run.reference import compared_with
 
@@ -228,7 +228,7 @@ if __name__ == "__main__":  # processes of engines begin with this file
             print("mortal:", error)
         assert (other.mass_matrix(q) == right).all() and (again.mass_matrix(q) == right).all()
     print(first is outside.process("again"))
-'''
+"""
 
 
 def test_a_process_that_ends_is_that_of_its_own_engine_alone(report):
@@ -237,7 +237,11 @@ def test_a_process_that_ends_is_that_of_its_own_engine_alone(report):
     (root / "compare/engines/mortal.py").write_text(mortal.format(**RIGHT))
     (root / "asked.py").write_text(ASKED)
     run = subprocess.run(
-        [sys.executable, "asked.py"], cwd=root, env=os.environ | {"PYTHONPATH": str(root)}, capture_output=True, text=True
+        [sys.executable, "asked.py"],
+        cwd=root,
+        env=os.environ | {"PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
     )
     assert run.stdout.splitlines() == ["mortal: its process was killed"] * 2 + ["True"], run.stderr
 

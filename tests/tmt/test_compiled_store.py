@@ -78,7 +78,7 @@ def test_another_version_of_tmt_or_another_processor_has_other_files(folder, mon
         assert len(files(folder)) == count
 
 
-COPIED = '''import os, sys, tmt
+COPIED = """import os, sys, tmt
 from pathlib import Path
 from tmt.compiled import sources, store
 
@@ -89,7 +89,7 @@ file = Path(tmt.__file__).parent / "model" / "lock.py"
 exec(sys.argv[1])
 tmt.prepare(tmt.ARM, "bias")
 print(first, sources.own_sources(), kept, len(list(Path(os.environ["TMT_CACHE"]).glob("*.o"))))
-'''
+"""
 
 
 @pytest.mark.parametrize("change, is_kept", [
