@@ -224,20 +224,19 @@ def test_neither_noise_nor_numbers_at_random_have_a_culprit(size):
     assert size < 1.0 or len(found.entries) == 5
 
 
-@pytest.mark.parametrize("half, is_single", [(0.4, False), (0.6, True)])
-def test_of_nearest_changes_a_pair_must_leave_less_than_half_of_what_a_single_one_leaves(half, is_single, monkeypatch):
-    fit = SimpleNamespace(places=("one",), left=1e-3, is_possible=True)
-    pair = SimpleNamespace(places=("one", "other"), left=1e-3 * half, is_possible=True)
+@pytest.mark.parametrize("half, places", [(0.4, 2), (0.6, 1)])
+def test_the_nearest_is_a_pair_where_it_leaves_less_than_half_of_what_a_single_change_leaves(half, places, monkeypatch):
     monkeypatch.setattr(search, "of_fitted", lambda fit, *_: len(fit.places))
-    found = SimpleNamespace(best=[pair, fit, SimpleNamespace(places=(), left=0.0, is_possible=False)])
-    assert search.closest(found) == (1 if is_single else 2)
+    fits = [
+        SimpleNamespace(places=(1,) * k, left=left, is_possible=k > 0) for k, left in ((0, 0.0), (1, 1.0), (2, half))
+    ]
+    assert search.closest(SimpleNamespace(best=fits)) == places
 
 
 @pytest.mark.parametrize("values", [(3.55812, 3.55812 * (1 + 1e-9)), (1.0, 1.0 + EPS), (0.1, 0.2), (0.0, 1e-20)])
 def test_two_numbers_that_differ_are_not_printed_as_one(values):
     texts = [apart(*pair) for pair in (values, values[::-1])]
-    assert texts[0] != texts[1] and max(map(len, texts)) <= 19
-    assert [float(text) for text in texts] == pytest.approx(values, rel=1e-5) and apart(0.1 + 0.2, 0.3, 4)[:3] == "0.3"
+    assert texts[0] != texts[1] and [float(text) for text in texts] == pytest.approx(values, rel=1e-5)
 
 
 def test_slides_have_powers():

@@ -97,31 +97,20 @@ def test_sympy_matrices_with_their_symbols(source, rng):
     assert own.takes_batches == {"mass_matrix": True, "bias": True}
 
 
-FORMS = [  # of a value of one state, as SymPy's lambdify, its matrices and lists give it
-    lambda x: x[..., None], lambda x: x[None], lambda x: np.ascontiguousarray(x)[None, ..., None], np.ndarray.tolist,
-    lambda x: x.astype(object), sympy.Matrix, sympy.ImmutableDenseMatrix, lambda x: sympy.Matrix(x).tolist(),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("tree", [tmt.ARM, tmt.ARM.lock({"alpha": 0.1, "beta": 0.2})])
+@pytest.mark.parametrize("form", [  # as SymPy's lambdify, its matrices and lists give it
+    lambda x: x[..., None], lambda x: x[None], lambda x: x[None, ..., None], lambda x: x.astype(object), sympy.Matrix,
+    sympy.ImmutableDenseMatrix, lambda x: sympy.Matrix(x).tolist(), lambda x: x.T,
+])  # fmt: skip
 def test_a_value_may_have_further_axes_of_length_1_and_be_of_any_numbers(tree, form, rng):
-    own = OwnEquations(
-        {"mass_matrix": lambda q: form(tmt.mass_matrix(q, tree)), "bias": lambda q, v: form(tmt.bias(q, v, tree))},
-        Coordinates(tree.hinge_names),
-    )
-    q, v = rng.uniform(-2.0, 2.0, (2, 7, len(tree.hinge_names)))
+    """A batch is not mixed up with it: of h (n, states) the states are asked one by one."""
+    functions = {
+        "mass_matrix": lambda q: form(tmt.mass_matrix(q, tree)),
+        "bias": lambda q, v: form(tmt.bias(q, v, tree)),
+    }
+    own, (q, v) = OwnEquations(functions, Coordinates(tree.hinge_names)), rng.uniform(-2.0, 2.0, (2, 7, len(tree.axis)))
     assert np.allclose(own.mass_matrix(q), tmt.mass_matrix(q, tree), rtol=1e-14, atol=0.0)
     assert np.allclose(own.bias(q, v), tmt.bias(q, v, tree), rtol=1e-14, atol=0.0)
-
-
-def test_columns_of_a_batch_are_not_taken_for_states(rng):
-    """Of h (n, states) the states are the last axis: it is asked state by state."""
-    q, v, _ = states(rng)
-    last = of_one("bias", lambda q, v: tmt.bias(q, v).T)
-    column = of_one("bias", lambda q, v: tmt.bias(q, v)[..., None])
-    for own, is_batched in ((last, False), (column, True)):
-        assert np.allclose(own.bias(q, v), tmt.bias(q, v)) and own.takes_batches == {"bias": is_batched}
 
 
 # what cannot be used

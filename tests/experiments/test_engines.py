@@ -217,33 +217,23 @@ from compare.run.reference import compared_with
 
 if __name__ == "__main__":  # processes of engines begin with this file
     case, q = compared_with("model", "robot.xml").robot.case(), np.array([[0.3, 0.4]])
-    dies, other, again = [outside.Outside(name).of(case) for name in ("mortal", "again", "again")]
-    right = other.mass_matrix(q)
-    first = outside.process("again")
+    dies, other = (outside.Outside(name).of(case) for name in ("mortal", "again"))
     for _ in range(2):
-        assert dies.bias(q, q).shape == (1, 2)  # its next process reads the file again
+        print(dies.bias(q, q).shape, other.mass_matrix(q).shape, len(other.readings))
         try:
             dies.mass_matrix(q)
         except outside.EngineError as error:
-            print("mortal:", error)
-        assert (other.mass_matrix(q) == right).all() and (again.mass_matrix(q) == right).all()
-    print(first is outside.process("again"))
+            print(error)
 """
 
 
-def test_a_process_that_ends_is_that_of_its_own_engine_alone(report):
-    root = report[0].parent
-    mortal = AGAIN.replace("return tmt.mass_matrix(q, self.tree)", "__import__('os')._exit(3)")
+def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_again(report):
+    root, mortal = report[0].parent, AGAIN.replace("return tmt.mass_matrix(q, self.tree)", "__import__('os')._exit(3)")
     (root / "compare/engines/mortal.py").write_text(mortal.format(**RIGHT))
     (root / "asked.py").write_text(ASKED)
-    run = subprocess.run(
-        [sys.executable, "asked.py"],
-        cwd=root,
-        env=os.environ | {"PYTHONPATH": str(root)},
-        capture_output=True,
-        text=True,
-    )
-    assert run.stdout.splitlines() == ["mortal: its process was killed"] * 2 + ["True"], run.stderr
+    command, environment = [sys.executable, "asked.py"], os.environ | {"PYTHONPATH": str(root)}
+    run = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True)
+    assert run.stdout.splitlines() == ["(1, 2) (1, 2, 2) 1", "its process was killed"] * 2, run.stderr
 
 
 def test_bodies_that_move_as_one():

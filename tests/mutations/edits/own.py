@@ -15,8 +15,8 @@ EDITS = (
          "one state that raises counts as all"),
     Edit("own.equations", "OwnEquations.acceleration", "tau - _1 - self.passive(q, v)", "tau - _1",
          "damping and springs are left out"),
-    Edit("own.returned", "converted", "array.dtype.kind == 'c'", "False", "complex values are said to be no numbers"),
-    Edit("own.returned", "converted", "len(array.shape) != len(expected)", "False", "a batch of one is a state"),
+    Edit("own.functions", "converted", "getattr(value, 'dtype', np.dtype(float)).kind == 'c'", "False",
+         "complex values are said to be no numbers"),
     Edit("engines.own", "OwnDynamics.acceleration", "case.added_damping * v", "0.0 * v", "damping of a scene is left out"),
     Edit("engines.own", "OwnDynamics.bias", "h - self.equations.gravity_balance(q)", "h", "gravity stays on in h"),
     # joints
@@ -47,7 +47,7 @@ EDITS = (
          "a slip that is small beside the terms is rounding"),
     Edit("agreement", "message", "why.is_found or given.rtol", "given.rtol", "an rtol is advised beside a cause"),
     Edit("agreement", "message", "why.is_found or given.rtol", "why.is_found", "a larger rtol is advised than stated"),
-    Edit("judge.entries", "Entries.mass_matrix", "root[..., :, None] * root[..., None, :]", "0.0",
+    Edit("judge.entries", "Entries.mass_matrix", "root[:, :, None] * root[:, None, :]", "0.0",
          "a structural zero has no tolerance"),
     # the diagnosis
     Edit("diagnosis.forces", "force_left_over", "SHARPER * rounding * _1", "10 * SHARPER * rounding * _1",
