@@ -216,10 +216,9 @@ def rounded(given: Given) -> float | None:
     small compared with them.
     """
     off = [(np.abs(of.own - of.right), of) for of in given.compared.values()]
-    shares = [over(difference, of.scale).max() for difference, of in off]
-    of_largest = [over(difference.max(), np.abs(of.right).max()) for difference, of in off]
-    worst = float(np.max(shares))
-    if not (worst <= ROUNDED and np.max(of_largest) <= ROUNDED):
+    worst = float(np.max([over(difference, of.scale).max() for difference, of in off]))
+    of_largest = np.max([over(difference.max(), np.abs(of.right).max()) for difference, of in off])
+    if not (worst <= ROUNDED and of_largest <= ROUNDED):
         return None
     exponent = int(np.floor(np.log10(worst)))
     return float(f"{np.ceil(worst / 10.0**exponent):.0f}e{exponent}")

@@ -80,6 +80,5 @@ def of_accelerations(given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarra
     unknown = np.full((*qd.shape, qd.shape[1]), np.nan)
     values = Values(q, qd, unknown, h + acting, (unknown, allowed))
     diagnosis = diagnose_stated(tree, given.joints, values, SECONDS_OF_CAUSE)
-    if diagnosis.causes:
-        return Why(diagnosis.sentence())
-    return Why(say(Finding("agreement", "accelerations_alone")), False)
+    text = diagnosis.sentence() if diagnosis.causes else say(Finding("agreement", "accelerations_alone"))
+    return Why(text, bool(diagnosis.causes))

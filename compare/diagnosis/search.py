@@ -21,7 +21,6 @@ from .variants import Variant, conventions, program_options, values_in
 FEW = 2  # states at which conventions are tried first
 UNCOMMON = 2  # see `order`
 SHOWN = 12  # single explanations that leave least
-AS_GOOD = 2.0  # times less left over: then a pair is nearer than a single change
 
 
 def diagnose(
@@ -67,15 +66,8 @@ def explanation(search: Search, compared: Compared, seconds: float) -> Diagnosis
     for causes in ranks(search, singles, compared):
         if causes:
             return found._replace(causes=tied(causes))
-    seconds_taken = None if search.is_finished else seconds
-    return found._replace(closest=closest(search), details=compared.details(), seconds=seconds_taken)
-
-
-def closest(search: Search) -> Cause | None:
-    """The change that leaves least of those that were fitted; a pair must leave clearly less than a single one."""
-    possible = [fit for fit in search.best if fit.is_possible and np.isfinite(fit.left)]
-    best = min(possible, key=lambda fit: fit.left * AS_GOOD ** len(fit.places), default=None)
-    return best and of_fitted(best, 1 + len(best.places), search)
+    closest = of_fitted(nearest[0], 2, search) if nearest else None
+    return found._replace(closest=closest, details=compared.details(), seconds=None if search.is_finished else seconds)
 
 
 def ranks(search: Search, singles: Sequence[Fitted], compared: Compared) -> Iterator[list[Cause]]:

@@ -1,13 +1,12 @@
 """Which causes a diagnosis names for values of Mbar and h that differ: numbers, conventions, terms; and where it names none."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import tmt
-from compare.diagnosis import diagnose, packed, search
+from compare.diagnosis import diagnose, packed
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 from compare.report.text import apart
@@ -222,15 +221,6 @@ def test_neither_noise_nor_numbers_at_random_have_a_culprit(size):
     found = diagnosis(right * (1.0 + size * noise) if size < 1.0 else noise, TREE)
     assert found.differs and found.causes == ()
     assert size < 1.0 or len(found.entries) == 5
-
-
-@pytest.mark.parametrize("half, places", [(0.4, 2), (0.6, 1)])
-def test_the_nearest_is_a_pair_where_it_leaves_less_than_half_of_what_a_single_change_leaves(half, places, monkeypatch):
-    monkeypatch.setattr(search, "of_fitted", lambda fit, *_: len(fit.places))
-    fits = [
-        SimpleNamespace(places=(1,) * k, left=left, is_possible=k > 0) for k, left in ((0, 0.0), (1, 1.0), (2, half))
-    ]
-    assert search.closest(SimpleNamespace(best=fits)) == places
 
 
 @pytest.mark.parametrize("values", [(3.55812, 3.55812 * (1 + 1e-9)), (1.0, 1.0 + EPS), (0.1, 0.2), (0.0, 1e-20)])

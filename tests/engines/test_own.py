@@ -138,7 +138,7 @@ def test_what_is_not_there_or_does_not_fit(source, said):
     (lambda q: np.eye(9)[None], r"shape \(1, 9, 9\)"), (lambda q: np.eye(3).ravel(), r"shape \(9,\)"),
     (lambda q: np.stack([np.eye(3)] * 3), r"shape \(3, 3, 3\)"), (lambda q: np.ma.masked_equal(np.eye(3), 1), "masked"),
     (lambda q: None, "None"), (lambda q: 1.0, r"shape \(\)"), (lambda q: [[1, 2], [3]], "real numbers"),
-    (lambda q: np.eye(3) * 1j, "complex"), (lambda q: sys.exit(3), "SystemExit: 3"), (4.0, "4.0.*function"),
+    (lambda q: np.eye(3) * 1j, "real numbers"), (lambda q: sys.exit(3), "SystemExit: 3"), (4.0, "4.0.*function"),
     (lambda: 0, r"TypeError.*expected mass_matrix\(q\)"), (Called.mass_matrix, "TypeError"),
     (lambda q: np.linalg.inv(np.zeros((3, 3))), r"LinAlgError: .*test_own.py, line \d+"),
 ])  # fmt: skip

@@ -190,8 +190,7 @@ def converted(name: str, value: object, expected: tuple, count: int | None) -> n
     shape = f"({', '.join('bodies' if n is None else str(n) for n in expected)}{',' * (len(expected) == 1)})"
     array = numbers_of(value)
     if array is None:
-        kind = " complex:" if getattr(value, "dtype", np.dtype(float)).kind == "c" else ""
-        raise OwnError(f"{name} is{kind} {shown(value)}; expected real numbers of shape {shape}")
+        raise OwnError(f"{name} is {shown(value)}; expected real numbers of shape {shape}")
     if None in expected and array.ndim == len(expected):
         expected = tuple(m if n is None else n for n, m in zip(expected, array.shape))
     fitted = in_shape(array, expected) if None not in expected else None
