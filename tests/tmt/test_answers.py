@@ -24,19 +24,14 @@ def in_parts(found):
     return found if isinstance(found, tuple) else (found,)
 
 
-@pytest.fixture
-def compiled():
-    """Machine code answers for a Tree and a quantity from now on."""
-
-    def got(tree, *quantities):
-        tmt.prepare(tree, *quantities or ("acceleration",))
-        return tree
-
-    return got
+def compiled(tree, *quantities):
+    """A Tree, prepared."""
+    tmt.prepare(tree, *quantities or ("acceleration",))
+    return tree
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
-def test_machine_code_answers_what_the_literal_form_returns(quantity, compiled, rng):
+def test_machine_code_answers_what_the_literal_form_returns(quantity, rng):
     """Of any batch, as 50 digits have it; and a state has the same bits alone and among others."""
     function, takes = getattr(tmt, quantity), QUANTITIES[quantity].takes
     assert (*signature(function).parameters,) == (*takes, "model")
@@ -82,7 +77,7 @@ def test_a_call_gives_the_same_bits_whatever_was_asked_before(rng):
     assert sum(not one.ready for one in answers.known.values()) <= answers.MOST
 
 
-def test_threads_change_no_bit(compiled, monkeypatch, rng):
+def test_threads_change_no_bit(monkeypatch, rng):
     """Neither those of the states of one question, nor several questions at once; nor if none can be started any more."""
     tree, states = compiled(SMALL), random_states(rng, SMALL, 200)
     alone, used = tmt.acceleration(*states, tree), []
@@ -106,7 +101,7 @@ def test_threads_change_no_bit(compiled, monkeypatch, rng):
 
 
 @pytest.mark.parametrize("convert", [np.ndarray.tolist, np.float32, lambda a: a[..., ::-1].copy()[..., ::-1]])
-def test_numbers_in_any_form_are_taken(convert, compiled):
+def test_numbers_in_any_form_are_taken(convert):
     compiled(tmt.ARM, "acceleration")
     q, qd, tau = np.random.default_rng(0).integers(-8, 9, (3, 5, 3)) / 8.0
     expected = tmt.acceleration(q, qd, tau)
@@ -137,7 +132,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("model, given", WRONG.values(), ids=WRONG)
-def test_what_is_wrong_is_said_in_the_same_words(model, given, compiled):
+def test_what_is_wrong_is_said_in_the_same_words(model, given):
     if isinstance(model, tmt.Tree):
         compiled(model, "acceleration", "mass_matrix")
     with pytest.raises(ValueError) as expected:
@@ -148,14 +143,14 @@ def test_what_is_wrong_is_said_in_the_same_words(model, given, compiled):
     assert "'a', 'c'" in str(found.value) or getattr(model, "body_names", ()) != ("hand",)
 
 
-def test_what_is_within_a_millionth_of_a_unit_quaternion_is_one(compiled):
+def test_what_is_within_a_millionth_of_a_unit_quaternion_is_one():
     compiled(BALL)
     for q in (TURNS[0], TURNS):
         assert np.isfinite(tmt.acceleration(q * (1.0 + 0.99e-6), Z, Z, BALL)).all()
 
 
 @pytest.mark.filterwarnings("error")
-def test_numbers_beyond_the_largest_double(compiled):
+def test_numbers_beyond_the_largest_double():
     compiled(tmt.ARM, "mass_matrix", "energy")
     slide = dataclasses.replace(BALL, axis=[(0, 0, 1)], damping=(0,), kind=("slide",), rest=(), armature=())
     compiled(slide, "potential_energy")

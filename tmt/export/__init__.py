@@ -62,10 +62,10 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
     known = [*LANGUAGES, *SYMBOLIC]
     if not isinstance(language, str) or language not in known:
         raise ValueError(f"language is {shown(language)}; expected one of {', '.join(known)}")
-    quantities = tuple(quantities) if isinstance(quantities, list | tuple) else (quantities,)
+    chosen: tuple[Any, ...] = tuple(quantities) if isinstance(quantities, list | tuple) else (quantities,)
     choices = OF_SYMBOLS if language in SYMBOLIC else tuple(QUANTITIES)
-    wrong = [quantity for quantity in quantities if not isinstance(quantity, str) or quantity not in choices]
-    if wrong or not quantities:
+    wrong = [quantity for quantity in chosen if not isinstance(quantity, str) or quantity not in choices]
+    if wrong or not chosen:
         raise ValueError(f"quantity is {shown((*wrong, ())[0])}; expected some of {', '.join(choices)}")
     if not isinstance(head, list | tuple) or not all(isinstance(line, str) for line in head):
         raise ValueError(f"head is {shown(head)}; a sequence of lines is expected")
@@ -80,8 +80,8 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
     lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
     if language in SYMBOLIC:
-        return SYMBOLIC[language](symbols_of(model, quantities), lines)
-    functions = [function_of(model, quantity) for quantity in dict.fromkeys(quantities)]
+        return SYMBOLIC[language](symbols_of(model, chosen), lines)
+    functions = [function_of(model, quantity) for quantity in dict.fromkeys(chosen)]
     return LANGUAGES[language](name, lines, functions, *[single] * (language in ("c", "c header")))
 
 
