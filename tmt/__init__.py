@@ -76,7 +76,7 @@ def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
     Examples
     --------
-    >>> print(tmt.com_positions([0.0, 0.0, 0.0]))  # the upper arm hangs, the forearm points ahead
+    >>> print(tmt.com_positions([0.0, 0.0, 0.0]) + 0.0)  # the upper arm hangs, the forearm points ahead
     [[ 0.    0.   -0.15]
      [ 0.15  0.   -0.3 ]]
     """
