@@ -34,9 +34,10 @@ Methods of `simulate`: "rk4"; "semi_implicit_euler" (MuJoCo's Euler, implicitfas
 "explicit_euler"; "dopri8" (Dormand and Prince, order 8: the best for many digits) and "dopri8_adaptive" (with steps of its own);
 "implicit_midpoint" and "gauss_legendre_4", which no linear motion can make unstable; and "taylor", the true motion.
 
-The functions of states answer the first few hundred with NumPy (literal.py), and then with compiled code, see answers.py;
-`prepare` compiles at once. Results differ in the last bits, and what is wrong is said in the same words. Compiled code is kept on
-disk, see compiled/store.py. Without MuJoCo, `pip install numpy llvmlite mpmath && pip install --no-deps .` is enough.
+NumPy (literal.py) answers calls of up to 500 states, compiled code larger ones and, after `prepare`, all calls of a model, which
+suits loops over single states; see answers.py. Both differ in the last bits, and say what is wrong in the same words. Compiled
+code is kept on disk, see compiled/store.py. Without MuJoCo, `pip install numpy llvmlite mpmath && pip install --no-deps .` is
+enough.
 """
 
 from collections.abc import Sequence
@@ -75,7 +76,7 @@ def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
     Examples
     --------
-    >>> print(tmt.com_positions([0.0, 0.0, 0.0]))  # the upper arm hangs, the forearm points ahead
+    >>> print(tmt.com_positions([0.0, 0.0, 0.0]) + 0.0)  # the upper arm hangs, the forearm points ahead
     [[ 0.    0.   -0.15]
      [ 0.15  0.   -0.3 ]]
     """

@@ -1,7 +1,7 @@
-"""Who answers the public functions: NumPy small requests, machine code all others.
+"""Who answers the public functions: NumPy calls of up to SMALL states, machine code larger ones and those of a prepared model.
 
-A request is small while no more than a few hundred states of a quantity of a model were asked for in this process. Compiled code
-answers where nothing is wrong with what is given; whatever is, the literal form says.
+Nothing depends on earlier calls: the same call gives the same bits. Compiled code answers where nothing is wrong with what is
+given; whatever is, the literal form says.
 """
 
 import math
@@ -19,9 +19,9 @@ from tmt.derivation.quantities import QUANTITIES
 from tmt.model import singular
 from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree
-from tmt.model.values import real_numbers
+from tmt.model.values import real_numbers, shown
 
-MOST = 64  # models that are held
+MOST = 64  # models that are held, besides those that are prepared
 DOUBLE = np.dtype(float)
 known: dict[int, "Answers"] = {}
 
@@ -41,16 +41,18 @@ def answered(quantity: str, model: Tree, *given: ArrayLike) -> Any:
 
 
 def answers_of(model: Tree) -> "Answers":
-    """What is compiled of a model; of the last ones only."""
-    if len(known) >= MOST:
-        known.clear()
+    """What is compiled of a model; of the prepared ones and the last others."""
+    others = [key for key, answers in list(known.items()) if not answers.ready]
+    for key in others if len(others) >= MOST else ():
+        known.pop(key, None)
     return known.setdefault(id(model), Answers(model))
 
 
 def prepare(model: Tree = ARM, *quantities: str) -> None:
-    """Have machine code answer for a model from now on, so that no call of up to some hundred states waits: in a controller.
+    """Have machine code answer all calls of a model from now on: for many calls of one state, in a loop or a controller.
 
-    The first time on a machine all take about a second for an arm and several for a humanoid.
+    Without it NumPy answers those of up to 500 states, ten times as slowly; the last bits differ. The first time on a machine all
+    take about a second for an arm and several for a humanoid.
 
     Parameters
     ----------
@@ -71,25 +73,24 @@ def prepare(model: Tree = ARM, *quantities: str) -> None:
     [-2.20725]
     """
     checked_model(model)
-    if unknown := [name for name in quantities if name not in QUANTITIES]:
-        raise ValueError(f"{unknown[0]!r} is no quantity; known are {', '.join(QUANTITIES)}")
+    if unknown := [name for name in quantities if not isinstance(name, str) or name not in QUANTITIES]:
+        raise ValueError(f"{shown(unknown[0])} is no quantity; known are {', '.join(QUANTITIES)}")
     for quantity in quantities or QUANTITIES:
         (known.get(id(model)) or answers_of(model)).get(quantity)
 
 
 class Answers:
-    """The compiled quantities of a model, and how much was asked of it."""
+    """The compiled quantities of a model, and those that are prepared."""
 
     def __init__(self, tree: Tree):
         self.tree = tree  # held, so that no other has its id
         self.compiled = {name: Evaluator(tree, name) for name in QUANTITIES}
-        self.asked = dict.fromkeys(QUANTITIES, 0)
-        self.ready: dict[str, Callable[..., Any]] = {}  # those of one state that are compiled
+        self.ready: dict[str, Callable[..., Any]] = {}  # of one state, those that are prepared
         self.shapes = [(tree.coordinates.nq,), (tree.coordinates.nv,), (tree.coordinates.nv,)]
         self.may_be_singular = not tree.never_singular
 
     def get(self, quantity: str) -> None:
-        """Have machine code answer for single states."""
+        """Have machine code answer all calls."""
         if quantity not in self.ready:
             self.ready[quantity] = self.compiled[quantity].single()
 
@@ -115,13 +116,11 @@ class Answers:
         except ValueError:
             return None
         count, own = math.prod(batch), self.compiled[quantity]
-        self.asked[quantity] += count
-        if not count or (self.asked[quantity] <= SMALL and quantity not in self.ready):
+        if not count or (count <= SMALL and quantity not in self.ready):
             return None
         if quantity == "acceleration" and self.may_be_singular and self.is_singular(arrays[0]):
             return None
         if not batch:
-            self.get(quantity)
             return own.of_one(*arrays)
         try:
             return own.of_any(*arrays)

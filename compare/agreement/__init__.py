@@ -28,7 +28,7 @@ Quantity = (
 )  # a function, values, or a SymPy matrix and its symbols
 Values = ArrayLike | None
 Names = Sequence[str] | None
-LEAST_DIGITS = 2  # in common: then the constants may be rounded
+ROUNDED = 1e-6  # of its terms: an entry that differs by no more may have rounded constants
 
 
 class Difference(NamedTuple):
@@ -182,7 +182,7 @@ def message(given: Given) -> str:
     """Which entries of which quantity are off, the worst of them, the probable cause, and what can be stated."""
     from ..engines.mujoco.remarks import remarks  # here, so that `import compare` need not wait for it
 
-    why = cause_of(given) if given.fails else Why("", False)
+    why = cause_of(given) if given.fails else Why()
     quantities: dict[str, list[Difference]] = {}
     for row in rows(given, why.text):
         if row.ratio > 1.0:
@@ -200,25 +200,25 @@ def message(given: Given) -> str:
     values = {
         "given": given,
         "quantities": worst,
-        "why": why.text,
+        "why": why,
         "remarks": [say(remark) for remark in remarks(given.reading, has_scenes=False)],
-        "rounded": rounded(given) if why.may_be_rounded else None,
+        "rounded": None if why.is_found or given.rtol else rounded(given),
         "hinge": next((name for name, kind in zip(given.tree.hinge_names, given.tree.kind) if kind == "hinge"), ""),
     }
     text = block("agreement", "message", **values)
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())
 
 
-def rounded(given: Given) -> tuple[int, float] | None:
-    """To how many digits of their terms all agree, and the rtol to state if the constants are rounded.
+def rounded(given: Given) -> float | None:
+    """The rtol to state if the constants are rounded; None if an entry is off by more than that, or is not finite.
 
-    None where a quantity is off by more than that of its own largest entry: terms far from the origin are large, and a slip is
+    Nor may a quantity be off by more than that of its own largest entry: terms far from the origin are large, and a slip is
     small compared with them.
     """
     off = [(np.abs(of.own - of.right), of) for of in given.compared.values()]
-    worst = max(float(over(difference, of.scale).max()) for difference, of in off)
-    of_largest = max(float(over(difference.max(), np.abs(of.right).max())) for difference, of in off)
-    if not 0.0 < worst <= 10.0**-LEAST_DIGITS or not of_largest <= 10.0**-LEAST_DIGITS:
+    worst = float(np.max([over(difference, of.scale).max() for difference, of in off]))
+    of_largest = np.max([over(difference.max(), np.abs(of.right).max()) for difference, of in off])
+    if not (worst <= ROUNDED and of_largest <= ROUNDED):
         return None
     exponent = int(np.floor(np.log10(worst)))
-    return int(-np.log10(worst)), float(f"{np.ceil(worst / 10.0**exponent):.0f}e{exponent}")
+    return float(f"{np.ceil(worst / 10.0**exponent):.0f}e{exponent}")

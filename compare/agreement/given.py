@@ -12,7 +12,7 @@ import numpy as np
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.values import real_numbers, shown
 
-from ..engines.own import ARGUMENTS, OwnEquations, is_function
+from ..engines.own import ARGUMENTS, OwnEquations, in_shape, is_function, numbers_of
 from ..judge.check import over
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
@@ -66,6 +66,7 @@ class Given:
         if not is_number(rtol) or rtol < 0.0:
             raise ValueError(f"rtol is {shown(rtol)}; expected a number of at least 0")
         self.rtol, self.rounding = float(rtol), FACTOR * EPS + float(rtol)
+        self.problems: list[str] = []  # other errors of the user's functions at the states, a line each
         self.read(mjcf)
         self.joints: JointMap = joint_map(self.coordinates, joints)
         functions = {name: value for name, value in brought.items() if is_function(value)}
@@ -136,10 +137,12 @@ class Given:
     def values(self) -> dict[str, np.ndarray]:
         """The user's values of each quantity, in the model's joints, (states, ...)."""
         own = self.own
-        return {
+        values = {
             name: self.asked(own, name) if own is not None and own.has(name) else self.table(name, brought)
             for name, brought in self.brought.items()
         }
+        self.problems = [problem.text for problem in own.problems] if own is not None else []
+        return values
 
     def asked(self, source: object, name: str) -> np.ndarray:
         """A quantity of an engine at the states."""
@@ -149,15 +152,14 @@ class Given:
     def table(self, name: str, brought: object) -> np.ndarray:
         """An array of values in the user's joints, in the model's, (states, ...); a row may hold Mbar flattened by rows."""
         count, nv = len(self.q), self.coordinates.nv
-        array = real_numbers(brought)
+        array = numbers_of(brought)
         shape = (count, nv, nv) if name == "mass_matrix" else (count, nv)
         if array is None:
             raise ValueError(f"{name} is {shown(brought)}; expected real numbers of shape {shape}, or a function")
-        accepted: list[tuple[int, ...]] = [shape, (count, nv * nv)] if name == "mass_matrix" else [shape]
-        accepted += [shape[1:]] * (count == 1) + [(count,)] * (nv == 1)
-        if array.shape not in accepted:
+        flat = in_shape(array, (count, nv * nv)) if name == "mass_matrix" else None
+        values = in_shape(array, shape) if flat is None else flat.reshape(shape)
+        if values is None:
             raise ValueError(f"{name} has shape {array.shape}; expected {shape}, its values at the given q")
-        values = array.reshape(shape)
         return self.joints.mass_matrix(values) if name == "mass_matrix" else self.joints.forces(values)
 
     @cached_property
@@ -189,11 +191,6 @@ class Given:
     @property
     def fails(self) -> bool:
         return any((comparison.ratio > 1.0).any() for comparison in self.compared.values())
-
-    @property
-    def problems(self) -> list[str]:
-        """Other errors of the user's functions, a line each."""
-        return [problem.text for problem in self.own.problems] if self.own is not None else []
 
 
 def rows_given(name: str, values: Any, size: int, count: int | None) -> np.ndarray:

@@ -20,10 +20,10 @@ SECONDS_OF_CAUSE = 10.0  # of a search
 
 
 class Why(NamedTuple):
-    """What explains a difference."""
+    """What explains a difference, or what else is known of it."""
 
     text: str = ""
-    may_be_rounded: bool = True  # whether rounded constants may be the cause
+    is_found: bool = True  # whether that is a cause
 
 
 def cause_of(given: Given) -> Why:
@@ -56,17 +56,17 @@ def of_equations(given: Given, values: Values) -> Why:
     own, M = given.own, values.mass_matrix
     mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), given.coordinates.speeds)
     if np.isfinite(M).all() and not mirrored.is_met:
-        return Why(mirrored.text, False)
+        return Why(mirrored.text)
     is_quick = own is not None and own.seconds <= QUICK and own.has("bias")
     of_speeds = partial(own.bias, values.q) if own is not None and is_quick else None
     diagnosis = diagnose_stated(given.tree, given.joints, values, SECONDS_OF_CAUSE, of_speeds)
     if not diagnosis.differs:
-        return Why()
+        return Why("", False)
     text = diagnosis.sentence()
     if not diagnosis.causes and own is not None and is_quick and own.has("mass_matrix") and values.are_finite:
         every = conditions(own.mass_matrix, own.bias, given.coordinates, values.q, values.qd)
         text = " ".join([*[one.text for one in every if not one.is_met][:1], text])
-    return Why(text, not diagnosis.causes or any("number" in cause.kind for cause in diagnosis.causes))
+    return Why(text, bool(diagnosis.causes))
 
 
 def of_accelerations(given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, own: dict[str, np.ndarray]) -> Why:
@@ -76,8 +76,9 @@ def of_accelerations(given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarra
     if causes := causes_of_forces(tree, q, qd, tau, h, acting, allowed):
         return Why(say(Finding("agreement", "forces", {"causes": causes})))
     if {"mass_matrix", "bias"} <= own.keys():
-        return Why(say(Finding("agreement", "solved")))
+        return Why(say(Finding("agreement", "solved")), False)
     unknown = np.full((*qd.shape, qd.shape[1]), np.nan)
     values = Values(q, qd, unknown, h + acting, (unknown, allowed))
     diagnosis = diagnose_stated(tree, given.joints, values, SECONDS_OF_CAUSE)
-    return Why(diagnosis.sentence() if diagnosis.causes else say(Finding("agreement", "accelerations_alone")))
+    text = diagnosis.sentence() if diagnosis.causes else say(Finding("agreement", "accelerations_alone"))
+    return Why(text, bool(diagnosis.causes))

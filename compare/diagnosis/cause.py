@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from ..judge.finding import Finding
 from ..report.text import say
 from ..robots.joint_map import JointMap
@@ -47,8 +45,7 @@ class Diagnosis(NamedTuple):
 
     differs: bool
     causes: tuple[Cause, ...] = ()  # of one rank, each explains everything; (): nothing does
-    left: float = 1.0  # of the difference that the nearest single number, term or pair leaves, a share
-    digits: float = np.inf  # to which the values agree
+    closest: Cause | None = None  # where nothing explains everything: of single changes the one that leaves least
     details: tuple[dict, ...] = ()  # coefficients that differ, with both numbers or in terms
     entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[hip][knee]"
     compared: int = 0  # entries in all

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..judge.finding import Finding
 from ..judge.words import listed
-from ..report.text import say
+from ..report.text import apart, say
 from ..robots.coordinates import Coordinates
 from .cause import TEMPLATE, Cause, Change, cause_of
 from .model import MOST_SPEEDS, Equations, coefficients_of
@@ -113,7 +113,8 @@ class Compared:
         for one, terms in list(zip(self.differing, self.terms))[:SHOWN]:
             k = int(np.argmax(np.abs(one.off)))
             at = [f"{name} = {value:.6g}" for name, value in list(zip(names, q[k]))[:SHOWN]]
-            details.append({"name": one.name, "terms": terms, "yours": one.yours[k], "right": one.right[k], "at": at})
+            yours, right = (part[k] if abs(part[k]) > one.tolerance[k] else 0.0 for part in (one.yours, one.right))
+            details.append({"name": one.name, "terms": terms, "yours": yours, "right": right, "at": at})
         return tuple(details)
 
     def cause(self, most: int) -> Cause | None:
@@ -221,14 +222,16 @@ def pairs_of_terms(right: dict[str, float], off: dict[str, float]) -> Iterator[t
             new.remove(same[0])
             yield with_factor(off[same[0]], same[0]), with_factor(-off[term], term)
         else:
-            mine = right[term] + off[term]
-            yield with_factor(mine, term) if abs(mine) > SAME_FACTOR * size else "", with_factor(right[term], term)
+            mine, expected = right[term] + off[term], right[term]
+            is_there = abs(mine) > SAME_FACTOR * size
+            yield with_factor(mine, term, expected) if is_there else "", with_factor(expected, term, mine)
     for term in new:
         yield with_factor(off[term], term), ""
 
 
-def with_factor(value: float, term: str) -> str:
-    """A coefficient with its term."""
+def with_factor(value: float, term: str, other: float = 0.0) -> str:
+    """A coefficient with its term; other: a coefficient that it is told from."""
+    number = apart(value, other, 10)
     if term == "1":
-        return f"a constant {value:.10g}"
-    return term if abs(value - 1.0) <= SAME_FACTOR else f"{value:.10g} {term}"
+        return f"a constant {number}"
+    return term if number == "1" else f"{number} {term}"

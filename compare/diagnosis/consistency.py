@@ -59,7 +59,7 @@ def conditions(
     rounding = of_h + FACTOR * EPS * np.max([np.abs(h) for h in (rest, ahead, behind, fast, back)], axis=(0, 2))
 
     def of_even(s, i) -> dict:
-        return {"name": names[i], "value": odd[s, i]}
+        return {"name": names[i], "value": odd[s, i], "unit": "N" if coordinates.units[i] == "m" else "N m"}
 
     def of_quadratic(s, i) -> dict:
         return {"name": names[i], "factor": doubled[s, i] / velocity[s, i] if velocity[s, i] else np.inf}
@@ -148,7 +148,7 @@ def power_balance(mass_matrix: Callable, coordinates: Coordinates, q, qd, veloci
     allowed = SAFETY * error + total**2 * of_M / STEP + 2.0 * total * of_h / largest**2
 
     def values(s) -> dict:
-        return {"yours": given[s] * watts[s], "right": slope[s] * watts[s]}
+        return {"yours": given[s] * watts[s], "right": slope[s] * watts[s], "balls": coordinates.has_balls}
 
     name = "h belongs to M: qd'(h - h at rest) = qd' Mdot qd / 2"
     return closest_to_breaking(name, np.abs(given - slope) * watts, allowed * watts, "W", "power", values)

@@ -60,7 +60,6 @@ class Search:
         self.off = self.weighted(self.right)
         self.size = float(np.linalg.norm(self.off))
         self.sizes = np.array([place.size for place in self.places])
-        self.best: list[Fitted] = []  # of what was fitted so far
         self.is_finished = True
 
     def in_time(self, fits: Callable[[], list[Fitted]]) -> list[Fitted]:
@@ -135,7 +134,6 @@ class Search:
             key = tuple(places.tolist())
             if key not in found or one.ratio < found[key].ratio:
                 found[key] = one
-        self.best += found.values()
         return sorted(found.values(), key=lambda one: one.ratio)
 
     def singles(self) -> list[Fitted]:

@@ -55,7 +55,6 @@ def explanation(search: Search, compared: Compared, seconds: float) -> Diagnosis
         return Diagnosis(False)
     found = Diagnosis(
         True,
-        digits=float(-np.log10(np.abs(search.off).max() * EPS * FACTOR)),
         entries=tuple(entry_name(entry, equations.names) for entry, off in zip(equations.entries, differing) if off),
         compared=int(search.known.any(axis=0).sum()),
     )
@@ -67,8 +66,8 @@ def explanation(search: Search, compared: Compared, seconds: float) -> Diagnosis
     for causes in ranks(search, singles, compared):
         if causes:
             return found._replace(causes=tied(causes))
-    left = min([one.left for one in search.best], default=1.0)
-    return found._replace(left=left, details=compared.details(), seconds=None if search.is_finished else seconds)
+    closest = of_fitted(nearest[0], 2, search) if nearest else None
+    return found._replace(closest=closest, details=compared.details(), seconds=None if search.is_finished else seconds)
 
 
 def ranks(search: Search, singles: Sequence[Fitted], compared: Compared) -> Iterator[list[Cause]]:

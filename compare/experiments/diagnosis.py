@@ -15,6 +15,7 @@ from ..diagnosis.forces import causes_of_forces, force_left_over
 from ..engines.own import QUICK, OwnDynamics
 from ..judge.check import Result, over
 from ..judge.finding import Finding
+from ..judge.scale import EPS, FACTOR
 from ..report.text import say
 from ..robots import Robot
 from . import Experiment
@@ -45,6 +46,11 @@ class Found(NamedTuple):
     def causes(self) -> list[Cause]:
         """Of one rank each, those of Mbar and h first."""
         return [*self.diagnosis.causes, *self.of_forces]
+
+    @property
+    def share(self) -> float:
+        """Of the largest difference of Mbar or h in the scale of its entry."""
+        return self.ratio * FACTOR * EPS
 
     @property
     def stated_by(self) -> str:

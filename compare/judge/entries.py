@@ -68,6 +68,13 @@ class Entries:
 
     @cached_property
     def mass_matrix(self) -> np.ndarray:
+        """Where no body adds a term (two branches) that of the diagonal's, sqrt(ii jj): Mbar is definite."""
+        root = np.sqrt(np.einsum("sii->si", self.added))
+        return np.where(self.added > 0.0, self.added, root[:, :, None] * root[:, None, :])
+
+    @cached_property
+    def added(self) -> np.ndarray:
+        """The terms of Mbar, (states, nv, nv)."""
         translation = np.einsum("b,sbi,sbj->sij", self.mass, self.t, self.t, optimize=True)
         rotation = np.einsum("b,bi,bj->ij", self.inertia, self.turns, self.turns)
         return self.of_states(translation + rotation + np.diag(self.tree.armature))
@@ -102,7 +109,7 @@ class Entries:
     @cached_property
     def energy(self) -> np.ndarray:
         speeds = np.abs(self.qd)
-        return self.potential_energy + np.einsum("si,sij,sj->s", speeds, self.mass_matrix, speeds) / 2.0
+        return self.potential_energy + np.einsum("si,sij,sj->s", speeds, self.added, speeds) / 2.0
 
     @cached_property
     def M(self) -> np.ndarray:
@@ -120,7 +127,7 @@ class Entries:
     def residual(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
         """Of Mbar qdd and the forces together; a factorization of Mbar has terms up to sqrt(Mbar_ii Mbar_jj)."""
         root = np.sqrt(np.einsum("sii->si", self.M))
-        sizes = self.mass_matrix + root[:, :, None] * root[:, None, :]
+        sizes = self.added + root[:, :, None] * root[:, None, :]
         return np.einsum("sij,sj->si", sizes, np.abs(qdd)) + force
 
     def acceleration(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:

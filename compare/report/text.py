@@ -60,10 +60,17 @@ def rounded(value: float) -> str:
     return f"{float(f'{value:.2g}'):g}"
 
 
+def apart(value: float, other: float, digits: int = 6) -> str:
+    """A number with as many digits, at least these, as tell it from another one."""
+    enough = (n for n in range(digits, 17) if f"{value:.{n}g}" != f"{other:.{n}g}")
+    return f"{value:.{next(enough, digits if value == other else 17)}g}"
+
+
 FILTERS = {
     "cell": cell,
     "hash": lambda text: base64.b64encode(hashlib.sha256(text.encode()).digest()).decode(),
     "g": lambda value, digits=3: f"{value:.{digits}g}",
+    "apart": apart,
     "percent": lambda share, digits=2: f"{100.0 * share:.{digits}g} %",
     "degrees": lambda angle, digits=4: f"{angle * 57.29577951308232:.{digits}g} deg",
     "count": count,

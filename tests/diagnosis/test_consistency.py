@@ -7,8 +7,9 @@ import pytest
 from models import PATHS
 
 import tmt
-from compare.diagnosis.consistency import conditions
+from compare.diagnosis.consistency import STEP, conditions
 from compare.engines.mujoco import reading
+from compare.judge.scale import EPS, FACTOR
 from compare.robots.coordinates import Coordinates
 
 ARM = tmt.ARM
@@ -55,3 +56,15 @@ FAULTS = {  # of an M that is not symmetric the power is not asked
 def test_each_condition_is_broken_by_its_fault(mass_matrix, bias, expected):
     found = asked(mass_matrix, bias)
     assert [k for k, condition in enumerate(found) if not condition.is_met] == expected
+
+
+@pytest.mark.parametrize("share, is_met", [(0.97, True), (1.03, False)])
+def test_the_power_is_that_of_M_to_the_rounding_of_its_difference_quotient(share, is_met):
+    """Of a constant M: (1 + 0.5)^2 times 64 eps of its largest entry over the step; a power of h of that size is just beyond."""
+    allowed, qd = 1.5**2 * FACTOR * EPS * 2.0 / STEP, np.array([[1.0, 0.5]])
+    of_slides = Coordinates(("x", "y"), ("slide", "slide"))
+    *_, power = conditions(
+        lambda q: np.tile(np.diag([2.0, 1.0]), (len(q), 1, 1)), lambda q, qd: share * allowed * qd**2 * [1.0, 0.0],
+        of_slides, np.zeros((1, 2)), qd,
+    )  # fmt: skip
+    assert power.unit == "W" and power.tolerance == pytest.approx(allowed, rel=1e-6) and power.is_met is is_met

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import tmt
-from compare.diagnosis.forces import causes_of_forces
+from compare.diagnosis.forces import causes_of_forces, force_left_over
+from compare.judge.entries import Entries
+from compare.judge.scale import EPS, FACTOR
 
 Q, QD, TAU = np.random.default_rng(0).uniform(-3.0, 3.0, (3, 24, 3))
 H = tmt.bias(Q, QD)
@@ -48,3 +50,15 @@ def test_a_cause_leaves_no_more_than_the_tolerance(share, found):
     acting = 0.1 * QD * [0, 1, 0]
     acting[3, 0] += share * TOLERANCE
     assert any(cause.place == "damping of beta" for cause in causes(acting)) is found
+
+
+@pytest.mark.parametrize("share, differs", [(0.95, False), (1.05, True)])
+def test_accelerations_are_off_by_four_times_the_scale_of_a_force(share, differs):
+    """They are rounded before Mbar is multiplied by them."""
+    M, qdd, scale = tmt.mass_matrix(Q), tmt.acceleration(Q, QD, TAU), Entries(tmt.ARM, Q, QD)
+    off = np.zeros_like(QD)
+    off[5, 1] = share * 4.0 * FACTOR * EPS * scale.residual(scale.force(TAU), qdd)[5, 1]
+    wrong = qdd + np.linalg.solve(M, off[..., None])[..., 0]
+    for given, is_over in ((qdd, False), (wrong, differs)):
+        acting, allowed = force_left_over(tmt.ARM, Q, QD, TAU, M, H, given)
+        assert (np.abs(acting) > allowed).any() == is_over

@@ -86,6 +86,7 @@ IN_TIME = dict(zip(SYMBOLS, MOVING))
 @pytest.mark.parametrize("source", [
     types.SimpleNamespace(mass_matrix=M2, bias=h2, symbols=sympy.Matrix(SYMBOLS)),
     {"mass_matrix": (M2, [q1, q2]), "bias": (h2, SYMBOLS)},
+    {"mass_matrix": (M2.as_immutable(), sympy.ImmutableDenseMatrix(SYMBOLS[:2])), "bias": (h2.T.as_immutable(), SYMBOLS)},
     {"mass_matrix": M2.subs(IN_TIME).tolist(), "bias": list(h2.subs(IN_TIME)), "symbols": [MOVING[:2], MOVING[2:]]},
 ])  # fmt: skip
 def test_sympy_matrices_with_their_symbols(source, rng):
@@ -94,6 +95,22 @@ def test_sympy_matrices_with_their_symbols(source, rng):
     assert np.allclose(own.mass_matrix(q), [[[3.0, c], [c, 1.0]] for c in np.cos(q[:, 1])], atol=1e-15)
     assert np.allclose(own.bias(q, v), [[a * b, s * a**2] for (a, b), s in zip(v, np.sin(q[:, 1]))], atol=1e-15)
     assert own.takes_batches == {"mass_matrix": True, "bias": True}
+
+
+@pytest.mark.parametrize("tree", [tmt.ARM, tmt.ARM.lock({"alpha": 0.1, "beta": 0.2})])
+@pytest.mark.parametrize("form", [  # as SymPy's lambdify, its matrices and lists give it
+    lambda x: x[..., None], lambda x: x[None], lambda x: x[None, ..., None], lambda x: x.astype(object), sympy.Matrix,
+    sympy.ImmutableDenseMatrix, lambda x: sympy.Matrix(x).tolist(), lambda x: x.T,
+])  # fmt: skip
+def test_a_value_may_have_further_axes_of_length_1_and_be_of_any_numbers(tree, form, rng):
+    """A batch is not mixed up with it: of h (n, states) the states are asked one by one."""
+    functions = {
+        "mass_matrix": lambda q: form(tmt.mass_matrix(q, tree)),
+        "bias": lambda q, v: form(tmt.bias(q, v, tree)),
+    }
+    own, (q, v) = OwnEquations(functions, Coordinates(tree.hinge_names)), rng.uniform(-2.0, 2.0, (2, 7, len(tree.axis)))
+    assert np.allclose(own.mass_matrix(q), tmt.mass_matrix(q, tree), rtol=1e-14, atol=1e-15)
+    assert np.allclose(own.bias(q, v), tmt.bias(q, v, tree), rtol=1e-13, atol=1e-15)
 
 
 # what cannot be used
@@ -117,9 +134,11 @@ def test_what_is_not_there_or_does_not_fit(source, said):
 
 
 @pytest.mark.parametrize("value, said", [
-    (lambda q: np.eye(2), r"\(2, 2\).*\(3, 3\).* at q = \["), (lambda q: np.eye(3)[None], r"shape \(1, 3, 3\)"),
+    (lambda q: np.eye(2), r"\(2, 2\).*\(3, 3\).* at q = \["),
+    (lambda q: np.eye(9)[None], r"shape \(1, 9, 9\)"), (lambda q: np.eye(3).ravel(), r"shape \(9,\)"),
+    (lambda q: np.stack([np.eye(3)] * 3), r"shape \(3, 3, 3\)"), (lambda q: np.ma.masked_equal(np.eye(3), 1), "masked"),
     (lambda q: None, "None"), (lambda q: 1.0, r"shape \(\)"), (lambda q: [[1, 2], [3]], "real numbers"),
-    (lambda q: np.eye(3) * 1j, "complex"), (lambda q: sys.exit(3), "SystemExit: 3"), (4.0, "4.0.*function"),
+    (lambda q: np.eye(3) * 1j, "real numbers"), (lambda q: sys.exit(3), "SystemExit: 3"), (4.0, "4.0.*function"),
     (lambda: 0, r"TypeError.*expected mass_matrix\(q\)"), (Called.mass_matrix, "TypeError"),
     (lambda q: np.linalg.inv(np.zeros((3, 3))), r"LinAlgError: .*test_own.py, line \d+"),
 ])  # fmt: skip

@@ -211,6 +211,31 @@ def test_a_number_as_read_just_inside_and_just_outside(number):
         assert [row["number"] for row in result.tables["engines_read"][:1]] == [number] * differs
 
 
+ASKED = """import numpy as np
+from compare.engines import outside
+from compare.run.reference import compared_with
+
+if __name__ == "__main__":  # processes of engines begin with this file
+    case, q = compared_with("model", "robot.xml").robot.case(), np.array([[0.3, 0.4]])
+    dies, other = (outside.Outside(name).of(case) for name in ("mortal", "again"))
+    for _ in range(2):
+        print(dies.bias(q, q).shape, other.mass_matrix(q).shape, len(other.readings))
+        try:
+            dies.mass_matrix(q)
+        except outside.EngineError as error:
+            print(error)
+"""
+
+
+def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_again(report):
+    root, mortal = report[0].parent, AGAIN.replace("return tmt.mass_matrix(q, self.tree)", "__import__('os')._exit(3)")
+    (root / "compare/engines/mortal.py").write_text(mortal.format(**RIGHT))
+    (root / "asked.py").write_text(ASKED)
+    command, environment = [sys.executable, "asked.py"], os.environ | {"PYTHONPATH": str(root)}
+    run = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True)
+    assert run.stdout.splitlines() == ["(1, 2) (1, 2, 2) 1", "its process was killed"] * 2, run.stderr
+
+
 def test_bodies_that_move_as_one():
     """Two points of 1 kg at 1 m from each other: 2 kg, and moments 0, 1/2, 1/2 kg m2 about their centre."""
     nothing = np.zeros((3, 3))

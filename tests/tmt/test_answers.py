@@ -24,21 +24,14 @@ def in_parts(found):
     return found if isinstance(found, tuple) else (found,)
 
 
-@pytest.fixture
-def compiled():
-    """Machine code answers for a Tree and a quantity from now on, which takes more than a few questions."""
-
-    def got(tree, *quantities):
-        for quantity in quantities or ("acceleration",):
-            answers.answers_of(tree).get(quantity)
-            answers.answers_of(tree).asked[quantity] = answers.SMALL
-        return tree
-
-    return got
+def compiled(tree, *quantities):
+    """A Tree, prepared."""
+    tmt.prepare(tree, *quantities or ("acceleration",))
+    return tree
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
-def test_machine_code_answers_what_the_literal_form_returns(quantity, compiled, rng):
+def test_machine_code_answers_what_the_literal_form_returns(quantity, rng):
     """Of any batch, as 50 digits have it; and a state has the same bits alone and among others."""
     function, takes = getattr(tmt, quantity), QUANTITIES[quantity].takes
     assert (*signature(function).parameters,) == (*takes, "model")
@@ -63,20 +56,28 @@ def test_machine_code_answers_what_the_literal_form_returns(quantity, compiled, 
     assert quantity == "spring_torque" or not all(map(np.array_equal, whole, expected))  # so it was machine code
 
 
-def test_few_states_are_answered_by_the_literal_form(rng, monkeypatch):
-    monkeypatch.setattr(answers, "MOST", 1)  # of models the last ones are held
-    tmt.mass_matrix(np.zeros(3))
-    tree = dataclasses.replace(tmt.ARM, mass=(1.75, 1.5))
-    q, qd, tau = rng.uniform(-2, 2, (3, 400, 3))
-    known, few = answers.answers_of(tree), (q[:90], qd[:90], tau[:90])
-    assert np.array_equal(tmt.acceleration(*few, tree), literal.acceleration(*few, tree))
-    assert known.asked["acceleration"] == 90 and not known.ready and len(answers.known) == 1
-    late = tmt.acceleration(np.tile(q, (2, 1)), np.tile(qd, (2, 1)), np.tile(tau, (2, 1)), tree)
-    assert "together" in vars(known.compiled["acceleration"])
-    assert late[:400] == pytest.approx(literal.acceleration(q, qd, tau, tree), rel=1e-10, abs=1e-10)
+def test_a_call_gives_the_same_bits_whatever_was_asked_before(rng):
+    """Up to 500 states have the literal form's, more of them, and of a prepared model all, those of machine code."""
+    tree, states = dataclasses.replace(tmt.ARM, mass=(1.75, 1.5)), rng.uniform(-2, 2, (3, 501, 3))
+    parts = 0, slice(1), slice(90), slice(500), slice(501)
+
+    def bits(function, *of_parts):
+        return [function(*states[:, part], tree).tobytes() for part in of_parts]
+
+    first = bits(tmt.acceleration, *parts)
+    assert bits(tmt.acceleration, *parts[::-1])[::-1] == bits(tmt.acceleration, *parts) == first
+    of_numpy = bits(literal.acceleration, *parts)
+    assert [x == y for x, y in zip(first, of_numpy)] == [True, True, True, True, False]
+    tmt.prepare(tree, "acceleration")
+    prepared = bits(tmt.acceleration, *parts)
+    assert all(x != y for x, y in zip(prepared, of_numpy)) and prepared[-1] == first[-1]
+    for mass in range(1, answers.MOST + 2):  # of other models the last ones are held
+        tmt.mass_matrix(np.zeros(3), dataclasses.replace(tmt.ARM, mass=(mass, 1.5)))
+    assert bits(tmt.acceleration, *parts) == prepared
+    assert sum(not one.ready for one in answers.known.values()) <= answers.MOST
 
 
-def test_threads_change_no_bit(compiled, monkeypatch, rng):
+def test_threads_change_no_bit(monkeypatch, rng):
     """Neither those of the states of one question, nor several questions at once; nor if none can be started any more."""
     tree, states = compiled(SMALL), random_states(rng, SMALL, 200)
     alone, used = tmt.acceleration(*states, tree), []
@@ -100,7 +101,7 @@ def test_threads_change_no_bit(compiled, monkeypatch, rng):
 
 
 @pytest.mark.parametrize("convert", [np.ndarray.tolist, np.float32, lambda a: a[..., ::-1].copy()[..., ::-1]])
-def test_numbers_in_any_form_are_taken(convert, compiled):
+def test_numbers_in_any_form_are_taken(convert):
     compiled(tmt.ARM, "acceleration")
     q, qd, tau = np.random.default_rng(0).integers(-8, 9, (3, 5, 3)) / 8.0
     expected = tmt.acceleration(q, qd, tau)
@@ -131,7 +132,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("model, given", WRONG.values(), ids=WRONG)
-def test_what_is_wrong_is_said_in_the_same_words(model, given, compiled):
+def test_what_is_wrong_is_said_in_the_same_words(model, given):
     if isinstance(model, tmt.Tree):
         compiled(model, "acceleration", "mass_matrix")
     with pytest.raises(ValueError) as expected:
@@ -142,14 +143,14 @@ def test_what_is_wrong_is_said_in_the_same_words(model, given, compiled):
     assert "'a', 'c'" in str(found.value) or getattr(model, "body_names", ()) != ("hand",)
 
 
-def test_what_is_within_a_millionth_of_a_unit_quaternion_is_one(compiled):
+def test_what_is_within_a_millionth_of_a_unit_quaternion_is_one():
     compiled(BALL)
     for q in (TURNS[0], TURNS):
         assert np.isfinite(tmt.acceleration(q * (1.0 + 0.99e-6), Z, Z, BALL)).all()
 
 
 @pytest.mark.filterwarnings("error")
-def test_numbers_beyond_the_largest_double(compiled):
+def test_numbers_beyond_the_largest_double():
     compiled(tmt.ARM, "mass_matrix", "energy")
     slide = dataclasses.replace(BALL, axis=[(0, 0, 1)], damping=(0,), kind=("slide",), rest=(), armature=())
     compiled(slide, "potential_energy")

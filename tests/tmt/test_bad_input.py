@@ -5,6 +5,7 @@ import warnings
 from decimal import Decimal
 from fractions import Fraction
 from functools import partial
+from inspect import signature
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import tmt
-from tmt.compiled import evaluator, runner
+from tmt.compiled import evaluator, prepared, runner
 from tmt.derivation.quantities import QUANTITIES
 from tmt.methods import METHODS
 
@@ -102,6 +103,8 @@ PLACES = {
     "tree of a runner": lambda tree: runner(tree, "rk4"),
     "method of a runner": lambda name: runner(tmt.ARM, name),
     "model of prepare": tmt.prepare,
+    "quantity of prepare": lambda name: tmt.prepare(tmt.ARM, name),
+    **{f"{of} of equations": lambda value, of=of: tmt.equations(**{of: value}) for of in signature(tmt.equations).parameters},
 }  # fmt: skip
 
 
@@ -130,10 +133,12 @@ def test_compiled_code_takes_its_own_arrays_only():
     assert "shares memory" in refused(compiled.each, rows[:40], rows[:40], rows[:40], rows[1:])
     refused(fixed, path[0], path[0], path[2], 0.1)
     for value in [*NONSENSE, None, True, Fraction(1, 2)]:
-        if not isinstance(value, float):  # a NaN is a number: the run is NaN, and says so
-            refused(fixed, *path, value)
-            refused(adaptive, *path, 0.1, value)
         refused(compiled.chain, REST, REST, REST, 1.0 if value is True else value)
+    for value in [*NONSENSE, None, True, np.inf, 0, 0.0, -0.1, np.float64(-1e-9)]:
+        for call, *others in ((fixed,), (adaptive, 1e-6), (partial(prepared, tmt.ARM, "rk4"),)):
+            refused(call, *path, value, *others)
+        for call in (adaptive, partial(prepared, tmt.ARM, "dopri8_adaptive")):
+            refused(call, *path, 0.1, value)
 
 
 def test_wrong_terms_are_refused():

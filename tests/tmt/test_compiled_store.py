@@ -4,6 +4,7 @@ import ctypes
 import dataclasses
 import hashlib
 import os
+import shutil
 import stat
 import subprocess
 import sys
@@ -69,18 +70,36 @@ def test_each_question_has_a_file_of_its_own(folder):
     assert len(files(folder)) == len(questions)
 
 
-def test_another_version_of_tmt_or_another_processor_has_other_files(folder, tmp_path, monkeypatch):
+def test_another_version_of_tmt_or_another_processor_has_other_files(folder, monkeypatch):
     for count, name in enumerate(("own_sources", "versions"), start=2):
         asked()
         monkeypatch.setattr(store, name, lambda: "another")
         asked()
         assert len(files(folder)) == count
-    monkeypatch.undo()
-    monkeypatch.setattr(store, "__file__", str(tmp_path / "tmt" / "compiled" / "store.py"))
-    empty = store.own_sources.__wrapped__()
-    (tmp_path / "tmt" / "model").mkdir(parents=True)
-    (tmp_path / "tmt" / "model" / "tree.py").write_text("a = 1")
-    assert store.own_sources.__wrapped__() != empty
+
+
+COPIED = """import sys, tmt
+from pathlib import Path
+from tmt.compiled import sources, store
+
+first, file = sources.own_sources(), Path(tmt.__file__).parent / "model" / "lock.py"
+exec(sys.argv[1])
+tmt.prepare(tmt.ARM, "bias")
+print(first, sources.own_sources(), len(list(store.cache_folder().glob("*.o"))))
+"""
+
+
+@pytest.mark.parametrize("change, kept", [
+    ("", 1), ("file.write_bytes(file.read_bytes() + b'# more')", 0), ("file.unlink()", 0), ("os.utime(file, ns=(0, 0))", 0),
+    ("tmt.model.lock.__loader__ = None", 0),
+])  # fmt: skip
+def test_what_is_compiled_is_kept_under_the_name_of_what_was_imported(change, kept, folder, tmp_path):
+    """Of sources that are others by now, or gone, nothing is kept: the next process would run another version's code."""
+    shutil.copytree(ROOT / "tmt", tmp_path / "tmt", ignore=shutil.ignore_patterns("__pycache__"))
+    command = [sys.executable, "-c", COPIED, f"import os\n{change}"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": "."})
+    first, later, count = done.stdout.split()
+    assert len(first) == 64 and later == (first if kept else "None") and int(count) == kept
 
 
 def to_another_group(path):

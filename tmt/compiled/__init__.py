@@ -3,6 +3,7 @@
 `Library`: of any LLVM text.
 """
 
+from . import sources  # noqa: F401 - which notes what is imported now
 from .evaluator import Evaluator, evaluator
 from .runner import prepared, runner
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy import ndarray
 
 from tmt.methods import METHODS, method_named
-from tmt.model.arguments import checked_model, whole
+from tmt.model.arguments import checked_model, positive, whole
 from tmt.model.tree import Tree
 from tmt.model.values import shown
 
@@ -38,6 +38,11 @@ class Runner:
             made = store.library(source, "run", self.tree, self.stepping, width)
             self.runs[width] = made.function("run", None, *ARGUMENTS)
         return self.runs[width]
+
+    def checked(self, dt, tolerance) -> tuple[float, float]:
+        """A step and a tolerance as numbers above 0; a method of fixed steps has no tolerance."""
+        adaptive = self.stepping.adaptive
+        return positive("dt", dt, "a step in s"), positive("tolerance", tolerance, "a number") if adaptive else 0.0
 
     def follow(self, q, qd, tau, dt: float, tolerance: float, every: int) -> tuple[np.ndarray, int]:
         """Fill the paths q (runs, records, nq) and qd (runs, records, nv) from their first states; tau (runs, nv).
@@ -116,8 +121,7 @@ def runner(tree: Tree, method: str) -> Callable:
         check_paths(tree, q, qd, tau)
         if ended is not None:
             check("ended", ended, (len(tau), 2), np.int64)
-        dt, tolerance, every = real("dt", dt), real("tolerance", tolerance), whole("every", every)
-        codes, evaluations = own.follow(q, qd, tau, dt, tolerance, every)
+        codes, evaluations = own.follow(q, qd, tau, *own.checked(dt, tolerance), whole("every", every))
         if ended is not None:
             ended[:] = codes
         return evaluations
@@ -137,15 +141,7 @@ def prepared(tree: Tree, method: str, q, qd, tau, dt, tolerance=0.0) -> tuple[Ca
     own = runner_of(tree, method)
     check_paths(tree, q, qd, tau)
     info = np.zeros((len(tau), 3), np.int64)
-    given = (
-        *map(address, (q, qd, tau)),
-        real("dt", dt),
-        real("tolerance", tolerance),
-        address(info),
-        1,
-        q.shape[1],
-        len(tau),
-    )
+    given = *map(address, (q, qd, tau)), *own.checked(dt, tolerance), address(info), 1, q.shape[1], len(tau)
     run = partial(own.compiled(1), *given)
     run.arrays = q, qd, tau, info  # they live as long as it
     return run, partial(own.outcome, q, qd, info, 1)
@@ -174,15 +170,3 @@ def check(name: str, array, shape: tuple, dtype=np.float64) -> None:
         return
     wanted = f"a contiguous array of {np.dtype(dtype)} of shape ({', '.join(map(str, shape))}) that can be written"
     raise ValueError(f"{name} {found}; {wanted} is expected")
-
-
-def real(name: str, value) -> float:
-    """The value as a float."""
-    if type(value) is float:
-        return value
-    if isinstance(value, (float, int, np.floating, np.integer)) and not isinstance(value, bool):
-        try:
-            return float(value)
-        except OverflowError:
-            pass
-    raise ValueError(f"{name} is {shown(value)}; a number is expected")

@@ -1,9 +1,9 @@
 """Object files on disk: $TMT_CACHE, else $XDG_CACHE_HOME/tmt, else ~/.cache/tmt.
 
-The name of a file is the hash of all that its machine code depends on: tmt's sources, the versions of llvmlite and LLVM, the
-processor, the tree and what is compiled for it. What lies there is run, so the folder must be the user's own: others may neither
-write to it nor put another in its place. Without such a folder, with a damaged file or a full disk, the code is compiled anew: it
-only costs time. To clear it is to delete the folder.
+The name of a file is the hash of all that its machine code depends on: tmt's sources as imported, the versions of llvmlite and
+LLVM, the processor, the tree and what is compiled for it. What lies there is run, so the folder must be the user's own: others
+may neither write to it nor put another in its place. Without such a folder, with a damaged file or a full disk, the code is
+compiled anew: it only costs time. To clear it is to delete the folder.
 """
 
 import hashlib
@@ -15,13 +15,13 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
-from functools import lru_cache
 from pathlib import Path
 
 from tmt.methods.stepping import Method
 from tmt.model.tree import Tree
 
 from .machine import Library, object_code, versions
+from .sources import own_sources
 
 DIGEST = 32  # bytes of a SHA-256, before the object code
 ABANDONED = 3600.0  # s: a file takes milliseconds to write, but the clocks of a shared disk differ
@@ -35,12 +35,12 @@ class NotOwn(OSError):
 def library(source: Callable[[], str], *what) -> Library:
     """The compiled module of a source, from the folder if it lies there; what: all that the source follows from, with tmt itself.
 
-    Of what is the user's own (a class of trees, a method, a function) nothing is kept, as it may have changed.
+    Of what is the user's own (a class of trees, a method, a function), or of changed sources, nothing is kept: it may be another.
     """
-    words = [word_of(one) for one in what]
+    words = [own_sources(), versions(), *map(word_of, what)]
     if None in words:
         return Library(source())
-    name = hashlib.sha256("\n".join([own_sources(), versions(), *words]).encode()).hexdigest()[:32]
+    name = hashlib.sha256("\n".join(words).encode()).hexdigest()[:32]
     try:
         folder = own_folder()
         found = read(folder / f"{name}.o")
@@ -79,15 +79,6 @@ def read(path: Path) -> bytes | None:
         return None
     digest, code = content[:DIGEST], content[DIGEST:]
     return code if digest == hashlib.sha256(code).digest() else None
-
-
-@lru_cache(maxsize=1)
-def own_sources() -> str:
-    """A name for the contents of tmt's own files."""
-    found = hashlib.sha256()
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
-        found.update(path.read_bytes())
-    return found.hexdigest()
 
 
 def complain(error) -> None:

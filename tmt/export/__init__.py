@@ -60,25 +60,28 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
     """See `tmt.equations`."""
     checked_model(model)
     known = [*LANGUAGES, *SYMBOLIC]
-    if language not in known:
+    if not isinstance(language, str) or language not in known:
         raise ValueError(f"language is {shown(language)}; expected one of {', '.join(known)}")
-    quantities = (quantities,) if isinstance(quantities, str) else tuple(quantities)
+    chosen: tuple[Any, ...] = tuple(quantities) if isinstance(quantities, list | tuple) else (quantities,)
     choices = OF_SYMBOLS if language in SYMBOLIC else tuple(QUANTITIES)
-    if wrong := [quantity for quantity in quantities if quantity not in choices] or [()][: not quantities]:
-        raise ValueError(f"quantity is {shown(wrong[0])}; expected some of {', '.join(choices)}")
-    if isinstance(head, str):
+    wrong = [quantity for quantity in chosen if not isinstance(quantity, str) or quantity not in choices]
+    if wrong or not chosen:
+        raise ValueError(f"quantity is {shown((*wrong, ())[0])}; expected some of {', '.join(choices)}")
+    if not isinstance(head, list | tuple) or not all(isinstance(line, str) for line in head):
         raise ValueError(f"head is {shown(head)}; a sequence of lines is expected")
     if not (isinstance(name, str) and re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name)) or is_word(name):
         raise ValueError(
             f"name is {shown(name)}; expected an identifier, no word of C, Python or MATLAB and no quantity"
         )
-    if single and language not in ("c", "c header"):
-        raise ValueError(f"single precision is written in C only, not in {language}")
-    lines = [line for text in head for line in str(text).splitlines() or [""]]  # a comment each
+    if not isinstance(single, bool) or (single and language not in ("c", "c header")):
+        raise ValueError(
+            f"single is {shown(single)}; single precision is True or False, and in C only (not in {language})"
+        )
+    lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
     if language in SYMBOLIC:
-        return SYMBOLIC[language](symbols_of(model, quantities), lines)
-    functions = [function_of(model, quantity) for quantity in dict.fromkeys(quantities)]
+        return SYMBOLIC[language](symbols_of(model, chosen), lines)
+    functions = [function_of(model, quantity) for quantity in dict.fromkeys(chosen)]
     return LANGUAGES[language](name, lines, functions, *[single] * (language in ("c", "c header")))
 
 

@@ -16,7 +16,6 @@ import time
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from functools import cache, cached_property
 from multiprocessing import get_context
 from pathlib import Path
 from types import ModuleType
@@ -78,26 +77,31 @@ class OutsideDynamics:
         self.name, self.case, self.tree, self.coordinates = name, case, case.tree, case.coordinates
         self.file = File(Path(case.robot.mjcf).resolve(), case.joints, case.coordinates.all_kinds)
         self.key = hash((self.file, self.tree))
+        self.readings: dict[ProcessPoolExecutor, Mapping] = {}  # by the process; a new one has read nothing
 
-    @cached_property
+    @property
     def reading(self) -> Mapping:
         """Of the child: its numbers as read, which of them were mended, and seconds until the model was there."""
-        return self.ask("read", self.name, self.file, self.tree)
+        own = process(self.name)
+        if own not in self.readings:
+            self.readings[own] = self.ask("read", self.name, self.file, self.tree)
+        return self.readings[own]
 
     def ask(self, act: str, *arguments):
         """The value of a function of answers.py in the engine's process; EngineError if it fails or the process ends."""
+        if act != "read":
+            self.reading  # noqa: B018 - mends what it has read differently
         begin = time.monotonic()
         try:
             return process(self.name).submit(answer, self.key, act, arguments).result()
         except BrokenProcessPool:
-            process.cache_clear()
+            processes.pop(self.name, None)  # those of other engines go on
             if time.monotonic() - begin > LIMIT:
                 raise TooLong(f"no answer within {LIMIT:g} s") from None
             raise EngineError("its process was killed") from None
 
     def rows(self, quantity: str, *values) -> np.ndarray:
         """A quantity at many states, (states, ...)."""
-        self.reading  # noqa: B018 - mends what it has read differently
         return self.ask("each", quantity, *(np.atleast_2d(np.asarray(value, float)) for value in values))
 
     def mass_matrix(self, q):
@@ -118,7 +122,6 @@ class OutsideDynamics:
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
         """Motions recorded at every multiple of dt."""
-        self.reading  # noqa: B018
         t, (batch, states), ended = np.linspace(0.0, dt * steps, steps + 1), rows_of_states(q, v, tau), []
         paths = []
         for state in zip(*states):
@@ -147,7 +150,12 @@ class OutsideDynamics:
         return run, read
 
 
-@cache
+processes: dict[str, ProcessPoolExecutor] = {}  # by the engine
+
+
 def process(name: str) -> ProcessPoolExecutor:
-    """The process of an engine."""
-    return ProcessPoolExecutor(1, get_context("spawn"), initializer=started, initargs=(RECORDS[name].environment,))
+    """The process of an engine, begun where there is none."""
+    if name not in processes:
+        begin = (RECORDS[name].environment,)
+        processes[name] = ProcessPoolExecutor(1, get_context("spawn"), initializer=started, initargs=begin)
+    return processes[name]

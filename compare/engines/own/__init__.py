@@ -11,10 +11,10 @@ from tmt.methods.stepping import stepped
 from ...robots.case import Case
 from .. import GRID, EngineRecord, Method, Motion, Prepared, Setting, rows_of_states
 from .equations import OwnEquations
-from .functions import ARGUMENTS, QUICK, OwnError, Problem, is_function, state_in_words
+from .functions import ARGUMENTS, QUICK, OwnError, Problem, in_shape, is_function, numbers_of, state_in_words
 
 __all__ = ["ARGUMENTS", "QUICK", "Own", "OwnDynamics", "OwnEquations", "OwnError", "Problem", "is_function"]
-__all__ += ["state_in_words"]
+__all__ += ["in_shape", "numbers_of", "state_in_words"]
 
 ENGINE = EngineRecord(order=50, label="yours", possessive="your", from_file=True)
 RK4_SCHEMES = ("rk4", "rk4_mean_speed")  # the second where a ball makes MuJoCo's RK4 another scheme

@@ -60,7 +60,7 @@ class OwnEquations:
         # of each function that was called: whether it takes batches; the time of one state, alone and in a batch, s; its shape
         self.takes_batches: dict[str, bool] = {}
         self.times, self.shapes = {}, {}
-        self.errors: dict[tuple[str, str], list] = {}  # (quantity, error): [first state, text, number of states]
+        self.errors: dict[tuple[str, str], list] = {}  # (quantity, error): [first state, text, all states, hashed]
 
     def has(self, name: str) -> bool:
         return name in self.functions
@@ -69,7 +69,7 @@ class OwnEquations:
     def problems(self) -> list[Problem]:
         """The errors so far, each once."""
         errors = [(quantity, *error) for (quantity, _), error in self.errors.items()]
-        return [Problem(name, state, f"{text} at {state}{and_more(count - 1)}") for name, state, text, count in errors]
+        return [Problem(name, at, f"{text} at {at}{and_more(len(all_of) - 1)}") for name, at, text, all_of in errors]
 
     @property
     def seconds(self) -> float:
@@ -209,7 +209,7 @@ class OwnEquations:
 
     def tried_together(self, name: str, given: list[np.ndarray]) -> np.ndarray | None:
         """Values of several states at once; None if it does not take batches."""
-        before = {key: list(value) for key, value in self.errors.items()}
+        before = {key: [*value[:2], set(value[2])] for key, value in self.errors.items()}
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore")
@@ -258,4 +258,5 @@ class OwnEquations:
         first = int(np.argmax(where))
         text = what if what.startswith(name) else f"{name} {what}"
         state = state_in_words([part[first] for part in given])
-        self.errors.setdefault((name, what), [state, text, 0])[2] += int(np.sum(where))
+        rows = np.concatenate([part[where] for part in given], axis=1)
+        self.errors.setdefault((name, what), [state, text, set()])[2].update(hash(row.tobytes()) for row in rows)

@@ -95,7 +95,7 @@ def of_tree(tree: tmt.Tree, coordinates: Coordinates) -> dict[str, Callable]:
 
 def is_function(value: object) -> bool:
     """Whether a value is a function, or an expression in symbols; else it is numbers."""
-    return callable(value) or hasattr(value, "free_symbols") or is_pair(value)
+    return callable(value) or bool(getattr(value, "free_symbols", None)) or is_pair(value)
 
 
 def is_pair(value: object) -> bool:
@@ -122,8 +122,8 @@ def of_symbols(name: str, matrix: object, symbols: object, coordinates: Coordina
     import sympy
 
     try:
-        symbols = list(sympy.flatten(symbols))
-        entries = [sympy.sympify(entry) for entry in sympy.flatten([matrix])]
+        nested = [value.tolist() if hasattr(value, "tolist") else value for value in (symbols, matrix)]
+        symbols, entries = sympy.flatten([nested[0]]), [sympy.sympify(entry) for entry in sympy.flatten([nested[1]])]
     except Exception as error:  # whatever SymPy makes of what is given
         raise OwnError(f"{name} is {shown(matrix)}; expected a SymPy matrix ({shown(str(error))})") from None
     nq, nv = coordinates.nq, coordinates.nv
@@ -188,20 +188,32 @@ def converted(name: str, value: object, expected: tuple, count: int | None) -> n
     """The value of a function as an array of float; OwnError if its type or shape is wrong."""
     expected = expected if count is None else (count, *expected)
     shape = f"({', '.join('bodies' if n is None else str(n) for n in expected)}{',' * (len(expected) == 1)})"
-    try:
-        array = None if value is None else np.asarray(value)
-        if array is not None and array.dtype.kind == "O":  # of SymPy's numbers and the like
-            array = array.astype(float)
-    except (Exception, SystemExit):  # whatever the conversion of a user's own object raises
-        array = None
-    if array is not None and array.dtype.kind == "c":
-        raise OwnError(f"{name} is complex: {shown(value)}; expected real numbers of shape {shape}")
-    array = None if array is None else real_numbers(array)
+    array = numbers_of(value)
     if array is None:
         raise OwnError(f"{name} is {shown(value)}; expected real numbers of shape {shape}")
-    if len(array.shape) != len(expected) or any(n not in (None, m) for n, m in zip(expected, array.shape)):
+    if None in expected and array.ndim == len(expected):
+        expected = tuple(m if n is None else n for n, m in zip(expected, array.shape))
+    fitted = in_shape(array, expected) if None not in expected else None
+    if fitted is None:
         raise OwnError(f"{name} has shape {array.shape}; expected {shape}")
-    return array
+    return fitted
+
+
+def numbers_of(value: object) -> np.ndarray | None:
+    """Values as an array of float, also those of SymPy and other objects; None if they are anything else."""
+    try:
+        array = real_numbers(value)
+        if array is None and value is not None and np.asarray(value).dtype.kind == "O":
+            return np.asarray(value).astype(float)
+        return array
+    except (Exception, SystemExit):  # whatever the conversion of a user's own object raises
+        return None
+
+
+def in_shape(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray | None:
+    """An array in a shape that differs in axes of length 1 alone, as (n, 1) of a column; else None."""
+    given, expected = ([n for n in axes if n != 1] for axes in (array.shape, shape))
+    return array.reshape(shape) if given == expected else None
 
 
 def same(together: np.ndarray, singles: np.ndarray) -> bool:

@@ -6,6 +6,8 @@ from small_runs import InProcess, Lines
 
 from compare.experiments import diagnosis, parameters
 from compare.judge.check import Result
+from compare.judge.scale import EPS, FACTOR
+from compare.report.text import say
 from compare.run import examine as experiment
 
 HEAVY = XML.replace('mass="1.5"', 'mass="1.51"')
@@ -24,7 +26,9 @@ def test_the_arm_has_nothing_to_explain():
     for k, field in enumerate(("ratio", "force_ratio")):
         for ratio, passes in ((1.0, True), (1.001, False)):
             setup.background["diagnosis"] = found._replace(**{field: ratio})
-            assert diagnosis.rows(setup).checks[k].passed is passes
+            noted = diagnosis.rows(setup)
+            assert noted.checks[k].passed is passes and [note.kind == "nothing" for note in noted.notes] == [passes]
+    assert found._replace(ratio=1e3).share == 1e3 * FACTOR * EPS
 
 
 def test_a_cause_is_a_row_and_a_note_of_the_check_that_fails():
@@ -33,7 +37,7 @@ def test_a_cause_is_a_row_and_a_note_of_the_check_that_fails():
     assert row["explains"] == pytest.approx(1.51, rel=1e-12) and row["left_over"] < 1e-9
     named = {"rank": 2, "kind": "number", "place": "mass of forearm", "stated": 1.5, "unit": "kg", "tied": 0}
     assert row.items() >= named.items() and (cause["place"], cause["found"]) == (row["place"], row["explains"])
-    assert "mass of forearm" in check.note and "1.51 kg" in check.note
+    assert "mass of forearm" in check.note and "1.51 kg" in check.note and list(map(say, result.notes)) == [check.note]
     ((*_, caption),) = [draw() for draw in diagnosis.figures(result, None)]
     assert caption.values["names"][0] == "mass of forearm"
 

@@ -97,7 +97,7 @@ EDITS = (
          "MuJoCo's matrix is definite if ours is"),
     Edit("mass", "check_definiteness", "(least / _1).min()", "(least / _1).max()",
          "the best state decides"),
-    Edit("judge.entries", "Entries.mass_matrix", "translation + rotation + _1",
+    Edit("judge.entries", "Entries.added", "translation + rotation + _1",
          "100 * (translation + rotation + _1)", "the scale x 100"),
     Edit("judge.entries", "Entries.weight", "g * _1", "100 * g * _1", "the scale x 100"),
     Edit("judge.entries", "Entries.bias", "_1 + _2 + self.weight", "_1 + 100 * _2 + self.weight",

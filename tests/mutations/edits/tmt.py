@@ -31,5 +31,8 @@ EDITS = (
     Edit("semi_implicit", "SemiImplicitEuler.gains_held", "(tree.position_gain, tree.speed_gain)",
          "(tree.speed_gain, tree.position_gain)", "gains of positions act on speeds"),
     Edit("answers", "Answers.of_one", "self.may_be_singular", "False", "compiled code answers where Mbar is singular"),
-    Edit("answers", "Answers.of_any", "self.asked[quantity] <= SMALL", "True", "machine code never answers unasked"),
+    Edit("answers", "answers_of", "not answers.ready", "True", "a prepared model is forgotten"),
+    Edit("compiled.sources", "own_sources", "stamps(IMPORTED) == IMPORTED", "True", "changed sources keep their name"),
+    Edit("compiled.runner", "Runner.checked", "positive('dt', dt, 'a step in s')", "float(dt)", "a step may be negative"),
+    Edit("answers", "Answers.of_any", "count <= SMALL", "True", "machine code never answers unasked"),
 )  # fmt: skip

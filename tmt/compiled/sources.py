@@ -1,0 +1,38 @@
+"""Tmt's own files as they were when it was imported: what is compiled follows from these, not from what lies there later."""
+
+import hashlib
+import os
+import sys
+from collections.abc import Iterable
+from functools import lru_cache
+from importlib.machinery import SourceFileLoader
+from pathlib import Path
+
+
+def stamps(files: Iterable[str]) -> dict[str, tuple[int, int]]:
+    """When each file was written, and its size."""
+    found = {file: os.stat(file) for file in files}
+    return {file: (of.st_mtime_ns, of.st_size) for file, of in found.items()}
+
+
+IMPORTED = stamps(sorted(map(str, Path(__file__).parents[1].rglob("*.py"))))
+
+
+@lru_cache(maxsize=1)
+def contents() -> str:
+    found = hashlib.sha256()
+    for file in IMPORTED:
+        found.update(Path(file).read_bytes())
+    return found.hexdigest()
+
+
+def own_sources() -> str | None:
+    """A name for the contents of tmt's files; None if one has changed since the import, or a module is not from a file."""
+    modules = [module for name, module in list(sys.modules.items()) if name.startswith("tmt.")]
+    if not all(type(module.__loader__) is SourceFileLoader and module.__file__ in IMPORTED for module in modules):
+        return None
+    try:
+        name = contents()
+        return name if stamps(IMPORTED) == IMPORTED else None
+    except OSError:  # one is gone
+        return None
