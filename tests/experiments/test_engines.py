@@ -155,22 +155,20 @@ class Other(TmtDynamics):
 
     def __init__(self, quantity="", share=0.0, eps=0.0):
         super().__init__(ARM.case())
-        self.quantity, self.off = quantity, share * FACTOR * eps
+        self.quantity = quantity
+        if share:
+            self.right = getattr(self, quantity)
+            off = share * FACTOR * eps
+            setattr(self, quantity, lambda *states: self.right(*states) + off * self.size(*states))
 
     def has(self, quantity):
         return quantity != "bias" or self.quantity != "none"
 
-    def __getattr__(self, quantity):
-        values = super().__getattr__(quantity)
-        return (
-            (lambda *states: values(*states) + self.off * self.size(*states)) if quantity == self.quantity else values
-        )
-
     def size(self, q, v=0.0, tau=0.0):
-        scale, quantity = Entries(self.tree, q, v), self.quantity
-        if quantity == "acceleration":
-            return scale.acceleration(scale.force(tau), super().__getattr__(quantity)(q, v, tau))
-        return getattr(scale, quantity)
+        scale = Entries(self.tree, q, v)
+        if self.quantity == "acceleration":
+            return scale.acceleration(scale.force(tau), self.right(q, v, tau))
+        return getattr(scale, self.quantity)
 
 
 @pytest.mark.parametrize("precision", RECORDS)
