@@ -76,6 +76,7 @@ class Option(NamedTuple):
     metavar: str | None = None
     default: object = None
     of_every: bool = False  # whether every experiment takes it; else `all`, and those whose record has it
+    example: str = ""  # of its use, in the help of those
 
 
 OPTIONS = {
@@ -83,9 +84,9 @@ OPTIONS = {
     "--quick": Option(None, of_every=True),
     "--mjcf": Option(metavar="FILE", of_every=True),
     "--reference": Option(stated_reference, "WHAT", of_every=True),
-    "--joints": Option(metavar="LIST"),
-    "--scenes": Option(metavar="FILE"),
-    "--dt": Option(seconds(5.0), "S"),
+    "--joints": Option(metavar="LIST", example=" --mjcf robot.xml --reference my_equations.py:"),
+    "--scenes": Option(metavar="FILE", example=" --scenes my.toml"),
+    "--dt": Option(seconds(5.0), "S", example=" --mjcf robot.xml --integrator Euler --dt 0.001"),
     "--integrator": Option(metavar="NAME"),
 }
 
@@ -126,8 +127,12 @@ def command_parser(name: str, usage: str, template: str, options: dict[str, Opti
 
 
 def help_of(experiment: str) -> str:
-    first, *rest = block(experiment, "help").split("\n")
-    return "\n".join([fill(first, LINE_WIDTH), *rest])
+    """The summary of an experiment, its own text, and commands."""
+    record, summary = EXPERIMENTS[experiment], fill(block(experiment, "summary"), LINE_WIDTH - 1)
+    examples = [" --mjcf my_arm.xml" if record.needs_file else ""]
+    examples += [OPTIONS[name].example for name in record.options if OPTIONS[name].example]
+    text = block(experiment, "help")
+    return block(TEXT, "experiment", name=experiment, summary=summary, text=text, examples=examples)
 
 
 def expected(word: str, known: dict[str, str], choices: str) -> str:
@@ -154,8 +159,9 @@ def request(arguments: Sequence[str]) -> argparse.Namespace:
             whole.error(f"{option} is an option of {', '.join(takers)}; {name} does not take it")
     if options.joints and ":" not in (options.reference or ""):
         whole.error("--joints needs equations of your own: --reference FILE.py:OBJECT or MODULE:OBJECT")
-    if name == "diagnosis" and not (options.mjcf or options.reference or options.version):
-        whole.error("diagnosis needs a robot's file or equations of your own (--mjcf, --reference)")
+    needs_file = name in EXPERIMENTS and EXPERIMENTS[name].needs_file
+    if needs_file and not (options.mjcf or options.reference or options.version):
+        whole.error(f"{name} needs a robot's file or equations of your own (--mjcf, --reference)")
     return options
 
 

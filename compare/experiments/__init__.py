@@ -32,6 +32,7 @@ class Experiment:
     order: int  # of `all` and of the report
     serves_own: bool = True  # whether it applies to a user's own equations; if not, the macro not_of_own says why
     asks_of_own: tuple[str, ...] | None = None  # which of a user's own functions it calls; None: all
+    needs_file: bool = False  # or equations of a user's own: there is nothing to say of the arm's
     options: tuple[str, ...] = ()  # of the command line, in addition to those of every experiment
     in_quick: bool = True  # whether a quick run of several experiments has it
     timed: bool = False  # it measures times: it runs last, while nothing else does

@@ -21,7 +21,7 @@ from ..robots import Robot
 from . import Experiment
 from .setup import Setup
 
-EXPERIMENT = Experiment(order=80, options=("--joints",))
+EXPERIMENT = Experiment(order=80, needs_file=True, options=("--joints",))
 SECONDS = 8.0  # of a search
 SECONDS_OF_CONDITIONS = 3.0
 CALLS_OF_CONDITIONS, CALLS_FOR_A_JOINT = 30, 16  # of Mbar and h at each state, that the conditions take, about
