@@ -12,7 +12,6 @@ from small_runs import Lines
 from compare.engines.mujoco.reading import read
 from compare.experiments import figures_overview, module, stability
 from compare.experiments.speed import first_screen as of_speed
-from compare.experiments.speed.first_screen import Cheapest, Curve
 from compare.judge.check import About, Result
 from compare.report.questions import answers, true_errors
 from compare.report.style import BLUE, ORANGE, RED
@@ -238,15 +237,12 @@ def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_n
         timed("tmt", "rk4", 1e-9, 2.0), timed("heyoka", "Taylor", None, None, why_not="absent"),
     ]  # fmt: skip
     result = Result("speed", rows=rows, curves={"regular": "s", "unit": "rad"})
-    assert of_speed.best_curves(result) == [
-        Curve("tmt", [1e-3, 1e-6, 1e-9], [1.0, 4.0, 5.0], Cheapest("tmt", "dopri8", 4.0)),
-        Curve("mujoco", [1.1e-6], [10.0], None),  # which is just outside of the error asked for
-    ]
+    assert of_speed.best_rows(result) == {"tmt": [rows[0], rows[2], rows[3]], "mujoco": [rows[4]]}
+    assert of_speed.within_target(rows[4:5]) is None  # just outside of the error asked for
     rows.append(timed("mujoco", "RK4", 3e-3, 1e-6, dt_s=0.00244140625, steps=2048.0))
     rows.append(timed("scipy", "DOP853", 4.5e-3, 1e-7))  # which is not the cheapest beside MuJoCo
-    best = of_speed.cheapest(of_speed.best_curves(result))
-    expected = [Cheapest("mujoco", "RK4", 3.0, 2048.0, 0.00244140625), Cheapest("tmt", "dopri8", 4.0)]
-    assert best == expected
+    best = of_speed.cheapest(of_speed.best_rows(result))
+    assert best == [{name: row.get(name) for name in of_speed.SETTING} for row in (rows[-2], rows[2])]
     assert {("o", to_hex(BLUE), 1e-6), ("s", to_hex(ORANGE), 1e-6)} <= marks("speed", result)
 
 

@@ -63,7 +63,6 @@ class MinimalCalls:
             "MuJoCo, mj_forward called from Python": ("forward_dynamics", called),
             "MuJoCo, mj_forward": ("forward_dynamics", run("mj_forward")),
             "MuJoCo, equal work": ("forward_dynamics", run(*before, "mj_factorM", *after, "mj_solveM")),
-            "MuJoCo, equal work, no solve": ("mass_matrix_and_bias", run(*before, *after)),
             "MuJoCo, mj_step": ("rk4_step", run("mj_step")),
         }
 

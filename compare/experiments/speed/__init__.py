@@ -17,7 +17,7 @@ from ...truth.reference import LOST, has_no_reference
 from .. import Experiment
 from ..setup import Setup
 from . import accuracy, advice, evaluations
-from .first_screen import best_curves, cheapest, target
+from .first_screen import best_rows, cheapest, target
 from .runs import FIRST_STEPS, measured, prepared, rows_of_scene, take_times
 from .settings import followed, left_out, regular_of, scenes_of
 
@@ -108,7 +108,7 @@ def add_times(setup: Setup, cases: Sequence[Case], references, floors, rows_of) 
 
 def add_advice(result: Result, setup: Setup, compiled: evaluations.Evaluations) -> None:
     """The cheapest settings, and the cost of one evaluation."""
-    if settings := cheapest(best_curves(result)):
+    if settings := cheapest(best_rows(result)):
         result.headline = result.finding("headline", settings=settings, **target(result))
         result.top.append(result.finding("answer", settings=settings, **target(result)))
     table = advice.advice(result.rows, list(result.curves["floors"]))
@@ -144,5 +144,5 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
 def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
     from .figures_speed import draw_overview  # matplotlib is for the process that draws
 
-    if best_curves(results["speed"]):
+    if best_rows(results["speed"]):
         yield partial(draw_overview, results["speed"])

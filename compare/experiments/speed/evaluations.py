@@ -20,7 +20,6 @@ MOST_OF_MANY = 3  # nv up to which MANY states fit into memory
 MOST_CALLS = 100_000  # repetitions in a timed call
 MOST_NUMBERS = 10_000_000  # of a path of many steps
 FORWARD, RK4_STEP = "forward_dynamics", "rk4_step"
-NAMES_IN_TMT = {FORWARD: "acceleration", "mass_matrix_and_bias": "mass_matrix_and_bias"}  # of tmt.compiled
 CALLED = "tmt.acceleration, called from Python"
 WAITING, EACH, IN_LANES = "compiled, each waits for the last", "compiled", "compiled, side by side"
 WHOLE = "MuJoCo, mj_forward"
@@ -29,10 +28,9 @@ COLUMNS = ["quantity", "implementation", "states", "threads", "ns_per_state", "o
 
 
 class Evaluations(NamedTuple):
-    """All evaluations, compiled and not yet timed. Keys: (quantity, implementation, states, threads)."""
+    """All evaluations, compiled and not yet timed."""
 
-    loops: dict[tuple, Callable]  # {key: loop(count)} of one state
-    of_many: dict[tuple, Callable]  # {key: call} of all its states
+    loops: dict[tuple, Callable]  # {(quantity, implementation, states, threads): loop(count) of calls}
     absent: dict[tuple, str]  # {(quantity, implementation): why it is not timed}
 
 
@@ -45,72 +43,70 @@ def compiled_evaluations(setup: Setup) -> Evaluations:
     rng = np.random.default_rng([SEED, 2])
     states = [coordinates.random(rng, many), *rng.uniform(-3.0, 3.0, (2, many, coordinates.nv))]
     first, few = [np.ascontiguousarray(a[0]) for a in states], [a[:FEW] for a in states]
-    made = Evaluations(of_one_state(tree, first), of_many_states(tree, few) | of_many_states(tree, states), {})
+    loops, absent = of_one_state(tree, first) | of_many_states(tree, few) | of_many_states(tree, states), {}
     if missing := MinimalCalls.unavailable():
-        made.absent[FORWARD, WHOLE] = missing
+        absent[FORWARD, WHOLE] = missing
     else:
         minimal = MinimalCalls(setup.engines["mujoco"].of(setup.robot.case()))
-        made.loops.update({(quantity, name, 1, 1): loop for name, (quantity, loop) in minimal.loops(*first).items()})
-    for loop in made.loops.values():
-        loop(1)  # its code is compiled, or loaded, on the first call
-    for (_, _, count, _), call in made.of_many.items():
-        if count == FEW:
+        loops |= {(quantity, name, 1, 1): loop for name, (quantity, loop) in minimal.loops(*first).items()}
+    for (_, _, count, _), loop in loops.items():
+        if count <= FEW:
+            loop(1)  # its code is compiled, or loaded, on the first call
+    return Evaluations(loops, absent)
+
+
+def repeated(call: Callable[[], object]) -> Callable[[int], None]:
+    def loop(count):
+        for _ in range(count):
             call()
-    return made
+
+    return loop
 
 
 def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> dict[tuple, Callable]:
     """Loops of tmt at one state."""
-    (q, qd, tau), n = state, len(tree.axis)
+    q, qd, tau = state
     tmt.prepare(tree)
-    run, most = runner(tree, "rk4"), min(MOST_CALLS, MOST_NUMBERS // n)
+    run, chain = runner(tree, "rk4"), evaluator(tree, "acceleration").chain
+    most = min(MOST_CALLS, MOST_NUMBERS // len(tree.axis))
     paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
     paths[0][0, 0], paths[1][0, 0] = q, qd
 
     def steps(count):
         run(*(path[:, : min(count, most) + 1].copy() for path in paths), tau[None], 1e-4)
 
-    def called(count):
-        for _ in range(count):
-            tmt.acceleration(q, qd, tau, tree)
-
-    loops = {(FORWARD, CALLED, 1, 1): called, (RK4_STEP, EACH, 1, 1): steps}
-    for quantity, name in NAMES_IN_TMT.items():
-        chain = evaluator(tree, name).chain
-        loops[quantity, WAITING, 1, 1] = lambda count, chain=chain: chain(q, qd, tau, count)
-    return loops
+    return {
+        (FORWARD, CALLED, 1, 1): repeated(lambda: tmt.acceleration(q, qd, tau, tree)),
+        (FORWARD, WAITING, 1, 1): lambda count: chain(q, qd, tau, count),
+        (RK4_STEP, EACH, 1, 1): steps,
+    }
 
 
 def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray]) -> dict[tuple, Callable]:
-    """Calls of tmt for many states, (N, nq and nv)."""
+    """Loops of tmt over many states, (N, nq and nv)."""
     q, qd, tau = (np.ascontiguousarray(a) for a in states)
-    count, calls, run = len(qd), {}, runner(tree, "rk4")
-    for quantity, name in NAMES_IN_TMT.items():
-        compiled = evaluator(tree, name)
-        out = np.ones((count, compiled.size))
-        wide = [np.ascontiguousarray(a.T) for a in (q, qd, tau, out)]
-        calls[quantity, EACH, count, 1] = lambda compiled=compiled, out=out: compiled.each(q, qd, tau, out)
-        calls[quantity, IN_LANES, count, 1] = lambda compiled=compiled, wide=wide: compiled.lanes(*wide)
-    calls[FORWARD, CALLED, count, cores()] = lambda: tmt.acceleration(q, qd, tau, tree)
+    count, run, compiled = len(qd), runner(tree, "rk4"), evaluator(tree, "acceleration")
+    out = np.ones((count, compiled.size))
+    wide = [np.ascontiguousarray(a.T) for a in (q, qd, tau, out)]
     paths = [np.stack([part, part], axis=1) for part in (q, qd)]
-    calls[RK4_STEP, IN_LANES, count, cores()] = lambda: run(*paths, tau, 1e-3)
-    return calls
+    return {
+        (FORWARD, EACH, count, 1): repeated(lambda: compiled.each(q, qd, tau, out)),
+        (FORWARD, IN_LANES, count, 1): repeated(lambda: compiled.lanes(*wide)),
+        (FORWARD, CALLED, count, cores()): repeated(lambda: tmt.acceleration(q, qd, tau, tree)),
+        (RK4_STEP, IN_LANES, count, cores()): repeated(lambda: run(*paths, tau, 1e-3)),
+    }
 
 
 def costs(setup: Setup, made: Evaluations) -> list[dict]:
     """The rows of evaluations.csv, by quantity, the slowest first, then what is not timed."""
     calls = {key: counted(loop) for key, loop in made.loops.items()}
-    for key, call in made.of_many.items():  # repeated, so that caches are as warm as in use
-        times = max(1, 10 * FEW // key[2])
-        calls[key] = (lambda call=call, times=times: [call() for _ in range(times)]), times * key[2]
     times = timing.in_turns([call for call, _ in calls.values()], rounds=setup.of(12, 5, 2))
-    ns = per_state({key: count for key, (_, count) in calls.items()}, times)
-    operations = {quantity: evaluator(setup.robot.tree, name).operations for quantity, name in NAMES_IN_TMT.items()}
-    of_compiled = {(q, name): count for q, count in operations.items() for name in (IN_LANES, EACH, WAITING)}
-    rows = []
-    for key, value in sorted(ns.items(), key=lambda item: (item[0][0], -item[1])):
-        count = of_compiled.get(key[:2])
-        rows.append((*key, value, count, count / value if count else None, None))
+    operations, rows = evaluator(setup.robot.tree, "acceleration").operations, []
+    for (key, (_, count)), of_call in zip(calls.items(), times):
+        ns = 1e9 * min(of_call) / (count * key[2])
+        is_counted = key[0] == FORWARD and key[1] in (WAITING, EACH, IN_LANES)
+        rows.append((*key, ns, *((operations, operations / ns) if is_counted else (None, None)), None))
+    rows.sort(key=lambda row: (row[0], -row[4]))
     rows += [] if setup.is_quick else of_outside_engines(setup)
     rows += [(*key, *[None] * 5, reason) for key, reason in made.absent.items()]
     return [dict(zip(COLUMNS, row)) for row in rows]
@@ -134,14 +130,9 @@ def of_outside_engines(setup: Setup) -> list[tuple]:
     return rows
 
 
-def counted(loop: Callable[[int], object]) -> tuple[Callable, int]:
+def counted(loop: Callable[[int], None]) -> tuple[Callable, int]:
     """A call that repeats a loop for about a millisecond, and how often it does."""
     loop(1)
     (once,) = timing.in_turns([lambda: loop(4)], 5)
     count = min(max(1, int(1e-3 / (min(once) / 4))), MOST_CALLS)
     return lambda: loop(count), count
-
-
-def per_state(counts: dict, times: list[list[float]]) -> dict:
-    """Nanoseconds of one state for each key of `counts`, {key: states in a call}, from the seconds of its calls."""
-    return {key: 1e9 * min(of_call) / count for (key, count), of_call in zip(counts.items(), times)}

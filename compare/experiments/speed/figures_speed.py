@@ -9,10 +9,9 @@ from matplotlib.patheffects import withStroke
 from ...engines import COLOURS, LABELS, MARKS
 from ...judge.check import Result
 from ...judge.finding import Finding
-from ...judge.units import value
 from ...report.style import GREY, WIDTH, file_name
 from ..figures_overview import chart
-from .first_screen import TARGET, best_curves, cheapest, front, target
+from .first_screen import TARGET, best_rows, cheapest, error, front, target, within_target
 
 METHOD_MARKERS = "osD^v<>PX*hp"  # of the methods of an engine, whose colour they have
 COARSE_END, FINE_END = 3.0, 3e-16  # rad: ends of the axis of errors
@@ -23,7 +22,7 @@ def draw_times(result: Result, scene: str, beginning: str = "") -> tuple:
     fig = Figure(figsize=(WIDTH, 5.6), layout="constrained")
     ax, unit = fig.subplots(), result.curves.get("unit", "rad")
     ran = [row for row in result.rows if row["scene"] == scene and row["why_not"] is None]
-    good = [row for row in ran if not row["diverged"] and value(row, "worst_error") <= COARSE_END]
+    good = [row for row in ran if not row["diverged"] and error(row) <= COARSE_END]
     markers = {}
     for engine, method in dict.fromkeys((row["engine"], row["method"]) for row in good):
         errors, times = drawn([row for row in good if (row["engine"], row["method"]) == (engine, method)])
@@ -45,25 +44,25 @@ def draw_times(result: Result, scene: str, beginning: str = "") -> tuple:
 
 def drawn(rows: list[dict]) -> tuple[np.ndarray, list[float]]:
     """Errors, at least FINE_END, and times in ms."""
-    return np.maximum([value(row, "worst_error") for row in rows], FINE_END), [1e3 * row["seconds"] for row in rows]
+    return np.maximum([error(row) for row in rows], FINE_END), [1e3 * row["seconds"] for row in rows]
 
 
 def draw_overview(result: Result) -> tuple[str, Figure, Finding]:
     """Time against error: the best settings of each engine in one scene, the cheapest within the target in a circle."""
     fig, ax = chart()
-    curves = best_curves(result)
-    for curve in curves:
-        colour, errors = COLOURS.get(curve.engine, GREY), np.maximum(curve.errors, 1e-16)
-        ax.plot(errors, curve.milliseconds, marker=MARKS.get(curve.engine, "v"), markersize=3.5, linewidth=1.2,
-                color=colour, label=LABELS.get(curve.engine, curve.engine))  # fmt: skip
-        if curve.cheapest:
-            time = curve.cheapest.milliseconds
-            error = errors[curve.milliseconds.index(time)]
-            ax.plot(error, time, "o", markersize=9, markerfacecolor="none", markeredgecolor="black")
-            if curve.engine in ("mujoco", "tmt"):
-                above, fine = curve.engine == "mujoco", error < np.sqrt(errors[0] * errors[-1])
-                text = f"{curve.cheapest.method} {float(f'{time:.2g}'):g} ms"
-                ax.annotate(text, (error, time), (0, 8 if above else -11), fontsize=8, color=colour,
+    fronts = best_rows(result)
+    for engine, rows in fronts.items():
+        colour, (errors, times) = COLOURS.get(engine, GREY), drawn(rows)
+        look = {"marker": MARKS.get(engine, "v"), "markersize": 3.5, "linewidth": 1.2, "color": colour}
+        ax.plot(errors, times, label=LABELS.get(engine, engine), **look)
+        if best := within_target(rows):
+            time = 1e3 * best["seconds"]
+            at = errors[times.index(time)]
+            ax.plot(at, time, "o", markersize=9, markerfacecolor="none", markeredgecolor="black")
+            if engine in ("mujoco", "tmt"):
+                above, fine = engine == "mujoco", at < np.sqrt(errors[0] * errors[-1])
+                text = f"{best['method']} {float(f'{time:.2g}'):g} ms"
+                ax.annotate(text, (at, time), (0, 8 if above else -11), fontsize=8, color=colour,
                             textcoords="offset points", ha="right" if above else "center" if fine else "left",
                             va="bottom" if above else "top",
                             path_effects=[withStroke(linewidth=3, foreground="white")])  # fmt: skip
@@ -73,4 +72,4 @@ def draw_overview(result: Result) -> tuple[str, Figure, Finding]:
     ax.invert_xaxis()
     ax.margins(0.06, 0.12)
     fig.legend(loc="outside upper center", ncols=4, fontsize=8, handletextpad=0.4, columnspacing=1.0)
-    return "overview_times", fig, result.finding("overview_caption", settings=cheapest(curves), **numbers)
+    return "overview_times", fig, result.finding("overview_caption", settings=cheapest(fronts), **numbers)

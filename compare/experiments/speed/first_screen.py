@@ -1,34 +1,13 @@
 """What speed shows on the first screen: the settings of each engine that are best in both error and time."""
 
-from collections.abc import Sequence
-from functools import partial
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
 
 from ...judge import units
 from ...judge.check import Result
 
 TARGET = 1e-6  # rad or m: the error for which the cheapest setting is named
 NOT_SOLVED = 1.0  # rad or m: a run with a larger error is none
-
-
-class Cheapest(NamedTuple):
-    """The setting that takes the least time within TARGET."""
-
-    engine: str
-    method: str
-    milliseconds: float
-    steps: float | None = None
-    dt: float | None = None  # s
-    tolerance: float | None = None
-
-
-class Curve(NamedTuple):
-    """The settings of one engine that no other of the same engine beats in both error and time."""
-
-    engine: str
-    errors: list[float]  # rad or m, from coarse to fine
-    milliseconds: list[float]
-    cheapest: Cheapest | None  # the first within TARGET
+SETTING = ("engine", "method", "seconds", "steps", "dt_s", "tolerance")  # columns
 
 
 def target(result: Result) -> dict:
@@ -36,10 +15,13 @@ def target(result: Result) -> dict:
     return {"target": TARGET, "scene": about.get("regular"), "unit": about["unit"], "servos_off": about["servos_off"]}
 
 
+def error(row: Mapping) -> float:
+    return units.value(row, "worst_error")
+
+
 def front(rows: Sequence[dict]) -> list[dict]:
     """The rows than which no other is both faster and more exact, from the fastest to the most exact."""
     best, least = [], NOT_SOLVED
-    error = partial(units.value, name="worst_error")
     for row in sorted(rows, key=lambda row: (row["seconds"], error(row))):
         if error(row) < least:
             best.append(row)
@@ -47,29 +29,25 @@ def front(rows: Sequence[dict]) -> list[dict]:
     return best
 
 
-def best_curves(result: Result) -> list[Curve]:
-    """A curve for each engine that computed the scene in which errors are regular."""
-    scene, error = result.curves.get("regular"), partial(units.value, name="worst_error")
-    rows = [row for row in result.rows if row["scene"] == scene and row["seconds"] and not row["diverged"]]
-    curves = []
-    for engine in dict.fromkeys(row["engine"] for row in rows):
-        best = front([row for row in rows if row["engine"] == engine])
-        within = [
-            Cheapest(engine, row["method"], 1e3 * row["seconds"], row.get("steps"), row.get("dt_s"), row.get("tolerance"))
-            for row in best
-            if error(row) <= TARGET
-        ]  # fmt: skip
-        if best:
-            errors, times = [float(error(row)) for row in best], [1e3 * row["seconds"] for row in best]
-            curves.append(Curve(engine, errors, times, within[0] if within else None))
-    return curves
+def best_rows(result: Result) -> dict[str, list[dict]]:
+    """The front of each engine that computed the scene in which errors are regular."""
+    scene, of_engine = result.curves.get("regular"), {}
+    for row in result.rows:
+        if row["scene"] == scene and row["seconds"] and not row["diverged"]:
+            of_engine.setdefault(row["engine"], []).append(row)
+    fronts = {engine: front(rows) for engine, rows in of_engine.items()}
+    return {engine: rows for engine, rows in fronts.items() if rows}
 
 
-def cheapest(curves: Sequence[Curve]) -> list[Cheapest]:
+def within_target(rows: Sequence[dict]) -> dict | None:
+    """The cheapest setting of a front within TARGET."""
+    row = next((row for row in rows if error(row) <= TARGET), None)
+    return row and {name: row.get(name) for name in SETTING}
+
+
+def cheapest(fronts: Mapping[str, Sequence[dict]]) -> list[dict]:
     """The cheapest setting of all engines, and the cheapest of MuJoCo (of tmt, if the first is MuJoCo's)."""
-    reached = {curve.engine: curve.cheapest for curve in curves if curve.cheapest}
-    if not reached:
-        return []
-    first = min(reached, key=lambda engine: reached[engine].milliseconds)
+    reached = {engine: setting for engine, rows in fronts.items() if (setting := within_target(rows))}
+    first = min(reached, key=lambda engine: reached[engine]["seconds"], default=None)
     other = "mujoco" if first != "mujoco" else "tmt"
     return [reached[engine] for engine in (first, other) if engine in reached]
