@@ -1,16 +1,16 @@
 """The motion as a GIF: the stick figures of both engines over each other, held and let go.
 
-Drawn without matplotlib, which takes seconds for a hundred pictures: a mask for each engine and one of text, in the colours of
-one small palette. The first engine's sticks are wide with discs, MuJoCo's narrow with rings.
+Drawn without matplotlib, which takes seconds for a hundred pictures. The first engine's sticks are wide with discs, MuJoCo's
+narrow with rings.
 """
 
 from collections.abc import Sequence
-from functools import partial
+from functools import cache
 from pathlib import Path
 
 import matplotlib
 import numpy as np
-from PIL import Image, ImageChops, ImageDraw, ImageFont
+from PIL import Image, ImageDraw, ImageFont
 
 from ...engines import LABELS
 from ...judge.check import Result
@@ -20,8 +20,10 @@ from ...report.style import BLUE, ORANGE
 from .motion import Drawn
 
 PIXELS, TOP, BOTTOM = (640, 420), 78, 34  # pixels; and the margins for text above and below
-FINE = 2  # masks are drawn larger by this factor
-LEVELS = 5  # shades of each colour
+ROOM, MIDDLE = (PIXELS[0] - 36, PIXELS[1] - TOP - BOTTOM - 36), (PIXELS[0] / 2, (PIXELS[1] + TOP - BOTTOM) / 2)
+FINE = 2  # a picture is drawn larger by this factor
+SHADES = 16  # colours of the GIF
+BLACK = "#1a1a1a"
 CENTISECONDS, PAUSE = 4, 120  # of a picture, and of the last one of a scene
 NAMES_AT = 16, 150  # pixels from the left: the engines' names
 MOST_WIDE = 6  # sticks that are drawn wide
@@ -39,11 +41,12 @@ class Animation:
         """Write the GIF, which is played again and again."""
         pictures, times = [], []
         for scene in self.scenes:
-            place = place_of(scene)
-            still = text_of_scene(scene, self.label, place)
-            pictures += [one_picture(scene, k, still, place) for k in range(len(scene.t))]
+            paths = scene.placed(ROOM, MIDDLE)
+            still = text_of_scene(scene, self.label, paths[0][0, 0])
+            pictures += [one_picture(scene, k, still, paths) for k in range(len(scene.t))]
             times += [10 * CENTISECONDS] * (len(scene.t) - 1) + [10 * PAUSE]
-        first, *others = pictures
+        first = pictures[0].quantize(SHADES, Image.Quantize.MAXCOVERAGE)  # all colours are in it
+        others = [picture.quantize(palette=first, dither=Image.Dither.NONE) for picture in pictures[1:]]
         first.save(path, save_all=True, append_images=others, duration=times, loop=0, optimize=False)
 
 
@@ -55,39 +58,18 @@ def draw_motion(result: Result) -> tuple[str, Animation, Finding]:
     return "motion", Animation(scenes, result.label), result.finding("figure_motion", engines=engines, scenes=seen)
 
 
-def place_of(scene: Drawn) -> tuple[float, np.ndarray]:
-    """Pixels per m, and the pixels of the origin, (2,), so that all points of a scene are seen."""
-    points = np.concatenate([path.reshape(-1, 2) for path in scene.points.values()])
-    points = points[np.isfinite(points).all(axis=1)]
-    low, high = points.min(axis=0), points.max(axis=0)
-    room = np.array([PIXELS[0], PIXELS[1] - TOP - BOTTOM]) - 36.0
-    scale = float((room / np.maximum(high - low, 1e-3)).min())
-    middle = np.array([PIXELS[0], PIXELS[1] + TOP - BOTTOM]) / 2
-    return scale, middle - scale * (low + high) / 2 * [1.0, -1.0]
-
-
-def one_picture(scene: Drawn, k: int, still: Image.Image, place: tuple) -> Image.Image:
-    """The k-th picture of a scene in the colours of the palette; still: the text in all of them."""
-    scale, origin = place
-    text = still.copy()
-    write = partial(ImageDraw.Draw(text).text, fill=255, font=font(17))
-    time, apart, gone = words_of_picture(scene, k)
-    write((PIXELS[0] - 16, PIXELS[1] - 28), time, anchor="ra")
-    write((16, PIXELS[1] - 28), apart)
-    write((PIXELS[0] - 16, 68), gone, anchor="ra", font=font(14))
-    shades = []
-    for which, path in enumerate(scene.points.values()):
-        mask = Image.new("L", (FINE * PIXELS[0], FINE * (PIXELS[1] - BOTTOM)))
+def one_picture(scene: Drawn, k: int, still: Image.Image, paths: Sequence[np.ndarray]) -> Image.Image:
+    """The k-th picture of a scene; still: the text in all of them; paths: of each engine, in pixels."""
+    image = still.copy()
+    pen = ImageDraw.Draw(image)
+    for which, path in enumerate(paths):
         if np.isfinite(path[k]).all():
-            points = [tuple(FINE * (origin + scale * point * [1.0, -1.0])) for point in path[k]]
-            draw_sticks(ImageDraw.Draw(mask), points, scene.links, which)
-        draw_sticks(ImageDraw.Draw(mask), [(FINE * (NAMES_AT[which] + x), FINE * 62) for x in (4, 36)], [(0, 1)], which)
-        small = Image.new("L", PIXELS)
-        small.paste(mask.reduce(FINE), (0, 0))
-        shades.append(small.point(SHADES[which]))
-    image = ImageChops.lighter(ImageChops.add(*shades), text.point(SHADES[2]))
-    image.putpalette(SHADES_OF_ALL)
-    return image
+            draw_sticks(pen, path[k], scene.links, which)
+    time, apart, gone = words_of_picture(scene, k)
+    write(pen, (PIXELS[0] - 16, PIXELS[1] - 28), time, 17, "ra")
+    write(pen, (16, PIXELS[1] - 28), apart, 17)
+    write(pen, (PIXELS[0] - 16, 68), gone, 14, "ra")
+    return image.reduce(FINE)
 
 
 def words_of_picture(scene: Drawn, k: int) -> tuple[str, str, str]:
@@ -103,32 +85,35 @@ def words_of_picture(scene: Drawn, k: int) -> tuple[str, str, str]:
     )
 
 
-def draw_sticks(pen: ImageDraw.ImageDraw, points: Sequence[tuple], links: Sequence[tuple], which: int) -> None:
-    """The sticks of an engine: of the first (0) wide with discs, of the other narrow with rings."""
-    few = len(links) <= MOST_WIDE
+def draw_sticks(pen: ImageDraw.ImageDraw, points: np.ndarray, links: Sequence[tuple], which: int) -> None:
+    """The sticks of an engine: of the first (0) wide with discs, of the other narrow with rings. points: (n, 2) pixels."""
+    few, colour, places = len(links) <= MOST_WIDE, (BLUE, ORANGE)[which], [tuple(FINE * point) for point in points]
     width = FINE * ((14 if few else 8), (4 if few else 3))[which]
     disc = FINE * ((7 if few else 4), (6 if few else 3))[which]
     for start, end in links:
-        pen.line([points[start], points[end]], fill=255, width=width)
-    for x, y in points:
-        pen.ellipse([x - disc, y - disc, x + disc, y + disc], fill=255)
+        pen.line([places[start], places[end]], fill=colour, width=width)
+    for place in places:
+        pen.circle(place, disc, fill=colour)
         if which:
-            inner = disc - 3 * FINE / 2
-            pen.ellipse([x - inner, y - inner, x + inner, y + inner], fill=0)
+            pen.circle(place, disc - 3 * FINE / 2, fill="white")
 
 
-def text_of_scene(scene: Drawn, label: str, place: tuple) -> Image.Image:
-    """The text in all pictures of a scene: its name, its run, the engines' names, a frame where the robot is fixed."""
-    text = Image.new("L", PIXELS)
-    pen = ImageDraw.Draw(text)
-    pen.text((16, 10), scene.scene, fill=255, font=font(20))
-    pen.text((PIXELS[0] - 16, 50), f"{scene.run}{slower(scene)}", fill=255, font=font(14), anchor="ra")
-    for at, name in zip(NAMES_AT, (label, LABELS["mujoco"])):
-        pen.text((at + 48, 62), name, fill=255, font=font(16), anchor="lm")
+def text_of_scene(scene: Drawn, label: str, base: np.ndarray) -> Image.Image:
+    """What is in all pictures of a scene: its name, its run, the engines' names, a frame where the robot is fixed."""
+    image = Image.new("RGB", (FINE * PIXELS[0], FINE * PIXELS[1]), "white")
+    pen = ImageDraw.Draw(image)
+    write(pen, (16, 10), scene.scene, 20)
+    write(pen, (PIXELS[0] - 16, 50), f"{scene.run}{slower(scene)}", 14, "ra")
+    for which, (x, name) in enumerate(zip(NAMES_AT, (label, LABELS["mujoco"]))):
+        draw_sticks(pen, np.array([[x + 4, 62], [x + 36, 62]]), [(0, 1)], which)
+        write(pen, (x + 48, 62), name, 16, "lm")
     if scene.fixed:
-        x, y = place[1] + place[0] * next(iter(scene.points.values()))[0, 0] * [1.0, -1.0]
-        pen.rectangle([x - 11, y - 11, x + 11, y + 11], outline=255, width=2)
-    return text
+        pen.rectangle([*(FINE * (base - 11)), *(FINE * (base + 11))], outline=BLACK, width=2 * FINE)
+    return image
+
+
+def write(pen: ImageDraw.ImageDraw, place: tuple, text: str, size: int, anchor: str = "la") -> None:
+    pen.text((FINE * place[0], FINE * place[1]), text, fill=BLACK, font=font(FINE * size), anchor=anchor)
 
 
 def slower(scene: Drawn) -> str:
@@ -139,28 +124,7 @@ def slower(scene: Drawn) -> str:
     return f", shown {times:.2g} times slower" if times > 1.0 else f", shown {1.0 / times:.2g} times faster"
 
 
+@cache
 def font(size: int) -> ImageFont.FreeTypeFont:
     """The font of all figures, size in pixels."""
-    if size not in FONTS:
-        FONTS[size] = ImageFont.truetype(
-            str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), size
-        )
-    return FONTS[size]
-
-
-def palette() -> bytes:
-    """The colours: shades of both figures over each other on white, then of the text."""
-    white, black = np.full(3, 255.0), np.full(3, 26.0)
-    blue, orange = (np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)], float) for colour in (BLUE, ORANGE))
-    share = np.linspace(0.0, 1.0, LEVELS)[:, None, None]
-    under = white + share * (blue - white)
-    both = under + share.reshape(1, LEVELS, 1) * (orange - under)
-    dark = white + share[:, 0] * (black - white)
-    return np.concatenate([both.reshape(-1, 3), dark]).round().astype(np.uint8).tobytes()
-
-
-FONTS: dict[int, ImageFont.FreeTypeFont] = {}
-SHADE = [round(level * (LEVELS - 1) / 255.0) for level in range(256)]
-# of a mask's level, its part of the palette's index: of the first engine, of MuJoCo, which lies over it, of text
-SHADES = [LEVELS * shade for shade in SHADE], SHADE, [shade and LEVELS**2 + shade for shade in SHADE]
-SHADES_OF_ALL = palette()
+    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), size)

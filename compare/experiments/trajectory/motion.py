@@ -31,6 +31,14 @@ class Drawn(NamedTuple):
     seen: Finding  # departures, the largest difference, divergence
     fixed: bool  # whether the first point does not move, as the first joint only turns
 
+    def placed(self, room: Sequence[float], middle: Sequence[float]) -> list[np.ndarray]:
+        """The points of each engine in a drawing whose y goes down, all of them in a room, (2,), about its middle, (2,)."""
+        points = np.concatenate([path.reshape(-1, 2) for path in self.points.values()])
+        points = points[np.isfinite(points).all(axis=1)]
+        low, high = points.min(axis=0), points.max(axis=0)
+        scale = (np.array(room) / np.maximum(high - low, 1e-3)).min()
+        return [middle + scale * (path - (low + high) / 2) * [1.0, -1.0] for path in self.points.values()]
+
 
 def drawn_motion(case: Case, runs: Mapping[tuple, dict]) -> Drawn | None:
     """The motion of a case by RK4; None if there is no such run.

@@ -40,7 +40,7 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
     engines = [label[:1].upper() + label[1:], "MuJoCo"]
     data, stride, scenes = inlined(drawn, engines)
     links, still = scenes[0]["links"], stride * scenes[0]["still"]
-    first, second = (outline(on_page(drawn[0], path)[still], links) for path in drawn[0].points.values())
+    first, second = (outline(path[still], links) for path in on_page(drawn[0]))
     wide, ring = (20, 16) if len(links) <= FEW_STICKS else (9, 7)
     values = {"ours": engines[0], "theirs": engines[1], "scenes": scenes, "data": Markup(data), "noun": robot.noun}
     values |= {"width": WIDE, "height": HIGH, "wide": wide, "ring": ring, "first": first, "second": second}
@@ -74,7 +74,7 @@ def inlined_scene(one: object, stride: int) -> dict:
 
     A picture is 0 where it is the one before, 1 where it is that of the first engine, None where the run has diverged.
     """
-    ours, theirs = (on_page(one, path[::stride]) for path in one.points.values())
+    ours, theirs = (path[::stride] for path in on_page(one))
     dt = stride * float(one.t[1] - one.t[0])
     slow = max(1.0, SHOWN_FOR / float(one.t[-1]))
     slow = slow if slow > 1.0 / UNDER else 1.0
@@ -94,14 +94,14 @@ def inlined_scene(one: object, stride: int) -> dict:
     }
 
 
-def on_page(one: object, path: np.ndarray) -> list:
-    """Points of an engine, (pictures, points, 2) m, in the drawing: a list of integers for each picture, None for NaN."""
-    points = np.concatenate([of.reshape(-1, 2) for of in one.points.values()])
-    points = points[np.isfinite(points).all(axis=1)]
-    low, high = points.min(axis=0), points.max(axis=0)
-    scale = ((np.array([WIDE, HIGH]) - 2 * BORDER) / np.maximum(high - low, 1e-3)).min()
-    at = np.array([WIDE, HIGH]) / 2 + scale * (path - (low + high) / 2) * [1.0, -1.0]
-    return [picture.round().astype(int).ravel().tolist() if np.isfinite(picture).all() else None for picture in at]
+def on_page(one: object) -> list[list]:
+    """A list of integers for each picture of each engine, x and y of each point in the drawing; None for NaN."""
+    paths = one.placed((WIDE - 2 * BORDER, HIGH - 2 * BORDER), (WIDE / 2, HIGH / 2))
+    return [[whole_numbers(picture) for picture in path] for path in paths]
+
+
+def whole_numbers(picture: np.ndarray) -> list[int] | None:
+    return picture.round().astype(int).ravel().tolist() if np.isfinite(picture).all() else None
 
 
 def shorter(pictures: Sequence, others: Sequence) -> list:
