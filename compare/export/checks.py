@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
 from tmt.compiled import evaluator
@@ -138,7 +137,3 @@ def times(compared: Compared, program: Program | None, quantities: Sequence[str]
         {"quantity": name, "c": ns[name, "c"], "tmt": ns[name, "tmt"], "mujoco": ns.get(("", "mujoco"))}
         for name in dict.fromkeys(quantities)
     ]
-
-
-def version() -> str:
-    return mujoco.__version__

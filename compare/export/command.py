@@ -17,6 +17,7 @@ from ..cli.command_line import EQUATIONS, Option, command_parser, expected
 from ..process import interrupt
 from ..process.crash import Refused
 from ..process.streams import in_one_line
+from ..report.provenance import installed
 from ..report.terminal import Terminal
 from ..report.text import block
 
@@ -105,7 +106,7 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
     of = {
         "outcome": outcome, "name": in_one_line(robot.name), "states": STATES, "features": robot.features,
         "command": in_one_line(command),
-        "sha256": hashlib.sha256(Path(robot.mjcf).read_bytes()).hexdigest()[:16], "mujoco": checks.version(),
+        "sha256": hashlib.sha256(Path(robot.mjcf).read_bytes()).hexdigest()[:16], "mujoco": installed("mujoco"),
     }  # fmt: skip
     texts = written(*block("export", "head", **of).splitlines())
     out = Path(options.out)

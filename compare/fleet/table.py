@@ -13,6 +13,7 @@ from ..judge.check import About
 from ..judge.finding import Finding
 from ..process.crash import Refused
 from ..process.streams import in_one_line
+from ..report import files
 from ..report.provenance import OURS, commit, installed
 from ..report.text import block, environment, say
 from ..report.verdict import Section, failures, worst
@@ -85,13 +86,6 @@ def order(row: dict) -> tuple:
     return rank, row["stable_at_file_dt"] is not False, -(row["worst_ratio"] or 0.0), row["file"]
 
 
-def csv_of_fleet(rows: Sequence[dict]) -> str:
-    """The table with all digits; an unknown value is empty."""
-    from ..report import files  # imports are slow
-
-    return files.csv(rows, FLEET_COLUMNS)
-
-
 def is_row(row: object) -> bool:
     """Whether what lay in the folder of a report is a row of the table."""
     if not isinstance(row, dict) or not EMPTY_ROW.keys() >= row.keys() or row.get("verdict") not in VERDICTS:
@@ -116,7 +110,7 @@ def by_file(table: str) -> dict[str, dict]:
 
 def changes(before: Mapping[str, dict], rows: Sequence[dict]) -> list[str]:
     """The changes since an earlier fleet, one line for each file: verdict, step, limit; new and removed files."""
-    now = by_file(csv_of_fleet(rows))
+    now = by_file(files.csv(rows, FLEET_COLUMNS))
     lines = [f"{file}: new, {row['verdict']}" for file, row in now.items() if file not in before]
     lines += [f"{file}: removed, was {row['verdict']}" for file, row in before.items() if file not in now]
     for file in now.keys() & before.keys():
@@ -153,7 +147,7 @@ def write_table(
         "mujoco": installed("mujoco"),
     }
     page = fleet_page(rows, summary=summary, left_out=left_out, changed=changed, origin=origin)
-    write_whole(out / "fleet.csv", csv_of_fleet(rows).encode("utf-8", "backslashreplace"))
+    write_whole(out / "fleet.csv", files.csv(rows, FLEET_COLUMNS).encode("utf-8", "backslashreplace"))
     write_whole(out / "index.html", page.encode("utf-8", "backslashreplace"))
     return summary
 

@@ -12,12 +12,13 @@ from tmt import literal
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.tree import GAINS
 
+from ..judge.words import some_of
 from .actuators import Controller, controller
 from .coordinates import KINDS as KINDS
 from .coordinates import Coordinates
 from .coordinates import fastest_rates as fastest_rates
 from .coordinates import rates_at as rates_at
-from .validation import WrongField, are_numbers, is_number, some
+from .validation import WrongField, are_numbers, is_number
 
 SEED = 10  # of every random number in a report
 MAX_STEPS = 20_000  # of a run; the finest of an experiment takes 128 times as many
@@ -115,7 +116,7 @@ class Case:
 
         def numbers(each: tuple, unit: str) -> str:
             units = ", ".join(dict.fromkeys(unit.format(KINDS[kind]) for kind in whole.all_kinds))
-            return f"{len(each)} numbers, one per joint ({some(each)}), in {units}"
+            return f"{len(each)} numbers, one per joint ({some_of(each)}), in {units}"
 
         count = numbers(whole.positions, "{0.position_given}")
         if isinstance(scene.posture, str):
@@ -145,7 +146,7 @@ class Case:
             scene.require("torque", acts, "free, hold or numbers: this robot has no actuator that takes part")
             scene.require("locked", not scene.locked, "no locked joint together with servos")
         is_right = set(scene.locked) <= set(names) and len(scene.locked) < len(names)
-        scene.require("locked", is_right, f"at most {len(names) - 1} of {some(names)}")
+        scene.require("locked", is_right, f"at most {len(names) - 1} of {some_of(names)}")
         moving = any(any(scene.speed[self.places[name].qd]) for name in scene.locked) if scene.speed else False
         scene.require("speed", not moving, f"speed 0 for locked joints ({', '.join(scene.locked)})")
 

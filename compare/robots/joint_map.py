@@ -13,9 +13,8 @@ import numpy as np
 
 import tmt
 
-from ..judge.words import listed
+from ..judge.words import listed, some_of
 from .coordinates import Coordinates
-from .validation import some
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}
 STATED = re.compile(r"(?P<name>.+?)(?P<offset>[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<measure>deg|rad|m)")
@@ -246,7 +245,7 @@ def refuse_unmatched(reference: tmt.Tree, tree: tmt.Tree, pairs: Mapping[int, in
     ]
     missing = [f"{name} ({kind})" for i, (name, kind) in enumerate(ours.items()) if i not in pairs]
     extra = [f"{name} ({kind})" for j, (name, kind) in enumerate(theirs.items()) if j not in pairs.values()]
-    wrong += [f"missing joints: {some(missing)}"] if missing else []
-    wrong += [f"additional joints: {some(extra)}"] if extra else []
+    wrong += [f"missing joints: {some_of(missing)}"] if missing else []
+    wrong += [f"additional joints: {some_of(extra)}"] if extra else []
     if wrong:
         raise Unmatched("; ".join(wrong))

@@ -1,7 +1,5 @@
 """Validation of what users give for a scene."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 
@@ -27,12 +25,6 @@ def are_numbers(values: object) -> bool:
     """Whether a value is a sequence of finite real numbers."""
     row = np.ndim(values) == 1 if isinstance(values, np.ndarray) else isinstance(values, tuple | list | range)
     return row and all(is_number(value) for value in values)
-
-
-def some(names: Sequence[str], most: int = 6) -> str:
-    """The first names, and the number of the others."""
-    more = len(names) - most
-    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def shorten(text: str, length: int = 60) -> str:

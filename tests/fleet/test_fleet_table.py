@@ -21,7 +21,6 @@ from compare.fleet.table import (
     REFUSED,
     UNCONFIRMED,
     changes,
-    csv_of_fleet,
     earlier,
     fleet_page,
     order,
@@ -29,6 +28,7 @@ from compare.fleet.table import (
     write_table,
 )
 from compare.judge.check import AT_OWN_STEP, ENDS, About, Result
+from compare.report import files
 from compare.report.verdict import Section
 from compare.run.reference import Reference
 
@@ -128,7 +128,7 @@ ROW = {
     ({}, {"file": "new.xml", "verdict": REFUSED}, ["a b.xml", "agree", "new.xml", "refused"]),  # and one is gone
 ])  # fmt: skip
 def test_a_verdict_a_step_or_a_limit_that_is_another_is_told(before, now, named, tmp_path):
-    (tmp_path / "fleet.csv").write_text(csv_of_fleet([ROW | before]), encoding="utf-8")
+    (tmp_path / "fleet.csv").write_text(files.csv([ROW | before], FLEET_COLUMNS), encoding="utf-8")
     found = changes(earlier(tmp_path), [ROW | now])
     places = [" ".join(found).index(name) for name in named or ()]
     assert bool(found) == bool(named) and places == sorted(places)

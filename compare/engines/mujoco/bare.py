@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..outside import together
 from .inventory import switch_off
 from .names import INTEGRATORS, bit, joint_places, rotors
+from .parameters import matrix, tensor
 from .reading import carriers
 from .source import locked_model
 
@@ -56,21 +56,16 @@ class Bare:
         """ReadModel.numbers, except gravity, of what an engine holds by MuJoCo's names, see HELD."""
         m = SimpleNamespace(nbody=self.model.nbody, **{name: held(name) for name in HELD})
         carrier, has_joint = carriers(m, self.places), set(m.jnt_bodyid.tolist())
-        frames, carried = [(np.zeros(3), Rotation.identity())], {joint: [] for joint in range(len(self.places))}
+        frames, carried = [(np.zeros(3), np.eye(3))], {joint: [] for joint in range(len(self.places))}
         for body in range(1, m.nbody):
             (at, turn), is_carried = frames[m.body_parentid[body]], body not in has_joint
-            own = (at + turn.apply(m.body_pos[body]), turn * rotation(m.body_quat[body]))
+            own = (at + turn @ m.body_pos[body], turn @ matrix(m.body_quat[body]))
             at, turn = own if is_carried else frames[0]  # in the axes of the body that the joint moves
             frames.append((at, turn))
             if carrier[body] >= 0:
-                axes = (turn * rotation(m.body_iquat[body])).as_matrix()
-                tensor = axes @ np.diag(m.body_inertia[body]) @ axes.T
-                carried[carrier[body]].append((m.body_mass[body], at + turn.apply(m.body_ipos[body]), tensor))
+                inertia = turn @ tensor(m.body_iquat[body], m.body_inertia[body]) @ turn.T
+                carried[carrier[body]].append((m.body_mass[body], at + turn @ m.body_ipos[body], inertia))
         mass, moments = zip(*(together(bodies) for bodies in carried.values()))
         speeds = {"armature": m.dof_armature, "damping": m.dof_damping, "stiffness": m.jnt_stiffness[m.dof_jntid]}
         speeds = {name: values[self.dofs] for name, values in speeds.items()}
         return {"mass": np.array(mass), "moments": np.array(moments)} | speeds
-
-
-def rotation(quaternion: np.ndarray) -> Rotation:
-    return Rotation.from_quat(np.roll(quaternion, -1))  # w x y z: SciPy has w last

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...engines import LABELS
+from ...engines import COLOURS, LABELS
 from ...judge.check import Result
 from ...judge.finding import Finding
 from ...judge.run import LEFT, number_or_nan
@@ -26,7 +26,6 @@ SCHEME_LOOKS = {  # colour, dash, name
     "dopri8": (SKY, (0, (4, 2)), "Dormand-Prince 8"),
 }
 MARKS, MUJOCO_MARKS = "ov^DsP", "x+1"
-ENGINE_COLOURS = {"tmt": BLUE, "mujoco": ORANGE}
 
 
 def look(name: str) -> tuple:
@@ -164,7 +163,7 @@ def draw_torques(ax: Axes, rows: list[dict], robot: Robot) -> None:
             mine = [row for row in rows if (row["engine"], row["direction"]) == (engine, side)]
             pushes, times = ([row[key] for row in mine] for key in ("push_rad_per_s2", "observed_s"))
             looks = {"fillstyle": fill, "markersize": 5, "label": f"{LABELS[engine]}, to {word} {symbol}"}
-            ax.plot(np.array(pushes) * 1e14, times, mark, color=ENGINE_COLOURS[engine], **looks)
+            ax.plot(np.array(pushes) * 1e14, times, mark, color=COLOURS[engine], **looks)
     predicted = sorted((row["push_rad_per_s2"] * 1e14, number_or_nan(row["predicted_s"])) for row in rows)
     ax.plot(*np.array(predicted).reshape(-1, 2).T, color="black", linewidth=0.8, label="predicted")
     ax.axvline(0.0, color="black", linewidth=0.5)
@@ -179,10 +178,10 @@ def draw_finer_steps(ax: Axes, rows: list[dict], robot: Robot) -> None:
         mine = [row for row in rows if (row["engine"], row["ulps"]) == (engine, sign)]
         counts, times = [duration / row["dt_s"] for row in mine], [number_or_nan(row["observed_s"]) for row in mine]
         fill = "full" if engine == "tmt" else "none"
-        ax.plot(counts, times, "-" if sign > 0 else "--", color=ENGINE_COLOURS[engine])
+        ax.plot(counts, times, "-" if sign > 0 else "--", color=COLOURS[engine])
         for row, count, time in zip(mine, counts, times):
             mark = "v" if row["direction"] == -1 else "^"
-            ax.plot(count, time, mark, color=ENGINE_COLOURS[engine], fillstyle=fill, markersize=5)
+            ax.plot(count, time, mark, color=COLOURS[engine], fillstyle=fill, markersize=5)
     ax.set(title=f"claim 2: {robot.claims.left}", xscale="log", xlabel=f"steps in {duration:g} s")
     ax.set_xticks([32, 512, 8192], ["32", "512", "8192"])
     ax.minorticks_off()
