@@ -75,8 +75,6 @@ def made(schemes: Collection[str], from_file: Mapping[str, "Engine"]) -> dict[st
 
 
 class Method(NamedTuple):
-    """A method of integration of one engine."""
-
     engine: str
     name: str
     order: int | None  # of its error; None: it chooses its own steps

@@ -45,7 +45,6 @@ TIMED = tuple(name for name, record in EXPERIMENTS.items() if record.timed)
 
 
 def module(name: str) -> ModuleType:
-    """An experiment's module."""
     return importlib.import_module(f".{name}", __package__)
 
 

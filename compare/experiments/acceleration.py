@@ -19,7 +19,6 @@ EXPERIMENT = Experiment(order=60, options=("--joints",), diagnosed=True, overvie
 
 
 def rows(setup: Setup) -> Result:
-    """Each quantity at the named postures and at random states."""
     robot, tree, (ours, theirs) = setup.robot, setup.robot.tree, setup.compared().values()
     whose, torques, damping = WHOSE[robot.compared[0]], unit(tree, "N m", "N"), np.array(tree.damping)
     work = "(tau - D qd).qd" if damping.any() else "tau.qd"

@@ -132,7 +132,6 @@ def rows(setup: Setup) -> Result:
 
 
 def record(cause: Cause, is_own: bool = False) -> dict:
-    """A cause as a report has it."""
     text = cause.text("option" if is_own else "")
     return {"rank": cause.rank, "place": cause.place, "stated": cause.stated, "found": cause.explains, "text": text}
 

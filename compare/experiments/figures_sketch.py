@@ -18,7 +18,6 @@ KIND_COLOURS = {"hinge": BLUE, "slide": RED, "ball": GREEN}
 
 
 def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
-    """The robot and the axes of its joints in two postures."""
     tree, poses = robot.tree, {name: robot.poses[name] for name in robot.sketched or tuple(robot.poses)[:2]}
     coms = {name: literal.com_positions(q, tree) for name, q in poses.items()}
     sticks = {}

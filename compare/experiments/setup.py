@@ -25,8 +25,6 @@ def nothing(*_: object) -> None:
 
 @dataclass(frozen=True)
 class Setup:
-    """The robot, the engines, and the size of the run."""
-
     robot: Robot
     engines: Mapping[str, Engine]
     states: int = 10_000  # random states

@@ -15,8 +15,6 @@ MODEL_ELEMENTS = "mujoco", "robot"  # root elements of MJCF and of URDF
 
 
 class Model(NamedTuple):
-    """One file."""
-
     path: Path
     parts: Sequence[Path]  # the file itself and the files that it includes or loads
 

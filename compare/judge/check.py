@@ -107,7 +107,6 @@ class Result:
         return Finding(of or self.experiment, kind, values)
 
     def find(self, kind: str, of: str = "", **values) -> None:
-        """Add a finding."""
         self.notes.append(self.finding(kind, of, **values))
 
     def check(

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 
 def capital(text: str) -> str:
-    """A text with a capital at its beginning."""
     return text[:1].upper() + text[1:]
 
 

@@ -38,8 +38,6 @@ class Section:
 
 
 class Report(NamedTuple):
-    """What a report is made of."""
-
     sections: Sequence[Section]
     robot: object  # a robots.Robot
     origin: dict  # see provenance

@@ -14,8 +14,6 @@ from .case import Case, Coordinates, Scene
 
 
 class Printed(NamedTuple):
-    """A printed result."""
-
     item: str
     quantity: str  # "holding torque", "qdd" or "Mbar"
     posture: str

@@ -12,8 +12,6 @@ from tmt.model import coordinates
 
 
 class Kind(NamedTuple):
-    """A kind of joint: its units."""
-
     speeds: int  # number of speeds
     unit: str  # of a movement; speeds: per s
     force: str  # unit

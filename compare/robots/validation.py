@@ -28,5 +28,4 @@ def are_numbers(values: object) -> bool:
 
 
 def shorten(text: str, length: int = 60) -> str:
-    """A text of limited length."""
     return text if len(text) <= length else text[: length - 4] + " ..."

@@ -14,8 +14,6 @@ MODELLED, OFF, OPEN, LEFT_OUT = "modelled", "switched_off", "open_tree", "left_o
 
 
 class Feature(NamedTuple):
-    """A feature of a file: a row of the inventory."""
-
     feature: str
     count: int
     names: tuple[str, ...]

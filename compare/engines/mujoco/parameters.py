@@ -116,7 +116,6 @@ def row_of(
 
 
 def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body, number: int) -> list[Stated]:
-    """Position, mass, centre of mass and tensor of a body."""
     place, options = element_name(model, "body", number), body.compiler
     total = {"settotalmass": spec.compiler.settotalmass > 0.0}
     from_geoms = {"inertiafromgeom": bool(body.geoms) and options.inertiafromgeom == FROM_GEOMS}
@@ -147,7 +146,6 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body, number: int) -> li
 
 
 def of_joint(model: mujoco.MjModel, joint, number: int) -> list[Stated]:
-    """Anchor, axis, armature, damping and stiffness of a joint."""
     name, kind, dof = joint_name(model, number), kind_of(model, number), model.jnt_dofadr[number]
     chosen = {"springdamper": bool(np.any(joint.springdamper))}
     pos, turn, length = in_frames(joint.pos, joint.frame)

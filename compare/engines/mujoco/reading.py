@@ -19,8 +19,6 @@ from .source import ModelError, compiled, name_of
 
 @dataclass(frozen=True)
 class Reading:
-    """A file as it is compared."""
-
     source: Path | str | None  # a Path or MJCF text; None: a model that was compiled elsewhere
     name: str  # of the model, "": it has none that can be printed in a line
     tree: tmt.Tree

@@ -19,7 +19,6 @@ def advice(error: str) -> str:
 
 
 def spec_of(path: Path) -> mujoco.MjSpec:
-    """The MjSpec of a file."""
     spec = mujoco.MjSpec.from_file(os.fsencode(path))
     of_free = [joint.parent.parent for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
     for base in [body for body in of_free if body.parent == spec.worldbody]:

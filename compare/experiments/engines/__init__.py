@@ -33,7 +33,6 @@ SHOWN = ["engine", "quantity", "unit", "states", "worst_difference", "bar", "dif
 
 
 def skipped(robot: Robot) -> Finding | None:
-    """Why the experiment does not apply to a robot, or None."""
     engines = [Outside(name) for name, record in RECORDS.items() if record.reads_file]
     if any(not engine.unavailable() for engine in engines):
         return None
@@ -177,7 +176,6 @@ def asked_at(setup: Setup, precision: str) -> Sample:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    """Calls that draw one figure each."""
     from . import figures_engines  # matplotlib is for the process that draws
 
     if result.rows:

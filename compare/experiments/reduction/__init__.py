@@ -26,7 +26,6 @@ NO_GAIN = 1.05  # a smaller speedup is within the accuracy of the times
 
 
 def claim_values(robot: Robot) -> dict:
-    """Values of the macros claim and tolerance."""
     return {
         "joint": joint_word(robot.coordinates),
         "digits": DIGITS,
@@ -101,7 +100,6 @@ def add_not_lockable(result: Result, robot: Robot, error: ModelError) -> None:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    """Calls that draw one figure each."""
     from . import figures_reduction  # matplotlib is for the process that draws
 
     needs = result.curves["needs"].values() if result.rows else ()  # empty if no joint can be locked

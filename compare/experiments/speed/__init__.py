@@ -27,12 +27,10 @@ COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "timed_ste
 
 
 def claim_values(robot: Robot) -> dict:
-    """Values of the macros claim and tolerance."""
     return {"unit": movement_unit(robot.coordinates), "times": GRID + 1, "eps": FACTOR, "lost": LOST}
 
 
 def skipped(robot: Robot) -> Finding | str | None:
-    """Why the experiment does not apply to a robot, or None."""
     if not scenes_of(robot):
         return Finding("speed", "no_scene", {"noun": robot.noun})
     return leaves_no_digits(robot) or has_no_reference(robot)
@@ -132,7 +130,6 @@ def add_absent(result: Result, setup: Setup) -> None:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    """Calls that draw one figure each."""
     from . import figures_speed  # matplotlib is for the process that draws
 
     if "what_should_i_use" not in result.tables:  # nothing was timed

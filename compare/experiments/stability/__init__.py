@@ -22,7 +22,6 @@ FINE_STEPS = (1e-2, 1e-3)  # s, of departures, in addition to the coarsest step
 
 
 def claim_values(robot: Robot) -> dict:
-    """What the claim and the tolerance need in addition to the robot."""
     return {
         "unit": unit_of_movements(robot),
         "servos": servos.TOLERANCES if robot.drive.actuators else None,
@@ -32,7 +31,6 @@ def claim_values(robot: Robot) -> dict:
 
 
 def skipped(robot: Robot) -> str | None:
-    """Why it does not apply to a robot, or None."""
     return leaves_no_digits(robot)
 
 

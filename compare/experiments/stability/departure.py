@@ -101,7 +101,6 @@ def check_departures(result: Result, rows: list[dict]) -> None:
 
 
 def perturbation(row: dict) -> tuple[float, str]:
-    """A row's perturbation and its unit."""
     column = next(name for name in row if name.startswith("perturbation_"))
     return row[column], column.removeprefix("perturbation_").replace("_", " ")
 

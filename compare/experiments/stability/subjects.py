@@ -23,8 +23,6 @@ REST = "rest"  # the posture at which a file's robot rests without torque
 
 
 class Subjects(NamedTuple):
-    """What is examined of a robot."""
-
     robot: Robot  # with the examined postures alone
     centres: tuple[str, ...]  # postures at which a small deviation stays small, the robot's example first
     saddles: tuple[str, ...]
@@ -66,7 +64,6 @@ def methods_of(engines: Mapping[str, Engine], robot: Robot, schemes: tuple[str, 
 
 
 def rk4_of_both(engines: Mapping[str, Engine]) -> tuple[Method, Method]:
-    """RK4 of tmt and of MuJoCo."""
     rk4 = same_scheme(engines, engines["mujoco"].methods["RK4"], "tmt")
     return rk4, same_scheme(engines, rk4, "mujoco")
 

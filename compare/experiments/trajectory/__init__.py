@@ -30,7 +30,6 @@ def claim_values(robot: Robot) -> dict:
 
 
 def skipped(robot: Robot) -> str | None:
-    """Why it does not apply to a robot, or None."""
     return leaves_no_digits(robot)
 
 

@@ -27,7 +27,6 @@ class SceneRun(NamedTuple):
 
 
 def scene_runs(result: Result, robot: Robot) -> list[SceneRun]:
-    """The scenes in their order."""
     names = {row["scene"] for row in result.rows}
     failing = [check.scene for check in result.checks if check.failed and check.about == About.MODELS]
     scenes = []

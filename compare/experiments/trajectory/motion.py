@@ -17,8 +17,6 @@ FRAMES = 128  # of a scene, about, without its start
 
 
 class Drawn(NamedTuple):
-    """The motion of one scene as it is drawn."""
-
     scene: str
     run: str  # method and step
     t: np.ndarray  # (frames,) s

@@ -23,8 +23,6 @@ ADHESION = "a transmission of type body"  # it acts in contacts alone
 
 
 class Prediction(NamedTuple):
-    """What is predicted at one posture."""
-
     at: Posture
     why: str  # there are no limits, if there are none
     there: dict[str, Posture]  # by integrator: at rest with the step that is the limit; none where it does not rest
