@@ -1,7 +1,7 @@
 """Made faults that the diagnosis must name: `python -m tests.faults [COUNT]` prints outcomes; exit 1 if one is wrong.
 
-Each fault is one number, term, slip in the derivation or convention of a joint. Wrong values come from tmt's composite form or
-from a second derivation in the world's axes, which shares nothing with the search. Outcomes: "named" (alone or among others that
+Each fault is one number, term, slip in the derivation or convention of a joint. Wrong values come from tmt's composite form, or
+from its literal Jacobians and convective terms, summed here. Outcomes: "named" (alone or among others that
 explain as much); "tied" (only other causes, no less simple, and again at further states); "none"; "invisible"; "wrong".
 """
 
@@ -22,6 +22,8 @@ from compare.diagnosis.model import OF_TERM
 from compare.engines.mujoco import reading
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
+from tmt import literal
+from tmt.derivation import method
 from tmt.derivation.composite import mass_matrix_and_bias
 
 ARM6 = Path(__file__).parent / "models" / "arm6.xml"
@@ -43,71 +45,30 @@ class Fault(NamedTuple):
     make: Callable  # (tree, q, qd) -> Mbar, h
 
 
-class Walk:
-    """Every body's place and motion at qdd = 0, at states q, qd (states, nv) of hinges and slides, in the world's axes."""
-
-    def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray):
-        self.tree, (self.states, self.nv) = tree, q.shape
-        zero = np.zeros((self.states, 3))
-        self.world = (zero, np.broadcast_to(np.eye(3), (self.states, 3, 3)), zero, zero, zero)
-        self.joints, self.axes = [], []  # origin, turn, angular velocity, acceleration, angular acceleration of each
-        for i, parent in enumerate(tree.parent):
-            x, R, w, a, alpha = self.joints[parent] if parent >= 0 else self.world
-            axis, angle, rate = R @ np.array(tree.axis[i]), q[:, i] - tree.reference[i], qd[:, i, None]
-            slides = tree.kind[i] == "slide"
-            arm = R @ np.array(tree.offset[i]) + (axis * angle[:, None] if slides else 0.0)
-            x, a = x + arm, a + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
-            if slides:
-                self.joints.append((x, R, w, a + 2.0 * np.cross(w, axis * rate), alpha))
-            else:
-                turn = R @ rotation(np.array(tree.axis[i]), angle)
-                self.joints.append((x, turn, w + axis * rate, a, alpha + np.cross(w, axis * rate)))
-            self.axes.append(axis)
-
-    def body(self, b: int):
-        joint = self.tree.body_hinge[b]
-        x, R, w, a, alpha = self.joints[joint] if joint >= 0 else self.world
-        arm = R @ np.array(self.tree.com[b])
-        x, a = x + arm, a + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
-        T, B = np.zeros((2, self.states, 3, self.nv))
-        while joint >= 0:
-            axis = self.axes[joint]
-            if self.tree.kind[joint] == "slide":
-                T[:, :, joint] = axis
-            else:
-                T[:, :, joint], B[:, :, joint] = np.cross(axis, x - self.joints[joint][0]), axis
-            joint = self.tree.parent[joint]
-        return R, w, a, alpha, T, B
-
-
-def rotation(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    K = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return np.eye(3) + np.sin(angle)[:, None, None] * K + (1.0 - np.cos(angle)[:, None, None]) * (K @ K)
-
-
 def derived(tree: tmt.Tree, q, qd, factors: dict | None = None, slip: str = "", bodies: tuple = ()):
     """Mbar (states, nv, nv) and h (states, nv), with factors {(body, term): number} and one slip in some bodies."""
-    walk, M, h = Walk(tree, q, qd), 0.0, 0.0
+    (T, B), w = literal.jacobians(q, tree), literal.angular_velocities(q, qd, tree)
+    (a, alpha), frames, M, h = literal.convective_terms(q, qd, tree), method.joint_frames(tree, list(q.T)), 0.0, 0.0
     for b, mass in enumerate(tree.mass):
-        R, w, a, alpha, T, B = walk.body(b)
         factor = {term: (factors or {}).get((b, term), 1.0) for term in OF_TERM}
-        inertia, c = np.array(tree.inertia[b]), np.array(tree.com[b])
-        slips, Rt = slip if b in bodies else "", np.swapaxes(R, 1, 2)
-        I = R @ inertia @ Rt
+        I, c, slips = np.array(tree.inertia[b]), np.array(tree.com[b]), slip if b in bodies else ""
+        R = np.moveaxis([[x + np.zeros(len(q)) for x in row] for row in frames[tree.body_hinge[b]].turn], -1, 0)
+        Rt, own_w, own_alpha, own_B = np.swapaxes(R, 1, 2), w[:, b], alpha[:, b], B[:, b]
         if slips == "not turned":
-            I = np.broadcast_to(inertia, I.shape)
+            I = Rt @ I @ R
         elif slips == "turned the wrong way":
-            I = Rt @ inertia @ R
+            I = Rt @ Rt @ I @ R @ R
         elif slips == "about the joint":
-            I = R @ (inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))) @ Rt
+            I = I + mass * (c @ c * np.eye(3) - np.outer(c, c))
         elif slips == "R for R'":
-            w, alpha, B = (R @ R @ w[..., None])[..., 0], (R @ R @ alpha[..., None])[..., 0], R @ R @ B
-        M = M + factor["translation"] * mass * np.swapaxes(T, 1, 2) @ T
-        M = M + factor["rotation"] * np.swapaxes(B, 1, 2) @ I @ B
-        force = mass * (factor["convective"] * a - factor["gravity"] * np.array(tree.gravity))
-        moment = factor["Euler"] * np.einsum("sij,sj->si", I, alpha)
-        moment = moment + factor["gyroscopic"] * np.cross(w, np.einsum("sij,sj->si", I, w))
-        h = h + np.einsum("sci,sc->si", T, force) + np.einsum("sci,sc->si", B, moment)
+            own_w, own_alpha, own_B = (R @ R @ x for x in (own_w[..., None], own_alpha[..., None], own_B))
+            own_w, own_alpha = own_w[..., 0], own_alpha[..., 0]
+        M = M + factor["translation"] * mass * np.swapaxes(T[:, b], 1, 2) @ T[:, b]
+        M = M + factor["rotation"] * np.swapaxes(own_B, 1, 2) @ I @ own_B
+        force = mass * (factor["convective"] * a[:, b] - factor["gravity"] * np.array(tree.gravity))
+        moment = factor["Euler"] * (I @ own_alpha[..., None])[..., 0]
+        moment = moment + factor["gyroscopic"] * np.cross(own_w, (I @ own_w[..., None])[..., 0])
+        h = h + np.einsum("sci,sc->si", T[:, b], force) + np.einsum("sci,sc->si", own_B, moment)
     return M + np.diag(tree.armature), h
 
 
