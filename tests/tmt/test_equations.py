@@ -5,7 +5,6 @@ import dataclasses
 import mpmath
 import numpy as np
 import pytest
-from engines.drawn_trees import drawn_trees
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from trees import random_state, small_tree, tree_of_kinds
@@ -16,8 +15,19 @@ from tmt.exact.values import distance, exact
 
 EPS = np.finfo(float).eps
 STEP = 1e-5  # of central differences, which are right to about 1e-8 of what is differenced
-of_trees = given(drawn_trees())
 few = settings(max_examples=20)
+
+
+@st.composite
+def drawn_trees(draw):
+    """A tree of up to four bodies, a state of it, and a generator of whatever else a test needs."""
+    kinds = draw(st.sets(st.sampled_from(["hinge", "slide", "ball"]), min_size=1))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))  # hypothesis alone would draw mostly zeros
+    tree = tree_of_kinds(rng, draw(st.integers(1, 4)), sorted(kinds))
+    return tree, *random_state(rng, tree), rng
+
+
+of_trees = given(drawn_trees())
 
 
 def along(tree, function, q, u):
@@ -55,11 +65,11 @@ def test_the_mass_matrix_gives_the_kinetic_energy_and_the_acceleration_which_cha
 @few
 @of_trees
 def test_gravity_and_springs_are_the_slope_of_the_potential_energy(drawn):
-    tree, q, *_ = drawn
+    tree, q, qd, *_ = drawn
     held = tmt.gravity_balance(q, tree) + tmt.spring_torque(q, tree)
     slope = by_each(tree, lambda q: tmt.potential_energy(q, tree), q)
     assert_close(slope, held, 1.0 + abs(tmt.potential_energy(q, tree)))
-    assert_close(tmt.bias(q, 0.0 * drawn.qd, tree), tmt.gravity_balance(q, tree), 100.0, 64 * EPS)
+    assert_close(tmt.bias(q, 0.0 * qd, tree), tmt.gravity_balance(q, tree), 100.0, 64 * EPS)
 
 
 @few
