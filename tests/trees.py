@@ -9,30 +9,13 @@ from tmt import Tree
 from tmt.exact.values import DIGITS
 
 
-def random_tree(rng, bodies=4, damping=0.0) -> Tree:
-    """Bodies with one to three hinges each, branched, off-axis, with products of inertia."""
-    parent, offset, axis, body_hinge, inertias = [], [], [], [], []
-    for b in range(bodies):
-        before = -1 if b == 0 else int(rng.choice([-1, *body_hinge]))
-        for _ in range(rng.integers(1, 4)):
-            parent.append(before)
-            before = len(parent) - 1
-            offset.append(rng.uniform(-0.4, 0.4, 3))
-            axis.append(rng.normal(size=3))
-        body_hinge.append(before)
-        inertias.append(possible_tensor(rng))
-    n = len(parent)
-    names, damped = [f"hinge{i}" for i in range(n)], rng.uniform(0.0, 1.0, n) * damping
-    return Tree(names, parent, offset, axis, damped, **random_bodies(rng, body_hinge, inertias))
-
-
-def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free")) -> Tree:
-    """Bodies on one or two joints each, with all that a Tree may have; "free": the first has three slides and a ball."""
+def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free"), most=2) -> Tree:
+    """Bodies on one to `most` joints each, with all that a Tree may have; "free": the first has three slides and a ball."""
     parent, offset, axis, kind, body_hinge, inertias = [], [], [], [], [], []
     for b in range(bodies):
         before, is_free = -1 if b == 0 else int(rng.choice([-1, *body_hinge])), "free" in kinds and b == 0
         others = [name for name in kinds if name != "free"]
-        chosen = ["slide"] * 3 + ["ball"] if is_free else list(rng.choice(others, rng.integers(1, 3)))
+        chosen = ["slide"] * 3 + ["ball"] if is_free else list(rng.choice(others, rng.integers(1, most + 1)))
         if chosen == ["ball", "ball"]:  # in one body they are singular
             chosen[0] = "slide"
         for name in chosen:
@@ -60,6 +43,14 @@ def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free")) -> Tr
         rest=rest,
         reference=[0.0 if name == "ball" else rng.uniform(-0.5, 0.5) for name in kind],
     )
+
+
+def random_tree(rng, bodies=4, damping=0.0) -> Tree:
+    """Hinges alone, without armature, springs and references."""
+    tree = tree_of_kinds(rng, bodies, ("hinge",), most=3)
+    n = len(tree.axis)
+    plain = dict.fromkeys(("armature", "stiffness", "rest", "reference"), (0.0,) * n)
+    return replace(tree, damping=rng.uniform(0.0, 1.0, n) * damping, **plain)
 
 
 def small_tree() -> Tree:
