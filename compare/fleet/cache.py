@@ -68,7 +68,7 @@ def write_whole(path: Path, content: bytes | dict[str, bytes]) -> None:
         else:
             shutil.rmtree(part, ignore_errors=True)
             unpacked(content, part)
-        with interrupt.postponed():
+        with interrupt.postponed:
             if path.is_dir():
                 shutil.rmtree(path)
             part.replace(path)

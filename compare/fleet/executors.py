@@ -64,7 +64,7 @@ def guarded(function: Callable, arguments: tuple, limit: float, memory: int, pla
         with tempfile.TemporaryDirectory(dir=place, ignore_cleanup_errors=True) as folder:
             pool = ProcessPool(1, context=context)
             try:
-                with interrupt.postponed():  # a process that is just being started would complain
+                with interrupt.postponed:  # a process that is just being started would complain
                     future = pool.schedule(alone, (function, arguments, folder, memory, place), timeout=limit)
                 return future.result()
             except TimeoutError:

@@ -19,7 +19,7 @@ from .crash import how_ended
 
 CAN_BLOCK = hasattr(signal, "pthread_sigmask")
 undo = []  # functions to call before the process ends, last first
-turn = threading.RLock()  # held while a thread decides how the run ends
+postponed = threading.RLock()  # held while an interrupt has to wait, and while the run ends
 PARENT = int(os.environ.pop("COMPARE_PARENT", 0))  # the process that waits for this one, see status_of_child
 FINISHED = 200  # added to the exit status of such a child: no status that a user's own code ends with
 
@@ -48,14 +48,9 @@ def listen() -> None:
         threading.Thread(target=end_when_asked, args=(numbers,), daemon=True).start()
 
 
-def postponed() -> threading.RLock:
-    """For `with`: an interrupt in the block takes effect at its end."""
-    return turn
-
-
 def settle() -> None:
     """From now on an interrupt does not change the exit status."""
-    with turn:
+    with postponed:
         Now.settled = True
 
 
@@ -65,7 +60,7 @@ def end_when_asked(numbers: list[int]) -> None:
 
 
 def end() -> None:
-    with turn:
+    with postponed:
         if not Now.settled:
             clear_up()
             with suppress(OSError):

@@ -64,7 +64,7 @@ class Workers(ThreadPoolExecutor):
     def ask(self, task, *call):
         """The result or exception of a call in one of the processes."""
         try:
-            with interrupt.postponed():  # a process that is half started would complain
+            with interrupt.postponed:  # a process that is half started would complain
                 future = self.processes.submit(timed, *call)
             value, error, seconds = future.result()
         except RuntimeError:  # a broken pool, or shut down

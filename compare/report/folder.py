@@ -69,7 +69,7 @@ class Work:
         try:
             self.out.mkdir(parents=True, exist_ok=True)
             with locked(self.out):
-                with interrupt.postponed():
+                with interrupt.postponed:
                     self.path = Path(tempfile.mkdtemp(prefix=".new-", dir=self.out))
                     self.lock = lock(self.path)
                 (self.path / "new").mkdir()
@@ -81,7 +81,7 @@ class Work:
 
     def exchange(self):
         """Move the old report away and the new one in; on an error put everything back."""
-        with locked(self.out), interrupt.postponed():
+        with locked(self.out), interrupt.postponed:
             clear_away(self.out)
             refuse_foreign(self.out)
             new, old, moving = (self.path / name for name in ("new", "old", "moving"))

@@ -61,7 +61,7 @@ class Terminal:
             return
         spinner = "dots" if self.err.encoding.lower().startswith("utf") else "line"
         interrupt.undo.append(wipe)
-        self.status = self.screen.status(Moving(self), spinner=spinner)
+        self.status = self.screen.status(self, spinner=spinner)
         try:
             with self.status:
                 yield
@@ -85,6 +85,9 @@ class Terminal:
         whole = ": ".join(filter(None, (", ".join(parts), text)))
         return whole if len(whole) <= space else whole[: space - 3] + "..."
 
+    def __rich__(self) -> Text:
+        return Text(self.line(), no_wrap=True)
+
     @contextmanager
     def paused(self):
         if self.status:
@@ -94,14 +97,6 @@ class Terminal:
         finally:
             if self.status:
                 self.status.start()
-
-
-class Moving:
-    def __init__(self, terminal: Terminal):
-        self.terminal = terminal
-
-    def __rich__(self) -> Text:
-        return Text(self.terminal.line(), no_wrap=True)
 
 
 def wipe() -> None:

@@ -1,4 +1,4 @@
-"""What one evaluation of the dynamics costs: MuJoCo's calls, the ways of tmt, and other engines."""
+"""What one evaluation of the dynamics costs: MuJoCo's calls, and the ways of tmt."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -9,8 +9,6 @@ import tmt
 from tmt.compiled import evaluator, runner
 from tmt.compiled.cores import cores
 
-from ...engines import LABELS
-from ...engines.outside import EngineError, Outside
 from ...judge import timing
 from ...robots.case import SEED
 from ..setup import Setup
@@ -107,27 +105,8 @@ def costs(setup: Setup, made: Evaluations) -> list[dict]:
         is_counted = key[0] == FORWARD and key[1] in (WAITING, EACH, IN_LANES)
         rows.append((*key, ns, *((operations, operations / ns) if is_counted else (None, None)), None))
     rows.sort(key=lambda row: (row[0], -row[4]))
-    rows += [] if setup.is_quick else of_outside_engines(setup)
     rows += [(*key, *[None] * 5, reason) for key, reason in made.absent.items()]
     return [dict(zip(COLUMNS, row)) for row in rows]
-
-
-def of_outside_engines(setup: Setup) -> list[tuple]:
-    """The same rows of engines that read the file: each is timed in its own process, which calls it from Python."""
-    rng, case, rows = np.random.default_rng([SEED, 2]), setup.robot.case(), []
-    q, qd, tau = case.coordinates.random(rng, FEW), *rng.uniform(-3.0, 3.0, (2, FEW, case.coordinates.nv))
-    for engine in setup.engines.values():
-        if isinstance(engine, Outside) and not engine.unavailable():
-            label, dynamics = LABELS[engine.name], engine.of(case)
-            try:
-                times = dynamics.timed(q, qd, tau)
-            except EngineError as error:
-                rows.append((FORWARD, label, *[None] * 5, str(error)))
-                continue
-            for count, ns in times.items():
-                name = f"{label}, {'called from Python' if count == 1 else 'many states in a call'}"
-                rows.append((FORWARD, name, count, None, ns, None, None, None))
-    return rows
 
 
 def counted(loop: Callable[[int], None]) -> tuple[Callable, int]:
