@@ -25,8 +25,6 @@ KINDS = {
     "slide": Kind(1, "m", "N", "m", "m/s", "m"),
     "ball": Kind(3, "rad", "N m", "quaternions", "deg/s", "deg"),
 }
-
-
 FREE = ("slide", "slide", "slide", "ball")
 
 

@@ -130,7 +130,7 @@ def compare_runs(
             stepped = one_step(dynamics, mine.states, tau, dt, method.name)
             levels.insert(0, ("one step", mine.stepped, stepped, mine.step_tolerance, mine.at))
         for level, ours, other, tolerance, at in levels:
-            difference = state_difference(coordinates, ours, other)
+            difference = np.concatenate([coordinates.difference(ours[0], other[0]), ours[1] - other[1]], axis=-1)
             check_level(result, where, about | {"level": level}, coordinates, difference, tolerance, at, ending)
         if len(mine.at) and (mine.step_tolerance.min(axis=0) >= mine.widest).any():
             result.not_judged(where, "one step", say(result.finding("wide_step")))
@@ -154,11 +154,6 @@ def compare_runs(
                 "left": {name: departure(t, mine.q, coordinates), "mujoco": departure(t, theirs[0], coordinates)},
             },
         )
-
-
-def state_difference(coordinates: Coordinates, state: Sequence, other: Sequence) -> np.ndarray:
-    """The difference of states (q, v): movements and speeds, (..., 2 nv)."""
-    return np.concatenate([coordinates.difference(state[0], other[0]), state[1] - other[1]], axis=-1)
 
 
 def ends_first(ends: Mapping[str, float | None]) -> float:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from ...judge.words import scene_of
+from ...judge.words import capital, scene_of
 from ..text import environment, say
 from ..verdict import Section, failures
 
@@ -34,10 +34,10 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
     drawn = section.result.curves.get("drawn") if section else None
     if not drawn:
         return ""
-    differing = scenes_that_differ(section)
+    names = [one.scene for one in drawn]
+    differing = {scene_of(check.scene, names) for check in failures([section]).differing}
     drawn = sorted(drawn, key=lambda one: one.scene not in differing)
-    label = section.result.label
-    engines = [label[:1].upper() + label[1:], "MuJoCo"]
+    engines = [capital(section.result.label), "MuJoCo"]
     data, stride, scenes = inlined(drawn, engines)
     links, still = scenes[0]["links"], stride * scenes[0]["still"]
     first, second = (outline(path[still], links) for path in on_page(drawn[0]))
@@ -47,11 +47,6 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
     values |= {"stride": stride, "left_out": [one.scene for one in drawn[len(scenes) :]]}
     text = environment().get_template("motion.html.jinja").render(values)
     return re.sub(r"\n\s*\n", "\n", text)  # an empty line would end the HTML inside of Markdown
-
-
-def scenes_that_differ(section: Section) -> set[str]:
-    names = [one.scene for one in section.result.curves["drawn"]]
-    return {scene_of(check.scene, names) for check in failures([section]).differing} - {None}
 
 
 def inlined(drawn: Sequence, engines: Sequence[str]) -> tuple[str, int, list[dict]]:
@@ -82,7 +77,7 @@ def inlined_scene(one: object, stride: int) -> dict:
     alive = [k for k in range(len(ours)) if ours[k] is not None and theirs[k] is not None]
     return {
         "name": one.scene,
-        "seen": f"{one.scene[:1].upper()}{one.scene[1:]}, {one.run}. {say(one.seen)}{shown}",
+        "seen": f"{capital(one.scene)}, {one.run}. {say(one.seen)}{shown}",
         "dt": dt,
         "pause": max(1, round(1000.0 * dt * slow)),
         "unit": one.unit,
