@@ -6,6 +6,9 @@ The arm; a cart with a slide, a hinge and a ball on it; a free stone.
 from models import PATHS
 
 from compare.engines.mujoco import Mujoco, parse, reading
+from compare.experiments import speed
+from compare.experiments.speed import runs, settings
+from compare.judge.check import Result
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.run.examine import Setup, engines
@@ -42,3 +45,10 @@ def setup_between(text: str, edited: str | None = None, states: int = 30, exact_
     """What an experiment needs to compare tmt's equations for a text with MuJoCo's for an edited one."""
     engine, robot = reading.engine(reading.read(edited or text)), robot_of(reading.read(text), "a text")
     return Setup(robot, engines(engine), states=states, exact_states=exact_states, size="small")
+
+
+def untimed_speed(setup: Setup) -> Result:
+    """What speed judges in its regular scene, without times."""
+    regular = settings.regular_of(setup.robot)
+    name, *parts = runs.scene(regular, setup.engines, setup.size)
+    return speed.judged(setup, [regular], *({name: part} for part in parts))

@@ -19,14 +19,14 @@ POSTURES = {  # deg, (alpha, beta, gamma); the assignment's named postures
     "bent": (30, 20, 60),
 }
 SCENES = (
-    Scene("zero, free", "zero", "free", tags=("full only", "speed", "fewer joints")),
+    Scene("zero, free", "zero", "free", tags=("full only", "speed")),
     Scene("ball catch, free", "ball catch", "free", tags=("speed",)),
     Scene("bent, free", "bent", "free", tags=("speed", "regular")),
     Scene("ball catch, held", "ball catch", "hold", judged=2.5),  # unstable: rounding grows fast
     Scene("bent, held", "bent", "hold"),
     Scene("bent, damped", "bent", "free", damping=0.5, tags=("full only", "speed")),
     Scene("thrown, no gravity", "bent", "free", (100.0, 200.0, -150.0), gravity=False, judged=4.5, tags=("full only",)),
-    Scene("elbow swing", "zero", "free", locked=("alpha", "beta"), tags=("full only", "fewer joints")),
+    Scene("elbow swing", "zero", "free", locked=("alpha", "beta"), tags=("full only",)),
 )
 PRINTED = (
     Printed("c", "holding torque", "zero", (-2.2072, 0.0, -2.2072), "N m", 0.5e-4),

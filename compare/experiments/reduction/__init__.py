@@ -1,6 +1,6 @@
 """What each scene needs of the model: the joints that can be locked without changing its motion."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -13,7 +13,6 @@ from ...judge.rounding import NARROW
 from ...judge.run import movement_unit
 from ...judge.scale import FACTOR
 from ...robots import Robot
-from ...robots.case import Case
 from .. import Experiment
 from ..setup import Setup, nothing
 from .exact_motion import compare_swing, pendulums
@@ -41,15 +40,12 @@ def begin(setup: Setup) -> None:
     setup.background["reduction"] = setup.map(untimed, [alone])
 
 
-def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) -> Result:
-    """Sub-blocks with joints locked; what each case needs, its runs and times; exact solutions.
-
-    cases: None for the robot's. timed=False: one choice of angles, the scenes with fewer joints, and the exact solutions: a
-    few tenths of a second, enough to see a wrong model.
-    """
-    begun = setup.background.pop("reduction", None) if timed and cases is None else None
-    result, models = next(iter(begun)) if begun else untimed(setup, cases, timed)
-    if timed and models is not None:
+def rows(setup: Setup) -> Result:
+    """Sub-blocks with joints locked; what each case needs, its runs and times; exact solutions."""
+    if "reduction" not in setup.background:
+        begin(setup)
+    ((result, models),) = setup.background.pop("reduction")
+    if models is not None:
         setup.quiet()
         time_models(result, models, setup, rounds=setup.of(64, 16, 2))
         best = largest_gain(result.rows, setup.robot.coordinates.nv)
@@ -73,16 +69,15 @@ def answers(result: Result, robot: Robot) -> list[Finding]:
     return sorted(found, key=lambda one: bool(one.values["needed"] and one.values["stays"]))
 
 
-def untimed(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) -> tuple[Result, list[tuple] | None]:
+def untimed(setup: Setup) -> tuple[Result, list[tuple] | None]:
     """The parts of `rows` that are not timed, and the models to be timed; None: no joint can be locked."""
     result, robot = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}}), setup.robot
     if driven := [case.name for case in robot.cases if case.controller]:
         result.find("driven", scenes=driven)
-    cases = cases or [case for case in robot.cases_of_torque if timed or "fewer joints" in case.scene.tags]
     try:
-        compare_blocks(result, setup, setup.of(10, 1 if robot.is_read else 3, 1) if timed else 1)
-        models = [model for case in cases for model in of_case(result, case, setup)]
-        for case in pendulums(cases):
+        compare_blocks(result, setup, setup.of(10, 1 if robot.is_read else 3, 1))
+        models = [model for case in robot.cases_of_torque for model in of_case(result, case, setup)]
+        for case in pendulums(robot.cases_of_torque):
             compare_swing(result, setup, case)
     except ModelError as error:
         add_not_lockable(result, robot, error)

@@ -38,29 +38,32 @@ def skipped(robot: Robot) -> Finding | str | None:
 
 def begin(setup: Setup) -> None:
     """Start measuring the errors of MuJoCo and tmt, in parallel with other work: they are timed later."""
-    setup.background["speed"] = measured(setup, followed(setup.robot, setup.size), "compiled")
+    setup.background["speed"] = measured(setup, followed(setup.robot, setup.size))
 
 
-def rows(setup: Setup, timed: bool = True) -> Result:
-    """Errors, times, orders, the error of rounding, and the cheapest settings.
-
-    timed=False: only the errors of one scene by MuJoCo's integrators and the same schemes of tmt, and their checks: a tenth
-    of a second, enough to see a wrong model.
-    """
-    result = Result("speed", shown=[])
-    if timed and "speed" not in setup.background:
+def rows(setup: Setup) -> Result:
+    """Errors, times, orders, the error of rounding, and the cheapest settings."""
+    if "speed" not in setup.background:
         begin(setup)
-    regular = regular_of(setup.robot)
-    cases, scenes = setup.background.pop("speed") if timed else measured(setup, [regular], "same schemes")
+    cases, scenes = setup.background.pop("speed")
     by_scene = {name: parts for name, *parts in scenes}
     references, floors, rows_of = ({case.name: by_scene[case.name][k] for case in cases} for k in range(3))
-    unit = movement_unit(setup.robot.coordinates)
+    compiled, failed = add_times(setup, cases, references, floors, rows_of)
+    result = judged(setup, cases, references, floors, rows_of)
+    add_advice(result, setup, compiled)
+    add_absent(result, setup)
+    unit, table = result.curves["unit"], result.rows + failed
+    result.rows = renamed([{name: row.get(name) for name in COLUMNS} for row in table], unit)
+    return result
+
+
+def judged(setup: Setup, cases: Sequence[Case], references, floors, rows_of) -> Result:
+    """The rows of the scenes, and checks of their errors and orders."""
+    regular, unit = regular_of(setup.robot), movement_unit(setup.robot.coordinates)
     servos_off = setup.robot.drive.feeds_back and not regular.controller
-    result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "servos_off": servos_off}
-    result.curves["of_file"] = setup.robot.is_read
-    if timed:
-        compiled, failed = add_times(setup, cases, references, floors, rows_of)
-    result.rows += [row for of_scene in rows_of.values() for row in of_scene]
+    curves = {"floors": floors, "regular": regular.name, "unit": unit, "servos_off": servos_off}
+    rows = [row for of_scene in rows_of.values() for row in of_scene]
+    result = Result("speed", shown=[], rows=rows, curves=curves | {"of_file": setup.robot.is_read})
     # with the coarse steps of a quick run errors are regular in this scene only, and other engines have too few settings
     whole, mujoco = setup.size == "full", setup.engines["mujoco"]
     ran = {(row["engine"], row["method"]): row["run"][1] for row in result.rows}
@@ -77,11 +80,6 @@ def rows(setup: Setup, timed: bool = True) -> Result:
         for scene, reference in references.items()
     ]
     result.find("references", runs=runs, unit=unit)
-    if timed:
-        add_advice(result, setup, compiled)
-        add_absent(result, setup)
-        result.rows += failed
-    result.rows = renamed([{name: row.get(name) for name in COLUMNS} for row in result.rows], unit)
     return result
 
 

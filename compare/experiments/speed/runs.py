@@ -26,18 +26,18 @@ EACH_STEP = 12  # nv up to which the growth takes the Jacobian of every step; ab
 FIRST_STEPS = 512  # a longer run of MuJoCo is timed over its first steps only
 
 
-def measured(setup: Setup, cases: Sequence[Case], which: str) -> tuple[Sequence[Case], Iterator[tuple]]:
+def measured(setup: Setup, cases: Sequence[Case]) -> tuple[Sequence[Case], Iterator[tuple]]:
     """The scenes, and `scene` of each. Different trees come first: their code compiles in parallel."""
     trees = [case.tree for case in cases]
     different_first = sorted(cases, key=lambda case: trees[: cases.index(case)].count(case.tree))
-    return cases, setup.map(partial(scene, engines=setup.engines, size=setup.size, which=which), different_first)
+    return cases, setup.map(partial(scene, engines=setup.engines, size=setup.size), different_first)
 
 
-def scene(case: Case, engines: Mapping[str, Engine], size: str, which: str) -> tuple:
-    """Name, reference, error of rounding, rad, and rows without times of a scene; which: see settings.methods."""
+def scene(case: Case, engines: Mapping[str, Engine], size: str) -> tuple:
+    """Name, reference, error of rounding, rad, and rows of a scene, without times, by compiled methods."""
     reference = references([case])[case.name]
     left = max(floor(case, engines["tmt"].of(case)), reference.apart)
-    return case.name, reference, left, rows_of_scene(case, engines, reference, left, size, which)
+    return case.name, reference, left, rows_of_scene(case, engines, reference, left, size, "compiled")
 
 
 def rows_of_scene(
@@ -48,7 +48,7 @@ def rows_of_scene(
     energy = tmt.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
     for method in methods(engines, size, which, case.robot, case):
         best, last, of_precision = np.inf, 0, RECORDS[method.engine].eps / EPS
-        for setting in settings_of(method, case, size, which):
+        for setting in settings_of(method, case, size):
             try:
                 rows.append(row_of_run(case, engines, method, setting, reference, energy, left))
             except EngineError as failed:

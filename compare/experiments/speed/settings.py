@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from tmt import Tree
 from tmt.methods import method_named
 
-from ...engines import GRID, IN_QUICK_RUNS, Engine, Method, Setting, methods_in, one_of_each_scheme
+from ...engines import GRID, IN_QUICK_RUNS, Engine, Method, Setting, methods_in
 from ...robots import Robot
 from ...robots.case import Case
 
@@ -17,7 +17,6 @@ EXPONENTS = {  # k of the coarsest and of the finest tolerance, 10^-k
 }  # fmt: skip
 FEW_SETTINGS = {"quick": 5, "small": 7}  # of a run that is not full: the coarsest settings
 FEW_OTHERS = 2  # the same for engines other than MuJoCo and tmt
-SETTINGS_OF_SAME_SCHEMES = slice(3, 7)  # coarse, yet near the reference where the motion is regular
 # A robot from a file may have any number of joints. Seconds of one evaluation are about a constant times nv^1.5, and of
 # engines that are called from Python those of a call and of the solver's own work:
 SECONDS, CALL_SECONDS = {"mujoco": 2e-7, "tmt": 5e-8}, 3e-5
@@ -56,14 +55,10 @@ def methods(
 ) -> list[Method]:
     """The methods of the available engines, which = "all".
 
-    "same schemes": one of MuJoCo for each scheme, and the same of tmt; "compiled": those whose loop over the steps is compiled;
-    "called": the others, whose runs take so long that they are followed only once.
+    "compiled": those whose loop over the steps is compiled; "called": the others, whose runs take so long that they are
+    followed only once.
     case: one in which the robot's actuators may act, which changes the schemes of some methods.
     """
-    if which == "same schemes":
-        theirs = one_of_each_scheme(engines["mujoco"])
-        schemes = {method.scheme for method in theirs}
-        return [*theirs, *(method for method in engines["tmt"].methods.values() if method.scheme in schemes)]
     excluded = left_out(engines, size, robot)
     compiled = {name: name in IN_QUICK_RUNS for name in engines}
     return [
@@ -117,15 +112,13 @@ def estimated(method: Method, tree: Tree) -> float:
     return evaluation * stepping.stages * (n if getattr(stepping, "implicit_bias", False) else 1)
 
 
-def settings_of(method: Method, case: Case, size: str = "full", which: str = "all") -> tuple[Setting, ...]:
+def settings_of(method: Method, case: Case, size: str = "full") -> tuple[Setting, ...]:
     """The settings of a method in a scene, from coarse to fine: steps halved, or tolerances divided by ten."""
     if method.adaptive:
         first, last = EXPONENTS.get(method.name, (2, 12))
         settings = tuple(Setting(case.duration, tolerance=10.0**-k) for k in range(first, last + 1))
     else:
         settings = halvings(method, case, size)
-    if which == "same schemes":
-        return settings[SETTINGS_OF_SAME_SCHEMES] or settings[-1:]
     few = FEW_SETTINGS if method.engine in IN_QUICK_RUNS else dict.fromkeys(FEW_SETTINGS, FEW_OTHERS)
     return settings[: few.get(size)]
 

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pandas as pd
 import pytest
-from edited import XML, setup_of
+from edited import XML, setup_of, untimed_speed
 from models import PATHS
 
 import tmt
@@ -64,17 +64,13 @@ def test_scenes_are_those_with_the_tag_and_a_users_own():
     assert speed.skipped(dataclasses.replace(ARM, scenes=())).kind == "no_scene"
 
 
-def test_methods_are_those_of_the_engines_that_are_there_or_the_same_schemes_of_both(engines):
+def test_methods_are_those_of_the_engines_that_are_there(engines):
     full, quick = (settings.methods(engines, size) for size in ("full", "quick"))
     there = [engine for engine in engines.values() if engine.unavailable() is None]
     assert full == settings.methods(engines, "small") == [m for engine in there for m in engine.methods.values()]
     assert quick == [m for m in full if m.engine in ("mujoco", "tmt")] and len(quick) < len(full)
     split = [settings.methods(engines, size, which) for size in ("full", "quick") for which in ("compiled", "called")]
     assert split == [quick, [m for m in full if m not in quick], quick, []]
-    same = settings.methods(engines, "full", "same schemes")
-    theirs = {m.name: m.scheme for m in same if m.engine == "mujoco"}
-    assert set(theirs) == {"Euler", "implicit", "RK4"}
-    assert {m.name for m in same if m.engine == "tmt"} == set(theirs.values())
 
 
 def test_a_step_response_is_followed_from_coarse_steps_on_by_the_schemes_that_it_has(of_gripper):
@@ -106,7 +102,6 @@ def test_steps_are_halved_from_the_scenes_own_to_the_finest(engine, name, finest
     found = settings.settings_of(method, BENT)
     assert [s.steps for s in found] == [64 << k for k in range(len(found))] and found[-1].steps == finest
     assert settings.settings_of(method, BENT, "quick") == found[: 2 if engine == "another" else 5]
-    assert [s.steps for s in settings.settings_of(method, BENT, "full", "same schemes")] == [512, 1024, 2048, 4096]
     adaptive = settings.settings_of(method._replace(name="Radau", adaptive=True), BENT)
     assert [s.tolerance for s in adaptive] == [1e-2, 1e-3, 1e-4]
 
@@ -147,7 +142,7 @@ def test_beyond_the_digits_of_the_reference_nothing_is_judged(engines, of_grippe
     known = known_reference._replace(apart=1e-6)
     monkeypatch.setattr(runs, "methods", lambda *_: [])
     monkeypatch.setattr(runs, "references", lambda cases: {case.name: known for case in cases})
-    assert runs.scene(BENT, engines, "small", "same schemes") == (BENT.name, known, 1e-6, [])
+    assert runs.scene(BENT, engines, "small") == (BENT.name, known, 1e-6, [])
 
 
 def test_a_reference_in_doubles_says_its_digits():
@@ -176,10 +171,10 @@ def test_a_small_run_takes_every_path(engines, small):
 
 
 def test_a_run_without_timings_has_the_checks_only_and_sees_a_wrong_model(engines):
-    result = speed.rows(Setup.small(ARM, engines), timed=False)
+    result = untimed_speed(Setup.small(ARM, engines))
     assert len(result.checks) > 10 and all(check.passed for check in result.checks)
     assert all(row["seconds"] is None for row in result.rows) and list(speed.figures(result, ARM)) == []
-    checks = speed.rows(setup_of(XML.replace('mass="1.5"', 'mass="1.50001"')), timed=False).checks
+    checks = untimed_speed(setup_of(XML.replace('mass="1.5"', 'mass="1.50001"'))).checks
     failed = {check.quantity for check in checks if not check.passed}
     assert {"smallest error of MuJoCo's RK4, compared with tmt's rk4", "the same error as tmt's rk4"} <= failed
 
@@ -228,4 +223,4 @@ def test_a_reference_in_doubles_measures_turns_and_no_quaternions():
 
 def test_whether_servos_are_off_is_known(engines, of_gripper):
     setups = Setup.quick(GRIPPER, of_gripper), Setup.quick(ARM, engines)
-    assert [speed.rows(setup, timed=False).curves["servos_off"] for setup in setups] == [True, False]
+    assert [untimed_speed(setup).curves["servos_off"] for setup in setups] == [True, False]

@@ -6,7 +6,7 @@ EDITS = (
     Edit("timing", "fastest", "min(taken)", "7 * min(taken)", "times x 7"),
     Edit("timing", "in_turns", "time.perf_counter() - begin", "7 * (time.perf_counter() - begin)", "seconds x 7"),
     Edit("timing", "in_turns", "len(taken) * min(taken)", "sum(taken)", "a call that was disturbed ends the repetition"),
-    Edit("speed", "rows", "_1.feeds_back and not regular.controller", "False", "nobody is told that servos are off"),
+    Edit("speed", "judged", "_1.feeds_back and not regular.controller", "False", "nobody is told that servos are off"),
     Edit("speed.runs", "take_times", "factor * min(of_row)", "7 * factor * min(of_row)", "reported seconds x 7"),
     Edit("speed.runs", "take_times", "factor * min(of_row)", "factor * max(of_row)", "the slowest run is reported"),
     Edit("speed.runs", "scene", "max(_1, reference.apart)", "_1",
