@@ -1,7 +1,7 @@
 """Made faults that the diagnosis must name: `python -m tests.faults [COUNT]` prints outcomes; exit 1 if one is wrong.
 
-Each fault is one number, term, slip in the derivation or convention of a joint. Wrong values come from tmt's composite form, or
-from its literal Jacobians and convective terms, summed here. Outcomes: "named" (alone or among others that
+Each fault is one number, term, slip in the derivation or convention of a joint. Wrong values come from tmt's
+composite form, or from its literal Jacobians and convective terms, summed here. Outcomes: "named" (alone or among others that
 explain as much); "tied" (only other causes, no less simple, and again at further states); "none"; "invisible"; "wrong".
 """
 
@@ -48,11 +48,12 @@ class Fault(NamedTuple):
 def derived(tree: tmt.Tree, q, qd, factors: dict | None = None, slip: str = "", bodies: tuple = ()):
     """Mbar (states, nv, nv) and h (states, nv), with factors {(body, term): number} and one slip in some bodies."""
     (T, B), w = literal.jacobians(q, tree), literal.angular_velocities(q, qd, tree)
-    (a, alpha), frames, M, h = literal.convective_terms(q, qd, tree), method.joint_frames(tree, list(q.T)), 0.0, 0.0
+    (a, alpha), M, h = literal.convective_terms(q, qd, tree), 0.0, 0.0
+    turns = [frame.turn for frame in method.joint_frames(tree, list(q.T))]
     for b, mass in enumerate(tree.mass):
         factor = {term: (factors or {}).get((b, term), 1.0) for term in OF_TERM}
         I, c, slips = np.array(tree.inertia[b]), np.array(tree.com[b]), slip if b in bodies else ""
-        R = np.moveaxis([[x + np.zeros(len(q)) for x in row] for row in frames[tree.body_hinge[b]].turn], -1, 0)
+        R = np.array([[x + np.zeros(len(q)) for x in row] for row in turns[tree.body_hinge[b]]]).transpose(2, 0, 1)
         Rt, own_w, own_alpha, own_B = np.swapaxes(R, 1, 2), w[:, b], alpha[:, b], B[:, b]
         if slips == "not turned":
             I = Rt @ I @ R

@@ -106,7 +106,8 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
     of = {
         "outcome": outcome, "name": in_one_line(robot.name), "states": STATES, "features": robot.features,
         "command": in_one_line(command),
-        "sha256": hashlib.sha256(Path(robot.mjcf).read_bytes()).hexdigest()[:16], "mujoco": installed("mujoco"),
+        "sha256": hashlib.sha256(Path(robot.mjcf).read_bytes()).hexdigest()[:16],
+        "mujoco": installed("mujoco"),
     }  # fmt: skip
     texts = written(*block("export", "head", **of).splitlines())
     out = Path(options.out)

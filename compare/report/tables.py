@@ -19,8 +19,11 @@ LONGEST_LIST = 80  # characters of a list in a report; its file has all
 
 
 def shown(rows: Sequence[Mapping], columns: Iterable[str] | None = None) -> dict:
-    """The columns and the cells, a list for each row, of a table as text, with the digits that a reader needs."""
-    names = list(dict.fromkeys(name for row in rows for name in row) if columns is None else columns)
+    """The columns and the cells, a list for each row, of a table as text. KeyError for a column that no row has."""
+    known = dict.fromkeys(name for row in rows for name in row)
+    names = list(known if columns is None else columns)
+    if rows and (absent := [name for name in names if name not in known]):
+        raise KeyError(absent[0])
     cells = [[text(name, row.get(name)) for name in names] for row in rows]
     return {"columns": [name.replace("_", " ") for name in names], "cells": cells}
 
@@ -55,8 +58,9 @@ def closest_checks(section: Section, most: int) -> dict:
 def origins(origin: dict) -> dict:
     rows = []
     for name, value in origin.items():
-        parts = ", ".join(f"{key} {part}" for key, part in value.items()) if isinstance(value, dict) else str(value)
-        rows.append({"what": IN_WORDS.get(name, name), "value": parts})
+        if isinstance(value, dict):
+            value = ", ".join(f"{key} {part}" for key, part in value.items())
+        rows.append({"what": IN_WORDS.get(name, name), "value": str(value)})
     return shown(rows)
 
 

@@ -1,7 +1,7 @@
 """The motion as a GIF: the stick figures of both engines over each other, held and let go.
 
-Drawn without matplotlib, which takes seconds for a hundred pictures. The first engine's sticks are wide with discs, MuJoCo's
-narrow with rings.
+Drawn without matplotlib, which takes seconds for a hundred pictures. The first engine's sticks are wide with
+discs, MuJoCo's narrow with rings.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,8 @@ from ...report.style import BLUE, ORANGE
 from .motion import Drawn
 
 PIXELS, TOP, BOTTOM = (640, 420), 78, 34  # pixels; and the margins for text above and below
-ROOM, MIDDLE = (PIXELS[0] - 36, PIXELS[1] - TOP - BOTTOM - 36), (PIXELS[0] / 2, (PIXELS[1] + TOP - BOTTOM) / 2)
+ROOM = PIXELS[0] - 36, PIXELS[1] - TOP - BOTTOM - 36
+MIDDLE = PIXELS[0] / 2, (PIXELS[1] + TOP - BOTTOM) / 2
 FINE = 2  # a picture is drawn larger by this factor
 SHADES = 16  # colours of the GIF
 BLACK = "#1a1a1a"
@@ -86,8 +87,9 @@ def words_of_picture(scene: Drawn, k: int) -> tuple[str, str, str]:
 
 
 def draw_sticks(pen: ImageDraw.ImageDraw, points: np.ndarray, links: Sequence[tuple], which: int) -> None:
-    """The sticks of an engine: of the first (0) wide with discs, of the other narrow with rings. points: (n, 2) pixels."""
-    few, colour, places = len(links) <= MOST_WIDE, (BLUE, ORANGE)[which], [tuple(FINE * point) for point in points]
+    """The sticks of an engine: of the first (0) wide with discs, of the other narrow with rings. points: (n, 2)."""
+    few, colour = len(links) <= MOST_WIDE, (BLUE, ORANGE)[which]
+    places = [tuple(FINE * point) for point in points]
     width = FINE * ((14 if few else 8), (4 if few else 3))[which]
     disc = FINE * ((7 if few else 4), (6 if few else 3))[which]
     for start, end in links:
@@ -99,7 +101,7 @@ def draw_sticks(pen: ImageDraw.ImageDraw, points: np.ndarray, links: Sequence[tu
 
 
 def text_of_scene(scene: Drawn, label: str, base: np.ndarray) -> Image.Image:
-    """What is in all pictures of a scene: its name, its run, the engines' names, a frame where the robot is fixed."""
+    """What is in all pictures of a scene: its name, its run, the engines, a frame where the robot is fixed."""
     image = Image.new("RGB", (FINE * PIXELS[0], FINE * PIXELS[1]), "white")
     pen = ImageDraw.Draw(image)
     write(pen, (16, 10), scene.scene, 20)
@@ -127,4 +129,4 @@ def slower(scene: Drawn) -> str:
 @cache
 def font(size: int) -> ImageFont.FreeTypeFont:
     """The font of all figures, size in pixels."""
-    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), size)
+    return ImageFont.truetype(str(Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")), size)

@@ -130,7 +130,8 @@ def compare_runs(
             stepped = one_step(dynamics, mine.states, tau, dt, method.name)
             levels.insert(0, ("one step", mine.stepped, stepped, mine.step_tolerance, mine.at))
         for level, ours, other, tolerance, at in levels:
-            difference = np.concatenate([coordinates.difference(ours[0], other[0]), ours[1] - other[1]], axis=-1)
+            movement = coordinates.difference(ours[0], other[0])
+            difference = np.concatenate([movement, ours[1] - other[1]], axis=-1)
             check_level(result, where, about | {"level": level}, coordinates, difference, tolerance, at, ending)
         if len(mine.at) and (mine.step_tolerance.min(axis=0) >= mine.widest).any():
             result.not_judged(where, "one step", say(result.finding("wide_step")))

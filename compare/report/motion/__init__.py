@@ -90,7 +90,7 @@ def inlined_scene(one: object, stride: int) -> dict:
 
 
 def on_page(one: object) -> list[list]:
-    """A list of integers for each picture of each engine, x and y of each point in the drawing; None for NaN."""
+    """For each engine and picture a list of integers, x and y of each point in the drawing; None for NaN."""
     paths = one.placed((WIDE - 2 * BORDER, HIGH - 2 * BORDER), (WIDE / 2, HIGH / 2))
     return [[whole_numbers(picture) for picture in path] for path in paths]
 

@@ -146,7 +146,8 @@ def test_the_gain_is_that_of_the_integrator_times_that_of_the_kernel_times_that_
 
 
 def test_operations_per_nanosecond_are_those_of_a_state_over_its_time(setup, monkeypatch):
-    made = evaluations.Evaluations({(evaluations.FORWARD, evaluations.EACH, 10_000, 1): lambda count: None}, {})
+    key = evaluations.FORWARD, evaluations.EACH, 10_000, 1
+    made = evaluations.Evaluations({key: lambda count: None}, {})
     monkeypatch.setattr(evaluations.timing, "in_turns", lambda calls, rounds: [[2e-3, 1e-3]])
     (found,) = evaluations.costs(setup, made)
     assert found["ns_per_state"] == pytest.approx(25.0)  # four calls of 10,000 states in a millisecond

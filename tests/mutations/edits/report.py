@@ -26,7 +26,7 @@ EDITS = (
     Edit("questions", "largest", "max(rows, key=_1)", "min(rows, key=_1)", "the smallest difference is the answer"),
     Edit("questions", "largest", "row['largest_difference'] is None", "False", "a diverged run is an answer"),
     Edit("questions", "printed", "row[name]", "row['mujoco']", "the answers name MuJoCo's numbers TMT's"),
-    Edit("speed.first_screen", "cheapest", "min(reached, key=_1, default=None)", "max(reached, key=_1, default=None)",
+    Edit("speed.first_screen", "cheapest", "min(reached, *_1)", "max(reached, *_1)",
          "the dearest is the cheapest"),
     Edit("report.document", "Document.section", "one['file'].endswith(LINKED)", "False",
          "a figure to which the first screen leads is folded"),
