@@ -53,7 +53,8 @@ def derived(tree: tmt.Tree, q, qd, factors: dict | None = None, slip: str = "", 
     for b, mass in enumerate(tree.mass):
         factor = {term: (factors or {}).get((b, term), 1.0) for term in OF_TERM}
         I, c, slips = np.array(tree.inertia[b]), np.array(tree.com[b]), slip if b in bodies else ""
-        R = np.array([[x + np.zeros(len(q)) for x in row] for row in turns[tree.body_hinge[b]]]).transpose(2, 0, 1)
+        turn = turns[tree.body_hinge[b]]
+        R = np.array([[x + np.zeros(len(q)) for x in row] for row in turn]).transpose(2, 0, 1)
         Rt, own_w, own_alpha, own_B = np.swapaxes(R, 1, 2), w[:, b], alpha[:, b], B[:, b]
         if slips == "not turned":
             I = Rt @ I @ R

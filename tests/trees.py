@@ -10,7 +10,7 @@ from tmt.exact.values import DIGITS
 
 
 def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free"), most=2) -> Tree:
-    """Bodies on one to `most` joints each, with all that a Tree may have; "free": the first is a free body."""
+    """Bodies on one to `most` joints each, with all that a Tree may have; "free": the first is free."""
     parent, offset, axis, kind, body_hinge, inertias = [], [], [], [], [], []
     for b in range(bodies):
         before, is_free = -1 if b == 0 else int(rng.choice([-1, *body_hinge])), "free" in kinds and b == 0

@@ -19,7 +19,7 @@ LONGEST_LIST = 80  # characters of a list in a report; its file has all
 
 
 def shown(rows: Sequence[Mapping], columns: Iterable[str] | None = None) -> dict:
-    """The columns and the cells, a list for each row, of a table as text. KeyError for a column that no row has."""
+    """The columns and the cells, a list for each row, as text. KeyError for a column that no row has."""
     known = dict.fromkeys(name for row in rows for name in row)
     names = list(known if columns is None else columns)
     if rows and (absent := [name for name in names if name not in known]):

@@ -55,8 +55,8 @@ def methods(
 ) -> list[Method]:
     """The methods of the available engines, which = "all".
 
-    "compiled": those whose loop over the steps is compiled; "called": the others, whose runs take so long that
-    they are followed only once.
+    "compiled": those whose loop over the steps is compiled; "called": the others, which take long and are
+    followed only once.
     case: one in which the robot's actuators may act, which changes the schemes of some methods.
     """
     excluded = left_out(engines, size, robot)

@@ -87,7 +87,7 @@ def words_of_picture(scene: Drawn, k: int) -> tuple[str, str, str]:
 
 
 def draw_sticks(pen: ImageDraw.ImageDraw, points: np.ndarray, links: Sequence[tuple], which: int) -> None:
-    """The sticks of an engine: of the first (0) wide with discs, of the other narrow with rings. points: (n, 2)."""
+    """The sticks of an engine: of the first (0) wide with discs, else narrow with rings. points: (n, 2)."""
     few, colour = len(links) <= MOST_WIDE, (BLUE, ORANGE)[which]
     places = [tuple(FINE * point) for point in points]
     width = FINE * ((14 if few else 8), (4 if few else 3))[which]
@@ -101,7 +101,7 @@ def draw_sticks(pen: ImageDraw.ImageDraw, points: np.ndarray, links: Sequence[tu
 
 
 def text_of_scene(scene: Drawn, label: str, base: np.ndarray) -> Image.Image:
-    """What is in all pictures of a scene: its name, its run, the engines, a frame where the robot is fixed."""
+    """What is in all pictures of a scene: its name, run, the engines, a frame where the robot is fixed."""
     image = Image.new("RGB", (FINE * PIXELS[0], FINE * PIXELS[1]), "white")
     pen = ImageDraw.Draw(image)
     write(pen, (16, 10), scene.scene, 20)
