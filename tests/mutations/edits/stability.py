@@ -16,6 +16,8 @@ EDITS = (
          "tolerance x 100"),
     Edit("departure", "late", "0.0 if times == (None, None) else None", "0.0",
          "a run that stays where the other leaves is as predicted"),
+    Edit("departure", "departures", "allowed and allowed['allowed_s'] >= _1", "False",
+         "a departure that may differ by more than it lasts is compared"),
     Edit("truth.linear", "Held.kind", "np.abs(values).min() <= small", "False",
          "without gravity every posture is a centre"),
     Edit("linear", "NEUTRAL", "1e-9", "0.1", "growth by a tenth in a step is none"),
