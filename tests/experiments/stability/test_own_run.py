@@ -89,6 +89,12 @@ def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step(quick):
     assert failed[0.004, "RK4"] == [own_run.AT_OWN, own_run.AT_REQUESTED]
 
 
+def test_the_first_six_keyframes_are_run(quick):
+    keys = "".join(f'<key name="k{i}" qpos="{i / 10}"/>' for i in range(7))
+    rows = quick(hinge('damping="0.05"', key=keys)).tables["own_run"]
+    assert sorted(row["start"] for row in rows) == [f"k{i}" for i in range(own_run.MOST_STARTS)]
+
+
 @pytest.mark.parametrize("source, why", [
     (hinge(option='viscosity="1"', actuator=STIFF), "not_judged"),
     (WELDED, "tied"),

@@ -37,6 +37,7 @@ EDITS = (
     Edit("own_run", "is_worse", "not finer.failed_at and not _1 <= _2", "False", "no run is unstable by its step"),
     Edit("own_run", "FASTER", "10.0", "1e3", "a run may be a thousand times as fast as at the finer step"),
     Edit("own_run", "add", "row['outcome'] in ('alike', 'calm')", "True", "what is not stable in its own run passes"),
+    Edit("own_run", "begin", "list(reading.keyframes)[:MOST_STARTS]", "list(reading.keyframes)[:1]", "one keyframe is run"),
     Edit("own_run", "begin", "(AT_REQUESTED, *setup.step)", "(AT_REQUESTED, reading.dt, reading.integrator)",
          "a requested step is the file's"),
     Edit("predicted", "why_unknown", "unmodelled(at.robot)", "False", "what has no law is left out of a limit"),
