@@ -53,6 +53,13 @@ def test_an_open_loop_is_judged_up_to_its_last_state(mujoco):
         assert judged_with(mujoco, damped._replace(q=q))[name].passed is passes
 
 
+def test_a_step_whose_bound_is_wider_than_what_moves_is_not_judged(mujoco):
+    damped = side(DAMPED)
+    for more, is_judged in ((1.01, True), (1.0, False)):
+        widest = np.append(damped.widest[:-1], more * damped.step_tolerance[:, -1].min())
+        assert ("one step" not in judged_with(mujoco, damped._replace(widest=widest))) is is_judged
+
+
 @pytest.mark.parametrize("rate", [100.0, 202.0])
 def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
     """Half a turn in 1/64 s is 201 rad/s."""

@@ -19,6 +19,8 @@ EDITS = (
          "band x 30 where servos act"),
     Edit("scale", "gain_scale", "np.abs(q)", "0.0 * np.abs(q)", "what servos feed back of positions is not rounded"),
     Edit("scale", "gain_scale", "np.abs(qd)", "30 * np.abs(qd)", "what servos feed back of speeds is rounded x 30"),
+    Edit("trajectory.runs", "compare_runs", "(mine.step_tolerance.min(axis=0) >= mine.widest).any()", "False",
+         "a step is judged by a bound wider than what moves"),
     Edit("run", "exchanged", "pull @ give @ pull / 2.0", "3 * pull @ give @ pull / 2.0", "the energy of servos x 3"),
     Edit("run", "exchanged", "case.tau - fed_back_at(_1, _2)", "case.tau + fed_back_at(_1, _2)",
          "servos push the other way from where they start"),
