@@ -105,6 +105,12 @@ def test_what_is_not_modelled_has_no_limit(quick, source, why):
     assert {row["limit"] for row in result.tables["step_limits"] if row["posture"] != "middle"} == {why}
 
 
+def test_adhesion_acts_in_contacts_alone_and_hides_no_limit(quick):
+    grip = f'{STIFF}<adhesion body="grip" ctrlrange="0 1" gain="2"/>'
+    result = quick(hinge(actuator=grip).replace("<body>", '<body name="grip">'))
+    assert "not_judged" not in {row["limit"] for row in result.tables["step_limits"]}
+
+
 def test_a_servo_at_its_range_lets_a_keyframe_rest_beside_it():
     key = '<key name="home" qpos="0.05" ctrl="0"/>'
     at, found = posture_of(hinge(actuator=SATURATED, option='gravity="0 0 0"', key=key))

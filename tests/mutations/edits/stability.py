@@ -40,6 +40,7 @@ EDITS = (
     Edit("own_run", "begin", "list(reading.keyframes)[:MOST_STARTS]", "list(reading.keyframes)[:1]", "one keyframe is run"),
     Edit("own_run", "begin", "(AT_REQUESTED, *setup.step)", "(AT_REQUESTED, reading.dt, reading.integrator)",
          "a requested step is the file's"),
+    Edit("predicted", "unmodelled", "reason != ADHESION", "True", "adhesion hides the limits"),
     Edit("predicted", "why_unknown", "unmodelled(at.robot)", "False", "what has no law is left out of a limit"),
     Edit("predicted", "why_unknown", "at.beyond > OUT_OF_RANGE", "False", "a rest beyond the range of a joint is one"),
     Edit("driven", "Posture.is_tied", "np.abs(jacobian).max(initial=0.0) > SYMMETRIC", "False",
