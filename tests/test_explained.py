@@ -53,6 +53,7 @@ other_acceleration = of(acceleration=acceleration)
 other_gravity = of(gravity=gravity)
 other_kinetic = of(energy=lambda q, v: height(q, v, factor=1.1))
 other_potential = of(energy=lambda q, v: height(q, v, lifted=1.1))
+rarely = of(acceleration=lambda q, v, tau: follows(q, v, tau) + (q[0] > 2.9))
 other_rubbing = of(acceleration=lambda q, v, tau: follows(q, v, tau, damping=0.4))
 """
 
@@ -65,7 +66,7 @@ def standing(sections):
 
 @pytest.mark.parametrize("name, stands", [
     ("alone", set()), ("other_acceleration", {"acceleration"}), ("other_gravity", {"gravity"}),
-    ("other_kinetic", {"energy"}), ("other_potential", {"energy"}), ("other_rubbing", set()),
+    ("other_kinetic", {"energy"}), ("other_potential", {"energy"}), ("other_rubbing", set()), ("rarely", {"acceleration"}),
 ])  # fmt: skip
 def test_what_is_the_users_own_must_follow_from_the_m_and_h_that_the_cause_explains(folder, name, stands):
     (folder / "own_equations_beside.py").write_text((folder / "mine.py").read_text())
@@ -112,7 +113,7 @@ def test_what_no_cause_explains(tmp_path, monkeypatch):
     other = replace(robot, tree=replace(robot.tree, parent=(-1, 0, 0)))
     assert explained(replace(setup, robot=other), printed) == []
     monkeypatch.setattr("compare.run.explained.what_follows", lambda setup: {"equations": True})
-    own = SimpleNamespace(robot=SimpleNamespace(own=("mass_matrix",)))
+    own = SimpleNamespace(robot=SimpleNamespace(own=("mass_matrix",)), background={})
     assert [check.value for check in explained(own, section_of("mass", ("M", None), ("M", 2.0)))] == [2.0]
     balls = SimpleNamespace(coordinates=SimpleNamespace(has_balls=True))
     assert np.isnan(lifted_less_work(balls, np.zeros((2, 4)))).all()
