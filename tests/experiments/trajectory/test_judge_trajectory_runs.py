@@ -66,9 +66,18 @@ def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
     case = DAMPED.changed(speed=(np.degrees(rate), 0.0, 0.0), duration=1.0, dt=1 / 64, judged=0.0)
     mine = side(case)
     alive = mine.t < (np.inf if mine.ended is None else mine.ended)
-    slow = np.abs(mine.v[alive]).max(axis=1) / 64 <= np.pi
-    assert np.array_equal(mine.at, mine.t[alive][slow]) and slow.all() == (rate < 201.1)
+    following = np.append(np.abs(mine.v[1:]).max(axis=1), 0.0)  # within each step: at its end
+    slow = np.maximum(np.abs(mine.v).max(axis=1), following)[alive] / 64 <= np.pi
+    assert np.array_equal(mine.at, mine.t[alive][slow]) and slow[0] == (rate < 201.1)
     assert ("one step, TMT to MuJoCo" in judged_with(mujoco, mine, case)) == slow.any()
+
+
+def test_a_step_that_ends_faster_than_half_a_turn_is_not_compared_alone(mujoco):
+    """From rest the arm falls; in a step of 10 s RK4 turns it far."""
+    far = FREE.changed(duration=20.0, dt=10.0, judged=0.0, tags=("own",))
+    mine = side(far)
+    assert 0.0 not in mine.at and 0.0 in side(FREE).at
+    assert [name for name, check in judged_with(mujoco, mine, far).items() if not check.judged] == ["open loop"]
 
 
 @pytest.mark.parametrize("judged, passes", [(3.04, True), (3.05, False)])
