@@ -64,7 +64,10 @@ def test_a_report_of_a_robot_with_any_names(tmp_path, capsys):
     assert all(c.isprintable() or c == "\n" for c in page + capsys.readouterr().out)
     assert page.count("<script") == 2 and NAMES[1] in html.unescape(page)
     # nothing is loaded, and of scripts the program's own alone runs
-    policy, (script,) = re.search(r'-Policy" content="([^"]+)"', page)[1], re.findall("<script>(.*?)</script>", page, re.S)
+    policy, (script,) = (
+        re.search(r'-Policy" content="([^"]+)"', page)[1],
+        re.findall("<script>(.*?)</script>", page, re.S),
+    )
     own = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     assert policy.startswith(f"default-src 'none'; script-src 'sha256-{own}'; ") and "unsafe-eval" not in policy
 
