@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..diagnosis.forces import force_left_over
 from ..engines.mujoco import engine, read
 from ..engines.own import OwnDynamics
 from ..experiments import module
@@ -84,11 +83,8 @@ def what_follows(setup: Setup) -> dict[str, bool]:
     found, given = module("diagnosis").diagnosed(setup), setup.engines["own"].of(setup.robot.case())
     equations = found.ratio <= 1.0 or bool(found.diagnosis.causes)
     motion = equations and (found.force_ratio <= 1.0 or bool(found.of_forces))
-    if motion and not found.of_forces and given.has("acceleration"):  # what the diagnosis has found at a few states
-        q, qd, tau = setup.random.q, setup.random.qd, setup.random.tau
-        values = given.mass_matrix(q), given.bias(q, qd), given.acceleration(q, qd, tau)
-        acting, allowed = force_left_over(setup.robot.tree, q, qd, tau, *values)
-        motion = bool((np.abs(acting) <= allowed).all())
+    if motion and not found.of_forces and given.has("acceleration"):  # the diagnosis has asked at a few states
+        motion = module("diagnosis").is_solved(given, setup.robot.tree, setup.random)
     follows = {"geometry": False, "equations": equations, "motion": motion, "gravity": equations, "energy": equations}
     sample = setup.random.first(found.states)
     scale = Entries(setup.robot.tree, sample.q, sample.qd)
