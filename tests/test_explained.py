@@ -53,7 +53,7 @@ other_acceleration = of(acceleration=acceleration)
 other_gravity = of(gravity=gravity)
 other_kinetic = of(energy=lambda q, v: height(q, v, factor=1.1))
 other_potential = of(energy=lambda q, v: height(q, v, lifted=1.1))
-rarely = of(acceleration=lambda q, v, tau: follows(q, v, tau) + (q[0] > 2.9))
+rarely = of(acceleration=lambda q, v, tau: follows(q, v, tau) + (abs(q[0] - 1.12) < 0.01))  # at the last of the states
 other_rubbing = of(acceleration=lambda q, v, tau: follows(q, v, tau, damping=0.4))
 """
 
