@@ -219,10 +219,18 @@ def changing(q):
     (RIGHT | {"acceleration": lambda q, v, t: acceleration(q, v, t) * [1.0, 1.1]}, "mass_matrix and bias"),
     (RIGHT | {"bias": lambda q, v: bias(q, v) + 0.1 * v}, "0.1 N m s/rad"),
     ({"mass_matrix": changing}, "and at 99 more states"),
+    (RIGHT | {"bias": wrong_bias, "acceleration": lambda q, v, t: acceleration(q, v, -t, wrong_bias)}, "torque in the acc"),
+    (RIGHT | {"bias": wrong_bias, "acceleration": lambda q, v, t: [1.0, 1.1] * acceleration(q, v, t, wrong_bias)}, "another"),
+    ({"mass_matrix": lambda q: 1.1 * mass_matrix(q), "bias": bias, "gravity": lambda q: 1.2 * gravity(q)}, "h[hip]"),
     ({"mass_matrix": lambda q: mass_matrix(q) + [[0.0, 0.1], [0.0, 0.0]]}, "symmetric: M[hip][knee]"),
 ])  # fmt: skip
 def test_the_probable_cause_of(brought, cause):
     assert cause in message_of(**brought)
+
+
+def test_no_other_error_is_told_where_accelerations_follow_from_a_wrong_bias():
+    follows = RIGHT | {"bias": wrong_bias, "acceleration": lambda q, v, t: acceleration(q, v, t, wrong_bias)}
+    assert message_of(**follows).count("acceleration") == 1 and SIGN in message_of(**follows)
 
 
 def test_the_cause_is_sought_where_there_are_values():

@@ -36,11 +36,15 @@ def cause_of(given: Given) -> Why:
     failing = [name for name, comparison in given.compared.items() if (comparison.ratio > 1.0).any()]
     if failing == ["acceleration"]:
         return of_accelerations(given, q, qd, given.tau[which], own)
-    h = own.get("bias", np.nan * qd)
-    if "gravity" in own and ("bias" not in own or set(failing) <= {"gravity", "acceleration"}):
-        h, qd = own["gravity"], np.zeros_like(qd)
+    if "gravity" in own and ("bias" not in own or ("gravity" in failing and "bias" not in failing)):
+        h, speeds = own["gravity"], np.zeros_like(qd)
+    else:
+        h, speeds = own.get("bias", np.nan * qd), qd
     M = own.get("mass_matrix", np.full((*qd.shape, qd.shape[1]), np.nan))
-    return of_equations(given, Values.of(given.tree, q, qd, M, h, given.rounding))
+    why = of_equations(given, Values.of(given.tree, q, speeds, M, h, given.rounding))
+    if "acceleration" not in failing or not why.is_found or not {"mass_matrix", "bias"} <= own.keys():
+        return why
+    return why._replace(text=f"{why.text} {beside(given, q, qd, given.tau[which], own)}".rstrip())
 
 
 def some_states(given: Given) -> np.ndarray:
@@ -67,6 +71,17 @@ def of_equations(given: Given, values: Values) -> Why:
         every = conditions(own.mass_matrix, own.bias, given.coordinates, values.q, values.qd)
         text = " ".join([*[one.text for one in every if not one.is_met][:1], text])
     return Why(text, bool(diagnosis.causes))
+
+
+def beside(given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, own: dict[str, np.ndarray]) -> str:
+    """What else is wrong with accelerations than the user's Mbar and h; "" where they follow from these."""
+    h = own["bias"]
+    state = given.tree, q, qd, tau
+    acting, allowed = force_left_over(*state, own["mass_matrix"], h, own["acceleration"], given.rounding)
+    if (np.abs(acting) <= allowed).all():
+        return ""
+    causes = causes_of_forces(*state, h, acting, allowed)
+    return say(Finding("agreement", "forces", {"causes": causes}) if causes else Finding("agreement", "another"))
 
 
 def of_accelerations(given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, own: dict[str, np.ndarray]) -> Why:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+import tmt
 from tmt import literal
 
 from ..diagnosis import STATES_ASKED, Diagnosis, Values, diagnose_stated, packed
@@ -18,6 +19,7 @@ from ..judge.finding import Finding
 from ..judge.scale import EPS, FACTOR
 from ..report.text import say
 from ..robots import Robot
+from ..robots.states import Sample
 from . import Experiment
 from .setup import Setup
 
@@ -95,6 +97,13 @@ def conditions_of(given: OwnDynamics, values: Values) -> tuple[list[Condition], 
         return [], True
     found = conditions(given.mass_matrix, given.bias, given.coordinates, q[:count], qd[:count])
     return [condition for condition in found if np.isfinite(condition.tolerance)], False
+
+
+def is_solved(given: OwnDynamics, tree: tmt.Tree, sample: Sample) -> bool:
+    """Whether a user's accelerations are those of the own Mbar and h at all states of a sample."""
+    q, qd, tau = sample.q, sample.qd, sample.tau
+    values = given.mass_matrix(q), given.bias(q, qd), given.acceleration(q, qd, tau)
+    return largest_ratio(*force_left_over(tree, q, qd, tau, *values)) <= 1.0
 
 
 def largest_ratio(off: np.ndarray, tolerance: np.ndarray) -> float:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from tmt import Tree
+from tmt.methods import METHODS
 from tmt.methods.derivatives import FEW_SPEEDS, amplification, has_residual, linear_system
 from tmt.methods.stepping import Method, stepped
 
@@ -14,6 +15,9 @@ NARROW = 1e-3  # rad, m: a run is judged while the band of its positions is narr
 # Rounding of a ball's turn in a step, a product of quaternions scaled to length 1: cosine and sine 1.5 eps, four sums of four
 # products 4 eps, division 0.5 eps: 6 eps of the quaternion, 12 of the turn, 24 for two runs; the difference of the runs 8 eps
 OF_A_BALL = 32 * EPS
+LEFT_OUT = (
+    3.2e-8  # N m or N: with servos MuJoCo's discrete takes forces for 0 whose sum of squares is below mjMINVAL, 1e-15
+)
 
 
 def slope_rounding(stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> tuple:
@@ -21,6 +25,7 @@ def slope_rounding(stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, 
 
     The bound is |A^-1| (64 eps R |a| + 64 eps S), entry by entry, because entries have different units. S is the sum of the
     absolute terms of the force; R_ij = sqrt(A_ii A_jj) bounds the terms of A_ij and of its factorization, where A is Mbar.
+    Of `discrete` with servos it has the force that MuJoCo leaves out, where the force is as small as that, or nearly so.
     """
     shape = q.shape[:1]
     if len(tree.axis) > FEW_SPEEDS and has_residual(stepping):
@@ -37,6 +42,9 @@ def slope_rounding(stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, 
     root = np.sqrt(np.abs(np.einsum("sii->si", A)))
     terms = np.maximum(np.abs(A), root[:, :, None] * root[:, None, :])
     errors = FACTOR * EPS * (np.einsum("sij,sj->si", terms, size) + force)
+    if tree.has_gains and stepping == METHODS["discrete"]:
+        whole = np.einsum("sij,sj->si", A, np.stack(np.broadcast_arrays(*a), axis=-1))
+        errors = errors + LEFT_OUT * (np.linalg.norm(whole, axis=1, keepdims=True) < 4.0 * LEFT_OUT)
     return a, size, np.einsum("sij,sj->si", np.abs(np.linalg.inv(A)), errors)
 
 

@@ -30,7 +30,9 @@ def explained(setup: Setup, section: Section) -> list[Check]:
     if section.name in STATES_CAUSES or not checks:
         return []
     if setup.robot.own:
-        follows = what_follows(setup)
+        if "follows" not in setup.background:
+            setup.background["follows"] = what_follows(setup)
+        follows = setup.background["follows"]
         return [check for check in checks if check.value is not None and follows[kind_of(check)]]
     mended = of_own_numbers(setup)
     if mended is None:
@@ -75,14 +77,16 @@ def kind_of(check: Check) -> str:
 def what_follows(setup: Setup) -> dict[str, bool]:
     """What of a user's own equations is explained by the causes of M and h, by the kinds of `kind_of`.
 
-    Accelerations follow where the diagnosis finds no other force in them, or explains it; own gravity and energy where they are
-    those of the own M and h, at some random states.
+    Accelerations follow where no other force is in them at any random state, or the diagnosis explains it; own gravity and
+    energy where they are those of the own M and h, at some of these states.
     """
-    found, own = module("diagnosis").diagnosed(setup), setup.engines["own"]
+    found, given = module("diagnosis").diagnosed(setup), setup.engines["own"].of(setup.robot.case())
     equations = found.ratio <= 1.0 or bool(found.diagnosis.causes)
     motion = equations and (found.force_ratio <= 1.0 or bool(found.of_forces))
+    if motion and not found.of_forces and given.has("acceleration"):  # the diagnosis has asked at a few states
+        motion = module("diagnosis").is_solved(given, setup.robot.tree, setup.random)
     follows = {"geometry": False, "equations": equations, "motion": motion, "gravity": equations, "energy": equations}
-    sample, given = setup.random.first(found.states), own.of(setup.robot.case())
+    sample = setup.random.first(found.states)
     scale = Entries(setup.robot.tree, sample.q, sample.qd)
     at_rest = np.zeros_like(sample.qd)
     if equations and given.has("gravity"):

@@ -131,6 +131,11 @@ def test_a_number_that_is_another_one_than_in_the_solution_is_the_cause(tmp_path
     assert len(failing(result)) == len(causes) and len(result.checks) > 20
 
 
+@pytest.mark.parametrize("off, names", [(4e-15, []), (4e-14, ["com"])])
+def test_a_centre_of_mass_is_that_of_the_solution_to_rounding_of_the_lengths_that_lead_there(tmp_path, off, names):
+    assert failing(beside_solution(tmp_path, CART.replace('pos="0 0 0.4"', f'pos="0 0 {0.4 + off!r}"'))) == names
+
+
 def test_a_small_body_beside_a_large_one_has_its_own_tolerance(tmp_path):
     large = CART.replace('mass="2" diaginertia="1 1 1"', 'mass="1e5" diaginertia="1e6 1e6 1e6"')
     small = large.replace('mass="1" diaginertia="0.1 0.2 0.3"', 'mass="1e-3" diaginertia="1e-9 1e-9 1e-9"')

@@ -43,9 +43,9 @@ def good(share=0.5):
     return "M", share, 1.0, "", "at most", About.MODELS
 
 
-def row_of(*checks, limits=(), causes=(), lost=(), reference=("arm",)):
+def row_of(*checks, limits=(), runs=(), causes=(), lost=(), reference=("arm",)):
     """The row of one section with checks: (quantity, value, tolerance, note, rule, about)."""
-    result = Result("stability", tables={"step_limits": list(limits)})
+    result = Result("stability", tables={"step_limits": list(limits), "own_run": list(runs)})
     for quantity, value, tolerance, note, rule, about in checks:
         if rule == "not judged":
             result.not_judged("home", quantity, note)
@@ -95,6 +95,9 @@ def limit(dt, stable, integrator="Euler", kind="finite"):
 def test_the_own_step_is_that_of_the_own_integrator_at_all_postures(limits, stable, least):
     row = row_of(good(), limits=limits)
     assert (row["stable_at_file_dt"], row["limit_s"]) == (stable, least)
+    for outcome, is_stable in {"calm": True, "alike": True, "worse": False, "fails": False}.items():
+        row = row_of(good(), limits=limits, runs=[{"outcome": "calm"}, {"outcome": outcome}])
+        assert row["stable_at_file_dt"] is (is_stable and stable is not False)
 
 
 def test_what_needs_a_look_comes_first():

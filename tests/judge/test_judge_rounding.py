@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 
 import tmt
-from compare.judge.rounding import OF_A_BALL, band, growth, slope_rounding, step_rounding
+from compare.engines.mujoco import engine, reading
+from compare.engines.mujoco.names import INTEGRATORS
+from compare.judge.rounding import LEFT_OUT, OF_A_BALL, band, growth, slope_rounding, step_rounding
 from compare.judge.scale import gain_scale
 from compare.robots.arm import ARM
+from compare.robots.file import robot_of
 from tmt.methods import METHODS, amplification
 from tmt.model.coordinates import coordinates_of
 
@@ -32,6 +35,23 @@ def turning(steps, dt, rate=5.0):
     rounding = (64 * EPS * 2.0 * a + 64 * EPS * torque) / 2.0
     rates = dt * rounding + 8 * EPS * (qd + dt * a)
     return q[:, None], qd[:, None], 8 * EPS * (q + dt * qd) + dt * rates, rates
+
+
+@pytest.mark.parametrize("name, share, left_out", [
+    ("discrete", 0.99, True), ("discrete", 3.99, True), ("discrete", 4.01, False), ("implicitfast", 0.99, False),
+])  # fmt: skip
+def test_the_bound_of_discrete_with_servos_has_the_force_that_mujoco_leaves_out(name, share, left_out):
+    servo = '<position joint="turn" kp="50" kv="4"/>'
+    joint = '<joint name="turn" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 2"/>'
+    text = f"<mujoco><worldbody><body>{joint}</body></worldbody><actuator>{servo}</actuator></mujoco>"
+    found = reading.read(text)
+    case = next(case for case in robot_of(found, "disc.xml").cases if case.controller)
+    q, mujoco = np.array([(case.tau - share * LEFT_OUT) / 50.0]), engine(found).of(case)  # the force is that share
+    a, _, bound = slope_rounding(METHODS[name], case.tree, q, 0.0 * q, case.tau, 1e-3)
+    assert bool(bound[0, 0] > LEFT_OUT / 2.1) is left_out
+    if name in INTEGRATORS:
+        qdd = mujoco.run(q[0], [0.0], case.tau, 1e-3, 1, name).v[1] / 1e-3
+        assert np.abs(qdd - a[0]).max() <= bound[0, 0]
 
 
 def test_what_a_controller_feeds_back_is_rounded_too():

@@ -1,5 +1,7 @@
 """Names are text, whatever they hold: in report.md, the page, a table, on the terminal, in a figure."""
 
+import base64
+import hashlib
 import html
 import random
 import re
@@ -61,6 +63,13 @@ def test_a_report_of_a_robot_with_any_names(tmp_path, capsys):
         assert not re.search(r'(href|src)="(?!#|data:image/png|tables/|figures/|index.html)', of)
     assert all(c.isprintable() or c == "\n" for c in page + capsys.readouterr().out)
     assert page.count("<script") == 2 and NAMES[1] in html.unescape(page)
+    # nothing is loaded, and of scripts the program's own alone runs
+    policy, (script,) = (
+        re.search(r'-Policy" content="([^"]+)"', page)[1],
+        re.findall("<script>(.*?)</script>", page, re.S),
+    )
+    own = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert policy.startswith(f"default-src 'none'; script-src 'sha256-{own}'; ") and "unsafe-eval" not in policy
 
 
 def test_in_a_table_on_the_terminal_and_in_a_figure(capsys):

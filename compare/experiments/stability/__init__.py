@@ -107,6 +107,7 @@ def rows(setup: Setup) -> Result:
         "examined", noun=robot.noun, is_read=robot.is_read, centres=subjects.centres, saddles=subjects.saddles,
         names=[*robot.postures, *robot.positions], has_actuators=bool(robot.drive.actuators),
         moving=setup.reading is not None and bool(setup.reading.model.key_qvel.any()),
+        departures=bool(result.tables.get("departure")),
     )  # fmt: skip
     result.tables = {name: table for name, table in result.tables.items() if table}
     return result

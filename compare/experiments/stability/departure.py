@@ -84,6 +84,8 @@ def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tupl
             dynamics = engines[method.engine].of(at.case)
             motion = dynamics.run(at.moved(moved), np.zeros_like(moved), torques, dt, steps, method.name)
         for (size, is_push), time, path in zip(sizes, expected, motion.q):
+            if allowed and allowed["allowed_s"] >= (time or LONGEST_DEPARTURE):
+                continue  # any departure would be as predicted
             rows.append({
                 "scene": at.name + ("" if is_push else ", torque off"), "engine": method.engine, "method": method.name,
                 "dt_s": dt, column: size, "predicted_s": time,

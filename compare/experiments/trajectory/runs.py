@@ -88,14 +88,17 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide
     t, q, v, *_ = dynamics.run(*case.start, tau, dt, steps, scheme)
     ended = diverged_at(case, t, q, v)
     width = band(stepping, tree, q, v, tau, dt, every, steps_afforded(case))
+    alive = t[::every] < (np.inf if ended is None else ended)
+    states, times = [path[::every][alive] for path in (q, v)], t[::every][alive]
+    stepped = one_step(dynamics, states, tau, dt, scheme)
     # the bound of a step's rounding is of first order in dt, and too small where a joint turns by more than half a turn
     turning = [i for i, unit in enumerate(case.coordinates.units) if unit == "rad"]
-    slow = dt * np.abs(v[::every, turning]).max(axis=1, initial=0.0) <= np.pi
-    single = slow & (t[::every] < (np.inf if ended is None else ended))
-    states = [path[::every][single] for path in (q, v)]
-    stepped, tolerance = one_step(dynamics, states, tau, dt, scheme), step_rounding(stepping, tree, *states, tau, dt)
+    rates = np.maximum(*(np.abs(speeds[:, turning]) for speeds in (states[1], stepped[1])))
+    single = dt * rates.max(axis=1, initial=0.0) <= np.pi
+    states, stepped = ([part[single] for part in pair] for pair in (states, stepped))
+    tolerance = step_rounding(stepping, tree, *states, tau, dt)
     widest = widest_judged(case, q, v)
-    return TmtSide(t, q, v, width, widest, ended, t[::every][single], states, stepped, tolerance)
+    return TmtSide(t, q, v, width, widest, ended, times[single], states, stepped, tolerance)
 
 
 def one_step(dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str) -> list:
@@ -135,8 +138,11 @@ def compare_runs(
             check_level(result, where, about | {"level": level}, coordinates, difference, tolerance, at, ending)
         if len(mine.at) and (mine.step_tolerance.min(axis=0) >= mine.widest).any():
             result.not_judged(where, "one step", say(result.finding("wide_step")))
-        check_time_judged(result, where, case, until, required, times[times < ends_first(ends)][-1])
-        check_divergence(result, where, ends, dt, steps, width)
+        alive = times[times < ends_first(ends)][-1]
+        check_time_judged(result, where, case, until, required, alive)
+        is_known = check_divergence(result, where, ends, dt, steps, width)
+        if not (alive or is_known or required):
+            result.not_judged(where, "open loop", say(result.finding("diverges_at_once")))
         if case.is_free and "own" not in case.scene.tags:
             before = t < ends_first(ends)
             moved = min(deviation_alive(path[before], case.q, coordinates) for path in (mine.q, theirs[0]))
@@ -186,20 +192,24 @@ def check_time_judged(result: Result, where: str, case: Case, until: float, requ
 
 def check_divergence(
     result: Result, where: str, ends: Mapping[str, float | None], dt: float, steps: int, width: np.ndarray
-) -> None:
+) -> bool:
     """Both diverge at the same step, if one does and the band (recorded,) is narrow at the first recorded state after that.
+
+    Returned: whether that is compared.
 
     ends: of MuJoCo's partner and of MuJoCo, s.
     """
     end = ends_first(ends)
     if end == np.inf:
-        return
+        return False
     every = steps // (len(width) - 1)
-    if width[-(-round(end / dt) // every)] < NARROW:
+    is_narrow = bool(width[-(-round(end / dt) // every)] < NARROW)
+    if is_narrow:
         ours, theirs = (steps + 1 if at is None else round(at / dt) for at in ends.values())
         whose = "TMT's" if result.label == "TMT" else result.label
         note = f"{steps + 1}: never" if steps + 1 in (ours, theirs) else ""
         result.check(where, f"step of divergence, MuJoCo's, is {whose}", theirs, ours, "", note, rule="equal")
+    return is_narrow
 
 
 def check_level(

@@ -89,6 +89,12 @@ def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step(quick):
     assert failed[0.004, "RK4"] == [own_run.AT_OWN, own_run.AT_REQUESTED]
 
 
+def test_the_first_six_keyframes_are_run(quick):
+    keys = "".join(f'<key name="k{i}" qpos="{i / 10}"/>' for i in range(7))
+    rows = quick(hinge('damping="0.05"', key=keys)).tables["own_run"]
+    assert sorted(row["start"] for row in rows) == [f"k{i}" for i in range(own_run.MOST_STARTS)]
+
+
 @pytest.mark.parametrize("source, why", [
     (hinge(option='viscosity="1"', actuator=STIFF), "not_judged"),
     (WELDED, "tied"),
@@ -97,6 +103,12 @@ def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step(quick):
 def test_what_is_not_modelled_has_no_limit(quick, source, why):
     result = quick(source)
     assert {row["limit"] for row in result.tables["step_limits"] if row["posture"] != "middle"} == {why}
+
+
+def test_adhesion_acts_in_contacts_alone_and_hides_no_limit(quick):
+    grip = f'{STIFF}<adhesion body="grip" ctrlrange="0 1" gain="2"/>'
+    result = quick(hinge(actuator=grip).replace("<body>", '<body name="grip">'))
+    assert "not_judged" not in {row["limit"] for row in result.tables["step_limits"]}
 
 
 def test_a_servo_at_its_range_lets_a_keyframe_rest_beside_it():

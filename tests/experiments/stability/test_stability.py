@@ -7,7 +7,7 @@ import pytest
 from models import PATHS
 
 import tmt
-from compare.engines.mujoco import reading
+from compare.engines.mujoco import engine, reading
 from compare.experiments import stability
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
@@ -156,3 +156,16 @@ def test_what_a_robot_lacks_is_left_out_with_a_reason(engines, posture, without,
     (examined,) = (note.values for note in result.notes if note.kind == "examined")
     assert not examined[without]
     assert [figure()[0] for figure in stability.figures(result, robot)] == drawn
+
+
+def test_departures_that_may_differ_by_more_than_they_last_are_not_compared(monkeypatch):
+    found = reading.read(SWING.format(keys=""))
+    setup = Setup.quick(robot_of(found, "robot.xml"), engines_of(engine(found)))
+    rows = stability.rows(setup).tables["departure"]
+    shortest = min(row["predicted_s"] for row in rows)
+    for curved, left in ((0.99 * shortest - departure.near({"dt_s": rows[0]["dt_s"]}), len(rows)), (1e6, 0)):
+        monkeypatch.setattr(departure, "curved_by", lambda at, curved=curved: curved)
+        result = stability.rows(setup)
+        assert len(result.tables.get("departure", ())) == left
+        (examined,) = (note.values for note in result.notes if note.kind == "examined")
+        assert examined["saddles"] and examined["departures"] is bool(left)

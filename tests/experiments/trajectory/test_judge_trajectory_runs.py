@@ -53,15 +53,31 @@ def test_an_open_loop_is_judged_up_to_its_last_state(mujoco):
         assert judged_with(mujoco, damped._replace(q=q))[name].passed is passes
 
 
+def test_a_step_whose_bound_is_wider_than_what_moves_is_not_judged(mujoco):
+    damped = side(DAMPED)
+    for more, is_judged in ((1.01, True), (1.0, False)):
+        widest = np.append(damped.widest[:-1], more * damped.step_tolerance[:, -1].min())
+        assert ("one step" not in judged_with(mujoco, damped._replace(widest=widest))) is is_judged
+
+
 @pytest.mark.parametrize("rate", [100.0, 202.0])
 def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
     """Half a turn in 1/64 s is 201 rad/s."""
     case = DAMPED.changed(speed=(np.degrees(rate), 0.0, 0.0), duration=1.0, dt=1 / 64, judged=0.0)
     mine = side(case)
     alive = mine.t < (np.inf if mine.ended is None else mine.ended)
-    slow = np.abs(mine.v[alive]).max(axis=1) / 64 <= np.pi
-    assert np.array_equal(mine.at, mine.t[alive][slow]) and slow.all() == (rate < 201.1)
+    following = np.append(np.abs(mine.v[1:]).max(axis=1), 0.0)  # within each step: at its end
+    slow = np.maximum(np.abs(mine.v).max(axis=1), following)[alive] / 64 <= np.pi
+    assert np.array_equal(mine.at, mine.t[alive][slow]) and slow[0] == (rate < 201.1)
     assert ("one step, TMT to MuJoCo" in judged_with(mujoco, mine, case)) == slow.any()
+
+
+def test_a_step_that_ends_faster_than_half_a_turn_is_not_compared_alone(mujoco):
+    """From rest the arm falls; in a step of 10 s RK4 turns it far."""
+    far = FREE.changed(duration=20.0, dt=10.0, judged=0.0, tags=("own",))
+    mine = side(far)
+    assert 0.0 not in mine.at and 0.0 in side(FREE).at
+    assert [name for name, check in judged_with(mujoco, mine, far).items() if not check.judged] == ["open loop"]
 
 
 @pytest.mark.parametrize("judged, passes", [(3.04, True), (3.05, False)])

@@ -3,6 +3,8 @@
 from ..edit import Edit
 
 EDITS = (
+    Edit("remarks", "remarks", "feature.treatment in (OFF, OPEN, LEFT_OUT)", "feature.treatment in (OFF, OPEN)",
+         "a keyframe that is left out is not told"),
     Edit("experiments.engines", "compare_quantities", "FACTOR * eps * size", "100 * FACTOR * eps * size", "tolerance x 100"),
     Edit("experiments.engines", "compare_quantities", "record.eps", "1.2e-07", "every engine is judged as float32"),
     Edit("experiments.engines", "compare_numbers", "FACTOR * record.eps", "1e9 * record.eps",

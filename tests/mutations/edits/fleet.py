@@ -3,6 +3,7 @@
 from ..edit import Edit
 
 EDITS = (
+    Edit("fleet.table", "own_step", "row['outcome'] in ('calm', 'alike')", "True", "a file is stable whatever its own run does"),
     Edit("fleet.table", "row_of_file", "outcome, reasons = DIFFER, _1", "outcome, reasons = AGREE, _1",
          "a file that differs agrees"),
     Edit("fleet.table", "row_of_file", "outcome, reasons = BROKE, []", "outcome, reasons = AGREE, []", "what broke off agrees"),

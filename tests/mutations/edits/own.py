@@ -59,6 +59,8 @@ EDITS = (
          "a process that ends takes those of other engines with it"),
     Edit("own.functions", "in_shape", "given == expected", "array.size == np.prod(shape)", "an array in another order is taken"),
     Edit("own.equations", "OwnEquations.note", "hash(row.tobytes())", "object()", "a state counts each time that it is asked"),
+    Edit("agreement.why", "beside", "(np.abs(acting) <= allowed).all()", "True", "a second error, in accelerations, is hidden"),
+    Edit("agreement.why", "cause_of", "'bias' not in failing", "False", "a wrong gravity is hidden behind a right bias"),
     Edit("agreement.why", "some_states", "np.flatnonzero(np.isfinite(worst))", "np.arange(len(worst))",
          "a cause is sought where there are no values"),
 )  # fmt: skip

@@ -9,6 +9,8 @@ READ = (
 )  # fmt: skip
 FOUND = "np.asarray(compiled[quantity], dtype=float)"
 EDITS = (
+    Edit("mujoco.parameters", "lengths", "before + of_bodies", "10 * (before + of_bodies)",
+         "a centre of mass may be off by ten times as much"),
     *(
         Edit("parameters", "rows", FOUND, f"numbers if quantity == {name!r} else {FOUND}", f"{name} is read as stated")
         for name in READ
