@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import pandas as pd
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
@@ -16,7 +17,7 @@ from ..judge.words import capital
 from .images import embedded
 from .motion import SCRIPT, motion_in_html
 from .questions import answers
-from .tables import CAUSES, TITLES, closest_checks, of_causes, origins, records, shortened, shown
+from .tables import TITLES, closest_checks, of_causes, origins, records, shortened, shown
 from .text import block, count, environment
 from .verdict import Parts, Report, Section, failures, headline, outcome, passed, standing
 
@@ -53,14 +54,14 @@ class Document:
             texts.append(self.motion)
         texts.append(self.made("the introduction", self.introduction))
         if report.causes:
-            texts.append(self.template.causes(of_causes(report.causes)))
-        if self.answers:
-            texts.append(self.template.questions(shown(self.answers)))
+            texts.append(self.template.causes(table_of(of_causes(report.causes))))
+        if self.answers is not None and len(self.answers):
+            texts.append(self.template.questions(table_of(self.answers)))
         for section in report.sections:
             text = self.parts.attempt(f"{section.name} in {self.file}", None, self.section, section)
             texts.append(self.template.missing(section.name, section.title) if text is None else text)
         texts.append(self.template.skipped(report.skipped) if report.skipped else "")
-        return [*texts, self.template.provenance(origins(report.origin))]
+        return [*texts, self.template.provenance(table_of(origins(report.origin)))]
 
     def made(self, name: str, make: Callable[[], str]) -> str:
         return self.parts.attempt(f"{name} in {self.file}", "", make)
@@ -79,7 +80,7 @@ class Document:
         return environment().get_template("page.html.jinja").render(values, body=html)
 
     def links(self) -> list[tuple[str, bool]]:
-        names = [("questions", False)] if self.answers else []
+        names = [("questions", False)] if self.answers is not None and len(self.answers) else []
         names += [(section.name, standing(section)[0] is False) for section in self.report.sections]
         return [*names, ("provenance", False)]
 
@@ -89,12 +90,12 @@ class Document:
         lines = [self.parts.attempt(f"the line of {one.name}", None, self.line, one) for one in report.sections]
         failed = [check for kind in failures(report.sections) for check in kind]
         if report.causes:
-            failing = of_causes(report.causes[:FIRST_CAUSES], CAUSES)
+            failing = table_of(of_causes(report.causes[:FIRST_CAUSES]).drop(columns="rank"))
             failing["label"] = "Cause" if len(report.causes) == 1 else "Causes"
             more = len(report.causes) - FIRST_CAUSES
         elif failed:
             columns = ["experiment", "scene", "quantity", "value", "tolerance", "note"]
-            failing = records(failed[:FIRST_CAUSES], columns) | {"label": "Failing checks"}
+            failing = table_of(records(failed[:FIRST_CAUSES])[columns]) | {"label": "Failing checks"}
             more = len(failed) - FIRST_CAUSES
         if failing:
             failing["known"] = bool(report.causes)
@@ -166,7 +167,7 @@ class Document:
             notes=notes[:most],
             further=notes[most:],
             tables=[self.table(section, name, rows) for name, rows in section.tables.items()],
-            checks={"count": len(result.checks), "rows": closest_checks(section, MOST_ROWS)},
+            checks={"count": len(result.checks), "rows": table_of(closest_checks(section, MOST_ROWS))},
             open_figures=first,
             folded_figures=[one for one in figures if one not in first],
         )
@@ -180,7 +181,7 @@ class Document:
         if columns == [] or name in section.result.filed or not is_main:
             return about
         few, about["which"] = shortened(rows, MOST_ROWS if self.page else MOST_IN_MARKDOWN)
-        about["rows"] = shown(few, columns)
+        about["rows"] = table_of(shown(pd.DataFrame(few), columns if few else None))
         return about
 
 
@@ -192,9 +193,13 @@ def kind(good: bool | None) -> str:
     return "none" if good is None else "good" if good else "bad"
 
 
+def table_of(table: pd.DataFrame) -> dict:
+    return {"columns": list(table.columns), "cells": table.astype(str).to_numpy().tolist()}
+
+
 def listing(checks: Sequence[Check], most: int) -> dict:
     """How many checks there are, and the first of them as a table."""
-    return {"count": len(checks), "rows": records(checks[:most])}
+    return {"count": len(checks), "rows": table_of(records(checks[:most]))}
 
 
 def figures_of(section: Section) -> list[dict]:

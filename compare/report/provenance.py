@@ -13,7 +13,7 @@ from ..process.streams import readable
 from ..process.workers import Clock
 
 OURS = "arm-tmt-mujoco"
-PACKAGES = ("mujoco", "numpy", "scipy", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka")
+PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka")
 OF_ENGINES = (
     "drake",
     "pin",

@@ -2,18 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 
+import pandas as pd
+
 from ..judge.check import Result
 from ..judge.finding import Finding
 from .text import say
 from .verdict import Section
 
 
-def answers(sections: Sequence[Section], robot) -> list[dict]:
+def answers(sections: Sequence[Section], robot) -> pd.DataFrame:
     """For each part that a run has answered: its letter, the question, where it is answered, the answer."""
     results = {section.name: section.result for section in sections}
     asked = [q for q in robot.questions if results.keys() & set(q.answered_in.split(", "))]
-    about = [{"part": q.part, "question": q.question, "answered in": q.answered_in} for q in asked]
-    return [row | {"answer": say(answer(results, *q.answer))} for row, q in zip(about, asked)]
+    rows = [(q.part, q.question, q.answered_in, say(answer(results, *q.answer))) for q in asked]
+    return pd.DataFrame(rows, columns=["part", "question", "answered in", "answer"])
 
 
 def answer(results: Mapping[str, Result], kind: str, *about) -> Finding:

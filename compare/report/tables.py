@@ -1,7 +1,9 @@
 """Tables of a report as text, and the rows of a long table that a reader needs."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
 
 from ..judge.check import Check
 from .verdict import Section
@@ -13,55 +15,50 @@ DIGITS |= dict.fromkeys(
 TITLES = {"what_should_i_use": "What should I use?"}  # of tables whose name is not their title
 IN_WORDS = {"seconds_of": "CPU seconds", "ended_after_s": "seconds from the start to the end"}
 LISTS = ("names", "hinges", "locked")  # columns with many names of joints
-CAUSES = ("place", "stated", "found", "cause")  # columns
-CHECKS = [name for name in Check.__annotations__ if name not in ("experiment", "rounding", "about", "judged")]
 LONGEST_LIST = 80  # characters of a list in a report; its file has all
 
 
-def shown(rows: Sequence[Mapping], columns: Iterable[str] | None = None) -> dict:
-    """The columns and the cells, a list for each row, as text. KeyError for a column that no row has."""
-    known = dict.fromkeys(name for row in rows for name in row)
-    names = list(known if columns is None else columns)
-    if rows and (absent := [name for name in names if name not in known]):
-        raise KeyError(absent[0])
-    cells = [[text(name, row.get(name)) for name in names] for row in rows]
-    return {"columns": [name.replace("_", " ") for name in names], "cells": cells}
+def shown(table: pd.DataFrame, columns: Sequence[str] | None = None) -> pd.DataFrame:
+    """A table as text, with the digits that a reader needs."""
+    table = table if columns is None else table[columns]
+
+    def text(value, digits, is_list):
+        if isinstance(value, float):
+            if not math.isfinite(value):
+                return ""
+            return f"{value:.0f}" if value.is_integer() and 1.0 <= abs(value) < 1e7 else f"{value:.{digits}g}"
+        whole = "" if value is None else str(value)
+        return f"{whole[: LONGEST_LIST - 4]} ..." if is_list and len(whole) > LONGEST_LIST else whole
+
+    columns = {c: [text(v, DIGITS.get(c, 3), c in LISTS) for v in table[c].astype(object)] for c in table.columns}
+    return pd.DataFrame(columns).rename(columns=lambda c: c.replace("_", " "))
 
 
-def text(column: str, value: object) -> str:
-    """A value in a cell; nothing for what is unknown or not finite."""
-    if isinstance(value, float):
-        if not math.isfinite(value):
-            return ""
-        digits = DIGITS.get(column, 3)
-        return f"{value:.0f}" if value.is_integer() and 1.0 <= abs(value) < 1e7 else f"{value:.{digits}g}"
-    whole = "" if value is None else str(value)
-    return f"{whole[: LONGEST_LIST - 4]} ..." if column in LISTS and len(whole) > LONGEST_LIST else whole
+def of_causes(causes: Sequence[dict]) -> pd.DataFrame:
+    columns = ["rank", "place", "stated", "found", "text"]
+    return shown(pd.DataFrame(causes)[columns].rename(columns={"text": "cause"}))
 
 
-def of_causes(causes: Sequence[dict], columns: Iterable[str] = ("rank", *CAUSES)) -> dict:
-    return shown([cause | {"cause": cause["text"]} for cause in causes], columns)
+def records(checks: Sequence[Check]) -> pd.DataFrame:
+    names = [field for field in Check.__annotations__ if field not in ("rounding", "about", "judged")]
+    found = [check.record() if check.judged else check.record() | {"value": "not judged"} for check in checks]
+    return shown(pd.DataFrame(found, columns=names))
 
 
-def records(checks: Sequence[Check], columns: Iterable[str] = ("experiment", *CHECKS)) -> dict:
-    values = [{} if check.judged else {"value": "not judged"} for check in checks]
-    return shown([check.record() | value for check, value in zip(checks, values)], columns)
-
-
-def closest_checks(section: Section, most: int) -> dict:
+def closest_checks(section: Section, most: int) -> pd.DataFrame:
     """At most `most` checks of a section as text: those that do not pass, then the largest shares of a rounding tolerance."""
     checks = section.result.checks
     order = sorted(range(len(checks)), key=lambda k: (checks[k].passed, -(checks[k].over_tolerance or 0.0)))
-    return records([checks[k] for k in sorted(order[:most])], CHECKS)
+    kept = [checks[k] for k in sorted(order[:most])]
+    return records(kept).drop(columns="experiment")
 
 
-def origins(origin: dict) -> dict:
-    rows = []
-    for name, value in origin.items():
-        if isinstance(value, dict):
-            value = ", ".join(f"{key} {part}" for key, part in value.items())
-        rows.append({"what": IN_WORDS.get(name, name), "value": str(value)})
-    return shown(rows)
+def origins(origin: dict) -> pd.DataFrame:
+    def in_one_cell(value) -> str:
+        return ", ".join(f"{name} {part}" for name, part in value.items()) if isinstance(value, dict) else str(value)
+
+    rows = [(IN_WORDS.get(name, name), in_one_cell(value)) for name, value in origin.items()]
+    return pd.DataFrame(rows, columns=["what", "value"])
 
 
 def shortened(rows: Sequence[dict], most: int) -> tuple[list[dict], str]:

@@ -1,5 +1,6 @@
 """Which rows of a long table are shown, and how long report.md becomes."""
 
+import pandas as pd
 from sections import BAD, GOOD, section
 
 from compare.experiments import EXPERIMENTS
@@ -28,12 +29,12 @@ def test_rows_that_fail_or_differ_are_shown_then_the_largest_shares_of_a_toleran
 def test_the_checks_that_fail_are_listed_first_then_those_closest_to_their_tolerance():
     checks = [(f"n{k}", 0.01 * k, 1.0, "at most", True) for k in range(9)]
     checks[2] = ("n2", 2.0, 1.0, "at most", True)
-    assert [cells[1] for cells in closest_checks(section("mass", *checks), 3)["cells"]] == ["n2", "n7", "n8"]
+    assert closest_checks(section("mass", *checks), 3)["quantity"].tolist() == ["n2", "n7", "n8"]
 
 
 def test_printed_numbers_have_seven_digits_and_others_three():
-    (cells,) = shown([{"published": 1.23456789, "other": 1.23456789, "names": "x" * 99, "no": None}])["cells"]
-    assert cells[:2] == ["1.234568", "1.23"] and len(cells[2]) == 80 and cells[3] == ""
+    table = shown(pd.DataFrame([{"published": 1.23456789, "other": 1.23456789, "names": "x" * 99, "no": None}]))
+    assert table.iloc[0].tolist()[:2] == ["1.234568", "1.23"] and len(table["names"][0]) == 80 and table["no"][0] == ""
 
 
 def text_of(*sections):

@@ -134,7 +134,7 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
 
 def answer_of(*sections) -> dict:
     """The answers by their part."""
-    return {row["part"]: row["answer"] for row in answers(sections, ARM)}
+    return answers(sections, ARM).set_index("part")["answer"].to_dict()
 
 
 def apart(scene, difference, quantity="Mbar"):

@@ -84,7 +84,7 @@ EDITS = (
     Edit("report.tables", "distance_from_failure", "row.get('passed') is not False", "True", "a row that fails may be left out"),
     Edit("report.tables", "distance_from_failure", "-share", "share", "the rows that use least of their tolerance are shown"),
     Edit("tables", "closest_checks", "checks[k].passed", "not checks[k].passed", "the checks that fail come last"),
-    Edit("tables", "text", "DIGITS.get(column, 3)", "3", "printed numbers have three digits"),
+    Edit("tables", "shown", "DIGITS.get(c, 3)", "3", "printed numbers have three digits"),
     Edit("provenance", "provenance", "Path(model).read_bytes()", "str(model).encode()", "the hash of a model is of its name"),
     Edit("provenance", "commit", "' with uncommitted changes' if changed else ''", "''", "changes since a commit are not told"),
     Edit("words", "scene_of", "max(*_1)", "min(*_1)", "a check is given to the scene of the shortest name"),
