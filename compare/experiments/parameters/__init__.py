@@ -125,9 +125,11 @@ def compare_features(result: Result, robot: Robot) -> list[dict]:
 
 def headline(result: Result) -> Finding | None:
     """What is not as stated, and how many numbers are equal to the stated ones to the last bit."""
-    off = [row["difference"] != 0.0 for row in result.rows if row.get("stated") is not None and not row.get("asked_by")]
+    stated_rows = [row for row in result.rows if row.get("stated") is not None]
+    off = [row["difference"] != 0.0 for row in stated_rows if not row.get("asked_by")]
+    changed = sum(bool(row.get("asked_by")) and row["difference"] != 0.0 for row in stated_rows)
     failing = [f"{check.quantity} ({check.scene})" for check in result.checks if check.failed]
-    return result.finding("headline", numbers=len(off), off=sum(off), failing=failing) if off else None
+    return result.finding("headline", numbers=len(off), off=sum(off), changed=changed, failing=failing) if off else None
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
