@@ -93,6 +93,8 @@ def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagr
     assert len(said) == 4 and standing(section("mass", GOOD))[0] is True and standing(section("mass"))[0] is None
     assert counts(section("trajectory", ("open loop", None, 1.0, "at most", True))) == [1, 0, 0, 0, 0, 0]  # it diverged
     assert passed([section("stability", (*OWN_STEP[:2], 0.002, *OWN_STEP[3:]))])  # just stable
+    text = verdict([section("stability", GOOD, OWN_STEP)], 1, robot="dog")
+    assert text.startswith("dog is not stable") and text.index("agree:") > 0  # the run comes before the equations
 
 
 def test_what_was_not_judged_is_neither_passed_nor_failed_and_nothing_is_said_to_agree():
