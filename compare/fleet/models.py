@@ -77,7 +77,8 @@ def paths_of(words: Iterable[str]) -> Iterator[tuple[Path, bool]]:
             is_pattern = has_magic(word) and "\0" not in word and not os.path.isdir(word)
             matches = sorted(glob(word, recursive=True)) if is_pattern else [word] * os.path.isdir(word)
             if not matches:
-                raise Refused(f"no such file: {in_one_line(word)}; expected a file, a folder, a pattern or @LIST")
+                problem = "not a regular file" if os.path.exists(word) else "no such file"
+                raise Refused(f"{problem}: {in_one_line(word)}; expected a file, a folder, a pattern or @LIST")
             for match in map(Path, matches):
                 yield from (
                     (file, False) for file in (files_in(match) if match.is_dir() else [match] * os.path.isfile(match))

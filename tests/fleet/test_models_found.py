@@ -49,6 +49,9 @@ def test_a_folder_gives_its_mjcf_at_any_depth_and_nothing_else(here):
              "m/robot.urdf.xml", "m/words.xml"]  # fmt: skip
     assert names("m") == found and "<sdf>" in left_out("m")["m/world.sdf.xml"]
     assert names("m/world.sdf.xml") == ["m/world.sdf.xml"]  # what is named is a model
+    if hasattr(os, "mkfifo"):
+        with pytest.raises(Refused, match="not a regular file"):
+            names("m/pipe.xml")
 
 
 def test_patterns_and_lists(here):
