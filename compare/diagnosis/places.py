@@ -12,6 +12,7 @@ import numpy as np
 
 import tmt
 
+from ..robots.joint_map import within_a_turn
 from .cause import Change
 from .model import BODY_TERMS, MOST_SPEEDS, OF_TERM, Equations, Path
 
@@ -60,7 +61,9 @@ class Place(NamedTuple):
         return self.value(change) >= self.least and (self.kind != "part" or is_common(self.value(change)))
 
     def changed(self, change: float) -> Change:
-        return Change(self.kind, self.name, float(self.stated), self.value(change), self.unit)
+        """The change as it is said; the zero of a hinge is at most half a turn from the stated one."""
+        value = self.value(within_a_turn(change, self.unit == "m") if self.kind == OF_ZERO else change)
+        return Change(self.kind, self.name, float(self.stated), value, self.unit)
 
 
 def is_common(factor: float) -> bool:

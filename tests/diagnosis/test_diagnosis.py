@@ -7,6 +7,7 @@ import pytest
 
 import tmt
 from compare.diagnosis import diagnose, packed
+from compare.diagnosis.places import OF_ZERO, Place
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 from compare.report.text import apart
@@ -237,3 +238,9 @@ def test_slides_have_powers():
     given[:, 0] += 0.3 * HIP * np.cos(KNEE)
     (cause,) = diagnosis(given, tree).causes
     assert cause.place == "M[cart][cart]" and "0.3 cart cos(rod)" in cause.text()
+
+
+@pytest.mark.parametrize("unit, explains", [("rad", 0.5 - np.pi / 2), ("m", 0.5 + 1.5 * np.pi)])
+def test_the_zero_of_a_hinge_is_at_most_half_a_turn_from_the_stated_one(unit, explains):
+    place = Place(1, OF_ZERO, "zero of knee", 0.5, unit, 1.0)
+    assert place.changed(1.5 * np.pi).explains == pytest.approx(explains)
