@@ -57,7 +57,9 @@ def test_numbers_that_an_option_changes_are_no_checks_and_have_its_name():
     asked = {name: row["asked_by"] for name, row in rows.items()}
     assert asked["arm", "mass"] == asked["rod", "mass"] == asked["arm", "inertia"] == "settotalmass"
     assert asked["rod", "com"] and asked["rod", "com"] != "settotalmass" and asked["lift", "damping"] == ""
-    changed = [row for row in result.rows if row.get("asked_by") and row["stated"] is not None and row["difference"] != 0.0]
+    changed = [
+        row for row in result.rows if row.get("asked_by") and row["stated"] is not None and row["difference"] != 0.0
+    ]
     assert parameters.headline(result).values["changed"] == len(changed) > 0
     assert (rows["lift", "damping"]["unit"], rows["turn", "damping"]["unit"]) == ("N s/m", "N m s/rad")
 
