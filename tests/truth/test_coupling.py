@@ -71,7 +71,9 @@ def test_a_floating_base_turns_with_the_constraints_that_it_carries():
     source = source.replace("</worldbody>", "</body></worldbody>").replace(
         "</actuator>", '<position joint="rocker" kp="20" kv="1"/></actuator><keyframe><key ctrl="0.4 -0.4"/></keyframe>'
     )  # the servos load the loop
-    assert predicted(source)[0].at.small.names == ("crank", "coupler", "rocker")
+    one = predicted(source)[0]
+    assert one.at.small.names == ("crank", "coupler", "rocker") and "discrete" not in one.known
+    assert "Euler" in one.known and "discrete" in predicted(FOUR_BARS)[0].known
 
 
 def test_constraints_at_rest_carry_what_mujoco_says_and_are_stiff_by_turning():

@@ -6,7 +6,7 @@ from ....engines.mujoco.names import INTEGRATORS
 from ....judge.check import Result
 from ....truth.step_limits import LIMIT_UP_TO
 from . import response
-from .predicted import KNOWN, Prediction, limit_rows, unmodelled
+from .predicted import COUPLED, KNOWN, Prediction, limit_rows, unmodelled
 
 DEFAULT_STEP = 0.002, "Euler"  # MuJoCo's step, s, and integrator where a file states none
 RESTS_WITHIN = 1e-6  # rad or m: a rest so near is the posture
@@ -36,7 +36,8 @@ def find_answer(
     answer = result.finding(
         "step", "servos", dt=dt, integrator=integrator, requested=requested, has_servos=drive.feeds_back,
         own=verdict(rows, integrator), default=default, default_dt=DEFAULT_STEP[0], unmodelled=unknown,
-        without={row["posture"]: row["limit"] for row in rows if row["limit"] not in KNOWN},
+        without={row["posture"]: row["limit"] for row in rows if row["limit"] not in (*KNOWN, COUPLED)},
+        coupled=any(row["limit"] == COUPLED for row in rows),
         left_out={name: why for name, why in (drive.refused | off).items() if name not in unknown},
         contacts=any(feature.feature == "contact" for feature in at.robot.features), floats=bool(at.base),
     )  # fmt: skip

@@ -17,7 +17,7 @@ from ..own_run import FULL_MODEL
 MOST_RESTS, SAME_REST = 4, 1e-3  # of limits, each at the rest with the one before; steps that are one, relative
 STILL_THERE, GIVEN_WAY = 1e-6, 0.01  # rad or m: by less nothing moves; by more the limit is that of another posture
 ASIDE_OF_LIMIT = 1e-2  # of a limit: where a step of MuJoCo is compared
-KNOWN = ("finite", "none")  # kinds of limits
+KNOWN, COUPLED = ("finite", "none"), "coupled"  # kinds of limits; of discrete with a free base and soft constraints
 OUT_OF_RANGE = 1e-3  # rad or m: a rest farther beyond the range of a joint is one on its limit, which is off here
 ADHESION = "a transmission of type body"  # it acts in contacts alone
 
@@ -85,6 +85,8 @@ def limit_at(at: Posture, integrator: str) -> tuple[Posture, Limit]:
     """The limit, and the posture at rest with a step so long: where soft constraints are loaded, a longer step softens them."""
     if not at.small.names:
         return at, Limit("drifts")
+    if integrator == "discrete" and at.small.couple and at.base:  # it lets a free base and soft constraints act at once
+        return at, Limit(COUPLED)
     limit = at.small.limit(integrator)
     for _ in range(MOST_RESTS):
         if limit.dt is None or not at.small.couple or abs(limit.dt / at.dt - 1.0) < SAME_REST:
