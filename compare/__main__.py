@@ -18,7 +18,7 @@ if __name__ == "__main__":
         interrupt.settle()
         if end:
             streams.say_error(
-                f"the run ended before its end, perhaps by your equations: {end}; the earlier report is unchanged"
+                f"the run ended before its end, perhaps by your equations: {end}; an earlier report is unchanged"
             )
         interrupt.leave(status)
 

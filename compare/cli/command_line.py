@@ -65,6 +65,10 @@ def stated_reference(text: str) -> str:
     """What a model is compared with; a text with a colon is read later."""
     if text in ("arm", "model") or ":" in text or text.lower().endswith((".xml", ".mjcf")):
         return text
+    if text.endswith(".py"):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a reference; expected {text}: (all of it), or FILE.py:OBJECT"
+        )
     hint = expected(text, {"arm": "arm", "model": "model"}, "arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT")
     raise argparse.ArgumentTypeError(f"{text!r} is not a reference; {hint}")
 

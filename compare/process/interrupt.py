@@ -27,7 +27,7 @@ FINISHED = 200  # added to the exit status of such a child: no status that a use
 class Now:
     listening = False  # an interrupt raises no KeyboardInterrupt
     settled = False  # the exit status is decided
-    line = "interrupted; the earlier report is unchanged"
+    line = "interrupted; an earlier report is unchanged"
 
 
 def listen() -> None:

@@ -68,7 +68,7 @@ class Workers(ThreadPoolExecutor):
                 future = self.processes.submit(timed, *call)
             value, error, seconds = future.result()
         except RuntimeError:  # a broken pool, or shut down
-            raise WorkerEnded("a worker process was killed; the earlier report is unchanged") from None
+            raise WorkerEnded("a worker process was killed; an earlier report is unchanged") from None
         self.clock.taken.append((task, seconds))
         if error:
             raise error

@@ -29,11 +29,12 @@ class Terminal:
         self.status, self.text, self.how_far = None, "", list
 
     def say(self, text="", style="") -> None:
-        """Print a line; on a narrower terminal without wide gaps, wrapped between words."""
+        """Print a line; on a narrower terminal without wide gaps if it fits then, else wrapped between words."""
         text, columns = in_one_line(text), self.out.columns()
         if columns and len(text) > columns:
             indent = " " * (len(text) - len(text.lstrip()))
-            text = indent + re.sub(" {2,}", "  ", text.strip())
+            narrow = indent + re.sub(" {2,}", "  ", text.strip())
+            text = narrow if len(narrow) <= columns else text
             text = fill(
                 text, max(columns, 20), subsequent_indent=indent + "  ", break_long_words=False, break_on_hyphens=False
             )

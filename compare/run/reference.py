@@ -52,7 +52,8 @@ class Reference(NamedTuple):
     @property
     def lines(self) -> tuple[str, ...]:
         """The first lines of the output and of the report."""
-        first = f"reference: {self.kind}; {self.file} compared with {REFERENCES.get(self.kind, self.source)}"
+        other = REFERENCES.get(self.kind, self.source.removesuffix(":"))
+        first = f"reference: {self.kind}; {self.file} compared with {other}"
         lines = first, self.matched, *self.remarks, *(f"MuJoCo warns: {line}" for line in self.warnings)
         return tuple(in_one_line(line) for line in lines if line)
 
