@@ -117,6 +117,7 @@ def verdict(
         compared=compared,
         robot=robot,
         ran={"names": names, "differ": bool(named), "checked": len(checked), "all": experiments},
+        alone=len(sections) == 1,
         models=sum(check.about == About.MODELS for check in checks),
         engines=sum(check.about == About.ENGINE for check in checks),
         failed=failed,

@@ -72,16 +72,17 @@ def test_the_verdict_counts_what_the_cause_explains_what_states_it_and_what_stan
     of.explained = of.result.checks[1:2]
     stating = section("parameters", ("mass of forearm", 1.0, 0.0, "at most", False))
     text = verdict([stating, of], 2, [cause()])
-    assert "explains 1 of them, 1 states it; 1 remains without a cause, first: mass: other" in " ".join(text.split())
+    text = " ".join(text.split())
+    assert "explains 1 of them, and 1 is the check that names it; 1 remains without a cause, first: mass: other" in text
     assert outcome(of).startswith("Failed: 2 of 3") and "1 of them explained" in outcome(of)
     of.explained = of.result.checks[1:]
-    assert "explains 2 of them, 1 states it." in verdict([stating, of], 2, [cause()])
+    assert "explains 2 of them, and 1 is the check that names it." in verdict([stating, of], 2, [cause()])
     of.explained = []
     assert "explains none of the other 2 failing checks" in verdict([stating, of], 2, [cause()])
 
 
 def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagree():
-    differs = "differ:"  # the sentence that decides: none of the others may have it
+    differs = "differ"  # the sentence that decides: none of the others may have it
     said = set()
     for k, about in enumerate((About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION, About.ENGINE)):
         of = section("mass", GOOD, ("what", 2.0, 1.0, "at most", False, about))
@@ -97,6 +98,14 @@ def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagr
     assert text.startswith("dog is not stable") and text.index("agree:") > 0  # the run comes before the equations
 
 
+def test_an_experiment_alone_is_named_and_a_step_that_is_not_stable_comes_first():
+    alone, other = section("stability", GOOD, OWN_STEP), section("mass", GOOD)
+    first, second, *_ = verdict([alone], 12, robot="leg.xml").split("\n")
+    assert first.startswith("leg.xml is not stable at its own step") and "agree in stability: 1 of 2" in second
+    lines = verdict([alone, other], 12, robot="leg.xml").split("\n")
+    assert lines[0] == first and "agree: 2 of 3" in lines[1] and "2 of 12 experiments" in lines[2]
+
+
 def test_what_was_not_judged_is_neither_passed_nor_failed_and_nothing_is_said_to_agree():
     some, none = section("mass", GOOD), section("gravity")
     for result in (some.result, none.result):
@@ -104,7 +113,7 @@ def test_what_was_not_judged_is_neither_passed_nor_failed_and_nothing_is_said_to
         assert (check.judged, check.passed, check.failed) == (False, False, False) and not check.record()["judged"]
     for one, passed_checks in ((some, "1 check"), (none, None)):
         text = verdict([one, section("kinematics")], 2)
-        assert not passed([one]) and standing(one)[0] is None and "agree:" not in text and "differ:" not in text
+        assert not passed([one]) and standing(one)[0] is None and "agree" not in text and "differ" not in text
         assert "the tolerance exceeds every value" in text and (passed_checks or "Nothing was compared") in text
         said = Lines()
         say_outcome(said, one, 1.0, [])
