@@ -23,6 +23,14 @@ from compare.robots.scene_file import read_scenes
 
 PARTS = ["Asks", "Compares", "Tables", "Figures", "Tolerance", "Examples"]
 
+POSITIONS = """
+
+def com_positions(q):
+    hip, knee = q[0], q[0] + q[1]
+    upper = np.array([-np.sin(hip), 0.0, -np.cos(hip)])
+    return np.array([upper / 2, upper + np.array([-np.sin(knee), 0.0, -np.cos(knee)]) / 2])
+"""
+
 
 def answered(arguments, capsys):
     """Exit status, stdout and stderr of a request that runs nothing."""
@@ -98,7 +106,8 @@ def test_a_command_line_that_is_shown_runs(inside, line, tmp_path, monkeypatch, 
     own_equations.write(tmp_path)
     servo = '<actuator><position joint="hip" kp="20" kv="1"/></actuator></mujoco>'
     Path("robot.xml").write_text(own_equations.XML.replace("</mujoco>", servo), encoding="utf-8")
-    Path("mine.py").rename("my_equations.py")
+    mine = Path("mine.py").read_text(encoding="utf-8")
+    Path("my_equations.py").write_text(mine + POSITIONS, encoding="utf-8")
     Path("my.toml").write_text(blocks("toml")[0], encoding="utf-8")
     assert read_scenes("my.toml", ARM)[0].name in blocks("toml")[0]
     text = ARM.mjcf.read_text(encoding="utf-8")
