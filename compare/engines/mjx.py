@@ -86,10 +86,6 @@ class Model(ReadModel):
     def acceleration(self, q, v, force):
         return self.values(q, v, force)[2]
 
-    def many(self, q, v, force):
-        accelerations = functions()["many"](self.model, self.data, *self.placed(q, v, force))
-        return np.asarray(accelerations)[:, self.bare.dofs]
-
     def prepare(self, method, tau, dt, tolerance):
         q = self.bare.model.qpos0[self.bare.qpos]
         self.run(q, np.zeros_like(tau), tau, np.arange(GRID + 1.0), 0, method, tolerance)
@@ -114,9 +110,6 @@ def functions() -> dict:
         data = mjx.forward(model, data.replace(qpos=qpos, qvel=qvel, qfrc_applied=force))
         return mjx.full_m(model, data), data.qfrc_bias, data.qacc
 
-    def many(model, data, *states):
-        return jax.vmap(lambda *state: values(model, data, *state)[2])(*states)
-
     def path(model, data, qpos, qvel, force, every, records):
         def step(_, state):
             now = mjx.step(model, data.replace(qpos=state[0], qvel=state[1], qfrc_applied=force))
@@ -128,4 +121,4 @@ def functions() -> dict:
         return jax.lax.scan(record, (qpos, qvel), None, records)[1]
 
     compiled = partial(jax.jit, compiler_options=COMPILER)
-    return {"values": compiled(values), "many": compiled(many), "path": compiled(path, static_argnames="records")}
+    return {"values": compiled(values), "path": compiled(path, static_argnames="records")}

@@ -109,10 +109,7 @@ class Model(ReadModel):
         return self.forward(q[None], v[None], np.zeros_like(v[None])).qfrc_bias.numpy()[0, self.bare.dofs]
 
     def acceleration(self, q, v, force):
-        return self.many(q[None], v[None], force[None])[0]
-
-    def many(self, q, v, force):
-        return self.forward(q, v, force).qacc.numpy()[:, self.bare.dofs]
+        return self.forward(q[None], v[None], force[None]).qacc.numpy()[0, self.bare.dofs]
 
     def prepare(self, method, tau, dt, tolerance):
         q = self.bare.model.qpos0[self.bare.qpos]

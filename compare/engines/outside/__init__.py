@@ -116,10 +116,6 @@ class OutsideDynamics:
     def has(self, quantity: str) -> bool:
         return quantity in self.reading["has"]
 
-    def timed(self, q, v, tau) -> dict[int, float]:
-        """Nanoseconds of an acceleration, by the number of states of a call; {} if it has no such function."""
-        return self.ask("timed", q, v, tau - passive(self.tree, q, v)) if self.has("acceleration") else {}
-
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
         """Motions recorded at every multiple of dt."""
         t, (batch, states), ended = np.linspace(0.0, dt * steps, steps + 1), rows_of_states(q, v, tau), []

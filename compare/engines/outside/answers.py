@@ -1,4 +1,4 @@
-"""What an engine's own process does: read a file, give quantities at states, run, time."""
+"""What an engine's own process does: read a file, give quantities at states, run."""
 
 import faulthandler
 import importlib
@@ -9,7 +9,6 @@ import numpy as np
 
 import tmt
 
-from ...judge import timing
 from ...judge.scale import FACTOR
 from ...process.crash import described
 from ...process.streams import in_one_line
@@ -18,7 +17,6 @@ from .. import RECORDS
 from .model import EngineError, File, ReadModel, Unread, numbers_of, size_of
 
 LIMIT = 120.0  # s, of an answer: compiling a large model may take hours
-ONE = 20  # calls of one state that are timed together
 QUANTITIES = "mass_matrix", "bias", "acceleration"
 
 
@@ -40,7 +38,7 @@ def answer(key: int, act: str, arguments: tuple) -> object:
     """
     faulthandler.dump_traceback_later(LIMIT, exit=True)
     try:
-        return {"read": read, "each": each, "prepared": prepared, "ran": ran, "timed": timed}[act](key, *arguments)
+        return {"read": read, "each": each, "prepared": prepared, "ran": ran}[act](key, *arguments)
     except EngineError:
         raise
     except Exception as error:
@@ -91,15 +89,3 @@ def ran(key: int, q, v, tau, t, steps, method, tolerance) -> tuple[np.ndarray, i
     except ArithmeticError as error:  # it cannot go on
         states, evaluations, why = np.concatenate([q, v])[None], None, str(error)
     return np.asarray(states, float), evaluations, time.perf_counter() - begin, why
-
-
-def timed(key: int, q, v, force) -> dict[int, float]:
-    """Nanoseconds of an acceleration, by the number of states of a call: of one, and of many where the engine can."""
-    model = models[key]
-    calls = {1: lambda: [model.acceleration(q[0], v[0], force[0]) for _ in range(ONE)]}
-    if type(model).many is not ReadModel.many:
-        calls[len(q)] = lambda: model.many(q, v, force)
-    for call in calls.values():
-        call()  # which may compile
-    times = timing.fastest(calls, 5)
-    return {count: 1e9 * seconds / (ONE if count == 1 else count) for count, seconds in times.items()}

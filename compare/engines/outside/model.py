@@ -84,10 +84,6 @@ class ReadModel:
         """(nv,), from M a = force - h by the engine's own forward dynamics; damping and springs are part of the force."""
         raise NotImplementedError
 
-    def many(self, q, v, force):
-        """The accelerations of many states at once, (states, nv), for timing; only engines that can."""
-        raise NotImplementedError
-
     def prepare(self, method: str, tau, dt: float | None, tolerance: float | None) -> None:
         """What a run needs that does not depend on its length: objects, compiled code."""
 
