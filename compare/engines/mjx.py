@@ -5,7 +5,7 @@ from functools import cache, cached_property, partial
 import numpy as np
 
 from . import GRID, EngineRecord
-from .outside import ReadModel, Unread
+from .outside.model import ReadModel, Unread
 
 ENGINE = EngineRecord(
     order=60, label="MJX", colour="#332288", marker="<", package="mujoco.mjx", extra="mjx", reads_file=True, compiles=True,

@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
 from . import EngineRecord
-from .outside import File, ReadModel, Unread, together
+from .outside.model import File, ReadModel, Unread, together
 
 ENGINE = EngineRecord(order=70, label="Newton", colour="#999933", marker="h", package="newton", extra="newton",
                       reads_file=True, precision="float32")  # fmt: skip

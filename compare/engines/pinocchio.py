@@ -10,8 +10,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from . import EngineRecord
-from .outside import File, ReadModel, Unread
 from .outside.mjcf_text import whole_text
+from .outside.model import File, ReadModel, Unread
 from .outside.order import near, order_of, wrong_masses
 
 ENGINE = EngineRecord(

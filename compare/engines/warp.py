@@ -9,7 +9,7 @@ import numpy as np
 from tmt.methods import lone_speeds
 
 from . import GRID, EngineRecord
-from .outside import ReadModel, Unread
+from .outside.model import ReadModel, Unread
 
 ENGINE = EngineRecord(order=65, label="MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp", extra="warp",
                       reads_file=True, compiles=True, precision="float32")  # fmt: skip

@@ -9,18 +9,8 @@ from pathlib import Path
 
 from tmt.compiled.cores import cores
 
-from ..cli.command_line import (
-    FLEET,
-    PROGRAM,
-    Option,
-    Parser,
-    command_parser,
-    expected,
-    not_empty,
-    process_count,
-    seconds,
-    stated_reference,
-)
+from ..cli import command_line as cli
+from ..cli.command_line import FLEET, PROGRAM, Option
 from ..experiments import EXPERIMENTS, TIMED
 from ..process.crash import Refused
 from ..process.streams import in_one_line
@@ -34,7 +24,7 @@ PERIOD = 10.0  # s between two lines of the progress where it cannot be shown
 def fleet_reference(text: str) -> str:
     if ":" in text:
         raise argparse.ArgumentTypeError(f"{text!r} is not a reference of a fleet; expected arm, model or FILE.xml")
-    return stated_reference(text)
+    return cli.stated_reference(text)
 
 
 FLEET_OPTIONS = {
@@ -43,27 +33,27 @@ FLEET_OPTIONS = {
     "--timing": Option(None),
     "--reference": Option(fleet_reference, "WHAT"),
     "--only": Option(metavar="LIST"),
-    "--workers": Option(process_count, "N"),
+    "--workers": Option(cli.process_count, "N"),
     "--dask": Option(metavar="ADDRESS"),
-    "--limit": Option(seconds(1e6), "S", 1800.0),
+    "--limit": Option(cli.seconds(1e6), "S", 1800.0),
     "--since": Option(metavar="DIR"),
 }
 
 
-def fleet_parser() -> Parser:
-    made = command_parser(FLEET, "PATH...", FLEET, FLEET_OPTIONS)
-    made.add_argument("paths", nargs="*", type=not_empty, metavar="PATH", help=argparse.SUPPRESS)
+def fleet_parser() -> cli.Parser:
+    made = cli.command_parser(FLEET, "PATH...", FLEET, FLEET_OPTIONS)
+    made.add_argument("paths", nargs="*", type=cli.not_empty, metavar="PATH", help=argparse.SUPPRESS)
     return made
 
 
-def experiments_of(made: Parser, only: str | None, timing: bool = False) -> tuple[str, ...]:
+def experiments_of(made: cli.Parser, only: str | None, timing: bool = False) -> tuple[str, ...]:
     """The experiments of --only, in their order; None: all that may run."""
     if only is None:
         return tuple(name for name in EXPERIMENTS if timing or name not in TIMED)
     names = only.replace(" ", "").split(",")
     for name in names:
         if name not in EXPERIMENTS:
-            near = expected(name, {known: known for known in EXPERIMENTS}, ", ".join(EXPERIMENTS))
+            near = cli.expected(name, {known: known for known in EXPERIMENTS}, ", ".join(EXPERIMENTS))
             made.error(f"--only: {name!r} is not an experiment; {near}")
         if name in TIMED and not timing:
             made.error(f"--only: {name} measures time; add --timing")

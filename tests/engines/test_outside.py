@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from compare.engines import RECORDS, Setting
-from compare.engines.outside import Outside, Unread
+from compare.engines.outside import Outside
+from compare.engines.outside.model import Unread
 from compare.judge.entries import Entries
 from compare.judge.scale import FACTOR
 from compare.robots.states import Sample

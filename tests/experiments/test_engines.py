@@ -15,7 +15,7 @@ from edited import setup_of
 
 from compare import engines
 from compare.engines import EngineRecord, Method
-from compare.engines.outside import numbers_of, size_of, together
+from compare.engines.outside.model import numbers_of, size_of, together
 from compare.engines.tmt import TmtDynamics
 from compare.experiments.engines import compare_numbers, compare_quantities, integrators
 from compare.judge.check import About, Result
@@ -38,7 +38,7 @@ import numpy as np
 import tmt
 
 from . import EngineRecord
-from .outside import ReadModel, Unread, numbers_of
+from .outside.model import ReadModel, Unread, numbers_of
 
 ENGINE = EngineRecord(order=90, label="{label}", reads_file=True, precision="{precision}")
 METHODS = {{"rk4": (4, "rk4"), "Euler": (1, "semi_implicit_euler"), "free": (None, "own")}}

@@ -9,7 +9,7 @@ import numpy as np
 from tmt import Tree
 
 from .. import EngineRecord
-from ..outside import File, ReadModel, Unread
+from ..outside.model import File, ReadModel, Unread
 from ..outside.order import near, order_of, wrong_masses
 from .plant import bodies_of, finished, fixed_force, joint_numbers, masses, parsed, set_masses, with_turned_force
 

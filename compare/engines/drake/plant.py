@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ..outside import File, Unread, combined
 from ..outside.mjcf_text import whole_text
+from ..outside.model import File, Unread, combined
 
 
 def parsed(file: File, dt: float):

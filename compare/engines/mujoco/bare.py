@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 
-from ..outside import together
+from ..outside.model import together
 from .inventory import switch_off
 from .names import INTEGRATORS, bit, joint_places, rotors
 from .parameters import matrix, tensor

@@ -4,7 +4,7 @@ Their modules have, beside the record with `reads_file`, two names; they import 
 
     METHODS = {name: (order, scheme), ...}      of integration; scheme: that of tmt, or a name of its own; order None: it takes a
                                                 tolerance and chooses its own steps
-    class Model(ReadModel)                      what the engine has made of a file
+    class Model(model.ReadModel)                what the engine has made of a file
 
 and, where they differ with the Tree, methods_for(tree), of the same form as METHODS.
 
@@ -26,21 +26,7 @@ from ...judge.words import listed
 from ...robots.case import Case
 from .. import GRID, RECORDS, Engine, Method, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
 from .answers import LIMIT, answer, started
-from .model import EngineError, File, ReadModel, TooLong, Unread, combined, numbers_of, passive, size_of, together
-
-__all__ = [
-    "EngineError",
-    "File",
-    "Outside",
-    "OutsideDynamics",
-    "ReadModel",
-    "TooLong",
-    "Unread",
-    "combined",
-    "numbers_of",
-    "size_of",
-    "together",
-]
+from .model import EngineError, File, TooLong, passive
 
 
 class Outside(Engine):

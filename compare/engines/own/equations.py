@@ -13,21 +13,8 @@ from ...process.interrupt import is_interrupt
 from ...robots.case import Coordinates
 from ...robots.joint_map import JointMap, JointsError, joint_map
 from .. import rows_of_states
-from .functions import (
-    ARGUMENTS,
-    SHAPES,
-    STATE,
-    OwnError,
-    Problem,
-    and_more,
-    as_raised,
-    call,
-    converted,
-    functions_of,
-    names_of,
-    same,
-    state_in_words,
-)
+from . import functions
+from .functions import ARGUMENTS, SHAPES, STATE, OwnError, Problem, and_more, call, state_in_words
 
 SKEW = 1e-9  # of the largest entry: a mass matrix with a larger asymmetry is reported as not symmetric
 DIVERGED = 2.0**49  # rad etc.: beyond it a run has diverged, and errors are not those of the equations
@@ -52,9 +39,9 @@ class OwnEquations:
         required: tuple[str, ...] = ("mass_matrix", "bias"),
     ):
         self.source, self.coordinates, self.tree = source, coordinates, tree
-        self.functions = functions_of(source, coordinates, required)
+        self.functions = functions.functions_of(source, coordinates, required)
         try:
-            self.joints = joints or joint_map(coordinates, names_of(source))
+            self.joints = joints or joint_map(coordinates, functions.names_of(source))
         except JointsError as error:
             raise OwnError(f"joint_names: {error}") from None
         # of each function that was called: whether it takes batches; the time of one state, alone and in a batch, s; its shape
@@ -201,7 +188,7 @@ class OwnEquations:
         if len(singles) == count:
             started = time.perf_counter()
             together = self.tried_together(name, [part[:count] for part in given])
-            if together is not None and same(together, np.array(singles)):
+            if together is not None and functions.same(together, np.array(singles)):
                 self.takes_batches[name] = True
                 self.times[name] = min(times), (time.perf_counter() - started) / count
         if len(given[0]) > 1:  # else another time
@@ -232,18 +219,18 @@ class OwnEquations:
                 hint = f"; expected an object, such as {self.source.__name__}(), not the class"
             elif isinstance(error, TypeError) and "positional argument" in str(error):
                 hint = f"; expected {call(name)}"
-            raise OwnError(f"{name} raised {as_raised(error)}{hint}") from error
+            raise OwnError(f"{name} raised {functions.as_raised(error)}{hint}") from error
         for symbol, before, after in zip(STATE, given, copies):
             changed = np.atleast_2d(before != after).any(axis=1)
             self.note(name, f"changes its argument {symbol}", [np.atleast_2d(part) for part in given], changed)
         expected = self.shapes.get(name, SHAPES[name](self.coordinates.nv))
         if name != "jacobians":
-            return converted(name, value, expected, count)
+            return functions.converted(name, value, expected, count)
         if not isinstance(value, tuple | list | np.ndarray) or len(value) != 2:
             raise OwnError(
                 f"jacobians is {shown(value)}; expected two arrays, T and B, of shape (bodies, 3, {expected[-1]})"
             )
-        return np.stack([converted(name, part, expected[1:], count) for part in value], axis=-4)
+        return np.stack([functions.converted(name, part, expected[1:], count) for part in value], axis=-4)
 
     def check_symmetry(self, M: np.ndarray, q: np.ndarray) -> None:
         with np.errstate(invalid="ignore"):  # inf - inf

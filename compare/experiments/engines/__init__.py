@@ -7,7 +7,8 @@ import numpy as np
 
 from ...diagnosis import Values, diagnose_stated
 from ...engines import LABELS, RECORDS, Engine, EngineRecord
-from ...engines.outside import EngineError, Outside, OutsideDynamics, TooLong, Unread, size_of
+from ...engines.outside import Outside, OutsideDynamics
+from ...engines.outside.model import EngineError, TooLong, Unread, size_of
 from ...judge.check import ENDS, About, Result, closest, over
 from ...judge.entries import Entries, unit
 from ...judge.finding import Finding

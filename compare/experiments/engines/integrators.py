@@ -9,7 +9,7 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...engines import GRID, LABELS, RECORDS, Engine, Method, Motion, Setting
-from ...engines.outside import TooLong, Unread
+from ...engines.outside.model import TooLong, Unread
 from ...judge.check import About, Result, closest
 from ...judge.rounding import step_rounding
 from ...judge.run import ORDER_MARGIN

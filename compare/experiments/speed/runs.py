@@ -10,7 +10,7 @@ import tmt
 from tmt.methods import METHODS, amplification
 
 from ...engines import GRID, RECORDS, Dynamics, Engine, Method, Setting
-from ...engines.outside import EngineError
+from ...engines.outside.model import EngineError
 from ...judge import timing
 from ...judge.rounding import growth
 from ...judge.run import diverged_at

@@ -9,19 +9,10 @@ from numpy.typing import ArrayLike
 from tmt.methods import METHODS
 
 from ...engines import LABELS, Dynamics, Engine, Method, compared, methods_in
+from ...judge import run
 from ...judge.check import About, Result, closest
 from ...judge.rounding import NARROW, band, step_rounding
-from ...judge.run import (
-    LEAST_JUDGED,
-    check_movement,
-    departure,
-    deviation_alive,
-    diverged_at,
-    movement_unit,
-    required_time,
-    step_in_words,
-    widest_judged,
-)
+from ...judge.run import departure
 from ...report.text import say
 from ...robots.case import Case, Coordinates
 
@@ -86,7 +77,7 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide
     stepping, tree, tau = METHODS[scheme], case.tree, case.tau
     dt, every = case.duration / steps, steps // recorded(case)
     t, q, v, *_ = dynamics.run(*case.start, tau, dt, steps, scheme)
-    ended = diverged_at(case, t, q, v)
+    ended = run.diverged_at(case, t, q, v)
     width = band(stepping, tree, q, v, tau, dt, every, steps_afforded(case))
     alive = t[::every] < (np.inf if ended is None else ended)
     states, times = [path[::every][alive] for path in (q, v)], t[::every][alive]
@@ -97,7 +88,7 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide
     single = dt * rates.max(axis=1, initial=0.0) <= np.pi
     states, stepped = ([part[single] for part in pair] for pair in (states, stepped))
     tolerance = step_rounding(stepping, tree, *states, tau, dt)
-    widest = widest_judged(case, q, v)
+    widest = run.widest_judged(case, q, v)
     return TmtSide(t, q, v, width, widest, ended, times[single], states, stepped, tolerance)
 
 
@@ -112,14 +103,14 @@ def compare_runs(
 ) -> None:
     """One side and the integrators of MuJoCo with the same scheme, from the same start with the same step."""
     tau, dt, every, coordinates = case.tau, case.duration / steps, steps // recorded(case), case.coordinates
-    t, times, name, unit = mine.t, mine.t[::every], case.robot.compared[0], movement_unit(coordinates)
+    t, times, name, unit = mine.t, mine.t[::every], case.robot.compared[0], run.movement_unit(coordinates)
     width = mine.width[:, : coordinates.nv].max(axis=1)
     for method in methods:
         _, *theirs = dynamics.run(*case.start, tau, dt, steps, method.name)[:3]
-        ends = {name: mine.ended, "mujoco": diverged_at(case, t, *theirs)}
+        ends = {name: mine.ended, "mujoco": run.diverged_at(case, t, *theirs)}
         count = judged(times, mine.width < mine.widest, ends)
-        where = f"{case.name}, {method.name}, {step_in_words(case, steps)}"
-        until, required = float(times[count - 1]), required_time(case, method.scheme, dt)
+        where = f"{case.name}, {method.name}, {run.step_in_words(case, steps)}"
+        until, required = float(times[count - 1]), run.required_time(case, method.scheme, dt)
         about = {"scene": case.name, "engine_integrator": method.name, "twin": method.scheme, "dt_s": dt}
         ending = {
             "judged_until_s": until,
@@ -145,8 +136,8 @@ def compare_runs(
             result.not_judged(where, "open loop", say(result.finding("diverges_at_once")))
         if case.is_free and "own" not in case.scene.tags:
             before = t < ends_first(ends)
-            moved = min(deviation_alive(path[before], case.q, coordinates) for path in (mine.q, theirs[0]))
-            check_movement(result, where, moved, unit)
+            moved = min(run.deviation_alive(path[before], case.q, coordinates) for path in (mine.q, theirs[0]))
+            run.check_movement(result, where, moved, unit)
         result.curves.setdefault(
             (case.name, method.scheme, steps),
             {
@@ -182,7 +173,7 @@ def check_time_judged(result: Result, where: str, case: Case, until: float, requ
 
     until: when it is no more judged; alive: the last recorded time before one of both runs diverges, s.
     """
-    least = required or min(LEAST_JUDGED * case.duration, alive)
+    least = required or min(run.LEAST_JUDGED * case.duration, alive)
     if until < least:
         reason = say(result.finding("wide", until=until, least=least))
         result.not_judged(where, "time judged", reason, "s")
@@ -236,7 +227,7 @@ def check_level(
     check = result.check(where, quantity, difference[k, i], tolerance[k, i], unit, place, True)
     found = {
         "largest_difference": None if check.value is None else difference[:, :n].max(),
-        "unit": movement_unit(coordinates),
+        "unit": run.movement_unit(coordinates),
         "worst_difference": check.value,
         "band": check.tolerance,
         "worst_unit": unit,
