@@ -1,7 +1,6 @@
 """Every number that an assignment prints, from TMT, from MuJoCo and exactly."""
 
-from collections.abc import Iterator, Mapping
-from functools import partial
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -99,10 +98,6 @@ def check_answer(result: Result, item: Printed, of: Answer, joints: tuple) -> No
         k = joints.index(joint)
         off = abs(abs(of.nearest[k]) - abs(printed[k]))
         result.check(where, f"exact: |{item.quantity}_{joint}| - |printed|", off, item.half_digit, item.unit)
-
-
-def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    yield from ()
 
 
 def headline(result: Result) -> Finding | None:

@@ -128,18 +128,18 @@ def band(
     return widths
 
 
-def growth(
-    stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, every: int
-) -> np.ndarray:
+def growth(stepping: Method, tree: Tree, q, qd, tau, dt: float, every: int, stride: int = 1) -> np.ndarray:
     """log10 of the growth of a small difference of the initial state, at every `every` steps.
 
     The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled to avoid overflow. NaN from where the run has diverged.
+    stride: steps for all of which the Jacobian of the first is taken; it divides `every`.
     """
     product, scale = np.eye(2 * qd.shape[1]), 0.0
     finite = np.isfinite([*q.T, *qd.T]).all(axis=0)
     result = np.full((len(q) - 1) // every + 1, np.nan)
     result[0] = 0.0
-    for k, J in enumerate(amplification(stepping, tree, q[:-1], qd[:-1], tau, dt), start=1):
+    jacobians = amplification(stepping, tree, q[:-1:stride], qd[:-1:stride], tau, dt)
+    for k, J in zip(range(stride, len(q), stride), np.linalg.matrix_power(jacobians, stride)):
         product = J @ product
         if not (finite[k] and np.isfinite(product).all()):
             break

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 import tmt
-from tmt.methods import METHODS, amplification
+from tmt.methods import METHODS
 
 from ...engines import GRID, RECORDS, Dynamics, Engine, Method, Setting
 from ...engines.outside.model import EngineError
@@ -111,22 +111,10 @@ def floor(case: Case, dynamics: Dynamics) -> float:
         dt = case.duration / steps
         motion = dynamics.run(*case.start, case.tau, dt, steps, "rk4")
         if np.isfinite(motion.q).all():
-            growth_of = growth if case.coordinates.nv <= EACH_STEP else sampled_growth
-            growths = growth_of(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_STEPS)
+            stride = 1 if case.coordinates.nv <= EACH_STEP else GROWTH_STEPS
+            growths = growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_STEPS, stride)
             return float(EPS * 10.0 ** growths.max() * max(1.0, np.abs(motion.q).max()))
     raise ValueError(f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; expected a shorter scene")
-
-
-def sampled_growth(stepping, tree, q, qd, tau, dt, every) -> np.ndarray:
-    """`growth`, with the Jacobian of one step in `every` for all of these."""
-    product, scale, result = np.eye(2 * qd.shape[1]), 0.0, [0.0]
-    jacobians = amplification(stepping, tree, q[:-1:every], qd[:-1:every], tau, dt)
-    for J in np.linalg.matrix_power(jacobians, every):
-        product = J @ product
-        size = np.linalg.norm(product, 2)
-        product, scale = product / size, scale + np.log10(size)
-        result.append(scale)
-    return np.array(result)
 
 
 def prepared(rows: list[dict], setup: Setup) -> list[tuple]:

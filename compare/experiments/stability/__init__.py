@@ -19,6 +19,7 @@ from .subjects import DAMPINGS, SCHEMES, Subjects, coarsest_case, methods_of, su
 EXPERIMENT = Experiment(order=100, serves_own=False, options=("--dt", "--integrator"), overview="limits")
 MOST_SPEEDS = 60  # of a file's robot: with more there are no runs without servos
 FINE_STEPS = (1e-2, 1e-3)  # s, of departures, in addition to the coarsest step
+skipped = leaves_no_digits
 
 
 def claim_values(robot: Robot) -> dict:
@@ -28,10 +29,6 @@ def claim_values(robot: Robot) -> dict:
         "most": limits.MOST_TOLERANCE,
         "run": {"push": own_run.PUSH, "calm": own_run.CALM, "faster": own_run.FASTER, "finer": own_run.FINER},
     }
-
-
-def skipped(robot: Robot) -> str | None:
-    return leaves_no_digits(robot)
 
 
 def reset_case(subjects: Subjects) -> Case | None:

@@ -23,14 +23,11 @@ EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=Tr
 SECONDS_OF_OWN = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all runs of a user's own equations together, about
 OVERHEAD_OF_OWN = 1e-4  # s of an evaluation in a run, about, beyond the equations themselves
 STAGES_OF_RK4 = 4  # evaluations in a step of RK4
+skipped = leaves_no_digits
 
 
 def claim_values(robot: Robot) -> dict:
     return {"narrow": NARROW, "moves": MOVES, "unit": movement_unit(robot.coordinates)}
-
-
-def skipped(robot: Robot) -> str | None:
-    return leaves_no_digits(robot)
 
 
 def begin(setup: Setup) -> None:
