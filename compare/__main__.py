@@ -17,9 +17,8 @@ if __name__ == "__main__":
         status, end = interrupt.status_of_child()
         interrupt.settle()
         if end:
-            streams.say_error(
-                f"the run ended before its end, perhaps by your equations: {end}; an earlier report is unchanged"
-            )
+            why = f"perhaps by your equations: {end}"
+            streams.say_error(f"the run ended before its end, {why}; an earlier report is unchanged")
         interrupt.leave(status)
 
 import shlex

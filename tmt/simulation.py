@@ -106,9 +106,8 @@ def simulate(
     stepping = runner.stepping
     steps, every, dt = given.whole("steps", steps), given.whole("every", every), given.positive("dt", dt, "a step in s")
     if steps % every:
-        raise ValueError(
-            f"every is {shown(every)}, of which steps = {shown(steps)} is no multiple; a divisor is expected"
-        )
+        why = f"of which steps = {shown(steps)} is no multiple"
+        raise ValueError(f"every is {shown(every)}, {why}; a divisor is expected")
     if tolerance is not None and not stepping.adaptive:
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
     usual = 1e-33 if taylor else 1e-9

@@ -23,9 +23,8 @@ from .why import Why, cause_of
 __all__ = ["Difference", "State", "assert_agrees", "differences"]
 
 Model = str | PathLike[str] | object  # a path, MJCF text or an MjModel
-Quantity = (
-    Callable[..., Any] | ArrayLike | tuple[Any, Any] | None
-)  # a function, values, or a SymPy matrix and its symbols
+# a function, values, or a SymPy matrix and its symbols
+Quantity = Callable[..., Any] | ArrayLike | tuple[Any, Any] | None
 Values = ArrayLike | None
 Names = Sequence[str] | None
 ROUNDED = 1e-6  # of its terms: an entry that differs by no more may have rounded constants

@@ -121,9 +121,8 @@ class Compared:
         """The cause if all that differs is at most this number of wrong terms; the same in several coefficients is one."""
         if not self.differing or not self.is_complete or not all(self.terms):
             return None
-        texts = dict.fromkeys(
-            say(Finding(TEMPLATE, "details", {"coefficient": {"terms": terms}})) for terms in self.terms
-        )
+        found = [Finding(TEMPLATE, "details", {"coefficient": {"terms": terms}}) for terms in self.terms]
+        texts = dict.fromkeys(map(say, found))
         kinds = {pair for terms in self.terms for pair in terms}
         if len(kinds) > most:
             return None

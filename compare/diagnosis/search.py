@@ -24,13 +24,7 @@ SHOWN = 12  # single explanations that leave least
 
 
 def diagnose(
-    tree: tmt.Tree,
-    q: np.ndarray,
-    qd: np.ndarray,
-    given: np.ndarray,
-    tolerance: np.ndarray,
-    seconds: float = np.inf,
-    bias: Callable | None = None,
+    tree: tmt.Tree, q, qd, given, tolerance, seconds: float = np.inf, bias: Callable | None = None
 ) -> Diagnosis:
     """What explains given values that differ from those of a tree's equations.
 
@@ -53,11 +47,9 @@ def explanation(search: Search, compared: Compared, seconds: float) -> Diagnosis
     equations, differing = search.equations, (np.abs(search.off) > 1.0).any(axis=0)
     if not differing.any():
         return Diagnosis(False)
-    found = Diagnosis(
-        True,
-        entries=tuple(entry_name(entry, equations.names) for entry, off in zip(equations.entries, differing) if off),
-        compared=int(search.known.any(axis=0).sum()),
-    )
+    entries = [entry for entry, off in zip(equations.entries, differing) if off]
+    names = tuple(entry_name(entry, equations.names) for entry in entries)
+    found = Diagnosis(True, entries=names, compared=int(search.known.any(axis=0).sum()))
     if len(np.unique(equations.q, axis=0)) < LEAST_STATES:
         return found._replace(too_few=len(equations.q))
     singles = search.in_time(search.singles)

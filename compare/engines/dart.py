@@ -53,9 +53,8 @@ class Model(OfUrdf):
                 v[own : own + 6] = np.r_[by, by.start - 3 : by.start]
         turned = tuple((slice(own, own + 3), at) for own, at in self.free.items())
         self.order = Order(q, v, turned, in_world=True)
-        self.dampers = {
-            own: joint for joint in self.joints.values() if (own := joint.getIndexInSkeleton(0)) not in self.free
-        }
+        numbered = {joint.getIndexInSkeleton(0): joint for joint in self.joints.values()}
+        self.dampers = {own: joint for own, joint in numbered.items() if own not in self.free}
         damping = np.zeros(len(v))
         damping[v[list(self.dampers)]] = [joint.getDampingCoefficient(0) for joint in self.dampers.values()]
         return damping

@@ -63,9 +63,7 @@ class Model(ReadModel):
 
     def placed(self, q, *of_speeds):
         """The arguments in MuJoCo's order of joints."""
-        placed = [
-            np.zeros((*np.shape(values)[:-1], np.shape(values)[-1]), self.precision) for values in (q, *of_speeds)
-        ]
+        placed = [np.zeros(np.shape(values), self.precision) for values in (q, *of_speeds)]
         placed[0][..., self.bare.qpos] = q
         for vector, values in zip(placed[1:], of_speeds):
             vector[..., self.bare.dofs] = values

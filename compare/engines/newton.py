@@ -50,9 +50,8 @@ class Model(ReadModel):
             nq, nv = coords[name].stop, dofs[name].stop
         self.coords, self.dofs = ([i for name in file.names for i in of[name]] for of in (coords, dofs))
         self.joint_of = {dofs[name][-1]: joint for joint, name in enumerate(file.names)}
-        self.read = {
-            name: getattr(self.model, f"joint_{name}").numpy().copy() for name in ("armature", "damping", "stiffness")
-        }
+        fields = "armature", "damping", "stiffness"
+        self.read = {name: getattr(self.model, f"joint_{name}").numpy().copy() for name in fields}
         self.solver = newton.solvers.SolverFeatherstone(self.model, angular_damping=0.0)
         self.state, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
 

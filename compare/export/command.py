@@ -52,9 +52,8 @@ def equations_status(arguments: Sequence[str], command: str) -> int:
     if unknown:
         made.error(f"unexpected argument {unknown[0]!r}")
     if options.to not in FILES:
-        made.error(
-            f"--to: {options.to!r} is not a language; {expected(options.to, dict(zip(FILES, FILES)), ', '.join(FILES))}"
-        )
+        near = expected(options.to, dict(zip(FILES, FILES)), ", ".join(FILES))
+        made.error(f"--to: {options.to!r} is not a language; {near}")
     if not options.out:
         made.error("expected a new folder: --out DIR")
     if Path(options.out).exists():
@@ -81,22 +80,16 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
 
     def written(*head: str) -> dict[str, str]:
         try:
-            return {
-                f"{name}{ending}": tmt.equations(
-                    robot.tree, language, quantities, name=name, single=options.float, head=head
-                )
-                for ending, language in FILES[options.to].items()
-            }
+            of_tree = partial(tmt.equations, robot.tree, name=name, single=options.float, head=head)
+            return {f"{name}{ending}": of_tree(to, quantities) for ending, to in FILES[options.to].items()}
         except ValueError as error:
             raise Refused(error) from None
 
     with terminal.progress("writes the equations"), TemporaryDirectory() as folder:
         interrupt.undo.append(partial(shutil.rmtree, folder, ignore_errors=True))
         texts = written()
-        size = sum(map(len, texts.values()))
-        terminal.say(
-            block("export", "written", names=list(texts), kilobytes=size / 1000, seconds=time.perf_counter() - started)
-        )
+        kilobytes, seconds = sum(map(len, texts.values())) / 1000, time.perf_counter() - started
+        terminal.say(block("export", "written", names=list(texts), kilobytes=kilobytes, seconds=seconds))
         for file, text in texts.items():
             Path(folder, file).write_text(text, encoding="utf-8")
         terminal.show(f"runs what was written, at {STATES} states")

@@ -69,9 +69,8 @@ class Program:
         except OSError as error:
             raise NotRun(f"{command[0]}: {error.strerror}") from None
         if done.returncode:
-            lines = [line for line in (done.stderr or done.stdout).splitlines() if "error" in line] or [
-                f"exit status {done.returncode}"
-            ]
+            lines = [line for line in (done.stderr or done.stdout).splitlines() if "error" in line]
+            lines = lines or [f"exit status {done.returncode}"]
             raise WrongProgram(f"{command[0]}: {lines[0]}")
         return done.stdout
 
@@ -103,9 +102,8 @@ class CProgram(Program):
         sizes = dict(zip(STATE, self.sizes))
         size = prod(shape_of(quantity, self.tree))
         own = size // self.parts(quantity)
-        taken = [f"{x} + {sizes[x]} * i" for x in of.takes] + [
-            f"out + {size} * i + {own * k}" for k in range(self.parts(quantity))
-        ]
+        taken = [f"{x} + {sizes[x]} * i" for x in of.takes]
+        taken += [f"out + {size} * i + {own * k}" for k in range(self.parts(quantity))]
         arguments = ", ".join(f"const {kind} *{x}" for x in STATE)
         call = f"{self.name}_{quantity}({', '.join(taken)});"
         return f"void states_{quantity}({arguments}, {kind} *out, long n) {{ for (long i = 0; i < n; i++) {call} }}"

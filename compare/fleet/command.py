@@ -112,9 +112,8 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
         terminal.say(line)
     for line in ["no changes"] if changed == [] else changed or ():
         terminal.say(f"since {in_one_line(options.since)}: {line}")
-    terminal.say(
-        f"Fleet: {in_one_line(os.path.join(options.out, 'index.html'))} ({time.perf_counter() - started:.1f} s)"
-    )
+    page, seconds = in_one_line(os.path.join(options.out, "index.html")), time.perf_counter() - started
+    terminal.say(f"Fleet: {page} ({seconds:.1f} s)")
     return 0 if run.is_good else 1
 
 

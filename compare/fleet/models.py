@@ -57,9 +57,8 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
             models.pop(file, None)
             left_out.append((in_one_line(path.as_posix()), f"included by {users[file]}"))
         elif file not in models:
-            left_out.append(
-                (in_one_line(path.as_posix()), f"root element <{in_one_line(kinds[file])}>, not <mujoco> or <robot>")
-            )
+            why = f"root element <{in_one_line(kinds[file])}>, not <mujoco> or <robot>"
+            left_out.append((in_one_line(path.as_posix()), why))
     if not models:
         raise Refused(f"no MJCF or URDF file in {', '.join(map(in_one_line, words))}")
     return sorted(models.values(), key=lambda model: model.shown), sorted(left_out)
@@ -80,9 +79,8 @@ def paths_of(words: Iterable[str]) -> Iterator[tuple[Path, bool]]:
                 problem = "not a regular file" if os.path.exists(word) else "no such file"
                 raise Refused(f"{problem}: {in_one_line(word)}; expected a file, a folder, a pattern or @LIST")
             for match in map(Path, matches):
-                yield from (
-                    (file, False) for file in (files_in(match) if match.is_dir() else [match] * os.path.isfile(match))
-                )
+                files = files_in(match) if match.is_dir() else [match] * os.path.isfile(match)
+                yield from ((file, False) for file in files)
 
 
 def files_in(folder: Path) -> Iterator[Path]:
@@ -90,11 +88,8 @@ def files_in(folder: Path) -> Iterator[Path]:
     for place, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(names):
-            if (
-                name.lower().endswith((".xml", ".mjcf", ".urdf"))
-                and not name.startswith(".")
-                and os.path.isfile(Path(place, name))
-            ):
+            is_model = name.lower().endswith((".xml", ".mjcf", ".urdf")) and not name.startswith(".")
+            if is_model and os.path.isfile(Path(place, name)):
                 yield Path(place, name)
 
 

@@ -15,9 +15,8 @@ NARROW = 1e-3  # rad, m: a run is judged while the band of its positions is narr
 # Rounding of a ball's turn in a step, a product of quaternions scaled to length 1: cosine and sine 1.5 eps, four sums of four
 # products 4 eps, division 0.5 eps: 6 eps of the quaternion, 12 of the turn, 24 for two runs; the difference of the runs 8 eps
 OF_A_BALL = 32 * EPS
-LEFT_OUT = (
-    3.2e-8  # N m or N: with servos MuJoCo's discrete takes forces for 0 whose sum of squares is below mjMINVAL, 1e-15
-)
+# N m or N: with servos MuJoCo's discrete takes forces for 0 whose sum of squares is below mjMINVAL, 1e-15
+LEFT_OUT = 3.2e-8
 
 
 def slope_rounding(stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> tuple:
@@ -80,16 +79,7 @@ def of_positions(tree: Tree, q: np.ndarray) -> np.ndarray:
     return sizes
 
 
-def band(
-    stepping: Method,
-    tree: Tree,
-    q: np.ndarray,
-    qd: np.ndarray,
-    tau: np.ndarray,
-    dt: float,
-    every: int = 1,
-    most: int | None = None,
-) -> np.ndarray:
+def band(stepping: Method, tree: Tree, q, qd, tau, dt: float, every=1, most: int | None = None) -> np.ndarray:
     """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states (steps + 1, nq, nv), (steps / every + 1, 2 nv).
 
     every: steps between two values. Infinite from where the run has diverged or the band is far too wide, and after `most` steps.

@@ -53,9 +53,8 @@ def motion_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """Convective and Euler terms of each entry of the bias, by their absolute values, N m or N, (states, nv)."""
     parts, shape = method.bodies(tree, list(q.T), list(qd.T)), q.shape[:1]
     T, B = (gather((zip(*columns) for columns in both), shape) for both in zip(*((b.T, b.B) for b in parts)))
-    v_conv, w_conv, omega = (
-        gather(map(list, vectors), shape) for vectors in zip(*((b.v_conv, b.w_conv, b.omega) for b in parts))
-    )
+    vectors = zip(*((b.v_conv, b.w_conv, b.omega) for b in parts))
+    v_conv, w_conv, omega = (gather(map(list, of_bodies), shape) for of_bodies in vectors)
     inertia = np.array(tree.inertia)
     moments = np.abs(np.einsum("bij,sbj->sbi", inertia, w_conv))
     moments += np.abs(np.cross(omega, np.einsum("bij,sbj->sbi", inertia, omega)))

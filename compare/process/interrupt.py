@@ -89,9 +89,8 @@ def status_of_child() -> tuple[int, str]:
 
     The exit status and "", or 2 and how the child ended if not by `leave`. The child answers an interrupt.
     """
-    child = subprocess.Popen(
-        [sys.executable, *sys.orig_argv[1:]], env=os.environ | {"COMPARE_PARENT": str(os.getpid())}
-    )
+    environment = os.environ | {"COMPARE_PARENT": str(os.getpid())}
+    child = subprocess.Popen([sys.executable, *sys.orig_argv[1:]], env=environment)
     undo.extend([lambda: leave(2), child.wait, child.terminate])
     code = child.wait()
     return (code - FINISHED, "") if code >= FINISHED else (2, how_ended(code))

@@ -100,9 +100,8 @@ class Document:
         if failing:
             failing["known"] = bool(report.causes)
         pictures = self.parts.attempt("the pictures of the first screen", [], self.pictures)
-        return self.template.first_screen(
-            [line for line in lines if line], report.skipped, pictures, failing, max(more, 0)
-        )
+        lines = [line for line in lines if line]
+        return self.template.first_screen(lines, report.skipped, pictures, failing, max(more, 0))
 
     def line(self, section: Section) -> dict:
         """The line of one experiment: what it asks, whether it passes, its headline."""

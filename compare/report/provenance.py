@@ -14,16 +14,8 @@ from ..process.workers import Clock
 
 OURS = "arm-tmt-mujoco"
 PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka")
-OF_ENGINES = (
-    "drake",
-    "pin",
-    "mujoco-mjx",
-    "jax",
-    "mujoco-warp",
-    "newton",
-    "dartpy",
-    "pybullet",
-)  # if installed
+# if installed
+OF_ENGINES = ("drake", "pin", "mujoco-mjx", "jax", "mujoco-warp", "newton", "dartpy", "pybullet")
 PROGRAM_FILES = (":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml")  # changes elsewhere do not change the program
 
 

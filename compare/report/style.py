@@ -15,14 +15,8 @@ from matplotlib.text import Text
 
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#666666"
 PINK, SKY = "#CC79A7", "#56B4E9"
-LINES = (
-    (BLUE, "-"),
-    (RED, "--"),
-    (GREEN, "-."),
-    (ORANGE, ":"),
-    (PINK, (0, (5, 1))),
-    (SKY, (0, (3, 1, 1, 1))),
-)  # of joints
+# of joints
+LINES = (BLUE, "-"), (RED, "--"), (GREEN, "-."), (ORANGE, ":"), (PINK, (0, (5, 1))), (SKY, (0, (3, 1, 1, 1)))
 STYLE = {
     "font.size": 9,
     "axes.titlesize": 9,

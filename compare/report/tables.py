@@ -9,9 +9,8 @@ from ..judge.check import Check
 from .verdict import Section
 
 DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled", "found"), 7)  # of a column; else 3
-DIGITS |= dict.fromkeys(
-    ("predicted_dt_s", "observed_dt_s", "dt_s", "mujoco_dt_s", "tmt_dt_s", "from_dt_s", "to_dt_s"), 5
-)
+STEPS = "predicted_dt_s", "observed_dt_s", "dt_s", "mujoco_dt_s", "tmt_dt_s", "from_dt_s", "to_dt_s"
+DIGITS |= dict.fromkeys(STEPS, 5)
 TITLES = {"what_should_i_use": "What should I use?"}  # of tables whose name is not their title
 IN_WORDS = {"seconds_of": "CPU seconds", "ended_after_s": "seconds from the start to the end"}
 LISTS = ("names", "hinges", "locked")  # columns with many names of joints

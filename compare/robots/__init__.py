@@ -66,9 +66,8 @@ class Robot:
     ranges: tuple = ()  # (low, high) or None for each joint, rad or m; (): no ranges
     described: str = ""  # in a sentence: "a human arm"
     symbols: Mapping[str, str] = field(default_factory=dict)  # of joints, for figures
-    kinds: Mapping[str, str] = field(
-        default_factory=dict
-    )  # example postures of a centre, a saddle, a marginal equilibrium
+    # example postures of a centre, a saddle, a marginal equilibrium
+    kinds: Mapping[str, str] = field(default_factory=dict)
     landmarks: Callable | None = None  # q (times, n) rad -> points, m, drawn as a chain; None: origins of the joints
     sketched: tuple[str, ...] = ()  # postures of the sketch; (): the first two
     axes: tuple[str, str, str] = ("x", "y", "z")  # labels of the inertial frame

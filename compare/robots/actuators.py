@@ -143,9 +143,8 @@ class Drive:
         """
         stated = self.controls.get(posture, (None,) * len(self.actuators))
         triples = zip(self.actuators, stated, lengths)
-        return np.array(
-            [actuator.target(length) if u is None else actuator.clamped(u) for actuator, u, length in triples]
-        )
+        chosen = [one.target(length) if u is None else one.clamped(u) for one, u, length in triples]
+        return np.array(chosen)
 
 
 class Controller(NamedTuple):

@@ -77,9 +77,8 @@ def remarks(answers: Mapping, dynamics: Mapping) -> list[Finding]:
     """Errors in the printed solution. answers: by item, those of TMT (`.tmt`) and MuJoCo (`.mujoco`); dynamics: by engine."""
     q, qd = ARM.posture("ball catch"), np.ones(3)
     c, s = np.cos(q[1]), np.sin(q[1])
-    right = {
-        label: dynamics[name].angular_velocities(q, qd)[0] for label, name in (("TMT", "tmt"), ("MuJoCo", "mujoco"))
-    }
+    engines = {"TMT": dynamics["tmt"], "MuJoCo": dynamics["mujoco"]}
+    right = {label: engine.angular_velocities(q, qd)[0] for label, engine in engines.items()}
     stated = {
         "text": np.array([qd[1], c * qd[0], s * qd[0]]),  # (bd, 0, 0) + Rb (0, ad, 0)
         "matrix": np.array([[0.0, 1.0, 0.0], [c, 0.0, 0.0], [-s, 0.0, 0.0]]) @ qd,  # B_1

@@ -49,9 +49,8 @@ class Scene:
 
     def __post_init__(self):
         self.require("name", is_text(self.name), "a text in one line, not empty")
-        self.set(
-            "posture", isinstance(self.posture, str) or are_numbers(self.posture), "the name of a posture, or numbers"
-        )
+        is_posture = isinstance(self.posture, str) or are_numbers(self.posture)
+        self.set("posture", is_posture, "the name of a posture, or numbers")
         is_torque = self.torque in TORQUES if isinstance(self.torque, str) else are_numbers(self.torque)
         self.set("torque", is_torque, "free, hold, servos, or a torque in N m for each joint")
         self.set("speed", are_numbers(self.speed), "a speed in deg/s for each joint")
@@ -122,20 +121,15 @@ class Case:
         if isinstance(scene.posture, str):
             named = self.robot.postures or self.robot.positions
             postures = [name for name, q in self.robot.poses.items() if len(q) == whole.nq and named]
-            scene.require(
-                "posture", scene.posture in postures, " or ".join([*filter(None, [", ".join(postures)]), count])
-            )
+            accepted = " or ".join(filter(None, [", ".join(postures), count]))
+            scene.require("posture", scene.posture in postures, accepted)
         elif scene.posture:
             scene.require("posture", len(scene.posture) == whole.nq, count)
             for joint in whole.places.balls:
                 is_unit = abs(np.linalg.norm(scene.posture[joint.q]) - 1.0) <= CLOSE_TO_ONE
                 scene.require("posture", is_unit, "a quaternion w, x, y, z of length 1 for each ball")
-        for name, unit in (
-            ("torque", "{0.force}"),
-            ("speed", "{0.speed_given}"),
-            ("damping", "{0.force} s/{0.unit}"),
-            ("targets", "{0.movement_given}"),
-        ):
+        units = {"torque": "{0.force}", "speed": "{0.speed_given}", "damping": "{0.force} s/{0.unit}"}
+        for name, unit in (units | {"targets": "{0.movement_given}"}).items():
             value = getattr(scene, name)
             is_each = isinstance(value, tuple) and (value or name != "speed")
             scene.require(name, not is_each or len(value) == whole.nv, numbers(whole.speeds, unit))

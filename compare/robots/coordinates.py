@@ -150,8 +150,6 @@ def fastest_rates(tree: Tree, inverse: np.ndarray, added: tuple = ()) -> tuple[f
     of_speeds = [k for kind, k in zip(tree.kind, tree.stiffness) for _ in range(KINDS[kind].speeds)]
     damped, stiff = np.diag(np.add(tree.damping, added or 0.0)), np.diag(of_speeds)
     if tree.has_gains:
-        damped, stiff = (
-            part + (gain or 0.0) for part, gain in ((damped, tree.speed_gain), (stiff, tree.position_gain))
-        )
+        damped, stiff = damped + (tree.speed_gain or 0.0), stiff + (tree.position_gain or 0.0)
     decay, square = (np.abs(np.linalg.eigvals(inverse @ part)).max() for part in (damped, stiff))
     return float(decay), float(np.sqrt(square))

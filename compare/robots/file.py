@@ -70,13 +70,9 @@ def robot_of_solution(
     names: of the file's joints, in the order of the solution's. Actuators do not act: those of the file may differ.
     """
     solution = replace(solution, tree=replace(solution.tree, hinge_names=tuple(names)), drive=Drive())
-    robot = replace(
-        robot_of(solution, shown),
-        mjcf=reading.source,
-        features=tuple(reading.features),
-        stated_in=whose,
-        features_stated=tuple(solution.features),
-    )
+    stated = {"stated_in": whose, "features_stated": tuple(solution.features)}
+    of_file = {"mjcf": reading.source, "features": tuple(reading.features)}
+    robot = replace(robot_of(solution, shown), **stated, **of_file)
     return robot, solution
 
 

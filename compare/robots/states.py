@@ -68,9 +68,8 @@ def random(robot: Robot, states: int, exact_states: int, seed: int = SEED) -> Sa
     """Random states: positions within the ranges of the joints; see `largest_speeds_and_torques`. Large robots have fewer."""
     rng, wanted, nv = np.random.default_rng(seed), states, robot.coordinates.nv
     states = min(wanted, max(1, MOST_NUMBERS // (3 * len(robot.tree.mass) * nv)))
-    notes = [Finding("shared", "fewer_states", {"count": states, "states": wanted, "seconds": None})] * (
-        states < wanted
-    )
+    fewer = Finding("shared", "fewer_states", {"count": states, "states": wanted, "seconds": None})
+    notes = [fewer] * (states < wanted)
     if nv > MOST_SPEEDS:
         exact_states = 0
         notes.append(Finding("shared", "no_exact_values", {"speeds": nv, "most": MOST_SPEEDS}))

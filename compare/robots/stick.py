@@ -39,9 +39,8 @@ def stick_figure(robot: Robot, q: np.ndarray, crosses: bool = False) -> tuple[np
             links += [(joint, len(points) + k) for k in range(len(ends))]
             points += ends
     joined = sorted({point for link in links for point in link})
-    return np.stack([points[k] for k in joined], axis=1).astype(float), [
-        (joined.index(one), joined.index(other)) for one, other in links
-    ]
+    pairs = [(joined.index(one), joined.index(other)) for one, other in links]
+    return np.stack([points[k] for k in joined], axis=1).astype(float), pairs
 
 
 def along_run(vector: Iterable, q: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from tmt.derivation.composite import mass_matrix_and_bias  # the sum over bodies
 from tmt.methods import by_speed, lone_speeds
 
 from ..robots.actuators import Rows
+from ..robots.coordinates import free_joints
 from .rest import carries
 from .servos import Driven, constraint_terms
 from .step_limits import SYMMETRIC, Small
@@ -78,9 +79,8 @@ class Posture:
         alone = lone_speeds(self.robot.tree)
         moments = Driven(self.robot.tree, self.robot.drive, self.ask).along(self.start).moments
         pulled = set(np.flatnonzero(moments.any(axis=0)).tolist())
-        return [
-            k for body in floating(self.robot.tree) if alone.issuperset(body) and not pulled & {*body} for k in body
-        ]
+        lone = [body for body in floating(self.robot.tree) if alone.issuperset(body) and not pulled & {*body}]
+        return [k for body in lone for k in body]
 
     @cached_property
     def base(self) -> list[int]:
@@ -164,11 +164,6 @@ class Posture:
 
 def floating(tree: tmt.Tree) -> list[list[int]]:
     """The six speeds of each free joint: three slides that carry nothing else, and a ball, from the world."""
-    bodies = []
-    for i in range(3, len(tree.kind)):
-        chain = [i - 3, i - 2, i - 1, i]
-        free = tuple(tree.kind[j] for j in chain) == ("slide",) * 3 + ("ball",)
-        if free and [tree.parent[j] for j in chain] == [-1, *chain[:3]] and not {*chain[:3]} & {*tree.body_hinge}:
-            joints = tree.coordinates.joints
-            bodies.append(list(range(joints[i - 3].qd.start, joints[i].qd.stop)))
-    return bodies
+    joints, free = tree.coordinates.joints, [i for i in free_joints(tree) if tree.parent[i] == -1]
+    alone = [i for i in free if not {i, i + 1, i + 2} & {*tree.body_hinge}]
+    return [list(range(joints[i].qd.start, joints[i + 3].qd.stop)) for i in alone]

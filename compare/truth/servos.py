@@ -90,9 +90,8 @@ class Driven:
             lengths[turning], moments[turning] = (values[turning] for values in self.ask(q))
         for j, step in enumerate(TURNED_BY * np.eye(n) if turning and differenced else ()):
             ahead, behind = (self.ask(self.coordinates.move(q, sign * step)) for sign in (1.0, -1.0))
-            slopes[turning, j], turns[turning, :, j] = (
-                (after[turning] - before[turning]) / (2.0 * TURNED_BY) for after, before in zip(ahead, behind)
-            )
+            changes = [(after - before)[turning] / (2.0 * TURNED_BY) for after, before in zip(ahead, behind)]
+            slopes[turning, j], turns[turning, :, j] = changes
         return Along(lengths, slopes, moments, turns)
 
     def pulls(self, along: Along, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -61,9 +61,8 @@ class Small:
     # filters: the actuator, its time constant in s, whether it is a filterexact
     poles: tuple[tuple[str, float, bool], ...] = ()
     base: tuple[int, ...] = ()  # the speeds of free bodies, which may drift
-    couple: Callable[[float, str], Rows] | None = (
-        None  # the Rows at a step size and an integrator, if there are constraints
-    )
+    # the Rows at a step size and an integrator, if there are constraints
+    couple: Callable[[float, str], Rows] | None = None
 
     def free(self, base: list[int]) -> "Small":
         """With a free base, given by its speeds: those without stiffness and damping keep the momentum at zero."""
@@ -77,9 +76,8 @@ class Small:
     def locked(self, base: list[int]) -> "Small":
         """With these speeds locked."""
         rest = [k for k in range(len(self.M)) if k not in base]
-        square = {
-            name: getattr(self, name)[np.ix_(rest, rest)] for name in ("M", "K", "D", "springs", "brakes", "on_path")
-        }
+        matrices = "M", "K", "D", "springs", "brakes", "on_path"
+        square = {name: getattr(self, name)[np.ix_(rest, rest)] for name in matrices}
         return replace(self, names=tuple(self.names[k] for k in rest), damping=self.damping[rest], **square)
 
     def __getstate__(self) -> dict:

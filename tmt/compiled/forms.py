@@ -99,9 +99,8 @@ def checked_terms(terms, tree, q, qd) -> tuple[list, list]:
         return M, h
     except Exception as error:
         why = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise ValueError(
-            f"terms(tree, q, qd) does not return Mbar, {n} rows of {n}, and h, {n} numbers: {why}"
-        ) from error
+        wanted = f"Mbar, {n} rows of {n}, and h, {n} numbers"
+        raise ValueError(f"terms(tree, q, qd) does not return {wanted}: {why}") from error
 
 
 def flat(nested) -> list:

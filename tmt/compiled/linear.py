@@ -11,9 +11,8 @@ def solve() -> Code:
 
     matrix: n rows of `stride` numbers, of which the first n belong to it; it is written over.
     """
-    code = Code(
-        "solve", {"matrix": POINTER, "stride": INDEX, "right": POINTER, "n": INDEX}, attributes="noinline", own=True
-    )
+    given = {"matrix": POINTER, "stride": INDEX, "right": POINTER, "n": INDEX}
+    code = Code("solve", given, attributes="noinline", own=True)
     matrix, stride, right, n = (code[name] for name in code.arguments)
     with code.loop(n) as outer:
         k = outer.index

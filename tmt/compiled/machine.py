@@ -32,9 +32,8 @@ def versions() -> str:
 def target() -> llvm.TargetMachine:
     """A new one each time: an engine takes its own over."""
     cpu, features = processor()
-    return llvm.Target.from_default_triple().create_target_machine(
-        cpu=cpu, features=features, opt=1, codemodel="jitdefault"
-    )
+    target = llvm.Target.from_default_triple()
+    return target.create_target_machine(cpu=cpu, features=features, opt=1, codemodel="jitdefault")
 
 
 def object_code(text: str) -> bytes:

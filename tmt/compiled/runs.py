@@ -17,12 +17,8 @@ from .sine import LIMIT
 from .straight import Traced, functions, trace
 
 INLINED = 1_500  # nodes of the slopes of a step that are put in the place of their calls
-SHORTEST_STEP, GROWTH, SHRINKING, SAFETY = (
-    1e-9,
-    6.0,
-    0.333,
-    0.9,
-)  # of an adaptive method, in units of dt and of the step before
+# of an adaptive method, in units of dt and of the step before
+SHORTEST_STEP, GROWTH, SHRINKING, SAFETY = 1e-9, 6.0, 0.333, 0.9
 
 
 def source(tree, stepping: Method, width: int) -> str:
@@ -49,9 +45,8 @@ class Step:
     def add(self, traced: Traced, width: int, inline: bool = False) -> str:
         """The functions of a traced one and of what it calls; its name."""
         self.functions += functions(traced, width, inline)
-        called = {
-            arguments[0] for kind, arguments in map(traced.tape.nodes.__getitem__, traced.nodes) if kind == "call"
-        }
+        operations = [traced.tape.nodes[i] for i in traced.nodes]
+        called = {arguments[0] for kind, arguments in operations if kind == "call"}
         known = {code.name for code in self.functions}
         if "solution" in called and "solution" not in known:
             self.functions += [linear.solve(), linear.solution(self.n)]
@@ -237,9 +232,8 @@ def residual(tree, stepping, joints, linear: bool) -> Traced:
                 slopes.append(found[n + k] - da[i * n + k])
         return [*values, *slopes]
 
-    return trace(
-        "linear_residual" if linear else "residual", (nq, n, n, 1, n * stepping.stages, n * stepping.stages), function
-    )
+    sizes = nq, n, n, 1, n * stepping.stages, n * stepping.stages
+    return trace("linear_residual" if linear else "residual", sizes, function)
 
 
 def run(step: Step, advance: Callable) -> Code:

@@ -153,9 +153,8 @@ def bias(tree, q, qd) -> list:
 
 def along(frames, rigid) -> list:
     """h: moment and force of what is carried along each speed's direction."""
-    return [
-        axis.dot(body.n) + shift.dot(body.f) for frame, body in zip(frames, rigid) for axis, shift in frame.directions
-    ]
+    along = [(direction, body) for frame, body in zip(frames, rigid) for direction in frame.directions]
+    return [axis.dot(body.n) + shift.dot(body.f) for (axis, shift), body in along]
 
 
 def carried(tree, q, qd) -> tuple[list[Frame], list[Rigid]]:

@@ -100,13 +100,11 @@ def followed(
         series.expand(code, high, low)
         step = step_size(high[:n], tolerance)
         if not step > 0.0:
-            error = ValueError(
-                f"at t = {float(t):g} s numbers overflow: the motion diverges, is too fast, or Mbar is singular"
-            )
+            why = "the motion diverges, is too fast, or Mbar is singular"
+            error = ValueError(f"at t = {float(t):g} s numbers overflow: {why}")
             if np.isfinite(high[:n, 1]).all():
-                error = TooManySteps(
-                    f"at t = {float(t):.3g} s the terms of a series overflow: the motion is too fast for it"
-                )
+                why = "the terms of a series overflow: the motion is too fast for it"
+                error = TooManySteps(f"at t = {float(t):.3g} s {why}")
             return np.array(path), count, error
         left, count = float((times[-1] - t) / Fraction(min(step, 2.0 * float(times[-1])))), count + 1
         if count - 1 + left > most and count >= min(SEEN, most):

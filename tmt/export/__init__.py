@@ -70,13 +70,11 @@ def text(model: Tree, language: str, quantities: Sequence[str], name: str, singl
     if not isinstance(head, list | tuple) or not all(isinstance(line, str) for line in head):
         raise ValueError(f"head is {shown(head)}; a sequence of lines is expected")
     if not (isinstance(name, str) and re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name)) or is_word(name):
-        raise ValueError(
-            f"name is {shown(name)}; expected an identifier, no word of C, Python or MATLAB and no quantity"
-        )
+        wanted = "an identifier, no word of C, Python or MATLAB and no quantity"
+        raise ValueError(f"name is {shown(name)}; expected {wanted}")
     if not isinstance(single, bool) or (single and language not in ("c", "c header")):
-        raise ValueError(
-            f"single is {shown(single)}; single precision is True or False, and in C only (not in {language})"
-        )
+        wanted = f"single precision is True or False, and in C only (not in {language})"
+        raise ValueError(f"single is {shown(single)}; {wanted}")
     lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
     if language in SYMBOLIC:

@@ -98,9 +98,8 @@ class Forms:
             parts = {(): number * (-1) ** (sines // 2)}  # of exp(i k q), divided by i where the number of sines is odd
             for s, c in self.ring.places:
                 own = {0: one}
-                for sign in [-1] * monomial[s] + [1] * monomial[
-                    c
-                ]:  # 2 i sin = z - 1/z, 2 cos = z + 1/z with z = exp(i q)
+                # 2 i sin = z - 1/z, 2 cos = z + 1/z with z = exp(i q)
+                for sign in [-1] * monomial[s] + [1] * monomial[c]:
                     turned = Counter()
                     for k, part in own.items():
                         turned[k + 1] += part / 2

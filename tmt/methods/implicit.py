@@ -105,9 +105,8 @@ class ImplicitRungeKutta(Method):
             stages = list(self.stage_states(q, qd, dt, a, joints))
             for joint in joints.balls:
                 rates = [product(q_i[joint.q], [0.0, *qd_i[joint.qd]]) for q_i, qd_i in stages]
-                balls.append(
-                    normalized([p + dt * (0.5 * weighted(self.b, of)) for p, of in zip(q[joint.q], zip(*rates))])
-                )
+                means = [0.5 * weighted(self.b, of) for of in zip(*rates)]
+                balls.append(normalized([p + dt * mean for p, mean in zip(q[joint.q], means)]))
         return placed(joints, q, moved, balls), [qd[k] + dt * weighted(self.b, a[k::n]) for k in range(n)]
 
 

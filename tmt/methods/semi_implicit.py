@@ -36,9 +36,8 @@ class SemiImplicitEuler(Method):
             return tree.position_gain, tree.speed_gain
         if not (self.implicit_gains and tree.speed_gain):
             return (), ()
-        return (), tuple(
-            tuple(gain if one else 0.0 for gain, one in zip(*rows)) for rows in zip(tree.speed_gain, on_one_path(tree))
-        )
+        both = zip(tree.speed_gain, on_one_path(tree))
+        return (), tuple(tuple(gain if one else 0.0 for gain, one in zip(*rows)) for rows in both)
 
     def matrix(self, tree, q, qd, dt, terms=mass_matrix_and_bias):
         """The matrix of the linear system for the slope: Mbar + dt D [+ dt dh/dqd] [+ dt S] [+ dt^2 k + dt^2 P]."""
@@ -75,9 +74,8 @@ class SemiImplicitEuler(Method):
         left = [x + d * y for x, d, y in zip(left_over(M, a, force), held, a)]
         position_gain, speed_gain = self.gains_held(tree)
         if position_gain:
-            left = [
-                x + weighted(row, [dt * (v + dt * y) for v, y in zip(qd, a)]) for x, row in zip(left, position_gain)
-            ]
+            moved = [dt * (v + dt * y) for v, y in zip(qd, a)]
+            left = [x + weighted(row, moved) for x, row in zip(left, position_gain)]
         if speed_gain:
             left = [x + weighted(row, [dt * y for y in a]) for x, row in zip(left, speed_gain)]
         if own := set(range(len(qd))) if self.implicit_bias else lone_speeds(tree) if self.lone_bodies else ():
@@ -123,9 +121,8 @@ class SemiImplicitEuler(Method):
 
 def by_speed(tree, of_joints) -> list:
     """For each speed the value of its joint."""
-    return [
-        value for value, joint in zip(of_joints, tree.coordinates.joints) for _ in range(joint.qd.start, joint.qd.stop)
-    ]
+    pairs = zip(of_joints, tree.coordinates.joints)
+    return [value for value, joint in pairs for _ in range(joint.qd.start, joint.qd.stop)]
 
 
 def weighted(row, values):

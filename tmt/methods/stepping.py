@@ -125,9 +125,8 @@ def checked_tableau(method, *rows) -> None:
         except TypeError:  # one number where rows are expected
             parts = [None]
         if any(part is None or part.ndim != 1 or not np.isfinite(part).all() for part in parts):
-            raise ValueError(
-                f"{name} of the method is {shown(given)}; {'rows of ' * (name in rows)}numbers are expected"
-            )
+            wanted = "rows of numbers" if name in rows else "numbers"
+            raise ValueError(f"{name} of the method is {shown(given)}; {wanted} are expected")
         parts = tuple(tuple(part.tolist()) for part in parts)
         object.__setattr__(method, name, parts if name in rows else parts[0])
 

@@ -44,9 +44,8 @@ def states(model, **arrays) -> list:
         if array.ndim == 0 or array.shape[-1] != n:
             kinds = dict.fromkeys(model.kind)
             each = " or ".join(kind for kind in kinds if kind != "ball")
-            one = [f"one number per {each}"] * bool(each) + [f"{'four' if name == 'q' else 'three'} per ball"] * (
-                "ball" in kinds
-            )
+            one = [f"one number per {each}"] * bool(each)
+            one += [f"{'four' if name == 'q' else 'three'} per ball"] * ("ball" in kinds)
             names = ", ".join(model.hinge_names)
             raise ValueError(f"{name} has shape {array.shape}; (..., {n}) is expected, {', '.join(one)} ({names})")
         if not np.isfinite(array).all():
@@ -57,9 +56,8 @@ def states(model, **arrays) -> list:
                 if off.size and off.max() > CLOSE_TO_ONE:
                     ball = model.hinge_names[coordinates.joints.index(joint)]
                     found = array[..., joint.q].reshape(-1, 4)[np.argmax(off)]
-                    raise ValueError(
-                        f"q of {ball!r} is {found.tolist()}; a quaternion w, x, y, z of length 1 is expected"
-                    )
+                    wanted = "a quaternion w, x, y, z of length 1 is expected"
+                    raise ValueError(f"q of {ball!r} is {found.tolist()}; {wanted}")
         checked.append(array)
     batches = [array.shape[:-1] for array in checked]
     try:

@@ -42,11 +42,6 @@ class Coordinates(NamedTuple):
         """Of each joint, in q and in qd."""
         return [(joint.q, joint.qd) for joint in self.joints]
 
-    @property
-    def at_zero(self) -> list[float]:
-        """The position with every frame parallel to the world's, if no joint has another reference: (nq,)."""
-        return [value for joint in self.joints for value in ((1.0, 0.0, 0.0, 0.0) if joint.kind == "ball" else (0.0,))]
-
     def move(self, q, u) -> list:
         """The position after a movement u from q, quaternions of length 1."""
         moved = []

@@ -110,9 +110,8 @@ def reason(tree, moving) -> str:
     kind = kinds.pop() if len(kinds) == 1 else "joint"
     if len(names) == 1:
         return f"{kind} {names[0]} {'moves' if kind == 'slide' else 'turns'} without moving any mass"
-    return (
-        f"{kind}s {', '.join(names)} {'turn' if kind in ('hinge', 'ball') else 'move'} together without moving any mass"
-    )
+    move = "turn" if kind in ("hinge", "ball") else "move"
+    return f"{kind}s {', '.join(names)} {move} together without moving any mass"
 
 
 def check_tree(tree) -> None:
@@ -123,9 +122,8 @@ def check_tree(tree) -> None:
             none = [not size[joint.qd].all() for joint in tree.coordinates.joints]
             raise ValueError(f"{reason(tree, none)}; Mbar is singular at every q")
         if not np.isfinite(size).all() or size.min() < np.finfo(float).tiny / CLEAR:
-            raise ValueError(
-                f"Mbar of the Tree has sizes from {size.min():.3g} to {size.max():.3g} kg m2; doubles cannot hold that"
-            )
+            sizes = f"from {size.min():.3g} to {size.max():.3g} kg m2"
+            raise ValueError(f"Mbar of the Tree has sizes {sizes}; doubles cannot hold that")
         if tree.never_singular:
             return
         # two states with nothing special about them: singular at both is singular everywhere

@@ -248,9 +248,8 @@ def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows:
     fed = np.array(rows) != 0.0
     for i, (kind, _, by) in enumerate(coordinates.joints):
         if kind == "ball" and (fed[by].any() or fed[:, by].any()):
-            raise ValueError(
-                f"Tree.{name} has an entry of joint {i}, a ball; of hinges and slides alone is it accepted"
-            )
+            why = "a ball; of hinges and slides alone is it accepted"
+            raise ValueError(f"Tree.{name} has an entry of joint {i}, {why}")
     return rows if fed.any() else ()
 
 

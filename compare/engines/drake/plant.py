@@ -104,9 +104,8 @@ def masses(context, bodies: list) -> tuple[float, np.ndarray, np.ndarray]:
     for body in bodies:
         inertia, pose = body.CalcSpatialInertiaInBodyFrame(context), body.EvalPoseInWorld(context)
         mass, com, turn = inertia.get_mass(), inertia.get_com(), pose.rotation().matrix()
-        about_com = inertia.CalcRotationalInertia().CopyToFullMatrix3() - mass * (
-            com @ com * np.eye(3) - np.outer(com, com)
-        )
+        of_com = mass * (com @ com * np.eye(3) - np.outer(com, com))
+        about_com = inertia.CalcRotationalInertia().CopyToFullMatrix3() - of_com
         parts.append((mass, pose.translation() + turn @ com, turn @ about_com @ turn.T))
     return combined(parts)
 

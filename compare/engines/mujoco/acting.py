@@ -19,9 +19,8 @@ from .names import INTEGRATORS, bit, kind_of, output_of
 # besides the joints' springs and dampers these drive a robot here and stay
 DRIVES = ("body_gravcomp", "tendon_stiffness", "tendon_damping")
 FREE = ("slide", "slide", "slide", "ball")
-DISCRETE = getattr(
-    mujoco.mjtIntegrator, "mjINT_DISCRETE", None
-)  # it is implicit in the constraints' springs and dampers
+# it is implicit in the constraints' springs and dampers
+DISCRETE = getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", None)
 
 
 class Acting:
@@ -85,10 +84,9 @@ class Acting:
         numbers = np.array([tendon.number for tendon in self.drive.tendons], int)
         jacobian = np.zeros((m.ntendon, m.nv))
         if m.ntendon:
-            rows = (m.ten_J_rownnz, m.ten_J_rowadr, m.ten_J_colind) if hasattr(m, "ten_J_rownnz") else None
-            mujoco.mju_sparse2dense(
-                jacobian, d.ten_J.reshape(-1), *(rows or (d.ten_J_rownnz, d.ten_J_rowadr, d.ten_J_colind.reshape(-1)))
-            )
+            of = m if hasattr(m, "ten_J_rownnz") else d
+            rows = of.ten_J_rownnz, of.ten_J_rowadr, of.ten_J_colind.reshape(-1)
+            mujoco.mju_sparse2dense(jacobian, d.ten_J.reshape(-1), *rows)
         lengths = np.concatenate([d.actuator_length[outputs], d.ten_length[numbers]])
         return lengths, np.concatenate([moments[outputs], jacobian[numbers]])
 
@@ -138,16 +136,7 @@ class Acting:
         return [int(self.model.actuator_actadr[i]) for i in filters]
 
     def deviations(
-        self,
-        q: np.ndarray,
-        u: np.ndarray,
-        dt: float,
-        integrator: str,
-        steps: Sequence[int],
-        movement: np.ndarray | float = 0.0,
-        speed: np.ndarray | float = 0.0,
-        activation: float = 0.0,
-        jump: np.ndarray | float = 0.0,
+        self, q, u, dt, integrator, steps: Sequence[int], movement=0.0, speed=0.0, activation=0.0, jump=0.0
     ) -> Iterator[np.ndarray]:
         """Deviations from q after each step of a run, then of filters' activations from u; one array for each part of the run.
 

@@ -39,9 +39,8 @@ class Bare:
         # with this flag MuJoCo Warp's implicitfast is explicit in the damping; actuators with armature are still there
         self.model.opt.disableflags &= ~bit("ACTUATION")
         self.model.actuator_gainprm[:] = self.model.actuator_biasprm[:] = 0.0
-        self.model.geom_contype[:] = self.model.geom_conaffinity[:] = (
-            0  # MJX refuses pairs even if there are no contacts
-        )
+        # MJX refuses pairs even if there are no contacts
+        self.model.geom_contype[:] = self.model.geom_conaffinity[:] = 0
         places = joint_places(self.model)
         self.places = {name: places[name] for name in names}
         self.qpos = np.array([i for place in self.places.values() for i in place.qpos])

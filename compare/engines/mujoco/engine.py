@@ -46,11 +46,9 @@ def methods_for(tree: tmt.Tree | None = None) -> dict[str, Method]:
             schemes["RK4"], order = "rk4_mean_speed", 2
         if lone and not FROM_4:
             del schemes["implicitfast"]
-    return {
-        name: Method("mujoco", name, order if name == "RK4" else 1, scheme)
-        for name, scheme in schemes.items()
-        if name in INTEGRATORS
-    }
+    known = {name: scheme for name, scheme in schemes.items() if name in INTEGRATORS}
+    orders = dict.fromkeys(known, 1) | {"RK4": order}
+    return {name: Method("mujoco", name, orders[name], scheme) for name, scheme in known.items()}
 
 
 METHODS = methods_for()

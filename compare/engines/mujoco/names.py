@@ -14,11 +14,8 @@ from ...robots.case import Coordinates
 
 # those that the installed version has; discrete came with 3.13
 NAMES = {"Euler": "EULER", "implicitfast": "IMPLICITFAST", "discrete": "DISCRETE", "implicit": "IMPLICIT", "RK4": "RK4"}
-INTEGRATORS = {
-    name: getattr(mujoco.mjtIntegrator, f"mjINT_{member}")
-    for name, member in NAMES.items()
-    if hasattr(mujoco.mjtIntegrator, f"mjINT_{member}")
-}
+MEMBERS = {name: getattr(mujoco.mjtIntegrator, f"mjINT_{member}", None) for name, member in NAMES.items()}
+INTEGRATORS = {name: member for name, member in MEMBERS.items() if member is not None}
 EVALUATIONS = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # of the dynamics, in a step
 OF_A_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # transmissions
 FREE_PARTS = ("x", "y", "z", "turn")

@@ -23,9 +23,8 @@ def spec_of(path: Path) -> mujoco.MjSpec:
     of_free = [joint.parent.parent for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
     for base in [body for body in of_free if body.parent == spec.worldbody]:
         robot = ElementTree.fromstring(path.read_text(encoding="utf-8", errors="replace"))
-        for element, key in [(link, "name") for link in robot.iter("link")] + [
-            (end, "link") for end in robot.iter("parent")
-        ]:
+        named = [(link, "name") for link in robot.iter("link")]
+        for element, key in named + [(end, "link") for end in robot.iter("parent")]:
             if element.get(key) == base.name:
                 element.set(key, "world")
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(robot, encoding="unicode"))

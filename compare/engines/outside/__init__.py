@@ -41,9 +41,7 @@ class Outside(Engine):
         return importlib.import_module(f"..{self.record.module or self.name}", __package__)
 
     def named(self, methods: Mapping) -> dict[str, Method]:
-        return {
-            name: Method(self.name, name, order, scheme, order is None) for name, (order, scheme) in methods.items()
-        }
+        return {name: Method(self.name, name, *of, adaptive=of[0] is None) for name, of in methods.items()}
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         """None where joints are locked or the robot's own actuators act."""

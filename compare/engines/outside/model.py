@@ -8,8 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
+from tmt.methods import by_speed
 
 from ...robots.case import Coordinates
+from ...robots.joint_map import places_of
 
 
 class File(NamedTuple):
@@ -99,21 +101,14 @@ class ReadModel:
 def numbers_of(tree: tmt.Tree) -> dict[str, np.ndarray]:
     """The Tree's numbers in the shapes of ReadModel.numbers; and about_origin (joints,): mass x com^2 from the joint, kg m2."""
     nv = tree.coordinates.nv
-    origins = []  # of the joints, at the reference positions
-    for parent, offset in zip(tree.parent, tree.offset):
-        origins.append(np.array(offset) + (origins[parent] if parent >= 0 else 0.0))
+    origins, *_ = places_of(tree)  # of the joints, at the reference positions
     groups = [[] for _ in tree.kind]
     for body, joint in enumerate(tree.body_hinge):
         if joint >= 0:
             groups[joint].append((tree.mass[body], origins[joint] + tree.com[body], np.array(tree.inertia[body])))
     mass, com, inertia = (np.array(values) for values in zip(*map(combined, groups)))
-    stiffness = [
-        k for k, place in zip(tree.stiffness, tree.coordinates.joints) for _ in range(place.qd.stop - place.qd.start)
-    ]
-    each = {"armature": tree.armature, "damping": tree.damping, "stiffness": stiffness}
-    each = {
-        name: np.broadcast_to(np.asarray(values, float) if len(values) else 0.0, nv) for name, values in each.items()
-    }
+    each = {"armature": tree.armature, "damping": tree.damping, "stiffness": by_speed(tree, tree.stiffness)}
+    each = {name: np.broadcast_to(np.array(values or 0.0, float), nv) for name, values in each.items()}
     each["about_origin"] = mass * ((com - origins) ** 2).sum(axis=1)
     each |= {"gravity": np.array(tree.gravity, float), "rest": np.array(tree.rest), "reference": np.array(tree.zero)}
     return {"mass": mass, "com": com, "moments": np.linalg.eigvalsh(inertia), "inertia": inertia} | each

@@ -30,9 +30,8 @@ class Own:
 
     @property
     def methods(self) -> Mapping[str, Method]:
-        return {
-            name: Method(self.name, name, tmt.METHODS[name].order, name) for name in RK4_SCHEMES if name in self.schemes
-        }
+        names = [name for name in RK4_SCHEMES if name in self.schemes]
+        return {name: Method(self.name, name, tmt.METHODS[name].order, name) for name in names}
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         """None if a robot's own actuators act: the equations do not have them."""

@@ -227,9 +227,8 @@ class OwnEquations:
         if name != "jacobians":
             return functions.converted(name, value, expected, count)
         if not isinstance(value, tuple | list | np.ndarray) or len(value) != 2:
-            raise OwnError(
-                f"jacobians is {shown(value)}; expected two arrays, T and B, of shape (bodies, 3, {expected[-1]})"
-            )
+            wanted = f"two arrays, T and B, of shape (bodies, 3, {expected[-1]})"
+            raise OwnError(f"jacobians is {shown(value)}; expected {wanted}")
         return np.stack([functions.converted(name, part, expected[1:], count) for part in value], axis=-4)
 
     def check_symmetry(self, M: np.ndarray, q: np.ndarray) -> None:

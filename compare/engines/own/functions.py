@@ -111,9 +111,8 @@ def function_of(name: str, value: object, symbols: object, coordinates: Coordina
     if is_pair(value):
         value, symbols = value
     if symbols is None:
-        raise OwnError(
-            f"{name} is {shown(value)}; expected a function {call(name)}, or a SymPy matrix with the list of its symbols"
-        )
+        wanted = f"a function {call(name)}, or a SymPy matrix with the list of its symbols"
+        raise OwnError(f"{name} is {shown(value)}; expected {wanted}")
     return of_symbols(name, value, symbols, coordinates)
 
 
@@ -138,9 +137,8 @@ def of_symbols(name: str, matrix: object, symbols: object, coordinates: Coordina
     entries = [entry.xreplace(dict(zip(symbols, plain))) for entry in entries]
     taken = counts[ARGUMENTS[name] - 1]
     if left := sorted({str(s) for entry in entries for s in entry.free_symbols - set(plain)}):
-        raise OwnError(
-            f"{name} has the symbol {left[0]}, which is not in the list of symbols; list it, or insert a number"
-        )
+        why = f"has the symbol {left[0]}, which is not in the list of symbols"
+        raise OwnError(f"{name} {why}; list it, or insert a number")
     used = {symbols[plain.index(s)] for entry in entries for s in entry.free_symbols & set(plain)}
     if more := [str(s) for s in symbols[taken:] if s in used]:
         raise OwnError(f"{name} depends on {more[0]}; expected {call(name)}")
@@ -219,9 +217,8 @@ def in_shape(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray | None:
 def same(together: np.ndarray, singles: np.ndarray) -> bool:
     """Whether a batch has the values of single states."""
     size = np.abs(singles[np.isfinite(singles)]).max(initial=0.0)
-    return together.shape == singles.shape and np.allclose(
-        together, singles, rtol=0.0, atol=SAME * size, equal_nan=True
-    )
+    within = {"rtol": 0.0, "atol": SAME * size, "equal_nan": True}
+    return together.shape == singles.shape and np.allclose(together, singles, **within)
 
 
 def state_in_words(state: list[np.ndarray]) -> str:

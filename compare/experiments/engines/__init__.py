@@ -158,9 +158,8 @@ def compare_quantities(
                "worst_difference": check.value, "bar": check.tolerance, "difference_over_bar": check.over_tolerance,
                "difference_eps": float(over(difference, eps * size).max()),
                "mujoco_eps": float(over(theirs, EPS * size).max())}  # fmt: skip
-        row |= {
-            f"worst_{of}": " ".join(repr(float(x)) for x in getattr(sample, of)[worst[0]]) for of in ("q", "qd", "tau")
-        }
+        for of in ("q", "qd", "tau"):
+            row[f"worst_{of}"] = " ".join(repr(float(x)) for x in getattr(sample, of)[worst[0]])
         result.rows.append(row | {"passed": check.passed})
     if not all(row["passed"] for row in result.rows if row["engine"] == label) and {"Mbar", "bias"} <= found.keys():
         values = Values.of(sample.tree, sample.q, sample.qd, found["Mbar"], found["bias"], FACTOR * eps)

@@ -14,6 +14,7 @@ from ...judge.finding import Finding
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...robots.case import Coordinates
+from ...robots.joint_map import places_of
 from .. import Experiment
 from ..setup import Setup
 from . import file
@@ -29,17 +30,14 @@ MAY_DIFFER = "contact", "limit", "clamp", "actuator"  # the equations of motion 
 
 def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict:
     """The numbers of a Tree by quantity: arrays per joint, speed, position or body, or one. joints, bodies: in this order."""
-    anchors = []
-    for parent, offset in zip(tree.parent, tree.offset):
-        anchors.append(np.array(offset) + (anchors[parent] if parent >= 0 else 0.0))
-    places = [tree.coordinates.joints[j] for j in joints]
+    (anchors, *_), places = places_of(tree), [tree.coordinates.joints[j] for j in joints]
     positions, speeds = ([i for place in places for i in range(place[k].start, place[k].stop)] for k in (1, 2))
     numbers = {-1: -1} | {j: i for i, j in enumerate(joints)}
     is_sprung = np.repeat([tree.stiffness[j] > 0.0 for j in joints], [at.stop - at.start for _, at, _ in places])
     return {
         "parent": np.array([numbers[tree.parent[j]] for j in joints]),
         "axis": np.array(tree.axis)[speeds],
-        "anchor": np.array(anchors)[joints],
+        "anchor": anchors[joints],
         "ref": np.array(tree.reference)[joints],
         "damping": np.array(tree.damping)[speeds],
         "armature": np.array(tree.armature)[speeds],

@@ -25,13 +25,8 @@ NO_GAIN = 1.05  # a smaller speedup is within the accuracy of the times
 
 
 def claim_values(robot: Robot) -> dict:
-    return {
-        "joint": joint_word(robot.coordinates),
-        "digits": DIGITS,
-        "eps": FACTOR,
-        "narrow": NARROW,
-        "unit": movement_unit(robot.coordinates),
-    }
+    words = {"joint": joint_word(robot.coordinates), "unit": movement_unit(robot.coordinates)}
+    return words | {"digits": DIGITS, "eps": FACTOR, "narrow": NARROW}
 
 
 def begin(setup: Setup) -> None:

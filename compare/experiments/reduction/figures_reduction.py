@@ -67,9 +67,8 @@ def kind_of_joint(joint: str, need: dict) -> str:
 def mark_times(ax: Axes, result: Result, scene: str, y: float) -> None:
     """The time of a step of each engine in a scene, of the whole and of the smallest model."""
     for engine, offset in HEIGHTS.items():
-        whole, *smaller = [
-            row["ns_per_step"] for row in result.rows if (row["scene"], row["engine"]) == (scene, engine)
-        ]
+        rows = [row for row in result.rows if (row["scene"], row["engine"]) == (scene, engine)]
+        whole, *smaller = [row["ns_per_step"] for row in rows]
         ax.plot(whole, y + offset, mfc="none", **look_of(engine))
         if smaller and smaller[0]:
             ax.plot([smaller[0], whole], [y + offset] * 2, color=COLOURS[engine], linewidth=1)

@@ -29,13 +29,8 @@ def of_case(result: Result, case: Case, setup: Setup) -> list[tuple]:
     reasons = {name: need.moves[name] for name in case.joints if name in need.moves}
     rows = [{"scene": case.name, "joint": name, "why_needed": why} for name, why in reasons.items()]
     result.tables.setdefault("reduction_needs", []).extend(rows)
-    joints = {
-        "needed": reasons,
-        "locked": case.scene.locked,
-        "stays": need.stays,
-        "undecided": case.joints if slow else (),
-    }
-    result.curves["needs"][case.name] = joints
+    joints = {"needed": reasons, "locked": case.scene.locked, "stays": need.stays}
+    result.curves["needs"][case.name] = joints | {"undecided": case.joints if slow else ()}
     if (smaller or rests) and not (case.robot.is_read and case.coordinates.nv > MOST_IN_A_BAND):
         compare_smaller(result, case, smaller, setup)
     return models
@@ -77,13 +72,7 @@ def free_places(case: Case, smaller: Case) -> list[int]:
 
 
 def check_smaller(
-    result: Result,
-    where: str,
-    coordinates: Coordinates,
-    t: np.ndarray,
-    apart: np.ndarray,
-    width: np.ndarray,
-    required: float,
+    result: Result, where: str, coordinates: Coordinates, t: np.ndarray, apart, width, required: float
 ) -> float:
     """The runs stay within the band of rounding while it is narrow, for the required time; until when they are judged, s.
 

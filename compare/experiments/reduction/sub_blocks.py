@@ -27,9 +27,8 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
     sets, states = subsets(robot.joints, setup.of(12, 6, 4)), 20
     if len(robot.joints) > ALL_SUBSETS:
         angles, states = 1, setup.of(4, 2, 2)
-    unit_of_mass, unit_of_force = (
-        ("kg m2, kg m or kg", "N m or N") if "slide" in coordinates.all_kinds else ("kg m2", "N m")
-    )
+    has_slides = "slide" in coordinates.all_kinds
+    unit_of_mass, unit_of_force = ("kg m2, kg m or kg", "N m or N") if has_slides else ("kg m2", "N m")
     for locked in sets:
         pairs = {}  # (quantity, pair): differences and scales, a pair of arrays for each choice of angles
         for _ in range(angles):
@@ -91,9 +90,7 @@ def sub_block_differences(
     free_q = [i for name in case.joints for i in range(places[name].q.start, places[name].q.stop)]
     free = [i for name in case.joints for i in range(places[name].qd.start, places[name].qd.stop)]
     scale = Entries(robot.tree, q, v)
-    whole, left = (
-        [engines[name] for name in ("tmt", "mujoco")] for engines in (setup.compared(), setup.compared(case))
-    )
+    whole, left = (list(setup.compared(of).values()) for of in (None, case))
     block, rows = np.ix_(range(len(q)), free, free), np.ix_(range(len(q)), free)
     masses = [(a.mass_matrix(q[:, free_q]), b.mass_matrix(q)[block]) for a, b in zip(left, whole)]
     biases = [(a.bias(q[:, free_q], v[:, free]), b.bias(q, v)[rows]) for a, b in zip(left, whole)]

@@ -94,9 +94,8 @@ def add_times(setup: Setup, cases: Sequence[Case], references, floors, rows_of) 
         called = rows_of_scene(case, setup.engines, references[name], floors[name], setup.size, "called")
         failed += [row for row in called if row.get("why_not")]
         called = [row for row in called if not row.get("why_not")]
-        again = [
-            row for row in called if row["seconds"] < timing.TIMED_ENOUGH and not RECORDS[row["engine"]].reads_file
-        ]
+        short = [row for row in called if row["seconds"] < timing.TIMED_ENOUGH]
+        again = [row for row in short if not RECORDS[row["engine"]].reads_file]
         take_times(of_scene + again, its_runs + prepared(again, setup), setup)
         of_scene += called
     return compiled, failed

@@ -30,9 +30,8 @@ def draw_times(result: Result, scene: str, beginning: str = "") -> tuple:
         look = {"color": COLOURS.get(engine, GREY), "marker": marker, "markersize": 4.5, "linewidth": 1.0}
         ax.plot(errors, times, label=f"{LABELS.get(engine, engine)} {method}", **look)
     ax.plot(*drawn(front(good)), "ko", markersize=9, markerfacecolor="none", label="Pareto front")
-    ax.axvline(
-        result.curves["floors"][scene], color=GREY, linestyle=":", label="rounding, or accuracy of the reference"
-    )
+    looks = {"color": GREY, "linestyle": ":", "label": "rounding, or accuracy of the reference"}
+    ax.axvline(result.curves["floors"][scene], **looks)
     ax.set(xscale="log", yscale="log", xlim=(2.0 * COARSE_END, FINE_END / 30), ylabel="time of the run, ms")
     ax.set(xlabel=f"maximum error, {unit} (decreasing)", xticks=[10.0**k for k in range(0, -17, -2)])
     ax.minorticks_off()

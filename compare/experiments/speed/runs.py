@@ -52,9 +52,8 @@ def rows_of_scene(
             try:
                 rows.append(row_of_run(case, engines, method, setting, reference, energy, left))
             except EngineError as failed:
-                rows.append(
-                    {"scene": case.name, "engine": method.engine, "method": method.name, "why_not": str(failed)}
-                )
+                about = {"scene": case.name, "engine": method.engine, "method": method.name}
+                rows.append(about | {"why_not": str(failed)})
                 break
             error, work = accuracy.error(rows[-1]), rows[-1]["evaluations"] or rows[-1]["steps"] or 2 * last + 1
             too_long = method.adaptive and work * estimated(method, case.tree) > MOST_SECONDS[size] / 2
@@ -67,13 +66,7 @@ def rows_of_scene(
 
 
 def row_of_run(
-    case: Case,
-    engines: Mapping[str, Engine],
-    method: Method,
-    setting: Setting,
-    reference: Reference,
-    energy: np.ndarray,
-    left=0.0,
+    case: Case, engines: Mapping, method: Method, setting: Setting, reference: Reference, energy, left=0.0
 ) -> dict:
     """The row of one run.
 

@@ -127,9 +127,8 @@ def halvings(method: Method, case: Case, size: str = "full") -> tuple[Setting, .
     """The scene's own step, halved repeatedly."""
     count = coarsest_steps(case)
     solves = method.engine == "tmt" and method_named(method.name).solves_stages
-    finest = (
-        FINEST_OTHERS if solves else FINEST.get((method.engine, method.name), FINEST.get(method.engine, FINEST_OTHERS))
-    )
+    of_engine = FINEST.get(method.engine, FINEST_OTHERS)
+    finest = FINEST_OTHERS if solves else FINEST.get((method.engine, method.name), of_engine)
     if case.robot.is_read:
         affordable = int(MOST_SECONDS[size] / estimated(method, case.tree))
         finest = max(min(finest, affordable), count << (LEAST_SETTINGS[size] - 1))

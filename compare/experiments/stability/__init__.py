@@ -91,11 +91,8 @@ def rows(setup: Setup) -> Result:
     limits.check_limits(result, [row for part in work["limits"] for row in part])
     check_equilibria(result, setup)
     departure.check_departures(result, [row for part in work["departure"] for row in part])
-    for name, check in (
-        ("torques", claims.check_torques),
-        ("finer", claims.check_finer_steps),
-        ("kept", claims.check_kept),
-    ):
+    checks = {"torques": claims.check_torques, "finer": claims.check_finer_steps, "kept": claims.check_kept}
+    for name, check in checks.items():
         for runs in work[name]:
             check(result, robot, runs)
     for run in work["reset"]:

@@ -30,9 +30,8 @@ def check_equilibria(result: Result, setup: Setup) -> None:
         at = held(robot, name)
         values = at.modes[0]
         grows = [float(v.real) for v in values if v.real > SLOW and v.imag >= 0.0]
-        result.find(
-            "posture", name=name, equilibrium=at.kind, grows=grows, swings=[float(v) for v in values.imag if v > SLOW]
-        )
+        swings = [float(v) for v in values.imag if v > SLOW]
+        result.find("posture", name=name, equilibrium=at.kind, grows=grows, swings=swings)
         for damping, steps in zip(dampings, (usual, usual, (FINE_DAMPED_STEP,))):
             at = held(robot, name, damping)
             for method, dt in product(one_of_each_scheme(mujoco), steps):

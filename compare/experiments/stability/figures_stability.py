@@ -102,9 +102,8 @@ def draw_limits(result: Result, robot: Robot, rows: list[dict]) -> tuple[str, Fi
     values = {"deviation": LINEAR_DEVIATION, "unit": unit_of_movements(robot)}
     values |= {"has_actuators": bool(robot.drive.actuators)}
     first = [row for row in rows if (row["scene"], row["damping"], row["engine"]) == (*panels[0], "tmt")]
-    products = {
-        look(row["method"])[2]: row["predicted_dt_s"] * row["mode_per_s"] for row in first if row["predicted_dt_s"]
-    }
+    finite = [row for row in first if row["predicted_dt_s"]]
+    products = {look(row["method"])[2]: row["predicted_dt_s"] * row["mode_per_s"] for row in finite}
     caption = result.finding("figure_limits", posture=panels[0][0], products=products, **values, **summary(rows))
     return "stability_limits", fig, caption
 

@@ -160,16 +160,15 @@ def check_limits(result: Result, rows: Sequence[dict]) -> None:
     """The table of limits, and a check for each row; `passed` is None where runs do not show the limit."""
     not_shown = []
     for row in rows:
-        seen, tolerance = row.pop("seen"), row.pop("allowed")
+        seen, allowed = row.pop("seen"), row.pop("allowed")
         where = f"{row['scene']}, {who(row)}, damping {row['damping']:g}"
         if seen is None:
             passed = not_shown.append(where)
         elif row["limit"] == "finite":
             off, note = apart(row), "" if seen == "finite" else f"observed: {KINDS[seen]}"
             about = About.PREDICTION
-            passed = result.check(
-                where, "limit, observed / predicted - 1", off, tolerance, "", note, about=about
-            ).passed
+            one = result.check(where, "limit, observed / predicted - 1", off, allowed, "", note, about=about)
+            passed = one.passed
         else:
             quantity = f"runs in which it {KINDS[row['limit']]}, as predicted"
             same = int(seen == row["limit"])

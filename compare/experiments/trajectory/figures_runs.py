@@ -122,13 +122,7 @@ def run_caption(result: Result, case: Case, columns: Sequence[dict], shown: int)
 
 
 def over_time(
-    ax: Axes,
-    t: np.ndarray,
-    ours: np.ndarray,
-    theirs: np.ndarray,
-    case: Case,
-    shown: Sequence[int] | None = None,
-    marks_at_most: int = 64,
+    ax: Axes, t, ours, theirs, case: Case, shown: Sequence[int] | None = None, marks_at_most: int = 64
 ) -> None:
     """Positions or speeds, (times, nv), against time: lines, and marks for MuJoCo. shown: the numbers of those, None: all."""
     every = slice(None, None, max(1, len(t) // marks_at_most))

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from tmt.methods import METHODS
 
@@ -204,14 +203,7 @@ def check_divergence(
 
 
 def check_level(
-    result: Result,
-    where: str,
-    about: dict,
-    coordinates: Coordinates,
-    difference: np.ndarray,
-    tolerance: ArrayLike,
-    times: np.ndarray,
-    ending: dict,
+    result: Result, where: str, about: dict, coordinates: Coordinates, difference, tolerance, times, ending
 ) -> None:
     """A row and a check: the component and recorded state that come closest to their tolerance.
 

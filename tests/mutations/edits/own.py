@@ -4,7 +4,7 @@ from ..edit import Edit
 
 EDITS = (
     # how they are asked
-    Edit("own.equations", "OwnEquations.first", "same(_1, _2)", "True", "a batch that gives something else is taken"),
+    Edit("own.equations", "OwnEquations.first", "functions.same(_1, _2)", "True", "a batch that gives something else is taken"),
     Edit("own.equations", "OwnEquations.called", "[np.array(part) for part in given]", "given", "no copies are handed over"),
     Edit("own.equations", "OwnEquations.values_of", "np.isfinite(computed)", "(computed == computed)",
          "infinite values are accepted"),

@@ -34,20 +34,14 @@ def response_error(at: Posture, integrator: str, reading: Reading, dt: float | N
         return None
     acting, size = acting_at(reading, at), RESPONSE_SIZE / largest
     with np.errstate(over="ignore", invalid="ignore"):
-        there, back = (
-            next(acting.deviations(at.q, at.u, dt, integrator, [steps], jump=sign * size * jump))
-            for sign in (1.0, -1.0)
-        )
+        rest = at.q, at.u, dt, integrator, [steps]
+        there, back = (next(acting.deviations(*rest, jump=by * jump)) for by in (size, -size))
         off = np.abs((there - back)[:, at.kept] / (2.0 * size) - exact)
     if not off.max() <= RESPONSE_MOST * largest:  # or no number
         return None
     units, most = np.array(at.robot.coordinates.units)[at.kept], np.abs(np.vstack([exact, end])).max(axis=0)
-    return float(
-        max(
-            off[:, units == unit].max() / max(most[units == unit].max(), RESPONSE_LEAST * largest)
-            for unit in set(units)
-        )
-    )
+    of_units = [(off[:, units == unit].max(), most[units == unit].max()) for unit in set(units)]
+    return float(max(apart / max(size, RESPONSE_LEAST * largest) for apart, size in of_units))
 
 
 def curve(at: Posture, integrator: str, limit: float | None, reading: Reading) -> list[tuple[float, float]]:
