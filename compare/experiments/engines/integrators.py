@@ -125,8 +125,8 @@ def check_order(result: Result, where: str, method: Method, order: float | None)
 
 def measured_order(steps: Sequence[float], errors: Sequence[float | None], eps: float) -> float | None:
     """The order by which the error falls between the last two of at least four runs with regular errors; None: not settled."""
-    least = [max(CLEAR, EARLY / dt) * eps for dt in steps]
-    regular = [(dt, error) for dt, error, low in zip(steps, errors, least) if error and low < error < REGULAR]
+    known = [(dt, error) for dt, error in zip(steps, errors) if error]
+    regular = [(dt, error) for dt, error in known if max(CLEAR, EARLY / dt) * eps < error < REGULAR]
     orders = [np.log(a[1] / b[1]) / np.log(a[0] / b[0]) for a, b in pairwise(regular)]
     settled = len(orders) > 2 and abs(orders[-1] - orders[-2]) <= ORDER_MARGIN
     return float(orders[-1]) if settled else None
