@@ -139,13 +139,8 @@ def write_table(
     text = block("fleet", "summary", numbers={v: numbers[v] for v in VERDICTS if numbers[v]}, copies=copies,
                  unstable=unstable, left_out=left_out)  # fmt: skip
     summary = [line for line in text.split("\n") if line]
-    origin = {
-        "command": command,
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "commit": commit(),
-        OURS: installed(OURS),
-        "mujoco": installed("mujoco"),
-    }
+    origin = {"command": command, "date": datetime.now(UTC).isoformat(timespec="seconds"), "commit": commit()}
+    origin |= {OURS: installed(OURS), "mujoco": installed("mujoco")}
     page = fleet_page(rows, summary=summary, left_out=left_out, changed=changed, origin=origin)
     write_whole(out / "fleet.csv", files.csv(rows, FLEET_COLUMNS).encode("utf-8", "backslashreplace"))
     write_whole(out / "index.html", page.encode("utf-8", "backslashreplace"))

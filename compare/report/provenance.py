@@ -53,10 +53,9 @@ def commit() -> str | None:
     if not (root / ".git").exists():
         return None
     try:
-        head, changed = [
-            subprocess.run(["git", "-C", root, *words], capture_output=True, check=True).stdout.decode().strip()
-            for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", *PROGRAM_FILES])
-        ]
+        asks = ["rev-parse", "HEAD"], ["status", "--porcelain", "--", *PROGRAM_FILES]
+        ran = [subprocess.run(["git", "-C", root, *words], capture_output=True, check=True) for words in asks]
+        head, changed = (one.stdout.decode().strip() for one in ran)
     except (OSError, ValueError, subprocess.CalledProcessError):
         return None
     return head + (" with uncommitted changes" if changed else "")

@@ -42,10 +42,8 @@ def subjects_of(robot: Robot) -> Subjects:
     at = {name: held(robot, name) for name in posture_names(robot)}
     centres = [name for name in at if at[name].stays and not at[name].without_stiffness.all()]
     saddles = [name for name in at if at[name].kind == "saddle"]
-    centres, saddles = (
-        tuple(sorted(found, key=lambda name: name != robot.kinds.get(kind)))
-        for kind, found in (("centre", centres), ("saddle", saddles))
-    )
+    centres = tuple(sorted(centres, key=lambda name: name != robot.kinds.get("centre")))
+    saddles = tuple(sorted(saddles, key=lambda name: name != robot.kinds.get("saddle")))
     return Subjects(robot, centres[:1], saddles[:1]) if robot.is_read else Subjects(robot, centres, saddles)
 
 

@@ -79,11 +79,8 @@ def words_of_picture(scene: Drawn, k: int) -> tuple[str, str, str]:
     apart = "; ".join(f"{capital(LABELS[name])} has diverged" for name in lost)
     left = [(time, LABELS[name]) for name, time in scene.left.items() if time is not None and time <= scene.t[k]]
     gone = "; ".join(f"{capital(name)} has left at {time:.2f} s" for time, name in sorted(left))
-    return (
-        f"t = {scene.t[k]:.2f} s",
-        apart or f"largest difference of a joint: {scene.apart[k]:.2g} {scene.unit}",
-        gone,
-    )
+    apart = apart or f"largest difference of a joint: {scene.apart[k]:.2g} {scene.unit}"
+    return f"t = {scene.t[k]:.2f} s", apart, gone
 
 
 def draw_sticks(pen: ImageDraw.ImageDraw, points: np.ndarray, links: Sequence[tuple], which: int) -> None:

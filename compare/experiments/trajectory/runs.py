@@ -111,12 +111,8 @@ def compare_runs(
         where = f"{case.name}, {method.name}, {run.step_in_words(case, steps)}"
         until, required = float(times[count - 1]), run.required_time(case, method.scheme, dt)
         about = {"scene": case.name, "engine_integrator": method.name, "twin": method.scheme, "dt_s": dt}
-        ending = {
-            "judged_until_s": until,
-            "required_s": required,
-            "diverged_at_s": ends["mujoco"],
-            "twin_diverged_at_s": ends[name],
-        }
+        ending = {"judged_until_s": until, "required_s": required}
+        ending |= {"diverged_at_s": ends["mujoco"], "twin_diverged_at_s": ends[name]}
         paths = [[path[::every][:count] for path in side] for side in ((mine.q, mine.v), theirs)]
         levels = [("open loop", *paths, mine.width[:count], times[:count])]
         if len(mine.at):
