@@ -4,7 +4,7 @@ An experiment is a module with a record, `EXPERIMENT = Experiment(order=..., ...
 NAME.md.jinja: a macro for its help, title, claim, tolerance, and for each kind of finding and caption. The module has
 
     rows(setup) -> Result                    numbers: tables, checks, findings
-    figures(result, robot)                   yields calls that draw, each returning (file name, figure, caption) (optional)
+    figures(result, robot)                   yields calls that draw: (file name, figure, caption) (optional)
     headline(result) -> Finding | None       its one number on the first screen
     overview(results, robot)                 draws its picture of the first screen (of a record with `overview`)
     claim_values(robot) -> dict              what the macros claim and tolerance take in addition to the robot (optional)

@@ -23,8 +23,8 @@ class Terminal:
 
     def __init__(self):
         self.out, self.err = Stream(sys.stdout), Stream(sys.stderr)
-        consoles = [Console(file=s, force_terminal=s.isatty(), width=80, height=25) for s in (self.out, self.err)]
-        self.lines, self.screen = consoles
+        both = [Console(file=s, force_terminal=s.isatty(), width=80, height=25) for s in (self.out, self.err)]
+        self.lines, self.screen = both
         self.status, self.text, self.how_far = None, "", list
 
     def say(self, text="", style="") -> None:

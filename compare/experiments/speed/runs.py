@@ -105,8 +105,8 @@ def floor(case: Case, dynamics: Dynamics) -> float:
         motion = dynamics.run(*case.start, case.tau, dt, steps, "rk4")
         if np.isfinite(motion.q).all():
             stride = 1 if case.coordinates.nv <= EACH_STEP else GROWTH_STEPS
-            growths = growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_STEPS, stride)
-            return float(EPS * 10.0 ** growths.max() * max(1.0, np.abs(motion.q).max()))
+            grown = growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_STEPS, stride)
+            return float(EPS * 10.0 ** grown.max() * max(1.0, np.abs(motion.q).max()))
     raise ValueError(f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; expected a shorter scene")
 
 

@@ -131,7 +131,7 @@ def compare_runs(
             result.not_judged(where, "open loop", say(result.finding("diverges_at_once")))
         if case.is_free and "own" not in case.scene.tags:
             before = t < ends_first(ends)
-            moved = min(run.deviation_alive(path[before], case.q, coordinates) for path in (mine.q, theirs[0]))
+            moved = min(run.deviation_alive(q[before], case.q, coordinates) for q in (mine.q, theirs[0]))
             run.check_movement(result, where, moved, unit)
         result.curves.setdefault(
             (case.name, method.scheme, steps),
