@@ -51,11 +51,7 @@ def robot(rng, text: str, flags: dict | None) -> tuple[ET.Element, list[str]]:
 def add_tendons(rng, root, joints: list[str], sites: list[str], stiffness: float, damping: float, dead: float) -> None:
     """A fixed tendon across two joints and a rope between two sites, with springs, dead bands and dampers."""
     tendons = ET.SubElement(root, "tendon")
-    given = {
-        "stiffness": numbers(stiffness),
-        "damping": numbers(damping),
-        "springlength": numbers([0.1, 0.1 + dead]),
-    }
+    given = {"stiffness": numbers(stiffness), "damping": numbers(damping), "springlength": numbers([0.1, 0.1 + dead])}
     across, rope = (
         ET.SubElement(tendons, "fixed", name="across", **given),
         ET.SubElement(tendons, "spatial", name="rope"),

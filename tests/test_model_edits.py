@@ -124,12 +124,7 @@ def without_some_joints(setup) -> Result:
 STATES = {
     module.__name__.split(".")[-1]: module.rows for module in (published, kinematics, mass, gravity, acceleration)
 }
-RUNS = {
-    "trajectory": follow,
-    "speed": untimed_speed,
-    "stability": linearise,
-    "reduction": without_some_joints,
-}
+RUNS = {"trajectory": follow, "speed": untimed_speed, "stability": linearise, "reduction": without_some_joints}
 
 
 @pytest.mark.parametrize("experiments", [STATES, pytest.param(RUNS, marks=pytest.mark.slow)], ids=["states", "runs"])
