@@ -66,18 +66,12 @@ def assert_right(symbols, tree, rng, states=100):
         assert (np.abs(found - expected) <= 64 * EPS * getattr(scale, SCALES[name])).all(), name
 
 
-@pytest.mark.parametrize(
-    "make, named",
-    [
-        (lambda rng: tmt.ARM, True),
-        (lambda rng: tmt.ARM, False),
-        (lambda rng: planar(2), True),
-        (lambda rng: cart_pole(0.4), True),
-        (lambda rng: cart_pole(0.4), False),
-        (lambda rng: random_tree(rng, bodies=1), True),
-        (lambda rng: tree_of_kinds(rng, bodies=2, kinds=("hinge", "slide")), False),
-    ],
-)
+@pytest.mark.parametrize("make, named", [
+    (lambda rng: tmt.ARM, True), (lambda rng: tmt.ARM, False), (lambda rng: planar(2), True),
+    (lambda rng: cart_pole(0.4), True), (lambda rng: cart_pole(0.4), False),
+    (lambda rng: random_tree(rng, bodies=1), True),
+    (lambda rng: tree_of_kinds(rng, bodies=2, kinds=("hinge", "slide")), False),
+])  # fmt: skip
 def test_the_numbers_are_those_of_the_tree(make, named, rng):
     tree = make(rng)
     symbols = symbolic(tree, named=named)

@@ -89,16 +89,11 @@ def chain(axes, com=(0.3, 0.1, 0.2), inertia=None, offsets=None):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "given, says",
-    [
-        (([Z], (0, 0, 0.3)), "'h0'"),
-        (([X, Z], (0, 0, 0.3)), "'h1'"),
-        (([Z, Z, Z], (0.3, 0.1, 0.2), np.eye(3)), "'h0', 'h1', 'h2'"),
-        (([Z, -Z],), "'h0', 'h1'"),
-        (([X, Y, Z],), "singular|together"),  # a point about a point has two ways to move
-    ],
-)
+@pytest.mark.parametrize("given, says", [
+    (([Z], (0, 0, 0.3)), "'h0'"), (([X, Z], (0, 0, 0.3)), "'h1'"),
+    (([Z, Z, Z], (0.3, 0.1, 0.2), np.eye(3)), "'h0', 'h1', 'h2'"), (([Z, -Z],), "'h0', 'h1'"),
+    (([X, Y, Z],), "singular|together"),  # a point about a point has two ways to move
+])  # fmt: skip
 def test_a_model_that_is_singular_everywhere_is_refused(given, says):
     with pytest.raises(ValueError, match=says):
         chain(*given)

@@ -101,18 +101,11 @@ def test_what_a_scene_asks_for_depends_on_the_scheme_and_the_step():
     assert [required_time(FREE, "implicit", dt) for dt in (0.0099, 0.0101)] == [5.0, 0.3]
 
 
-@pytest.mark.parametrize(
-    "ours, theirs, width, found",
-    [
-        (None, None, NARROW, []),
-        (0.5, 0.5, NARROW, [True]),
-        (0.5, 0.51, NARROW, [False]),
-        (None, 0.5, NARROW, [False]),
-        (0.5, None, NARROW + 2e-6, []),
-        (0.1, 0.11, AT_ONCE, [False]),
-        (0.12, 0.13, AT_ONCE, []),  # the band opens before the next recorded state
-    ],
-)
+@pytest.mark.parametrize("ours, theirs, width, found", [
+    (None, None, NARROW, []), (0.5, 0.5, NARROW, [True]), (0.5, 0.51, NARROW, [False]),
+    (None, 0.5, NARROW, [False]), (0.5, None, NARROW + 2e-6, []), (0.1, 0.11, AT_ONCE, [False]),
+    (0.12, 0.13, AT_ONCE, []),  # the band opens before the next recorded state
+])  # fmt: skip
 def test_both_diverge_at_the_same_step_while_the_band_is_narrow(ours, theirs, width, found):
     ends = {"tmt": ours, "mujoco": theirs}
     assert [*verdicts(runs.check_divergence, ends, 0.01, 100, width).values()] == found
