@@ -46,9 +46,8 @@ def texts_of(figure, panels, flat) -> list[Text]:
         for axis in (ax.xaxis, ax.yaxis):
             numbers = (label for tick in axis._update_ticks() for label in (tick.label1, tick.label2))
             texts += [axis.label, axis.get_offset_text(), *numbers]
-    return [
-        text for text in dict.fromkeys(texts) if text is not None and text.get_visible() and text.get_text().strip()
-    ]
+    texts = filter(None, dict.fromkeys(texts))
+    return [text for text in texts if text.get_visible() and text.get_text().strip()]
 
 
 def cut(box, page) -> bool:

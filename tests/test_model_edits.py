@@ -10,17 +10,7 @@ from math import pi
 import pytest
 from edited import XML, setup_of, untimed_speed
 
-from compare.experiments import (
-    acceleration,
-    gravity,
-    kinematics,
-    mass,
-    parameters,
-    published,
-    reduction,
-    stability,
-    trajectory,
-)
+from compare.experiments import module, parameters, reduction, stability, trajectory
 from compare.judge.check import Result
 from compare.report.verdict import Section
 from compare.robots.arm import ARM
@@ -42,9 +32,7 @@ NO_FORCE = "kinematics"  # no masses nor forces in positions, speeds and Jacobia
 NO_WEIGHT = "kinematics gravity"  # no inertia in the torque that holds
 NO_MASS = "kinematics mass"  # it is no part of M
 NOT_AT_REST = "kinematics mass published gravity"
-NOT_AT_ZERO = (
-    "kinematics mass gravity published reduction"  # where springs and servos are at rest, or joints are locked
-)
+NOT_AT_ZERO = "kinematics mass gravity published reduction"  # springs and servos are at rest, or joints are locked
 STANDS_STILL = OFF = f"kinematics {MOTION}"  # beside the arm; the file switches the constraint stage off
 MIRROR = MOTION  # M, torques and runs are those of the arm turned about beta the other way
 NO_PLACE = MOTION.replace("acceleration ", "")  # the equations do not depend on where the shoulder is
@@ -121,9 +109,7 @@ def without_some_joints(setup) -> Result:
     return reduction.untimed(replace(setup, robot=replace(setup.robot, scenes=scenes)))[0]
 
 
-STATES = {
-    module.__name__.split(".")[-1]: module.rows for module in (published, kinematics, mass, gravity, acceleration)
-}
+STATES = {name: module(name).rows for name in ("published", "kinematics", "mass", "gravity", "acceleration")}
 RUNS = {"trajectory": follow, "speed": untimed_speed, "stability": linearise, "reduction": without_some_joints}
 
 
@@ -196,10 +182,8 @@ def test_causes_come_by_rank_then_by_size():
 
 
 def test_a_force_that_no_number_explains_is_the_cause():
-    assert set(places(edited(SERVO, ('mass="1.5"', 'mass="1.501"')))) == {
-        "forces of actuators (actuator 0)",
-        "mass of forearm",
-    }
+    both = places(edited(SERVO, ('mass="1.5"', 'mass="1.501"')))
+    assert {*both} == {"forces of actuators (actuator 0)", "mass of forearm"}
     held = "</mujoco>", '<equality><joint joint1="gamma" polycoef="0.3 0 0 0 0"/></equality></mujoco>'
     assert places(edited(held, ('constraint="disable" ', ""))) == ["forces of constraints and contacts"]
 

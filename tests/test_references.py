@@ -80,13 +80,10 @@ def test_bodies_of_a_solution_are_found_on_their_joints(tmp_path):
     reference, robot, mujoco, reading = compared_with(path, path)
     assert (reference.kind, reference.name, reference.renamed) == ("solution", path, ())
     assert mujoco.bodies == list(reading.bodies) and not robot.drive.actuators
-    a, b = (
-        f'<body name="{name}"><inertial pos="0 0 0" mass="{mass}" diaginertia="1 1 1"/></body>'
-        for name, mass in ("a1", "b2")
-    )
-    first, second = (
-        written(tmp_path, XML.replace("</body>", f"{pair}</body>", 1), f"{pair[12:14]}.xml") for pair in (a + b, b + a)
-    )
+    of_body = '<body name="{}{}"><inertial pos="0 0 0" mass="{}" diaginertia="1 1 1"/></body>'
+    a, b = of_body.format("a", 1, 1), of_body.format("b", 2, 2)
+    texts = (XML.replace("</body>", f"{pair}</body>", 1) for pair in (a + b, b + a))
+    first, second = (written(tmp_path, text, f"{k}.xml") for k, text in enumerate(texts))
     engines = [compared_with(first, second).mujoco, compared_with(second, first).mujoco]
     assert [engine.model.body_mass[engine.bodies].tolist()[-2:] for engine in engines] == [[1.0, 2.0], [2.0, 1.0]]
     hand = '<body><inertial pos="0.3 0 0" mass="1" diaginertia="1 1 1"/></body></body>'

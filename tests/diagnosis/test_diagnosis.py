@@ -189,9 +189,8 @@ def test_a_slip_in_one_part_of_M_comes_before_unusual_factors_of_other_terms(add
 
 
 def test_a_wrong_term_of_the_speeds_is_named():
-    (cause,) = told(
-        {}, lambda q, qd: tmt.bias(q, qd, TREE) + 0.2 * np.cos(q[:, :1]) * qd[:, :1] * qd[:, 1:] * [0, 1]
-    ).causes
+    more = lambda q, qd: 0.2 * np.cos(q[:, :1]) * qd[:, :1] * qd[:, 1:] * [0, 1]  # noqa: E731
+    (cause,) = told({}, lambda q, qd: tmt.bias(q, qd, TREE) + more(q, qd)).causes
     assert "h[knee], coefficient of hip' knee'" in cause.place and " 0.2 cos(hip)" in cause.text()
 
 

@@ -26,14 +26,10 @@ def mjcf(content: str = PLAIN, before: str = "", after: str = "") -> str:
 def case_of(tree: tmt.Tree, locked=None, damping=0.0, gravity=True):
     """A case of a Tree, as far as MuJoCo's engine asks it; tree is that without the locked joints."""
     return SimpleNamespace(
-        tree=tree,
-        locked=locked or {},
-        scene=SimpleNamespace(gravity=gravity, damping=damping),
-        controller=None,
-        added_damping=np.full(len(tree.axis), damping),
-        joints=tree.hinge_names,
+        tree=tree, locked=locked or {}, scene=SimpleNamespace(gravity=gravity, damping=damping),
+        controller=None, added_damping=np.full(len(tree.axis), damping), joints=tree.hinge_names,
         coordinates=Coordinates(tree.hinge_names, tree.kind),
-    )
+    )  # fmt: skip
 
 
 def assert_the_same(dynamics, tree, rng, states=3):

@@ -33,17 +33,14 @@ def since(text):
 
 
 REFUSED = {  # actuator, and a word of why it takes no part
-    '<muscle joint="k" lengthrange="0 1"/>': "muscle",
-    '<general joint="k" dyntype="user"/>': "user",
+    '<muscle joint="k" lengthrange="0 1"/>': "muscle", '<general joint="k" dyntype="user"/>': "user",
     '<general joint="k" gaintype="user" biastype="user"/>': "user",
     '<dcmotor joint="k" motorconst="0.1" resistance="1"/>': "DC",
     '<adhesion body="b" ctrlrange="0 1" gain="2"/>': "body",
     '<position joint="k" kp="3" delay="0.02" nsample="3"/>': "delay",
-    '<general joint="k" damping="1 2"/>': "damping",
-    '<general tendon="t" damping="1"/>': "damping",
-    '<pid joint="k" kp="3" ki="1"/>': "pid",
-    '<orientation site="s" refsite="s" kp="1"/>': "so3",
-}
+    '<general joint="k" damping="1 2"/>': "damping", '<general tendon="t" damping="1"/>': "damping",
+    '<pid joint="k" kp="3" ki="1"/>': "pid", '<orientation site="s" refsite="s" kp="1"/>': "so3",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("text", REFUSED)

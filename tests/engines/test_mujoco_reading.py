@@ -166,9 +166,8 @@ def test_what_has_no_name_is_called_by_its_kind_and_number():
 
 
 def test_a_joint_without_a_name_does_not_get_that_of_another():
-    assert (
-        read(mjcf(TWO.replace('name="j"', "").replace('name="k"', 'name="joint 0"'))).tree.hinge_names[1] == "joint 0"
-    )
+    text = mjcf(TWO.replace('name="j"', "").replace('name="k"', 'name="joint 0"'))
+    assert read(text).tree.hinge_names[1] == "joint 0"
 
 
 def test_a_flex_without_elasticity_is_compared(rng):

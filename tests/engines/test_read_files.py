@@ -78,11 +78,8 @@ def test_what_acts_in_drakes_runs(text, tmp_path):
     text = text if "<mujoco>" in text else f"<mujoco>{text}</mujoco>"
     robot = robot_of(tmp_path / "robot.xml", text)
     of, n = Outside("drake").of(robot.case()), robot.coordinates.nv
-    q, v, tau = (
-        robot.coordinates.random(np.random.default_rng(5), 1)[0],
-        np.linspace(-0.5, 0.5, n),
-        np.linspace(0.3, -0.2, n),
-    )
+    q, v = robot.coordinates.random(np.random.default_rng(5), 1)[0], np.linspace(-0.5, 0.5, n)
+    tau = np.linspace(0.3, -0.2, n)
     run, read = of.prepare(q, v, tau, Setting(0.5, 256), "RK5")
     motion, exact = read(run()), tmt.simulate(q, v, tau, 0.5 / 1024, 1024, "dopri8", robot.tree)
     assert np.abs(robot.coordinates.difference(motion.q[-1], exact.q[-1])).max() < 1e-10

@@ -41,10 +41,8 @@ def test_a_random_tree(seed, rng):
 
 def assert_the_same(source, rng, states=5):
     reading = read(source)
-    tree, model = (
-        reading.tree,
-        mujoco.MjModel.from_xml_string(urdf(reading.model).replace("</robot>", f"{COMPILER}</robot>")),
-    )
+    text, tree = urdf(reading.model).replace("</robot>", f"{COMPILER}</robot>"), reading.tree
+    model = mujoco.MjModel.from_xml_string(text)
     model.opt.gravity = tree.gravity
     numbers = [model.joint(name).id for name in tree.hinge_names]
     assert (model.dof_damping[numbers] == tree.damping).all()

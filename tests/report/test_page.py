@@ -122,9 +122,8 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
     """A report of which the questions, a table, a cause and sections cannot be made."""
     asks = replace(ARM, questions=(Question("a", "what", "mass", ("largest", "mass", "Mbar", None)),))
     other = {"quantity": "Mbar", "scene": "zero", "unit": "kg m2", "largest_difference": "far"}
-    sections = [
-        section(name, GOOD, rows=[row]) for name, row in (("mass", other), ("gravity", {"a": 1.5}), ("speed", {}))
-    ]
+    rows = {"mass": other, "gravity": {"a": 1.5}, "speed": {}}
+    sections = [section(name, GOOD, rows=[row]) for name, row in rows.items()]
     report = report_of(folder, sections, [CAUSE | {"found": float("nan")}, CAUSE], robot=asks)
     sections[1].figures = [("nowhere", "A caption.")]
     sections[2].result.rows = 3

@@ -47,17 +47,12 @@ def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
     text = verdict(sections, 10)
     assert all(part in text for part in ("mass, gravity", "2 of 10", "all 3", "0.5 kg m2", " 50 %", "torque"))
     assert "Mbar" not in text and "0.9" not in text
-    assert "Mbar" not in verdict(
-        [section("mass", ("Mbar", 0.0, 1.0, "at most", True))], 10
-    )  # no difference is the largest
+    equal = section("mass", ("Mbar", 0.0, 1.0, "at most", True))
+    assert "Mbar" not in verdict([equal], 10)  # no difference is the largest
 
 
 def test_what_does_not_agree_is_named_with_its_first_cause_and_nothing_else():
-    sections = [
-        section("mass", GOOD, BAD),
-        section("gravity", GOOD),
-        section("diagnosis", BAD),
-    ]  # which says why others fail
+    sections = [section("mass", GOOD, BAD), section("gravity", GOOD), section("diagnosis", BAD)]  # why others fail
     text = verdict(sections, 10, [{"text": f"number {k}"} for k in range(3)])
     assert "3 of 10 experiments" in text and " mass." in text and "gravity" not in text and "diagnosis" not in text
     assert "2 of 4" in text and "number 0; 2 more" in text and "number 2" not in text

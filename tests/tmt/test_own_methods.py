@@ -71,9 +71,7 @@ class Weaker(RungeKutta):
         return [0.5 * a for a in super().slope(tree, q, qd, tau, dt, terms)]
 
 
-@pytest.mark.parametrize(
-    "own, few", [(Longer, 5), (Weaker, 5), (Weaker, 0)]
-)  # speeds, beyond which they are articulated
+@pytest.mark.parametrize("own, few", [(Longer, 5), (Weaker, 5), (Weaker, 0)])  # speeds; with more articulated
 def test_another_step_or_slope_is_taken_and_not_kept(own, few, folder, monkeypatch):
     monkeypatch.setattr(forms, "FEW", few)
     rk4 = METHODS["rk4"]

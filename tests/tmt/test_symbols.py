@@ -192,9 +192,8 @@ def entries_in_page(text) -> dict:
             found[letter, int(i), int(j or 1)] = " ".join(formulas[1:]).split()
         for table in paragraph.iter("mtable"):
             letter = formulas[0][0]
-            found |= {
-                (letter, i, j): tex(cell).split() for i, row in enumerate(table, 1) for j, cell in enumerate(row, 1)
-            }
+            for i, row in enumerate(table, 1):
+                found |= {(letter, i, j): tex(cell).split() for j, cell in enumerate(row, 1)}
     return found
 
 

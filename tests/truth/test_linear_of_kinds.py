@@ -39,12 +39,9 @@ def robot(source):
 
 @pytest.fixture(scope="module")
 def robots():
-    names = {name: robot(PATHS[name]) for name in ("gripper", "pendulum_ball", "free_body", "loop")}
-    return names | {
-        "random": robot(random_tree(3, joints=4)),
-        "pendulum": robot(PENDULUM),
-        "cart": robot(CART.format(0)),
-    }
+    sources = {name: PATHS[name] for name in ("gripper", "pendulum_ball", "free_body", "loop")}
+    sources |= {"random": random_tree(3, joints=4), "pendulum": PENDULUM, "cart": CART.format(0)}
+    return {name: robot(source) for name, source in sources.items()}
 
 
 @pytest.fixture(scope="module")

@@ -76,10 +76,8 @@ def test_methods_are_those_of_the_engines_that_are_there(engines):
 def test_a_step_response_is_followed_from_coarse_steps_on_by_the_schemes_that_it_has(of_gripper):
     stiff = robot_in("arm7").cases[-1]
     assert settings.coarsest_steps(stiff) == 64 < stiff.steps and settings.coarsest_steps(FREE) == FREE.steps
-    of_step, of_free = (
-        {(m.engine, m.name): m.scheme for m in settings.methods(of_gripper, "full", "all", GRIPPER, case)}
-        for case in (STEP, FREE)
-    )
+    of_both = (settings.methods(of_gripper, "full", "all", GRIPPER, case) for case in (STEP, FREE))
+    of_step, of_free = ({(m.engine, m.name): m.scheme for m in methods} for methods in of_both)
     schemes = [of["mujoco", "implicitfast"] for of in (of_step, of_free)]
     assert schemes == ["implicitfast", "semi_implicit_euler"]
     assert ("tmt", "implicitfast") in of_step and ("tmt", "implicitfast") not in of_free

@@ -127,8 +127,7 @@ def test_constraints_of_a_sparse_jacobian_and_a_pickled_model():
 def test_a_robot_of_many_speeds_has_its_servo_limits_alone(quick):
     result = quick(hinge(actuator=STIFF))
     assert result.tables.keys() == {"own_run", "step_limits"} and not result.rows
-    calm = {
-        row["integrator"]: row["full_model_calm"] for row in result.tables["step_limits"] if row["posture"] == "aside"
-    }
+    aside = [row for row in result.tables["step_limits"] if row["posture"] == "aside"]
+    calm = {row["integrator"]: row["full_model_calm"] for row in aside}
     assert calm == dict.fromkeys(INTEGRATORS) | {"Euler": False}
     assert [finding.kind for finding in result.top] == ["own_run", "step", "large"]
