@@ -98,7 +98,9 @@ def test_a_problem_of_a_users_function_is_told_once_by_an_experiment_that_asks_i
 
 
 def test_progress_counts_from_one():
-    clock = SimpleNamespace(ended={"start": 0.1, "mass": 0.5}, under_way="gravity")
+    clock = SimpleNamespace(ended={"start": 0.1, "mass": 0.5}, under_way="")
+    assert experiment.progress(clock, ["mass", "gravity", "speed"]) == []
+    clock.under_way = "gravity"
     assert experiment.progress(clock, ["mass", "gravity", "speed"]) == ["2 of 3", "gravity"]
 
 

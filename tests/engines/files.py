@@ -16,6 +16,9 @@ TWO = PLAIN.replace(
 )
 
 TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/><joint joint="k" coef="2"/></fixed></tendon>'
+URDF = """<robot name="r"><link name="base"/><link name="b"><inertial><origin xyz="0.1 0 0.2" rpy="0.4 -0.3 0.9"/>
+<mass value="1"/><inertia ixx="0.04" ixy="0.003" ixz="0" iyy="0.025" iyz="-0.002" izz="0.02"/></inertial></link>
+<joint name="j" type="continuous"><parent link="base"/><child link="b"/><axis xyz="0 1 0"/></joint></robot>"""
 
 
 def mjcf(content: str = PLAIN, before: str = "", after: str = "") -> str:

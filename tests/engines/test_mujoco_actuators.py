@@ -73,12 +73,6 @@ def test_a_keyframe_states_controls_activations_or_neither(actuators, key, expec
     assert controls.get("home") == expected and "plain" not in controls
 
 
-def test_a_disabled_group_is_off():
-    servos = '<position joint="j" kp="5" group="2"/><position joint="k" kp="5" group="1"/>'
-    drive = drive_of(servos, before='<option actuatorgroupdisable="2"/>')
-    assert [one.acts for one in drive.actuators] == [False, True]
-
-
 def mass_matrix(model):
     data, full = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     mujoco.mj_forward(model, data)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from files import PLAIN, mjcf
+from files import PLAIN, URDF, mjcf
 from models import PATHS
 
 from compare.engines.mujoco import read
@@ -29,9 +29,6 @@ FRAMES = """<frame pos="0.1 0.2 0.3" euler="10 20 30"><body name="b" pos="1 2 3"
 INERTIAL = """<body name="b"><frame pos="0.1 0.2 0.3" euler="10 20 30"><frame pos="0.3 0 0" euler="0 90 0">
 <joint name="j" damping="2" stiffness="3"/>
 <inertial pos="0.2 0 0.1" mass="1" fullinertia="0.02 0.03 0.04 0.001 0.002 0.003"/></frame></frame></body>"""
-URDF = """<robot name="r"><link name="base"/><link name="b"><inertial><origin xyz="0.1 0 0.2" rpy="0.4 -0.3 0.9"/>
-<mass value="1"/><inertia ixx="0.04" ixy="0.003" ixz="0" iyy="0.025" iyz="-0.002" izz="0.02"/></inertial></link>
-<joint name="j" type="continuous"><parent link="base"/><child link="b"/><axis xyz="0 1 0"/></joint></robot>"""
 
 
 SOURCES = [PATHS["mixed"], mjcf(FRAMES, '<compiler eulerseq="zyx"/>'), mjcf(INERTIAL), mjcf(), URDF]

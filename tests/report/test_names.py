@@ -47,14 +47,17 @@ def test_no_text_is_markup_at_any_place():
 
 
 def test_a_report_of_a_robot_with_any_names(tmp_path, capsys):
-    (tmp_path / f"{ATTACK}.xml").write_text(ROBOT.format(*("".join(f"&#{ord(c)};" for c in name) for name in NAMES)))
+    file = tmp_path / f"{ATTACK}\nb.xml"
+    file.write_text(ROBOT.format(*("".join(f"&#{ord(c)};" for c in name) for name in NAMES)))
     with without_workers():
-        assert main(["trajectory", "--quick", f"--mjcf={tmp_path / ATTACK}.xml", f"--out={tmp_path / 'out'}"]) == 0
+        assert main(["trajectory", "--quick", f"--mjcf={file}", f"--out={tmp_path / 'out'}"]) == 0
     page, text = ((tmp_path / "out" / name).read_text(encoding="utf-8") for name in ("index.html", "report.md"))
     for of in (page, MARKDOWN.render(text)):
         assert NAMES[2] in html.unescape(of) and ATTACK in html.unescape(of) and "<img src=x" not in of
         assert not re.search(r'(href|src)="(?!#|data:image/png|tables/|figures/|index.html)', of)
-    assert all(c.isprintable() or c == "\n" for c in page + capsys.readouterr().out)
+    out = capsys.readouterr().out
+    assert all(c.isprintable() or c == "\n" for c in page + out)
+    assert out.startswith("reference: model; ") and f"{ATTACK}\\nb.xml" in out.splitlines()[0]
     assert page.count("<script") == 2 and NAMES[1] in html.unescape(page)
     # nothing is loaded, and of scripts the program's own alone runs
     policy = re.search(r'-Policy" content="([^"]+)"', page)[1]
