@@ -29,10 +29,8 @@ FREE = """<mujoco><worldbody><body name="top"><freejoint name="base"/>
 </body></worldbody></mujoco>"""
 
 
-STL = struct.pack("<80sI", b"", 4) + b"".join(  # a tetrahedron
-    struct.pack("<12fH", 0, 0, 0, *(x for k in face for x in np.eye(4, 3)[k]), 0)
-    for face in ((0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2))
-)
+FACES = (0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)  # of a tetrahedron
+STL = [struct.pack("<12fH", 0, 0, 0, *np.eye(4, 3)[list(face)].ravel(), 0) for face in FACES]
 MESHES = """<mujoco><compiler meshdir="parts"/><asset><mesh name="m" file="m.stl"/></asset><worldbody>
 <geom type="mesh" mesh="m"/><body><joint name="j" axis="0 1 0"/><geom type="mesh" mesh="m"/><body pos="0 0 1">
 <joint axis="1 0 0"/>
@@ -50,7 +48,7 @@ def test_a_urdf_and_files_with_an_include_and_with_meshes(engine, name, text, tm
     """A body whose mass is a mesh's has the inertia that MuJoCo has computed."""
     (tmp_path / "part.xml").write_text(PART)
     (tmp_path / "parts").mkdir()
-    (tmp_path / "parts" / "m.stl").write_bytes(STL)
+    (tmp_path / "parts" / "m.stl").write_bytes(struct.pack("<80sI", b"", 4) + b"".join(STL))
     robot = robot_of(tmp_path / name, text)
     of, rng = Outside(engine).of(robot.case()), np.random.default_rng(4)
     q = robot.coordinates.random(rng, 3)

@@ -111,12 +111,9 @@ def test_the_difference_closest_to_its_tolerance(difference, tolerance, place):
 
 def test_a_scale_of_each_entry_may_be_the_same_for_all_states_or_bodies():
     differences = np.arange(12.0).reshape(2, 3, 2)
-    for scale, found, of in (
-        (np.array([[[1.0, 4.0]]]), [4.0, 10.0], [1.0, 1.0]),
-        (np.broadcast_to([1.0, 4.0], (5, 3, 2)), [4.0, 10.0], [1.0, 1.0]),
-        (np.array([2.0, 3.0, 9.0]), [5.0, 11.0], [2.0, 3.0]),
-    ):
-        assert [a.tolist() for a in worst_of_each(differences, scale)] == [found, of]
+    for scale in ([[[1.0, 4.0]]], np.broadcast_to([1.0, 4.0], (5, 3, 2))):
+        assert np.array_equal(worst_of_each(differences, np.array(scale)), [[4.0, 10.0], [1.0, 1.0]])
+    assert np.array_equal(worst_of_each(differences, np.array([2.0, 3.0, 9.0])), [[5.0, 11.0], [2.0, 3.0]])
 
 
 def test_every_component_of_a_state_is_compared():

@@ -63,12 +63,10 @@ def test_the_verdict_a_line_for_each_experiment_and_the_pictures_come_before_all
 
 
 def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_shows_it(folder):
-    sections = [
-        with_figures(section("mass", GOOD), "mass_distances"),
-        with_figures(section("acceleration", GOOD), f"{OVERVIEW}agreement"),
-        with_figures(section("trajectory", GOOD, BAD), f"{OVERVIEW}scenes"),
-        section("speed"),
-    ]
+    checks = {"mass": [GOOD], "acceleration": [GOOD], "trajectory": [GOOD, BAD], "speed": []}
+    sections = [section(name, *of) for name, of in checks.items()]
+    for of, figure in zip(sections, ("mass_distances", f"{OVERVIEW}agreement", f"{OVERVIEW}scenes")):
+        with_figures(of, figure)
     top, rest = page_of(folder, sections, causes=[CAUSE])
     assert re.search(r"<td>mass of forearm</td><td>1\.5</td><td>1\.6</td>", top)
     assert 'class="verdict bad"' in top and '<main id="main" class="bad">' in top

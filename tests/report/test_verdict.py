@@ -40,11 +40,8 @@ def test_one_failing_check_among_many_fails_the_verdict(place):
 
 
 def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
-    sections = [
-        section("mass", ("Mbar", 0.25, 1.0, "at most", True), ("printed", 0.9, 1.0, "at most", False)),
-        section("gravity", ("torque", 0.5, 1.0, "at most", True)),
-    ]
-    text = verdict(sections, 10)
+    mass = section("mass", ("Mbar", 0.25, 1.0, "at most", True), ("printed", 0.9, 1.0, "at most", False))
+    text = verdict([mass, section("gravity", ("torque", 0.5, 1.0, "at most", True))], 10)
     assert all(part in text for part in ("mass, gravity", "2 of 10", "all 3", "0.5 kg m2", " 50 %", "torque"))
     assert "Mbar" not in text and "0.9" not in text
     equal = section("mass", ("Mbar", 0.0, 1.0, "at most", True))
@@ -220,11 +217,8 @@ def marks(experiment, result, robot=ARM):
 
 
 def test_the_agreement_is_the_largest_of_all_rows_of_a_quantity_and_its_picture_says_whose_distance_is_whose():
-    rows = [
-        OF_BIAS | {"mujoco_from_exact_eps": None},
-        OF_BIAS | {"difference_eps": 7.0, "tmt_from_exact_eps": None, "mujoco_from_exact_eps": None},
-        OF_BIAS | {"quantity": "other", "difference_eps": 9.0},
-    ]
+    near, far = {"mujoco_from_exact_eps": None}, {"difference_eps": 7.0, "tmt_from_exact_eps": None}
+    rows = [OF_BIAS | near, OF_BIAS | near | far, OF_BIAS | {"quantity": "other", "difference_eps": 9.0}]
     (found,) = figures_overview.agreements({"mass": Result("mass", rows=rows)})
     assert found | {"name": ""} == {"name": "", "apart": 7.0, "ours": 1.0, "theirs": None, "passed": True}
     _, _, caption = figures_overview.draw_agreement({"mass": Result("mass", rows=rows)})

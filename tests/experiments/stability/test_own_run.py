@@ -81,10 +81,9 @@ def result_of(source, **more):
 
 
 def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step(quick):
-    failed = {
-        step: [check.quantity for check in quick(hinge('damping="2"', "RK4", key=""), step=step).checks if check.failed]
-        for step in (None, (1e-4, "RK4"), (0.005, "Euler"), (0.004, "RK4"))
-    }
+    failed, source = {}, hinge('damping="2"', "RK4", key="")
+    for step in (None, (1e-4, "RK4"), (0.005, "Euler"), (0.004, "RK4")):
+        failed[step] = [check.quantity for check in quick(source, step=step).checks if check.failed]
     assert failed[None] == failed[1e-4, "RK4"] == failed[0.005, "Euler"] == [own_run.AT_OWN]
     assert failed[0.004, "RK4"] == [own_run.AT_OWN, own_run.AT_REQUESTED]
 

@@ -27,12 +27,11 @@ CHECKS = (
 )  # fmt: skip
 # module, function, the two that are compared, as written in the call of `agree`
 AGREEMENTS = (
-    ("gravity", "rows", '"holding torque, springs too"'),
-    ("gravity", "rows", '"yours: gravity - bias at rest"'),
+    ("gravity", "rows", '"holding torque, springs too"'), ("gravity", "rows", '"yours: gravity - bias at rest"'),
     ("acceleration", "rows", 'f"tau from MuJoCo\'s qdd by {_1}"'),
     ("acceleration", "rows", 'f"tau from {_1} qdd by mj_inverse"'),
     ("acceleration", "rows", 'f"dE/dt - {work} at {_1} qdd"'),
-)
+)  # fmt: skip
 EDITS = (
     *(
         Edit(module, where, f"result.check(_3, {quantity}, _4, _5, *_6)", f"result.check(_3, {quantity}, _5, _5, *_6)",
