@@ -13,10 +13,7 @@ FILES = sorted((ROOT / "compare").rglob("*.py"))
 OF_TMT = sorted((ROOT / "tmt").rglob("*.py"))
 PAGE = ROOT / "ARCHITECTURE.md"
 DIAGRAM = re.compile(r"(?<=```mermaid\n).*?(?=```)", re.DOTALL)
-SHARED = {
-    "compare.report.text",
-    "compare.report.style",
-}  # for all of compare: words from templates, the style of figures
+SHARED = {"compare.report.text", "compare.report.style"}  # for all: words from templates, the style of figures
 
 
 def dotted(path) -> str:

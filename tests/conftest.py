@@ -48,12 +48,9 @@ def pytest_runtest_teardown(item):
 
 
 def pytest_terminal_summary(terminalreporter):
-    seconds = {
-        report.nodeid: dict(report.user_properties).get("processor_s", 0.0)
-        for reports in terminalreporter.stats.values()
-        for report in reports
-        if getattr(report, "when", "") == "teardown"
-    }
+    every = (report for reports in terminalreporter.stats.values() for report in reports)
+    ended = [report for report in every if getattr(report, "when", "") == "teardown"]
+    seconds = {report.nodeid: dict(report.user_properties).get("processor_s", 0.0) for report in ended}
     folders = defaultdict(float)
     for name, of_test in seconds.items():
         parts = Path(name.split("::")[0]).parts

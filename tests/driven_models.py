@@ -22,17 +22,15 @@ def laws(rng) -> dict[str, tuple[str, dict]]:
     bias = {"biastype": "affine", "biasprm": numbers([rng.uniform(-1, 1), rng.uniform(-9, 1), rng.uniform(-1, 1)])}
     affine = {"gaintype": "affine", "gainprm": numbers([rng.uniform(1, 5), *rng.uniform(-3, 3, 2)])} | bias
     return {
-        "motor": ("motor", {}),
-        "position": ("position", {"kp": some(5, 50), "kv": some(0, 5)}),
+        "motor": ("motor", {}), "position": ("position", {"kp": some(5, 50), "kv": some(0, 5)}),
         "velocity": ("velocity", {"kv": some(0, 5)}),
         "damper": ("damper", {"kv": some(0, 5), "ctrlrange": "0 2"}),
-        "general": ("general", {"gainprm": some(1, 5)} | bias),
-        "affine": ("general", affine),
+        "general": ("general", {"gainprm": some(1, 5)} | bias), "affine": ("general", affine),
         "intvelocity": ("intvelocity", {"kp": some(5, 50), "kv": some(0, 2), "actrange": "-3 3"}),
         "cylinder": ("cylinder", {"area": some(0.5, 2), "timeconst": some(0.1, 1), "bias": some(-1, 1, 3)}),
         "filter": ("general", affine | {"dyntype": "filter", "dynprm": some(0.01, 0.1)}),
         "filterexact": ("general", affine | {"dyntype": "filterexact", "dynprm": some(0.01, 0.1)}),
-    }
+    }  # fmt: skip
 
 
 def robot(rng, text: str, flags: dict | None) -> tuple[ET.Element, list[str]]:
@@ -51,16 +49,9 @@ def robot(rng, text: str, flags: dict | None) -> tuple[ET.Element, list[str]]:
 def add_tendons(rng, root, joints: list[str], sites: list[str], stiffness: float, damping: float, dead: float) -> None:
     """A fixed tendon across two joints and a rope between two sites, with springs, dead bands and dampers."""
     tendons = ET.SubElement(root, "tendon")
-    given = {
-        "stiffness": numbers(stiffness),
-        "damping": numbers(damping),
-        "springlength": numbers([0.1, 0.1 + dead]),
-    }
-    across, rope = (
-        ET.SubElement(tendons, "fixed", name="across", **given),
-        ET.SubElement(tendons, "spatial", name="rope"),
-    )
-    rope.attrib.update(given)
+    given = {"stiffness": numbers(stiffness), "damping": numbers(damping), "springlength": numbers([0.1, 0.1 + dead])}
+    across = ET.SubElement(tendons, "fixed", name="across", **given)
+    rope = ET.SubElement(tendons, "spatial", name="rope", **given)
     for joint in rng.choice(joints, 2, replace=False):
         ET.SubElement(across, "joint", joint=str(joint), coef=numbers(rng.normal()))
     for site in rng.choice(sites, 2, replace=False):

@@ -40,9 +40,8 @@ def of_crane():
         robot = crane(folder)
         setup = experiment.Setup.small(robot, experiment.engines(load(robot.mjcf, robot.tree)))
         reasons = {name: say(reason) for name in EXPERIMENTS if (reason := skipped(name, robot))}
-        sections, causes, _ = experiment.examine(
-            [n for n in EXPERIMENTS if n not in reasons], setup, folder, lines, InProcess()
-        )
+        names = [name for name in EXPERIMENTS if name not in reasons]
+        sections, causes, _ = experiment.examine(names, setup, folder, lines, InProcess())
         words = verdict.verdict(sections, len(EXPERIMENTS), causes)
         report = verdict.Report(sections, robot, {"command": "c"}, words, causes, list(reasons.items()))
         files.write(folder, report)

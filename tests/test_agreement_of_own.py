@@ -60,9 +60,8 @@ def test_values_as_arrays_at_the_given_states(given):
     states, values = given
     compare.assert_agrees(PENDULUM, **values, **states)
     assert all(one.ratio <= 1.0 and one.cause == "" for one in compare.differences(PENDULUM, **values, **states))
-    compare.assert_agrees(
-        PENDULUM, mass_matrix=values["mass_matrix"].tolist(), bias=bias, q=states["q"].tolist(), qd=0.0
-    )
+    M, q = values["mass_matrix"].tolist(), states["q"].tolist()
+    compare.assert_agrees(PENDULUM, mass_matrix=M, bias=bias, q=q, qd=0.0)
     first = {name: part[0] for name, part in states.items()}
     compare.assert_agrees(PENDULUM, **{name: value[0] for name, value in values.items()}, **first)  # without a batch
     column = {"mass_matrix": values["mass_matrix"][..., None], "bias": values["bias"][..., None].astype(object)}
@@ -124,9 +123,7 @@ def advised(mjcf=PENDULUM, **brought):
 
 
 @pytest.mark.parametrize("height, share, is_rounded", [(0, 0.98e-6, True), (0, 1.02e-6, False), (20, 1e-3, False)])
-def test_constants_rounded_to_six_digits_get_an_rtol_however_far_from_the_origin(
-    height, share, is_rounded, monkeypatch
-):
+def test_constants_rounded_to_six_digits_get_an_rtol_however_far_away(height, share, is_rounded, monkeypatch):
     """Far away the terms of each entry are large, and a slip is small compared with them."""
     monkeypatch.setattr("compare.agreement.why.SECONDS_OF_CAUSE", 0.0)
     aloft = PENDULUM.replace("<worldbody>", f'<worldbody><body pos="0 0 {height}">')
@@ -150,9 +147,8 @@ def test_no_rtol_is_advised_beside_a_cause_or_another_rtol_or_without_numbers(gi
 @pytest.mark.parametrize("share, agrees", [(0.99, True), (1.01, False), (1e12, False)])
 def test_a_structural_zero_has_the_scale_of_its_diagonal(share, agrees):
     """Of two rods side by side, sqrt(M00 M11) by terms; where it is no zero, its cause is sought."""
-    of_rod = (
-        '<body><joint name="{}" axis="0 1 0"/><inertial pos="0 0 -0.5" mass="{}" diaginertia="0.1 0.1 0.1"/></body>'
-    )
+    inertial = '<inertial pos="0 0 -0.5" mass="{}" diaginertia="0.1 0.1 0.1"/>'
+    of_rod = f'<body><joint name="{{}}" axis="0 1 0"/>{inertial}</body>'
     rods = f"<mujoco><worldbody>{of_rod.format('left', 1)}{of_rod.format('right', 2)}</worldbody></mujoco>"
     scale = Entries(read(rods).tree, np.zeros((1, 2))).mass_matrix[0]
     between = share * FACTOR * EPS * np.sqrt(scale[0, 0] * scale[1, 1])

@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Text
 
 from compare.experiments import EXPERIMENTS, module
-from compare.report import style
 from compare.robots.arm import ARM
 
 SLACK = 1.0  # pixels
@@ -46,9 +44,8 @@ def texts_of(figure, panels, flat) -> list[Text]:
         for axis in (ax.xaxis, ax.yaxis):
             numbers = (label for tick in axis._update_ticks() for label in (tick.label1, tick.label2))
             texts += [axis.label, axis.get_offset_text(), *numbers]
-    return [
-        text for text in dict.fromkeys(texts) if text is not None and text.get_visible() and text.get_text().strip()
-    ]
+    texts = filter(None, dict.fromkeys(texts))
+    return [text for text in texts if text.get_visible() and text.get_text().strip()]
 
 
 def cut(box, page) -> bool:
@@ -80,20 +77,3 @@ def test_no_figure_of_a_run_is_cut_or_covered(small):
     drawn = [call() for name in EXPERIMENTS for call in module(name).figures(small(name), ARM)]
     found = {name: flaws(figure) for name, figure, _ in drawn if hasattr(figure, "axes")}
     assert len(found) > 20 and {name: of for name, of in found.items() if of} == {}
-
-
-def test_what_is_wrong_with_a_figure_is_seen():
-    figure = Figure(figsize=(style.WIDTH, 3.0), layout="constrained")
-    ax = figure.subplots()
-    for mark in "osv^":
-        ax.plot([0, 1], [0, 1], mark, label=mark)
-    ax.set(title="a title", xlabel="time, s")
-    figure.legend(loc="outside upper center", ncols=4)
-    assert flaws(figure) == []
-    ax.set_title("so long a title in small print that it does not stand above the panel " * 3, fontsize=6.5)
-    ax.set_ylim(-1e-9, 1e-9)
-    ax.text(0.5, 0.0, "one name")
-    ax.text(0.5, 0.0, "another name")
-    ax.legend(loc="center left")
-    found = {flaw.partition(":")[0] for flaw in flaws(figure)}
-    assert found == {"cut", "too small", "on each other", "a legend on data", "a factor at the end of an axis"}

@@ -86,9 +86,8 @@ def copy(tmp_path_factory):
 def output(root, *arguments):
     """The output of a command in the copy; it must succeed."""
     environment = os.environ | {"PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
-    run = subprocess.run(
-        [sys.executable, "-m", "compare", *arguments], cwd=root, env=environment, capture_output=True, text=True
-    )
+    command = [sys.executable, "-m", "compare", *arguments]
+    run = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True)
     assert run.returncode == 0, run.stdout + run.stderr
     return run.stdout
 

@@ -113,15 +113,8 @@ def test_a_command_line_that_is_shown_runs(inside, line, tmp_path, monkeypatch, 
     text = ARM.mjcf.read_text(encoding="utf-8")
     for folder in ("models", "class", "submissions"):
         Path(folder).mkdir()
-    for name in (
-        "robot.urdf",
-        "my_arm.xml",
-        "my_robot.xml",
-        "solution.xml",
-        "models/a.xml",
-        "class/a.xml",
-        "submissions/a.xml",
-    ):
+    robots = ["robot.urdf", *(f"{name}.xml" for name in ("my_arm", "my_robot", "solution"))]
+    for name in (*robots, "models/a.xml", "class/a.xml", "submissions/a.xml"):
         Path(name).write_text(text, encoding="utf-8")
     Path("submissions/b.xml").write_text(text.replace('mass="1.5"', 'mass="1.6"'), encoding="utf-8")
     words = shlex.split(line.replace("/tmp/mass", "mass"))

@@ -65,10 +65,8 @@ def test_right_equations_agree_in_whatever_form(folder, asked, joints):
 
 
 def test_the_tree_of_another_robot_agrees(folder):
-    text = (
-        "from models import PATHS\nfrom compare.engines.mujoco import read\ntree = read(PATHS['pendulum_ball']).tree\n"
-    )
-    (folder / "trees.py").write_text(text)
+    text = "from models import PATHS\nfrom compare.engines.mujoco import read\n"
+    (folder / "trees.py").write_text(f"{text}tree = read(PATHS['pendulum_ball']).tree\n")
     run = examined(folder, "trees.py:tree", ["kinematics", *STATIC], PATHS["pendulum_ball"])
     assert not run.failed and {row["quantity"] for row in run.sections[0].result.rows} == {"x_b", "T_b", "B_b"}
 

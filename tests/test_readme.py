@@ -49,9 +49,8 @@ def test_its_figures_are_those_of_the_example():
     assert results["provenance"]["command"].endswith("-m compare all --out reports/example") and results["passed"]
     rows = [row for row in table("stability") if row["predicted_dt_s"] and row["observed_dt_s"]]
     off = [float(row["observed_dt_s"]) / float(row["predicted_dt_s"]) - 1.0 for row in rows]
-    worst = re.search(
-        r"rounding tolerance(?:: | is .*?, )(\d+ %)", (EXAMPLE / "report.md").read_text(encoding="utf-8")
-    )[1]
+    text = (EXAMPLE / "report.md").read_text(encoding="utf-8")
+    worst = re.search(r"rounding tolerance(?:: | is .*?, )(\d+ %)", text)[1]
     of_free = {"engine_integrator": "RK4", "dt_s": "0.078125", "unit": "rad", "level": "open loop"}
     free = [row for row in table("trajectory") if row["scene"].endswith(", free")]
     followed = {"engine": "mujoco", "method": "RK4", "dt_s": "0.078125", "scene": "ball catch, free"}
@@ -65,10 +64,8 @@ def test_its_figures_are_those_of_the_example():
     ):  # fmt: skip
         assert figure in text, figure
     rows = [row for row in table("evaluations") if row["quantity"] == "forward_dynamics"]
-    mujoco, compiled = (
-        min(float(row["ns_per_state"]) for row in rows if row["implementation"] == name)
-        for name in ("MuJoCo, mj_forward", "compiled")
-    )
+    asked = ([row for row in rows if row["implementation"] == name] for name in ("MuJoCo, mj_forward", "compiled"))
+    mujoco, compiled = (min(float(row["ns_per_state"]) for row in of) for of in asked)
     assert f"is {mujoco / compiled:.0f} times as fast as mj_forward per evaluation" in README
     shown = [(row, f"| {row['scene']}: {float(row['target_rad']):.0e} rad |") for row in table("what_should_i_use")]
     shown = [f"{said} {cheapest(row)} |" for row, said in shown if said in README]

@@ -69,9 +69,7 @@ def test_both_engines_start_every_scene_alike(name):
 @pytest.mark.parametrize("before, shift, free, floating", [
     (-1, 0.0, [1], True), (0, 0.0, [1], False), (-1, 0.1, [], False),
 ])  # fmt: skip
-def test_three_slides_and_a_ball_in_one_place_are_free_and_float_where_nothing_carries_them(
-    before, shift, free, floating
-):
+def test_three_slides_and_a_ball_in_one_place_are_free_and_float_if_not_carried(before, shift, free, floating):
     tree = tmt.Tree(
         [*"hxyzb"], (-1, before, 1, 2, 3), [(0, 0, 0)] * 2 + [(shift, 0, 0)] + [(0, 0, 0)] * 2,
         [(0, 1, 0), *np.eye(3), *np.eye(3)],

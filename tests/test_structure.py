@@ -9,39 +9,26 @@ from architecture import FILES, OF_TMT, ROOT, dotted, imports, modules_imported
 
 # what each part of compare may import of the others; of its own part: anything that makes no circle
 DIRECTIONS = {
-    "": "agreement",
-    "agreement": "tmt diagnosis engines judge robots",
-    "robots": "tmt judge",
-    "judge": "tmt robots",
-    "engines": "tmt robots judge process",
-    "truth": "tmt robots",
-    "diagnosis": "tmt robots judge",
-    "report": "judge process engines experiments",
+    "": "agreement", "agreement": "tmt diagnosis engines judge robots", "robots": "tmt judge",
+    "judge": "tmt robots", "engines": "tmt robots judge process", "truth": "tmt robots",
+    "diagnosis": "tmt robots judge", "report": "judge process engines experiments",
     "experiments": "tmt robots engines truth judge diagnosis",
-    "run": "tmt robots engines judge process report experiments",
-    "cli": "experiments process report",
+    "run": "tmt robots engines judge process report experiments", "cli": "experiments process report",
     "fleet": "tmt robots engines judge process report experiments run cli",
     "export": "tmt robots engines judge process report experiments run cli",
     "__main__": "tmt robots engines judge process report experiments run cli fleet export",
-}
+}  # fmt: skip
 # the modules, or beginnings of their names, that may import a library
 LIBRARIES = {
     "mujoco": ("compare.engines.mujoco", "compare.engines.mjx", "compare.export.checks"),
-    "mujoco_warp": ("compare.engines.warp",),
-    "warp": ("compare.engines.newton", "compare.engines.warp"),
-    "jax": ("compare.engines.mjx",),
-    "heyoka": ("compare.engines.heyoka",),
-    "dartpy": ("compare.engines.dart",),
-    "pybullet": ("compare.engines.pybullet",),
-    "newton": ("compare.engines.newton",),
-    "pinocchio": ("compare.engines.pinocchio",),
-    "pydrake": ("compare.engines.drake",),
-    "pandas": ("compare.report",),
-    "matplotlib": ("compare.report.style",),
-    "PIL": ("compare.report.images",),
-    "distributed": ("compare.fleet.executors",),
-    "rich": ("compare.report.terminal",),
-}
+    "mujoco_warp": ("compare.engines.warp",), "warp": ("compare.engines.newton", "compare.engines.warp"),
+    "jax": ("compare.engines.mjx",), "heyoka": ("compare.engines.heyoka",),
+    "dartpy": ("compare.engines.dart",), "pybullet": ("compare.engines.pybullet",),
+    "newton": ("compare.engines.newton",), "pinocchio": ("compare.engines.pinocchio",),
+    "pydrake": ("compare.engines.drake",), "pandas": ("compare.report",),
+    "matplotlib": ("compare.report.style",), "PIL": ("compare.report.images",),
+    "distributed": ("compare.fleet.executors",), "rich": ("compare.report.terminal",),
+}  # fmt: skip
 DRAWING = ("matplotlib", "PIL")  # for modules whose name begins with figures, too
 
 
@@ -74,9 +61,8 @@ def test_imports_keep_their_directions():
             is_style = path.stem.startswith("figures") and name == "compare.report.style"
             assert part(name) in allowed or is_style or name == "compare.report.text", said
             shared = tuple(f"compare.experiments.{name}" for name in ("figures", "quantities", "setup"))
-            assert (
-                not name.startswith("compare.experiments.") or name.startswith(shared) or name.split(".")[:3] == own
-            ), said
+            is_free = name.startswith(shared) or name.split(".")[:3] == own
+            assert is_free or not name.startswith("compare.experiments."), said
         assert "tmt" not in libraries(path) or "tmt" in allowed, path
         for library in libraries(path) & LIBRARIES.keys():
             drawn = library in DRAWING and path.stem.startswith("figures")

@@ -31,18 +31,12 @@ def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free"), most=
     n, nv = len(parent), len(axis)
     rest = [x for name in kind for x in (unit_quaternion(rng) if name == "ball" else [rng.uniform(-0.5, 0.5)])]
     return Tree(
-        hinge_names=[f"{name}{i}" for i, name in enumerate(kind)],
-        parent=parent,
-        offset=offset,
-        axis=axis,
-        damping=rng.uniform(0.0, 0.5, nv),
-        **random_bodies(rng, body_hinge, inertias),
-        kind=kind,
+        hinge_names=[f"{name}{i}" for i, name in enumerate(kind)], parent=parent, offset=offset, axis=axis,
+        damping=rng.uniform(0.0, 0.5, nv), **random_bodies(rng, body_hinge, inertias), kind=kind, rest=rest,
         armature=rng.uniform(0.0, 0.1, nv) * rng.integers(0, 2, nv),
         stiffness=rng.uniform(0.0, 3.0, n) * rng.integers(0, 2, n),
-        rest=rest,
         reference=[0.0 if name == "ball" else rng.uniform(-0.5, 0.5) for name in kind],
-    )
+    )  # fmt: skip
 
 
 def random_tree(rng, bodies=4, damping=0.0) -> Tree:

@@ -177,14 +177,11 @@ def test_a_wrong_term_is_named(changes, names, numbers):
     assert -1 not in at and at == sorted(at)
 
 
-@pytest.mark.parametrize(
-    "added, factor, places",
-    [
-        (-2.0, -1.0, {"mass of lower * (offset of knee)^2 in M[hip][hip]"}),
-        (np.cos(KNEE), 2.0, {"mass of lower * offset of knee * CoM of lower in M[hip][hip]"}),
-        (-0.1, 0.0, {"B' I B of lower in M[hip][hip]", "B' I B of upper in M[hip][hip]"}),
-    ],
-)
+@pytest.mark.parametrize("added, factor, places", [
+    (-2.0, -1.0, {"mass of lower * (offset of knee)^2 in M[hip][hip]"}),
+    (np.cos(KNEE), 2.0, {"mass of lower * offset of knee * CoM of lower in M[hip][hip]"}),
+    (-0.1, 0.0, {"B' I B of lower in M[hip][hip]", "B' I B of upper in M[hip][hip]"}),
+])  # fmt: skip
 def test_a_slip_in_one_part_of_M_comes_before_unusual_factors_of_other_terms(added, factor, places):
     causes = told({M00: added}).causes
     assert places <= {cause.place for cause in causes}
@@ -192,9 +189,8 @@ def test_a_slip_in_one_part_of_M_comes_before_unusual_factors_of_other_terms(add
 
 
 def test_a_wrong_term_of_the_speeds_is_named():
-    (cause,) = told(
-        {}, lambda q, qd: tmt.bias(q, qd, TREE) + 0.2 * np.cos(q[:, :1]) * qd[:, :1] * qd[:, 1:] * [0, 1]
-    ).causes
+    more = lambda q, qd: 0.2 * np.cos(q[:, :1]) * qd[:, :1] * qd[:, 1:] * [0, 1]  # noqa: E731
+    (cause,) = told({}, lambda q, qd: tmt.bias(q, qd, TREE) + more(q, qd)).causes
     assert "h[knee], coefficient of hip' knee'" in cause.place and " 0.2 cos(hip)" in cause.text()
 
 

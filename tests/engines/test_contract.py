@@ -22,12 +22,11 @@ from tmt.exact.values import distance, exact
 ENGINES = (Tmt, Mujoco, Scipy, Heyoka)
 METHODS = [method for engine in (Tmt(), Mujoco, Scipy, Heyoka) for method in engine.methods.values()]
 CASES = {
-    "as it is": ARM.case(),
-    "damped, weightless": ARM.case("floating", damping=0.4, gravity=False),
+    "as it is": ARM.case(), "damped, weightless": ARM.case("floating", damping=0.4, gravity=False),
     "one joint locked": ARM.case("stiff", posture="bent", locked=("beta",), damping=0.1),
     # whose hinges and bodies stand in another order in the file
     "crane": Case(Robot("crane", None, TREE, {}, ()), Scene("damped", (0, 0, 0, 0), damping=0.2)),
-}
+}  # fmt: skip
 DURATION = 0.5  # s
 # every method follows the case as it is; the others, which take time to compile, are followed by one of each engine
 FIRST = [next(method for method in METHODS if method.engine == engine.name) for engine in ENGINES]
@@ -65,8 +64,7 @@ def test_quantities_are_those_of_50_digits(engine, name, engines, rng):
     with_torque = force + np.abs(tau).max(axis=1) + max(tree.damping) * np.abs(v).max(axis=1)
     kinetic = scale.mass_scale(tree, q) * speed**2
     scales = {  # by the method: its arguments, and the scale of each field of the truth that it gives
-        "mass_matrix": ((q,), {"mass_matrix": scale.mass_scale(tree, q)}),
-        "bias": ((q, v), {"bias": force}),
+        "mass_matrix": ((q,), {"mass_matrix": scale.mass_scale(tree, q)}), "bias": ((q, v), {"bias": force}),
         "acceleration": ((q, v, tau), {"acceleration": scale.acceleration_scale(tree, q, with_torque)}),
         "com_positions": ((q,), {"com_positions": reach}),
         "angular_velocities": ((q, v), {"angular_velocities": speed}),
@@ -75,7 +73,7 @@ def test_quantities_are_those_of_50_digits(engine, name, engines, rng):
         "gravity_balance": ((q,), {"gravity_balance": weight}),
         "potential_energy": ((q,), {"potential_energy": weight}),
         "energy": ((q, v), {"energy": weight + kinetic}),
-    }
+    }  # fmt: skip
     for name, (arguments, fields) in scales.items():
         function = getattr(dynamics, name)
         found = function(*arguments)
@@ -87,9 +85,8 @@ def test_quantities_are_those_of_50_digits(engine, name, engines, rng):
             assert np.array_equal(function(*(x[None] for x in arguments)), found[None])
     if hasattr(dynamics, "inverse"):
         back = dynamics.inverse(q, v, dynamics.acceleration(q, v, tau))
-        assert (
-            np.abs(back - tau).max(axis=1) <= FACTOR * EPS * np.linalg.cond(tmt.mass_matrix(q, tree)) * with_torque
-        ).all()
+        allowed = FACTOR * EPS * np.linalg.cond(tmt.mass_matrix(q, tree)) * with_torque
+        assert (np.abs(back - tau).max(axis=1) <= allowed).all()
         assert not any(np.abs(force).max() for force in dynamics.other_forces(q, v).values())
 
 

@@ -33,17 +33,14 @@ def since(text):
 
 
 REFUSED = {  # actuator, and a word of why it takes no part
-    '<muscle joint="k" lengthrange="0 1"/>': "muscle",
-    '<general joint="k" dyntype="user"/>': "user",
+    '<muscle joint="k" lengthrange="0 1"/>': "muscle", '<general joint="k" dyntype="user"/>': "user",
     '<general joint="k" gaintype="user" biastype="user"/>': "user",
     '<dcmotor joint="k" motorconst="0.1" resistance="1"/>': "DC",
     '<adhesion body="b" ctrlrange="0 1" gain="2"/>': "body",
     '<position joint="k" kp="3" delay="0.02" nsample="3"/>': "delay",
-    '<general joint="k" damping="1 2"/>': "damping",
-    '<general tendon="t" damping="1"/>': "damping",
-    '<pid joint="k" kp="3" ki="1"/>': "pid",
-    '<orientation site="s" refsite="s" kp="1"/>': "so3",
-}
+    '<general joint="k" damping="1 2"/>': "damping", '<general tendon="t" damping="1"/>': "damping",
+    '<pid joint="k" kp="3" ki="1"/>': "pid", '<orientation site="s" refsite="s" kp="1"/>': "so3",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("text", REFUSED)
@@ -74,12 +71,6 @@ KEPT = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntyp
 def test_a_keyframe_states_controls_activations_or_neither(actuators, key, expected):
     controls = drive_of(actuators, keys=KEYS.format(key)).controls
     assert controls.get("home") == expected and "plain" not in controls
-
-
-def test_a_disabled_group_is_off():
-    servos = '<position joint="j" kp="5" group="2"/><position joint="k" kp="5" group="1"/>'
-    drive = drive_of(servos, before='<option actuatorgroupdisable="2"/>')
-    assert [one.acts for one in drive.actuators] == [False, True]
 
 
 def mass_matrix(model):

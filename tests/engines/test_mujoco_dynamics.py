@@ -18,10 +18,8 @@ REST = np.zeros(3)
 def test_a_diverged_run_is_not_reset_where_the_file_allows_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert XML.count(' autoreset="disable"') == 1
-    lenient, strict = (
-        parse(text, tmt.ARM).of(ARM.case()).run(REST, np.full(3, 1e3), REST, 10.0, 200, "RK4")
-        for text in (XML.replace(' autoreset="disable"', ""), XML)
-    )
+    both = (parse(text, tmt.ARM).of(ARM.case()) for text in (XML.replace(' autoreset="disable"', ""), XML))
+    lenient, strict = (of.run(REST, np.full(3, 1e3), REST, 10.0, 200, "RK4") for of in both)
     assert not np.isfinite(lenient.q[-1]).any() and np.array_equal(lenient.q, strict.q, equal_nan=True)
     assert lenient.ended == strict.ended and list(tmp_path.iterdir()) == []
 

@@ -15,6 +15,7 @@ from compare.engines.mujoco.source import compiled_without, editable, without_vi
 from compare.robots.arm import ARM
 
 JOINTS = 'name="gamma" type="hinge"'
+NUMBERS = ("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "dof_M0", "jnt_axis")
 PIXELS = 3000  # of a texture's edges: 27 MB
 STATED = '<inertial pos="0.1 0.2 0.3" mass="7" diaginertia="1 1.1 1.2"/>'
 SHAPE = '<geom type="capsule" size="0.1 0.2" pos="0.1 0.02 0.3"/>'
@@ -89,16 +90,7 @@ def test_what_is_taken_out_changes_no_number_of_the_motion(compiler, option):
     complete.compiler.fusestatic = False
     whole = complete.compile()
     for lighter in (without_visuals(spec()).compile(), compiled_without(without_visuals(spec()), {}, bare=True)):
-        for name in (
-            "body_mass",
-            "body_inertia",
-            "body_pos",
-            "body_quat",
-            "body_ipos",
-            "body_iquat",
-            "dof_M0",
-            "jnt_axis",
-        ):
+        for name in NUMBERS:
             assert np.array_equal(getattr(whole, name), getattr(lighter, name)), name
 
 

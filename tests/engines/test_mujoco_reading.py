@@ -5,7 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from files import PLAIN, TENDON, TWO, assert_the_same, case_of, mjcf
+from files import PLAIN, TENDON, TWO, URDF, assert_the_same, case_of, mjcf
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from models import KINDS, PATHS, gymnasium_files, random_tree
@@ -15,13 +15,6 @@ from compare.engines.mujoco import ModelError, engine, read
 from compare.engines.mujoco.inventory import REASONS
 from compare.engines.mujoco.parameters import stated_numbers
 
-URDF = """<robot name="two"><link name="base"/>
-<link name="upper"><inertial><origin xyz="0.1 0 -0.5"/><mass value="2"/>
-<inertia ixx="0.3" iyy="0.2" izz="0.2" ixy="0.01" ixz="0" iyz="0"/></inertial></link>
-<link name="tip"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="hip" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
-<joint name="rail" type="prismatic"><parent link="upper"/><child link="tip"/><origin xyz="0 0 -1" rpy="0.3 0 0"/>
-<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="10" velocity="10"/></joint></robot>"""
 FEW = ("ant.xml", "humanoid.xml", "reacher.xml", "swimmer.xml")
 PUBLISHED = [pytest.param(path, marks=[pytest.mark.slow] * (path.name not in FEW)) for path in gymnasium_files()]
 
@@ -65,7 +58,7 @@ def test_a_random_tree_is_the_same_in_both(seed, kinds, joints):
     compared(random_tree(seed, kinds, joints), np.random.default_rng(seed))
 
 
-@pytest.mark.parametrize("source", [PATHS["mixed"], random_tree(0)], ids=["mixed", "random"])
+@pytest.mark.parametrize("source", [PATHS["mixed"], random_tree(0), URDF], ids=["mixed", "random", "URDF"])
 def test_a_file_is_the_same_in_both_and_a_change_of_the_case_reaches_mujoco(source, rng):
     reading = compared(source, rng)
     tree = replace(reading.tree, gravity=(0.0,) * 3, damping=np.add(reading.tree.damping, 0.4))
@@ -76,12 +69,6 @@ def test_a_point_mass_that_is_fixed_to_a_body_counts(rng):
     point = '<body name="point" pos="0.5 0 0"><inertial pos="0 0 0.1" mass="2" diaginertia="0 0 0"/></body>'
     reading = compared(mjcf(PLAIN.replace("</body>", f"{point}</body>")), rng)
     assert reading.tree.body_names == ("b", "point") and reading.tree.mass[1] == 2.0
-
-
-def test_a_urdf_is_the_same_in_both(tmp_path, rng):
-    (tmp_path / "robot.urdf").write_text(URDF)
-    reading = compared(tmp_path / "robot.urdf", rng)
-    assert reading.tree.hinge_names == ("hip", "rail") and reading.tree.kind == ("hinge", "slide")
 
 
 @pytest.mark.parametrize("path", PUBLISHED, ids=lambda path: path.name)
@@ -166,9 +153,8 @@ def test_what_has_no_name_is_called_by_its_kind_and_number():
 
 
 def test_a_joint_without_a_name_does_not_get_that_of_another():
-    assert (
-        read(mjcf(TWO.replace('name="j"', "").replace('name="k"', 'name="joint 0"'))).tree.hinge_names[1] == "joint 0"
-    )
+    text = mjcf(TWO.replace('name="j"', "").replace('name="k"', 'name="joint 0"'))
+    assert read(text).tree.hinge_names[1] == "joint 0"
 
 
 def test_a_flex_without_elasticity_is_compared(rng):

@@ -13,19 +13,15 @@ BALL = '<body><joint type="ball" name="w"/><geom size="0.1"/><body><joint name="
 REFUSED = {  # a word of why, and the file
     "tendon 't'": mjcf(TWO, after=TENDON.format('armature="1"')),
     "actuator 'a'": mjcf(TWO, after=TENDON.format("") + ALONG),
-    "flex 'soft'": mjcf(
-        PLAIN + '<flexcomp name="soft" type="grid" count="2 2 2" spacing=".1 .1 .1" dim="3" mass="1">'
-        '<elasticity young="1e3"/></flexcomp>'
-    ),
+    "flex 'soft'": mjcf(PLAIN + '<flexcomp name="soft" type="grid" count="2 2 2" spacing=".1 .1 .1" dim="3" mass="1">'
+                         '<elasticity young="1e3"/></flexcomp>'),
     "mass": mjcf("<body><joint/></body>"),
     "pos of 'far' is inf;": mjcf('<body name="far" pos="inf 0 0"><geom size="1"/></body>' + PLAIN),
     "damping of 'j' is -1;": mjcf(PLAIN.replace('name="j"', 'name="j" damping="-1"')),
     "gainprm of 's'": mjcf(after='<actuator><position name="s" joint="j" kp="nan"/></actuator>'),
-    "together": mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")),
-    "'w x'": mjcf(BALL),
-    "MJCF": "hello",
-    "1,002 speeds": mjcf("<body><freejoint/><geom size='1'/></body>" * 167),
-}
+    "together": mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")), "'w x'": mjcf(BALL),
+    "MJCF": "hello", "1,002 speeds": mjcf("<body><freejoint/><geom size='1'/></body>" * 167),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("why", REFUSED)

@@ -29,10 +29,8 @@ FREE = """<mujoco><worldbody><body name="top"><freejoint name="base"/>
 </body></worldbody></mujoco>"""
 
 
-STL = struct.pack("<80sI", b"", 4) + b"".join(  # a tetrahedron
-    struct.pack("<12fH", 0, 0, 0, *(x for k in face for x in np.eye(4, 3)[k]), 0)
-    for face in ((0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2))
-)
+FACES = (0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)  # of a tetrahedron
+STL = [struct.pack("<12fH", 0, 0, 0, *np.eye(4, 3)[list(face)].ravel(), 0) for face in FACES]
 MESHES = """<mujoco><compiler meshdir="parts"/><asset><mesh name="m" file="m.stl"/></asset><worldbody>
 <geom type="mesh" mesh="m"/><body><joint name="j" axis="0 1 0"/><geom type="mesh" mesh="m"/><body pos="0 0 1">
 <joint axis="1 0 0"/>
@@ -50,7 +48,7 @@ def test_a_urdf_and_files_with_an_include_and_with_meshes(engine, name, text, tm
     """A body whose mass is a mesh's has the inertia that MuJoCo has computed."""
     (tmp_path / "part.xml").write_text(PART)
     (tmp_path / "parts").mkdir()
-    (tmp_path / "parts" / "m.stl").write_bytes(STL)
+    (tmp_path / "parts" / "m.stl").write_bytes(struct.pack("<80sI", b"", 4) + b"".join(STL))
     robot = robot_of(tmp_path / name, text)
     of, rng = Outside(engine).of(robot.case()), np.random.default_rng(4)
     q = robot.coordinates.random(rng, 3)
@@ -78,11 +76,8 @@ def test_what_acts_in_drakes_runs(text, tmp_path):
     text = text if "<mujoco>" in text else f"<mujoco>{text}</mujoco>"
     robot = robot_of(tmp_path / "robot.xml", text)
     of, n = Outside("drake").of(robot.case()), robot.coordinates.nv
-    q, v, tau = (
-        robot.coordinates.random(np.random.default_rng(5), 1)[0],
-        np.linspace(-0.5, 0.5, n),
-        np.linspace(0.3, -0.2, n),
-    )
+    q, v = robot.coordinates.random(np.random.default_rng(5), 1)[0], np.linspace(-0.5, 0.5, n)
+    tau = np.linspace(0.3, -0.2, n)
     run, read = of.prepare(q, v, tau, Setting(0.5, 256), "RK5")
     motion, exact = read(run()), tmt.simulate(q, v, tau, 0.5 / 1024, 1024, "dopri8", robot.tree)
     assert np.abs(robot.coordinates.difference(motion.q[-1], exact.q[-1])).max() < 1e-10

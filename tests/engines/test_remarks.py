@@ -53,10 +53,8 @@ def test_a_base_is_free_if_a_joint_frees_it_else_it_is_said_to_be_fixed(base, ki
 ])  # fmt: skip
 def test_a_mesh_of_a_package_is_found_above_the_file_or_beside_it_else_one_line_says_where_to(folder, place, tmp_path):
     file = tmp_path / folder / "r.urdf"
-    for path, text in (
-        (file, urdf("base", mesh=MESH.format("package://robot/meshes/a.obj"))),
-        (tmp_path / place, TETRAHEDRON),
-    ):
+    robot = urdf("base", mesh=MESH.format("package://robot/meshes/a.obj"))
+    for path, text in ((file, robot), (tmp_path / place, TETRAHEDRON)):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
     if place != "a.obj":

@@ -41,10 +41,8 @@ def test_a_random_tree(seed, rng):
 
 def assert_the_same(source, rng, states=5):
     reading = read(source)
-    tree, model = (
-        reading.tree,
-        mujoco.MjModel.from_xml_string(urdf(reading.model).replace("</robot>", f"{COMPILER}</robot>")),
-    )
+    text, tree = urdf(reading.model).replace("</robot>", f"{COMPILER}</robot>"), reading.tree
+    model = mujoco.MjModel.from_xml_string(text)
     model.opt.gravity = tree.gravity
     numbers = [model.joint(name).id for name in tree.hinge_names]
     assert (model.dof_damping[numbers] == tree.damping).all()
@@ -66,9 +64,7 @@ def assert_the_same(source, rng, states=5):
         assert (error <= FACTOR * EPS * scales.bias[state]).all()
 
 
-@pytest.mark.parametrize(
-    "name, why", [("quadruped", "root' is of type free"), ("pendulum_ball", "upper' is of type ball")]
-)
+@pytest.mark.parametrize("name, why", [("quadruped", "root' is of type free"), ("pendulum_ball", "r' is of type ball")])
 def test_what_a_urdf_cannot_say_is_refused(name, why):
     with pytest.raises(ValueError, match=why):
         urdf(PATHS[name])

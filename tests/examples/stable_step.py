@@ -26,9 +26,8 @@ status = subprocess.run([sys.executable, "-m", "compare", *words], stdout=subpro
 results = json.loads(Path("report/results.json").read_text(encoding="utf-8"))
 for check in results["checks"]:
     if check["quantity"] == "stable at its own step":
-        print(
-            f"step of the file, {check['value']} s: {'stable' if check['passed'] else 'not stable'} (status {status})"
-        )
+        answer = "stable" if check["passed"] else "not stable"
+        print(f"step of the file, {check['value']} s: {answer} (status {status})")
 with open("report/tables/step_limits.csv", encoding="utf-8", newline="") as file:
     for row in csv.DictReader(file):
         limit = f"{float(row['predicted_dt_s']):.4f} s, {row['limiting_joint']}" if row["predicted_dt_s"] else "none"

@@ -14,20 +14,15 @@ from compare.run.examine import Setup
 from tmt import literal
 
 OF_MUJOCO = [  # the experiment, what is off (of a pair which), the checks of both engines that fail
-    (kinematics, "com_positions", {}, {"x_b"}),
-    (kinematics, "angular_velocities", {}, {"omega_b"}),
-    (kinematics, "jacobians", {"place": 0}, {"T_b"}),
-    (kinematics, "jacobians", {"place": 1}, {"B_b"}),
+    (kinematics, "com_positions", {}, {"x_b"}), (kinematics, "angular_velocities", {}, {"omega_b"}),
+    (kinematics, "jacobians", {"place": 0}, {"T_b"}), (kinematics, "jacobians", {"place": 1}, {"B_b"}),
     (kinematics, "convective_terms", {"place": 0}, {"v_conv"}),
-    (kinematics, "convective_terms", {"place": 1}, {"w_conv"}),
-    (mass, "mass_matrix", {}, {"Mbar"}),
-    (gravity, "gravity_balance", {}, {"holding torque"}),
-    (acceleration, "bias", {}, {"bias"}),
+    (kinematics, "convective_terms", {"place": 1}, {"w_conv"}), (mass, "mass_matrix", {}, {"Mbar"}),
+    (gravity, "gravity_balance", {}, {"holding torque"}), (acceleration, "bias", {}, {"bias"}),
     (acceleration, "acceleration", {}, {"qdd", "tau from MuJoCo's qdd by TMT", "dE/dt - tau.qd at MuJoCo's qdd"}),
     (acceleration, "inverse", {}, {"tau from TMT's qdd by mj_inverse"}),
-    (acceleration, "energy", {}, {"energy"}),
-    (acceleration, "potential_energy", {}, {"potential energy"}),
-]
+    (acceleration, "energy", {}, {"energy"}), (acceleration, "potential_energy", {}, {"potential energy"}),
+]  # fmt: skip
 COMPILED = {  # what each function gives, by the name of its check
     kinematics: {"com_positions": ["x_b"], "angular_velocities": ["omega_b"], "jacobians": ["T_b", "B_b"],
                  "convective_terms": ["v_conv", "w_conv"]},
@@ -77,15 +72,10 @@ def test_a_joint_whose_accelerations_are_all_smaller_than_their_tolerance_is_not
     sizes, robot = [np.array([[3.0, 0.5, 0.0]]), np.array([[2.0, np.nan, 0.0], [0.0, 1.0, 0.0]])], setup.robot
     for least, judged in ((0.999, True), (1.001, False)):
         scales = [np.array([[4.0, 2.0, 1.0]]), np.array([[2.999, 3.0, 1.0], [9.0, least, 1.0]])]
-        comparisons = [
-            SimpleNamespace(
-                robot=robot,
-                values=lambda name, size=size: [size, -size, None],
-                acceleration_scale=scale / (64 * 2.0**-52),
-            )
-            for size, scale in zip(sizes, scales)
-        ]
-        result = Result("acceleration")
+        result, comparisons = Result("acceleration"), []
+        for size, scale in zip(sizes, scales):
+            of = {"robot": robot, "values": lambda name, size=size: [size, -size, None]}
+            comparisons.append(SimpleNamespace(acceleration_scale=scale / (64 * 2.0**-52), **of))
         check_wide(result, comparisons)
         assert [("beta" in check.note, check.judged) for check in result.checks] == [(True, False)] * (not judged)
 

@@ -15,15 +15,13 @@ from compare.report.text import say
 MODULES = (kinematics, mass, gravity, acceleration)
 BODY = '<inertial pos="0.1 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/></body></worldbody></mujoco>'
 ROBOTS = {
-    "a random tree": random_tree(3, joints=4),
-    "springs without gravity": CART.replace("0 0 -9.81", "0 0 0"),
+    "a random tree": random_tree(3, joints=4), "springs without gravity": CART.replace("0 0 -9.81", "0 0 0"),
     "far from the origin": STONE.replace('pos="0.4 -0.3 1.2"', 'pos="1000 2000 10"'),
     "nothing acts at rest": f'<mujoco><option gravity="0 0 0"/><worldbody><body><joint axis="0 0 1"/>{BODY}',
-    "slides alone": '<mujoco><worldbody><body><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 1"/>'
-    + BODY,
+    "slides alone": '<mujoco><worldbody><body><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 1"/>' + BODY,
     "a ball with a spring": f'<mujoco><worldbody><body><joint type="ball" stiffness="3"/>{BODY}',
     "a slide after a ball": f'<mujoco><worldbody><body><joint type="ball"/><joint type="slide" axis="1 0 0"/>{BODY}',
-}
+}  # fmt: skip
 
 
 SEEDED = {  # an error in a file: the checks that must fail
@@ -72,22 +70,17 @@ def test_units_are_those_of_the_joints_and_the_tolerance_of_springs_is_of_the_su
     held = [check for check in gravity.rows(setup).checks if check.quantity == "holding torque, springs too"]
     of = Entries(setup.robot.tree, setup.random.q)
     assert len(held) == 2 * setup.robot.tree.has_springs
-    assert all(
-        np.isclose(check.tolerance, FACTOR * EPS * (of.weight + of.springs), atol=0.0).any() for check in held[1:]
-    )
+    sums = FACTOR * EPS * (of.weight + of.springs)
+    assert all(np.isclose(check.tolerance, sums, atol=0.0).any() for check in held[1:])
 
 
 @pytest.mark.parametrize("text, old, new, expected", SEEDED.values(), ids=SEEDED)
 def test_an_error_of_a_number_fails_the_checks_that_depend_on_it(text, old, new, expected):
     assert text.count(old) == 1
     setup = setup_between(text, text.replace(old, new), states=10)
-    failed = [
-        f"{each.__name__.split('.')[-1]} {check.quantity}"
-        for each in MODULES
-        if any(each.__name__.endswith(name.split()[0]) for name in expected)
-        for check in each.rows(setup).checks
-        if not check.passed
-    ]
+    modules = {each.__name__.split(".")[-1]: each for each in MODULES}
+    results = {name: modules[name].rows(setup) for name in {name.split()[0] for name in expected}}
+    failed = [f"{name} {check.quantity}" for name, of in results.items() for check in of.checks if check.failed]
     assert all(any(name.startswith(named) for name in failed) for named in expected)
 
 

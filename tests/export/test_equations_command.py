@@ -205,10 +205,9 @@ def test_a_wrong_request_gets_one_line_and_status_2(words, why, tmp_path, monkey
     assert status == 2 and why in error and error.count("\n") == 1 and not (tmp_path / "new").exists()
 
 
-@pytest.mark.parametrize(
-    ("stem", "name"),
-    [("arm", "arm"), ("my robot-2", "my_robot_2"), ("2dof", "robot_2dof"), ("ü", "robot"), ("for", "robot_for")],
-)
+@pytest.mark.parametrize(("stem", "name"), [
+    ("arm", "arm"), ("my robot-2", "my_robot_2"), ("2dof", "robot_2dof"), ("ü", "robot"), ("for", "robot_for"),
+])  # fmt: skip
 def test_the_name_of_a_file_becomes_an_identifier(stem, name):
     assert identifier(stem) == name
 

@@ -154,10 +154,8 @@ def test_the_key_ctrl_c(temporary, tmp_path):
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGKILL"])
 def test_a_signal_and_the_same_command_again(temporary, tmp_path, name):
     def cached():
-        paths = (tmp_path / "out" / "files").rglob(".fleet")
-        return {
-            path: path.stat().st_mtime_ns for path in paths if path.parent.suffix != ".part"
-        }  # not yet in its place
+        paths = (tmp_path / "out" / "files").rglob(".fleet")  # a part is not yet in its place
+        return {path: path.stat().st_mtime_ns for path in paths if path.parent.suffix != ".part"}
 
     run = runs.started(*runs.command(*WORDS), cwd=tmp_path)
     assert soon(cached)

@@ -10,23 +10,9 @@ from urllib.parse import unquote
 
 import pytest
 
+from compare.fleet import table
 from compare.fleet.models import place_of_report
-from compare.fleet.table import (
-    AGREE,
-    BROKE,
-    DIFFER,
-    FLEET_COLUMNS,
-    ITSELF,
-    NOT_JUDGED,
-    REFUSED,
-    UNCONFIRMED,
-    changes,
-    earlier,
-    fleet_page,
-    order,
-    row_of_file,
-    write_table,
-)
+from compare.fleet.table import AGREE, BROKE, DIFFER, FLEET_COLUMNS, ITSELF, NOT_JUDGED, REFUSED, UNCONFIRMED
 from compare.judge.check import AT_OWN_STEP, ENDS, About, Result
 from compare.report import files
 from compare.report.verdict import Section
@@ -53,7 +39,7 @@ def row_of(*checks, limits=(), runs=(), causes=(), lost=(), reference=("arm",)):
         result.check("home", quantity, value, tolerance, "s", note, about == About.MODELS, rule, about)
     kind, *renamed = reference
     section = Section("stability", "", "", "", result)
-    return row_of_file([section], causes, lost, Reference(kind, "a.xml", renamed=tuple(renamed)))
+    return table.row_of_file([section], causes, lost, Reference(kind, "a.xml", renamed=tuple(renamed)))
 
 
 @pytest.mark.parametrize("verdict, checks, more, named", [
@@ -109,7 +95,7 @@ def test_what_needs_a_look_comes_first():
     ]  # fmt: skip
     rows = [dict(zip(("verdict", "stable_at_file_dt", "worst_ratio", "file"), row)) for row in right]
     for seed in range(20):
-        assert sorted(random.Random(seed).sample(rows, len(rows)), key=order) == rows
+        assert sorted(random.Random(seed).sample(rows, len(rows)), key=table.order) == rows
 
 
 # what has changed since an earlier fleet
@@ -132,14 +118,14 @@ ROW = {
 ])  # fmt: skip
 def test_a_verdict_a_step_or_a_limit_that_is_another_is_told(before, now, named, tmp_path):
     (tmp_path / "fleet.csv").write_text(files.csv([ROW | before], FLEET_COLUMNS), encoding="utf-8")
-    found = changes(earlier(tmp_path), [ROW | now])
+    found = table.changes(table.earlier(tmp_path), [ROW | now])
     places = [" ".join(found).index(name) for name in named or ()]
     assert bool(found) == bool(named) and places == sorted(places)
 
 
 def page_of(rows, **more):
     given = {"summary": [], "left_out": (), "changed": None, "origin": {}}
-    return fleet_page(rows=rows, **given | more)
+    return table.fleet_page(rows=rows, **given | more)
 
 
 def test_every_name_leads_to_its_report():
@@ -174,7 +160,7 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
     rows = [ROW, ROW | {"file": "b.xml", "verdict": DIFFER}, ROW | {"file": "c.xml", "stable_at_file_dt": False},
             ROW | {"file": "d.xml", "same_as": "c.xml", "verdict": REFUSED}]  # fmt: skip
     run = SimpleNamespace(rows=rows, verdicts=Counter(row["verdict"] for row in rows))
-    summary = write_table(tmp_path, run, [("early.xml", "because")], None, "the command")
+    summary = table.write_table(tmp_path, run, [("early.xml", "because")], None, "the command")
     assert all(part in summary[0] for part in ("4 files", "1 copy", "1 was refused"))
     with (tmp_path / "fleet.csv").open(newline="") as file:
         found = list(csv.DictReader(file))

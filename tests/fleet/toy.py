@@ -39,15 +39,12 @@ def soon(question):
 
 # function, arguments, its value, words of the reason why there is none
 FAULTS = {
-    "hangs": (time.sleep, (600,), None, "5 s"),
-    "raises": (divmod, (1, 0), None, "ZeroDivisionError"),
-    "exits": (os._exit, (3,), None, "status 3"),
-    "crashes": (os.abort, (), None, "SIGABRT"),
+    "hangs": (time.sleep, (600,), None, "5 s"), "raises": (divmod, (1, 0), None, "ZeroDivisionError"),
+    "exits": (os._exit, (3,), None, "status 3"), "crashes": (os.abort, (), None, "SIGABRT"),
     "reads elsewhere": (signal.raise_signal, (signal.SIGSEGV,), None, "SIGSEGV"),
-    "eats": (bytearray, (4 * 10**12,), None, "out of memory"),
-    "prints": (print, ("no answer",), None, ""),
+    "eats": (bytearray, (4 * 10**12,), None, "out of memory"), "prints": (print, ("no answer",), None, ""),
     "returns": (abs, (-4,), 4, ""),
-}
+}  # fmt: skip
 
 
 def check_all(executor):
@@ -56,6 +53,5 @@ def check_all(executor):
     for name, future in futures.items():
         future.exception()  # wait
         value, why = executor.outcome(future)
-        assert value == FAULTS[name][2] and FAULTS[name][3] in why and bool(FAULTS[name][3]) == bool(why), (
-            f"{name}: {why}"
-        )
+        *_, expected, words = FAULTS[name]
+        assert value == expected and words in why and bool(words) == bool(why), f"{name}: {why}"

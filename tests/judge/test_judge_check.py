@@ -25,15 +25,10 @@ def agreed(ours, theirs, scale, exact=None):
     return result.checks, result.rows[0]
 
 
-@pytest.mark.parametrize(
-    "rule, inside, outside",
-    [
-        ("at most", (1.0, -9.0), 1.0 + 1e-15),
-        ("at least", (1.0, 9.0), 1.0 - 1e-15),
-        ("equal", (1.0, 1.0), 1.0 - 1e-15),
-        ("equal", (1.0, 1.0), 1.0 + 1e-15),
-    ],
-)
+@pytest.mark.parametrize("rule, inside, outside", [
+    ("at most", (1.0, -9.0), 1.0 + 1e-15), ("at least", (1.0, 9.0), 1.0 - 1e-15),
+    ("equal", (1.0, 1.0), 1.0 - 1e-15), ("equal", (1.0, 1.0), 1.0 + 1e-15),
+])  # fmt: skip
 def test_a_check_passes_within_its_tolerance_only(rule, inside, outside):
     for passes, values in ((True, inside), (False, (outside,)), (False, (None, np.nan, np.inf, -np.inf))):
         for value in values:
@@ -104,27 +99,21 @@ def test_the_distance_of_each_engine_from_the_exact_value_is_checked(eps, passes
     assert row["tmt_from_exact_eps"] is None and row["exact_states"] == 0
 
 
-@pytest.mark.parametrize(
-    "difference, tolerance, place",
-    [
-        ([1.0, 3.0, -2.0], [1.0, 6.0, 1.0], 2),  # the largest share, of whatever sign, not the largest difference
-        ([1.0, np.nan, 9.0], 1.0, 1),  # no number comes before all
-        ([5.0, 0.0, 1e-300], [1.0, 0.0, 0.0], 2),  # so does a difference where none is allowed
-        ([0.5, 0.0], [1.0, 0.0], 0),
-    ],
-)
+@pytest.mark.parametrize("difference, tolerance, place", [
+    ([1.0, 3.0, -2.0], [1.0, 6.0, 1.0], 2),  # the largest share, of whatever sign, not the largest difference
+    ([1.0, np.nan, 9.0], 1.0, 1),  # no number comes before all
+    ([5.0, 0.0, 1e-300], [1.0, 0.0, 0.0], 2),  # so does a difference where none is allowed
+    ([0.5, 0.0], [1.0, 0.0], 0),
+])  # fmt: skip
 def test_the_difference_closest_to_its_tolerance(difference, tolerance, place):
     assert closest(np.array(difference), np.array(tolerance)) == (place,)
 
 
 def test_a_scale_of_each_entry_may_be_the_same_for_all_states_or_bodies():
     differences = np.arange(12.0).reshape(2, 3, 2)
-    for scale, found, of in (
-        (np.array([[[1.0, 4.0]]]), [4.0, 10.0], [1.0, 1.0]),
-        (np.broadcast_to([1.0, 4.0], (5, 3, 2)), [4.0, 10.0], [1.0, 1.0]),
-        (np.array([2.0, 3.0, 9.0]), [5.0, 11.0], [2.0, 3.0]),
-    ):
-        assert [a.tolist() for a in worst_of_each(differences, scale)] == [found, of]
+    for scale in ([[[1.0, 4.0]]], np.broadcast_to([1.0, 4.0], (5, 3, 2))):
+        assert np.array_equal(worst_of_each(differences, np.array(scale)), [[4.0, 10.0], [1.0, 1.0]])
+    assert np.array_equal(worst_of_each(differences, np.array([2.0, 3.0, 9.0])), [[5.0, 11.0], [2.0, 3.0]])
 
 
 def test_every_component_of_a_state_is_compared():

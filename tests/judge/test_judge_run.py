@@ -63,14 +63,11 @@ def alone(kind, **more) -> tmt.Tree:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "tree, scene",
-    [
-        (alone("ball"), {"torque": (0.0, 0.0, 3.0)}),  # it turns and turns: all of its energy is the work of the torque
-        (alone("slide", gravity=(0.0, 0.0, -9.81)), {}),  # no reach, and the weight goes down with it
-        (alone("slide", stiffness=(8.0,), rest=(0.0,)), {"posture": (0.7,), "duration": np.pi / 4, "dt": np.pi / 256}),
-    ],
-)
+@pytest.mark.parametrize("tree, scene", [
+    (alone("ball"), {"torque": (0.0, 0.0, 3.0)}),  # it turns and turns: all of its energy is the work of the torque
+    (alone("slide", gravity=(0.0, 0.0, -9.81)), {}),  # no reach, and the weight goes down with it
+    (alone("slide", stiffness=(8.0,), rest=(0.0,)), {"posture": (0.7,), "duration": np.pi / 4, "dt": np.pi / 256}),
+])  # fmt: skip
 def test_a_run_of_any_joint_has_diverged_with_more_energy_than_its_motion_can_have_exchanged(tree, scene):
     """Each starts at rest: at the end its kinetic energy is what it has got, and may be twice that, but no more."""
     case = Robot("ball", None, tree, {}, ()).case("alone", **{"duration": 4.0, "dt": 1 / 16} | scene)

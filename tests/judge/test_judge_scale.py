@@ -11,21 +11,14 @@ from tmt import literal
 
 MOMENTS = ((0.02, 0.03, 0.04), (0.001, 0.002, 0.002), (0.01, 0.01, 0.02))
 TREE = tmt.Tree(  # a slide, on it a hinge, on that a ball; and a hinge of its own beside them
-    hinge_names=("rail", "swing", "wrist", "lid"),
-    parent=(-1, 0, 1, -1),
+    hinge_names=("rail", "swing", "wrist", "lid"), parent=(-1, 0, 1, -1),
     offset=((0.0, 0.0, 0.3), (0.0, 0.2, 0.0), (0.4, 0.0, 0.0), (0.0, -0.6, 0.0)),
     axis=((1.0, 0.0, 0.0), (0.0, 0.6, 0.8), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
-    damping=(0.4, 0.0, 0.1, 0.1, 0.1, 0.0),
-    body_names=("cart", "bob", "door"),
-    body_hinge=(0, 2, 3),
-    mass=(2.0, 0.5, 1.5),
-    com=((0.0, 0.0, 0.1), (0.0, 0.0, -0.2), (0.3, 0.0, 0.0)),
-    inertia=tuple(tuple(map(tuple, np.diag(moments))) for moments in MOMENTS),
-    gravity=(0.0, 3.0, -4.0),
-    kind=("slide", "hinge", "ball", "hinge"),
-    armature=(0.3, 0.02, 0.0, 0.0, 0.0, 0.0),
-    stiffness=(20.0, 5.0, 2.0, 0.0),
-    rest=(0.1, -0.3, 1.0, 0.0, 0.0, 0.0, 0.0),
+    damping=(0.4, 0.0, 0.1, 0.1, 0.1, 0.0), body_names=("cart", "bob", "door"), body_hinge=(0, 2, 3),
+    mass=(2.0, 0.5, 1.5), com=((0.0, 0.0, 0.1), (0.0, 0.0, -0.2), (0.3, 0.0, 0.0)),
+    inertia=tuple(tuple(map(tuple, np.diag(moments))) for moments in MOMENTS), gravity=(0.0, 3.0, -4.0),
+    kind=("slide", "hinge", "ball", "hinge"), armature=(0.3, 0.02, 0.0, 0.0, 0.0, 0.0),
+    stiffness=(20.0, 5.0, 2.0, 0.0), rest=(0.1, -0.3, 1.0, 0.0, 0.0, 0.0, 0.0),
     reference=(0.05, 0.0, 0.0, 0.0),
 )  # fmt: skip
 SLIDES = np.array([[1, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0]])
@@ -35,9 +28,8 @@ LARGEST = (0.04, 0.002, 0.02)  # moments of inertia
 Q = np.array([[-0.7, 0.4, *np.array([1.0, 2.0, 0.0, 2.0]) / 3.0, 1.0], [0.05, -1.0, 1.0, 0.0, 0.0, 0.0, 0.0]])
 QD = np.array([[0.5, -1.0, 2.0, 0.0, 1.0, -3.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
 REACH = np.array([[0.3 + 0.75 + 0.1, 0.3 + 0.75 + 0.2 + 0.4 + 0.2, 0.6 + 0.3], [0.3 + 0.1, 0.3 + 0.2 + 0.4 + 0.2, 0.9]])
-LEVERS = np.array(
-    [[0, 0, 0, 0, 0, 0], [0, 0.4 + 0.2, 0.2, 0.2, 0.2, 0], [0, 0, 0, 0, 0, 0.3]]
-)  # of each body and speed
+# of each body and speed
+LEVERS = np.array([[0, 0, 0, 0, 0, 0], [0, 0.4 + 0.2, 0.2, 0.2, 0.2, 0], [0, 0, 0, 0, 0, 0.3]])
 MOVES = SLIDES + LEVERS + TURNS * (0.6 / 8 + np.max(REACH, axis=0)[:, None] / 64)
 OF = entries.Entries(TREE, Q, QD)
 
@@ -57,12 +49,9 @@ def test_lengths_are_from_the_joint_and_have_what_slides_have_moved():
     from_joints, from_origin = scale.levers(TREE, Q)
     assert np.allclose(from_origin, REACH, rtol=1e-14) and np.allclose(scale.levers(TREE)[1], REACH[1], rtol=1e-14)
     assert np.allclose(from_joints, LEVERS[:, [0, 1, 2, 5]], rtol=1e-14)
-    turned = dataclasses.replace(
-        TREE, kind=("hinge", "slide", "ball", "hinge")
-    )  # a slide after a hinge lengthens its lever
-    assert scale.levers(turned, Q)[0][:, 1, 0] == pytest.approx(
-        [0.4 + 0.2 + 0.2 + 0.4, 0.4 + 0.2 + 0.2 + 1.0], rel=1e-14
-    )
+    turned = dataclasses.replace(TREE, kind=("hinge", "slide", "ball", "hinge"))  # a slide after a hinge
+    lengthened = [0.4 + 0.2 + 0.2 + 0.4, 0.4 + 0.2 + 0.2 + 1.0]
+    assert scale.levers(turned, Q)[0][:, 1, 0] == pytest.approx(lengthened, rel=1e-14)
     assert scale.gravity_scale(TREE, Q) == pytest.approx(5.0 * REACH @ TREE.mass, rel=1e-14)
     for b, T in enumerate(np.broadcast_to(OF.T, (2, 3, 3, 6))[0]):
         assert np.allclose(T[1], COUNT[b] * MOVES[b])

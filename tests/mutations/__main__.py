@@ -36,16 +36,16 @@ STATUS = """exit status: 0 no edit survives; 1 some do; 2 an edit does not apply
 without it too"""
 
 
-def main(arguments: list[str] | None = None, project: Path = PROJECT, edits: tuple[Edit, ...] = EDITS) -> int:
+def main(arguments: list[str] | None = None) -> int:
     """Run the command line; the exit status."""
     parser = argparse.ArgumentParser("python -m tests.mutations", description=__doc__, epilog=STATUS)
     parser.add_argument("words", nargs="*", metavar="WORD", help="only edits that have one of these in their name")
     parser.add_argument("--list", action="store_true", help="list the edits, run nothing")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="runs side by side (%(default)s)")
     options = parser.parse_args(arguments)
-    chosen = [edit for edit in edits if not options.words or any(word in edit.name for word in options.words)]
+    chosen = [edit for edit in EDITS if not options.words or any(word in edit.name for word in options.words)]
     try:
-        places = {edit: applied(project, edit) for edit in chosen}
+        places = {edit: applied(PROJECT, edit) for edit in chosen}
     except DoesNotApply as error:
         print(f"does not apply: {error}")
         return 2
@@ -55,15 +55,15 @@ def main(arguments: list[str] | None = None, project: Path = PROJECT, edits: tup
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     caught_by, survived = set(), 0
     with TemporaryDirectory(prefix="edits-") as folder:
-        copies = [copied(project, Path(folder, str(number))) for number in range(options.jobs)]
-        with closing(outcomes(project, places, copies)) as tried:
+        copies = [copied(Path(folder, str(number))) for number in range(options.jobs)]
+        with closing(outcomes(places, copies)) as tried:
             for edit, seconds, caught in tried:
                 print(f"{seconds:5.1f} s  {edit.name}: {f'caught by {caught}' if caught else 'SURVIVED'}", flush=True)
                 if caught.startswith("tests"):
                     caught_by.add(caught.split("[")[0])
                 if not caught:
                     survived += 1
-                    print(difference(project, places[edit]))
+                    print(difference(places[edit]))
         print(f"{len(chosen)} edits, {survived} survived")
         if caught_by and (failed := first_failed(copies[0], sorted(caught_by))):
             print(f"fails without an edit: {failed}")
@@ -71,11 +71,11 @@ def main(arguments: list[str] | None = None, project: Path = PROJECT, edits: tup
     return 1 if survived else 0
 
 
-def copied(project: Path, folder: Path) -> Path:
-    return Path(shutil.copytree(project, folder, ignore=NOT_COPIED))
+def copied(folder: Path) -> Path:
+    return Path(shutil.copytree(PROJECT, folder, ignore=NOT_COPIED))
 
 
-def outcomes(project: Path, places: dict[Edit, Place], copies: list[Path]) -> Iterator[tuple[Edit, float, str]]:
+def outcomes(places: dict[Edit, Place], copies: list[Path]) -> Iterator[tuple[Edit, float, str]]:
     """Each edit as it ends: its seconds, and which test caught it; empty if it survived."""
     idle = SimpleQueue()
     for copy in copies:
@@ -83,8 +83,8 @@ def outcomes(project: Path, places: dict[Edit, Place], copies: list[Path]) -> It
 
     def tried(edit: Edit, place: Place) -> tuple[Edit, float, str]:
         copy, started = idle.get(), time.perf_counter()
-        name = place.path.relative_to(project)
-        files = nearest(project, edit, name)
+        name = place.path.relative_to(PROJECT)
+        files = nearest(edit, name)
         write(copy / name, place.after)
         parts = [files[start:end] for start, end in pairwise(SLICES) if files[start:end]]
         caught = next(filter(None, map(partial(first_failed, copy), parts)), "")
@@ -142,7 +142,7 @@ def end_children(pid: int) -> None:
                 child.kill()
 
 
-def nearest(project: Path, edit: Edit, name: Path) -> list[str]:
+def nearest(edit: Edit, name: Path) -> list[str]:
     """The files of tests, those first that import the edited file, or are named like it, or name what is edited."""
     parts = edit.module.split(".")
     words = {*parts, *edit.where.split(".")}
@@ -155,13 +155,13 @@ def nearest(project: Path, edit: Edit, name: Path) -> list[str]:
         score = sum(word in text for word in words) + 2 * in_name + 4 * bool(imported.search(text))
         return score, -len(text)  # of two, the smaller file
 
-    files = [path for path in sorted(project.joinpath("tests").rglob("test_*.py")) if path.name not in BLIND]
-    return [str(file.relative_to(project)) for file in sorted(files, key=named, reverse=True)]
+    files = [path for path in sorted(PROJECT.joinpath("tests").rglob("test_*.py")) if path.name not in BLIND]
+    return [str(file.relative_to(PROJECT)) for file in sorted(files, key=named, reverse=True)]
 
 
-def difference(project: Path, place: Place) -> str:
+def difference(place: Place) -> str:
     texts = (text.splitlines() for text in (place.before, place.after))
-    name = place.path.relative_to(project)
+    name = place.path.relative_to(PROJECT)
     return "\n".join(difflib.unified_diff(*texts, f"a/{name}", f"b/{name}", n=1, lineterm=""))
 
 

@@ -64,10 +64,8 @@ def applied(project: Path, edit: Edit) -> Place:
     path, node, holes = hits[(edit.nth or 1) - 1]
     before = text_of(path)
     lines = before.encode().splitlines(keepends=True)
-    start, end = (
-        sum(map(len, lines[: line - 1])) + column
-        for line, column in ((node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset))
-    )
+    places = (node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset)
+    start, end = (sum(map(len, lines[: line - 1])) + column for line, column in places)
     new = ast.unparse(Filled(holes).visit(ast.parse(textwrap.dedent(edit.new).strip())))
     if isinstance(node, ast.stmt):
         new = textwrap.indent(new, " " * node.col_offset).lstrip()

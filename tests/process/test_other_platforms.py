@@ -36,18 +36,9 @@ for package in (compare, tmt):
             assert error.name and error.name.split(".")[0] in OPTIONAL, (module.name, error)
 """
 OPTIONAL = {
-    "dartpy",
-    "heyoka",
-    "jax",
-    "mujoco_warp",
-    "newton",
-    "pinocchio",
-    "pybullet",
-    "pydrake",
-    "sympy",
-    "warp",
+    "dartpy", "heyoka", "jax", "mujoco_warp", "newton", "pinocchio", "pybullet", "pydrake", "sympy", "warp",
     "distributed",
-}
+}  # fmt: skip
 
 pytestmark = [pytest.mark.slow, posix]  # the others have no need of it
 

@@ -143,10 +143,7 @@ def test_two_runs_at_once_both_end_well(tmp_path):
 
 
 def test_only_what_a_run_has_left_is_cleared(tmp_path):
-    left, kept = (
-        tmp_path / ".new-a1b2c3_d",
-        [tmp_path / ".new-a1b2c3_e" / "mine", tmp_path / ".new-ideas" / "report.md"],
-    )
+    left, *kept = (tmp_path / name for name in (".new-a1b2c3_d", ".new-a1b2c3_e/mine", ".new-ideas/report.md"))
     (left / "new" / "tables").mkdir(parents=True)
     for path in kept:
         path.mkdir(parents=True)

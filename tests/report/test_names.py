@@ -21,16 +21,9 @@ MARKDOWN = MarkdownIt("commonmark", {"html": True}).enable(["table", "strikethro
 ATTACK = "<img src=x onerror=document.documentElement.id='run'>"
 NAMES = (f"`{ATTACK}``", "*/ [x](http://x.y) | a | __b__ &lt; \\", '=$\\frac{1}$"""', f"\u202e\n\n# {ATTACK}\x1b[31m")
 SIGNS = [
-    *"`*_[](){}<>#|~!\\+-=.:;&$%'\"@ab1é \t\n\r\u202e",
-    "**",
-    "](u)",
-    "[a]: /u",
-    ATTACK,
-    "&lt;",
-    "---",
-    "- ",
+    *"`*_[](){}<>#|~!\\+-=.:;&$%'\"@ab1é \t\n\r\u202e", "**", "](u)", "[a]: /u", ATTACK, "&lt;", "---", "- ",
     "1. ",
-]
+]  # fmt: skip
 PLACES = ("- {}\n- c\n", "# {}\n\np", "**w** {} {}\n", "**{}.** z {}\n", "| a | b |\n| - | - |\n| {} | {} |\n", "{}\n",
           "p\n\n{}: t\n", "![f](f.png) {} ", "x: {}; y: {}.", '<p title="{}">{}</p>\n\n{}\n')  # fmt: skip
 ROBOT = """<mujoco model="{3}"><worldbody><body name="{0}b"><joint name="{0}" axis="0 1 0" damping="1"/><inertial mass="1"
@@ -54,20 +47,21 @@ def test_no_text_is_markup_at_any_place():
 
 
 def test_a_report_of_a_robot_with_any_names(tmp_path, capsys):
-    (tmp_path / f"{ATTACK}.xml").write_text(ROBOT.format(*("".join(f"&#{ord(c)};" for c in name) for name in NAMES)))
+    file = tmp_path / f"{ATTACK}\nb.xml"
+    file.write_text(ROBOT.format(*("".join(f"&#{ord(c)};" for c in name) for name in NAMES)))
     with without_workers():
-        assert main(["trajectory", "--quick", f"--mjcf={tmp_path / ATTACK}.xml", f"--out={tmp_path / 'out'}"]) == 0
+        assert main(["trajectory", "--quick", f"--mjcf={file}", f"--out={tmp_path / 'out'}"]) == 0
     page, text = ((tmp_path / "out" / name).read_text(encoding="utf-8") for name in ("index.html", "report.md"))
     for of in (page, MARKDOWN.render(text)):
         assert NAMES[2] in html.unescape(of) and ATTACK in html.unescape(of) and "<img src=x" not in of
         assert not re.search(r'(href|src)="(?!#|data:image/png|tables/|figures/|index.html)', of)
-    assert all(c.isprintable() or c == "\n" for c in page + capsys.readouterr().out)
+    out = capsys.readouterr().out
+    assert all(c.isprintable() or c == "\n" for c in page + out)
+    assert out.startswith("reference: model; ") and f"{ATTACK}\\nb.xml" in out.splitlines()[0]
     assert page.count("<script") == 2 and NAMES[1] in html.unescape(page)
     # nothing is loaded, and of scripts the program's own alone runs
-    policy, (script,) = (
-        re.search(r'-Policy" content="([^"]+)"', page)[1],
-        re.findall("<script>(.*?)</script>", page, re.S),
-    )
+    policy = re.search(r'-Policy" content="([^"]+)"', page)[1]
+    (script,) = re.findall("<script>(.*?)</script>", page, re.S)
     own = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     assert policy.startswith(f"default-src 'none'; script-src 'sha256-{own}'; ") and "unsafe-eval" not in policy
 

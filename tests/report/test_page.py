@@ -63,12 +63,10 @@ def test_the_verdict_a_line_for_each_experiment_and_the_pictures_come_before_all
 
 
 def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_shows_it(folder):
-    sections = [
-        with_figures(section("mass", GOOD), "mass_distances"),
-        with_figures(section("acceleration", GOOD), f"{OVERVIEW}agreement"),
-        with_figures(section("trajectory", GOOD, BAD), f"{OVERVIEW}scenes"),
-        section("speed"),
-    ]
+    checks = {"mass": [GOOD], "acceleration": [GOOD], "trajectory": [GOOD, BAD], "speed": []}
+    sections = [section(name, *of) for name, of in checks.items()]
+    for of, figure in zip(sections, ("mass_distances", f"{OVERVIEW}agreement", f"{OVERVIEW}scenes")):
+        with_figures(of, figure)
     top, rest = page_of(folder, sections, causes=[CAUSE])
     assert re.search(r"<td>mass of forearm</td><td>1\.5</td><td>1\.6</td>", top)
     assert 'class="verdict bad"' in top and '<main id="main" class="bad">' in top
@@ -122,9 +120,8 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
     """A report of which the questions, a table, a cause and sections cannot be made."""
     asks = replace(ARM, questions=(Question("a", "what", "mass", ("largest", "mass", "Mbar", None)),))
     other = {"quantity": "Mbar", "scene": "zero", "unit": "kg m2", "largest_difference": "far"}
-    sections = [
-        section(name, GOOD, rows=[row]) for name, row in (("mass", other), ("gravity", {"a": 1.5}), ("speed", {}))
-    ]
+    rows = {"mass": other, "gravity": {"a": 1.5}, "speed": {}}
+    sections = [section(name, GOOD, rows=[row]) for name, row in rows.items()]
     report = report_of(folder, sections, [CAUSE | {"found": float("nan")}, CAUSE], robot=asks)
     sections[1].figures = [("nowhere", "A caption.")]
     sections[2].result.rows = 3

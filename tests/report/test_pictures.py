@@ -56,9 +56,8 @@ def pictures_of(scene) -> list:
 
 
 def test_it_opens_on_the_scene_that_differs():
-    of = section(
-        "trajectory", ("open loop", 2.0, 1.0, "at most", True), ("drift", 2.0, 1.0, "at most", False, About.PREDICTION)
-    )
+    drift = "drift", 2.0, 1.0, "at most", False, About.PREDICTION
+    of = section("trajectory", ("open loop", 2.0, 1.0, "at most", True), drift)
     scenes = zip(of.result.checks, ("let go", "held"))
     of.result.checks = [replace(check, scene=f"{scene}, RK4") for check, scene in scenes]
     of.result.curves = {"drawn": [drawn("held"), drawn("let"), drawn("let go")]}

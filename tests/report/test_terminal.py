@@ -1,4 +1,4 @@
-"""What a user sees on a terminal, wide or narrow, clever or dumb, with any name of a file; how far a run is."""
+"""What a user sees on a terminal, wide or narrow, clever or dumb, with any name of a file."""
 
 import json
 import os
@@ -8,10 +8,8 @@ import shutil
 import pytest
 from runs import ROOT, compare, in_shell
 
-from compare.process.workers import Clock
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
-from compare.run.examine import progress
 
 OLD = "LC_ALL=C PYTHONUTF8=0 PYTHONCOERCECLOCALE=0"
 
@@ -63,12 +61,3 @@ def test_what_nobody_foresaw_is_one_line(tmp_path):
     (line,) = run.stderr.splitlines()
     assert run.returncode == 2 and re.search(r"RuntimeError: two lines \(compare/report/terminal.py:\d+\)$", line)
     assert ROOT.as_posix() not in run.stderr
-
-
-def test_progress_is_the_number_and_the_name_of_the_experiment_under_way():
-    clock = Clock()
-    clock.ends("start")
-    clock.ends("mass")
-    assert progress(clock, ["mass", "gravity"]) == []
-    clock.under_way = "gravity"
-    assert progress(clock, ["mass", "gravity"]) == ["2 of 2", "gravity"]

@@ -40,24 +40,16 @@ def test_one_failing_check_among_many_fails_the_verdict(place):
 
 
 def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
-    sections = [
-        section("mass", ("Mbar", 0.25, 1.0, "at most", True), ("printed", 0.9, 1.0, "at most", False)),
-        section("gravity", ("torque", 0.5, 1.0, "at most", True)),
-    ]
-    text = verdict(sections, 10)
+    mass = section("mass", ("Mbar", 0.25, 1.0, "at most", True), ("printed", 0.9, 1.0, "at most", False))
+    text = verdict([mass, section("gravity", ("torque", 0.5, 1.0, "at most", True))], 10)
     assert all(part in text for part in ("mass, gravity", "2 of 10", "all 3", "0.5 kg m2", " 50 %", "torque"))
     assert "Mbar" not in text and "0.9" not in text
-    assert "Mbar" not in verdict(
-        [section("mass", ("Mbar", 0.0, 1.0, "at most", True))], 10
-    )  # no difference is the largest
+    equal = section("mass", ("Mbar", 0.0, 1.0, "at most", True))
+    assert "Mbar" not in verdict([equal], 10)  # no difference is the largest
 
 
 def test_what_does_not_agree_is_named_with_its_first_cause_and_nothing_else():
-    sections = [
-        section("mass", GOOD, BAD),
-        section("gravity", GOOD),
-        section("diagnosis", BAD),
-    ]  # which says why others fail
+    sections = [section("mass", GOOD, BAD), section("gravity", GOOD), section("diagnosis", BAD)]  # why others fail
     text = verdict(sections, 10, [{"text": f"number {k}"} for k in range(3)])
     assert "3 of 10 experiments" in text and " mass." in text and "gravity" not in text and "diagnosis" not in text
     assert "2 of 4" in text and "number 0; 2 more" in text and "number 2" not in text
@@ -225,11 +217,8 @@ def marks(experiment, result, robot=ARM):
 
 
 def test_the_agreement_is_the_largest_of_all_rows_of_a_quantity_and_its_picture_says_whose_distance_is_whose():
-    rows = [
-        OF_BIAS | {"mujoco_from_exact_eps": None},
-        OF_BIAS | {"difference_eps": 7.0, "tmt_from_exact_eps": None, "mujoco_from_exact_eps": None},
-        OF_BIAS | {"quantity": "other", "difference_eps": 9.0},
-    ]
+    near, far = {"mujoco_from_exact_eps": None}, {"difference_eps": 7.0, "tmt_from_exact_eps": None}
+    rows = [OF_BIAS | near, OF_BIAS | near | far, OF_BIAS | {"quantity": "other", "difference_eps": 9.0}]
     (found,) = figures_overview.agreements({"mass": Result("mass", rows=rows)})
     assert found | {"name": ""} == {"name": "", "apart": 7.0, "ours": 1.0, "theirs": None, "passed": True}
     _, _, caption = figures_overview.draw_agreement({"mass": Result("mass", rows=rows)})

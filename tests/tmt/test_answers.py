@@ -117,8 +117,7 @@ BALL = tmt.Tree(
 WRIST, Z = dataclasses.replace(wrist(), inertia=[np.eye(3)]), np.zeros(3)
 TURNS = np.array([[1.0, 0.0, 0.0, 0.0]] * 10)
 WRONG = {
-    "no numbers": (tmt.ARM, (["a"] * 3, Z, Z)),
-    "too few": (tmt.ARM, (np.zeros(2), Z, Z)),
+    "no numbers": (tmt.ARM, (["a"] * 3, Z, Z)), "too few": (tmt.ARM, (np.zeros(2), Z, Z)),
     "not finite": (tmt.ARM, (np.array([0.0, np.nan, 0.0]), Z, Z)),
     "batches that do not fit": (tmt.ARM, (np.zeros((4, 3)), np.zeros((5, 3)), Z)),
     "beyond the largest double": (tmt.ARM, (Z, np.full(3, 1e200), Z)),
@@ -126,9 +125,8 @@ WRONG = {
     "one of many is short": (BALL, (TURNS - np.eye(10)[:, :4] * [1.01e-6, 0, 0, 0], Z, Z)),
     "singular": (WRIST, (Z, Z, Z)),
     "singular except for rounding": (WRIST, (np.array([0.3, np.pi, 0.7]), Z, Z)),
-    "one of many singular": (WRIST, (np.eye(3)[[1, 1, 1, 2, 1]], Z, Z)),
-    "no model": ("arm", (Z, Z, Z)),
-}
+    "one of many singular": (WRIST, (np.eye(3)[[1, 1, 1, 2, 1]], Z, Z)), "no model": ("arm", (Z, Z, Z)),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("model, given", WRONG.values(), ids=WRONG)

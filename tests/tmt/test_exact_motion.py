@@ -62,9 +62,8 @@ def short_run(tree, q, qd, tau, duration) -> list:
 def test_a_pendulum_is_its_elliptic_function(axis, arm, form):
     """Pulled along its arm each is that of frequency 2 per second, after many turns; of one axis no double has the direction."""
     square, arm = sum(x * x for x in arm), tuple(map(float, arm))
-    tree = dataclasses.replace(
-        ONE_HINGE, axis=[axis], com=[arm], inertia=[square * np.eye(3)], gravity=tuple(8.0 * x for x in arm)
-    )
+    more = {"axis": [axis], "com": [arm], "inertia": [square * np.eye(3)], "gravity": tuple(8.0 * x for x in arm)}
+    tree = dataclasses.replace(ONE_HINGE, **more)
     assert (sum(Fraction(x) ** 2 for x in tree.axis[0]) != 1) == (axis == (1, 2, 2))
     path = trajectory(tree, [200.0], [1.5], [0.0], 0.375, 8, form=form)
     expected = exact_swing(0.375 * np.arange(9), 200.0, 1.5, 0.0, 2.0)

@@ -37,10 +37,9 @@ def near(values, expected):
 
 
 TREES = {
-    "arm": tmt.ARM,
-    "kinds": tree_of_kinds(np.random.default_rng(3)),
+    "arm": tmt.ARM, "kinds": tree_of_kinds(np.random.default_rng(3)),
     "many": random_tree(np.random.default_rng(1), bodies=8, damping=1.0),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", QUANTITIES)

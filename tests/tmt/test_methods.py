@@ -23,15 +23,11 @@ IMPLICIT = [name for name, stepping in METHODS.items() if stepping.solves_stages
 SMALL = small_tree()
 
 
-@pytest.mark.parametrize(
-    "name, changes, word",
-    [
-        ("rk4", {"b": (1.0, 0.5, 0.0, 0.0)}, "1.5"),
-        ("rk4", {"c": (0.0, 0.5, 0.4, 1.0)}, "row 2 of A"),
-        ("rk4", {"A": ((), (0.5, 0.5), (0.0, 0.5), (0.0, 0.0, 1.0))}, "entries"),
-        ("implicit_midpoint", {"A": ((),)}, "square"),
-    ],
-)
+@pytest.mark.parametrize("name, changes, word", [
+    ("rk4", {"b": (1.0, 0.5, 0.0, 0.0)}, "1.5"), ("rk4", {"c": (0.0, 0.5, 0.4, 1.0)}, "row 2 of A"),
+    ("rk4", {"A": ((), (0.5, 0.5), (0.0, 0.5), (0.0, 0.0, 1.0))}, "entries"),
+    ("implicit_midpoint", {"A": ((),)}, "square"),
+])  # fmt: skip
 def test_a_wrong_tableau_cannot_be_built(name, changes, word):
     with pytest.raises(ValueError, match=word):
         dataclasses.replace(METHODS[name], **changes)
@@ -142,15 +138,10 @@ DRIVEN = dataclasses.replace(FORK, position_gain=P, speed_gain=S)
 q, qd, tau = np.array([0.4, -0.7, 1.1]), np.array([1.2, -0.5, 2.0]), np.array([3.0, -1.0, 0.5])
 
 
-@pytest.mark.parametrize(
-    "name, speed, position",
-    [
-        ("semi_implicit_euler", 0.0 * S, 0.0 * P),
-        ("implicitfast", S * ON_ONE_PATH, 0.0 * P),
-        ("implicit", S * ON_ONE_PATH, 0.0 * P),
-        ("discrete", S, P),
-    ],
-)
+@pytest.mark.parametrize("name, speed, position", [
+    ("semi_implicit_euler", 0.0 * S, 0.0 * P), ("implicitfast", S * ON_ONE_PATH, 0.0 * P),
+    ("implicit", S * ON_ONE_PATH, 0.0 * P), ("discrete", S, P),
+])  # fmt: skip
 def test_which_gains_are_implicit(name, speed, position):
     """The matrix and the force of the linear system, written out."""
     stepping, dt, k = METHODS[name], 0.01, np.diag(FORK.stiffness) * (name == "discrete")

@@ -71,9 +71,7 @@ class Weaker(RungeKutta):
         return [0.5 * a for a in super().slope(tree, q, qd, tau, dt, terms)]
 
 
-@pytest.mark.parametrize(
-    "own, few", [(Longer, 5), (Weaker, 5), (Weaker, 0)]
-)  # speeds, beyond which they are articulated
+@pytest.mark.parametrize("own, few", [(Longer, 5), (Weaker, 5), (Weaker, 0)])  # speeds; with more articulated
 def test_another_step_or_slope_is_taken_and_not_kept(own, few, folder, monkeypatch):
     monkeypatch.setattr(forms, "FEW", few)
     rk4 = METHODS["rk4"]
@@ -97,18 +95,11 @@ def test_the_jacobian_of_a_step_is_that_of_its_own_slope():
     assert np.array_equal(J, np.block([[np.eye(3), 0.5 * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]]))
 
 
-@pytest.mark.parametrize(
-    "own, word",
-    [
-        (Method(), "step"),
-        (Midpoint, "True or False"),
-        (Plain(adaptive="yes"), "adaptive is 'yes'"),
-        (Plain(order=0), "order is 0"),
-        (Plain(adaptive=True), "attempt"),
-        (Plain(solves_stages=True), "how many"),
-        (Plain(solves_stages=True, stages=2), "stage_states"),
-    ],
-)
+@pytest.mark.parametrize("own, word", [
+    (Method(), "step"), (Midpoint, "True or False"), (Plain(adaptive="yes"), "adaptive is 'yes'"),
+    (Plain(order=0), "order is 0"), (Plain(adaptive=True), "attempt"),
+    (Plain(solves_stages=True), "how many"), (Plain(solves_stages=True, stages=2), "stage_states"),
+])  # fmt: skip
 def test_what_is_no_method_is_refused(own, word, monkeypatch):
     monkeypatch.setitem(METHODS, "mine", own)
     with pytest.raises(ValueError, match=r"^METHODS\['mine'\].*" + word) as error:

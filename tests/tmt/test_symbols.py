@@ -66,18 +66,12 @@ def assert_right(symbols, tree, rng, states=100):
         assert (np.abs(found - expected) <= 64 * EPS * getattr(scale, SCALES[name])).all(), name
 
 
-@pytest.mark.parametrize(
-    "make, named",
-    [
-        (lambda rng: tmt.ARM, True),
-        (lambda rng: tmt.ARM, False),
-        (lambda rng: planar(2), True),
-        (lambda rng: cart_pole(0.4), True),
-        (lambda rng: cart_pole(0.4), False),
-        (lambda rng: random_tree(rng, bodies=1), True),
-        (lambda rng: tree_of_kinds(rng, bodies=2, kinds=("hinge", "slide")), False),
-    ],
-)
+@pytest.mark.parametrize("make, named", [
+    (lambda rng: tmt.ARM, True), (lambda rng: tmt.ARM, False), (lambda rng: planar(2), True),
+    (lambda rng: cart_pole(0.4), True), (lambda rng: cart_pole(0.4), False),
+    (lambda rng: random_tree(rng, bodies=1), True),
+    (lambda rng: tree_of_kinds(rng, bodies=2, kinds=("hinge", "slide")), False),
+])  # fmt: skip
 def test_the_numbers_are_those_of_the_tree(make, named, rng):
     tree = make(rng)
     symbols = symbolic(tree, named=named)
@@ -142,16 +136,6 @@ def test_python_text_is_accepted_by_the_comparison():
     assert own["joint_names"] == ["hip", "knee"] and own["parameters"][sympy.Symbol("m_lower")] == 0.8
 
 
-@pytest.mark.parametrize("make", [lambda: tmt.ARM, lambda: cart_pole(0.4)])
-def test_the_page_is_well_formed_and_needs_no_network(make):
-    text = page(symbolic(make()), ["from a < b & c"])
-    body = text.partition("<body>")[2].partition("</body>")[0].replace("<wbr>", "")
-    for name in ("alpha", "beta", "gamma"):
-        body = body.replace(f"&{name};", name)
-    assert ElementTree.fromstring(f"<body>{body}</body>").findall(".//math")
-    assert "http" not in text and "src=" not in text
-
-
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no pdflatex")
 def test_the_arm_in_latex_is_one_page(tmp_path):
     (tmp_path / "arm.tex").write_text(latex(symbolic(), ["50% of a_b & c"]), encoding="utf-8")
@@ -198,9 +182,8 @@ def entries_in_page(text) -> dict:
             found[letter, int(i), int(j or 1)] = " ".join(formulas[1:]).split()
         for table in paragraph.iter("mtable"):
             letter = formulas[0][0]
-            found |= {
-                (letter, i, j): tex(cell).split() for i, row in enumerate(table, 1) for j, cell in enumerate(row, 1)
-            }
+            for i, row in enumerate(table, 1):
+                found |= {(letter, i, j): tex(cell).split() for j, cell in enumerate(row, 1)}
     return found
 
 
@@ -245,7 +228,8 @@ OBLIQUE = replace(planar(2), axis=((0, 0, 1), (1, 0, 2e-5)))
 def test_what_is_printed_in_latex_and_on_the_page_has_the_values(tree, rtol, rng):
     symbols = symbolic(tree)
     found = entries_in_latex(latex(symbols))
-    assert entries_in_page(page(symbols)) == found
+    text = page(symbols, ["from a < b & c"])  # an XML that fetches nothing
+    assert entries_in_page(text) == found and "http" not in text and "src=" not in text
     n, (q, qd) = len(tree.axis), rng.uniform(-2.0, 2.0, (2, len(tree.axis)))
     known = {symbols.display[symbol]: row.value for symbol, row in symbols.parameters.items()}
     known |= {symbols.display[symbol]: x for symbol, x in zip(symbols.q + symbols.qd, [*q, *qd])}

@@ -23,29 +23,23 @@ def test_tree_converts_arrays_and_scales_axes():
 
 X, Y, Z = np.eye(3)
 REFUSED = [  # changes of the arm, and a word of what is said
-    ({"mass": (1.9, np.nan)}, "finite"),
-    ({"mass": (1.9, -1.0)}, "at least 0"),
-    ({"mass": ("1.9", "1.5")}, "numbers"),
-    ({"axis": (Y, 0 * X, Y)}, r"axis\[1\]"),
-    ({"parent": (-1, 2, 1)}, r"parent\[1\]"),
-    ({"body_hinge": (1, 1)}, "'gamma'"),
-    ({"damping": (0, -1, 0)}, "damping"),
-    ({"inertia": (np.diag([1, 1, 2 + 1e-9]), np.eye(3))}, "larger"),
+    ({"mass": (1.9, np.nan)}, "finite"), ({"mass": (1.9, -1.0)}, "at least 0"),
+    ({"mass": ("1.9", "1.5")}, "numbers"), ({"axis": (Y, 0 * X, Y)}, r"axis\[1\]"),
+    ({"parent": (-1, 2, 1)}, r"parent\[1\]"), ({"body_hinge": (1, 1)}, "'gamma'"),
+    ({"damping": (0, -1, 0)}, "damping"), ({"inertia": (np.diag([1, 1, 2 + 1e-9]), np.eye(3))}, "larger"),
     ({"inertia": ([[1, 1e-9, 0], [0, 1, 0], [0, 0, 1]], np.eye(3))}, "symmetric"),
     ({"mass": (1.9, 0), "inertia": (np.eye(3), np.zeros((3, 3)))}, "'gamma'"),
     ({"mass": (1e-320, 1e-320), "inertia": np.zeros((2, 3, 3))}, "doubles"),
-    ({"hinge_names": ("a", "b", "a")}, "names"),
-    ({"colour": 3}, "'colour'"),
+    ({"hinge_names": ("a", "b", "a")}, "names"), ({"colour": 3}, "'colour'"),
     ({"position_gain": np.zeros((2, 3))}, "position_gain"),
-]
+]  # fmt: skip
 OF_KINDS = [  # changes of a slide on a ball
     ({"kind": ("hinge", "screw")}, "kind"),
     *(({"axis": [*axes, Y]}, "right-handed") for axes in ((X, X, Z), (X, Z, Y))),
-    ({"reference": [1.0, 0.0]}, "ball"),
-    ({"rest": [1.0, 1.0, 0.0, 0.0, 0.0]}, "quaternion"),
+    ({"reference": [1.0, 0.0]}, "ball"), ({"rest": [1.0, 1.0, 0.0, 0.0, 0.0]}, "quaternion"),
     ({"stiffness": [0.0, -1.0]}, "at least 0"),
     *(({"position_gain": np.outer(*np.eye(4)[pair])}, "ball") for pair in ([0, 3], [3, 0])),
-]
+]  # fmt: skip
 SLIDE_ON_A_BALL = tmt.Tree(
     ("b", "s"), (-1, 0), ((0, 0, 0), (0, 0, 1)), (X, Y, Z, Y), (0,) * 4, ("body",), (1,), (1.0,), ((0, 0, 1),),
     (np.eye(3),), (0, 0, -9.81), kind=("ball", "slide"),
@@ -89,16 +83,11 @@ def chain(axes, com=(0.3, 0.1, 0.2), inertia=None, offsets=None):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "given, says",
-    [
-        (([Z], (0, 0, 0.3)), "'h0'"),
-        (([X, Z], (0, 0, 0.3)), "'h1'"),
-        (([Z, Z, Z], (0.3, 0.1, 0.2), np.eye(3)), "'h0', 'h1', 'h2'"),
-        (([Z, -Z],), "'h0', 'h1'"),
-        (([X, Y, Z],), "singular|together"),  # a point about a point has two ways to move
-    ],
-)
+@pytest.mark.parametrize("given, says", [
+    (([Z], (0, 0, 0.3)), "'h0'"), (([X, Z], (0, 0, 0.3)), "'h1'"),
+    (([Z, Z, Z], (0.3, 0.1, 0.2), np.eye(3)), "'h0', 'h1', 'h2'"), (([Z, -Z],), "'h0', 'h1'"),
+    (([X, Y, Z],), "singular|together"),  # a point about a point has two ways to move
+])  # fmt: skip
 def test_a_model_that_is_singular_everywhere_is_refused(given, says):
     with pytest.raises(ValueError, match=says):
         chain(*given)

@@ -39,12 +39,9 @@ def robot(source):
 
 @pytest.fixture(scope="module")
 def robots():
-    names = {name: robot(PATHS[name]) for name in ("gripper", "pendulum_ball", "free_body", "loop")}
-    return names | {
-        "random": robot(random_tree(3, joints=4)),
-        "pendulum": robot(PENDULUM),
-        "cart": robot(CART.format(0)),
-    }
+    sources = {name: PATHS[name] for name in ("gripper", "pendulum_ball", "free_body", "loop")}
+    sources |= {"random": random_tree(3, joints=4), "pendulum": PENDULUM, "cart": CART.format(0)}
+    return {name: robot(source) for name, source in sources.items()}
 
 
 @pytest.fixture(scope="module")
@@ -93,9 +90,7 @@ def test_a_spherical_pendulum_swings_alike_to_both_sides_and_spins_freely(robots
     assert at.kind == "marginal" and at.stays and at.without_stiffness.sum() == 2
 
 
-@pytest.mark.parametrize(
-    "method, limit", [("rk4", 2.785293563), ("explicit_euler", 2.0), ("semi_implicit_euler", None)]
-)
+@pytest.mark.parametrize("method, limit", [("rk4", 2.785293563), ("explicit_euler", 2), ("semi_implicit_euler", None)])
 def test_the_limit_of_a_mode_that_only_decays_is_that_of_its_rate(robots, method, limit):
     """Where damping is implicit there is none."""
     kind, dt = held(robots["cart"], "qpos0").limit(method)

@@ -13,16 +13,11 @@ def small(M, K, D, damping=None, springs=None, on_path=None, poles=()):
     M, K, D = (np.atleast_2d(np.asarray(x, float)) for x in (M, K, D))
     n = len(M)
     return Small(
-        names=tuple(f"joint{k}" for k in range(n)),
-        M=M,
-        K=K,
-        D=D,
+        names=tuple(f"joint{k}" for k in range(n)), M=M, K=K, D=D,
         damping=np.zeros(n) if damping is None else np.asarray(damping, float),
-        springs=np.zeros_like(K) if springs is None else np.atleast_2d(np.asarray(springs, float)),
-        brakes=D,
-        on_path=np.ones((n, n), bool) if on_path is None else on_path,
-        poles=poles,
-    )
+        springs=np.zeros_like(K) if springs is None else np.atleast_2d(np.asarray(springs, float)), brakes=D,
+        on_path=np.ones((n, n), bool) if on_path is None else on_path, poles=poles,
+    )  # fmt: skip
 
 
 def alone(K, D, **more):
@@ -93,11 +88,7 @@ KNOWN = {  # what is limited, by which integrator, and the limit in closed form;
     "half of a spring implicit": (small(1.0, 400.0, 0.0, springs=200.0), "discrete", None),
     "a quarter": (small(1.0, 400.0, 0.0, springs=100.0), "discrete", np.sqrt(4.0 / 200.0)),
     # K is not symmetric; kv of the fast one is implicit: 4 + 2 dt - 400 dt^2 = 0 of the other
-    "beside a fast servo": (
-        alone([[1e10, 5e4], [0.0, 400.0]], [1e9, 1.0]),
-        "implicitfast",
-        (1 + np.sqrt(1601.0)) / 400,
-    ),
+    "beside a fast servo": (alone([[1e10, 5e4], [0.0, 400.0]], [1e9, 1.0]), "implicitfast", (1 + np.sqrt(1601.0)) / 400),
     # one limit is up to five seconds: by its closed form, by eigenvalues, of a filter
     "4.99 s": (small(1.0, 4.0 / 4.99**2, 0.0), "Euler", 4.99),
     "5.01 s": (small(1.0, 4.0 / 5.01**2, 0.0), "Euler", None),
@@ -107,7 +98,7 @@ KNOWN = {  # what is limited, by which integrator, and the limit in closed form;
     "5.01 s, filter": (small(1.0, 1e-3, 1.0, [1.0], poles=(("servo", 5.01 / 2, False),)), "Euler", None),
     "a filterexact": (small(1.0, 1.0, 1.0, [1.0], poles=(("servo", 0.05, True),)), "Euler", 1.0 + np.sqrt(5.0)),
     "a filterexact, RK4": (small(1.0, 1.0, 1.0, [1.0], poles=(("servo", 0.05, True),)), "RK4", 0.05 * POLE_RK4),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", KNOWN)
@@ -126,9 +117,8 @@ def test_a_saddle_says_how_fast_it_is_left_and_a_drift_that_nothing_holds(name):
         ([-16.0, 100.0], [6.0, 0.0], 2.0, 1e-6),  # s^2 + 6 s - 16 = 0
         ([[100.0, 5.0], [-5.0, 100.0]], [1e-3, 1e-3], 0.25, 0.02),  # a force that turns, though no energy says so
         # left slowly beside a stiff servo, K symmetric or not:
-        ([[1e10, 5e4], [0.0, -20.0]], [1e5, 10.0], 1.71, 1e-2),
-        ([1e8, 100.0], [1e5, -0.5], 0.25, 1e-4),
-    ):
+        ([[1e10, 5e4], [0.0, -20.0]], [1e5, 10.0], 1.71, 1e-2), ([1e8, 100.0], [1e5, -0.5], 0.25, 1e-4),
+    ):  # fmt: skip
         limit = alone(K, D).limit(name)
         assert limit.limit == "saddle" and limit.rate == pytest.approx(rate, rel=off)
     for K, D in (([0.0, 100.0], [0.0, 0.0]), ([[1e10, 0.0], [5e4, -1e-7]], [1e5, 0.0])):

@@ -29,18 +29,12 @@ def test_sub_blocks_agree_within_64_eps(apart, passes):
     assert found == {"Mbar, reduced, TMT to MuJoCo": passes}
 
 
-@pytest.mark.parametrize(
-    "apart, width, required, within, long_enough",
-    [
-        (0.99e-9, 1e-9, 5.0, True, True),
-        (1.01e-9, 1e-9, 5.0, False, True),
-        (np.nan, 1e-9, 5.0, False, True),
-        (1e-300, 0.0, 5.0, False, True),
-        (0.0, 0.99e-3, 5.0, True, True),
-        (1.0, 1.01e-3, 3.0, True, True),  # too wide from 4 s on: then nothing is judged there
-        (0.0, 1.01e-3, 3.01, True, False),
-    ],
-)
+@pytest.mark.parametrize("apart, width, required, within, long_enough", [
+    (0.99e-9, 1e-9, 5.0, True, True), (1.01e-9, 1e-9, 5.0, False, True), (np.nan, 1e-9, 5.0, False, True),
+    (1e-300, 0.0, 5.0, False, True), (0.0, 0.99e-3, 5.0, True, True),
+    (1.0, 1.01e-3, 3.0, True, True),  # too wide from 4 s on: then nothing is judged there
+    (0.0, 1.01e-3, 3.01, True, False),
+])  # fmt: skip
 def test_the_smallest_model_is_judged_while_the_band_is_narrow(apart, width, required, within, long_enough):
     t = np.arange(6.0)
     off, band = np.zeros((6, 4)), np.full((6, 4), 1e-9)
@@ -89,15 +83,12 @@ def test_both_engines_meet_the_elliptic_function_and_a_heavier_arm_does_not():
     assert failed(found) == ["elbow swing, RK4, MuJoCo"] and len(found.checks) == 2
 
 
-@pytest.mark.parametrize(
-    "scene",
-    [
-        {"posture": "zero", "speed": (0, 0, 2000)},  # it turns over
-        {"posture": (0, 0, 89)},  # it hardly moves
-        {"posture": (90, 90, 0)},  # the forearm turns about a vertical
-        {"posture": "zero", "damping": 0.1},
-    ],
-)
+@pytest.mark.parametrize("scene", [
+    {"posture": "zero", "speed": (0, 0, 2000)},  # it turns over
+    {"posture": (0, 0, 89)},  # it hardly moves
+    {"posture": (90, 90, 0)},  # the forearm turns about a vertical
+    {"posture": "zero", "damping": 0.1},
+])  # fmt: skip
 def test_a_pendulum_that_shows_nothing_is_left_out(engines, scene):
     result = swings(engines, **scene)
     assert result.checks == [] and result.curves["swings"] == {}

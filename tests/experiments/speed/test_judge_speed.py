@@ -31,10 +31,8 @@ def known_rows():
     for k in range(5):
         steps, error = 64 << k, 2e-2 / 16**k
         rows += [row("mujoco", "RK4", error, steps, 20e-3 * 2**k), row("tmt", "rk4", error, steps, 1e-3 * 2**k)]
-        rows += [
-            row("mujoco", "Euler", 0.5 / 2**k, steps, 4e-3 * 2**k),
-            row("tmt", "dopri8", error**2, steps, 2e-3 * 2**k),
-        ]
+        rows += [row("mujoco", "Euler", 0.5 / 2**k, steps, 4e-3 * 2**k)]
+        rows += [row("tmt", "dopri8", error**2, steps, 2e-3 * 2**k)]
     return rows
 
 
@@ -180,9 +178,8 @@ def test_what_is_called_is_followed_once_after_all_else_has_ended(setup, monkeyp
     known, called = [row("tmt", "rk4", 1.0)], [row("scipy", "RK45", 1.0, 64, s) for s in (0.014, 0.016)]
     monkeypatch.setattr(speed, "rows_of_scene", lambda *given: log.append(given[-1]) or called)
     monkeypatch.setattr(speed, "prepared", lambda rows, setup: rows)
-    monkeypatch.setattr(
-        speed, "take_times", lambda rows, runs, setup: log.append(rows == runs == [known[0], called[0]])
-    )
+    taken = lambda rows, runs, setup: log.append(rows == runs == [known[0], called[0]])  # noqa: E731
+    monkeypatch.setattr(speed, "take_times", taken)
     monkeypatch.setattr(speed.evaluations, "compiled_evaluations", lambda setup: log.append("made"))
     of = {case.name: known}
     speed.add_times(setup, [case], {case.name: None}, {case.name: 0.0}, of)

@@ -1,4 +1,4 @@
-"""Speed against accuracy: who takes part, with which steps; runs and what they are measured against; orders on a free body."""
+"""Speed against accuracy: who takes part, with which steps; runs and what they are measured against."""
 
 import dataclasses
 
@@ -12,17 +12,15 @@ import tmt
 from compare.engines import RECORDS, Method, Setting
 from compare.engines.heyoka import Heyoka
 from compare.engines.mujoco import engine, read
-from compare.engines.scipy import Scipy
 from compare.experiments import speed
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
-from compare.experiments.speed import accuracy, runs, settings
+from compare.experiments.speed import runs, settings
 from compare.judge.rounding import growth
 from compare.robots.arm import ARM
 from compare.robots.case import Scene
 from compare.robots.file import robot_of
 from compare.truth import reference
-from tmt.exact.motion import trajectory
 
 OWN = Scene("my swing", (0, 0, 120), duration=2.0, dt=1 / 50, tags=("own",))
 MINE = dataclasses.replace(ARM, scenes=(*ARM.scenes, OWN))
@@ -76,10 +74,8 @@ def test_methods_are_those_of_the_engines_that_are_there(engines):
 def test_a_step_response_is_followed_from_coarse_steps_on_by_the_schemes_that_it_has(of_gripper):
     stiff = robot_in("arm7").cases[-1]
     assert settings.coarsest_steps(stiff) == 64 < stiff.steps and settings.coarsest_steps(FREE) == FREE.steps
-    of_step, of_free = (
-        {(m.engine, m.name): m.scheme for m in settings.methods(of_gripper, "full", "all", GRIPPER, case)}
-        for case in (STEP, FREE)
-    )
+    of_both = (settings.methods(of_gripper, "full", "all", GRIPPER, case) for case in (STEP, FREE))
+    of_step, of_free = ({(m.engine, m.name): m.scheme for m in methods} for methods in of_both)
     schemes = [of["mujoco", "implicitfast"] for of in (of_step, of_free)]
     assert schemes == ["implicitfast", "semi_implicit_euler"]
     assert ("tmt", "implicitfast") in of_step and ("tmt", "implicitfast") not in of_free
@@ -145,13 +141,6 @@ def test_beyond_the_digits_of_the_reference_nothing_is_judged(engines, of_grippe
     assert runs.scene(BENT, engines, "small") == (BENT.name, known, 1e-6, [])
 
 
-def test_a_reference_in_doubles_says_its_digits():
-    known = reference.in_doubles(FREE)
-    assert known.apart < 1e-13 and known.low.max() == 0.0 and known.steps > FREE.steps
-    finer = tmt.simulate(*FREE.start, FREE.tau, FREE.duration / 2**14, 2**14, "rk4", FREE.tree)
-    assert known.error(finer.q[::256], range(4)).max() < 10 * max(known.apart, 1e-15)
-
-
 @pytest.mark.slow
 def test_a_small_run_takes_every_path(engines, small):
     result = small("speed")
@@ -177,39 +166,6 @@ def test_a_run_without_timings_has_the_checks_only_and_sees_a_wrong_model(engine
     checks = untimed_speed(setup_of(XML.replace('mass="1.5"', 'mass="1.50001"'))).checks
     failed = {check.quantity for check in checks if not check.passed}
     assert {"smallest error of MuJoCo's RK4, compared with tmt's rk4", "the same error as tmt's rk4"} <= failed
-
-
-MOMENTS, QUATERNION, END = (0.03, 0.05, 0.06), (0.5, 0.5, -0.5, 0.5), 2.0  # kg m2, of a free body that tumbles; s
-
-
-@pytest.fixture(scope="module")
-def stone():
-    """A free asymmetric body on a ball joint, its true quaternions at nine times, MuJoCo's engine of it."""
-    body = f'<inertial pos="0 0 0" mass="1" diaginertia="{" ".join(map(str, MOMENTS))}"/><joint type="ball"/>'
-    reading = read(f'<mujoco><option gravity="0 0 0"/><worldbody><body>{body}</body></worldbody></mujoco>')
-    case = robot_of(reading, "stone.xml").case("tumbling", posture=QUATERNION, speed=(480, 120, 360))
-    exact = trajectory(case.tree, *case.start, case.tau, END / 8, 8).high[:, :4]
-    return case, exact, engine(reading)
-
-
-def test_each_method_keeps_its_order_on_a_free_body(engines, stone):
-    case, exact, theirs = stone
-    for of_body in (engines["tmt"], theirs):
-        for method in of_body.methods.values():
-            errors = []
-            for steps in () if method.adaptive else (256 << k for k in range(6)):
-                q = of_body.of(case).run(*case.start, case.tau, END / steps, steps, method.name).q[:: steps // 8]
-                errors.append(np.abs(case.coordinates.difference(q, exact)).max())
-            regular = [error for error in errors if error > accuracy.CLEAR][-2:]
-            if method.order != 8 and not method.adaptive:
-                assert np.log2(regular[0] / regular[1]) == pytest.approx(method.order, abs=0.15), method
-
-
-def test_a_coarse_run_of_scipy_has_quaternions_of_length_1(stone):
-    case, exact, _ = stone
-    motion = Scipy().of(case).run(*case.start, case.tau, END / 8, 8, "RK45", tolerance=1e-2)
-    assert np.abs(np.linalg.norm(motion.q, axis=1) - 1.0).max() < 1e-15
-    assert np.abs(case.coordinates.difference(motion.q, exact)).max() > 1e-6
 
 
 def test_a_reference_in_doubles_measures_turns_and_no_quaternions():

@@ -38,10 +38,8 @@ def torque_rows(times=(4.7, 4.7), moved=0.0, sides=(1, 1), clear=(1, 1), leaving
 def test_claim_1(result, changed, reproduced, passes):
     result.check("elsewhere", "a check that is not of this claim", 2.0, 1.0, "")
     claims.check_torques(result, ARM, torque_rows(**changed))
-    assert (
-        result.notes[-1].values["reproduced"] is reproduced
-        and all(check.passed for check in result.checks[1:]) is passes
-    )
+    assert result.notes[-1].values["reproduced"] is reproduced
+    assert all(check.passed for check in result.checks[1:]) is passes
 
 
 @pytest.mark.parametrize("to, found", [(0.3, 1), (-0.3, -1), (np.nan, None)])

@@ -81,10 +81,9 @@ def result_of(source, **more):
 
 
 def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step(quick):
-    failed = {
-        step: [check.quantity for check in quick(hinge('damping="2"', "RK4", key=""), step=step).checks if check.failed]
-        for step in (None, (1e-4, "RK4"), (0.005, "Euler"), (0.004, "RK4"))
-    }
+    failed, source = {}, hinge('damping="2"', "RK4", key="")
+    for step in (None, (1e-4, "RK4"), (0.005, "Euler"), (0.004, "RK4")):
+        failed[step] = [check.quantity for check in quick(source, step=step).checks if check.failed]
     assert failed[None] == failed[1e-4, "RK4"] == failed[0.005, "Euler"] == [own_run.AT_OWN]
     assert failed[0.004, "RK4"] == [own_run.AT_OWN, own_run.AT_REQUESTED]
 
@@ -127,8 +126,7 @@ def test_constraints_of_a_sparse_jacobian_and_a_pickled_model():
 def test_a_robot_of_many_speeds_has_its_servo_limits_alone(quick):
     result = quick(hinge(actuator=STIFF))
     assert result.tables.keys() == {"own_run", "step_limits"} and not result.rows
-    calm = {
-        row["integrator"]: row["full_model_calm"] for row in result.tables["step_limits"] if row["posture"] == "aside"
-    }
+    aside = [row for row in result.tables["step_limits"] if row["posture"] == "aside"]
+    calm = {row["integrator"]: row["full_model_calm"] for row in aside}
     assert calm == dict.fromkeys(INTEGRATORS) | {"Euler": False}
     assert [finding.kind for finding in result.top] == ["own_run", "step", "large"]

@@ -203,9 +203,8 @@ def test_a_full_run_observes_every_integrator_and_draws_curves(result):
         assert [one.name for one, *_ in work["observed"][0]] == ["up"] * len(INTEGRATORS) + ["qpos0"] * alone
     drawn, curves = work["curves"]
     assert [name for _, name, _ in drawn] == [*INTEGRATORS]
-    servos.add(
-        result, setup, work | {"observed": ([], ()), "curves": (drawn[:1], curves)}
-    )  # one curve, and no limit is sought
+    work |= {"observed": ([], ()), "curves": (drawn[:1], curves)}  # one curve, and no limit is sought
+    servos.add(result, setup, work)
     row, (curve,) = result.tables["step_limits"][0], result.curves["step response"]["lines"].values()
     assert curve[0][0] < 0.002 < curve[-1][0] <= row["predicted_dt_s"] < 1.5 * curve[-1][0]
     assert figures_step.draw_step_response(result, None)

@@ -43,23 +43,20 @@ def test_a_band_judges_nothing_that_moves_less():
     nv, free = 4, SimpleNamespace(coordinates=LIFT_AND_HEAD, is_held=False)
     q, v = np.array([[0.0, 1.0, 0.0, 0.0, 0.0]] * 2), np.zeros((2, nv))
 
-    def widest(scene="free", lift=0.0, turn=0.0, speeds=(0.0,) * 4, targets=0.0):
-        free.scene = SimpleNamespace(torque=scene, speed=(), targets=targets)
+    def widest(lift=0.0, turn=0.0, speeds=(0.0,) * 4, torque="free", targets=0.0):
+        free.scene = SimpleNamespace(torque=torque, speed=(), targets=targets)
         q[1] = [lift, np.cos(turn / 2), np.sin(turn / 2), 0.0, 0.0]
         v[1] = speeds
         return widest_judged(free, q, v)
 
     assert np.allclose(widest(lift=2e-4, speeds=(3.0, 0, 0, 0)), [2e-4, 1e-3, 1e-3, 1e-3, 3.0, *[np.inf] * 3])
     assert np.allclose(widest(lift=0.5, turn=1.0, speeds=(3.0, 2.0, 1e-9, 0)), [*[1e-3] * 4, 3.0, 2.0, 2.0, 2.0])
-    assert np.allclose(
-        widest(turn=4e-4, lift=1.0, speeds=(1.0, 2e-2, 1e-3, 0)), [1e-3, *[4e-4] * 3, 1.0, 2e-2, 1e-3, 2e-2]
-    )
-    assert np.allclose(
-        widest(lift=2.0, turn=1e-12, speeds=(1.0, 1e-12, 0, 0)), [*[1e-3] * 4, 1.0, *[np.inf] * 3]
-    )  # rounding
-    assert not widest().any() and not widest("servos", targets=6.0)[:nv].any()  # nothing moves: nothing is judged
+    slow, rounded = widest(1.0, 4e-4, (1.0, 2e-2, 1e-3, 0)), widest(2.0, 1e-12, (1.0, 1e-12, 0, 0))
+    assert np.allclose(slow, [1e-3, *[4e-4] * 3, 1.0, 2e-2, 1e-3, 2e-2])
+    assert np.allclose(rounded, [*[1e-3] * 4, 1.0, *[np.inf] * 3])
+    assert not widest().any() and not widest(torque="servos", targets=6.0)[:nv].any()  # nothing moves
     for rests in ("hold", "servos"):
-        assert np.array_equal(widest(rests), [*[1e-3] * 4, *[np.inf] * 4])
+        assert np.array_equal(widest(torque=rests), [*[1e-3] * 4, *[np.inf] * 4])
 
 
 @pytest.mark.parametrize("required, until, alive, judged", [
@@ -101,18 +98,11 @@ def test_what_a_scene_asks_for_depends_on_the_scheme_and_the_step():
     assert [required_time(FREE, "implicit", dt) for dt in (0.0099, 0.0101)] == [5.0, 0.3]
 
 
-@pytest.mark.parametrize(
-    "ours, theirs, width, found",
-    [
-        (None, None, NARROW, []),
-        (0.5, 0.5, NARROW, [True]),
-        (0.5, 0.51, NARROW, [False]),
-        (None, 0.5, NARROW, [False]),
-        (0.5, None, NARROW + 2e-6, []),
-        (0.1, 0.11, AT_ONCE, [False]),
-        (0.12, 0.13, AT_ONCE, []),  # the band opens before the next recorded state
-    ],
-)
+@pytest.mark.parametrize("ours, theirs, width, found", [
+    (None, None, NARROW, []), (0.5, 0.5, NARROW, [True]), (0.5, 0.51, NARROW, [False]),
+    (None, 0.5, NARROW, [False]), (0.5, None, NARROW + 2e-6, []), (0.1, 0.11, AT_ONCE, [False]),
+    (0.12, 0.13, AT_ONCE, []),  # the band opens before the next recorded state
+])  # fmt: skip
 def test_both_diverge_at_the_same_step_while_the_band_is_narrow(ours, theirs, width, found):
     ends = {"tmt": ours, "mujoco": theirs}
     assert [*verdicts(runs.check_divergence, ends, 0.01, 100, width).values()] == found
@@ -182,9 +172,8 @@ def test_drift_is_measured_where_nothing_takes_energy_and_an_engine_that_does_no
 
 def test_a_torque_that_does_not_hold_is_not_rounding(engines):
     left, farthest = {"tmt": None, "mujoco": 0.1}, {"tmt": 0.0, "mujoco": 2.0}
-    earth, moon = (
-        true_motion.departures(HELD, engines | other, left, farthest) for other in ({}, with_gravity("0 0 -1.62"))
-    )
+    others = {}, with_gravity("0 0 -1.62")
+    earth, moon = (true_motion.departures(HELD, engines | other, left, farthest) for other in others)
     pushes = [[engine["push"] for engine in of["engines"]] for of in (earth, moon)]
     assert max(pushes[0]) <= earth["allowed"] < 1e-11
     q, left_over = HELD.q, 1.0 - 1.62 / 9.81

@@ -4,47 +4,34 @@ from ..edit import Edit
 
 # module, function, quantity: as written in the call of `check`, _1, _2 for what is filled in
 CHECKS = (
-    ("parameters", "compare_number", "quantity"),
-    ("parameters", "check_forces", 'f"no forces of {_1}"'),
+    ("parameters", "compare_number", "quantity"), ("parameters", "check_forces", 'f"no forces of {_1}"'),
     ("published", "check_answer", 'f"{_1}: {item.quantity} - printed"'),
     ("published", "check_answer", 'f"{_1}: {item.quantity} - exact"'),
     ("published", "check_answer", "digits"),
     ("published", "check_answer", 'f"exact: |{item.quantity}_{_1}| - |printed|"'),
-    ("mass", "check_symmetry", "what"),
-    ("mass", "check_definiteness", "what"),
-    ("accuracy", "check_same_schemes", "quantity"),
-    ("accuracy", "check_smallest_errors", "quantity"),
+    ("mass", "check_symmetry", "what"), ("mass", "check_definiteness", "what"),
+    ("accuracy", "check_same_schemes", "quantity"), ("accuracy", "check_smallest_errors", "quantity"),
     ("accuracy", "check_smallest_errors", "\"smallest error of MuJoCo's RK4, compared with tmt's rk4\""),
-    ("accuracy", "check_order", "name"),
-    ("accuracy", "check_order", 'f"measured order, nominal {_1}"'),
-    ("exact_motion", "check_falling", "name"),
-    ("needs", "check_smaller", '"smallest model to whole"'),
-    ("needs", "check_smaller", '"time judged"'),
-    ("reduction", "add_not_lockable", "quantity"),
-    ("sub_blocks", "check_blocks", "name"),
-    ("trajectory", "check_time_judged", '"time judged"'),
+    ("accuracy", "check_order", "name"), ("accuracy", "check_order", 'f"measured order, nominal {_1}"'),
+    ("exact_motion", "check_falling", "name"), ("needs", "check_smaller", '"smallest model to whole"'),
+    ("needs", "check_smaller", '"time judged"'), ("reduction", "add_not_lockable", "quantity"),
+    ("sub_blocks", "check_blocks", "name"), ("trajectory", "check_time_judged", '"time judged"'),
     ("trajectory", "check_divergence", 'f"step of divergence, MuJoCo\'s, is {whose}"'),
-    ("judge.run", "check_movement", '"movement"'),
-    ("trajectory", "check_level", "quantity"),
+    ("judge.run", "check_movement", '"movement"'), ("trajectory", "check_level", "quantity"),
     ("energy", "check_order", "name"),
     ("stability.limits", "check_limits", '"limit, observed / predicted - 1"'),
-    ("stability.limits", "check_limits", "quantity"),
-    ("departure", "check_row", "quantity"),
-    ("claims", "check_torques", "text"),
-    ("claims", "check_torques", "quantity"),
-    ("claims", "check_finer_steps", "quantity"),
-    ("claims", "check_kept", "what"),
-    ("failure", "check_reset", "quantity"),
-    ("equilibria", "check_amplification", "quantity"),
-)
+    ("stability.limits", "check_limits", "quantity"), ("departure", "check_row", "quantity"),
+    ("claims", "check_torques", "text"), ("claims", "check_torques", "quantity"),
+    ("claims", "check_finer_steps", "quantity"), ("claims", "check_kept", "what"),
+    ("failure", "check_reset", "quantity"), ("equilibria", "check_amplification", "quantity"),
+)  # fmt: skip
 # module, function, the two that are compared, as written in the call of `agree`
 AGREEMENTS = (
-    ("gravity", "rows", '"holding torque, springs too"'),
-    ("gravity", "rows", '"yours: gravity - bias at rest"'),
+    ("gravity", "rows", '"holding torque, springs too"'), ("gravity", "rows", '"yours: gravity - bias at rest"'),
     ("acceleration", "rows", 'f"tau from MuJoCo\'s qdd by {_1}"'),
     ("acceleration", "rows", 'f"tau from {_1} qdd by mj_inverse"'),
     ("acceleration", "rows", 'f"dE/dt - {work} at {_1} qdd"'),
-)
+)  # fmt: skip
 EDITS = (
     *(
         Edit(module, where, f"result.check(_3, {quantity}, _4, _5, *_6)", f"result.check(_3, {quantity}, _5, _5, *_6)",
