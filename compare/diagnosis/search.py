@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
+from numpy import ndarray
 
 import tmt
 
@@ -24,7 +25,13 @@ SHOWN = 12  # single explanations that leave least
 
 
 def diagnose(
-    tree: tmt.Tree, q, qd, given, tolerance, seconds: float = np.inf, bias: Callable | None = None
+    tree: tmt.Tree,
+    q: ndarray,
+    qd: ndarray,
+    given: ndarray,
+    tolerance: ndarray,
+    seconds: float = np.inf,
+    bias: Callable | None = None,
 ) -> Diagnosis:
     """What explains given values that differ from those of a tree's equations.
 

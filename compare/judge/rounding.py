@@ -1,6 +1,7 @@
 """Bounds of the difference that rounding alone makes between two runs of the same method."""
 
 import numpy as np
+from numpy import ndarray
 
 from tmt import Tree
 from tmt.methods import METHODS
@@ -79,7 +80,16 @@ def of_positions(tree: Tree, q: np.ndarray) -> np.ndarray:
     return sizes
 
 
-def band(stepping: Method, tree: Tree, q, qd, tau, dt: float, every=1, most: int | None = None) -> np.ndarray:
+def band(
+    stepping: Method,
+    tree: Tree,
+    q: ndarray,
+    qd: ndarray,
+    tau: ndarray,
+    dt: float,
+    every: int = 1,
+    most: int | None = None,
+) -> ndarray:
     """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states (steps + 1, nq, nv), (steps / every + 1, 2 nv).
 
     every: steps between two values. Infinite from where the run has diverged or the band is far too wide, and after `most` steps.
@@ -118,7 +128,9 @@ def band(stepping: Method, tree: Tree, q, qd, tau, dt: float, every=1, most: int
     return widths
 
 
-def growth(stepping: Method, tree: Tree, q, qd, tau, dt: float, every: int, stride: int = 1) -> np.ndarray:
+def growth(
+    stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float, every: int, stride: int = 1
+) -> ndarray:
     """log10 of the growth of a small difference of the initial state, at every `every` steps.
 
     The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled to avoid overflow. NaN from where the run has diverged.
