@@ -53,6 +53,7 @@ def test_what_does_not_agree_is_named_with_its_first_cause_and_nothing_else():
     text = verdict(sections, 10, [{"text": f"number {k}"} for k in range(3)])
     assert "3 of 10 experiments" in text and " mass." in text and "gravity" not in text and "diagnosis" not in text
     assert "2 of 4" in text and "number 0; 2 more" in text and "number 2" not in text
+    assert "First failing check: mass: Mbar" in verdict(sections, 10)
 
 
 def cause(rank=2, experiment="parameters", **more):
