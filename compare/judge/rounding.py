@@ -81,14 +81,7 @@ def of_positions(tree: Tree, q: np.ndarray) -> np.ndarray:
 
 
 def band(
-    stepping: Method,
-    tree: Tree,
-    q: ndarray,
-    qd: ndarray,
-    tau: ndarray,
-    dt: float,
-    every: int = 1,
-    most: int | None = None,
+    stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float, every=1, most: int | None = None
 ) -> ndarray:
     """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states (steps + 1, nq, nv), (steps / every + 1, 2 nv).
 

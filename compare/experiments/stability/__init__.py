@@ -108,7 +108,7 @@ def rows(setup: Setup) -> Result:
 
 
 def is_large(robot: Robot) -> bool:
-    """Whether a file's robot has so many speeds that compiling its equations takes minutes."""
+    """Whether compiling the equations of a file's robot takes minutes, since it has many speeds."""
     return robot.is_read and robot.coordinates.nv > MOST_SPEEDS
 
 
