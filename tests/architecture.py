@@ -13,7 +13,10 @@ FILES = sorted((ROOT / "compare").rglob("*.py"))
 OF_TMT = sorted((ROOT / "tmt").rglob("*.py"))
 PAGE = ROOT / "ARCHITECTURE.md"
 DIAGRAM = re.compile(r"(?<=```mermaid\n).*?(?=```)", re.DOTALL)
-SHARED = {"compare.report.text", "compare.report.style"}  # for all: words from templates, the style of figures
+SHARED = {
+    "compare.report.text",
+    "compare.report.style",
+}  # for all: words from templates, the style of figures
 
 
 def dotted(path) -> str:
@@ -43,7 +46,9 @@ def imports(path) -> frozenset[str]:
 @cache
 def modules_imported(path) -> set[str]:
     """The modules of compare and tmt that a file imports."""
-    return {name if name in MODULES else name.rpartition(".")[0] for name in imports(path)} & MODULES - {dotted(path)}
+    return {name if name in MODULES else name.rpartition(".")[0] for name in imports(path)} & MODULES - {
+        dotted(path)
+    }
 
 
 def folder(module: str) -> str:
@@ -96,7 +101,9 @@ def diagram() -> str:
 
 def drawn() -> list[tuple[str, str]]:
     """The arrows of the diagram in ARCHITECTURE.md."""
-    return re.findall(r"^  (\S+) --> (\S+)$", DIAGRAM.search(PAGE.read_text(encoding="utf-8"))[0], re.MULTILINE)
+    return re.findall(
+        r"^  (\S+) --> (\S+)$", DIAGRAM.search(PAGE.read_text(encoding="utf-8"))[0], re.MULTILINE
+    )
 
 
 if __name__ == "__main__":

@@ -19,7 +19,10 @@ def laws(rng) -> dict[str, tuple[str, dict]]:
     def some(low, high, size=None):
         return numbers(rng.uniform(low, high, size))
 
-    bias = {"biastype": "affine", "biasprm": numbers([rng.uniform(-1, 1), rng.uniform(-9, 1), rng.uniform(-1, 1)])}
+    bias = {
+        "biastype": "affine",
+        "biasprm": numbers([rng.uniform(-1, 1), rng.uniform(-9, 1), rng.uniform(-1, 1)]),
+    }
     affine = {"gaintype": "affine", "gainprm": numbers([rng.uniform(1, 5), *rng.uniform(-3, 3, 2)])} | bias
     return {
         "motor": ("motor", {}), "position": ("position", {"kp": some(5, 50), "kv": some(0, 5)}),
@@ -36,7 +39,9 @@ def laws(rng) -> dict[str, tuple[str, dict]]:
 def robot(rng, text: str, flags: dict | None) -> tuple[ET.Element, list[str]]:
     """A random tree without contacts, some bodies lighter than they are or falling upwards; and a site in each body."""
     root, sites = ET.fromstring(text), []
-    ET.SubElement(root.find("option"), "flag", {"contact": "disable", "constraint": "disable"} | (flags or {}))
+    ET.SubElement(
+        root.find("option"), "flag", {"contact": "disable", "constraint": "disable"} | (flags or {})
+    )
     for body in root.iter("body"):
         sites.append(f"site of {body.get('name')}")
         place = {"pos": numbers(rng.uniform(-0.3, 0.3, 3)), "euler": numbers(rng.uniform(-1, 1, 3))}
@@ -46,10 +51,16 @@ def robot(rng, text: str, flags: dict | None) -> tuple[ET.Element, list[str]]:
     return root, sites
 
 
-def add_tendons(rng, root, joints: list[str], sites: list[str], stiffness: float, damping: float, dead: float) -> None:
+def add_tendons(
+    rng, root, joints: list[str], sites: list[str], stiffness: float, damping: float, dead: float
+) -> None:
     """A fixed tendon across two joints and a rope between two sites, with springs, dead bands and dampers."""
     tendons = ET.SubElement(root, "tendon")
-    given = {"stiffness": numbers(stiffness), "damping": numbers(damping), "springlength": numbers([0.1, 0.1 + dead])}
+    given = {
+        "stiffness": numbers(stiffness),
+        "damping": numbers(damping),
+        "springlength": numbers([0.1, 0.1 + dead]),
+    }
     across = ET.SubElement(tendons, "fixed", name="across", **given)
     rope = ET.SubElement(tendons, "spatial", name="rope", **given)
     for joint in rng.choice(joints, 2, replace=False):
@@ -109,7 +120,9 @@ def with_servos(seed: int, floats: bool = False, flags: dict | None = None) -> s
         kp, kind = 10.0 ** rng.uniform(1.5, 3.5), joint.get("type")
         kv = kp / 100 * rng.choice([0, 0.5, 5, 50, 500])
         for gear in ("1 0 0", "0 1 0", "0 0 1") if kind == "ball" else (str(rng.choice([1, 1, 3, -2])),):
-            ET.SubElement(actuators, "position", joint=joint.get("name"), kp=numbers(kp), kv=numbers(kv), gear=gear)
+            ET.SubElement(
+                actuators, "position", joint=joint.get("name"), kp=numbers(kp), kv=numbers(kv), gear=gear
+            )
         names += [joint.get("name")] * (kind != "ball")
     add_tendons(rng, root, names, sites, 30.0, 3.0, 0.0)
     kp, kv = 10 ** rng.uniform(1, 3), rng.choice([0, 5, 50])

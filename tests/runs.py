@@ -97,7 +97,9 @@ def started(*arguments, cwd, env=None):
 
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     environment = ENVIRONMENT | (env or {})
-    return subprocess.Popen(arguments, cwd=cwd, env=environment, start_new_session=True, preexec_fn=hearing, **pipes)
+    return subprocess.Popen(
+        arguments, cwd=cwd, env=environment, start_new_session=True, preexec_fn=hearing, **pipes
+    )
 
 
 def ended(run, name):

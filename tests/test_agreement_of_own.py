@@ -30,7 +30,12 @@ def given_states():
     """States, and MuJoCo's values of every quantity."""
     q, qd, tau = np.random.default_rng(2019).uniform(-2.0, 2.0, (3, 12, 2))
     theirs = engine(READING).of(ROBOT.case())
-    values = theirs.mass_matrix(q), theirs.bias(q, qd), theirs.gravity_balance(q), theirs.acceleration(q, qd, tau)
+    values = (
+        theirs.mass_matrix(q),
+        theirs.bias(q, qd),
+        theirs.gravity_balance(q),
+        theirs.acceleration(q, qd, tau),
+    )
     return {"q": q, "qd": qd, "tau": tau}, dict(zip(RIGHT, values))
 
 
@@ -51,7 +56,9 @@ def test_a_path_text_and_a_compiled_model_are_compared_at_the_same_states(tmp_pa
     models = PENDULUM, Path("pendulum.xml"), "pendulum.xml", model
     found, *same = [compare.differences(one, bias=bias, seed=3, states=5) for one in models]
     assert all(one == found for one in same) and len({one.state for one in found}) == 5
-    assert {one.state for one in found}.isdisjoint(one.state for one in compare.differences(model, bias=bias, states=5))
+    assert {one.state for one in found}.isdisjoint(
+        one.state for one in compare.differences(model, bias=bias, states=5)
+    )
     assert (model.opt.disableflags, model.opt.integrator, model.dof_damping.tolist()) == before
     assert os.listdir() == ["pendulum.xml"]  # no log, no cache
 
@@ -59,16 +66,26 @@ def test_a_path_text_and_a_compiled_model_are_compared_at_the_same_states(tmp_pa
 def test_values_as_arrays_at_the_given_states(given):
     states, values = given
     compare.assert_agrees(PENDULUM, **values, **states)
-    assert all(one.ratio <= 1.0 and one.cause == "" for one in compare.differences(PENDULUM, **values, **states))
+    assert all(
+        one.ratio <= 1.0 and one.cause == "" for one in compare.differences(PENDULUM, **values, **states)
+    )
     M, q = values["mass_matrix"].tolist(), states["q"].tolist()
     compare.assert_agrees(PENDULUM, mass_matrix=M, bias=bias, q=q, qd=0.0)
     first = {name: part[0] for name, part in states.items()}
-    compare.assert_agrees(PENDULUM, **{name: value[0] for name, value in values.items()}, **first)  # without a batch
-    column = {"mass_matrix": values["mass_matrix"][..., None], "bias": values["bias"][..., None].astype(object)}
+    compare.assert_agrees(
+        PENDULUM, **{name: value[0] for name, value in values.items()}, **first
+    )  # without a batch
+    column = {
+        "mass_matrix": values["mass_matrix"][..., None],
+        "bias": values["bias"][..., None].astype(object),
+    }
     compare.assert_agrees(PENDULUM, **column, **states)
     numbers = {name: sympy.Matrix(values[name][0]) for name in ("mass_matrix", "bias")}
     compare.assert_agrees(PENDULUM, **numbers, **first)
-    flat = {"mass_matrix": values["mass_matrix"].reshape(12, 4), "bias": values["bias"]}  # as in the rows of a file
+    flat = {
+        "mass_matrix": values["mass_matrix"].reshape(12, 4),
+        "bias": values["bias"],
+    }  # as in the rows of a file
     compare.assert_agrees(PENDULUM, **flat, **states)
 
 
@@ -104,13 +121,19 @@ def test_differences_are_every_entry_with_the_largest_ratio_first(given):
     changed[5, 1] += 1e-3
     changed[2, 0] -= 1e-2
     found = compare.differences(PENDULUM, bias=changed, **states)
-    assert len(found) == 24 and [one.ratio for one in found] == sorted((one.ratio for one in found), reverse=True)
+    assert len(found) == 24 and [one.ratio for one in found] == sorted(
+        (one.ratio for one in found), reverse=True
+    )
     first, second, third = found[:3]
     assert {(one.entry, one.state.number) for one in (first, second)} == {("h[hip]", 2), ("h[knee]", 5)}
     assert third.ratio <= 1.0 and third.cause == "" and first.cause == second.cause != ""
     for one in found:
         at = one.state.number, ["h[hip]", "h[knee]"].index(one.entry)
-        assert (one.yours, one.mujoco, one.difference) == (changed[at], values["bias"][at], one.yours - one.mujoco)
+        assert (one.yours, one.mujoco, one.difference) == (
+            changed[at],
+            values["bias"][at],
+            one.yours - one.mujoco,
+        )
         assert all(np.allclose(getattr(one.state, name), part[at[0]]) for name, part in states.items())
 
 
@@ -122,7 +145,9 @@ def advised(mjcf=PENDULUM, **brought):
     return float(rtol.split()[0].rstrip(".")) if found else None
 
 
-@pytest.mark.parametrize("height, share, is_rounded", [(0, 0.98e-6, True), (0, 1.02e-6, False), (20, 1e-3, False)])
+@pytest.mark.parametrize(
+    "height, share, is_rounded", [(0, 0.98e-6, True), (0, 1.02e-6, False), (20, 1e-3, False)]
+)
 def test_constants_rounded_to_six_digits_get_an_rtol_however_far_away(height, share, is_rounded, monkeypatch):
     """Far away the terms of each entry are large, and a slip is small compared with them."""
     monkeypatch.setattr("compare.agreement.why.SECONDS_OF_CAUSE", 0.0)
@@ -139,7 +164,9 @@ def test_no_rtol_is_advised_beside_a_cause_or_another_rtol_or_without_numbers(gi
     noise = 1.0 + 1e-7 * np.random.default_rng(0).normal(size=(12, 2, 2))
     noisy = {"mass_matrix": values["mass_matrix"] * (noise + np.swapaxes(noise, 1, 2)) / 2.0} | states
     assert 1e-8 < advised(**noisy) < 1e-6 and advised(**noisy, rtol=1e-9) is None
-    assert advised(mass_matrix=values["mass_matrix"] * (1.0 + 1e-7), **states) is None  # a factor of all is a cause
+    assert (
+        advised(mass_matrix=values["mass_matrix"] * (1.0 + 1e-7), **states) is None
+    )  # a factor of all is a cause
     bad = np.where(states["q"] > 1.0, np.nan, values["bias"])
     assert advised(mass_matrix=values["mass_matrix"], bias=bad, **states) is None
 
@@ -153,7 +180,9 @@ def test_a_structural_zero_has_the_scale_of_its_diagonal(share, agrees):
     scale = Entries(read(rods).tree, np.zeros((1, 2))).mass_matrix[0]
     between = share * FACTOR * EPS * np.sqrt(scale[0, 0] * scale[1, 1])
     worst, *_ = compare.differences(rods, mass_matrix=lambda q: [[0.35, between], [between, 0.6]])
-    assert worst.entry in ("M[left][right]", "M[right][left]") and worst.ratio == pytest.approx(share, rel=1e-2)
+    assert worst.entry in ("M[left][right]", "M[right][left]") and worst.ratio == pytest.approx(
+        share, rel=1e-2
+    )
     assert (worst.cause == "") is agrees
 
 
@@ -168,7 +197,9 @@ def in_joints(stated):
     return {
         "mass_matrix": lambda q: of.own_mass_matrix(mass_matrix(of.positions(q))),
         "bias": lambda q, v: of.own_forces(bias(of.positions(q), of.speeds(v))),
-        "acceleration": lambda q, v, t: of.own_forces(acceleration(of.positions(q), of.speeds(v), of.forces(t))),
+        "acceleration": lambda q, v, t: of.own_forces(
+            acceleration(of.positions(q), of.speeds(v), of.forces(t))
+        ),
     }, of
 
 

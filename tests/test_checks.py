@@ -18,7 +18,9 @@ DEPENDS = "smallest error of"  # on where rounding takes over on a machine
 
 def named(result) -> set[str]:
     """Experiment, scene and quantity of each check of a result, without measured numbers."""
-    lines = {MEASURED.sub("#", f"{c.experiment} | {c.scene} | {c.quantity} | {c.rule}") for c in result.checks}
+    lines = {
+        MEASURED.sub("#", f"{c.experiment} | {c.scene} | {c.quantity} | {c.rule}") for c in result.checks
+    }
     return {line for line in lines if DEPENDS not in line}
 
 

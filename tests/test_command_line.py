@@ -68,7 +68,9 @@ def test_a_quick_run_of_all_passes_with_a_line_for_each_experiment(of_the_termin
     # there is nothing to diagnose, and a quick run has no other engines, whether they are installed or not
     order = sorted(set(EXPERIMENTS) - {"engines"}, key=lambda name: (name in TIMED, EXPERIMENTS[name].order))
     expected = [[name, "skipped:" if name == "diagnosis" else "ok"] for name in order]
-    of_experiments = [line.split()[:2] for line in lines if line.split()[:1] and line.split()[0] in EXPERIMENTS]
+    of_experiments = [
+        line.split()[:2] for line in lines if line.split()[:1] and line.split()[0] in EXPERIMENTS
+    ]
     of_experiments.remove(["engines", "skipped:"])
     assert of_experiments == expected
     assert "Report: reports/latest/index.html (" in words(lines[len(EXPERIMENTS) :])
@@ -76,14 +78,22 @@ def test_a_quick_run_of_all_passes_with_a_line_for_each_experiment(of_the_termin
 
 def test_a_report_has_its_files_and_no_others_and_its_links_lead_to_them(report):
     folder, names = report
-    assert {p.name for p in folder.iterdir()} == {"report.md", "index.html", "results.json", "tables", "figures"}
+    assert {p.name for p in folder.iterdir()} == {
+        "report.md",
+        "index.html",
+        "results.json",
+        "tables",
+        "figures",
+    }
     found = (folder.glob(of) for of in ("tables/*", "figures/*"))
     tables, figures = ({str(path.relative_to(folder)): path for path in paths} for paths in found)
     assert {path.stem for path in tables.values()} >= {*names} - {"diagnosis", "engines"}
     for path in tables.values():  # tidy
         table = pd.read_csv(path)
         assert len(table) > 0 and "nan" not in path.read_text().lower()
-        assert all(re.fullmatch(r"[a-z0-9_]+", str(c)) or str(c).endswith("_J") for c in table.columns), path.name
+        assert all(re.fullmatch(r"[a-z0-9_]+", str(c)) or str(c).endswith("_J") for c in table.columns), (
+            path.name
+        )
     assert all(path.suffix in (".png", ".gif") and path.stat().st_size > 5000 for path in figures.values())
     page, text = ((folder / name).read_text(encoding="utf-8") for name in ("index.html", "report.md"))
     assert set(re.findall(r'(?:src|href)="(?!data:|#)([^"]+)"', page)) == tables.keys()
@@ -96,8 +106,14 @@ def test_results_have_their_fields(report):
     folder, names = report
     ran, results = {*names} - {"diagnosis", "engines"}, results_in(folder)  # a quick run, where nothing fails
     assert set(results) == {"passed", "reference", "checks", "causes", "skipped", "provenance"}
-    assert (results["reference"], results["passed"], results["causes"]) == ({"kind": "arm", "name": "arm"}, True, [])
-    assert sorted(skip["experiment"] for skip in results["skipped"]) == sorted({"diagnosis", "engines"} & {*names})
+    assert (results["reference"], results["passed"], results["causes"]) == (
+        {"kind": "arm", "name": "arm"},
+        True,
+        [],
+    )
+    assert sorted(skip["experiment"] for skip in results["skipped"]) == sorted(
+        {"diagnosis", "engines"} & {*names}
+    )
     assert all(set(check) == FIELDS for check in results["checks"])
     assert {check["experiment"] for check in results["checks"]} == ran
     origin = results["provenance"]
@@ -116,7 +132,10 @@ def test_results_have_their_fields(report):
 def test_a_wrong_file_differs_from_the_stated_numbers_and_not_from_its_own(inside, tmp_path, capsys):
     path, out = tmp_path / "two.xml", tmp_path / "out"
     path.write_text(XML.replace('mass="1.5"', 'mass="1.6"').replace("-9.81", "-9.8"))
-    for asked, status, kind, name in (([], 1, "arm", "arm"), (["--reference", "model"], 0, "model", str(path))):
+    for asked, status, kind, name in (
+        ([], 1, "arm", "arm"),
+        (["--reference", "model"], 0, "model", str(path)),
+    ):
         assert main(["parameters", "--quick", "--mjcf", str(path), *asked, "--out", str(out)]) == status
         first, *lines = capsys.readouterr().out.splitlines()
         assert first.startswith(f"reference: {kind}; {path} ")
@@ -147,7 +166,9 @@ def test_a_robot_that_is_not_stable_at_its_own_step_agrees_and_fails(inside, tmp
     assert not results["passed"] and results["causes"] == []
     failed = [check for check in results["checks"] if not check["passed"]]
     quantities = ("stable in its own run", "stable at its own step")
-    assert [(check["quantity"], check["scene"]) for check in failed] == [(quantity, "qpos0") for quantity in quantities]
+    assert [(check["quantity"], check["scene"]) for check in failed] == [
+        (quantity, "qpos0") for quantity in quantities
+    ]
 
 
 def test_a_requested_step_that_is_not_stable_fails(inside, tmp_path, capsys):
@@ -209,7 +230,9 @@ def test_a_bad_request_gets_one_line_and_status_2(arguments, capsys, monkeypatch
         status = stop.code
     out, err = capsys.readouterr()
     assert (status, out, len(err.splitlines())) == (2, "", 1) and WRONG[arguments] in err, err
-    assert err.startswith("python -m compare: ") and {path.name for path in tmp_path.iterdir()} == FILES.keys()
+    assert (
+        err.startswith("python -m compare: ") and {path.name for path in tmp_path.iterdir()} == FILES.keys()
+    )
 
 
 def test_values_at_the_edge_are_accepted_and_those_beyond_are_not():

@@ -24,7 +24,8 @@ EXPECTED = {
 
 
 @pytest.mark.parametrize(
-    "path", [pytest.param(path, marks=[pytest.mark.slow] * (path.stem in SLOW), id=path.stem) for path in EXAMPLES]
+    "path",
+    [pytest.param(path, marks=[pytest.mark.slow] * (path.stem in SLOW), id=path.stem) for path in EXAMPLES],
 )
 def test_an_example_runs_and_says_what_it_finds(path, tmp_path):
     if path.stem == "exported_c" and not shutil.which("gcc"):

@@ -75,7 +75,9 @@ def test_what_is_the_users_own_must_follow_from_the_m_and_h_that_the_cause_expla
     assert "mass" in found.causes[0]["text"] and found.failed
     left = standing(found.sections)
     if stands == {"energy"}:
-        assert {check.quantity.split()[0].strip(",") for check in left} >= {"energy"} and len(left) < len(found.failed)
+        assert {check.quantity.split()[0].strip(",") for check in left} >= {"energy"} and len(left) < len(
+            found.failed
+        )
     else:
         assert {check.experiment for check in left} == stands
 
@@ -87,7 +89,9 @@ def test_a_wrong_number_of_a_file_explains_no_error_of_an_engine(tmp_path, monke
     file.write_text(Path("mjcf/arm.xml").read_text().replace('mass="1.5"', 'mass="1.51"'))
     monkeypatch.setattr(MujocoDynamics, "bias", lambda *a: bias(*a) + wrong)
     _, robot, mujoco, reading = compared_with("arm", str(file))
-    setup = Setup(robot, engines(mujoco), states=30, exact_states=1, finer=(1,), size="quick", reading=reading)
+    setup = Setup(
+        robot, engines(mujoco), states=30, exact_states=1, finer=(1,), size="quick", reading=reading
+    )
     sections, causes, _ = examine(NAMES, setup, tmp_path, Lines(), IDLE)
     assert causes[0]["text"].startswith("mass of forearm")
     assert {check.experiment for check in standing(sections)} == stands
@@ -107,7 +111,9 @@ def test_what_no_cause_explains(tmp_path, monkeypatch):
     file = tmp_path / "heavy.xml"
     file.write_text(Path("mjcf/arm.xml").read_text().replace('mass="1.5"', 'mass="1.51"'))
     _, robot, mujoco, reading = compared_with("arm", str(file))
-    setup = Setup(robot, engines(mujoco), states=30, exact_states=1, finer=(1,), size="quick", reading=reading)
+    setup = Setup(
+        robot, engines(mujoco), states=30, exact_states=1, finer=(1,), size="quick", reading=reading
+    )
     printed = section_of("published", ("TMT, torque", 2.0), ("MuJoCo, torque", 2.0))
     assert [check.quantity for check in explained(setup, printed)] == ["MuJoCo, torque"]
     other = replace(robot, tree=replace(robot.tree, parent=(-1, 0, 0)))

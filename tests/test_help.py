@@ -88,7 +88,11 @@ def test_a_command_line_that_is_shown_can_be_given(line, capsys):
         assert request(words).experiment == words[0]
 
 
-TAKES_SECONDS = ("equations --out arm_c", "mass --out /tmp/mass", "parameters --mjcf my_arm.xml --reference arm")
+TAKES_SECONDS = (
+    "equations --out arm_c",
+    "mass --out /tmp/mass",
+    "parameters --mjcf my_arm.xml --reference arm",
+)
 
 
 def lines_to_run():

@@ -53,7 +53,9 @@ def test_what_does_not_fit_is_one_line(coordinates, stated, word):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("first", [["hip", "knee-0.1rad", "rail+0.2m"], ["-knee+170deg", "-hip+0.3rad", "-rail+5m"]])
+@pytest.mark.parametrize(
+    "first", [["hip", "knee-0.1rad", "rail+0.2m"], ["-knee+170deg", "-hip+0.3rad", "-rail+5m"]]
+)
 @pytest.mark.parametrize(
     "second", [["rail-7m", "-knee+20deg", "hip"], ["-hip in deg", "knee+90deg in deg (rad/s)", "-rail+3m"]]
 )

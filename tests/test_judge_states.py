@@ -25,7 +25,10 @@ def test_random_states_fill_the_ranges_of_joints_which_a_speed_passes_in_a_secon
     ranges = (-1.0, 2.0), None, (0.5, 0.75)
     robot = dataclasses.replace(ARM, ranges=ranges)
     widths = np.array([3.0, 2.0 * np.pi, 0.25])
-    for states_of, most in ((states.random(robot, 500, 0).q, widths), (states.random(robot, 500, 0).qd, 2.0 * widths)):
+    for states_of, most in (
+        (states.random(robot, 500, 0).q, widths),
+        (states.random(robot, 500, 0).qd, 2.0 * widths),
+    ):
         assert (np.ptp(states_of, axis=0) <= most).all() and (np.ptp(states_of, axis=0) > 0.95 * most).all()
     q = states.random(robot, 500, 0).q[:, [0, 2]]
     assert (q.min(axis=0) >= [-1.0, 0.5]).all() and (q.max(axis=0) <= [2.0, 0.75]).all()
@@ -36,7 +39,9 @@ def test_random_states_fill_the_ranges_of_joints_which_a_speed_passes_in_a_secon
 def larger(joints):
     """The arm with this many times its joints and bodies, one chain."""
     tree, n = ARM.tree, 3 * joints
-    many = {name: getattr(tree, name) * joints for name in ("offset", "axis", "damping", "mass", "com", "inertia")}
+    many = {
+        name: getattr(tree, name) * joints for name in ("offset", "axis", "damping", "mass", "com", "inertia")
+    }
     names = {"hinge_names": [f"h{i}" for i in range(n)], "body_names": [f"b{i}" for i in range(2 * joints)]}
     hinges = {"parent": range(-1, n - 1), "body_hinge": [3 * k + i for k in range(joints) for i in (1, 2)]}
     rest = dict.fromkeys(("kind", "armature", "stiffness", "rest", "reference"), ())
@@ -52,7 +57,11 @@ def test_a_large_robot_gets_fewer_states_with_a_note():
     giant = larger(states.MOST_SPEEDS // 3 + 1)
     assert states.named(giant).exact_states == 0
     some = states.random(giant, 10_000, 5)
-    assert some.exact_states == 0 and len(some.notes) == 2 and states.random(giant, 10, 5).notes == some.notes[1:]
+    assert (
+        some.exact_states == 0
+        and len(some.notes) == 2
+        and states.random(giant, 10, 5).notes == some.notes[1:]
+    )
     numbers = 3 * len(giant.tree.mass) * giant.coordinates.nv
     assert len(some.q) * numbers <= states.MOST_NUMBERS < (len(some.q) + 1) * numbers
 
@@ -66,7 +75,10 @@ def test_the_first_states_of_a_sample_are_a_sample():
 
 def test_exact_values_are_those_of_the_first_states_in_their_order():
     sample = states.random(ARM, 10, 4)
-    for function, arguments in (("mass_matrix", (sample.q,)), ("acceleration", (sample.q, sample.qd, sample.tau))):
+    for function, arguments in (
+        ("mass_matrix", (sample.q,)),
+        ("acceleration", (sample.q, sample.qd, sample.tau)),
+    ):
         expected = getattr(tmt, function)(*(x[:4] for x in arguments))
         assert np.allclose(sample.exact(function).high, expected, rtol=1e-12)
     assert np.allclose(sample.exact("jacobians", 1).high, tmt.jacobians(sample.q[:4])[1], atol=1e-14)

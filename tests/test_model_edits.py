@@ -19,7 +19,9 @@ from compare.run.examine import Setup, new_causes
 ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge"' for name in ("alpha", "beta", "gamma"))
 FOREARM = '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>'
 STAGES_OFF = 'contact="disable" constraint="disable"'
-ON_THE_WORLD = XML.replace('<body name="fore', '</body><body name="fore').replace("</body>\n    </body>", "</body>")
+ON_THE_WORLD = XML.replace('<body name="fore', '</body><body name="fore').replace(
+    "</body>\n    </body>", "</body>"
+)
 GEOM = '<geom size="0.001" pos="0.2 0.2 0.2"/>'
 TOUCHING = XML.replace("</worldbody>", f"{GEOM}</worldbody>").replace(FOREARM, FOREARM + GEOM)
 TABLE = '<body pos="1 0 0"><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/></body></worldbody>'
@@ -32,7 +34,9 @@ NO_FORCE = "kinematics"  # no masses nor forces in positions, speeds and Jacobia
 NO_WEIGHT = "kinematics gravity"  # no inertia in the torque that holds
 NO_MASS = "kinematics mass"  # it is no part of M
 NOT_AT_REST = "kinematics mass published gravity"
-NOT_AT_ZERO = "kinematics mass gravity published reduction"  # springs and servos are at rest, or joints are locked
+NOT_AT_ZERO = (
+    "kinematics mass gravity published reduction"  # springs and servos are at rest, or joints are locked
+)
 STANDS_STILL = OFF = f"kinematics {MOTION}"  # beside the arm; the file switches the constraint stage off
 MIRROR = MOTION  # M, torques and runs are those of the arm turned about beta the other way
 NO_PLACE = MOTION.replace("acceleration ", "")  # the equations do not depend on where the shoulder is
@@ -110,18 +114,29 @@ def without_some_joints(setup) -> Result:
 
 
 STATES = {name: module(name).rows for name in ("published", "kinematics", "mass", "gravity", "acceleration")}
-RUNS = {"trajectory": follow, "speed": untimed_speed, "stability": linearise, "reduction": without_some_joints}
+RUNS = {
+    "trajectory": follow,
+    "speed": untimed_speed,
+    "stability": linearise,
+    "reduction": without_some_joints,
+}
 
 
-@pytest.mark.parametrize("experiments", [STATES, pytest.param(RUNS, marks=pytest.mark.slow)], ids=["states", "runs"])
-@pytest.mark.parametrize("name", [None, *(name for name, (*_, unseen) in EDITS.items() if unseen is not None)])
+@pytest.mark.parametrize(
+    "experiments", [STATES, pytest.param(RUNS, marks=pytest.mark.slow)], ids=["states", "runs"]
+)
+@pytest.mark.parametrize(
+    "name", [None, *(name for name, (*_, unseen) in EDITS.items() if unseen is not None)]
+)
 def test_a_wrong_model_fails_wherever_it_matters(name, experiments):
     old, new, _, unseen = EDITS[name] if name else ("</mujoco>", "</mujoco>", [], " ".join(experiments))
     try:
         setup = setup_of(edited((old, new)), Setup, states=20, exact_states=1, finer=(1,), size="small")
     except ValueError:
         pytest.skip("this MuJoCo does not know what the edit asks for")
-    failing = {each for each, rows in experiments.items() if not all(check.passed for check in rows(setup).checks)}
+    failing = {
+        each for each, rows in experiments.items() if not all(check.passed for check in rows(setup).checks)
+    }
     assert failing == experiments.keys() - set(unseen.split())
 
 
@@ -162,7 +177,9 @@ def test_a_number_that_differs_fails_its_own_check_and_is_the_cause(quantity):
         else:
             raise
     assert quantity.removesuffix(" of all") in failed
-    assert [(c["rank"], c["place"], c["stated"], pytest.approx(c["found"], rel=1e-14)) for c in known] == causes
+    assert [
+        (c["rank"], c["place"], c["stated"], pytest.approx(c["found"], rel=1e-14)) for c in known
+    ] == causes
 
 
 def test_causes_come_by_rank_then_by_size():
@@ -183,7 +200,11 @@ def test_a_force_that_no_number_explains_is_the_cause():
 def test_geoms_that_cannot_touch_are_no_cause():
     """They are excluded, or MuJoCo has no contact stage."""
     excluded = '<contact><exclude body1="world" body2="forearm"/></contact></mujoco>'
-    for stages, end in (('contact="disable"', "</mujoco>"), ('constraint="disable"', "</mujoco>"), ("", excluded)):
+    for stages, end in (
+        ('contact="disable"', "</mujoco>"),
+        ('constraint="disable"', "</mujoco>"),
+        ("", excluded),
+    ):
         assert places(TOUCHING.replace(STAGES_OFF, stages).replace("</mujoco>", end)) == []
 
 

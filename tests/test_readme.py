@@ -46,7 +46,10 @@ def largest(rows, **where):
 
 def test_its_figures_are_those_of_the_example():
     results = json.loads((EXAMPLE / "results.json").read_text(encoding="utf-8"))
-    assert results["provenance"]["command"].endswith("-m compare all --out reports/example") and results["passed"]
+    assert (
+        results["provenance"]["command"].endswith("-m compare all --out reports/example")
+        and results["passed"]
+    )
     rows = [row for row in table("stability") if row["predicted_dt_s"] and row["observed_dt_s"]]
     off = [float(row["observed_dt_s"]) / float(row["predicted_dt_s"]) - 1.0 for row in rows]
     text = (EXAMPLE / "report.md").read_text(encoding="utf-8")
@@ -64,10 +67,14 @@ def test_its_figures_are_those_of_the_example():
     ):  # fmt: skip
         assert figure in text, figure
     rows = [row for row in table("evaluations") if row["quantity"] == "forward_dynamics"]
-    asked = ([row for row in rows if row["implementation"] == name] for name in ("MuJoCo, mj_forward", "compiled"))
+    asked = (
+        [row for row in rows if row["implementation"] == name] for name in ("MuJoCo, mj_forward", "compiled")
+    )
     mujoco, compiled = (min(float(row["ns_per_state"]) for row in of) for of in asked)
     assert f"is {mujoco / compiled:.0f} times as fast as mj_forward per evaluation" in README
-    shown = [(row, f"| {row['scene']}: {float(row['target_rad']):.0e} rad |") for row in table("what_should_i_use")]
+    shown = [
+        (row, f"| {row['scene']}: {float(row['target_rad']):.0e} rad |") for row in table("what_should_i_use")
+    ]
     shown = [f"{said} {cheapest(row)} |" for row, said in shown if said in README]
     assert len(shown) == 4 and all(line in README for line in shown)
 
@@ -83,7 +90,9 @@ def cheapest(row):
 @pytest.mark.parametrize("text", blocks("python"), ids=lambda text: text.splitlines()[0])
 def test_python_runs_as_it_is_printed(text, tmp_path, monkeypatch):
     """A block that fails does so with the message that the next block shows."""
-    following = ([block for at, block in enumerate(BLOCKS) if at and BLOCKS[at - 1][1] == text] or [("", "")])[0]
+    following = (
+        [block for at, block in enumerate(BLOCKS) if at and BLOCKS[at - 1][1] == text] or [("", "")]
+    )[0]
     try:
         names = run(text, tmp_path, monkeypatch)
     except AssertionError as error:

@@ -16,7 +16,9 @@ from compare.robots.actuators import Drive
 from compare.robots.coordinates import floats, free_joints
 from compare.robots.file import COARSER, DURATION, SERVOS_ACT, added_damping, coarsest, robot_of, scenes_from
 
-ONE = replace(tmt.ARM.lock({"alpha": 0.0, "beta": 0.0}), gravity=(0.0, 0.0, 0.0))  # one hinge, its inertia 0.0527 kg m2
+ONE = replace(
+    tmt.ARM.lock({"alpha": 0.0, "beta": 0.0}), gravity=(0.0, 0.0, 0.0)
+)  # one hinge, its inertia 0.0527 kg m2
 
 
 def reading_of(tree, **more):
@@ -39,10 +41,16 @@ def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
     alone = robot_of(reading_of(arm), "my.xml")
     assert list(alone.poses) == ["qpos0"] and alone.scenes[0].posture == "qpos0" and alone.is_read
     keys = {name: np.full(3, 0.1 * k) for k, name in enumerate(["qpos0", "key qpos0"], start=1)}
-    assert list(robot_of(reading_of(arm, keyframes=keys), "my.xml").poses) == ["key key qpos0", "key qpos0", "qpos0"]
+    assert list(robot_of(reading_of(arm, keyframes=keys), "my.xml").poses) == [
+        "key key qpos0",
+        "key qpos0",
+        "qpos0",
+    ]
     reading = read(PATHS["pendulum_ball"])  # quaternions of one turn are one posture
     assert list(robot_of(replace(reading, keyframes={"turned": -reading.qpos0}), "p.xml").poses) == ["turned"]
-    assert list(robot_of(replace(reading, keyframes={}, ranges=((0.0, 1.0),) * 2), "p.xml").poses) == ["qpos0"]
+    assert list(robot_of(replace(reading, keyframes={}, ranges=((0.0, 1.0),) * 2), "p.xml").poses) == [
+        "qpos0"
+    ]
 
 
 @pytest.mark.parametrize("name", [*PATHS, 0, 1])
@@ -69,7 +77,9 @@ def test_both_engines_start_every_scene_alike(name):
 @pytest.mark.parametrize("before, shift, free, floating", [
     (-1, 0.0, [1], True), (0, 0.0, [1], False), (-1, 0.1, [], False),
 ])  # fmt: skip
-def test_three_slides_and_a_ball_in_one_place_are_free_and_float_if_not_carried(before, shift, free, floating):
+def test_three_slides_and_a_ball_in_one_place_are_free_and_float_if_not_carried(
+    before, shift, free, floating
+):
     tree = tmt.Tree(
         [*"hxyzb"], (-1, before, 1, 2, 3), [(0, 0, 0)] * 2 + [(shift, 0, 0)] + [(0, 0, 0)] * 2,
         [(0, 1, 0), *np.eye(3), *np.eye(3)],
@@ -80,7 +90,9 @@ def test_three_slides_and_a_ball_in_one_place_are_free_and_float_if_not_carried(
 
 
 def test_a_free_body_is_thrown_up_and_tumbles():
-    (scene,) = (scene for scene in robot_of(read(PATHS["free_body"]), "s.xml").scenes if scene.name.endswith("thrown"))
+    (scene,) = (
+        scene for scene in robot_of(read(PATHS["free_body"]), "s.xml").scenes if scene.name.endswith("thrown")
+    )
     assert scene.speed == (0.0, 0.0, 2.0, 120.0, 60.0, -90.0)
 
 
@@ -123,7 +135,9 @@ def test_steps_are_four_of_the_files_own_and_no_longer_than_the_fastest_rate():
     inverse = np.array([[1.0 / inertia]])
 
     def count(dt, rate=0.0, swing=0.0, added=()):
-        return coarsest(replace(ONE, damping=(rate * inertia,), stiffness=(swing**2 * inertia,)), inverse, dt, added)
+        return coarsest(
+            replace(ONE, damping=(rate * inertia,), stiffness=(swing**2 * inertia,)), inverse, dt, added
+        )
 
     assert count(1.0) == 64 and count(DURATION / 64 / COARSER) == 64
     assert count(0.99 * DURATION / 64 / COARSER) == 128 and count(1e-9) == 8192

@@ -48,7 +48,9 @@ def test_tmt_imports_three_libraries_alone():
     """And its symbolic equations SymPy, which need not be installed."""
     allowed = {*sys.stdlib_module_names, "tmt", "numpy", "llvmlite", "mpmath"}
     for path in OF_TMT:
-        assert not libraries(path) - allowed - ({"sympy"} if dotted(path).startswith("tmt.export.") else set()), path
+        assert (
+            not libraries(path) - allowed - ({"sympy"} if dotted(path).startswith("tmt.export.") else set())
+        ), path
 
 
 def test_imports_keep_their_directions():

@@ -29,7 +29,9 @@ def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free"), most=
         body_hinge.append(before)
         inertias.append(possible_tensor(rng))
     n, nv = len(parent), len(axis)
-    rest = [x for name in kind for x in (unit_quaternion(rng) if name == "ball" else [rng.uniform(-0.5, 0.5)])]
+    rest = [
+        x for name in kind for x in (unit_quaternion(rng) if name == "ball" else [rng.uniform(-0.5, 0.5)])
+    ]
     return Tree(
         hinge_names=[f"{name}{i}" for i, name in enumerate(kind)], parent=parent, offset=offset, axis=axis,
         damping=rng.uniform(0.0, 0.5, nv), **random_bodies(rng, body_hinge, inertias), kind=kind, rest=rest,
@@ -74,7 +76,12 @@ def random_bodies(rng, body_hinge, inertias) -> dict:
     """What a Tree says of bodies on these joints, and gravity."""
     count = len(body_hinge)
     mass, com = rng.uniform(0.5, 2.0, count), rng.uniform(-0.3, 0.3, (count, 3))
-    bodies = {"body_names": [f"body{b}" for b in range(count)], "body_hinge": body_hinge, "mass": mass, "com": com}
+    bodies = {
+        "body_names": [f"body{b}" for b in range(count)],
+        "body_hinge": body_hinge,
+        "mass": mass,
+        "com": com,
+    }
     return bodies | {"inertia": inertias, "gravity": rng.normal(size=3) * 5.0}
 
 

@@ -106,9 +106,13 @@ class Answers:
 
     def of_any(self, quantity: str, given: tuple[Any, ...]) -> Any:
         """The quantity of states of any batch shape; None where the literal form is to answer."""
-        with np.errstate(all="ignore"):  # of numbers beyond the largest double, which the literal form refuses
+        with np.errstate(
+            all="ignore"
+        ):  # of numbers beyond the largest double, which the literal form refuses
             found = [x if type(x) is ndarray and x.dtype is DOUBLE else real_numbers(x) for x in given]
-        arrays = [x for x, shape in zip(found, self.shapes) if x is not None and x.ndim and x.shape[-1:] == shape]
+        arrays = [
+            x for x, shape in zip(found, self.shapes) if x is not None and x.ndim and x.shape[-1:] == shape
+        ]
         if len(arrays) < len(given):
             return None
         try:

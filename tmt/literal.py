@@ -53,7 +53,11 @@ def gather(nested, batch, overflow=None) -> np.ndarray:
     """
 
     def lists(item):
-        return [lists(i) for i in item] if not isinstance(item, (float, np.ndarray)) else np.broadcast_to(item, batch)
+        return (
+            [lists(i) for i in item]
+            if not isinstance(item, (float, np.ndarray))
+            else np.broadcast_to(item, batch)
+        )
 
     array = np.array(lists(nested), dtype=float)
     finite = np.isfinite(array)

@@ -104,7 +104,11 @@ def simulate(
     taylor = isinstance(method, str) and method == "taylor"
     runner = runner_of(model, "dopri8_adaptive" if taylor else method)
     stepping = runner.stepping
-    steps, every, dt = given.whole("steps", steps), given.whole("every", every), given.positive("dt", dt, "a step in s")
+    steps, every, dt = (
+        given.whole("steps", steps),
+        given.whole("every", every),
+        given.positive("dt", dt, "a step in s"),
+    )
     if steps % every:
         why = f"of which steps = {shown(steps)} is no multiple"
         raise ValueError(f"every is {shown(every)}, {why}; a divisor is expected")
@@ -116,7 +120,9 @@ def simulate(
     runs = len(start[0])
     path_q, path_qd = given.paths(runs, steps, every, model.coordinates.nq, model.coordinates.nv)
     if steps * dt == np.inf:
-        raise ValueError(f"dt is {dt:g} and steps is {shown(steps)}; their product is beyond the largest double")
+        raise ValueError(
+            f"dt is {dt:g} and steps is {shown(steps)}; their product is beyond the largest double"
+        )
     path_q[:, 0], path_qd[:, 0], torque = start
     if taylor:
         ended, evaluations = by_series(model, path_q, path_qd, torque, dt, steps, every, tolerance)
@@ -151,14 +157,23 @@ def starts(model: Tree, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
 
 
 def by_series(
-    tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, steps: int, every: int, tolerance: float
+    tree: Tree,
+    q: np.ndarray,
+    qd: np.ndarray,
+    tau: np.ndarray,
+    dt: float,
+    steps: int,
+    every: int,
+    tolerance: float,
 ) -> tuple[np.ndarray, int]:
     """Write the true motions to the paths (runs, records, nq and nv), which hold the starts: why each ended, and the steps."""
     from tmt.exact.motion import followed  # here, so that `import tmt` need not wait for it
 
     ended, count = np.full(len(q), None, dtype=object), 0
     for run in range(len(q)):
-        path, took, error = followed(tree, q[run, 0], qd[run, 0], tau[run], dt, steps, every, tolerance=tolerance)
+        path, took, error = followed(
+            tree, q[run, 0], qd[run, 0], tau[run], dt, steps, every, tolerance=tolerance
+        )
         count, alive = count + took, len(path)
         q[run, 1:alive], qd[run, 1:alive] = np.split(path[1:, 0], [q.shape[-1]], axis=1)
         q[run, alive:], qd[run, alive:] = np.nan, np.nan
@@ -195,7 +210,9 @@ def reasons(
         record, last = divmod(int(steps[run]), every)
         path, speeds = between(run, record) if last and between else (q[run, record:], qd[run, record:])
         code = int(codes[run])
-        reach = max((max(abs(path[last, at][0]), dt * abs(speeds[last, by][0])) for _, at, by in hinges), default=0.0)
+        reach = max(
+            (max(abs(path[last, at][0]), dt * abs(speeds[last, by][0])) for _, at, by in hinges), default=0.0
+        )
         if code in (OVERFLOW, NEWTON) and reach > 2.0**48:
             code = TURNED  # within the step: there is no sine at its stages
         elif code == TURNED and not reach > 2.0**48:
@@ -217,8 +234,13 @@ def singular_step(
     last = int(np.isfinite(q[:, 0]).sum()) - 1
     change = np.abs(np.diff(qd[: last + 1], axis=0)).max(axis=1)
     more = {min(last, len(q) - 2), int(np.argmax(change)) if len(change) else 0}
-    looked = [(0, every, found), *((record * every, 1, singular_in(tree, *between(record))) for record in more)]
-    return min(((first + stride * found[0], found[1]) for first, stride, found in looked if found), default=None)
+    looked = [
+        (0, every, found),
+        *((record * every, 1, singular_in(tree, *between(record))) for record in more),
+    ]
+    return min(
+        ((first + stride * found[0], found[1]) for first, stride, found in looked if found), default=None
+    )
 
 
 def singular_in(tree: Tree, q: np.ndarray, qd: np.ndarray) -> tuple[int, str] | None:

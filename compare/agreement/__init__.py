@@ -202,7 +202,9 @@ def message(given: Given) -> str:
         "why": why,
         "remarks": [say(remark) for remark in remarks(given.reading, has_scenes=False)],
         "rounded": None if why.is_found or given.rtol else rounded(given),
-        "hinge": next((name for name, kind in zip(given.tree.hinge_names, given.tree.kind) if kind == "hinge"), ""),
+        "hinge": next(
+            (name for name, kind in zip(given.tree.hinge_names, given.tree.kind) if kind == "hinge"), ""
+        ),
     }
     text = block("agreement", "message", **values)
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())

@@ -22,7 +22,12 @@ from ..robots.joint_map import JointMap, joint_map
 from ..robots.states import random
 from ..robots.validation import is_number
 
-SYMBOLS_OF = {"mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd"}  # quantities and their entries
+SYMBOLS_OF = {
+    "mass_matrix": "M",
+    "bias": "h",
+    "gravity": "g",
+    "acceleration": "qdd",
+}  # quantities and their entries
 SCALES = {"mass_matrix": "mass_matrix", "bias": "bias", "gravity": "weight"}
 DEFAULT_STATES = 100
 OWN_SECONDS = 20.0  # s for the user's functions at random states
@@ -70,7 +75,9 @@ class Given:
         self.read(mjcf)
         self.joints: JointMap = joint_map(self.coordinates, joints)
         functions = {name: value for name, value in brought.items() if is_function(value)}
-        self.own = OwnEquations(functions, self.coordinates, self.joints, self.tree, ()) if functions else None
+        self.own = (
+            OwnEquations(functions, self.coordinates, self.joints, self.tree, ()) if functions else None
+        )
         if q is not None:
             self.take_states(q, qd, tau)
             if states != DEFAULT_STATES:
@@ -105,7 +112,9 @@ class Given:
         self.own.try_at(sample.q, sample.qd, sample.tau)
         count = self.own.affordable(len(sample.q), OWN_SECONDS)
         if count < len(sample.q):
-            text = f"{count} states instead of {states}: your functions take {self.own.seconds:.2g} s per state"
+            text = (
+                f"{count} states instead of {states}: your functions take {self.own.seconds:.2g} s per state"
+            )
             warnings.warn(text, stacklevel=4)
         self.q, self.qd, self.tau = sample.q[:count], sample.qd[:count], sample.tau[:count]
 
@@ -117,14 +126,22 @@ class Given:
         for name, value in {"qd": qd, "tau": tau}.items():
             needed = [of for of in self.brought if name in ("q", "qd", "tau")[: ARGUMENTS[of]]]
             if value is None and needed:
-                raise ValueError(f"{needed[0]} depends on {name}; expected {name} of shape ({count}, {nv}), or 0.0")
+                raise ValueError(
+                    f"{needed[0]} depends on {name}; expected {name} of shape ({count}, {nv}), or 0.0"
+                )
             own[name] = rows_given(name, 0.0 if value is None else value, nv, count)
         self.q = self.joints.positions(own["q"])
         self.qd, self.tau = self.joints.speeds(own["qd"]), self.joints.forces(own["tau"])
         for joint, name in zip(self.coordinates.places.joints, self.coordinates.names):
-            off = np.abs(np.linalg.norm(self.q[:, joint.q], axis=1) - 1.0).max() if joint.kind == "ball" else 0.0
+            off = (
+                np.abs(np.linalg.norm(self.q[:, joint.q], axis=1) - 1.0).max()
+                if joint.kind == "ball"
+                else 0.0
+            )
             if off > CLOSE_TO_ONE:
-                raise ValueError(f"q of {name} is not a quaternion of length 1 at every state; expected w, x, y, z")
+                raise ValueError(
+                    f"q of {name} is not a quaternion of length 1 at every state; expected w, x, y, z"
+                )
 
     @cached_property
     def states(self) -> list[State]:
@@ -155,7 +172,9 @@ class Given:
         array = numbers_of(brought)
         shape = (count, nv, nv) if name == "mass_matrix" else (count, nv)
         if array is None:
-            raise ValueError(f"{name} is {shown(brought)}; expected real numbers of shape {shape}, or a function")
+            raise ValueError(
+                f"{name} is {shown(brought)}; expected real numbers of shape {shape}, or a function"
+            )
         flat = in_shape(array, (count, nv * nv)) if name == "mass_matrix" else None
         values = in_shape(array, shape) if flat is None else flat.reshape(shape)
         if values is None:
@@ -203,7 +222,12 @@ def rows_given(name: str, values: Any, size: int, count: int | None) -> np.ndarr
         array = np.full((count, size), float(array))
     elif array.ndim == 1 and size in (1, len(array)):
         array = array.reshape(-1, size)
-    if array.ndim != 2 or array.shape[1] != size or (count is not None and len(array) != count) or not len(array):
+    if (
+        array.ndim != 2
+        or array.shape[1] != size
+        or (count is not None and len(array) != count)
+        or not len(array)
+    ):
         raise ValueError(f"{name} has shape {np.shape(values)}; expected {expected}")
     if not np.isfinite(array).all():
         raise ValueError(f"{name} has values that are not finite; expected finite numbers")

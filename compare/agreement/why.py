@@ -49,7 +49,9 @@ def cause_of(given: Given) -> Why:
 
 def some_states(given: Given) -> np.ndarray:
     """The numbers of as many states as a diagnosis takes: of those with finite values the first, and the worst."""
-    ratios = [comparison.ratio.reshape(len(given.q), -1).max(axis=1) for comparison in given.compared.values()]
+    ratios = [
+        comparison.ratio.reshape(len(given.q), -1).max(axis=1) for comparison in given.compared.values()
+    ]
     worst = np.max(ratios, axis=0)
     finite = np.flatnonzero(np.isfinite(worst))
     return np.unique([*finite[np.argsort(-worst[finite])[:1]], *finite[: STATES_ASKED - 1]]).astype(int)
@@ -81,10 +83,14 @@ def beside(given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, own: di
     if (np.abs(acting) <= allowed).all():
         return ""
     causes = causes_of_forces(*state, h, acting, allowed)
-    return say(Finding("agreement", "forces", {"causes": causes}) if causes else Finding("agreement", "another"))
+    return say(
+        Finding("agreement", "forces", {"causes": causes}) if causes else Finding("agreement", "another")
+    )
 
 
-def of_accelerations(given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, own: dict[str, np.ndarray]) -> Why:
+def of_accelerations(
+    given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, own: dict[str, np.ndarray]
+) -> Why:
     """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right."""
     tree, qdd, h = given.tree, own["acceleration"], literal.bias(q, qd, given.tree)
     acting, allowed = force_left_over(tree, q, qd, tau, literal.mass_matrix(q, tree), h, qdd, given.rounding)

@@ -30,12 +30,16 @@ class Parser(argparse.ArgumentParser):
         if option.type is None:
             self.add_argument(name, action="store_true", help=text)
         else:
-            self.add_argument(name, type=option.type, metavar=option.metavar, default=option.default, help=text)
+            self.add_argument(
+                name, type=option.type, metavar=option.metavar, default=option.default, help=text
+            )
 
     def refuse_option(self, word: str, options: Sequence[str]) -> NoReturn:
         """End with an unknown option, and the nearest known one."""
         names = {name.strip("-"): name for name in options}
-        self.error(f"{word!r} is not an option; {expected(word.strip('-').split('=')[0], names, ' '.join(options))}")
+        self.error(
+            f"{word!r} is not an option; {expected(word.strip('-').split('=')[0], names, ' '.join(options))}"
+        )
 
 
 def not_empty(text: str) -> str:
@@ -49,7 +53,9 @@ def seconds(most: float) -> Callable[[str], float]:
 
     def time(text: str) -> float:
         if not 1e-6 <= float(text) <= most:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a time: expected seconds, from 1e-6 to {most:g}")
+            raise argparse.ArgumentTypeError(
+                f"{text!r} is not a time: expected seconds, from 1e-6 to {most:g}"
+            )
         return float(text)
 
     return time
@@ -69,7 +75,9 @@ def stated_reference(text: str) -> str:
         raise argparse.ArgumentTypeError(
             f"{text!r} is not a reference; expected {text}: (all of it), or FILE.py:OBJECT"
         )
-    hint = expected(text, {"arm": "arm", "model": "model"}, "arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT")
+    hint = expected(
+        text, {"arm": "arm", "model": "model"}, "arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT"
+    )
     raise argparse.ArgumentTypeError(f"{text!r} is not a reference; {hint}")
 
 

@@ -45,7 +45,9 @@ class Diagnosis(NamedTuple):
 
     differs: bool
     causes: tuple[Cause, ...] = ()  # of one rank, each explains everything; (): nothing does
-    closest: Cause | None = None  # where nothing explains everything: of single changes the one that leaves least
+    closest: Cause | None = (
+        None  # where nothing explains everything: of single changes the one that leaves least
+    )
     details: tuple[dict, ...] = ()  # coefficients that differ, with both numbers or in terms
     entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[hip][knee]"
     compared: int = 0  # entries in all

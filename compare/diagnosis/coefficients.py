@@ -72,7 +72,9 @@ class Compared:
                         self.tolerance[:, entries.index(place)] if place[0] == "M" else of_h)
             for place, values in yours.items() if np.isfinite(values).all()
         ]  # fmt: skip
-        return [coefficient for coefficient in known if (np.abs(coefficient.off) > coefficient.tolerance).any()]
+        return [
+            coefficient for coefficient in known if (np.abs(coefficient.off) > coefficient.tolerance).any()
+        ]
 
     @property
     def is_complete(self) -> bool:
@@ -90,7 +92,11 @@ class Compared:
     @cached_property
     def terms(self) -> list[list[tuple[str, str]]]:
         """Of each coefficient that differs, your terms and the right ones in their places, "" for none; [] if not found."""
-        tree, names, reference = self.equations.tree, self.equations.names, np.array(self.equations.tree.reference)
+        tree, names, reference = (
+            self.equations.tree,
+            self.equations.names,
+            np.array(self.equations.tree.reference),
+        )
         if "ball" in tree.kind or len(tree.kind) > MOST_JOINTS or len(self.differing) > SHOWN:
             return [[] for _ in self.differing]
         n = len(tree.kind)
@@ -98,7 +104,9 @@ class Compared:
         right = right_values(Equations(tree, x + reference, np.zeros_like(x)))
         angles = self.equations.q - reference
         at_x = [form(names, tree.kind, x) for form in (sums, products)]
-        tried = sums(names, tree.kind, angles) | products(names, tree.kind, angles) | dict(zip(names, angles.T))
+        tried = (
+            sums(names, tree.kind, angles) | products(names, tree.kind, angles) | dict(zip(names, angles.T))
+        )
         found = []
         for one in self.differing:
             expression = right_terms(at_x, right[one.place], np.abs(one.yours).max())
@@ -113,7 +121,9 @@ class Compared:
         for one, terms in list(zip(self.differing, self.terms))[:SHOWN]:
             k = int(np.argmax(np.abs(one.off)))
             at = [f"{name} = {value:.6g}" for name, value in list(zip(names, q[k]))[:SHOWN]]
-            yours, right = (part[k] if abs(part[k]) > one.tolerance[k] else 0.0 for part in (one.yours, one.right))
+            yours, right = (
+                part[k] if abs(part[k]) > one.tolerance[k] else 0.0 for part in (one.yours, one.right)
+            )
             details.append({"name": one.name, "terms": terms, "yours": yours, "right": right, "at": at})
         return tuple(details)
 
@@ -150,9 +160,13 @@ def products(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> dict[
             (f"sin({name}) cos({name})", s * c),
         ]
         of_each.append(powers if kind == "slide" else [*powers[:1], *turns])
-    chosen = sorted(product(*of_each), key=lambda factors: sum(bool(name) + ("^2" in name) for name, _ in factors))
+    chosen = sorted(
+        product(*of_each), key=lambda factors: sum(bool(name) + ("^2" in name) for name, _ in factors)
+    )
     return {
-        " ".join(filter(None, (name for name, _ in factors))) or "1": np.prod([part for _, part in factors], axis=0)
+        " ".join(filter(None, (name for name, _ in factors))) or "1": np.prod(
+            [part for _, part in factors], axis=0
+        )
         for factors in chosen
     }
 
@@ -161,7 +175,9 @@ def sums(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> dict[str,
     """Sines and cosines of sums of the angles, each up to twice, times powers of the slides, (states,) each."""
     slides = [k for k, kind in enumerate(kinds) if kind == "slide"]
     hinges = [k for k in range(len(kinds)) if k not in slides]
-    powers = products([names[k] for k in slides], ["slide"] * len(slides), x[:, slides]) if slides else {"1": 1.0}
+    powers = (
+        products([names[k] for k in slides], ["slide"] * len(slides), x[:, slides]) if slides else {"1": 1.0}
+    )
     terms = {power: column * np.ones(len(x)) for power, column in powers.items()}
     for times in sorted(product(range(-2, 3), repeat=len(hinges)), key=lambda times: sum(map(abs, times))):
         if next((k for k in times if k), 0) > 0:  # the others are the same
@@ -185,7 +201,9 @@ def right_terms(forms: list[dict[str, np.ndarray]], right: np.ndarray, size: flo
     return min(fits, key=len)
 
 
-def few_terms(tried: dict, right: dict[str, float], off: np.ndarray, tolerance: np.ndarray) -> dict[str, float]:
+def few_terms(
+    tried: dict, right: dict[str, float], off: np.ndarray, tolerance: np.ndarray
+) -> dict[str, float]:
     """The terms that make up a difference, off (states,), with their coefficients; {}: a few do not suffice."""
     names, columns, target = list(tried), np.array(list(tried.values())) / tolerance, off / tolerance
     own = [names.index(name) for name in right]
@@ -194,7 +212,10 @@ def few_terms(tried: dict, right: dict[str, float], off: np.ndarray, tolerance: 
             for best in completed(columns, target, list(chosen)) if others else [list(chosen)]:
                 x = np.linalg.lstsq(columns[best].T, target, rcond=None)[0]
                 sizes = np.abs(x)
-                if sizes.min() <= FIT_ROUNDING * sizes.max() or np.abs(target - x @ columns[best]).max() > 1.0:
+                if (
+                    sizes.min() <= FIT_ROUNDING * sizes.max()
+                    or np.abs(target - x @ columns[best]).max() > 1.0
+                ):
                     continue
                 if not is_replaced or np.ptp(sizes) <= FIT_ROUNDING * sizes.max():
                     return {names[k]: float(value) for k, value in zip(best, x)}

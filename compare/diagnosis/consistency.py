@@ -54,9 +54,13 @@ def conditions(
     M, names = np.asarray(mass_matrix(q)), coordinates.speeds
     of_M = FACTOR * EPS * np.abs(M).max(axis=(1, 2)) + SAFETY * noise(mass_matrix, coordinates, q)
     of_h = SAFETY * noise(lambda q: bias(q, qd), coordinates, q)
-    rest, ahead, behind, fast, back = (np.asarray(bias(q, factor * qd)) for factor in (0.0, 1.0, -1.0, 2.0, -2.0))
+    rest, ahead, behind, fast, back = (
+        np.asarray(bias(q, factor * qd)) for factor in (0.0, 1.0, -1.0, 2.0, -2.0)
+    )
     velocity, doubled = (ahead + behind) / 2.0 - rest, (fast + back) / 2.0 - rest
-    rounding = of_h + FACTOR * EPS * np.max([np.abs(h) for h in (rest, ahead, behind, fast, back)], axis=(0, 2))
+    rounding = of_h + FACTOR * EPS * np.max(
+        [np.abs(h) for h in (rest, ahead, behind, fast, back)], axis=(0, 2)
+    )
 
     def of_even(s, i) -> dict:
         return {"name": names[i], "value": odd[s, i], "unit": "N" if coordinates.units[i] == "m" else "N m"}
@@ -70,14 +74,18 @@ def conditions(
         definite(M, of_M),
         *gradient_at_rest(lambda q: bias(q, 0.0 * qd), coordinates, q, of_h),
         closest_to_breaking("h is even in the rates", odd, allowed, "N m", "even", of_even),
-        closest_to_breaking("h is quadratic in the rates", off, 4.0 * allowed, "N m", "quadratic", of_quadratic),
+        closest_to_breaking(
+            "h is quadratic in the rates", off, 4.0 * allowed, "N m", "quadratic", of_quadratic
+        ),
     ]
     if tested[0].is_met:
         tested.append(power_balance(mass_matrix, coordinates, q, qd, velocity, of_M, rounding))
     return tested
 
 
-def closest_to_breaking(name: str, off, allowed, unit: str, kind: str, values: Callable[..., dict]) -> Condition:
+def closest_to_breaking(
+    name: str, off, allowed, unit: str, kind: str, values: Callable[..., dict]
+) -> Condition:
     """A condition on differences, off (states, ...). values: of an index, for the macro `kind`."""
     at, allowed = closest(off, allowed), np.broadcast_to(allowed, off.shape)
     return Condition(name, float(off[at]), float(allowed[at]), unit, Finding(TEMPLATE, kind, values(*at)))
@@ -116,7 +124,9 @@ def definite(M: np.ndarray, allowed: np.ndarray) -> Condition:
     return Condition("M is positive definite", float(least[s]), float(floor), "", wrong, "at least")
 
 
-def gradient_at_rest(weight: Callable, coordinates: Coordinates, q: np.ndarray, floor: float) -> list[Condition]:
+def gradient_at_rest(
+    weight: Callable, coordinates: Coordinates, q: np.ndarray, floor: float
+) -> list[Condition]:
     """dh_i/dq_j at rest is symmetric, in hinges and slides; [] where there is one of them at most."""
     joints = zip(coordinates.all_kinds, coordinates.places.joints)
     straight = [joint.qd.start for kind, joint in joints if kind != "ball"]
@@ -125,7 +135,10 @@ def gradient_at_rest(weight: Callable, coordinates: Coordinates, q: np.ndarray, 
     steps = np.eye(coordinates.nv)[straight]
     of_each = [derivative(lambda t, e=e: weight(coordinates.move(q, t * e))[:, straight]) for e in steps]
     slopes, errors, sizes = (np.stack(part, axis=2) for part in zip(*of_each))  # (states, i, j)
-    curl, rounding = np.abs(slopes - np.swapaxes(slopes, 1, 2)), (FACTOR * EPS * sizes.max(axis=(1, 2)) + floor) / STEP
+    curl, rounding = (
+        np.abs(slopes - np.swapaxes(slopes, 1, 2)),
+        (FACTOR * EPS * sizes.max(axis=(1, 2)) + floor) / STEP,
+    )
     allowed = SAFETY * (errors + np.swapaxes(errors, 1, 2)) + rounding[:, None, None]
 
     def values(s, a, b) -> dict:
@@ -141,10 +154,17 @@ def power_balance(mass_matrix: Callable, coordinates: Coordinates, q, qd, veloci
     rates = qd / largest[:, None]  # of about 1, so that the step is one of positions
 
     def kinetic(t):
-        return np.einsum("si,sij,sj->s", rates, np.asarray(mass_matrix(coordinates.move(q, t * rates))), rates) / 2.0
+        return (
+            np.einsum("si,sij,sj->s", rates, np.asarray(mass_matrix(coordinates.move(q, t * rates))), rates)
+            / 2.0
+        )
 
     slope, error, _ = derivative(kinetic)
-    given, total, watts = np.einsum("si,si->s", rates, velocity) / largest**2, np.abs(rates).sum(axis=1), largest**3
+    given, total, watts = (
+        np.einsum("si,si->s", rates, velocity) / largest**2,
+        np.abs(rates).sum(axis=1),
+        largest**3,
+    )
     allowed = SAFETY * error + total**2 * of_M / STEP + 2.0 * total * of_h / largest**2
 
     def values(s) -> dict:

@@ -19,7 +19,9 @@ LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
 POLISHED = 24  # places with a quadratic influence that are fitted
 CANDIDATES = 64  # pairs that are fitted, the most promising of all
 ROWS = 256  # of changes in one evaluation
-TURNED = np.pi * np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # further starts for the zero of a hinge
+TURNED = np.pi * np.array(
+    [-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0]
+)  # further starts for the zero of a hinge
 
 
 class Fitted(NamedTuple):
@@ -100,7 +102,9 @@ class Search:
         left = self.weighted(self.values(which, x))
         best, damping, moving = (left**2).sum(axis=(1, 2)), np.full(len(x), 1e-3), np.arange(len(x))
         for _ in range(rounds):
-            slopes = [self.values(which[moving], x[moving] + step).imag / TINY * self.weight for step in steps]
+            slopes = [
+                self.values(which[moving], x[moving] + step).imag / TINY * self.weight for step in steps
+            ]
             J = np.stack(slopes, axis=1).reshape(len(moving), x.shape[1], -1) * size[moving][:, :, None]
             normal = np.einsum("rim,rjm->rij", J, J)
             diagonal = np.einsum("rii->ri", normal)
@@ -115,7 +119,9 @@ class Search:
             better = sums < best[moving]
             now = moving[better]
             x[now], left[now], best[now] = tried[better], after[better], sums[better]
-            damping[moving] = np.clip(np.where(better, damping[moving] * 0.05, damping[moving] * 10.0), LEAST, 1e8)
+            damping[moving] = np.clip(
+                np.where(better, damping[moving] * 0.05, damping[moving] * 10.0), LEAST, 1e8
+            )
             moving = moving[(np.abs(step).max(axis=1) > CONVERGED) & (damping[moving] < 1e6)]
             if not len(moving):
                 break
@@ -143,7 +149,9 @@ class Search:
         directions and zeros are fitted from several starts.
         """
         which, starts, promising = [], [], []
-        for k, (place, (left, best)) in enumerate(zip(self.places, nearest_changes(*self.expansion, self.off))):
+        for k, (place, (left, best)) in enumerate(
+            zip(self.places, nearest_changes(*self.expansion, self.off))
+        ):
             best *= place.size
             if place.is_quadratic:
                 promising.append((left, k, best))
@@ -170,7 +178,9 @@ class Search:
         """Two places of some kinds together: the most promising, where each change is taken to act alone, are fitted."""
         columns = np.concatenate([part.reshape(len(self.places), -1) for part in self.expansion])
         lengths = np.linalg.norm(columns, axis=1)
-        columns = np.divide(columns, lengths[:, None], out=np.zeros_like(columns), where=lengths[:, None] > 0.0)
+        columns = np.divide(
+            columns, lengths[:, None], out=np.zeros_like(columns), where=lengths[:, None] > 0.0
+        )
         inner, down, count = columns @ columns.T, columns @ self.off.ravel(), len(self.places)
         active = [k for k, place in enumerate(self.places) if lengths[k] > 0.0 and place.kind in kinds]
         pairs = np.array(list(combinations(active, 2)))
@@ -191,9 +201,16 @@ def nearest_changes(first: np.ndarray, second: np.ndarray, off: np.ndarray) -> l
     """
     nearest = []
     for a, b in zip(first, second):
-        cubic = [2.0 * (b * b).sum(), 3.0 * (a * b).sum(), (a * a).sum() - 2.0 * (off * b).sum(), -(off * a).sum()]
+        cubic = [
+            2.0 * (b * b).sum(),
+            3.0 * (a * b).sum(),
+            (a * a).sum() - 2.0 * (off * b).sum(),
+            -(off * a).sum(),
+        ]
         roots = np.roots(cubic) if np.isfinite(cubic).all() else np.zeros(0)
         real = [float(x.real) for x in roots if abs(x.imag) <= 1e-9 * (1.0 + abs(x))]
         left = [(float(np.linalg.norm(off - x * a - x * x * b)), x) for x in [*real, 0.0]]
-        nearest.append(min(left, key=lambda one: (np.round(one[0]), abs(one[1]))))  # of two that do the same the nearer
+        nearest.append(
+            min(left, key=lambda one: (np.round(one[0]), abs(one[1])))
+        )  # of two that do the same the nearer
     return nearest

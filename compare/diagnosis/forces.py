@@ -42,7 +42,9 @@ def causes_of_forces(tree: tmt.Tree, q, qd, tau, h, left_over, tolerance) -> tup
     if not (np.isfinite(left_over).all() and np.isfinite(tolerance).all()):
         return ()
     nothing = SimpleNamespace(values=lambda changes=None: np.zeros((1, *left_over.shape)))
-    search = Search(nothing, list(forces(tree, q, qd)), left_over, np.broadcast_to(tolerance, left_over.shape))
+    search = Search(
+        nothing, list(forces(tree, q, qd)), left_over, np.broadcast_to(tolerance, left_over.shape)
+    )
     if np.abs(search.off).max() <= 1.0:
         return ()
     causes = []

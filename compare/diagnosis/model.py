@@ -78,7 +78,9 @@ class Equations:
         """See `coefficients_of`."""
 
         def h(speeds: np.ndarray) -> np.ndarray:
-            return Equations(self.tree, self.q, np.broadcast_to(speeds, self.qd.shape)).values()[0][:, -self.nv :]
+            return Equations(self.tree, self.q, np.broadcast_to(speeds, self.qd.shape)).values()[0][
+                :, -self.nv :
+            ]
 
         return coefficients_of(h, self.nv)
 
@@ -96,7 +98,9 @@ class Equations:
             for i in moving:
                 h[i] = h[i] + b.T[i].dot(force) + b.B[i].dot(moment)
                 for j in moving[: moving.index(i) + 1]:
-                    M[i][j] = M[i][j] + b.mass * translation * b.T[i].dot(b.T[j]) + rotation * b.B[i].dot(turned[j])
+                    M[i][j] = (
+                        M[i][j] + b.mass * translation * b.T[i].dot(b.T[j]) + rotation * b.B[i].dot(turned[j])
+                    )
         flat = [*(M[i][j] for i, j in zip(*self.triangle)), *h]
         count = max([np.shape(value)[0] for value in flat if np.ndim(value) == 2], default=1)
         return np.stack([np.broadcast_to(value, (count, len(self.q))) for value in flat], axis=-1)

@@ -29,7 +29,11 @@ MOST_HINGES = 3  # whose single terms of Mbar are tried
 OF_ZERO = "zero position"  # the kind of a place
 FIT_ROUNDING = 1e-11  # of the size of a number: what a fit leaves of a number that is 0
 TURNING = ("N m s/rad", "N m/rad", "N m")
-UNITS_OF_FORCES = {"hinge": TURNING, "slide": ("N s/m", "N/m", "N"), "ball": TURNING}  # of damping, stiffness, force
+UNITS_OF_FORCES = {
+    "hinge": TURNING,
+    "slide": ("N s/m", "N/m", "N"),
+    "ball": TURNING,
+}  # of damping, stiffness, force
 
 
 class Place(NamedTuple):
@@ -114,7 +118,9 @@ def numbers(equations: Equations) -> list[Place]:
 
     def add(name, field, index, unit, size, *more, least=-np.inf, rank=2, kind="number"):
         moves = ((Path(field, index), 1.0), *more)
-        places.append(Place(rank, kind, name, float(stated[field][index]), unit, float(size), moves, least=least))
+        places.append(
+            Place(rank, kind, name, float(stated[field][index]), unit, float(size), moves, least=least)
+        )
 
     for b, body in enumerate(tree.body_names):
         heavy = stated["mass"][b] or stated["mass"].max()
@@ -154,7 +160,9 @@ def terms(equations: Equations) -> Iterator[Place]:
     called = {name: (term,) for term, name in OF_TERM.items()} | TOGETHER
     for name, together in called.items():
         for body, which in groups(equations.tree).items():
-            moves = tuple((Path("factor", (b, BODY_TERMS.index(term))), 1.0) for b in which for term in together)
+            moves = tuple(
+                (Path("factor", (b, BODY_TERMS.index(term))), 1.0) for b in which for term in together
+            )
             yield Place(2, "term", name.format(body), 1.0, "times", 1.0, moves)
 
 
@@ -167,7 +175,9 @@ def parts_of_terms(equations: Equations) -> Iterator[Place]:
     if set(tree.kind) != {"hinge"} or equations.nv > MOST_HINGES:
         return
     entries = [entry_name(entry, equations.names) for entry in equations.entries[:count]]
-    lengths = [(f"offset of {name}", ("offset", i)) for i, name in enumerate(tree.hinge_names) if tree.parent[i] >= 0]
+    lengths = [
+        (f"offset of {name}", ("offset", i)) for i, name in enumerate(tree.hinge_names) if tree.parent[i] >= 0
+    ]
 
     def alone(*kept: tuple[str, int]) -> np.ndarray:
         """Mbar and h if all masses, tensors and lengths are zero except some."""
@@ -225,14 +235,20 @@ def coefficients(equations: Equations) -> list[Place]:
         add(f"all of {name}", part, right[:, part])
     of_h = equations.coefficients()
     for (kind, i, *pair), column in of_h.items():
-        name = f"{entry_name(('h', i), names)} at rest" if kind == "gravity" else entry_name((kind, i, *pair), names)
+        name = (
+            f"{entry_name(('h', i), names)} at rest"
+            if kind == "gravity"
+            else entry_name((kind, i, *pair), names)
+        )
         add(name, parts + i, column * np.prod(qd[:, pair], axis=1))
     if nv > MOST_SPEEDS:
         return places
     for i, j in np.argwhere(~np.eye(nv, dtype=bool)).tolist():
         name = f"{entry_name(('h', j), names)} at rest in {entry_name(('h', i), names)}"
         add(name, parts + i, of_h["gravity", j], 0.0)
-    of_bias = [place for place in terms(equations) if len(place.moves) == 1 and place.moves[0][0].index[1] > 1]
+    of_bias = [
+        place for place in terms(equations) if len(place.moves) == 1 and place.moves[0][0].index[1] > 1
+    ]
     for place in of_bias:  # the factor of each term of each body in one row of h alone
         added = (equations.values({place.moves[0][0]: np.ones(1)})[0] - right)[:, -nv:]
         for i in range(nv):

@@ -66,7 +66,9 @@ def explanation(search: Search, compared: Compared, seconds: float) -> Diagnosis
         if causes:
             return found._replace(causes=tied(causes))
     closest = of_fitted(nearest[0], 2, search) if nearest else None
-    return found._replace(closest=closest, details=compared.details(), seconds=None if search.is_finished else seconds)
+    return found._replace(
+        closest=closest, details=compared.details(), seconds=None if search.is_finished else seconds
+    )
 
 
 def ranks(search: Search, singles: Sequence[Fitted], compared: Compared) -> Iterator[list[Cause]]:
@@ -76,7 +78,9 @@ def ranks(search: Search, singles: Sequence[Fitted], compared: Compared) -> Iter
     wrong number, agrees with a wrong model.
     """
     of_joints, explaining = explained_by_joints(search), [fit for fit in singles if fit.explains]
-    first = explained(search, program_options(search.equations)) + [cause for cause in of_joints if cause.rank == 1]
+    first = explained(search, program_options(search.equations)) + [
+        cause for cause in of_joints if cause.rank == 1
+    ]
     first += [of_fitted(fit, 1, search) for fit in explaining if fit.places[0].rank == 1]
     if not all(cause.joints for cause in first):
         yield first
@@ -90,7 +94,11 @@ def ranks(search: Search, singles: Sequence[Fitted], compared: Compared) -> Iter
     yield first + [cause for cause in second if least > 0 or order(cause) < UNCOMMON]
     pairs = search.in_time(lambda: search.pairs(("number", OF_ZERO)))
     third = [of_fitted(fit, 3, search) for fit in pairs if fit.explains]
-    yield [cause for cause in of_joints if cause.rank == 3] + third + [compared.cause(2)] * bool(compared.cause(2))
+    yield (
+        [cause for cause in of_joints if cause.rank == 3]
+        + third
+        + [compared.cause(2)] * bool(compared.cause(2))
+    )
 
 
 def order(cause: Cause) -> int:

@@ -17,13 +17,17 @@ from .variants import Variant
 def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
     """For each slip: of single bodies; of all; these in M alone. The first of these lists that explains is meant."""
     tree, right, count = equations.tree, equations.values()[0], len(equations.triangle[0])
-    of_one = SimpleNamespace(gravity=tree.gravity, armature=[0.0] * equations.nv, factor=np.ones((1, len(BODY_TERMS))))
+    of_one = SimpleNamespace(
+        gravity=tree.gravity, armature=[0.0] * equations.nv, factor=np.ones((1, len(BODY_TERMS)))
+    )
     bodies = method.bodies(tree, list(equations.q.T), list(equations.qd.T))
     parts = [equations.summed(of_one, [b])[0] for b in bodies]
     for name, changed in changed_bodies(equations, bodies):
         added = [equations.summed(of_one, [b])[0] - part for b, part in zip(changed, parts)]
         sums = {body: right + sum(added[b] for b in which) for body, which in groups(tree).items()}
-        variants = [Variant(Change("slip", name.format(body), "no", ""), values, 2) for body, values in sums.items()]
+        variants = [
+            Variant(Change("slip", name.format(body), "no", ""), values, 2) for body, values in sums.items()
+        ]
         alone = [change._replace(place=f"{change.place} in M alone") for change, *_ in variants]
         of_M = [np.hstack([values[:, :count], right[:, count:]]) for _, values, *_ in variants]
         in_mass = [Variant(change, values, 2) for change, values in zip(alone, of_M)]
@@ -32,7 +36,9 @@ def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
         yield [list(lagrange(equations))]
 
 
-def changed_bodies(equations: Equations, bodies: list[method.Body]) -> Iterator[tuple[str, list[method.Body]]]:
+def changed_bodies(
+    equations: Equations, bodies: list[method.Body]
+) -> Iterator[tuple[str, list[method.Body]]]:
     """Each slip by its name, made in every body."""
     tree, q, qd = equations.tree, list(equations.q.T), equations.qd
     frames = method.joint_frames(tree, q)

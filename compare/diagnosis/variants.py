@@ -50,7 +50,9 @@ def program_options(equations: Equations) -> Iterator[Variant]:
 
     yield option("gravity", "on", "off", with_factor(0.0, "gravity"))
     yield option("sign of gravity", "+", "-", with_factor(-1.0, "gravity"))
-    yield option("velocity terms in h", "there", "left out", with_factor(0.0, "convective", "Euler", "gyroscopic"))
+    yield option(
+        "velocity terms in h", "there", "left out", with_factor(0.0, "convective", "Euler", "gyroscopic")
+    )
     yield option("bias", "there", "left out", with_bias(0.0 * h))
     yield option("sign of the bias", "Mbar qdd + h = tau", "Mbar qdd = tau + h", with_bias(-h))
     if q.shape == qd.shape:
@@ -61,7 +63,9 @@ def program_options(equations: Equations) -> Iterator[Variant]:
         yield option("damping D qd", "not in h", "in h", with_bias(h + drag))
         yield option("damping D qd", "not in h", "in h, of the other sign", with_bias(h - drag))
     if tree.has_springs:
-        yield option("springs k (q - rest)", "not in h", "in h", with_bias(h + literal.spring_torque(q, tree)))
+        yield option(
+            "springs k (q - rest)", "not in h", "in h", with_bias(h + literal.spring_torque(q, tree))
+        )
     if any(tree.armature):
         rotors = {Path("armature", (i,)): np.array([-rotor]) for i, rotor in enumerate(tree.armature)}
         yield option("armature", "on the diagonal of Mbar", "left out", equations.values(rotors)[0])

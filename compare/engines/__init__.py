@@ -108,7 +108,9 @@ class Motion(NamedTuple):
     q: np.ndarray  # (..., times, nq) rad
     v: np.ndarray  # (..., times, nv) rad/s
     evaluations: int | None = None  # of the dynamics in all; None where a method has no such thing
-    ended: str | np.ndarray | None = None  # when and why a run ended early, or None; of a batch an array of its shape
+    ended: str | np.ndarray | None = (
+        None  # when and why a run ended early, or None; of a batch an array of its shape
+    )
     steps: int | None = None  # that the method took; None: not known
     seconds: float | None = None  # of the run, where the engine measures it in a process of its own
 
@@ -183,7 +185,9 @@ def rows_of_states(*values: ArrayLike) -> tuple[tuple[int, ...], list[np.ndarray
     return batch, [np.array(row, order="C").reshape(-1, row.shape[-1]) for row in rows]
 
 
-def as_far_as_it_goes(t: np.ndarray, states: np.ndarray, start: np.ndarray, why: str) -> tuple[np.ndarray, str | None]:
+def as_far_as_it_goes(
+    t: np.ndarray, states: np.ndarray, start: np.ndarray, why: str
+) -> tuple[np.ndarray, str | None]:
     """The states of one run at the times t, NaN from where they are no longer finite; and when and why that is, or None.
 
     states: (times reached, n); start: (n,), the first.

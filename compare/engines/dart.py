@@ -40,7 +40,10 @@ class Model(OfUrdf):
         never.mEnabled = False
         self.world.setDeactivationOptions(never)
         q, v = np.zeros((2, file.coordinates.nv), int)  # the places in the Tree of DART's numbers
-        self.joints, self.free = {}, {}  # by their numbers in the Tree; quaternions by the first of DART's numbers
+        self.joints, self.free = (
+            {},
+            {},
+        )  # by their numbers in the Tree; quaternions by the first of DART's numbers
         for k, (name, (kind, at, by)) in enumerate(zip(file.names, file.coordinates.places.joints)):
             joint = self.skeleton.getJoint(name.removesuffix(" turn") if kind == "ball" else name)
             if joint is None:  # a part of a free joint
@@ -60,7 +63,10 @@ class Model(OfUrdf):
         return damping
 
     def bodies(self):
-        bodies, numbers = [[] for _ in self.file.names], {joint.getName(): k for k, joint in self.joints.items()}
+        bodies, numbers = (
+            [[] for _ in self.file.names],
+            {joint.getName(): k for k, joint in self.joints.items()},
+        )
         moved_by = {None: None}  # the joint that moves a body, by the body's name
         for body in self.skeleton.getBodyNodes():
             parent = body.getParentBodyNode()

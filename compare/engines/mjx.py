@@ -92,7 +92,9 @@ class Model(ReadModel):
         records = len(times) - 1
         dt = np.asarray(times[-1] / max(steps, 1), self.precision)
         model = self.models[method].tree_replace({"opt.timestep": dt})
-        path = functions()["path"](model, self.data, *self.placed(q, v, tau), steps // records, records=records)
+        path = functions()["path"](
+            model, self.data, *self.placed(q, v, tau), steps // records, records=records
+        )
         qpos, qvel = map(np.asarray, path)
         path = np.hstack([qpos[:, self.bare.qpos], qvel[:, self.bare.dofs]])
         return np.vstack([np.hstack([q, v]), path]), steps * (4 if method == "RK4" else 1)

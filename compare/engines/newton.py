@@ -28,7 +28,9 @@ class Model(ReadModel):
 
         builder, warp.config.enable_backward = newton.ModelBuilder(), False
         is_urdf, mjcf = file.path.suffix == ".urdf", {"skip_equality_constraints": True}
-        builder.add_urdf(str(file.path), floating=False) if is_urdf else builder.add_mjcf(str(file.path), **mjcf)
+        builder.add_urdf(str(file.path), floating=False) if is_urdf else builder.add_mjcf(
+            str(file.path), **mjcf
+        )
         self.newton, self.model = newton, builder.finalize(device="cpu")
         for name in OFF:
             getattr(self.model, f"joint_{name}").zero_()
@@ -37,8 +39,14 @@ class Model(ReadModel):
             raise Unread(f"it has read {self.model.joint_dof_count} speeds, the file has {own.nv}")
         firsts, children = self.model.joint_qd_start.numpy().tolist(), self.model.joint_child.numpy()
         coords, dofs, self.reference = {}, {}, np.zeros(own.nq)  # in Newton's vectors
-        self.turns, nq, nv = [], 0, 0  # the first coordinate and dof of balls, and the centre of mass of a free body
-        places = sorted(joint_places(own).items(), key=lambda i: (own.jnt_bodyid[i[1].joint], i[1].kind != "slide"))
+        self.turns, nq, nv = (
+            [],
+            0,
+            0,
+        )  # the first coordinate and dof of balls, and the centre of mass of a free body
+        places = sorted(
+            joint_places(own).items(), key=lambda i: (own.jnt_bodyid[i[1].joint], i[1].kind != "slide")
+        )
         for name, place in places:
             is_free = kind_of(own, place.joint) == "free"
             coords[name], dofs[name] = range(nq, nq + len(place.qpos)), range(nv, nv + len(place.dofs))
@@ -114,7 +122,9 @@ class Model(ReadModel):
     def bias(self, q, v):
         S, c = self.set_state(q, v)
         weight, rest = self.model.state().joint_qd, self.model.state().joint_qd
-        self.newton.eval_inverse_dynamics_passive(self.model, self.state, gravity_force=weight, coriolis_force=rest)
+        self.newton.eval_inverse_dynamics_passive(
+            self.model, self.state, gravity_force=weight, coriolis_force=rest
+        )
         return S.T @ (weight.numpy().astype(float) + rest.numpy() + self.own_mass_matrix() @ c)
 
     def acceleration(self, q, v, force):
@@ -129,8 +139,12 @@ class Model(ReadModel):
     def prepare(self, method, tau, dt, tolerance):
         self.model.joint_damping.assign(self.read["damping"])
         self.model.joint_stiffness.assign(self.read["stiffness"])
-        if any(self.read["stiffness"][i] or (c is not None and self.read["damping"][i]) for _, i, c in self.turns):
-            raise Unread("the Featherstone solver has no springs of ball joints and no damping of free joints")
+        if any(
+            self.read["stiffness"][i] or (c is not None and self.read["damping"][i]) for _, i, c in self.turns
+        ):
+            raise Unread(
+                "the Featherstone solver has no springs of ball joints and no damping of free joints"
+            )
 
     def run(self, q, v, tau, times, steps, method, tolerance):
         self.prepare(method, tau, times[-1] / steps, tolerance)

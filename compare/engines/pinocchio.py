@@ -15,7 +15,13 @@ from .outside.model import File, ReadModel, Unread
 from .outside.order import near, order_of, wrong_masses
 
 ENGINE = EngineRecord(
-    order=55, label="Pinocchio", colour="#56B4E9", marker="X", package="pinocchio", extra="pinocchio", reads_file=True
+    order=55,
+    label="Pinocchio",
+    colour="#56B4E9",
+    marker="X",
+    package="pinocchio",
+    extra="pinocchio",
+    reads_file=True,
 )
 METHODS = {}  # it has no integrators
 
@@ -77,7 +83,9 @@ class Model(ReadModel):
         else:
             wrong = wrong_masses(self.numbers(), self.stated)
             for number in [number for number, k in self.last.items() if k in wrong]:
-                mass, com, inertia = (self.stated[part][self.last[number]] for part in ("mass", "com", "inertia"))
+                mass, com, inertia = (
+                    self.stated[part][self.last[number]] for part in ("mass", "com", "inertia")
+                )
                 place = self.data.oMi[number]
                 own = place.rotation.T @ inertia @ place.rotation
                 self.model.inertias[number] = pinocchio.Inertia(mass, place.actInv(com), own)
@@ -108,7 +116,9 @@ class Model(ReadModel):
         import pinocchio
 
         q_own, v_own, force = self.own(q, v, force)
-        return self.order.tree(q, pinocchio.aba(self.model, self.data, q_own, v_own, force) - self.turning(v_own))
+        return self.order.tree(
+            q, pinocchio.aba(self.model, self.data, q_own, v_own, force) - self.turning(v_own)
+        )
 
 
 def built(path: Path):

@@ -14,7 +14,13 @@ from . import EngineRecord
 from .outside.of_urdf import OfUrdf
 
 ENGINE = EngineRecord(
-    order=80, label="PyBullet", colour="#661100", marker="d", package="pybullet", extra="pybullet", reads_file=True
+    order=80,
+    label="PyBullet",
+    colour="#661100",
+    marker="d",
+    package="pybullet",
+    extra="pybullet",
+    reads_file=True,
 )
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
 
@@ -36,7 +42,9 @@ class Model(OfUrdf):
             (Path(folder) / "robot.urdf").write_text(text)
             flags = self.bullet.URDF_USE_INERTIA_FROM_FILE
             self.robot = self.bullet.loadURDF(f"{folder}/robot.urdf", useFixedBase=True, flags=flags)
-        self.infos = [self.bullet.getJointInfo(self.robot, k) for k in range(self.bullet.getNumJoints(self.robot))]
+        self.infos = [
+            self.bullet.getJointInfo(self.robot, k) for k in range(self.bullet.getNumJoints(self.robot))
+        ]
         by_name = {info[1].decode(): info for info in self.infos}
         self.links = [by_name[name][0] for name in file.names]
         self.order = np.argsort(self.links)  # the Tree's joints in PyBullet's vectors
@@ -51,7 +59,11 @@ class Model(OfUrdf):
         self.bullet.setJointMotorControlArray(self.robot, self.links, mode, forces=forces.tolist())
 
     def bodies(self):
-        moved_by, bodies, joints = {-1: None}, [[] for _ in self.links], {link: k for k, link in enumerate(self.links)}
+        moved_by, bodies, joints = (
+            {-1: None},
+            [[] for _ in self.links],
+            {link: k for k, link in enumerate(self.links)},
+        )
         for link, info in enumerate(self.infos):
             joint = moved_by[link] = joints.get(link, moved_by[info[16]])
             if joint is not None:
@@ -74,7 +86,9 @@ class Model(OfUrdf):
 
     def mass_matrix(self, q):
         M = np.empty((len(q), len(q)))
-        M[np.ix_(self.order, self.order)] = self.bullet.calculateMassMatrix(self.robot, q[self.order].tolist())
+        M[np.ix_(self.order, self.order)] = self.bullet.calculateMassMatrix(
+            self.robot, q[self.order].tolist()
+        )
         return M + np.diag(self.armature)
 
     def bias(self, q, v):

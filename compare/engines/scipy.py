@@ -19,7 +19,8 @@ LEAST_RELATIVE = 2.3e-14  # that solve_ivp takes
 class Scipy(Engine):
     name = "scipy"
     methods: ClassVar = {
-        name: Method("scipy", name, None, name, adaptive=True) for name in ("RK45", "DOP853", "Radau", "LSODA")
+        name: Method("scipy", name, None, name, adaptive=True)
+        for name in ("RK45", "DOP853", "Radau", "LSODA")
     }
 
     def of(self, case: Case) -> "ScipyDynamics":
@@ -54,13 +55,17 @@ class ScipyDynamics(TmtDynamics):
         for state in zip(*states):
             run, read = self.prepared(*state, t, method, tolerance)
             motions.append(read(run()))
-        q, v = (np.array([getattr(m, name) for m in motions]).reshape(*batch, len(t), -1) for name in ("q", "v"))
+        q, v = (
+            np.array([getattr(m, name) for m in motions]).reshape(*batch, len(t), -1) for name in ("q", "v")
+        )
         ended = np.array([m.ended for m in motions], dtype=object).reshape(batch)[()]
         counts = [m.evaluations for m in motions]
         return Motion(t, q, v, None if None in counts else sum(counts), ended)
 
     def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
-        return self.prepared(q, v, tau, np.linspace(0.0, setting.duration, GRID + 1), method, setting.tolerance)
+        return self.prepared(
+            q, v, tau, np.linspace(0.0, setting.duration, GRID + 1), method, setting.tolerance
+        )
 
     def prepared(self, q, v, tau, t, method, tolerance) -> Prepared:
         from scipy.integrate import solve_ivp

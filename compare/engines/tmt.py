@@ -66,7 +66,9 @@ class TmtDynamics:
         if not self.is_large:
             return literal.acceleration(q, v, tau, self.tree)
         forces = tau - np.array(self.tree.damping) * v - literal.spring_torque(q, self.tree)
-        return np.linalg.solve(self.mass_matrix(q), (forces - literal.bias(q, v, self.tree))[..., None])[..., 0]
+        return np.linalg.solve(self.mass_matrix(q), (forces - literal.bias(q, v, self.tree))[..., None])[
+            ..., 0
+        ]
 
     def __getattr__(self, quantity: str) -> Callable:
         if quantity not in QUANTITIES:
@@ -75,7 +77,9 @@ class TmtDynamics:
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
         motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance)
-        return Motion(*motion, motion.evaluations, motion.ended, None if method_named(method).adaptive else steps)
+        return Motion(
+            *motion, motion.evaluations, motion.ended, None if method_named(method).adaptive else steps
+        )
 
     def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
         stepping = method_named(method)
@@ -86,7 +90,9 @@ class TmtDynamics:
         every, dt = setting.every, setting.duration / setting.steps
         paths = [np.full((1, setting.steps + 1, len(start)), np.nan) for start in (q, v)]
         paths[0][0, 0], paths[1][0, 0] = q, v
-        run, outcome = prepared(self.tree, method, *paths, np.array(tau, float)[None], dt, setting.tolerance or 0.0)
+        run, outcome = prepared(
+            self.tree, method, *paths, np.array(tau, float)[None], dt, setting.tolerance or 0.0
+        )
         t = np.linspace(0.0, setting.duration, GRID + 1)
 
         def read(_):

@@ -49,7 +49,11 @@ class Model(ReadModel):
         joints = self.bare.model.dof_jntid[self.bare.dofs]
         index = {"stiffness": joints, "gravity": slice(None)}.get(name, self.bare.dofs)
         for model in self.models.values():
-            fields = {"gravity": model.opt.gravity, "armature": model.dof_armature, "damping": model.dof_damping}
+            fields = {
+                "gravity": model.opt.gravity,
+                "armature": model.dof_armature,
+                "damping": model.dof_damping,
+            }
             if (field := (fields | {"stiffness": model.jnt_stiffness}).get(name)) is None:
                 return False
             numbers = field.numpy()
@@ -70,7 +74,9 @@ class Model(ReadModel):
         """Data of as many worlds as there are states, at these states (worlds, n)."""
         import mujoco_warp
 
-        if len(q) not in self.worlds:  # njmax=0 is possible, but then Euler and implicitfast do not accelerate
+        if (
+            len(q) not in self.worlds
+        ):  # njmax=0 is possible, but then Euler and implicitfast do not accelerate
             self.worlds[len(q)] = mujoco_warp.make_data(self.bare.model, len(q), nconmax=0, njmax=1)
         data = self.worlds[len(q)]
         for field, values in ((data.qpos, q), (data.qvel, v), (data.qfrc_applied, force)):
@@ -125,7 +131,9 @@ class Model(ReadModel):
         for _ in times[1:]:
             for _ in range(steps // (len(times) - 1)):
                 advance()
-            path.append(np.hstack([data.qpos.numpy()[0, self.bare.qpos], data.qvel.numpy()[0, self.bare.dofs]]))
+            path.append(
+                np.hstack([data.qpos.numpy()[0, self.bare.qpos], data.qvel.numpy()[0, self.bare.dofs]])
+            )
         return np.array(path), steps * (4 if method == "RK4" else 1)
 
 

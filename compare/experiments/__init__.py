@@ -30,7 +30,9 @@ class Experiment:
     """What the program has to know of an experiment before it imports it."""
 
     order: int  # of `all` and of the report
-    serves_own: bool = True  # whether it applies to a user's own equations; if not, the macro not_of_own says why
+    serves_own: bool = (
+        True  # whether it applies to a user's own equations; if not, the macro not_of_own says why
+    )
     asks_of_own: tuple[str, ...] | None = None  # which of a user's own functions it calls; None: all
     needs_file: bool = False  # or equations of a user's own: there is nothing to say of the arm's
     options: tuple[str, ...] = ()  # of the command line, in addition to those of every experiment

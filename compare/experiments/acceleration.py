@@ -33,7 +33,9 @@ def rows(setup: Setup) -> Result:
         springs = literal.spring_torque(q, tree) if tree.has_springs else 0.0
         back = inertia + comparison.values("bias")[0] + drag + springs
         result.agree(sample, f"tau from MuJoCo's qdd by {result.label}", torques, back, tau, closing)
-        result.agree(sample, f"tau from {whose} qdd by mj_inverse", torques, tau, theirs.inverse(q, qd, qdd), closing)
+        result.agree(
+            sample, f"tau from {whose} qdd by mj_inverse", torques, tau, theirs.inverse(q, qd, qdd), closing
+        )
         if "energy" in robot.own:  # which may be zero at any position
             zero, rest = np.array(tree.zero)[None], np.zeros((1, tree.coordinates.nv))
             above = (engine.energy(q, qd) - engine.energy(zero, rest) for engine in (ours, theirs))

@@ -26,7 +26,10 @@ from .setup import Setup
 EXPERIMENT = Experiment(order=80, needs_file=True, options=("--joints",))
 SECONDS = 8.0  # of a search
 SECONDS_OF_CONDITIONS = 3.0
-CALLS_OF_CONDITIONS, CALLS_FOR_A_JOINT = 30, 16  # of Mbar and h at each state, that the conditions take, about
+CALLS_OF_CONDITIONS, CALLS_FOR_A_JOINT = (
+    30,
+    16,
+)  # of Mbar and h at each state, that the conditions take, about
 CAUSE_COLUMNS = ["rank", "kind", "place", "stated", "explains", "unit", "left_over", "tied"]
 OF_ACCELERATIONS = "accelerations follow from M and h: force left over, over its tolerance"
 WHOSE_VALUES = {"own": "Your", "mujoco": "MuJoCo's"}
@@ -70,7 +73,9 @@ def search(setup: Setup) -> Found:
     tree, sample, is_own = setup.robot.tree, setup.random.first(STATES_ASKED), bool(setup.robot.own)
     name = "own" if is_own else "mujoco"
     given, (q, qd, tau) = setup.engines[name].of(setup.robot.case()), (sample.q, sample.qd, sample.tau)
-    M, h, qdd = (np.asarray(part) for part in (given.mass_matrix(q), given.bias(q, qd), given.acceleration(q, qd, tau)))
+    M, h, qdd = (
+        np.asarray(part) for part in (given.mass_matrix(q), given.bias(q, qd), given.acceleration(q, qd, tau))
+    )
     values = Values.of(tree, q, qd, M, h)
 
     def bias(qd: np.ndarray) -> np.ndarray:
@@ -129,7 +134,14 @@ def rows(setup: Setup) -> Result:
         (OF_ACCELERATIONS, found.force_ratio, "of_forces", np.isfinite(found.force_ratio)),
     ):
         values = {"found": found} if is_known else {}
-        check(name, ratio, 1.0, ratio > 1.0, result.finding(kind if is_known else "no_numbers", **values), unit="")
+        check(
+            name,
+            ratio,
+            1.0,
+            ratio > 1.0,
+            result.finding(kind if is_known else "no_numbers", **values),
+            unit="",
+        )
     result.rows = [{name: getattr(cause, name) for name in CAUSE_COLUMNS} for cause in found.causes]
     if found.too_slow:
         result.find("too_slow")
@@ -142,11 +154,21 @@ def rows(setup: Setup) -> Result:
 
 def record(cause: Cause, is_own: bool = False) -> dict:
     text = cause.text("option" if is_own else "")
-    return {"rank": cause.rank, "place": cause.place, "stated": cause.stated, "found": cause.explains, "text": text}
+    return {
+        "rank": cause.rank,
+        "place": cause.place,
+        "stated": cause.stated,
+        "found": cause.explains,
+        "text": text,
+    }
 
 
 def headline(result: Result) -> Finding | None:
-    return result.finding("headline", place=result.rows[0]["place"], more=len(result.rows) - 1) if result.rows else None
+    return (
+        result.finding("headline", place=result.rows[0]["place"], more=len(result.rows) - 1)
+        if result.rows
+        else None
+    )
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:

@@ -30,7 +30,9 @@ def draw_distances(result: Result, quantities: list[str]) -> tuple[str, Figure, 
         for name, colour, dash in styles if exact else styles[:1]:
             values = np.maximum(curves[quantity][name], ZERO_AT)
             share = np.arange(1, len(values) + 1) / len(values)
-            shown = np.unique(np.linspace(0, len(values) - 1, min(len(values), MOST_DRAWN)).round().astype(int))
+            shown = np.unique(
+                np.linspace(0, len(values) - 1, min(len(values), MOST_DRAWN)).round().astype(int)
+            )
             ax.step(values[shown], share[shown], where="post", color=colour, linestyle=dash, label=name)
         ax.axvline(FACTOR, color=RED, linewidth=2, label=f"tolerance, {FACTOR} eps")
         ax.set(title=quantity, xscale="log", ylim=(0, 1.02))
@@ -59,7 +61,12 @@ def draw_nearest(result: Result) -> tuple[str, Figure, Finding]:
     fig = Figure(figsize=(WIDTH, 0.9 + 0.25 * len(names)), layout="constrained")
     ax = fig.subplots()
     ax.barh(range(len(names)), left, color=[GREEN if one else GREY for one in explains])
-    ax.set(xscale="log", xlim=(EPS / 3.0, 1.5), xlabel="remaining share of the difference", yticks=range(len(names)))
+    ax.set(
+        xscale="log",
+        xlim=(EPS / 3.0, 1.5),
+        xlabel="remaining share of the difference",
+        yticks=range(len(names)),
+    )
     ax.set_yticklabels(names)
     ax.invert_yaxis()
     looks = ((True, GREEN, "explains the difference down to rounding"), (False, GREY, "does not explain it"))

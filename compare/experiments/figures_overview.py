@@ -38,7 +38,9 @@ def named_rows(ax: Axes, names: Sequence[str], passed: Sequence[bool]) -> None:
 def beyond_tolerance(ax: Axes, tolerance: float, text: str) -> None:
     """A line at the tolerance, and hatching beyond it."""
     ax.axvline(tolerance, color=RED, linewidth=2)
-    ax.axvspan(tolerance, 1e30, facecolor="none", edgecolor=(0.84, 0.37, 0.0, 0.35), hatch="////", linewidth=0)
+    ax.axvspan(
+        tolerance, 1e30, facecolor="none", edgecolor=(0.84, 0.37, 0.0, 0.35), hatch="////", linewidth=0
+    )
     ax.annotate(f"tolerance {text}", (tolerance, 0.02), (-4, 0), xycoords=("data", "axes fraction"), fontsize=7.5,
                 textcoords="offset points", color=RED, rotation=90, ha="right", va="bottom",
                 path_effects=[withStroke(linewidth=3, foreground="white")])  # fmt: skip
@@ -50,9 +52,15 @@ def agreements(results: Mapping[str, Result]) -> list[dict]:
     for quantity, name in QUANTITIES.items():
         rows = [row for result in results.values() for row in result.rows if row.get("quantity") == quantity]
         label = next(iter(results.values())).label.lower()
-        columns = {"apart": "difference_eps", "ours": f"{label}_from_exact_eps", "theirs": "mujoco_from_exact_eps"}
+        columns = {
+            "apart": "difference_eps",
+            "ours": f"{label}_from_exact_eps",
+            "theirs": "mujoco_from_exact_eps",
+        }
         if rows:
-            largest = {key: largest_known([row.get(column) for row in rows]) for key, column in columns.items()}
+            largest = {
+                key: largest_known([row.get(column) for row in rows]) for key, column in columns.items()
+            }
             quantities.append({"name": name, **largest, "passed": all(row["passed"] for row in rows)})
     return quantities
 

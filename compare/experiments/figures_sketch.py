@@ -24,10 +24,14 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
     for name, q in poses.items():
         (points,), links = stick_figure(robot, q[None])
         sticks[name] = [points[list(link)] for link in links]
-    size = max(np.ptp(np.concatenate([*sticks[name], coms[name]]), axis=0).max() for name in poses) or 1.0  # m
+    size = (
+        max(np.ptp(np.concatenate([*sticks[name], coms[name]]), axis=0).max() for name in poses) or 1.0
+    )  # m
     few = max(len(robot.joints), len(tree.mass)) <= MOST_NAMED
     arrows = {name: axes(robot, q, (0.57 if few else 0.1) * size) for name, q in poses.items()}
-    drawn = np.concatenate([part for name in poses for part in (*sticks[name], coms[name], arrows[name].sum(axis=1))])
+    drawn = np.concatenate(
+        [part for name in poses for part in (*sticks[name], coms[name], arrows[name].sum(axis=1))]
+    )
     half, middle = 0.55 * np.ptp(drawn, axis=0).max(), (drawn.max(axis=0) + drawn.min(axis=0)) / 2
     fig = Figure(figsize=(WIDTH, 3.9))
     fig.subplots_adjust(left=0.0, right=0.95, bottom=0.1, top=0.93, wspace=0.05)
@@ -41,7 +45,9 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
             ax.text(*(com + size * np.array([0.12, 0.0, -0.1])), str(number), fontsize=9)
         for axis, label, centre in zip("xyz", robot.axes, middle):
             ax.set(**{f"{axis}label": f"{label}, m", f"{axis}lim": (centre - half, centre + half)})
-            getattr(ax, f"{axis}axis").set_major_locator(matplotlib.ticker.MaxNLocator(4, steps=[1, 2, 5, 10]))
+            getattr(ax, f"{axis}axis").set_major_locator(
+                matplotlib.ticker.MaxNLocator(4, steps=[1, 2, 5, 10])
+            )
         ax.view_init(elev=ELEVATION, azim=AZIMUTH)
         ax.set_box_aspect((1, 1, 1), zoom=1.1)
     counts = {kind: tree.kind.count(kind) for kind in KIND_COLOURS if kind in tree.kind}

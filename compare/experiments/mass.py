@@ -33,8 +33,12 @@ def check_symmetry(result: Result, M: np.ndarray, scale: np.ndarray) -> None:
 def check_definiteness(result: Result, label: str, M: np.ndarray) -> None:
     """The smallest eigenvalue over the largest of Mbar in units of its diagonal, at all states, is more than rounding."""
     diagonal = np.einsum("sii->si", M)
-    root = np.sqrt(np.where((diagonal > 0.0).all(axis=1, keepdims=True), diagonal, 1.0))  # else it is not definite
+    root = np.sqrt(
+        np.where((diagonal > 0.0).all(axis=1, keepdims=True), diagonal, 1.0)
+    )  # else it is not definite
     scaled = M / (root[:, :, None] * root[:, None, :])
     values = np.linalg.eigvalsh(scaled) if np.isfinite(scaled).all() else np.full((1, 2), np.nan)
     what, least = f"{label}: least eigenvalue of Mbar in units of its diagonal over the largest", values[:, 0]
-    result.check("random states", what, (least / np.abs(values).max(axis=1)).min(), FACTOR * EPS, "", rule="at least")
+    result.check(
+        "random states", what, (least / np.abs(values).max(axis=1)).min(), FACTOR * EPS, "", rule="at least"
+    )

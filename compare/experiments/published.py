@@ -23,7 +23,9 @@ def skipped(robot: Robot) -> Finding | None:
 
 
 def claim_values(robot: Robot) -> dict:
-    noise = [item.item for item in robot.printed if item.is_rounding and any(item.values)]  # printed, but truly zero
+    noise = [
+        item.item for item in robot.printed if item.is_rounding and any(item.values)
+    ]  # printed, but truly zero
     return {"weight": gravity_scale(robot.tree), "rounding": noise}
 
 
@@ -63,7 +65,9 @@ def answer(item: Printed, robot: Robot, dynamics: Mapping[str, Dynamics]) -> Ans
 
 def rows(setup: Setup) -> Result:
     """One row for each printed component, one check for each item and engine."""
-    result = Result("published", shown=["item", "quantity", "component", "published", "exact", "tmt", "mujoco", "unit"])
+    result = Result(
+        "published", shown=["item", "quantity", "component", "published", "exact", "tmt", "mujoco", "unit"]
+    )
     robot, dynamics = setup.robot, setup.compared()
     answers = {item.item: answer(item, robot, dynamics) for item in robot.printed}
     for item in robot.printed:
@@ -71,8 +75,18 @@ def rows(setup: Setup) -> Result:
         check_answer(result, item, of, robot.joints)
         for index in np.ndindex(printed.shape):
             component = " ".join(robot.joints[i] for i in index)
-            row = {"item": item.item, "posture": item.posture, "quantity": item.quantity, "component": component}
-            row |= {"unit": item.unit, "published": printed[index], "exact": of.nearest[index], "tmt": of.tmt[index]}
+            row = {
+                "item": item.item,
+                "posture": item.posture,
+                "quantity": item.quantity,
+                "component": component,
+            }
+            row |= {
+                "unit": item.unit,
+                "published": printed[index],
+                "exact": of.nearest[index],
+                "tmt": of.tmt[index],
+            }
             tolerance = of.rounding + (0.0 if item.is_rounding else item.half_digit)
             result.rows.append(row | {"mujoco": of.mujoco[index], "tolerance": tolerance})
     if robot.remarks:
@@ -90,7 +104,9 @@ def check_answer(result: Result, item: Printed, of: Answer, joints: tuple) -> No
             result.check(where, f"{label}: {item.quantity} - printed", off, tolerance, item.unit)
         elif label != "exact":
             off = distance(values, of.exact).max()
-            result.check(where, f"{label}: {item.quantity} - exact", off, of.rounding, item.unit, rounding=True)
+            result.check(
+                where, f"{label}: {item.quantity} - exact", off, of.rounding, item.unit, rounding=True
+            )
     for label in [name for name in ("exact", "TMT") if name.lower() in item.to_every_digit]:
         digits, off = f"{label}: {item.quantity} - printed", np.abs(engines[label] - printed).max()
         result.check(where, digits, off, item.half_digit, item.unit)
@@ -103,6 +119,7 @@ def check_answer(result: Result, item: Printed, of: Answer, joints: tuple) -> No
 def headline(result: Result) -> Finding | None:
     """How many of the printed numbers both engines meet."""
     met = sum(
-        all(abs(row[name] - row["published"]) <= row["tolerance"] for name in ("tmt", "mujoco")) for row in result.rows
+        all(abs(row[name] - row["published"]) <= row["tolerance"] for name in ("tmt", "mujoco"))
+        for row in result.rows
     )
     return result.finding("headline", met=met, numbers=len(result.rows)) if result.rows else None

@@ -66,7 +66,9 @@ class Comparison:
         function, part = QUANTITIES[name].function, QUANTITIES[name].part
         if function not in self.returned:
             states = [getattr(self.sample, argument) for argument in QUANTITIES[name].arguments]
-            returned = self.returned[function] = [getattr(engine, function)(*states) for engine in self.engines]
+            returned = self.returned[function] = [
+                getattr(engine, function)(*states) for engine in self.engines
+            ]
             if function == "convective_terms" and self.robot.coordinates.has_balls:
                 # mj_jacDot of MuJoCo 4.0 leaves out what a ball does to a slide after it in the same body
                 returned[1] = convective_accelerations(self.engines[1], *states)
@@ -115,13 +117,22 @@ def check_wide(result: Result, comparisons: Sequence[Comparison]) -> None:
     if len(wide):
         worst = wide[np.argmax(least[wide] / largest[wide])]
         joint = comparisons[0].robot.coordinates.speeds[worst]
-        found = {"joint": joint, "tolerance": least[worst], "largest": largest[worst], "others": len(wide) - 1}
+        found = {
+            "joint": joint,
+            "tolerance": least[worst],
+            "largest": largest[worst],
+            "others": len(wide) - 1,
+        }
         result.not_judged("all states", "qdd", say(Finding("shared", "wide", found)))
 
 
 def headline(result: Result) -> Finding | None:
     """The difference with the largest share of its tolerance; one that is not a number comes first."""
-    rows = [row for row in result.rows if row["worst_difference"] is None or row["difference_over_bar"] is not None]
+    rows = [
+        row
+        for row in result.rows
+        if row["worst_difference"] is None or row["difference_over_bar"] is not None
+    ]
     if not rows:
         return None
     top = max(rows, key=lambda row: np.inf if row["worst_difference"] is None else row["difference_over_bar"])

@@ -37,7 +37,9 @@ class Setup:
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
     alone: bool = False  # whether the experiment runs by itself, and may take longer than in `all`
     step: tuple[float, str] | None = None  # stability: step, s, and integrator of MuJoCo to be checked
-    size: str = "full"  # "quick": some parts, in seconds; "small": all parts with few states and steps, for tests
+    size: str = (
+        "full"  # "quick": some parts, in seconds; "small": all parts with few states and steps, for tests
+    )
 
     @property
     def is_quick(self) -> bool:

@@ -56,7 +56,9 @@ def checked(
     compared: Compared, make: Callable[[], Program], quantities: Sequence[str], states: int, single: bool
 ) -> tuple[Outcome, Program | None]:
     """Run a program at random states; a float32 program is asked at states that float32 has."""
-    q, qd, tau = (x.astype(np.float32).astype(float) if single else x for x in random_states(compared.robot, states))
+    q, qd, tau = (
+        x.astype(np.float32).astype(float) if single else x for x in random_states(compared.robot, states)
+    )
     eps = float(np.finfo(np.float32 if single else float).eps)
     theirs, scales, rows = compared.mujoco.of(compared.robot.case()), Entries(compared.robot.tree, q, qd), []
     try:
@@ -83,7 +85,14 @@ def random_states(robot: Robot, count: int) -> list[np.ndarray]:
 
 
 def rows_of(
-    tree, name: str, operations: int, own: list, theirs: Dynamics, scales: Entries, states: tuple, factor: float
+    tree,
+    name: str,
+    operations: int,
+    own: list,
+    theirs: Dynamics,
+    scales: Entries,
+    states: tuple,
+    factor: float,
 ) -> list[Row]:
     """A row for each array of a quantity."""
     exact, rows = exact_of_many(tree, name, *states), []

@@ -93,7 +93,9 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
         for file, text in texts.items():
             Path(folder, file).write_text(text, encoding="utf-8")
         terminal.show(f"runs what was written, at {STATES} states")
-        make = partial(programs.PROGRAMS[options.to], Path(folder), name, robot.tree, quantities, options.float)
+        make = partial(
+            programs.PROGRAMS[options.to], Path(folder), name, robot.tree, quantities, options.float
+        )
         outcome, program = checks.checked(compared, make, quantities, STATES, options.float)
         times = checks.times(compared, program, quantities, STATES)
     of = {
@@ -114,7 +116,9 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
         terminal.say(line)
     style = "bold green" if outcome.passed else "bold" if outcome.not_run else "bold red"
     terminal.say(block("export", "verdict", outcome=outcome, states=STATES), style)
-    terminal.say(f"Files: {', '.join(str(out / file) for file in texts)} ({time.perf_counter() - started:.1f} s)")
+    terminal.say(
+        f"Files: {', '.join(str(out / file) for file in texts)} ({time.perf_counter() - started:.1f} s)"
+    )
     return 0 if outcome.passed or outcome.not_run else 1
 
 

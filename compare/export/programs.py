@@ -37,7 +37,13 @@ class Program:
     of = ""  # the file that is run, where there are others with the same expressions
 
     def __init__(self, folder: Path, name: str, tree: tmt.Tree, quantities: Sequence[str], single: bool):
-        self.folder, self.name, self.tree, self.quantities, self.single = folder, name, tree, quantities, single
+        self.folder, self.name, self.tree, self.quantities, self.single = (
+            folder,
+            name,
+            tree,
+            quantities,
+            single,
+        )
         self.start()
 
     def start(self) -> None:
@@ -79,7 +85,9 @@ class CProgram(Program):
     """Compiled with -O2, called for many states by a loop in C."""
 
     def start(self):
-        compiler = shlex.split(os.environ.get("CC", "")) or list(filter(shutil.which, ("gcc", "cc", "clang")))[:1]
+        compiler = (
+            shlex.split(os.environ.get("CC", "")) or list(filter(shutil.which, ("gcc", "cc", "clang")))[:1]
+        )
         if not compiler or not shutil.which(compiler[0]):
             raise NotRun(f"no C compiler was found ({' '.join(compiler) or 'gcc, cc, clang'})")
         driver = [f'#include "{self.name}.h"', *map(self.loop, self.quantities)]
@@ -177,7 +185,9 @@ class MatlabProgram(Program):
         lines = []
         for x, values in zip(takes, (q, qd, tau)):
             np.ascontiguousarray(values).tofile(self.folder / f"{x}.bin")
-            lines.append(f"f = fopen('{x}.bin'); {x} = fread(f, [{values.shape[1]}, Inf], 'double'); fclose(f);")
+            lines.append(
+                f"f = fopen('{x}.bin'); {x} = fread(f, [{values.shape[1]}, Inf], 'double'); fclose(f);"
+            )
         results = [f"r{k}" for k in range(parts)]
         lines.append(f"[{', '.join(results)}] = {self.name}('{quantity}', {', '.join(takes)});")
         lines += [f"f = fopen('{r}.bin', 'w'); fwrite(f, {r}, 'double'); fclose(f);" for r in results]

@@ -40,9 +40,13 @@ def locked(out: Path) -> Iterator[None]:
         (out / FILES).mkdir(parents=True, exist_ok=True)
         held = lock(out / FILES, wait=False)
     except OSError as error:
-        raise Refused(f"cannot write to {out}: {what_is_wrong(out, error)}; expected a writable folder") from None
+        raise Refused(
+            f"cannot write to {out}: {what_is_wrong(out, error)}; expected a writable folder"
+        ) from None
     if held is None and fcntl is not None:
-        raise Refused(f"another fleet is writing to {out}; use another folder (--out), or wait until it has ended")
+        raise Refused(
+            f"another fleet is writing to {out}; use another folder (--out), or wait until it has ended"
+        )
     interrupt.Now.line = f"interrupted; {RESUME}"
     try:
         yield

@@ -28,12 +28,22 @@ try:
 except ImportError:  # Windows: no memory limit
     resource = None
 
-KILLED, RETRIES = -9, 3  # exit code after SIGKILL, and how often the call is made again, as a Dask scheduler does
+KILLED, RETRIES = (
+    -9,
+    3,
+)  # exit code after SIGKILL, and how often the call is made again, as a Dask scheduler does
 LONGEST_PATH = 70  # bytes, of the folder of the forkserver's socket, whose whole path may have 107
 SHARE = 0.9  # of the machine's memory, for all its processes together
 CONNECTING = 10.0  # s, time limit for the scheduler and its first worker to answer
 ALONE = 60.0  # s without a worker or a connection after which a fleet ends
-LOGGERS = ("distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio")
+LOGGERS = (
+    "distributed",
+    "distributed.client",
+    "distributed.core",
+    "tornado",
+    "tornado.application",
+    "asyncio",
+)
 
 
 class OtherVersion(RuntimeError):
@@ -48,7 +58,9 @@ def own_folder() -> str:
     return tempfile.tempdir
 
 
-def guarded(function: Callable, arguments: tuple, limit: float, memory: int, place: str) -> tuple[object, str]:
+def guarded(
+    function: Callable, arguments: tuple, limit: float, memory: int, place: str
+) -> tuple[object, str]:
     """The value of a call and "", or None and why there is none.
 
     A process that is killed by SIGKILL (no memory, an operator) may have done nothing wrong: its call is made again.
@@ -179,7 +191,10 @@ class Cluster:
             raise Refused(f"lost the connection to the scheduler {self.address}; {RESUME}")
         error = future.exception(timeout=CONNECTING)
         if type(error).__name__ == "KilledWorker":
-            return None, f"{1 + error.allowed_failures} workers lost, the last one {error.last_worker.address}"
+            return (
+                None,
+                f"{1 + error.allowed_failures} workers lost, the last one {error.last_worker.address}",
+            )
         if isinstance(error, OtherVersion | ImportError | AttributeError):
             raise Refused(f"a worker runs a different version of compare or MuJoCo: {error}; {RESUME}")
         return None, described(error)
@@ -202,4 +217,6 @@ def on_worker(function: Callable, arguments: tuple, limit: float, expected: str)
     if program() != expected:
         raise OtherVersion(f"worker {worker.address}; all workers need the version of this machine")
     memory = worker.memory_manager.memory_limit or memory_of_machine()
-    return guarded(function, arguments, limit, int(SHARE * memory / worker.state.nthreads), worker.local_directory)
+    return guarded(
+        function, arguments, limit, int(SHARE * memory / worker.state.nthreads), worker.local_directory
+    )

@@ -24,10 +24,19 @@ class Run:
     """
 
     def __init__(
-        self, models: Sequence[Model], options: FleetOptions, executor: Pool | Cluster, out: Path, sent: Mapping
+        self,
+        models: Sequence[Model],
+        options: FleetOptions,
+        executor: Pool | Cluster,
+        out: Path,
+        sent: Mapping,
     ):
         self.models, self.options, self.executor, self.out, self.sent = models, options, executor, out, sent
-        self.rows, self.first, self.copies = [], {}, []  # first: model of each content; copies: (model, first)
+        self.rows, self.first, self.copies = (
+            [],
+            {},
+            [],
+        )  # first: model of each content; copies: (model, first)
 
     def carry_out(self, progress: Callable[[list[dict]], object]) -> None:
         """Run to the end, copies last. progress is called with the new rows, and every POLLING s."""
@@ -80,7 +89,9 @@ class Run:
         row = {"verdict": BROKE, "reason": why}
         if value is not None:
             row, written = value
-            write_whole(self.out / place_of_report(model.shown), written | {MARK: json.dumps((key, row)).encode()})
+            write_whole(
+                self.out / place_of_report(model.shown), written | {MARK: json.dumps((key, row)).encode()}
+            )
         self.end(model, row)
 
     def end(self, model: Model, row: dict) -> None:

@@ -34,11 +34,17 @@ NUMBERS = "joints", "worst_ratio", "file_dt_s", "stable_at_file_dt", "limit_s", 
 FLEET_COLUMNS = ("file", "sha256", "same_as", *HEADS)
 EMPTY_ROW = dict.fromkeys(FLEET_COLUMNS) | {"reason": "", "seconds": 0.0, "has_report": False}
 REFERENCES = {"arm": "stated numbers", SOLUTION: "the solution", "model": "itself"}
-CHANGES = {"verdict": "verdict", "stable_at_file_dt": "stable", "limit_s": "limit in s"}  # columns and their names
+CHANGES = {
+    "verdict": "verdict",
+    "stable_at_file_dt": "stable",
+    "limit_s": "limit in s",
+}  # columns and their names
 MOVED = 0.01  # relative change of a step limit that is reported
 
 
-def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Sequence[str], reference: Reference) -> dict:
+def row_of_file(
+    sections: Sequence[Section], causes: Sequence[dict], lost: Sequence[str], reference: Reference
+) -> dict:
     """Verdict and reason, largest share of a tolerance, step. lost: parts of the report that broke off.
 
     An unstable step of the file and joints that are matched by other names do not change the verdict; the reason names them.
@@ -57,7 +63,9 @@ def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Seque
         outcome = UNCONFIRMED if unconfirmed else ITSELF if reference.kind == "model" else AGREE
         outcome = NOT_JUDGED if not_judged else outcome
         said = {"not_judged": not_judged, "unconfirmed": unconfirmed, "unstable": unstable}
-        reasons = [say(Finding("verdict", kind, {"checks": checks})) for kind, checks in said.items() if checks]
+        reasons = [
+            say(Finding("verdict", kind, {"checks": checks})) for kind, checks in said.items() if checks
+        ]
     reasons += [f"not finished: {first_of(unfinished)}"] if unfinished else []
     return {
         "verdict": outcome, "reason": "; ".join(filter(None, (*reasons, reference.matched))),
@@ -100,7 +108,9 @@ def earlier(folder: str) -> dict[str, dict]:
     try:
         return by_file(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, KeyError, csv.Error):
-        raise Refused(f"cannot read {in_one_line(str(path))}; expected the folder of an earlier fleet") from None
+        raise Refused(
+            f"cannot read {in_one_line(str(path))}; expected the folder of an earlier fleet"
+        ) from None
 
 
 def by_file(table: str) -> dict[str, dict]:
@@ -153,7 +163,9 @@ def fleet_page(rows: Sequence[dict], **values: object) -> str:
     pages = environment()
     values |= {"rows": list(map(shown_row, rows)), "heads": HEADS, "title": title, "good": good}
     body = pages.get_template("fleet.html.jinja").render(values)
-    return pages.get_template("page.html.jinja").render(title=title, links=(), good=good, script="", body=Markup(body))
+    return pages.get_template("page.html.jinja").render(
+        title=title, links=(), good=good, script="", body=Markup(body)
+    )
 
 
 def shown_row(row: dict) -> dict:
@@ -171,5 +183,11 @@ def cell(name: str, value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.1f}" if name == "seconds" else f"{1e3 * value:.4g}" if name.endswith("_s") else f"{value:.2g}"
+        return (
+            f"{value:.1f}"
+            if name == "seconds"
+            else f"{1e3 * value:.4g}"
+            if name.endswith("_s")
+            else f"{value:.2g}"
+        )
     return "" if value is None else REFERENCES.get(value, str(value))

@@ -31,13 +31,20 @@ class FleetOptions(NamedTuple):
 
     def command(self, shown: str) -> str:
         """The command that writes the same report for one file."""
-        words = ["fleet", shown, *["--full"] * (not self.is_quick), *["--timing"] * bool({*TIMED} & {*self.names})]
+        words = [
+            "fleet",
+            shown,
+            *["--full"] * (not self.is_quick),
+            *["--timing"] * bool({*TIMED} & {*self.names}),
+        ]
         words += ["--only", ",".join(self.names)]
         words += ["--reference", self.reference] if self.reference else []
         return shlex.join(["python", "-m", "compare", *words])
 
 
-def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) -> tuple[dict, dict[str, bytes]]:
+def compare_file(
+    shown: str, options: FleetOptions, bundle: dict[str, bytes]
+) -> tuple[dict, dict[str, bytes]]:
     """The row of a file, and its report: {path: content}, empty if nothing can be compared."""
     began, top, out = time.process_time(), Path.cwd() / "model", Path.cwd() / "report"
     path = unpacked(bundle, top)
@@ -60,7 +67,10 @@ def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) ->
         "reference": compared.reference.kind,
     }  # fmt: skip
     if not names:
-        return row | {"verdict": REFUSED, "reason": f"no experiment applies: {'; '.join(map(': '.join, left_out))}"}, {}
+        return row | {
+            "verdict": REFUSED,
+            "reason": f"no experiment applies: {'; '.join(map(': '.join, left_out))}",
+        }, {}
     out.mkdir()
     setup = experiment.setup_of(compared, options.is_quick)
     with ThreadPoolExecutor(1) as workers:

@@ -56,7 +56,9 @@ class Check:
 
     def __post_init__(self):
         if self.rule not in RULES or not np.isfinite(self.tolerance):
-            raise ValueError(f"{self.quantity!r}: unknown rule {self.rule!r} or infinite tolerance {self.tolerance}")
+            raise ValueError(
+                f"{self.quantity!r}: unknown rule {self.rule!r} or infinite tolerance {self.tolerance}"
+            )
 
     @property
     def passed(self) -> bool:
@@ -69,10 +71,25 @@ class Check:
     @property
     def over_tolerance(self) -> float | None:
         """Value over tolerance, for a tolerance of rounding that is not zero; else None."""
-        return self.value / self.tolerance if self.rounding and self.tolerance and self.value is not None else None
+        return (
+            self.value / self.tolerance
+            if self.rounding and self.tolerance and self.value is not None
+            else None
+        )
 
     def record(self) -> dict:
-        names = ("experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "judged", "passed", "note")
+        names = (
+            "experiment",
+            "scene",
+            "quantity",
+            "rule",
+            "value",
+            "tolerance",
+            "unit",
+            "judged",
+            "passed",
+            "note",
+        )
         return {name: getattr(self, name) for name in names}
 
     def __str__(self):
@@ -110,11 +127,22 @@ class Result:
         self.notes.append(self.finding(kind, of, **values))
 
     def check(
-        self, scene, quantity, value, tolerance, unit, note="", rounding=False, rule="at most", about=About.MODELS
+        self,
+        scene,
+        quantity,
+        value,
+        tolerance,
+        unit,
+        note="",
+        rounding=False,
+        rule="at most",
+        about=About.MODELS,
     ) -> Check:
         """Add a check; a value that is None or not finite fails."""
         value = None if value is None or not np.isfinite(value) else float(value)
-        check = Check(self.experiment, scene, quantity, value, float(tolerance), unit, note, rounding, rule, about)
+        check = Check(
+            self.experiment, scene, quantity, value, float(tolerance), unit, note, rounding, rule, about
+        )
         self.checks.append(check)
         return check
 
@@ -124,7 +152,9 @@ class Result:
         self.checks.append(check)
         return check
 
-    def agree(self, sample, quantity, unit, values, mujoco_values, scale, exact: "Pairs | None" = None) -> None:
+    def agree(
+        self, sample, quantity, unit, values, mujoco_values, scale, exact: "Pairs | None" = None
+    ) -> None:
         """Add a row and a check: of the differences between two engines over the states, the one closest to its tolerance.
 
         values, mujoco_values: (states, ...). scale: a number or (states,), or with as many dimensions as the values for a
@@ -143,7 +173,9 @@ class Result:
             """A check of the state that is closest to its tolerance, and its index."""
             tolerance = FACTOR * EPS * scale
             (k,) = closest(difference, tolerance)
-            return self.check(sample.name, quantity, difference[k], tolerance[k], unit, sample.describe(k), True), k
+            return self.check(
+                sample.name, quantity, difference[k], tolerance[k], unit, sample.describe(k), True
+            ), k
 
         check, worst = check_closest(quantity, difference, scale)
         for name in list(worst_of_states)[1:]:
@@ -159,7 +191,9 @@ class Result:
             "difference_over_bar": check.over_tolerance,
             "scale": scale[worst],
             "difference_eps": in_eps[between].max(),
-            f"{self.label.lower()}_from_exact_eps": in_eps[f"{self.label} to exact"].max() if exact_states else None,
+            f"{self.label.lower()}_from_exact_eps": in_eps[f"{self.label} to exact"].max()
+            if exact_states
+            else None,
             "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if exact_states else None,
             "exact_states": exact_states,
             "worst_state": check.note,
@@ -167,8 +201,13 @@ class Result:
         for name in ("q", "qd", "tau"):
             row[f"worst_{name}"] = " ".join(repr(float(number)) for number in getattr(sample, name)[worst])
         self.rows.append(row | {"passed": check.passed})
-        self.curves.setdefault(sample.name, {})[quantity] = {name: np.sort(values) for name, values in in_eps.items()}
-        self.shown = [*list(row)[:SHOWN], *(f"{engine.lower()}_from_exact_eps" for engine in (self.label, "MuJoCo"))]
+        self.curves.setdefault(sample.name, {})[quantity] = {
+            name: np.sort(values) for name, values in in_eps.items()
+        }
+        self.shown = [
+            *list(row)[:SHOWN],
+            *(f"{engine.lower()}_from_exact_eps" for engine in (self.label, "MuJoCo")),
+        ]
 
 
 def largest_known(values: Sequence[float | None]) -> float | None:

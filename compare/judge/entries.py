@@ -47,7 +47,10 @@ class Entries:
         by_joint = np.array([tree.moves(b) for b in range(len(tree.mass))])
         turns = np.array(tree.kind) != "slide"
         self.count = np.maximum(1, (by_joint & turns).sum(axis=1))  # k, (m,)
-        moved, turns = np.array([per_speed(tree, joints) for joints in by_joint]), np.array(per_speed(tree, turns))
+        moved, turns = (
+            np.array([per_speed(tree, joints) for joints in by_joint]),
+            np.array(per_speed(tree, turns)),
+        )
         self.slides, self.turns = moved & ~turns, moved & turns  # (m, nv)
         of_speeds = per_speed(tree, range(len(tree.kind)))
         arms = from_joints[..., of_speeds] + from_joints.max(initial=0.0) / 8
@@ -103,7 +106,9 @@ class Entries:
     def potential_energy(self) -> np.ndarray:
         """J, (states,): m g L, and k (|q| + |rest|)^2 / 2."""
         stiffness = np.array(per_speed(self.tree, self.tree.stiffness))
-        stretched = np.divide(self.springs**2, stiffness, out=np.zeros_like(self.springs), where=stiffness > 0.0)
+        stretched = np.divide(
+            self.springs**2, stiffness, out=np.zeros_like(self.springs), where=stiffness > 0.0
+        )
         return np.linalg.norm(self.tree.gravity) * (self.reach @ self.mass) + stretched.sum(axis=1) / 2.0
 
     @cached_property

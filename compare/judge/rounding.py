@@ -20,7 +20,9 @@ OF_A_BALL = 32 * EPS
 LEFT_OUT = 3.2e-8
 
 
-def slope_rounding(stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> tuple:
+def slope_rounding(
+    stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float
+) -> tuple:
     """a, |a| and the bound of the rounding error of a, rad/s2; (states, nv) each: A a = force, with the method's matrix A.
 
     The bound is |A^-1| (64 eps R |a| + 64 eps S), entry by entry, because entries have different units. S is the sum of the
@@ -81,7 +83,14 @@ def of_positions(tree: Tree, q: np.ndarray) -> np.ndarray:
 
 
 def band(
-    stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float, every=1, most: int | None = None
+    stepping: Method,
+    tree: Tree,
+    q: ndarray,
+    qd: ndarray,
+    tau: ndarray,
+    dt: float,
+    every=1,
+    most: int | None = None,
 ) -> ndarray:
     """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states (steps + 1, nq, nv), (steps / every + 1, 2 nv).
 
@@ -89,7 +98,9 @@ def band(
     """
     blocks = (len(q) - 1) // every
     finite = np.isfinite([*q.T, *qd.T]).all(axis=0)
-    ran = (int(np.argmin(finite)) - 1) // every if not finite.all() else blocks  # whole blocks before it diverges
+    ran = (
+        (int(np.argmin(finite)) - 1) // every if not finite.all() else blocks
+    )  # whole blocks before it diverges
     ran = ran if most is None else min(ran, most // every)
     size = 2 * qd.shape[1]
     widths = np.full((blocks + 1, size), np.inf)
@@ -122,7 +133,14 @@ def band(
 
 
 def growth(
-    stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float, every: int, stride: int = 1
+    stepping: Method,
+    tree: Tree,
+    q: ndarray,
+    qd: ndarray,
+    tau: ndarray,
+    dt: float,
+    every: int,
+    stride: int = 1,
 ) -> ndarray:
     """log10 of the growth of a small difference of the initial state, at every `every` steps.
 

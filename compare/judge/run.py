@@ -13,10 +13,15 @@ from .scale import EPS, FACTOR, gravity_scale
 LEFT = 0.1  # rad or m: the distance at which a held model has left its posture
 MOVES = 0.1  # rad or m: the least movement of a run without a holding torque that tests anything
 ORDER_MARGIN = 0.15  # of a measured order
-LEAST_JUDGED = 0.1  # of a scene that states no minimum: the share of its time for which its runs must be judged
+LEAST_JUDGED = (
+    0.1  # of a scene that states no minimum: the share of its time for which its runs must be judged
+)
 RESTS = 1e-9  # rad or m, and per s: what moves less only rounds
 STILL = 1e-3  # of the largest movement of its unit: a joint that moves less is not what a run tests
-COARSE_STEP, STABLE_TIME = 0.01, 0.3  # s: from this step on, methods other than RK4 may be unstable after this time
+COARSE_STEP, STABLE_TIME = (
+    0.01,
+    0.3,
+)  # s: from this step on, methods other than RK4 may be unstable after this time
 
 
 def step_in_words(case: Case, steps: int) -> str:
@@ -44,7 +49,9 @@ def widest_judged(case: Case, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         largest = np.nanmax(sizes, axis=0)
         of_unit = np.array([largest[units == unit].max() for unit in units])
         widest = np.where(largest >= STILL * of_unit, largest, of_unit)
-        moves = of_unit > RESTS if largest.max() > RESTS else np.ones(nv, bool)  # else another unit is what moves
+        moves = (
+            of_unit > RESTS if largest.max() > RESTS else np.ones(nv, bool)
+        )  # else another unit is what moves
         limits.append(np.where(moves, np.minimum(widest, most), most))
     return np.concatenate(limits)
 
@@ -123,9 +130,13 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     times the distance along the slides. Rounding may add 64 eps of 1 J for each inertia and stiffness of 1.
     """
     tree, coordinates = case.tree, case.coordinates
-    exchange = 2.0 * gravity_scale(case.robot.tree, case.posture)  # the reach includes the slides at the start
+    exchange = 2.0 * gravity_scale(
+        case.robot.tree, case.posture
+    )  # the reach includes the slides at the start
     exchange = exchange + tmt.energy(q[0], case.v, tree) - tmt.potential_energy(q[0], tree)
-    if tree.position_gain:  # servos return energy until they exert no force; the remaining torque is that of a motor
+    if (
+        tree.position_gain
+    ):  # servos return energy until they exert no force; the remaining torque is that of a motor
         gain = np.array(tree.position_gain)
         pull, give = case.tau - fed_back_at(tree, q[0]), np.linalg.pinv(gain, hermitian=True)
         exchange = exchange + pull @ give @ pull / 2.0
@@ -133,7 +144,9 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     if tree.has_springs:
         stretch = coordinates.difference(q[0], np.array(tree.rest))
         exchange = exchange + tmt.spring_torque(q[0], tree) @ stretch / 2.0
-    slides = [i for kind, _, by in coordinates.places.joints if kind == "slide" for i in range(by.start, by.stop)]
+    slides = [
+        i for kind, _, by in coordinates.places.joints if kind == "slide" for i in range(by.start, by.stop)
+    ]
     weight = np.linalg.norm(tree.gravity) * np.sum(tree.mass)
     lifted = weight * np.abs(coordinates.difference(q, q[0])[:, slides]).sum(axis=1)
     stiff = np.sum(tree.stiffness) + (np.trace(tree.position_gain) if tree.position_gain else 0.0)

@@ -68,7 +68,9 @@ def mass_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     return np.abs(literal.mass_matrix(q, tree)).max(axis=(1, 2))
 
 
-def acceleration_scale(tree: tmt.Tree, q: np.ndarray, force: ArrayLike, size: ArrayLike | None = None) -> np.ndarray:
+def acceleration_scale(
+    tree: tmt.Tree, q: np.ndarray, force: ArrayLike, size: ArrayLike | None = None
+) -> np.ndarray:
     """|Mbar^-1| (|Mbar| |qdd| + force), rad/s2, (states,): the effect of errors of eps in Mbar and in the force on qdd.
 
     force: scale of the forces, N m, (states,). size: |qdd|; None: its bound |Mbar^-1| force, for which the scale is
@@ -81,7 +83,9 @@ def acceleration_scale(tree: tmt.Tree, q: np.ndarray, force: ArrayLike, size: Ar
 
 def gain_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """|P| |q| + |S| |qd| of a controller's gains, N m or N, (..., nv)."""
-    positions = np.abs(q)[..., [at.start for at, by in tree.coordinates.places for _ in range(by.start, by.stop)]]
+    positions = np.abs(q)[
+        ..., [at.start for at, by in tree.coordinates.places for _ in range(by.start, by.stop)]
+    ]
     gains = zip((tree.position_gain, tree.speed_gain), (positions, np.abs(qd)))
     return sum((values @ np.abs(gain).T for gain, values in gains if gain), np.zeros(np.shape(qd)))
 

@@ -7,7 +7,9 @@ def renamed(rows: Sequence[dict], unit: str) -> list[dict]:
     """Rows with the suffix _rad of columns replaced by a column `unit`, unless the unit is rad."""
     if unit == "rad":
         return list(rows)
-    return [{name.removesuffix("_rad"): value for name, value in row.items()} | {"unit": unit} for row in rows]
+    return [
+        {name.removesuffix("_rad"): value for name, value in row.items()} | {"unit": unit} for row in rows
+    ]
 
 
 def value(row: dict, name: str) -> object:

@@ -76,7 +76,12 @@ class Document:
         if not self.page:
             return joined([head, *body])
         html = Markup(MarkdownIt("commonmark", {"html": True}).render(joined([head, *body])))
-        values = {"title": title, "good": good, "links": self.links(), "script": SCRIPT if self.motion else ""}
+        values = {
+            "title": title,
+            "good": good,
+            "links": self.links(),
+            "script": SCRIPT if self.motion else "",
+        }
         return environment().get_template("page.html.jinja").render(values, body=html)
 
     def links(self) -> list[tuple[str, bool]]:
@@ -87,7 +92,9 @@ class Document:
     def first_screen(self) -> str:
         """A line for each experiment, the pictures; on the page also what explains that checks fail."""
         report, failing, more = self.report, None, 0
-        lines = [self.parts.attempt(f"the line of {one.name}", None, self.line, one) for one in report.sections]
+        lines = [
+            self.parts.attempt(f"the line of {one.name}", None, self.line, one) for one in report.sections
+        ]
         failed = [check for kind in failures(report.sections) for check in kind]
         if report.causes:
             failing = table_of(of_causes(report.causes[:FIRST_CAUSES]).drop(columns="rank"))
@@ -106,7 +113,12 @@ class Document:
     def line(self, section: Section) -> dict:
         """The line of one experiment: what it asks, whether it passes, its headline."""
         good, words = standing(section)
-        named = {"name": section.name, "title": section.title, "outcome": words, "headline": headline(section)}
+        named = {
+            "name": section.name,
+            "title": section.title,
+            "outcome": words,
+            "headline": headline(section),
+        }
         if 0 < sum(check.failed for check in section.result.checks) == len(section.explained):
             named["headline"] = block("verdict", "consequence")
         return named | {"good": good, "kind": kind(good)}
@@ -123,7 +135,12 @@ class Document:
                 if file.startswith(OVERVIEW):
                     of = [one for one in self.report.sections if picture_of(one) == picture_of(section)]
                     shown += [one for one in of if one in wrong]
-                    about = {"file": file, "path": f"{file}.png", "caption": caption, "link": linked_figure(of)}
+                    about = {
+                        "file": file,
+                        "path": f"{file}.png",
+                        "caption": caption,
+                        "link": linked_figure(of),
+                    }
                     words = {"title": block(section.name, "overview_title")}
                     words["alternative"] = block(section.name, "overview_alternative")
                     pictures.append(about | words | {"fails": any(one in wrong for one in of)})
@@ -148,7 +165,10 @@ class Document:
         failed = [check for check in result.checks if check.failed and check not in consequences]
         not_judged = [check for check in result.checks if not check.judged]
         few, most = (MOST_ROWS, FIRST_NOTES) if self.page else (MOST_IN_MARKDOWN, MOST_NOTES)
-        notes, figures = section.notes, [one for one in figures_of(section) if not (self.page and one["moves"])]
+        notes, figures = (
+            section.notes,
+            [one for one in figures_of(section) if not (self.page and one["moves"])],
+        )
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
         first = [one for one in figures if one in first or one["file"].endswith(LINKED)]
         return self.template.section(

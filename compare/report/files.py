@@ -39,7 +39,9 @@ def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
     for document, body in bodies.items():
         text = parts.attempt(f"the head of {document.file}", None, document.text, body)
         if text is not None or document is markdown:
-            save(folder / document.file, joined([*map(escaped, parts.lines), *body]) if text is None else text)
+            save(
+                folder / document.file, joined([*map(escaped, parts.lines), *body]) if text is None else text
+            )
     reference = report.reference
     results = {
         "passed": passed(report.sections) and not parts.broken,
@@ -58,7 +60,9 @@ def records(parts: Parts, name: str, found: Sequence[dict]) -> list[dict]:
     """Those of the records that can be written as JSON."""
     written = []
     for number, record in enumerate(found, start=1):
-        text = parts.attempt(f"{name} {number} in results.json", None, partial(json.dumps, allow_nan=False), record)
+        text = parts.attempt(
+            f"{name} {number} in results.json", None, partial(json.dumps, allow_nan=False), record
+        )
         written += [json.loads(text)] if text else []
     return written
 

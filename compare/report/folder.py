@@ -210,14 +210,18 @@ def save(path: Path, text: str) -> None:
 def files(folder: Path) -> list[str]:
     """The files of a report in a folder, as relative paths."""
     found = [path for name in OWN for path in [folder / name, *(folder / name).rglob("*")]]
-    return sorted(path.relative_to(folder).as_posix() for path in found if path.is_file() or path.is_symlink())
+    return sorted(
+        path.relative_to(folder).as_posix() for path in found if path.is_file() or path.is_symlink()
+    )
 
 
 def refuse_foreign(out: Path) -> None:
     """FolderError for a file under a report's names that the report in `out` does not list as its own."""
     own = provenance_of(out).get("files", ())
     if foreign := [name for name in files(out) if name not in own]:
-        raise FolderError(f"{out} has {foreign[0]}, which no earlier report has written; use another folder (--out)")
+        raise FolderError(
+            f"{out} has {foreign[0]}, which no earlier report has written; use another folder (--out)"
+        )
 
 
 def provenance_of(out: Path) -> dict:

@@ -16,7 +16,12 @@ OURS = "arm-tmt-mujoco"
 PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka")
 # if installed
 OF_ENGINES = ("drake", "pin", "mujoco-mjx", "jax", "mujoco-warp", "newton", "dartpy", "pybullet")
-PROGRAM_FILES = (":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml")  # changes elsewhere do not change the program
+PROGRAM_FILES = (
+    ":/compare",
+    ":/mjcf",
+    ":/tmt",
+    ":/pyproject.toml",
+)  # changes elsewhere do not change the program
 
 
 def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict:
@@ -37,13 +42,19 @@ def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict:
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         OURS: installed(OURS),
-    } | {package: found for package in (*PACKAGES, *OF_ENGINES) if (found := installed(package)) or package in PACKAGES}
+    } | {
+        package: found
+        for package in (*PACKAGES, *OF_ENGINES)
+        if (found := installed(package)) or package in PACKAGES
+    }
 
 
 def durations(clock: Clock) -> dict:
     """CPU seconds of each task, and when it ended, wall-clock seconds from the start."""
     return {
-        "seconds_of": {task: round(clock.seconds_of(task), 2) for task in clock.ended if clock.seconds_of(task)},
+        "seconds_of": {
+            task: round(clock.seconds_of(task), 2) for task in clock.ended if clock.seconds_of(task)
+        },
         "ended_after_s": {task: round(at, 2) for task, at in clock.ended.items()},
     }
 

@@ -25,20 +25,26 @@ def answer(results: Mapping[str, Result], kind: str, *about) -> Finding:
     if kind == "printed":
         if "published" not in results:
             return Finding("questions", "not_run")
-        return Finding("questions", "printed", {"items": [printed(results["published"], item) for item in about]})
+        return Finding(
+            "questions", "printed", {"items": [printed(results["published"], item) for item in about]}
+        )
     found = [largest(results, *about[k : k + 3]) for k in range(0, len(about), 3)]
     is_of_runs = "trajectory" in about and "trajectory" in results
     errors, steps = true_errors(results["trajectory"]) if is_of_runs else ({}, None)
     return Finding("questions", "largest", {"answers": found, "errors": errors, "steps": steps})
 
 
-def largest(results: Mapping[str, Result], experiment: str, quantity: str, where: Mapping[str, object]) -> dict:
+def largest(
+    results: Mapping[str, Result], experiment: str, quantity: str, where: Mapping[str, object]
+) -> dict:
     """The largest difference of the engines in an experiment: of the rows with these values, or of this quantity."""
     about = {"experiment": experiment, "quantity": quantity}
     if experiment not in results:
         return about | {"state": "absent"}
     where = where or {"quantity": quantity}
-    rows = [row for row in results[experiment].rows if all(row.get(key) == value for key, value in where.items())]
+    rows = [
+        row for row in results[experiment].rows if all(row.get(key) == value for key, value in where.items())
+    ]
     if not rows or any(row["largest_difference"] is None for row in rows):
         return about | {"state": "diverged" if rows else "empty"}
     top = max(rows, key=lambda row: row["largest_difference"])

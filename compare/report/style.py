@@ -29,7 +29,9 @@ STYLE = {
 WIDTH = 7.5  # inches, a page
 NUMBER = re.compile(r"\$(\\mathdefault\{)?[-0-9.^{}]*(\\times10)?[-0-9.^{}]*\$")  # of an axis, as a formula
 matplotlib.rcParams.update(STYLE)
-warnings.filterwarnings("ignore", "constrained_layout not applied")  # names that leave no room for what is drawn
+warnings.filterwarnings(
+    "ignore", "constrained_layout not applied"
+)  # names that leave no room for what is drawn
 
 
 def joint_lines(robot) -> dict[str, tuple]:

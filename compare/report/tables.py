@@ -8,7 +8,9 @@ import pandas as pd
 from ..judge.check import Check
 from .verdict import Section
 
-DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled", "found"), 7)  # of a column; else 3
+DIGITS = dict.fromkeys(
+    ("published", "exact", "tmt", "mujoco", "stated", "compiled", "found"), 7
+)  # of a column; else 3
 STEPS = "predicted_dt_s", "observed_dt_s", "dt_s", "mujoco_dt_s", "tmt_dt_s", "from_dt_s", "to_dt_s"
 DIGITS |= dict.fromkeys(STEPS, 5)
 TITLES = {"what_should_i_use": "What should I use?"}  # of tables whose name is not their title
@@ -29,7 +31,9 @@ def shown(table: pd.DataFrame, columns: Sequence[str] | None = None) -> pd.DataF
         whole = "" if value is None else str(value)
         return f"{whole[: LONGEST_LIST - 4]} ..." if is_list and len(whole) > LONGEST_LIST else whole
 
-    columns = {c: [text(v, DIGITS.get(c, 3), c in LISTS) for v in table[c].astype(object)] for c in table.columns}
+    columns = {
+        c: [text(v, DIGITS.get(c, 3), c in LISTS) for v in table[c].astype(object)] for c in table.columns
+    }
     return pd.DataFrame(columns).rename(columns=lambda c: c.replace("_", " "))
 
 
@@ -54,7 +58,11 @@ def closest_checks(section: Section, most: int) -> pd.DataFrame:
 
 def origins(origin: dict) -> pd.DataFrame:
     def in_one_cell(value) -> str:
-        return ", ".join(f"{name} {part}" for name, part in value.items()) if isinstance(value, dict) else str(value)
+        return (
+            ", ".join(f"{name} {part}" for name, part in value.items())
+            if isinstance(value, dict)
+            else str(value)
+        )
 
     rows = [(IN_WORDS.get(name, name), in_one_cell(value)) for name, value in origin.items()]
     return pd.DataFrame(rows, columns=["what", "value"])

@@ -35,7 +35,11 @@ class Terminal:
             narrow = indent + re.sub(" {2,}", "  ", text.strip())
             text = narrow if len(narrow) <= columns else text
             text = fill(
-                text, max(columns, 20), subsequent_indent=indent + "  ", break_long_words=False, break_on_hyphens=False
+                text,
+                max(columns, 20),
+                subsequent_indent=indent + "  ",
+                break_long_words=False,
+                break_on_hyphens=False,
             )
         with self.paused():
             self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)

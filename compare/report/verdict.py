@@ -54,7 +54,9 @@ class Report(NamedTuple):
     @property
     def answer(self) -> list[str]:
         """The last lines of a run of one experiment: what is said of the robot, else its number."""
-        return self.top or [f"{capital(headline(section))}." for section in self.sections if section.result.checks]
+        return self.top or [
+            f"{capital(headline(section))}." for section in self.sections if section.result.checks
+        ]
 
 
 class Failures(NamedTuple):
@@ -87,7 +89,9 @@ def passed(sections: Sequence[Section]) -> bool:
 
 def worst(sections: Sequence[Section]) -> Check | None:
     """The check that uses most of a tolerance of rounding, or None."""
-    checks = [check for section in sections for check in section.result.checks if check.over_tolerance is not None]
+    checks = [
+        check for section in sections for check in section.result.checks if check.over_tolerance is not None
+    ]
     return max(checks, key=lambda check: check.over_tolerance, default=None)
 
 
@@ -175,7 +179,11 @@ def headline(section: Section) -> str:
     checks = [check for check in section.result.checks if check.judged]
     shares = [check.over_tolerance for check in checks if check.over_tolerance is not None and check.passed]
     numbers = {"passed": sum(check.passed for check in checks), "checks": len(checks)}
-    return say(Finding("verdict", "checks_passed", {**numbers, "share": max(shares, default=None)})) if checks else ""
+    return (
+        say(Finding("verdict", "checks_passed", {**numbers, "share": max(shares, default=None)}))
+        if checks
+        else ""
+    )
 
 
 class Parts:
@@ -194,7 +202,10 @@ class Parts:
 
     @property
     def lines(self) -> list[str]:
-        return [say(Finding("verdict", "incomplete", {"name": name, "why": why})) for name, why in self.broken.items()]
+        return [
+            say(Finding("verdict", "incomplete", {"name": name, "why": why}))
+            for name, why in self.broken.items()
+        ]
 
     @property
     def checks(self) -> list[Check]:

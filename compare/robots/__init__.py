@@ -68,13 +68,17 @@ class Robot:
     symbols: Mapping[str, str] = field(default_factory=dict)  # of joints, for figures
     # example postures of a centre, a saddle, a marginal equilibrium
     kinds: Mapping[str, str] = field(default_factory=dict)
-    landmarks: Callable | None = None  # q (times, n) rad -> points, m, drawn as a chain; None: origins of the joints
+    landmarks: Callable | None = (
+        None  # q (times, n) rad -> points, m, drawn as a chain; None: origins of the joints
+    )
     sketched: tuple[str, ...] = ()  # postures of the sketch; (): the first two
     axes: tuple[str, str, str] = ("x", "y", "z")  # labels of the inertial frame
     printed: tuple[Printed, ...] = ()
     claims: Claims | None = None
     questions: tuple[Question, ...] = ()
-    remarks: Callable | None = None  # (answers by item, dynamics by engine) -> Findings about the printed results
+    remarks: Callable | None = (
+        None  # (answers by item, dynamics by engine) -> Findings about the printed results
+    )
     features: tuple = ()  # of a file, see engines.mujoco.inventory; its numbers are those that MuJoCo compiled
     drive: Drive = field(default_factory=Drive)  # forces other than gravity and springs of joints
     stated_in: str = ""  # another file, the solution, with the numbers for this one; "": none

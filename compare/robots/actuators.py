@@ -60,7 +60,12 @@ class Actuator:
         return (self.gain[0] + self.gain[1] * length) * u + self.bias[0] + self.bias[1] * length
 
     def largest(self, u: float, length: float) -> float:
-        return max(abs(self.gain[0] * u), abs(self.gain[1] * length * u), abs(self.bias[0]), abs(self.bias[1] * length))
+        return max(
+            abs(self.gain[0] * u),
+            abs(self.gain[1] * length * u),
+            abs(self.bias[0]),
+            abs(self.bias[1] * length),
+        )
 
     def stiffness(self, u: float) -> float:
         """-d force/dl."""
@@ -129,12 +134,16 @@ class Drive:
     @property
     def refused(self) -> dict[str, str]:
         """Elements that are left out, by name, and why."""
-        return {actuator.name: actuator.refused for actuator in self.actuators if actuator.refused} | dict(self.unknown)
+        return {actuator.name: actuator.refused for actuator in self.actuators if actuator.refused} | dict(
+            self.unknown
+        )
 
     @property
     def feeds_back(self) -> bool:
         """Whether an actuator force depends on position or speed; if none does, there is no step limit."""
-        return any(actuator.acts and any((*actuator.bias[1:], *actuator.gain[1:])) for actuator in self.actuators)
+        return any(
+            actuator.acts and any((*actuator.bias[1:], *actuator.gain[1:])) for actuator in self.actuators
+        )
 
     def control(self, posture: str, lengths: Sequence[float]) -> np.ndarray:
         """u of each actuator at a posture, within its range: that of the keyframe, else the target is the posture.
@@ -176,7 +185,9 @@ def controller(drive: Drive, posture: object, q: np.ndarray, targets: np.ndarray
     of a ball any numbers; targets: (nv,) rad or m, shift of the targets: the target length of a servo by |J| @ targets.
     """
     moved, n = np.broadcast_to(targets, len(q)), len(q)
-    moments = [np.zeros(n) if actuator.moment is None else np.array(actuator.moment) for actuator in drive.actuators]
+    moments = [
+        np.zeros(n) if actuator.moment is None else np.array(actuator.moment) for actuator in drive.actuators
+    ]
     stated = drive.control(posture if isinstance(posture, str) else "", [moment @ q for moment in moments])
     torque, position_gain, speed_gain = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
     controls, left_out = {actuator.name: None for actuator in drive.actuators}, {}

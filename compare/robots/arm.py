@@ -25,7 +25,15 @@ SCENES = (
     Scene("ball catch, held", "ball catch", "hold", judged=2.5),  # unstable: rounding grows fast
     Scene("bent, held", "bent", "hold"),
     Scene("bent, damped", "bent", "free", damping=0.5, tags=("full only", "speed")),
-    Scene("thrown, no gravity", "bent", "free", (100.0, 200.0, -150.0), gravity=False, judged=4.5, tags=("full only",)),
+    Scene(
+        "thrown, no gravity",
+        "bent",
+        "free",
+        (100.0, 200.0, -150.0),
+        gravity=False,
+        judged=4.5,
+        tags=("full only",),
+    ),
     Scene("elbow swing", "zero", "free", locked=("alpha", "beta"), tags=("full only",)),
 )
 PRINTED = (
@@ -88,7 +96,13 @@ def remarks(answers: Mapping, dynamics: Mapping) -> list[Finding]:
         for name, values in stated.items()
     }
     sign = {"printed": PRINTED[0].values[0], "tmt": answers["c"].tmt[0], "mujoco": answers["c"].mujoco[0]}
-    findings = {"transposes": differences, "stacked_transform": {}, "equations": {}, "program": {}, "sign": sign}
+    findings = {
+        "transposes": differences,
+        "stacked_transform": {},
+        "equations": {},
+        "program": {},
+        "sign": sign,
+    }
     return [Finding("arm", kind, values) for kind, values in findings.items()]
 
 

@@ -36,7 +36,9 @@ class Scene:
 
     name: str
     posture: str | tuple = ()  # name, or one number per joint, deg (m, quaternion); (): all zero
-    torque: str | tuple = "free"  # "hold": balance of gravity and springs at the start; "servos": own actuators; or N m
+    torque: str | tuple = (
+        "free"  # "hold": balance of gravity and springs at the start; "servos": own actuators; or N m
+    )
     speed: tuple = ()  # deg/s (m/s) at the start; (): at rest
     damping: float | tuple = 0.0  # N m s/rad (N s/m), added to that of all joints, or of each speed
     targets: float | tuple = 0.0  # deg (m), shift of the targets of the servos, of all joints or each speed
@@ -56,7 +58,9 @@ class Scene:
         self.set("speed", are_numbers(self.speed), "a speed in deg/s for each joint")
         accepted = f"a time from {TIMES[0]:g} to {TIMES[1]:g} s"
         for name in ("duration", "dt"):
-            self.set(name, is_number(getattr(self, name)) and TIMES[0] <= getattr(self, name) <= TIMES[1], accepted)
+            self.set(
+                name, is_number(getattr(self, name)) and TIMES[0] <= getattr(self, name) <= TIMES[1], accepted
+            )
         accepted = "a number of at least 0 N m s/rad, or one for each joint"
         self.set("damping", is_each(self.damping) and np.min(self.damping) >= 0.0, accepted)
         self.set("targets", is_each(self.targets), "a movement in deg (m), of all joints or each")
@@ -141,7 +145,9 @@ class Case:
             scene.require("locked", not scene.locked, "no locked joint together with servos")
         is_right = set(scene.locked) <= set(names) and len(scene.locked) < len(names)
         scene.require("locked", is_right, f"at most {len(names) - 1} of {some_of(names)}")
-        moving = any(any(scene.speed[self.places[name].qd]) for name in scene.locked) if scene.speed else False
+        moving = (
+            any(any(scene.speed[self.places[name].qd]) for name in scene.locked) if scene.speed else False
+        )
         scene.require("speed", not moving, f"speed 0 for locked joints ({', '.join(scene.locked)})")
 
     @cached_property
@@ -186,7 +192,9 @@ class Case:
         if self.scene.torque != "servos":
             return None
         whole = self.robot.coordinates
-        q = np.array([self.posture[at.start] for at, by in whole.places.places for _ in range(by.start, by.stop)])
+        q = np.array(
+            [self.posture[at.start] for at, by in whole.places.places for _ in range(by.start, by.stop)]
+        )
         targets = whole.from_degrees(np.broadcast_to(self.scene.targets, whole.nv), positions=False)
         return controller(self.robot.drive, self.scene.posture, q, targets)
 
@@ -196,7 +204,9 @@ class Case:
         tree, scene = self.robot.tree, self.scene
         gravity = tree.gravity if scene.gravity else (0.0, 0.0, 0.0)
         gains = {name: getattr(self.controller, name) for name in GAINS} if self.controller else {}
-        return dataclasses.replace(tree, damping=np.add(tree.damping, scene.damping), gravity=gravity, **gains)
+        return dataclasses.replace(
+            tree, damping=np.add(tree.damping, scene.damping), gravity=gravity, **gains
+        )
 
     @property
     def locked(self) -> Mapping[str, float | tuple]:

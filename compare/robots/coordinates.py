@@ -76,7 +76,9 @@ class Coordinates(NamedTuple):
     def _named(self, parts):
         pairs = zip(self.names, self.all_kinds)
         return tuple(
-            name + part for name, kind in pairs for part in ([f" {p}" for p in parts] if kind == "ball" else [""])
+            name + part
+            for name, kind in pairs
+            for part in ([f" {p}" for p in parts] if kind == "ball" else [""])
         )
 
     def difference(self, q1: np.ndarray, q0: np.ndarray) -> np.ndarray:
@@ -84,7 +86,9 @@ class Coordinates(NamedTuple):
         if not self.has_balls:
             return np.subtract(q1, q0)
         q1, q0 = np.broadcast_arrays(q1, q0)
-        return np.stack(self.places.difference(*([q[..., i] for i in range(self.nq)] for q in (q1, q0))), axis=-1)
+        return np.stack(
+            self.places.difference(*([q[..., i] for i in range(self.nq)] for q in (q1, q0))), axis=-1
+        )
 
     def move(self, q: np.ndarray, dv: np.ndarray) -> np.ndarray:
         """The position after a movement, (..., nq)."""
@@ -108,7 +112,9 @@ class Coordinates(NamedTuple):
                 turns = rng.normal(size=(count, 4))
                 q[:, at] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
             else:
-                q[:, at.start] = rng.uniform(*(limits or {"hinge": (-np.pi, np.pi), "slide": (-0.5, 0.5)}[kind]), count)
+                q[:, at.start] = rng.uniform(
+                    *(limits or {"hinge": (-np.pi, np.pi), "slide": (-0.5, 0.5)}[kind]), count
+                )
         return q
 
     def from_degrees(self, values: ArrayLike, positions: bool) -> np.ndarray:

@@ -97,12 +97,16 @@ def named_positions(reading: Reading, names: Mapping[str, str]) -> dict[str, tup
     own = dict(zip(OWN_POSTURES, (reading.qpos0, middle)))
     positions = {}
     for name, q in ({names[key]: q for key, q in reading.keyframes.items()} | own).items():
-        if not any(np.abs(coordinates.difference(q, np.array(other))).max() < 1e-9 for other in positions.values()):
+        if not any(
+            np.abs(coordinates.difference(q, np.array(other))).max() < 1e-9 for other in positions.values()
+        ):
             positions[name] = tuple(map(float, q))
     return positions
 
 
-def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Drive | None = None) -> tuple[Scene, ...]:
+def scenes_from(
+    tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Drive | None = None
+) -> tuple[Scene, ...]:
     """The scenes of a robot: held, let go, let go with damping; a free body is thrown too; with servos see servo_scenes.
 
     Only agreement is expected, as long as rounding allows. A robot that would stay at rest gets an initial speed. Methods are
@@ -111,7 +115,9 @@ def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Dri
     """
     coordinates = Coordinates(tree.hinge_names, tree.kind)
     mass_matrix, weight = map(np.array, mass_matrix_and_bias(tree, q.tolist(), [0.0] * coordinates.nv))
-    root = np.sqrt(np.where(np.diag(mass_matrix) > 0.0, np.diag(mass_matrix), 1.0))  # joints of very different inertia
+    root = np.sqrt(
+        np.where(np.diag(mass_matrix) > 0.0, np.diag(mass_matrix), 1.0)
+    )  # joints of very different inertia
     inverse = np.linalg.pinv(mass_matrix / np.outer(root, root), hermitian=True) / np.outer(root, root)
     accelerations = inverse @ -(weight + literal.spring_torque(q, tree))
     added = added_damping(inverse, accelerations)
@@ -124,7 +130,9 @@ def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Dri
     tags = ("own", "speed", "regular")
     if free := free_joints(tree):
         made.append(Scene(f"{start}, thrown", start, speed=thrown(tree), tags=tags, **timing))
-        turns = np.delete(accelerations, [tree.coordinates.joints[i + k].qd.start for i in free for k in range(3)])
+        turns = np.delete(
+            accelerations, [tree.coordinates.joints[i + k].qd.start for i in free for k in range(3)]
+        )
         tags = ("own", "speed") if rests or np.abs(turns).max() >= STILL else ("own", "falls")
     made += [
         Scene(f"{start}, {how}", start, tags=tags, **speed, **timing),
@@ -146,7 +154,10 @@ def servo_scenes(
     if not acting.position_gain.any():
         return []
     driven = replace(tree, **{name: getattr(acting, name) for name in GAINS})
-    count, least = coarsest(driven, inverse, dt, duration=SERVOS_ACT), SERVOS_ACT * max(fastest_rates(driven, inverse))
+    count, least = (
+        coarsest(driven, inverse, dt, duration=SERVOS_ACT),
+        SERVOS_ACT * max(fastest_rates(driven, inverse)),
+    )
     free = bool(free_joints(tree))
     settings = {"gravity": not free, "duration": SERVOS_ACT, "dt": SERVOS_ACT / count, "judged": 0.0}
     moved = tuple(MOVED_TARGETS[kind] for kind, _, by in joints for _ in range(by.start, by.stop))
@@ -174,7 +185,9 @@ def added_damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float
     return tuple(float(rate / ease) for ease in np.diag(inverse))
 
 
-def coarsest(tree: tmt.Tree, inverse: np.ndarray, dt: float, added: tuple = (), duration: float = DURATION) -> int:
+def coarsest(
+    tree: tmt.Tree, inverse: np.ndarray, dt: float, added: tuple = (), duration: float = DURATION
+) -> int:
     """The number of steps of a scene, 64, 128 ... 8192: about four times the step of the file.
 
     No step is longer than 1 / the fastest rate of damping, added damping, springs and servos. inverse: of Mbar, (nv, nv).

@@ -17,7 +17,9 @@ from ..judge.words import listed, some_of
 from .coordinates import Coordinates
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}
-STATED = re.compile(r"(?P<name>.+?)(?P<offset>[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<measure>deg|rad|m)")
+STATED = re.compile(
+    r"(?P<name>.+?)(?P<offset>[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<measure>deg|rad|m)"
+)
 FORMS = '"knee", "-knee", "knee+90deg" or "knee in deg"'
 
 
@@ -131,7 +133,9 @@ def joint_map(coordinates: Coordinates, stated: Sequence[str] | None) -> JointMa
     if twice:
         raise JointsError(f"joint {twice[0]!r} is stated twice")
     if missing:
-        raise JointsError(f"joints without {listed(missing)}; expected all {len(coordinates.names)} of the model")
+        raise JointsError(
+            f"joints without {listed(missing)}; expected all {len(coordinates.names)} of the model"
+        )
     return JointMap(coordinates, joints)
 
 
@@ -152,10 +156,14 @@ def read_joint(text: str, coordinates: Coordinates) -> Joint:
         rest, value = match["name"], float(match["offset"])
         zero = np.radians(value) if match["measure"] == "deg" else value
         if rest in kinds and (match["measure"] == "m") != (kinds[rest] == "slide"):
-            raise JointsError(f"joint {text!r}: {rest} is a {kinds[rest]}, its zero cannot be in {match['measure']}")
+            raise JointsError(
+                f"joint {text!r}: {rest} is a {kinds[rest]}, its zero cannot be in {match['measure']}"
+            )
     name, measured, measure = rest.rpartition(" in ")
     if rest not in kinds and measured and name.removeprefix("-") in kinds:
-        raise JointsError(f"joint {text!r}: unknown unit {measure!r}; known: {', '.join(filter(None, PER_UNIT))}")
+        raise JointsError(
+            f"joint {text!r}: unknown unit {measure!r}; known: {', '.join(filter(None, PER_UNIT))}"
+        )
     if rest not in kinds:
         raise JointsError(f"unknown joint {text!r}; known: {listed(coordinates.names)}, stated as {FORMS}")
     if kinds[rest] == "ball" and (sign, zero, unit) != (1.0, 0.0, ""):
@@ -204,7 +212,11 @@ def same_names(reference: Sequence[str], names: Sequence[str]) -> dict[int, int]
     pairs = {i: names.index(name) for i, name in enumerate(reference) if name in names}
     small, right = [name.casefold() for name in names], [name.casefold() for name in reference]
     for i, name in enumerate(right):
-        if i not in pairs and small.count(name) == right.count(name) == 1 and small.index(name) not in pairs.values():
+        if (
+            i not in pairs
+            and small.count(name) == right.count(name) == 1
+            and small.index(name) not in pairs.values()
+        ):
             pairs[i] = small.index(name)
     return pairs
 

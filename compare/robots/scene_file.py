@@ -9,7 +9,19 @@ from . import Robot
 from .case import Case, Scene
 from .validation import WrongField, are_numbers, is_number, shorten
 
-KEYS = ("name", "posture", "q", "speed", "torque", "targets", "gravity", "damping", "locked", "duration", "dt")
+KEYS = (
+    "name",
+    "posture",
+    "q",
+    "speed",
+    "torque",
+    "targets",
+    "gravity",
+    "damping",
+    "locked",
+    "duration",
+    "dt",
+)
 STEPS = 64  # of a scene without dt
 NEARLY_ONE = 1e-3  # accepted deviation of the length of a quaternion from 1, for few digits
 
@@ -57,7 +69,9 @@ def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
     """One entry as a scene of the robot."""
 
     def refuse(key: str, accepted: str) -> SceneError:
-        return SceneError(f"{where}: {key} is {in_toml(entry.get(key, values.get(key)))}; expected {accepted}")
+        return SceneError(
+            f"{where}: {key} is {in_toml(entry.get(key, values.get(key)))}; expected {accepted}"
+        )
 
     values = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
     for key in entry:
@@ -84,7 +98,9 @@ def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
         Case(robot, scene)
         return scene
     except WrongField as error:
-        raise refuse("q" if error.field == "posture" and "q" in entry else error.field, error.accepted) from None
+        raise refuse(
+            "q" if error.field == "posture" and "q" in entry else error.field, error.accepted
+        ) from None
     except ValueError as error:
         raise SceneError(f"{where}: {' '.join(str(error).split())}") from None
 

@@ -51,7 +51,9 @@ class Sample:
         """The first states, without exact values."""
         if count >= len(self.q):
             return self
-        return Sample(self.tree, self.name, *(a[:count] for a in (self.q, self.qd, self.tau)), 0, self.states[:count])
+        return Sample(
+            self.tree, self.name, *(a[:count] for a in (self.q, self.qd, self.tau)), 0, self.states[:count]
+        )
 
 
 def named(robot: Robot) -> Sample:
@@ -76,7 +78,9 @@ def random(robot: Robot, states: int, exact_states: int, seed: int = SEED) -> Sa
     q = robot.coordinates.random(rng, states, robot.ranges)
     most = largest_speeds_and_torques(robot)[:, None]
     speeds, torques = rng.uniform(-most, most, (2, states, nv))
-    return Sample(robot.tree, "random states", q, speeds, torques, min(exact_states, states), notes=tuple(notes))
+    return Sample(
+        robot.tree, "random states", q, speeds, torques, min(exact_states, states), notes=tuple(notes)
+    )
 
 
 def seconds(robot: Robot) -> float:

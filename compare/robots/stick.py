@@ -16,7 +16,9 @@ RIGHTWARD = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of the camera
 UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E)])
 
 
-def stick_figure(robot: Robot, q: np.ndarray, crosses: bool = False) -> tuple[np.ndarray, list[tuple[int, int]]]:
+def stick_figure(
+    robot: Robot, q: np.ndarray, crosses: bool = False
+) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """Points in the world, (times, points, 3) m, at positions q (times, nq), and the pairs of points with a stick.
 
     The landmarks; else the joints, and the centres of mass after the last joints; the slides of a free joint are left out.

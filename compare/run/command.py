@@ -31,7 +31,9 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     try:
         compared = compared_with(options.reference, options.mjcf, options.joints)
         if options.scenes:
-            compared = compared._replace(robot=compared.robot.with_scenes(read_scenes(options.scenes, compared.robot)))
+            compared = compared._replace(
+                robot=compared.robot.with_scenes(read_scenes(options.scenes, compared.robot))
+            )
         if options.experiment != "all" and (reason := skipped(options.experiment, compared.robot)):
             raise Refused(f"{options.experiment} does not apply to {compared.robot.name}: {say(reason)}")
         with new_report(options.out) as folder:
@@ -80,7 +82,9 @@ def compute(options, command: str, compared: Compared, folder: Path, terminal: T
     return write_report(folder, *outcome, list(reasons.items()), origin, compared)
 
 
-def write_report(folder: Path, sections, causes, needless, skipped, origin: dict, compared: Compared) -> tuple:
+def write_report(
+    folder: Path, sections, causes, needless, skipped, origin: dict, compared: Compared
+) -> tuple:
     """Write a report with its verdict to a folder that has its figures: the verdict.Report and its Parts.
 
     sections, causes, needless: see examine; skipped, origin: see Report.

@@ -16,7 +16,12 @@ from ..robots import Robot
 
 
 def draw(
-    experiment: str, result: Result, robot: Robot, folder: Path, others: Mapping | None = None, few: bool = False
+    experiment: str,
+    result: Result,
+    robot: Robot,
+    folder: Path,
+    others: Mapping | None = None,
+    few: bool = False,
 ) -> list[tuple[str, str]]:
     """The figures of an experiment on disk: names (without .png) and captions.
 

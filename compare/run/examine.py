@@ -19,7 +19,10 @@ from .drawing import draw, quiet, results_needed
 from .explained import explained
 from .reference import Compared
 
-START, END = "start", "figures"  # tasks of the clock: what comes before the first experiment and after the last
+START, END = (
+    "start",
+    "figures",
+)  # tasks of the clock: what comes before the first experiment and after the last
 DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers on which Mbar and h depend, by their names in `parameters`
 IN_EQUATIONS = (
@@ -31,11 +34,18 @@ SHOWN = 5  # lines on the terminal about an experiment that fails
 def setup_of(compared: Compared, is_quick: bool, **more: object) -> Setup:
     """What the experiments need. more: further fields of Setup."""
     make = Setup.quick if is_quick else Setup
-    return make(compared.robot, engines(compared.mujoco, compared.reference.own), reading=compared.reading, **more)
+    return make(
+        compared.robot, engines(compared.mujoco, compared.reference.own), reading=compared.reading, **more
+    )
 
 
 def examine(
-    names: Sequence[str], setup: Setup, folder: Path, terminal: Terminal, workers: Workers, clock: Clock | None = None
+    names: Sequence[str],
+    setup: Setup,
+    folder: Path,
+    terminal: Terminal,
+    workers: Workers,
+    clock: Clock | None = None,
 ) -> tuple[list[Section], list[dict], dict[str, str]]:
     """The section of each experiment with its figures, the causes of failing checks, and the skipped experiments with reasons.
 
@@ -76,7 +86,9 @@ def examine(
             new = [{"experiment": name, **cause} for cause in new_causes(setup, sections, causes)]
             causes = new + causes
             if causes:
-                sections[-1].explained = attempt("explained", partial(explained, section=sections[-1]), setup)[0] or []
+                sections[-1].explained = (
+                    attempt("explained", partial(explained, section=sections[-1]), setup)[0] or []
+                )
         clock.ends(name)
         if section:
             few = setup.is_quick and not setup.alone and not any(failures([section]))
@@ -127,7 +139,9 @@ def add_problems(result: Result, problems: Sequence, reported: set) -> None:
     for k, problem in enumerate(problems):
         if k not in reported and (asked is None or problem.quantity in asked):
             reported.add(k)
-            result.check("", f"{problem.quantity} returns valid values", None, 0.0, "", problem.text, rule="equal")
+            result.check(
+                "", f"{problem.quantity} returns valid values", None, 0.0, "", problem.text, rule="equal"
+            )
     result.checks += others
 
 
@@ -192,13 +206,18 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
     result.check("", quantity, None, 0.0, "", described(error), rule="equal", about=About.PROGRAM)
 
 
-def say_outcome(terminal: Terminal, section: Section, seconds: float, new: Sequence, known: bool = False) -> None:
+def say_outcome(
+    terminal: Terminal, section: Section, seconds: float, new: Sequence, known: bool = False
+) -> None:
     """One line for an experiment, then the causes that are new, and the first failing checks that no cause explains.
 
     seconds: of the processor, for the experiment itself; known: whether there are causes, new ones or others.
     """
     checks, of_cause = section.result.checks, section.explained
-    failed, open_checks = [check for check in checks if check.failed], [check for check in checks if not check.judged]
+    failed, open_checks = (
+        [check for check in checks if check.failed],
+        [check for check in checks if not check.judged],
+    )
     used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
     most = f"{len(of_cause)} explained by the cause" if of_cause else ""
     if any(used) and not failed:

@@ -14,7 +14,12 @@ from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..report.verdict import STATES_CAUSES, Section, failures
 
-AT_STATES = ("kinematics", "mass", "gravity", "acceleration")  # what compares models directly, with little work
+AT_STATES = (
+    "kinematics",
+    "mass",
+    "gravity",
+    "acceleration",
+)  # what compares models directly, with little work
 NODES = 24  # of the integral of a force at rest, which is smooth
 
 
@@ -38,7 +43,11 @@ def explained(setup: Setup, section: Section) -> list[Check]:
     if mended is None:
         return []
     if section.name in (*AT_STATES, "trajectory"):
-        still = {(check.scene, check.quantity) for check in compared_again(mended, section.name).checks if check.failed}
+        still = {
+            (check.scene, check.quantity)
+            for check in compared_again(mended, section.name).checks
+            if check.failed
+        }
         return [check for check in checks if (check.scene, check.quantity) not in still]
     if any(check.failed for name in AT_STATES for check in compared_again(mended, name).checks):
         return []
@@ -53,7 +62,9 @@ def of_own_numbers(setup: Setup) -> Setup | None:
     if (tree.hinge_names, tree.kind, tree.parent) != (stated.hinge_names, stated.kind, stated.parent):
         return None
     robot = dataclasses.replace(setup.robot, tree=tree)
-    return dataclasses.replace(setup, robot=robot, engines=engines(engine(reading)), reading=reading, background={})
+    return dataclasses.replace(
+        setup, robot=robot, engines=engines(engine(reading)), reading=reading, background={}
+    )
 
 
 def compared_again(mended: Setup, name: str) -> Result:
@@ -83,9 +94,17 @@ def what_follows(setup: Setup) -> dict[str, bool]:
     found, given = module("diagnosis").diagnosed(setup), setup.engines["own"].of(setup.robot.case())
     equations = found.ratio <= 1.0 or bool(found.diagnosis.causes)
     motion = equations and (found.force_ratio <= 1.0 or bool(found.of_forces))
-    if motion and not found.of_forces and given.has("acceleration"):  # the diagnosis has asked at a few states
+    if (
+        motion and not found.of_forces and given.has("acceleration")
+    ):  # the diagnosis has asked at a few states
         motion = module("diagnosis").is_solved(given, setup.robot.tree, setup.random)
-    follows = {"geometry": False, "equations": equations, "motion": motion, "gravity": equations, "energy": equations}
+    follows = {
+        "geometry": False,
+        "equations": equations,
+        "motion": motion,
+        "gravity": equations,
+        "energy": equations,
+    }
     sample = setup.random.first(found.states)
     scale = Entries(setup.robot.tree, sample.q, sample.qd)
     at_rest = np.zeros_like(sample.qd)

@@ -69,9 +69,13 @@ class Compared(NamedTuple):
         if dt is None and integrator is None:
             return None
         if self.reading is None:
-            raise ModelError(f"--dt and --integrator need a robot's file; the numbers of {self.robot.name} are stated")
+            raise ModelError(
+                f"--dt and --integrator need a robot's file; the numbers of {self.robot.name} are stated"
+            )
         try:
-            return self.reading.dt if dt is None else dt, integrator_by_name(integrator or self.reading.integrator)
+            return self.reading.dt if dt is None else dt, integrator_by_name(
+                integrator or self.reading.integrator
+            )
         except ValueError as error:
             raise ModelError(f"--integrator: {error}") from None
 
@@ -83,7 +87,11 @@ def compared_with(reference, path, joints=None, shown=None, solution=None) -> Co
     solution: the path of the solution, if not `reference`. ModelError, in one line, for a file that cannot be compared,
     JointsDiffer for different joints, OwnFileError for equations that cannot be used.
     """
-    file, shown, source = path or ARM.mjcf, in_one_line(shown or path or "mjcf/arm.xml"), in_one_line(reference or "")
+    file, shown, source = (
+        path or ARM.mjcf,
+        in_one_line(shown or path or "mjcf/arm.xml"),
+        in_one_line(reference or ""),
+    )
     if reference == "arm" or (reference is None and (path is None or has_hinges(path, ARM.joints))):
         robot, renamed = ARM, ()
         if not has_hinges(file, ARM.joints):

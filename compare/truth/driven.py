@@ -105,7 +105,9 @@ class Posture:
     def beyond(self) -> float:
         """How far the rest is beyond the range of a joint, rad or m."""
         joints = zip(self.robot.coordinates.places.joints, self.robot.ranges)
-        limited = [(self.q[at.start], limits) for (kind, at, _), limits in joints if limits and kind != "ball"]
+        limited = [
+            (self.q[at.start], limits) for (kind, at, _), limits in joints if limits and kind != "ball"
+        ]
         return float(max((max(low - q, q - high) for q, (low, high) in limited), default=0.0))
 
     @property

@@ -16,7 +16,9 @@ from ..robots.coordinates import floats
 from .rest import holding, moving, slopes
 from .steps import growth_of, is_runge_kutta, linear_step
 
-AS_IT_STANDS = 6  # speeds up to which the method is differentiated as written; beyond, composite inertias are faster
+AS_IT_STANDS = (
+    6  # speeds up to which the method is differentiated as written; beyond, composite inertias are faster
+)
 LONGEST_STEP, SHORTEST_STEP = 1e3, 1e-4  # s: the range in which a limit is searched
 SCANNED = 281  # steps in this range, 40 for each power of ten
 NEUTRAL = 1e-9  # growth per step that can be rounding
@@ -77,7 +79,9 @@ class Held:
         """d(qd, qdd)/d(q, qd), (2nv, 2nv), for movements of q: TMT's right-hand side differentiated by dual numbers."""
         nq, n, unit = len(self.q), self.nv, np.eye(2 * self.nv)
         start = [float(x) for x in self.q]
-        state = seeded([*start, *np.zeros(n)], [*self.tree.coordinates.component_rates(start, unit[:n]), *unit[n:]])
+        state = seeded(
+            [*start, *np.zeros(n)], [*self.tree.coordinates.component_rates(start, unit[:n]), *unit[n:]]
+        )
         terms = method.mass_matrix_and_bias if n <= AS_IT_STANDS else composite.mass_matrix_and_bias
         qdd = method.acceleration(self.tree, state[:nq], state[nq:], [float(t) for t in self.tau], terms)
         return np.vstack([unit[n:], slopes(state, qdd)])
@@ -140,7 +144,9 @@ class Held:
         _, sizes, rows = np.linalg.svd(by_movement)
         soft = rows[sizes <= max(NEGLIGIBLE**2 * sizes.max(), SLOWEST**2)].T
         push = self.curvature(soft @ np.random.default_rng(SEED).normal(size=soft.shape[1])) @ soft
-        return bool(np.abs(push).max(initial=0.0) <= NEGLIGIBLE * np.abs(self.mass_matrix @ by_movement).max())
+        return bool(
+            np.abs(push).max(initial=0.0) <= NEGLIGIBLE * np.abs(self.mass_matrix @ by_movement).max()
+        )
 
     def step(self, name: str, dt: float) -> np.ndarray:
         """The amplification matrix of a step of a method of tmt, (2nv, 2nv)."""
@@ -152,7 +158,9 @@ class Held:
         idle = self.without_stiffness
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             if is_runge_kutta(stepping):
-                return np.abs(growth_of(stepping, dt[..., None] * np.where(idle, 0.0, self.modes[0]))).max(axis=-1)
+                return np.abs(growth_of(stepping, dt[..., None] * np.where(idle, 0.0, self.modes[0]))).max(
+                    axis=-1
+                )
             factors = np.linalg.eigvals(linear_step(self, stepping, np.atleast_1d(dt))).reshape(*dt.shape, -1)
             if idle.any():
                 near = np.clip(self.small * dt, *AT_ONE)[..., None]
@@ -197,4 +205,6 @@ def posture_names(robot) -> tuple[str, ...]:
 def held(robot, posture: str, damping: float = 0.0) -> Held:
     """A named posture under TMT's holding torque, with added joint damping, N m s/rad; without gravity if the robot floats."""
     gravity = not floats(robot.tree)
-    return Held(robot.case(f"{posture}, held", posture=posture, torque="hold", damping=damping, gravity=gravity))
+    return Held(
+        robot.case(f"{posture}, held", posture=posture, torque="hold", damping=damping, gravity=gravity)
+    )

@@ -14,13 +14,17 @@ def pendulum(tree: tmt.Tree) -> tuple[float, float]:
     """
     axis, gravity = np.array(tree.axis[0]), np.array(tree.gravity)
     inertia, moment = tree.armature[0], np.zeros(3)
-    for hinge, mass, com, tensor in zip(tree.body_hinge, tree.mass, np.array(tree.com), np.array(tree.inertia)):
+    for hinge, mass, com, tensor in zip(
+        tree.body_hinge, tree.mass, np.array(tree.com), np.array(tree.inertia)
+    ):
         if hinge == 0:
             inertia += axis @ tensor @ axis + mass * np.sum(np.cross(axis, com) ** 2)
             moment += mass * com
     across, pull = (v - axis * (axis @ v) for v in (moment, gravity))
     hanging = np.arctan2(axis @ np.cross(across, pull), across @ pull)
-    return float(hanging + tree.reference[0]), float(np.sqrt(np.linalg.norm(across) * np.linalg.norm(pull) / inertia))
+    return float(hanging + tree.reference[0]), float(
+        np.sqrt(np.linalg.norm(across) * np.linalg.norm(pull) / inertia)
+    )
 
 
 def swing(t: np.ndarray, q: float, qd: float, hanging: float, frequency: float) -> np.ndarray:

@@ -19,7 +19,10 @@ from .steps import growth_of
 
 RECORDS = 64  # states of a run, without its start
 LOST = 1e-30  # error of a run in pairs relative to the growth of a small difference, about
-DOUBLES, MOST_DOUBLINGS = "dopri8", 5  # the method of a run in doubles; how often its number of steps is doubled
+DOUBLES, MOST_DOUBLINGS = (
+    "dopri8",
+    5,
+)  # the method of a run in doubles; how often its number of steps is doubled
 DIVERGES = 1.05  # growth in a step that overflows in the thousands of steps of a run
 
 
@@ -59,7 +62,9 @@ def reference(case: Case) -> Reference:
     except TooManySteps as error:
         return in_doubles(case)._replace(why=str(error))
     except ValueError as error:
-        raise ValueError(f"scene {case.name!r}: {error}; expected a slower start or a shorter scene") from error
+        raise ValueError(
+            f"scene {case.name!r}: {error}; expected a slower start or a shorter scene"
+        ) from error
     return Reference(times(case), path.high, path.low, apart, path.steps, case.coordinates)
 
 
@@ -108,7 +113,9 @@ def has_no_reference(robot: object) -> str | None:
     for case in robot.cases_of_torque if robot.is_read else ():
         count = first_steps(case) << MOST_DOUBLINGS
         decay, swing = rates_at(case.tree, case.q)
-        grown = np.abs(growth_of(METHODS[DOUBLES], np.array([-decay, 1j * swing]) * case.duration / count)).max()
+        grown = np.abs(
+            growth_of(METHODS[DOUBLES], np.array([-decay, 1j * swing]) * case.duration / count)
+        ).max()
         if not grown <= DIVERGES:
             return (
                 f"the {robot.noun}'s fastest rate, {max(decay, swing):.1e} per second, is too fast for the reference's finest "

@@ -22,7 +22,11 @@ def holding(tree: tmt.Tree, q) -> list:
     torque = method.bias(method.bodies(tree, q), tree.gravity)
     if tree.has_springs:
         torque = [a + b for a, b in zip(torque, method.spring_torque(tree, q))]
-    return [a + b for a, b in zip(torque, method.fed_back(tree, q, [0.0] * len(torque)))] if tree.has_gains else torque
+    return (
+        [a + b for a, b in zip(torque, method.fed_back(tree, q, [0.0] * len(torque)))]
+        if tree.has_gains
+        else torque
+    )
 
 
 def slopes(seeds, values) -> list:
@@ -60,7 +64,9 @@ def weight(tree: tmt.Tree, q: np.ndarray, mass: Sequence[float], gravity: Sequen
     for m, com, j in zip(mass, tree.com, tree.body_hinge):
         if j >= 0:
             masses[j] += m
-            moments[j] += m * (np.array([*frames[j].origin]) + np.array([[*row] for row in frames[j].turn]) @ com)
+            moments[j] += m * (
+                np.array([*frames[j].origin]) + np.array([[*row] for row in frames[j].turn]) @ com
+            )
     masses, moments = carrying @ masses, carrying @ moments
     joint = by_speed(tree, range(len(frames)))
     axes = np.array([[*axis] for frame in frames for axis in frame.axes])

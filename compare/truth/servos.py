@@ -101,9 +101,13 @@ class Driven:
             force = act.force(control, length)
             is_cut = act.is_cut(force)
             force = np.clip(force, *act.force_range) if is_cut else force
-            laws.append((force, act.stiffness(control), act.damping(control), is_cut) if act.acts else (0.0,) * 4)
+            laws.append(
+                (force, act.stiffness(control), act.damping(control), is_cut) if act.acts else (0.0,) * 4
+            )
         for tendon, length in zip(self.drive.tendons, along.lengths[len(laws) :]):
-            laws.append((tendon.force(length), tendon.stiffness * tendon.pulls(length), tendon.damping, False))
+            laws.append(
+                (tendon.force(length), tendon.stiffness * tendon.pulls(length), tendon.damping, False)
+            )
         forces, stiff, damped, cut = np.array(laws, float).reshape(-1, 4).T
         return forces, np.where(cut, 0.0, stiff), np.where(cut, 0.0, damped), cut.astype(bool)
 
@@ -116,7 +120,10 @@ class Driven:
         """The sum of all forces at rest, (nv,) N m or N, and its largest term."""
         along, count = self.along(q), len(self.drive.actuators)
         weigh = self.weight(q)
-        sizes = [act.largest(x, length) * act.acts for act, x, length in zip(self.drive.actuators, u, along.lengths)]
+        sizes = [
+            act.largest(x, length) * act.acts
+            for act, x, length in zip(self.drive.actuators, u, along.lengths)
+        ]
         sizes += [tendon.largest(length) for tendon, length in zip(self.drive.tendons, along.lengths[count:])]
         by_drive = (np.abs(along.moments) * np.array(sizes).reshape(-1, 1)).max(initial=0.0)
         by_springs = np.abs(by_speed(self.tree, self.tree.stiffness)).max() * max(1.0, np.abs(q).max())

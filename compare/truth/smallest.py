@@ -37,7 +37,9 @@ def needed(case: Case) -> Needed:
     names, coordinates = case.joints, case.coordinates
     joints = dict(zip(names, coordinates.places.joints))
     units = {name: coordinates.units[joint.qd.start] for name, joint in joints.items()}
-    moves = {name: f"{name} has a speed at the start" for name, joint in joints.items() if any(case.v[joint.qd])}
+    moves = {
+        name: f"{name} has a speed at the start" for name, joint in joints.items() if any(case.v[joint.qd])
+    }
     while still := tuple(name for name in names if name not in moves):
         rng = np.random.default_rng(SEED)
         (q,), qd = coordinates.random(rng, 1), rng.uniform(-10.0, 10.0, coordinates.nv)
@@ -51,7 +53,9 @@ def needed(case: Case) -> Needed:
     return Needed(still, moves)
 
 
-def forces(case: Case, tree, still: Sequence[str], start: Sequence, q: Sequence, qd: Sequence) -> tuple[list, list]:
+def forces(
+    case: Case, tree, still: Sequence[str], start: Sequence, q: Sequence, qd: Sequence
+) -> tuple[list, list]:
     """Mbar qdd (nv,) and the position: joints in `still` at their start and at rest, the others at q, qd; in mpmath's numbers.
 
     A holding torque is the model's own bias (and springs) at the start in these numbers, not its rounded value.
@@ -86,7 +90,10 @@ def exact_accelerations(case: Case, still: Sequence[str], q: np.ndarray, qd: np.
             values = solve(exact_mass_matrix(still_tree, tuple(q)), values)
         zero = ZERO * max(1, *map(abs, values))
         joints = dict(zip(case.joints, case.tree.coordinates.joints))
-        return {name: tuple(a if abs(a) > zero else mpmath.mpf(0) for a in values[joints[name].qd]) for name in still}
+        return {
+            name: tuple(a if abs(a) > zero else mpmath.mpf(0) for a in values[joints[name].qd])
+            for name in still
+        }
 
 
 @lru_cache(maxsize=8)

@@ -66,7 +66,9 @@ class Small:
 
     def free(self, base: list[int]) -> "Small":
         """With a free base, given by its speeds: those without stiffness and damping keep the momentum at zero."""
-        nonzero = [np.abs(matrix) > SYMMETRIC * np.abs(matrix).max(initial=0.0) for matrix in (self.K, self.D)]
+        nonzero = [
+            np.abs(matrix) > SYMMETRIC * np.abs(matrix).max(initial=0.0) for matrix in (self.K, self.D)
+        ]
         loose = [k for k in base if not any(matrix[k].any() or matrix[:, k].any() for matrix in nonzero)]
         kept, rest = self.locked(loose), [k for k in range(len(self.M)) if k not in loose]
         across = np.linalg.solve(self.M[np.ix_(loose, loose)], self.M[np.ix_(loose, rest)])
@@ -172,7 +174,10 @@ class Small:
     @cached_property
     def implicit(self) -> dict[str, np.ndarray]:
         """The part of D that is implicit in each integrator, in the units of M."""
-        return {name: self.scaled(self.braking(name)) for name in ("Euler", "implicitfast", "implicit", "discrete")}
+        return {
+            name: self.scaled(self.braking(name))
+            for name in ("Euler", "implicitfast", "implicit", "discrete")
+        }
 
     def step(self, integrator: str, dt: float) -> np.ndarray:
         """The matrix of a step of a small deviation (x, v), in the units of M, (2nv, 2nv)."""
@@ -181,7 +186,9 @@ class Small:
         if integrator == "RK4":
             stiff, damped, _ = self.constrained(integrator, dt, self.stiff, self.damped, unit)
             Z = dt * np.block([[none, unit], [-stiff, -damped]])
-            return np.eye(2 * n) + Z @ (np.eye(2 * n) + Z @ (np.eye(2 * n) / 2 + Z @ (np.eye(2 * n) / 6 + Z / 24)))
+            return np.eye(2 * n) + Z @ (
+                np.eye(2 * n) + Z @ (np.eye(2 * n) / 2 + Z @ (np.eye(2 * n) / 6 + Z / 24))
+            )
         held = dt * self.scaled(self.springs) if integrator == "discrete" else none
         matrix = unit + dt * (self.implicit[integrator] + held)
         stiff, damped, _ = self.constrained(integrator, dt, self.stiff, self.damped + held, matrix)
@@ -198,7 +205,10 @@ class Small:
         if not self.couple:
             return stiff, damped, np.eye(len(self.M))
         rows = self.couple(dt, integrator)
-        J, metric = rows.jacobian @ self.unrooted.T, matrix if integrator == "discrete" else np.eye(len(self.M))
+        J, metric = (
+            rows.jacobian @ self.unrooted.T,
+            matrix if integrator == "discrete" else np.eye(len(self.M)),
+        )
         eased = np.linalg.solve(metric, J.T).T
         pull = np.linalg.solve(eased @ J.T + np.diag(rows.softness), J).T
         stiff = stiff - pull @ (eased @ stiff - rows.stiffness[:, None] * J)
@@ -228,7 +238,9 @@ class Small:
     def pole_limit(self, integrator: str) -> tuple[float, str]:
         """The largest stable step of the filters, s, and the actuator. RK4 integrates a filterexact like a filter."""
         by, exact = (POLE_RK4, False) if integrator == "RK4" else (POLE, True)
-        limits = [(by * constant, name) for name, constant, is_exact in self.poles if not (exact and is_exact)]
+        limits = [
+            (by * constant, name) for name, constant, is_exact in self.poles if not (exact and is_exact)
+        ]
         return min(limits, default=(np.inf, ""))
 
     def limit(self, integrator: str) -> Limit:
@@ -241,7 +253,9 @@ class Small:
         dt = self.first_unstable(integrator) if self.names else None
         slowest, name = self.pole_limit(integrator)
         if slowest < min(dt or np.inf, LIMIT_UP_TO):
-            return Limit("finite", slowest, name, (POLE_RK4 if integrator == "RK4" else POLE) / slowest, "real")
+            return Limit(
+                "finite", slowest, name, (POLE_RK4 if integrator == "RK4" else POLE) / slowest, "real"
+            )
         if dt is None:
             return Limit("none")
         values, vectors = np.linalg.eig(self.step(integrator, (1.0 + BEYOND_LIMIT) * dt))
@@ -252,7 +266,9 @@ class Small:
         """The first unstable step, s, by the eigenvalues of steps; None: stable up to 5 s."""
         low, fastest = 0.0, np.abs(self.modes[0]).max(initial=1e-300)
         first = min(LIMIT_FROM / fastest, 0.1 * LIMIT_UP_TO)
-        for dt in np.geomspace(first, LIMIT_UP_TO, int(np.ceil(STEPS_A_DECADE * np.log10(LIMIT_UP_TO / first))) + 1):
+        for dt in np.geomspace(
+            first, LIMIT_UP_TO, int(np.ceil(STEPS_A_DECADE * np.log10(LIMIT_UP_TO / first))) + 1
+        ):
             if not self.stays(integrator, dt):
                 return bisected(lambda dt: self.stays(integrator, dt), low, dt)
             low = dt

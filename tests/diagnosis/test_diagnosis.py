@@ -79,7 +79,9 @@ CAUSES = {  # the given values, or the tree whose values these are: rank, place 
 @pytest.mark.parametrize("given, rank, place, explains, alone", CAUSES.values(), ids=CAUSES)
 def test_a_cause_is_named_with_its_value_and_its_rank(given, rank, place, explains, alone):
     causes = diagnosis(given, DAMPED if "D qd" in place else ARM).causes
-    assert {cause.rank for cause in causes} == {rank} and {cause.tied for cause in causes} == {len(causes) - 1}
+    assert {cause.rank for cause in causes} == {rank} and {cause.tied for cause in causes} == {
+        len(causes) - 1
+    }
     assert len(causes) == 1 or not alone
     (cause,) = (cause for cause in causes if cause.place == place)
     assert cause.explains == (explains if isinstance(explains, str) else pytest.approx(explains, rel=1e-9))
@@ -220,7 +222,9 @@ def test_neither_noise_nor_numbers_at_random_have_a_culprit(size):
     assert size < 1.0 or len(found.entries) == 5
 
 
-@pytest.mark.parametrize("values", [(3.55812, 3.55812 * (1 + 1e-9)), (1.0, 1.0 + EPS), (0.1, 0.2), (0.0, 1e-20)])
+@pytest.mark.parametrize(
+    "values", [(3.55812, 3.55812 * (1 + 1e-9)), (1.0, 1.0 + EPS), (0.1, 0.2), (0.0, 1e-20)]
+)
 def test_two_numbers_that_differ_are_not_printed_as_one(values):
     texts = [apart(*pair) for pair in (values, values[::-1])]
     assert texts[0] != texts[1] and [float(text) for text in texts] == pytest.approx(values, rel=1e-5)
@@ -228,7 +232,11 @@ def test_two_numbers_that_differ_are_not_printed_as_one(values):
 
 def test_slides_have_powers():
     """A cart with a rod: M[slide][slide] is the constant, M[slide][hinge] has cos(hinge)."""
-    cart = {"kind": ("slide", "hinge"), "axis": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "offset": ((0.0,) * 3,) * 2}
+    cart = {
+        "kind": ("slide", "hinge"),
+        "axis": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+        "offset": ((0.0,) * 3,) * 2,
+    }
     tree = replace(TREE, hinge_names=("cart", "rod"), **cart)
     given = values(tree, RODS, SPEEDS)
     given[:, 0] += 0.3 * HIP * np.cos(KNEE)

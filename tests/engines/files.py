@@ -12,7 +12,8 @@ EPS = np.finfo(float).eps
 
 PLAIN = '<body name="b"><joint name="j"/><geom name="g" size="0.1" pos="0.2 0 0"/></body>'
 TWO = PLAIN.replace(
-    "</body>", '<body name="c" pos="0.5 0 0"><joint name="k" axis="0 1 0"/><geom name="h" size="0.1"/></body></body>'
+    "</body>",
+    '<body name="c" pos="0.5 0 0"><joint name="k" axis="0 1 0"/><geom name="h" size="0.1"/></body></body>',
 )
 
 TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/><joint joint="k" coef="2"/></fixed></tendon>'
@@ -51,7 +52,11 @@ def assert_the_same(dynamics, tree, rng, states=3):
         same(dynamics.bias(q, v), h, force)
         same(dynamics.gravity_balance(q), tmt.gravity_balance(q, tree), force)
         cond = np.linalg.cond(M)
-        same(dynamics.acceleration(q, v, tau), tmt.acceleration(q, v, tau, tree), cond * (force + 1.0) / largest * cond)
+        same(
+            dynamics.acceleration(q, v, tau),
+            tmt.acceleration(q, v, tau, tree),
+            cond * (force + 1.0) / largest * cond,
+        )
         same(dynamics.com_positions(q), tmt.com_positions(q, tree), reach)
         same(dynamics.angular_velocities(q, v), tmt.angular_velocities(q, v, tree), np.abs(v).sum())
         for found, value in zip(dynamics.jacobians(q), tmt.jacobians(q, tree)):

@@ -55,7 +55,9 @@ def test_a_law_that_is_not_known_is_refused_by_name_and_the_rest_is_done(text):
 def test_springs_and_dampers_that_are_not_linear_are_named(what):
     joint, tendon = TWO.replace('name="j"', f'name="j" {what}="1 2"'), f'{what}="1 2"'
     drive = read(since(text_of(tendon=tendon, content=joint))).drive
-    assert drive.refused.keys() == {"joint j", "tendon t"} and all(what in why for why in drive.refused.values())
+    assert drive.refused.keys() == {"joint j", "tendon t"} and all(
+        what in why for why in drive.refused.values()
+    )
 
 
 KEYS = '<keyframe><key name="plain" qpos="0.1 0"/><key name="home" qpos="0.2 0" {}/></keyframe>'

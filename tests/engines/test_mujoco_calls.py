@@ -12,7 +12,9 @@ from compare.engines.mujoco.linear import transition
 from compare.robots.arm import ARM
 
 
-@pytest.mark.skipif(MinimalCalls.unavailable() is not None, reason="MuJoCo's library is not beside its package")
+@pytest.mark.skipif(
+    MinimalCalls.unavailable() is not None, reason="MuJoCo's library is not beside its package"
+)
 def test_a_loop_repeats_its_calls_at_the_current_state(mujoco, rng):
     dynamics, nothing = mujoco.of(ARM.case()), np.zeros(3)
     minimal = MinimalCalls(dynamics)
@@ -55,5 +57,9 @@ def test_a_step_is_differenced_in_movements(reading, rng):
         A = np.zeros((2 * model.nv + model.na,) * 2)
         calls.mujoco.mjd_transitionFD(model, data, 1e-6, True, A, None, None, None)
         order = np.concatenate([dynamics.dofs, model.nv + dynamics.dofs])
-        assert np.allclose(A[np.ix_(order, order)], transition(dynamics, q[0], tau[0], 1e-3, integrator), atol=1e-6)
-    assert np.allclose(transition(dynamics, q[0], tau[0], 1e-9, "RK4"), np.eye(2 * len(dynamics.dofs)), atol=1e-5)
+        assert np.allclose(
+            A[np.ix_(order, order)], transition(dynamics, q[0], tau[0], 1e-3, integrator), atol=1e-6
+        )
+    assert np.allclose(
+        transition(dynamics, q[0], tau[0], 1e-9, "RK4"), np.eye(2 * len(dynamics.dofs)), atol=1e-5
+    )

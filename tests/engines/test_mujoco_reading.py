@@ -16,7 +16,9 @@ from compare.engines.mujoco.inventory import REASONS
 from compare.engines.mujoco.parameters import stated_numbers
 
 FEW = ("ant.xml", "humanoid.xml", "reacher.xml", "swimmer.xml")
-PUBLISHED = [pytest.param(path, marks=[pytest.mark.slow] * (path.name not in FEW)) for path in gymnasium_files()]
+PUBLISHED = [
+    pytest.param(path, marks=[pytest.mark.slow] * (path.name not in FEW)) for path in gymnasium_files()
+]
 
 
 def compared(source, rng, states=2):
@@ -52,7 +54,9 @@ def test_a_file_with_every_kind_of_joint():
 
 @settings(max_examples=20)
 @given(
-    st.integers(0, 2**32 - 1), st.lists(st.sampled_from(KINDS), min_size=1, max_size=3, unique=True), st.integers(3, 6)
+    st.integers(0, 2**32 - 1),
+    st.lists(st.sampled_from(KINDS), min_size=1, max_size=3, unique=True),
+    st.integers(3, 6),
 )
 def test_a_random_tree_is_the_same_in_both(seed, kinds, joints):
     compared(random_tree(seed, kinds, joints), np.random.default_rng(seed))
@@ -80,7 +84,9 @@ def test_a_published_file_is_the_same_in_both_and_with_joints_locked(path, rng):
             assert np.allclose(row.stated, row.compiled, rtol=1e-6, atol=1e-12), row
 
 
-@pytest.mark.parametrize("flag, field", [("gravity", "gravity"), ("damper", "damping"), ("spring", "stiffness")])
+@pytest.mark.parametrize(
+    "flag, field", [("gravity", "gravity"), ("damper", "damping"), ("spring", "stiffness")]
+)
 def test_a_flag_of_the_file_counts(flag, field, rng):
     text = PLAIN.replace('<joint name="j"/>', '<joint name="j" damping="1" stiffness="3"/>')
     reading = compared(mjcf(text, f'<option><flag {flag}="disable"/></option>'), rng)
@@ -90,7 +96,19 @@ def test_a_flag_of_the_file_counts(flag, field, rng):
     assert_the_same(engine(reading).of(case_of(damped, damping=0.5)), damped, rng)
 
 
-OF_MIXED = ["hinge", "slide", "ball", "free", "armature", "damping", "spring", "limit", "clamp", "actuator", "keyframe"]
+OF_MIXED = [
+    "hinge",
+    "slide",
+    "ball",
+    "free",
+    "armature",
+    "damping",
+    "spring",
+    "limit",
+    "clamp",
+    "actuator",
+    "keyframe",
+]
 LIGHT = PLAIN.replace('name="b"', 'name="b" gravcomp="1"').replace('name="j"', 'name="j" axis="0 1 0"')
 MORE = {  # feature: file, names
     "contact": (mjcf(PLAIN + '<geom name="floor" type="plane" size="1 1 1"/>'), ("floor", "g")),
@@ -140,13 +158,17 @@ def test_what_else_changes_a_motion_is_switched_off_by_name(name, rng):
         assert [row.names for row in reading.features if row.feature == "other"] == [(name,)] * (not paths)
         dynamics = engine(reading).of(case_of(reading.tree))
         assert dynamics.model.opt.enableflags == 0
-        paths.append(dynamics.run(np.array([1.2]), np.array([2.0]), np.array([0.1]), 0.01, 50, "Euler").states)
+        paths.append(
+            dynamics.run(np.array([1.2]), np.array([2.0]), np.array([0.1]), 0.01, 50, "Euler").states
+        )
     assert np.array_equal(*paths)
 
 
 def test_what_has_no_name_is_called_by_its_kind_and_number():
     body = '<body><joint name="w" type="ball"/><joint type="slide"/><geom size="0.1" pos="0.1 0 0"/></body>'
-    found = read(mjcf(body, after='<keyframe><key name="k" qpos="0 0 2 0 0"/><key qpos="2 0 0 0 0"/></keyframe>'))
+    found = read(
+        mjcf(body, after='<keyframe><key name="k" qpos="0 0 2 0 0"/><key qpos="2 0 0 0 0"/></keyframe>')
+    )
     assert found.tree.hinge_names == ("w", "joint 1")
     keys = {"k": [0.0, 0.0, 1.0, 0.0, 0.0], "key 1": [1.0, 0.0, 0.0, 0.0, 0.0]}  # quaternions of length 1
     assert {name: q.tolist() for name, q in found.keyframes.items()} == keys

@@ -31,7 +31,9 @@ INERTIAL = """<body name="b"><frame pos="0.1 0.2 0.3" euler="10 20 30"><frame po
 <joint name="j" damping="2" stiffness="3"/>
 <inertial pos="0.2 0 0.1" mass="1" fullinertia="0.02 0.03 0.04 0.001 0.002 0.003"/></frame></frame></body>"""
 
-TURNED = pytest.mark.skipif(mujoco.mj_version() < 4_000_000, reason="MuJoCo 3.10 leaves out the rpy of an inertial")
+TURNED = pytest.mark.skipif(
+    mujoco.mj_version() < 4_000_000, reason="MuJoCo 3.10 leaves out the rpy of an inertial"
+)
 SOURCES = [PATHS["mixed"], mjcf(FRAMES, '<compiler eulerseq="zyx"/>'), mjcf(INERTIAL), mjcf()]
 SOURCES += [pytest.param(URDF, marks=TURNED)]
 
@@ -69,7 +71,9 @@ def test_an_option_that_asks_for_a_change_is_named_where_it_changes(option):
         assert row.why in ("", name) and (difference(row) > 0.1) == (row.quantity in quantities)
 
 
-@pytest.mark.parametrize("of", ['boundmass="0.5"', 'boundinertia="0.5"', 'balanceinertia="true"', 'settotalmass="1"'])
+@pytest.mark.parametrize(
+    "of", ['boundmass="0.5"', 'boundinertia="0.5"', 'balanceinertia="true"', 'settotalmass="1"']
+)
 def test_an_option_without_effect_is_not_named(of):
     rows = rows_of(mjcf(BODY.format("1 1.5 2", ""), f"<compiler {of}/>"))
     assert not any(row.why for row in rows.values())

@@ -64,7 +64,9 @@ def assert_the_same(source, rng, states=5):
         assert (error <= FACTOR * EPS * scales.bias[state]).all()
 
 
-@pytest.mark.parametrize("name, why", [("quadruped", "root' is of type free"), ("pendulum_ball", "r' is of type ball")])
+@pytest.mark.parametrize(
+    "name, why", [("quadruped", "root' is of type free"), ("pendulum_ball", "r' is of type ball")]
+)
 def test_what_a_urdf_cannot_say_is_refused(name, why):
     with pytest.raises(ValueError, match=why):
         urdf(PATHS[name])

@@ -32,5 +32,7 @@ def test_my_equations():
 if __name__ == "__main__":
     test_my_equations()
     worst = compare.differences(CART_POLE, bias=lambda q, qd: [bias(q, qd)[0], -bias(q, qd)[1]])[0]
-    print(f"the equations agree; with a wrong sign {worst.entry} is {worst.yours:.3g}, not {worst.mujoco:.3g}")
+    print(
+        f"the equations agree; with a wrong sign {worst.entry} is {worst.yours:.3g}, not {worst.mujoco:.3g}"
+    )
     print(f"probable cause: {worst.cause}")

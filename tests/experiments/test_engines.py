@@ -120,7 +120,9 @@ def test_each_seeded_error_fails_its_own_checks_and_no_others(report):
             failed.setdefault(check["scene"].split()[0].rstrip(","), set()).add(check["quantity"])
     assert "Right" not in failed and "Upside" not in failed
     assert failed["Heavy"] == {"mass as read", "Mbar to exact", "bias to exact", "qdd to exact"}
-    assert failed["Tilted"] == {"Mbar to exact", "bias to exact", "qdd to exact"} | failed["Tilted"] - {"mass as read"}
+    assert failed["Tilted"] == {"Mbar to exact", "bias to exact", "qdd to exact"} | failed["Tilted"] - {
+        "mass as read"
+    }
     assert {"Mbar to exact", "qdd to exact"} <= failed["Bare"] and "bias to exact" not in failed["Bare"]
     assert failed["Later"] == {"one step of Euler, compared with tmt's semi_implicit_euler"}
 
@@ -128,8 +130,12 @@ def test_each_seeded_error_fails_its_own_checks_and_no_others(report):
 def test_what_is_read_differently_is_a_row_and_says_whether_it_was_set(report):
     rows = {(row["engine"], row["number"], row["of"]): row for row in table(report[0], "engines_read")}
     assert rows["Upside", "gravity", "z"]["set_by_this_program"] == "true"
-    heavy = rows["Heavy", "mass", next(of for engine, number, of in rows if (engine, number) == ("Heavy", "mass"))]
-    assert (float(heavy["read"]), float(heavy["compared"])) == (1.001, 1.0) and heavy["set_by_this_program"] == "false"
+    heavy = rows[
+        "Heavy", "mass", next(of for engine, number, of in rows if (engine, number) == ("Heavy", "mass"))
+    ]
+    assert (float(heavy["read"]), float(heavy["compared"])) == (1.001, 1.0) and heavy[
+        "set_by_this_program"
+    ] == "false"
     assert ("Blind", "", "") in rows and rows["Blind", "", ""]["why_not"]  # it cannot read the file
     assert {engine for engine, *_ in rows} == {"Upside", "Heavy", "Blind"}
 
@@ -170,7 +176,9 @@ class Other(TmtDynamics):
 
 
 @pytest.mark.parametrize("precision", RECORDS)
-@pytest.mark.parametrize("quantity, name", (("mass_matrix", "Mbar"), ("bias", "bias"), ("acceleration", "qdd")))
+@pytest.mark.parametrize(
+    "quantity, name", (("mass_matrix", "Mbar"), ("bias", "bias"), ("acceleration", "qdd"))
+)
 def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, precision):
     """A float32 engine is allowed what its own eps allows, and no more."""
     for share, fails in ((0.9, False), (1.1, True)):
@@ -195,7 +203,9 @@ def test_a_number_as_read_just_inside_and_just_outside(number):
         result, read = Result("engines"), {name: values.copy() for name, values in stated.items()}
         result.tables["engines_read"] = []
         size = size_of(stated, number) or 1.0
-        read[number][..., -1] += off * RECORDS["float64"].eps * size * (1.0 if stated[number].any() else differs)
+        read[number][..., -1] += (
+            off * RECORDS["float64"].eps * size * (1.0 if stated[number].any() else differs)
+        )
         reading = {"read": read, "stated": stated, "mended": {number: True} if differs else {}}
         compare_numbers(result, ARM, "Other", reading, RECORDS["float64"])
         failed = [f"{number} as read"] * (differs and number in ("mass", "moments"))
@@ -220,7 +230,10 @@ if __name__ == "__main__":  # processes of engines begin with this file
 
 
 def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_again(report):
-    root, mortal = report[0].parent, AGAIN.replace("return tmt.mass_matrix(q, self.tree)", "__import__('os')._exit(3)")
+    root, mortal = (
+        report[0].parent,
+        AGAIN.replace("return tmt.mass_matrix(q, self.tree)", "__import__('os')._exit(3)"),
+    )
     (root / "compare/engines/mortal.py").write_text(mortal.format(**RIGHT))
     (root / "asked.py").write_text(ASKED)
     command, environment = [sys.executable, "asked.py"], os.environ | {"PYTHONPATH": str(root)}
@@ -231,7 +244,9 @@ def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_
 def test_bodies_that_move_as_one():
     """Two points of 1 kg at 1 m from each other: 2 kg, and moments 0, 1/2, 1/2 kg m2 about their centre."""
     nothing = np.zeros((3, 3))
-    mass, moments = together([(1.0, np.array([0.0, 0.0, 1.0]), nothing), (1.0, np.array([0.0, 0.0, 2.0]), nothing)])
+    mass, moments = together(
+        [(1.0, np.array([0.0, 0.0, 1.0]), nothing), (1.0, np.array([0.0, 0.0, 2.0]), nothing)]
+    )
     assert mass == 2.0 and moments == pytest.approx([0.0, 0.5, 0.5])
     with_armature = dataclasses.replace(ARM.tree, armature=[0.1, 0.2, 0.3])
     assert numbers_of(with_armature)["armature"] == pytest.approx([0.1, 0.2, 0.3])
@@ -246,7 +261,9 @@ def test_an_order_is_taken_from_regular_errors_above_the_floor(order):
     assert integrators.measured_order(steps, [*errors[:3], 1e-14], 2.2e-16) is None  # rounding
     assert integrators.measured_order(steps, errors, 1e-2) is None
     finer = [2.0**-k for k in range(7, 14)]
-    assert integrators.measured_order(finer, [2e-16 / dt for dt in finer], 2.2e-16) is None  # an eps of each step
+    assert (
+        integrators.measured_order(finer, [2e-16 / dt for dt in finer], 2.2e-16) is None
+    )  # an eps of each step
 
 
 def test_a_step_is_compared_with_the_same_scheme():

@@ -43,7 +43,9 @@ def test_the_models_are_as_their_files_state_and_nothing_more_acts(name):
     features = [row["feature"] for row in result.tables["inventory"]]
     assert features == [feature.feature for feature in read(PATHS[name]).features]
     forces = [check.quantity for check in result.checks if check.scene == "random states"]
-    assert forces == [f"no forces of {what}" for what in ("fluid and tendons", "actuators", "constraints and contacts")]
+    assert forces == [
+        f"no forces of {what}" for what in ("fluid and tendons", "actuators", "constraints and contacts")
+    ]
 
 
 def test_a_force_of_what_is_switched_off_is_a_failed_check():
@@ -58,7 +60,9 @@ def test_numbers_that_an_option_changes_are_no_checks_and_have_its_name():
     assert asked["arm", "mass"] == asked["rod", "mass"] == asked["arm", "inertia"] == "settotalmass"
     assert asked["rod", "com"] and asked["rod", "com"] != "settotalmass" and asked["lift", "damping"] == ""
     changed = [
-        row for row in result.rows if row.get("asked_by") and row["stated"] is not None and row["difference"] != 0.0
+        row
+        for row in result.rows
+        if row.get("asked_by") and row["stated"] is not None and row["difference"] != 0.0
     ]
     assert parameters.headline(result).values["changed"] == len(changed) > 0
     assert (rows["lift", "damping"]["unit"], rows["turn", "damping"]["unit"]) == ("N s/m", "N m s/rad")
@@ -85,7 +89,10 @@ def test_a_number_may_be_off_by_64_eps_of_its_scale(quantity, stated, scale, sha
 def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none():
     (cause,) = compared(Result("parameters"), Stated("arm", "mass", 2.0, 2.5, ""))
     assert (cause["rank"], cause["place"], cause["stated"], cause["found"]) == (2, "mass of arm", 2.0, 2.5)
-    vector, result = Stated("arm", "com", np.zeros(3), np.array([0.0, 1e-30, np.nan]), ""), Result("parameters")
+    vector, result = (
+        Stated("arm", "com", np.zeros(3), np.array([0.0, 1e-30, np.nan]), ""),
+        Result("parameters"),
+    )
     assert [cause["place"] for cause in compared(result, vector)] == ["com y of arm", "com z of arm"]
     assert failing(result) == ["com"]
 
@@ -136,8 +143,12 @@ def test_a_number_that_is_another_one_than_in_the_solution_is_the_cause(tmp_path
 
 
 @pytest.mark.parametrize("off, names", [(4e-15, []), (4e-14, ["com"])])
-def test_a_centre_of_mass_is_that_of_the_solution_to_rounding_of_the_lengths_that_lead_there(tmp_path, off, names):
-    assert failing(beside_solution(tmp_path, CART.replace('pos="0 0 0.4"', f'pos="0 0 {0.4 + off!r}"'))) == names
+def test_a_centre_of_mass_is_that_of_the_solution_to_rounding_of_the_lengths_that_lead_there(
+    tmp_path, off, names
+):
+    assert (
+        failing(beside_solution(tmp_path, CART.replace('pos="0 0 0.4"', f'pos="0 0 {0.4 + off!r}"'))) == names
+    )
 
 
 def test_a_small_body_beside_a_large_one_has_its_own_tolerance(tmp_path):

@@ -27,7 +27,9 @@ def tolerances(module, qd) -> dict:
     setup, zero = setup_of(make=Setup, states=1, exact_states=1), np.zeros((1, 3))
     setup.__dict__["random"] = Sample(ARM.tree, "random states", zero, np.array([qd]), zero, 1)
     checks = module.rows(setup).checks
-    return {check.quantity: check.tolerance / (64 * EPS) for check in checks if check.scene == "random states"}
+    return {
+        check.quantity: check.tolerance / (64 * EPS) for check in checks if check.scene == "random states"
+    }
 
 
 @pytest.mark.parametrize("module", [kinematics, mass, gravity, acceleration])
@@ -39,7 +41,9 @@ def test_tolerances_are_64_eps_of_the_scale_of_an_entry_of_the_quantity(module):
     sizes = {name: getattr(of, quantity.scale) for name, quantity in QUANTITIES.items() if name in found}
     if module is acceleration:
         closing = of.closing(force, qdd)
-        sizes |= {"qdd": of.acceleration(force, qdd)} | {name: closing for name in found if name.startswith("tau from")}
+        sizes |= {"qdd": of.acceleration(force, qdd)} | {
+            name: closing for name in found if name.startswith("tau from")
+        }
         sizes |= {name: closing @ np.abs(rates) for name in found if name.startswith("dE/dt")}
         assert len(sizes) == 8
     assert sizes and all(np.isclose(found[name], size, rtol=1e-9).any() for name, size in sizes.items())
@@ -72,7 +76,10 @@ def test_forces_that_the_equations_lack_are_zero_except_for_rounding_of_what_is_
 @pytest.mark.parametrize("share, passes", [(0.99, True), (1.01, False)])
 def test_a_mass_matrix_is_symmetric_within_the_scale_of_each_entry(share, passes):
     result, off = Result("mass"), share * 64 * EPS
-    M, scale = np.array([[[1.0, 1.0 + off * 2.0**10], [1.0, 1.0]]]), np.array([[[9e3, 1.0], [1.0, 9e3]]]) * 2.0**10
+    M, scale = (
+        np.array([[[1.0, 1.0 + off * 2.0**10], [1.0, 1.0]]]),
+        np.array([[[9e3, 1.0], [1.0, 9e3]]]) * 2.0**10,
+    )
     mass.check_symmetry(result, M, scale)
     assert list(verdicts(result).values()) == [passes]
 
@@ -93,11 +100,21 @@ def of_item(name, ours=0.0, theirs=0.0, scale=0.0, exactly=0.0, printed=True):
 
 
 @pytest.mark.parametrize("name", ["c", "f1", "g", "h"])
-@pytest.mark.parametrize("off, inside", [(0.499e-4, True), (-0.499e-4, True), (0.501e-4, False), (-0.501e-4, False)])
+@pytest.mark.parametrize(
+    "off, inside", [(0.499e-4, True), (-0.499e-4, True), (0.501e-4, False), (-0.501e-4, False)]
+)
 def test_four_decimals_are_met_to_half_a_unit_of_the_last(name, off, inside):
     what = ITEMS[name].quantity + " - printed"
-    assert of_item(name, ours=off) == {f"TMT: {what}": inside, f"MuJoCo: {what}": True, f"exact: {what}": True}
-    assert of_item(name, theirs=off) == {f"TMT: {what}": True, f"MuJoCo: {what}": inside, f"exact: {what}": True}
+    assert of_item(name, ours=off) == {
+        f"TMT: {what}": inside,
+        f"MuJoCo: {what}": True,
+        f"exact: {what}": True,
+    }
+    assert of_item(name, theirs=off) == {
+        f"TMT: {what}": True,
+        f"MuJoCo: {what}": inside,
+        f"exact: {what}": True,
+    }
 
 
 @pytest.mark.parametrize("name", ["f2", "f3", "f4"])
@@ -119,12 +136,17 @@ def test_the_printed_digits_of_f2_and_f3_are_met_to_half_a_unit_of_the_last(off,
 def test_each_column_is_whose_it_says_and_f4_is_asked_under_the_torque_of_c():
     of_moon = published.rows(setup_of(MOON)).rows
     moon = {(row["item"], row["component"]): row for row in of_moon}
-    ours, least = tmt.gravity_balance(np.zeros(3)), np.linalg.eigvalsh(tmt.mass_matrix(ARM.posture("hanging")))
+    ours, least = (
+        tmt.gravity_balance(np.zeros(3)),
+        np.linalg.eigvalsh(tmt.mass_matrix(ARM.posture("hanging"))),
+    )
     theirs = parse(MOON, tmt.ARM).of(ARM.case()).gravity_balance(np.zeros(3))
     assert [moon["c", name]["tmt"] for name in ARM.joints] == list(ours)
     assert [moon["c", name]["mujoco"] for name in ARM.joints] == list(theirs)
     of_alpha = moon["c", "alpha"]
-    assert of_alpha["exact"] == pytest.approx(-2.20725) and of_alpha["tolerance"] == pytest.approx(0.5e-4, rel=1e-6)
+    assert of_alpha["exact"] == pytest.approx(-2.20725) and of_alpha["tolerance"] == pytest.approx(
+        0.5e-4, rel=1e-6
+    )
     for name in ("tmt", "exact"):
         assert max(abs(float(row[name])) for row in of_moon if row["item"] == "f4") < 1e-12
     allowed = 64 * EPS * (least[-1] / least[0] + 1.0) / least[0] * 9.4176

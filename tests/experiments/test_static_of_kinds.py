@@ -47,7 +47,9 @@ def drawn(module, setup):
     result = module.rows(setup)
     for figure in module.figures(result, setup.robot):
         name, fig, caption = figure()
-        assert name.startswith((result.experiment, setup.robot.name)) and fig.axes and "nan" not in say(caption)
+        assert (
+            name.startswith((result.experiment, setup.robot.name)) and fig.axes and "nan" not in say(caption)
+        )
     return result
 
 
@@ -80,7 +82,9 @@ def test_an_error_of_a_number_fails_the_checks_that_depend_on_it(text, old, new,
     setup = setup_between(text, text.replace(old, new), states=10)
     modules = {each.__name__.split(".")[-1]: each for each in MODULES}
     results = {name: modules[name].rows(setup) for name in {name.split()[0] for name in expected}}
-    failed = [f"{name} {check.quantity}" for name, of in results.items() for check in of.checks if check.failed]
+    failed = [
+        f"{name} {check.quantity}" for name, of in results.items() for check in of.checks if check.failed
+    ]
     assert all(any(name.startswith(named) for name in failed) for named in expected)
 
 

@@ -24,7 +24,8 @@ COUNT = 20
 
 
 @pytest.mark.parametrize(
-    "language", ["c", "python", pytest.param("matlab", marks=pytest.mark.skipif(not HAS_OCTAVE, reason="no Octave"))]
+    "language",
+    ["c", "python", pytest.param("matlab", marks=pytest.mark.skipif(not HAS_OCTAVE, reason="no Octave"))],
 )
 def test_the_arm_in_a_language(language, tmp_path, capsys):
     if language == "c" and not HAS_C:
@@ -92,7 +93,9 @@ def test_states_are_spread_within_the_ranges_and_those_of_floats_are_floats():
             assert x.shape == (COUNT, 7) and (np.ptp(x, axis=0) > 0.5 * np.abs(x).max(axis=0)).all()
             assert (x == x.astype(kind)).all()
     assert any((x != x.astype(np.float32)).any() for x in seen[0])
-    assert all((low <= q).all() and (q <= high).all() for q, (low, high) in zip(seen[0][0].T, compared.robot.ranges))
+    assert all(
+        (low <= q).all() and (q <= high).all() for q, (low, high) in zip(seen[0][0].T, compared.robot.ranges)
+    )
 
 
 NEEDS = {"c": HAS_C, "matlab": HAS_OCTAVE, "python": True, "latex": True}
@@ -112,7 +115,9 @@ def test_what_is_judged_is_what_was_written(language, tmp_path):
 
 @pytest.mark.skipif(not HAS_OCTAVE, reason="no Octave")
 def test_arrays_of_matlab_are_stored_by_rows(tmp_path):
-    (tmp_path / "arm.m").write_text(tmt.equations(tmt.ARM, "matlab", ["jacobians"], name="arm"), encoding="utf-8")
+    (tmp_path / "arm.m").write_text(
+        tmt.equations(tmt.ARM, "matlab", ["jacobians"], name="arm"), encoding="utf-8"
+    )
     make = partial(PROGRAMS["matlab"], tmp_path, "arm", tmt.ARM, ["jacobians"], False)
     assert checks.checked(compared_with(None, None), make, ["jacobians"], COUNT, False)[0].passed
 
@@ -135,7 +140,9 @@ def test_single_precision_is_written_and_checked_at_all_states(tmp_path, monkeyp
 @pytest.mark.parametrize("name", QUANTITIES)
 def test_each_quantity_has_a_counterpart_in_mujoco(name):
     compared = compared_with("model", str(PATHS["mixed"]))
-    outcome, _ = checks.checked(compared, partial(Altered, compared.robot.tree, "", 0.0), [name], COUNT, False)
+    outcome, _ = checks.checked(
+        compared, partial(Altered, compared.robot.tree, "", 0.0), [name], COUNT, False
+    )
     assert outcome.passed and len(outcome.rows) == max(1, len(QUANTITIES[name].parts))
 
 
@@ -154,7 +161,8 @@ def test_a_wrong_value_is_a_failed_check_with_status_1_and_stands_in_the_file(tm
 
 
 @pytest.mark.parametrize(
-    ("error", "status", "said"), [(NotRun, 0, "Not checked: no such thing"), (WrongProgram, 1, "Failed: no such thing")]
+    ("error", "status", "said"),
+    [(NotRun, 0, "Not checked: no such thing"), (WrongProgram, 1, "Failed: no such thing")],
 )
 def test_what_cannot_be_run_is_written_and_says_so(error, status, said, tmp_path, monkeypatch):
     def start(self):

@@ -40,7 +40,12 @@ def test_a_fleet_says_which_file_differs_and_why_and_has_a_tidy_table(folder, mo
     shown, err = capsys.readouterr()
     lines = shown.splitlines()
     said = {line.split()[0]: line for line in lines if line.split()[:1] and ".xml:" in line}
-    assert err == "" and "0 of 3 files" in shown and "Left out: 1 file" in shown and "out/index.html (" in lines[-1]
+    assert (
+        err == ""
+        and "0 of 3 files" in shown
+        and "Left out: 1 file" in shown
+        and "out/index.html (" in lines[-1]
+    )
     assert f"m/x/{NAME}: " in said["self-consistent"] and " %" in said["self-consistent"]
     assert "m/heavy.xml: mass of upper arm: stated 1.9 kg, compiled 9 kg" in said["differ"]
     assert "\x1b" not in shown and "\r" not in shown  # nothing moves in a pipe
@@ -65,7 +70,9 @@ def test_a_file_has_the_report_that_it_has_alone(folder):
     assert {path.name for path in one.iterdir()} <= {path.name for path in many.iterdir()}
 
 
-def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_is_said(folder, monkeypatch, capsys):
+def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_is_said(
+    folder, monkeypatch, capsys
+):
     said = []
 
     def carry_out(self, progress):
@@ -89,13 +96,19 @@ def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_
     (["fleet", "m", "--dask", "x", "--workers", "2"], "--workers"), (["fleet", "m", "--timing", "--workers", "2"], "--workers"),
     (["fleet", "m", "--since", "nowhere"], "nowhere/fleet.csv"), (["fleet", "m", "--out", "m/part.xml"], "m/part.xml"),
 ])  # fmt: skip
-def test_what_is_mistyped_or_cannot_be_carried_out_gets_status_2_and_one_line(arguments, word, folder, capsys):
+def test_what_is_mistyped_or_cannot_be_carried_out_gets_status_2_and_one_line(
+    arguments, word, folder, capsys
+):
     try:
         status = main(arguments)
     except SystemExit as stop:
         status = stop.code
     out, err = capsys.readouterr()
-    assert (status, out, len(err.splitlines())) == (2, "", 1) and word in err and not (folder / "reports").exists()
+    assert (
+        (status, out, len(err.splitlines())) == (2, "", 1)
+        and word in err
+        and not (folder / "reports").exists()
+    )
 
 
 @pytest.mark.parametrize("words, asked", [
@@ -112,7 +125,10 @@ def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, cap
         raise Refused("seen")
 
     for name in ("Pool", "Cluster"):
-        made = {"__init__": lambda self, *given: seen.extend((type(self).__name__, *given)), "close": lambda self: None}
+        made = {
+            "__init__": lambda self, *given: seen.extend((type(self).__name__, *given)),
+            "close": lambda self: None,
+        }
         monkeypatch.setattr(f"compare.fleet.executors.{name}", type(name, (), made))
     monkeypatch.setattr("compare.fleet.run.Run", run)
     assert main(["fleet", "m", "--only", "gravity,mass", "--out", "asked", *words]) == 2
@@ -122,7 +138,16 @@ def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, cap
 # ended in the middle: a line, nothing left behind, and the same command goes on from there
 
 FILES = [str(MODELS / f"{name}.xml") for name in ("pendulum_ball", "free_body")]
-WORDS = ("fleet", *FILES, "--only", "parameters", "--out", "out", "--workers", "1")  # one file after the other
+WORDS = (
+    "fleet",
+    *FILES,
+    "--only",
+    "parameters",
+    "--out",
+    "out",
+    "--workers",
+    "1",
+)  # one file after the other
 
 
 @pytest.fixture

@@ -167,5 +167,7 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
     assert [row["file"] for row in found] == ["b.xml", "d.xml", "c.xml", "a b.xml"]
     assert tuple(found[0]) == FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
     text = (tmp_path / "index.html").read_text()
-    assert all(part in text for part in ("early.xml", "the command", '<a href="files/c.xml/index.html">d.xml</a>'))
+    assert all(
+        part in text for part in ("early.xml", "the command", '<a href="files/c.xml/index.html">d.xml</a>')
+    )
     assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")

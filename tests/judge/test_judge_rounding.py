@@ -46,7 +46,10 @@ def test_the_bound_of_discrete_with_servos_has_the_force_that_mujoco_leaves_out(
     text = f"<mujoco><worldbody><body>{joint}</body></worldbody><actuator>{servo}</actuator></mujoco>"
     found = reading.read(text)
     case = next(case for case in robot_of(found, "disc.xml").cases if case.controller)
-    q, mujoco = np.array([(case.tau - share * LEFT_OUT) / 50.0]), engine(found).of(case)  # the force is that share
+    q, mujoco = (
+        np.array([(case.tau - share * LEFT_OUT) / 50.0]),
+        engine(found).of(case),
+    )  # the force is that share
     a, _, bound = slope_rounding(METHODS[name], case.tree, q, 0.0 * q, case.tau, 1e-3)
     assert bool(bound[0, 0] > LEFT_OUT / 2.1) is left_out
     if name in INTEGRATORS:
@@ -71,7 +74,12 @@ def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
     q, qd, tau, dt, M = 0.3, -4.0, 2.0, 0.01, 0.05275
     (h,) = tmt.bias(np.array([q]), np.array([qd]), tree)
     a = (tau - 0.5 * qd - h) / M
-    S = 9.81 * 1.5 * (0.15 + 0.15 / 8 + 0.45 / 64) + 1.5 * 0.15**2 * abs(np.sin(2 * q)) * qd**2 + tau + 0.5 * 4.0
+    S = (
+        9.81 * 1.5 * (0.15 + 0.15 / 8 + 0.45 / 64)
+        + 1.5 * 0.15**2 * abs(np.sin(2 * q)) * qd**2
+        + tau
+        + 0.5 * 4.0
+    )
     rates = dt * (64 * EPS * M * abs(a) + 64 * EPS * S) / M + 8 * EPS * (4.0 + dt * abs(a))
     expected = [8 * EPS * (q + dt * 4.0) + dt * rates, rates]
     at = tree, np.array([[q]]), np.array([[qd]]), np.array([tau]), dt

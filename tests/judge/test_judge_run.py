@@ -6,7 +6,14 @@ from judged import BOTH, INSIDE, OUTSIDE
 
 import tmt
 from compare.engines.mujoco import reading
-from compare.judge.run import departure, deviation, deviation_alive, diverged_at, leaves_no_digits, movement_unit
+from compare.judge.run import (
+    departure,
+    deviation,
+    deviation_alive,
+    diverged_at,
+    leaves_no_digits,
+    movement_unit,
+)
 from compare.robots import Robot
 from compare.robots.actuators import Actuator, Drive
 from compare.robots.arm import ARM
@@ -15,7 +22,10 @@ from compare.robots.file import robot_of
 from compare.truth.reference import has_no_reference
 
 CASES = {case.name: case for case in ARM.cases}
-ENDS = (INSIDE, None), (OUTSIDE, 0.5)  # shares of the energy that can be gained, and when a run of two states diverges
+ENDS = (
+    (INSIDE, None),
+    (OUTSIDE, 0.5),
+)  # shares of the energy that can be gained, and when a run of two states diverges
 T = np.array([0.0, 0.5])
 
 
@@ -27,7 +37,9 @@ def test_a_run_has_diverged_beyond_the_energy_that_the_arm_can_have(name, moved)
     case, (start, rate) = CASES[name], CASES[name].start
     q, at_first = start + moved, rate @ tmt.mass_matrix(start, case.tree) @ rate / 2
     allowed = 2.0 * 9.81 * (1.9 * 0.15 + 1.5 * 0.45) + at_first
-    gained = tmt.potential_energy(q, case.tree) - tmt.potential_energy(start, case.tree) - (q - start) @ case.tau
+    gained = (
+        tmt.potential_energy(q, case.tree) - tmt.potential_energy(start, case.tree) - (q - start) @ case.tau
+    )
     for share, ends in ENDS:
         kinetic = share * allowed + at_first - gained
         new = np.array([np.sqrt(2.0 * kinetic / tmt.mass_matrix(q, case.tree)[0, 0]), 0.0, 0.0])

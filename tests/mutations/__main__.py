@@ -29,9 +29,21 @@ from .edits import EDITS
 
 PROJECT = Path(__file__).resolve().parents[2]
 NOT_COPIED = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "latest")
-BLIND = ("test_mutations.py", "test_structure.py", "test_interrupt.py")  # they see any edit, or no edit of a judge
-SLICES = (0, 4, 16, 1000)  # the files of tests run in parts, the nearest first: most edits are caught by the first
-PATIENCE = 90.0, 20.0  # s that a part may take, and for each of its files: then an edit counts as an endless run
+BLIND = (
+    "test_mutations.py",
+    "test_structure.py",
+    "test_interrupt.py",
+)  # they see any edit, or no edit of a judge
+SLICES = (
+    0,
+    4,
+    16,
+    1000,
+)  # the files of tests run in parts, the nearest first: most edits are caught by the first
+PATIENCE = (
+    90.0,
+    20.0,
+)  # s that a part may take, and for each of its files: then an edit counts as an endless run
 STATUS = """exit status: 0 no edit survives; 1 some do; 2 an edit does not apply to the sources, or a test that caught one fails
 without it too"""
 
@@ -39,7 +51,9 @@ without it too"""
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; the exit status."""
     parser = argparse.ArgumentParser("python -m tests.mutations", description=__doc__, epilog=STATUS)
-    parser.add_argument("words", nargs="*", metavar="WORD", help="only edits that have one of these in their name")
+    parser.add_argument(
+        "words", nargs="*", metavar="WORD", help="only edits that have one of these in their name"
+    )
     parser.add_argument("--list", action="store_true", help="list the edits, run nothing")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="runs side by side (%(default)s)")
     options = parser.parse_args(arguments)
@@ -58,7 +72,10 @@ def main(arguments: list[str] | None = None) -> int:
         copies = [copied(Path(folder, str(number))) for number in range(options.jobs)]
         with closing(outcomes(places, copies)) as tried:
             for edit, seconds, caught in tried:
-                print(f"{seconds:5.1f} s  {edit.name}: {f'caught by {caught}' if caught else 'SURVIVED'}", flush=True)
+                print(
+                    f"{seconds:5.1f} s  {edit.name}: {f'caught by {caught}' if caught else 'SURVIVED'}",
+                    flush=True,
+                )
                 if caught.startswith("tests"):
                     caught_by.add(caught.split("[")[0])
                 if not caught:

@@ -58,9 +58,13 @@ def applied(project: Path, edit: Edit) -> Place:
     if not holding:
         raise DoesNotApply(f"{edit.name}: there is no {edit.where} below {' or '.join(PACKAGES)}")
     old = read(edit.old)
-    hits = [(path, *hit) for path in holding for scope in scopes(path, edit.where) for hit in matches(scope, old)]
+    hits = [
+        (path, *hit) for path in holding for scope in scopes(path, edit.where) for hit in matches(scope, old)
+    ]
     if not 1 <= (edit.nth or 1) <= len(hits) or (edit.nth is None and len(hits) > 1):
-        raise DoesNotApply(f"{edit.name}: {len(hits)} times {edit.old} in {edit.where}; one is expected, or nth")
+        raise DoesNotApply(
+            f"{edit.name}: {len(hits)} times {edit.old} in {edit.where}; one is expected, or nth"
+        )
     path, node, holes = hits[(edit.nth or 1) - 1]
     before = text_of(path)
     lines = before.encode().splitlines(keepends=True)
@@ -129,7 +133,11 @@ def read(text: str) -> ast.AST:
 def matches(node: ast.AST, pattern: ast.AST) -> Iterator[tuple[ast.AST, dict]]:
     """Every node in a function or statement that matches a pattern, in the order of the source, with what the holes stand for."""
     holes, wanted = {}, pattern
-    if isinstance(node, ast.keyword) and isinstance(pattern, ast.Assign) and isinstance(pattern.targets[0], ast.Name):
+    if (
+        isinstance(node, ast.keyword)
+        and isinstance(pattern, ast.Assign)
+        and isinstance(pattern.targets[0], ast.Name)
+    ):
         wanted = ast.keyword(arg=pattern.targets[0].id, value=pattern.value)
     if fits(wanted, node, holes):
         yield node, holes

@@ -27,7 +27,9 @@ LISTENING = "from compare.process import interrupt; interrupt.listen()\n"
 
 
 ALL = command("all", "--quick", "--out", "report")
-OWN = command("all", "--quick", "--out", "report", "--reference", Path(__file__).parents[1] / "own_equations.py:")
+OWN = command(
+    "all", "--quick", "--out", "report", "--reference", Path(__file__).parents[1] / "own_equations.py:"
+)
 OWN += ["--mjcf", "../double.xml"]
 RUNS = {  # what runs, what it is sent, and when
     "workers start": (ALL, "SIGTERM", lambda run: time.sleep(0.8)),

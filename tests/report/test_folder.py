@@ -27,7 +27,9 @@ def fill(work, text):
 def files(folder):
     """What is in a folder; of results.json only the text of `fill`."""
     found = {p.relative_to(folder).as_posix(): p.read_text() for p in folder.rglob("*") if p.is_file()}
-    return {name: json.loads(text)["text"] if name == "results.json" else text for name, text in found.items()}
+    return {
+        name: json.loads(text)["text"] if name == "results.json" else text for name, text in found.items()
+    }
 
 
 def old_report(out):
@@ -143,7 +145,9 @@ def test_two_runs_at_once_both_end_well(tmp_path):
 
 
 def test_only_what_a_run_has_left_is_cleared(tmp_path):
-    left, *kept = (tmp_path / name for name in (".new-a1b2c3_d", ".new-a1b2c3_e/mine", ".new-ideas/report.md"))
+    left, *kept = (
+        tmp_path / name for name in (".new-a1b2c3_d", ".new-a1b2c3_e/mine", ".new-ideas/report.md")
+    )
     (left / "new" / "tables").mkdir(parents=True)
     for path in kept:
         path.mkdir(parents=True)
@@ -177,10 +181,14 @@ def test_a_full_disk_while_a_figure_is_drawn_is_said_with_the_name_of_the_file(t
     monkeypatch.setitem(sys.modules, "compare.experiments.plain", module)
     resource = pytest.importorskip("resource")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))  # no file may be longer, as on a disk that is full
+    resource.setrlimit(
+        resource.RLIMIT_FSIZE, (1000, before[1])
+    )  # no file may be longer, as on a disk that is full
     try:
         with pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
             draw("plain", None, None, work)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert f"{tmp_path / 'out' / 'plot.png'}: File too large" in str(error.value) and names_in(tmp_path) == set()
+    assert (
+        f"{tmp_path / 'out' / 'plot.png'}: File too large" in str(error.value) and names_in(tmp_path) == set()
+    )

@@ -16,7 +16,14 @@ from compare.report.verdict import Parts, Report, verdict
 from compare.robots import Question
 from compare.robots.arm import ARM
 
-CAUSE = {"rank": 2, "place": "mass of forearm", "stated": 1.5, "found": 1.6, "text": "forearm: 1.6 kg", "size": 9.0}
+CAUSE = {
+    "rank": 2,
+    "place": "mass of forearm",
+    "stated": 1.5,
+    "found": 1.6,
+    "text": "forearm: 1.6 kg",
+    "size": 9.0,
+}
 
 
 @pytest.fixture
@@ -33,7 +40,9 @@ def with_figures(of, *files):
 def report_of(folder, sections, causes=(), skipped=(), robot=ARM):
     for file in (file for one in sections for file, _ in one.figures):
         images.save_figure(Figure(figsize=(1, 1)), folder / "figures" / f"{file}.png")
-    return Report(sections, robot, {"command": "c"}, verdict(sections, len(sections), causes), causes, skipped)
+    return Report(
+        sections, robot, {"command": "c"}, verdict(sections, len(sections), causes), causes, skipped
+    )
 
 
 def page_of(folder, sections, causes=(), skipped=()):
@@ -52,7 +61,9 @@ def test_the_verdict_a_line_for_each_experiment_and_the_pictures_come_before_all
     with_figures(sections[2], "acceleration_distances", f"{OVERVIEW}agreement")
     with_figures(sections[3], "trajectory_a", f"{OVERVIEW}scenes")
     top, rest = page_of(folder, sections, skipped=[("speed", "<too slow>")])
-    assert top.index('class="verdict good"') < top.index('class="experiments"') < top.index('class="pictures"')
+    assert (
+        top.index('class="verdict good"') < top.index('class="experiments"') < top.index('class="pictures"')
+    )
     assert 'class="causes"' not in top and '<main id="main" class="good">' in top
     for name in names:
         assert re.search(rf'<li class="good">.*?<a href="#{name}">', top) and f'<section id="{name}"' in rest
@@ -74,11 +85,18 @@ def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_s
         ("bad", "trajectory"), ("good", "figure-mass_distances"),
     ]  # fmt: skip
     for name, kind in (("mass", "good"), ("trajectory", "bad"), ("speed", "none")):
-        assert re.search(f'<li class="{kind}">[^\n]*?<a href="#{name}">', top) and f'<p class="outcome {kind}">' in rest
+        assert (
+            re.search(f'<li class="{kind}">[^\n]*?<a href="#{name}">', top)
+            and f'<p class="outcome {kind}">' in rest
+        )
     top, rest = page_of(folder, [with_figures(section("kinematics", *[BAD] * 5), "kinematics_distances")])
     assert rest.count("<tr><td>kinematics</td><td>zero</td><td>Mbar</td>") == 5
-    assert '<div class="pictures"><figure class="bad"><a href="#figure-kinematics_distances">' in top  # not a picture
-    assert top.count("<td>kinematics</td><td>zero</td><td>Mbar</td><td>2</td><td>1</td>") == 4  # no cause is known
+    assert (
+        '<div class="pictures"><figure class="bad"><a href="#figure-kinematics_distances">' in top
+    )  # not a picture
+    assert (
+        top.count("<td>kinematics</td><td>zero</td><td>Mbar</td><td>2</td><td>1</td>") == 4
+    )  # no cause is known
 
 
 def test_a_section_folds_its_details_and_all_but_the_first_figures(folder):
@@ -89,7 +107,11 @@ def test_a_section_folds_its_details_and_all_but_the_first_figures(folder):
     fold = text.index("<details>")
     assert text.index("Note 2 &lt; 9.") < fold < text.index("Note 3")
     assert "<table" not in text[:fold] and text.count("<tr><td>other</td>") == 40
-    assert '<a href="tables/mass.csv">' in text and '<a href="tables/extra.csv">' in text and "<td>1.5</td>" not in text
+    assert (
+        '<a href="tables/mass.csv">' in text
+        and '<a href="tables/extra.csv">' in text
+        and "<td>1.5</td>" not in text
+    )
     assert [text.index(f'id="figure-{name}"') < fold for name in names] == [True, True, False, False, True]
 
 
@@ -113,7 +135,9 @@ def test_results_have_every_check_cause_and_digit(folder):
     html, text = (text_of(folder / name) for name in ("index.html", "report.md"))
     assert names not in text and CAUSE["text"] in html and CAUSE["text"] in text
     assert html.count("<td>0.123</td>") == 3 and "The cause explains 1 failing check" in text
-    assert [path.name for path in (folder / "figures").iterdir()] == ["mass_distances.png"]  # WebP is in the page alone
+    assert [path.name for path in (folder / "figures").iterdir()] == [
+        "mass_distances.png"
+    ]  # WebP is in the page alone
 
 
 def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):

@@ -33,8 +33,14 @@ def test_the_checks_that_fail_are_listed_first_then_those_closest_to_their_toler
 
 
 def test_printed_numbers_have_seven_digits_and_others_three():
-    table = shown(pd.DataFrame([{"published": 1.23456789, "other": 1.23456789, "names": "x" * 99, "no": None}]))
-    assert table.iloc[0].tolist()[:2] == ["1.234568", "1.23"] and len(table["names"][0]) == 80 and table["no"][0] == ""
+    table = shown(
+        pd.DataFrame([{"published": 1.23456789, "other": 1.23456789, "names": "x" * 99, "no": None}])
+    )
+    assert (
+        table.iloc[0].tolist()[:2] == ["1.234568", "1.23"]
+        and len(table["names"][0]) == 80
+        and table["no"][0] == ""
+    )
 
 
 def text_of(*sections):
@@ -53,7 +59,12 @@ def test_report_md_is_short_whatever_there_is_to_say():
     text = text_of(*sections)
     assert len(text.splitlines()) <= 600
     for name in EXPERIMENTS:
-        parts = (f"Note 0 of {name}.", f"(tables/{name}.csv)", f"(figures/{name}_9.png)", f"(index.html#{name})")
+        parts = (
+            f"Note 0 of {name}.",
+            f"(tables/{name}.csv)",
+            f"(figures/{name}_9.png)",
+            f"(index.html#{name})",
+        )
         assert all(part in text for part in parts) and f"Note 39 of {name}." not in text
 
 

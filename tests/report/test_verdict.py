@@ -49,9 +49,18 @@ def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
 
 
 def test_what_does_not_agree_is_named_with_its_first_cause_and_nothing_else():
-    sections = [section("mass", GOOD, BAD), section("gravity", GOOD), section("diagnosis", BAD)]  # why others fail
+    sections = [
+        section("mass", GOOD, BAD),
+        section("gravity", GOOD),
+        section("diagnosis", BAD),
+    ]  # why others fail
     text = verdict(sections, 10, [{"text": f"number {k}"} for k in range(3)])
-    assert "3 of 10 experiments" in text and " mass." in text and "gravity" not in text and "diagnosis" not in text
+    assert (
+        "3 of 10 experiments" in text
+        and " mass." in text
+        and "gravity" not in text
+        and "diagnosis" not in text
+    )
     assert "2 of 4" in text and "number 0; 2 more" in text and "number 2" not in text
     assert "First failing check: mass: Mbar" in verdict(sections, 10)
 
@@ -66,7 +75,10 @@ def test_the_verdict_counts_what_the_cause_explains_what_states_it_and_what_stan
     stating = section("parameters", ("mass of forearm", 1.0, 0.0, "at most", False))
     text = verdict([stating, of], 2, [cause()])
     text = " ".join(text.split())
-    assert "explains 1 of them, and 1 is the check that names it; 1 remains without a cause, first: mass: other" in text
+    assert (
+        "explains 1 of them, and 1 is the check that names it; 1 remains without a cause, first: mass: other"
+        in text
+    )
     assert outcome(of).startswith("Failed: 2 of 3") and "1 of them explained" in outcome(of)
     of.explained = of.result.checks[1:]
     assert "explains 2 of them, and 1 is the check that names it." in verdict([stating, of], 2, [cause()])
@@ -81,20 +93,35 @@ def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagr
         of = section("mass", GOOD, ("what", 2.0, 1.0, "at most", False, about))
         assert not passed([of]) and standing(of)[0] is False
         assert counts(of) == [int(k == one) for one in range(6)]
-        assert (differs in verdict([of], 1)) == (about == About.MODELS) and "1 of 2 checks" in verdict([of], 1)
+        assert (differs in verdict([of], 1)) == (about == About.MODELS) and "1 of 2 checks" in verdict(
+            [of], 1
+        )
         assert differs in verdict([of, section("gravity", BAD)], 2)
         said.add(standing(of)[1])
-    assert len(said) == 4 and standing(section("mass", GOOD))[0] is True and standing(section("mass"))[0] is None
-    assert counts(section("trajectory", ("open loop", None, 1.0, "at most", True))) == [1, 0, 0, 0, 0, 0]  # it diverged
+    assert (
+        len(said) == 4 and standing(section("mass", GOOD))[0] is True and standing(section("mass"))[0] is None
+    )
+    assert counts(section("trajectory", ("open loop", None, 1.0, "at most", True))) == [
+        1,
+        0,
+        0,
+        0,
+        0,
+        0,
+    ]  # it diverged
     assert passed([section("stability", (*OWN_STEP[:2], 0.002, *OWN_STEP[3:]))])  # just stable
     text = verdict([section("stability", GOOD, OWN_STEP)], 1, robot="dog")
-    assert text.startswith("dog is not stable") and text.index("agree in") > 0  # the run comes before the equations
+    assert (
+        text.startswith("dog is not stable") and text.index("agree in") > 0
+    )  # the run comes before the equations
 
 
 def test_an_experiment_alone_is_named_and_a_step_that_is_not_stable_comes_first():
     alone, other = section("stability", GOOD, OWN_STEP), section("mass", GOOD)
     first, second, *_ = verdict([alone], 12, robot="leg.xml").split("\n")
-    assert first.startswith("leg.xml is not stable at its own step") and "agree in stability: 1 of 2" in second
+    assert (
+        first.startswith("leg.xml is not stable at its own step") and "agree in stability: 1 of 2" in second
+    )
     lines = verdict([alone, other], 12, robot="leg.xml").split("\n")
     assert lines[0] == first and "agree: 2 of 3" in lines[1] and "2 of 12 experiments" in lines[2]
 
@@ -103,11 +130,15 @@ def test_what_was_not_judged_is_neither_passed_nor_failed_and_nothing_is_said_to
     some, none = section("mass", GOOD), section("gravity")
     for result in (some.result, none.result):
         check = result.not_judged("held", "qdd", "the tolerance exceeds every value")
-        assert (check.judged, check.passed, check.failed) == (False, False, False) and not check.record()["judged"]
+        assert (check.judged, check.passed, check.failed) == (False, False, False) and not check.record()[
+            "judged"
+        ]
     for one, passed_checks in ((some, "1 check"), (none, None)):
         text = verdict([one, section("kinematics")], 2)
         assert not passed([one]) and standing(one)[0] is None and "agree" not in text and "differ" not in text
-        assert "the tolerance exceeds every value" in text and (passed_checks or "Nothing was compared") in text
+        assert (
+            "the tolerance exceeds every value" in text and (passed_checks or "Nothing was compared") in text
+        )
         said = Lines()
         say_outcome(said, one, 1.0, [])
         assert "NOT JUDGED" in said[0] and len(said) == 2
@@ -118,7 +149,9 @@ def test_what_was_not_judged_is_neither_passed_nor_failed_and_nothing_is_said_to
 
 def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
     said = Lines()
-    say_outcome(said, section("mass", ("a", 0.25, 1.0, "at most", True), ("b", 0.5, 1.0, "at most", True)), 1.25, [])
+    say_outcome(
+        said, section("mass", ("a", 0.25, 1.0, "at most", True), ("b", 0.5, 1.0, "at most", True)), 1.25, []
+    )
     assert len(said) == 1 and said[0].split()[:4] == ["mass", "ok", "2", "checks"] and " 50 %" in said[0]
     of = section("mass", *[BAD] * 7, GOOD)
     say_outcome(said, of, 1.0, [{"text": "mass of forearm: stated 1"}])
@@ -130,7 +163,10 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
     of = section("mass", *[BAD] * 7, wrong)
     of.explained = of.result.checks[:7]
     say_outcome(said, of, 1.0, [], True)
-    assert [line.startswith("  FAIL mass: what") for line in said] == [False, True] and " 7 explained" in said[0]
+    assert [line.startswith("  FAIL mass: what") for line in said] == [
+        False,
+        True,
+    ] and " 7 explained" in said[0]
 
 
 # the answers to the questions of the assignment
@@ -214,7 +250,9 @@ def marks(experiment, result, robot=ARM):
     """What is marked in the first panel of the picture of an experiment: (mark, colour, x) of every point."""
     ((_, figure, _),) = (call() for call in module(experiment).overview({experiment: result}, robot))
     lines = [line for line in figure.axes[0].get_lines() if line.get_marker() not in (None, "None", "")]
-    return {(line.get_marker(), to_hex(line.get_color()), float(x)) for line in lines for x in line.get_xdata()}
+    return {
+        (line.get_marker(), to_hex(line.get_color()), float(x)) for line in lines for x in line.get_xdata()
+    }
 
 
 def test_the_agreement_is_the_largest_of_all_rows_of_a_quantity_and_its_picture_says_whose_distance_is_whose():

@@ -38,13 +38,17 @@ def test_machine_code_answers_what_the_literal_form_returns(quantity, rng):
     tree, states = compiled(SMALL, quantity), random_states(rng, SMALL, 21)
     given = states[: len(takes)]
     expected = in_parts(getattr(literal, quantity)(*given, tree))
-    condition = np.linalg.cond(literal.mass_matrix(states[0], tree)).max() if quantity == "acceleration" else 1.0
+    condition = (
+        np.linalg.cond(literal.mass_matrix(states[0], tree)).max() if quantity == "acceleration" else 1.0
+    )
     whole = in_parts(function(*given, tree))
     for batch in ((), (21,), (3, 7), (2, 0)):
         size = int(np.prod(batch))
         some = [rows[0] if batch == () else rows[:size].reshape(*batch, rows.shape[1]) for rows in given]
         for found, all_of_it, same in zip(in_parts(function(*some, tree)), expected, whole, strict=True):
-            other, bits = (x[0] if batch == () else x[:size].reshape(*batch, *x.shape[1:]) for x in (all_of_it, same))
+            other, bits = (
+                x[0] if batch == () else x[:size].reshape(*batch, *x.shape[1:]) for x in (all_of_it, same)
+            )
             assert type(found) is np.ndarray and found.shape == other.shape and found.dtype == other.dtype
             assert found.flags.c_contiguous and found.flags.writeable and np.array_equal(found, bits)
             assert np.abs(found - other).max(initial=0.0) <= 64 * EPS * condition * np.abs(all_of_it).max()
@@ -53,7 +57,9 @@ def test_machine_code_answers_what_the_literal_form_returns(quantity, rng):
         wanted = getattr(truth, field)
         largest = np.abs(np.asarray(wanted, dtype=float)).max()
         assert distance(found, wanted).max() <= 64 * EPS * condition * max(1.0, largest)
-    assert quantity == "spring_torque" or not all(map(np.array_equal, whole, expected))  # so it was machine code
+    assert quantity == "spring_torque" or not all(
+        map(np.array_equal, whole, expected)
+    )  # so it was machine code
 
 
 def test_a_call_gives_the_same_bits_whatever_was_asked_before(rng):
@@ -94,7 +100,9 @@ def test_threads_change_no_bit(monkeypatch, rng):
     monkeypatch.undo()
 
     def ask(k):
-        return all(np.array_equal(tmt.acceleration(*(x[k] for x in states), tree), alone[k]) for _ in range(100))
+        return all(
+            np.array_equal(tmt.acceleration(*(x[k] for x in states), tree), alone[k]) for _ in range(100)
+        )
 
     with ThreadPoolExecutor(8) as pool:
         assert all(pool.map(ask, range(8)))
@@ -171,5 +179,7 @@ def test_who_cannot_wait_has_it_prepared(monkeypatch):
 
 
 def test_a_short_question_never_waits_for_a_compiler():
-    program = "import sys, tmt; tmt.acceleration([0.1] * 3, [0.0] * 3, [0.0] * 3); print('llvmlite' in sys.modules)"
+    program = (
+        "import sys, tmt; tmt.acceleration([0.1] * 3, [0.0] * 3, [0.0] * 3); print('llvmlite' in sys.modules)"
+    )
     assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout == "False\n"

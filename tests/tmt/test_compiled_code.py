@@ -59,7 +59,9 @@ def test_another_form_of_mbar_and_h_is_traced_and_not_kept(folder, rng):
     states = list(rng.uniform(-2, 2, (3, 5, 3)))
     doubled = evaluator(tmt.ARM, "acceleration", own)
     wanted = literal.acceleration(states[0], states[1], states[2] / 2.0)
-    assert rows_of(doubled, states) == pytest.approx(wanted, rel=1e-10, abs=1e-10) and not list(folder.glob("*"))
+    assert rows_of(doubled, states) == pytest.approx(wanted, rel=1e-10, abs=1e-10) and not list(
+        folder.glob("*")
+    )
     literally = evaluator(tmt.ARM, TERMS, method.mass_matrix_and_bias)
     assert literally.operations > 2 * evaluator(tmt.ARM, TERMS).operations
 
@@ -69,7 +71,9 @@ def compiled(traced):
     code = Code("f", {"in": POINTER, "out": POINTER})
     code.call(traced.name, code["in"], code["out"])
     code.give_back()
-    function = Library(module([*functions(traced, 1), code])).function("f", None, ctypes.c_void_p, ctypes.c_void_p)
+    function = Library(module([*functions(traced, 1), code])).function(
+        "f", None, ctypes.c_void_p, ctypes.c_void_p
+    )
 
     def call(given):
         given, out = np.array(given, dtype=float), np.full(len(traced.outputs), np.nan)
@@ -80,7 +84,9 @@ def compiled(traced):
 
 
 @pytest.mark.parametrize("name, few", [("rk4", 0), ("implicit", 99)])
-def test_the_derivative_of_a_slope_is_that_of_dual_numbers_through_the_literal_form(name, few, rng, monkeypatch):
+def test_the_derivative_of_a_slope_is_that_of_dual_numbers_through_the_literal_form(
+    name, few, rng, monkeypatch
+):
     """In articulated bodies, where that can be, and by Mbar and h."""
     monkeypatch.setattr(forms, "FEW", few)
     stepping, (q, qd, tau), dt = METHODS[name], random_state(rng, SMALL), 0.05
@@ -97,7 +103,11 @@ def test_the_derivative_of_a_slope_is_that_of_dual_numbers_through_the_literal_f
 sincos = compiled(trace("both", [1], lambda x: [sin(x[0]), cos(x[0])]))
 
 
-@given(st.floats(LIMIT / 2, LIMIT) | st.floats(-10.0, 10.0) | st.integers(-1000, 1000).map(lambda n: n * np.pi / 4))
+@given(
+    st.floats(LIMIT / 2, LIMIT)
+    | st.floats(-10.0, 10.0)
+    | st.integers(-1000, 1000).map(lambda n: n * np.pi / 4)
+)
 def test_sine_and_cosine_to_the_last_digit(x):
     with mpmath.workdps(60):
         for value, truth in zip(sincos([x]), (mpmath.sin(x), mpmath.cos(x))):

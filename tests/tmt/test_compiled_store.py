@@ -94,7 +94,9 @@ def test_what_is_compiled_is_kept_under_the_name_of_what_was_imported(change, ke
     """Of sources that are others by now, or gone, nothing is kept: the next process would run another version's code."""
     shutil.copytree(ROOT / "tmt", tmp_path / "tmt", ignore=shutil.ignore_patterns("__pycache__"))
     command = [sys.executable, "-c", COPIED, f"import os\n{change}"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": "."})
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": "."}
+    )
     first, later, count = done.stdout.split()
     assert len(first) == 64 and later == (first if kept else "None") and int(count) == kept
 
@@ -128,7 +130,9 @@ def test_others_may_read_the_folder_and_not_write_nor_exchange_it(folder, place,
 
 
 @pytest.mark.skipif(getattr(os, "geteuid", str)() != 0, reason="only root can say who is in a group")
-@pytest.mark.parametrize("name, members, accepted", [("root", ["root"], 1), ("root", ["eve"], 0), ("staff", [], 0)])
+@pytest.mark.parametrize(
+    "name, members, accepted", [("root", ["root"], 1), ("root", ["eve"], 0), ("staff", [], 0)]
+)
 def test_a_group_of_the_user_alone_may_write(folder, name, members, accepted, monkeypatch):
     """With the mask 002 that many systems set, a folder is the group's too, and the group is the user's own."""
     grp = pytest.importorskip("grp")
@@ -189,15 +193,29 @@ def test_processes_share_what_they_compile(tmp_path):
     """In any path, where Python takes every text for ASCII, and nothing is left elsewhere; a refusal is a line on stderr."""
     folder, home = tmp_path / os.fsdecode("Zwischenlager für Übersetztes".encode()), tmp_path / "home"
     home.mkdir()
-    environment = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONDONTWRITEBYTECODE": "1"}
-    environment |= {"PYTHONPATH": str(ROOT), "TMT_CACHE": str(folder), "HOME": str(home), "PATH": os.environ["PATH"]}
+    environment = {
+        "LC_ALL": "C",
+        "PYTHONUTF8": "0",
+        "PYTHONCOERCECLOCALE": "0",
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    environment |= {
+        "PYTHONPATH": str(ROOT),
+        "TMT_CACHE": str(folder),
+        "HOME": str(home),
+        "PATH": os.environ["PATH"],
+    }
 
     def output(program):
-        run = subprocess.run([sys.executable, "-c", program], env=environment, cwd=home, capture_output=True, text=True)
+        run = subprocess.run(
+            [sys.executable, "-c", program], env=environment, cwd=home, capture_output=True, text=True
+        )
         return run.stdout, run.stderr
 
     first, errors = output(PROGRAM)
-    assert first and output(NO_COMPILER + PROGRAM) == (first, errors) == (first, "") and len(files(folder)) == 1
+    assert (
+        first and output(NO_COMPILER + PROGRAM) == (first, errors) == (first, "") and len(files(folder)) == 1
+    )
     folder.chmod(0o777)
     again, errors = output(PROGRAM)
     assert again == first and errors.count("\n") == 1 and "0777" in errors and not list(home.iterdir())

@@ -78,7 +78,9 @@ def test_jacobians_and_convective_terms_are_derivatives_of_what_moves(drawn):
     tree, q, qd, *_ = drawn
 
     def turns(q):
-        return np.array([[list(row) for row in method.joint_frames(tree, list(q))[h].turn] for h in tree.body_hinge])
+        return np.array(
+            [[list(row) for row in method.joint_frames(tree, list(q))[h].turn] for h in tree.body_hinge]
+        )
 
     T, B = tmt.jacobians(q, tree)
     assert_close(T, by_each(tree, lambda q: tmt.com_positions(q, tree), q))
@@ -101,7 +103,9 @@ def test_composite_and_articulated_bodies_give_the_numbers_of_the_literal_sums(d
             assert_close(np.array(found), expected, digits=1e-12)
     assert_close(np.array(articulated.bias(tree, q, qd)), h, digits=1e-12)
     qdd = np.array(articulated.forward_dynamics(tree, q, qd, tau))
-    assert_close(M @ qdd, method.reduced_force(tree, h, q, qd, tau), np.abs(M).max() * np.abs(qdd).max(), 1e-12)
+    assert_close(
+        M @ qdd, method.reduced_force(tree, h, q, qd, tau), np.abs(M).max() * np.abs(qdd).max(), 1e-12
+    )
 
 
 @few
@@ -120,7 +124,10 @@ def test_a_locked_tree_is_the_sub_block_of_the_whole(drawn, data):
     tree, q, qd, *_ = drawn
     joints = tree.coordinates.joints
     locked = data.draw(st.sets(st.integers(0, len(joints) - 1), max_size=len(joints) - 1))
-    held = {tree.hinge_names[i]: q[joints[i].q] if tree.kind[i] == "ball" else float(q[joints[i].q][0]) for i in locked}
+    held = {
+        tree.hinge_names[i]: q[joints[i].q] if tree.kind[i] == "ball" else float(q[joints[i].q][0])
+        for i in locked
+    }
     free = [joint for i, joint in enumerate(joints) if i not in locked]
     at = [k for joint in free for k in range(joint.q.start, joint.q.stop)]
     by = [k for joint in free for k in range(joint.qd.start, joint.qd.stop)]
@@ -145,7 +152,18 @@ def test_the_distance_from_many_digits_is_that_of_all_digits():
 
 DIGITS = 150
 TINY = mpmath.mpf(10) ** -35  # errors: of order TINY^2, and 10^-DIGITS / TINY^2
-NUMBERS = ("offset", "axis", "mass", "com", "inertia", "gravity", "armature", "stiffness", "rest", "reference")
+NUMBERS = (
+    "offset",
+    "axis",
+    "mass",
+    "com",
+    "inertia",
+    "gravity",
+    "armature",
+    "stiffness",
+    "rest",
+    "reference",
+)
 mp = np.vectorize(mpmath.mpf, otypes=[object])
 IDENTITY = mp(np.eye(3))
 
@@ -178,7 +196,9 @@ class Lagrange:
 
         n = self.tangents(q)
         energies = [self.kinetic(q, one) for one in n]
-        M = np.array([[self.kinetic(q, a + b) - x - y for b, y in zip(n, energies)] for a, x in zip(n, energies)])
+        M = np.array(
+            [[self.kinetic(q, a + b) - x - y for b, y in zip(n, energies)] for a, x in zip(n, energies)]
+        )
 
         def momentum(moved, one):
             now = u @ self.tangents(q + moved)

@@ -27,7 +27,10 @@ ONE_HINGE = tmt.Tree(
 def off(path, expected, record=-1):
     """The largest difference of a record from numbers of many digits."""
     with mpmath.workdps(60):
-        found = [mpmath.mpf(h) + mpmath.mpf(l) for h, l in zip(path.high[record].tolist(), path.low[record].tolist())]
+        found = [
+            mpmath.mpf(h) + mpmath.mpf(l)
+            for h, l in zip(path.high[record].tolist(), path.low[record].tolist())
+        ]
         return float(max(abs(a - b) for a, b in zip(found, expected)))
 
 
@@ -43,7 +46,9 @@ def short_run(tree, q, qd, tau, duration) -> list:
 
         def rate(state):
             q, qd = list(state[:nq]), list(state[nq:])
-            return mpmath.matrix([*exact.coordinates.component_rates(q, qd), *acceleration(exact, q, qd, torque)])
+            return mpmath.matrix(
+                [*exact.coordinates.component_rates(q, qd), *acceleration(exact, q, qd, torque)]
+            )
 
         start = rate(first)
         for j in range(1, COLUMNS + 1):
@@ -62,7 +67,12 @@ def short_run(tree, q, qd, tau, duration) -> list:
 def test_a_pendulum_is_its_elliptic_function(axis, arm, form):
     """Pulled along its arm each is that of frequency 2 per second, after many turns; of one axis no double has the direction."""
     square, arm = sum(x * x for x in arm), tuple(map(float, arm))
-    more = {"axis": [axis], "com": [arm], "inertia": [square * np.eye(3)], "gravity": tuple(8.0 * x for x in arm)}
+    more = {
+        "axis": [axis],
+        "com": [arm],
+        "inertia": [square * np.eye(3)],
+        "gravity": tuple(8.0 * x for x in arm),
+    }
     tree = dataclasses.replace(ONE_HINGE, **more)
     assert (sum(Fraction(x) ** 2 for x in tree.axis[0]) != 1) == (axis == (1, 2, 2))
     path = trajectory(tree, [200.0], [1.5], [0.0], 0.375, 8, form=form)
@@ -86,7 +96,9 @@ def turned_about(omega, t):
 def test_a_symmetric_free_body_precesses_about_its_angular_momentum():
     tree = read(PATHS["free_body"]).tree
     turn, spin = (0.5, 0.5, -0.5, 0.5), (4.0, 1.0, 3.0)
-    tree = dataclasses.replace(tree, inertia=[np.diag([2.0, 2.0, 0.5])], com=[(0.0, 0.0, 0.0)], damping=[0.0] * 6)
+    tree = dataclasses.replace(
+        tree, inertia=[np.diag([2.0, 2.0, 0.5])], com=[(0.0, 0.0, 0.0)], damping=[0.0] * 6
+    )
     path = trajectory(tree, [0.0] * 3 + list(turn), [1.0, 0.0, 2.0, *spin], [0.0] * 6, 0.25, 4)
     assert np.array_equal(tree.axis[3:], np.eye(3))
     for k in (1, 4):
@@ -97,7 +109,11 @@ def test_a_symmetric_free_body_precesses_about_its_angular_momentum():
             rate = (mpmath.mpf(0.5) - 2) / 2 * 3  # of the spin about the axis of symmetry, in the body's axes
             (x, y, z), cosine, sine = spin, mpmath.cos(rate * t), mpmath.sin(rate * t)
             omega = [x * cosine - y * sine, x * sine + y * cosine, z]
-            momentum = [mpmath.mpf(4), mpmath.mpf(1), mpmath.mpf(3) / 4]  # over the moment about the other axes
+            momentum = [
+                mpmath.mpf(4),
+                mpmath.mpf(1),
+                mpmath.mpf(3) / 4,
+            ]  # over the moment about the other axes
             quaternion = product(product(turn, turned_about(momentum, t)), turned_about([0, 0, -rate], t))
         assert off(path, [*position, *quaternion, *speed, *omega], k) < 1e-29
 
@@ -130,7 +146,9 @@ def test_two_runs_of_other_forms_and_orders_agree_and_a_seeded_error_sets_them_a
     assert np.all(np.abs(path.low) <= np.spacing(np.abs(path.high)) / 2)
 
     def wrong(tree, q, qd):
-        return composite.mass_matrix_and_bias(tree, q, [v * (1 + mpmath.mpf(2) ** -60) for v in qd], mpmath.mpf)
+        return composite.mass_matrix_and_bias(
+            tree, q, [v * (1 + mpmath.mpf(2) ** -60) for v in qd], mpmath.mpf
+        )
 
     monkeypatch.setitem(reference_run.FORMS, "literal", wrong)
     assert truth(tree, *start, 0.0625, 4)[1] > 1e-20

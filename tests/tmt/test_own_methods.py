@@ -8,7 +8,15 @@ import pytest
 import tmt
 from tmt.compiled import forms
 from tmt.derivation import method
-from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler, amplification, derivatives, method_named, one_step
+from tmt.methods import (
+    METHODS,
+    RungeKutta,
+    SemiImplicitEuler,
+    amplification,
+    derivatives,
+    method_named,
+    one_step,
+)
 from tmt.methods.stepping import FIELDS, Method, advance
 
 BENT = np.radians([30.0, 20.0, 60.0])
@@ -39,7 +47,9 @@ class Plain:
         return Midpoint().step(slope, q, qd, dt)
 
 
-@pytest.mark.parametrize("own, order", [(Midpoint(), 2), (Plain(), 1)], ids=["made from Method", "of no known kind"])
+@pytest.mark.parametrize(
+    "own, order", [(Midpoint(), 2), (Plain(), 1)], ids=["made from Method", "of no known kind"]
+)
 def test_a_method_of_ones_own(own, order, rng, monkeypatch):
     monkeypatch.setitem(METHODS, "mine", own)
     monkeypatch.setitem(METHODS, "tableau", RungeKutta(2, ((), (0.5,)), (0.0, 1.0), (0.0, 0.5)))

@@ -47,7 +47,8 @@ SLIDE_ON_A_BALL = tmt.Tree(
 
 
 @pytest.mark.parametrize(
-    "tree, changes, word", [*((tmt.ARM, *row) for row in REFUSED), *((SLIDE_ON_A_BALL, *row) for row in OF_KINDS)]
+    "tree, changes, word",
+    [*((tmt.ARM, *row) for row in REFUSED), *((SLIDE_ON_A_BALL, *row) for row in OF_KINDS)],
 )
 def test_what_cannot_be_is_refused_in_one_line(tree, changes, word):
     with pytest.raises(ValueError, match=word) as error:
@@ -70,7 +71,11 @@ def test_a_state_of_a_ball_is_refused_by_its_name():
 @pytest.mark.parametrize("size", [5e-324, 1.7e308])
 def test_an_axis_of_any_length_is_a_direction(size):
     tree = dataclasses.replace(tmt.ARM, axis=((0, 1, 0), (size, size, 0), (0, 0, -size)))
-    assert np.allclose(tree.axis[1], (0.5**0.5, 0.5**0.5, 0.0), rtol=0, atol=2e-16) and tree.axis[2] == (0.0, 0.0, -1.0)
+    assert np.allclose(tree.axis[1], (0.5**0.5, 0.5**0.5, 0.0), rtol=0, atol=2e-16) and tree.axis[2] == (
+        0.0,
+        0.0,
+        -1.0,
+    )
 
 
 def chain(axes, com=(0.3, 0.1, 0.2), inertia=None, offsets=None):
@@ -117,11 +122,14 @@ def test_a_hinge_locked_at_zero_rounds_nothing():
     planar, arm = tmt.ARM.lock({"beta": 0.0}), tmt.ARM
     assert (planar.offset, planar.axis) == (arm.offset[::2], arm.axis[::2])
     assert (planar.parent, planar.body_hinge) == ((-1, 0), (0, 1))
-    assert (planar.com, planar.inertia, planar.mass) == (arm.com, arm.inertia, arm.mass) and arm.lock({}) == arm
+    assert (planar.com, planar.inertia, planar.mass) == (arm.com, arm.inertia, arm.mass) and arm.lock(
+        {}
+    ) == arm
 
 
 @pytest.mark.parametrize(
-    "angles, word", [({"wrist": 0.0}, "'wrist'"), (dict.fromkeys(tmt.ARM.hinge_names, 0.0), "one must be free")]
+    "angles, word",
+    [({"wrist": 0.0}, "'wrist'"), (dict.fromkeys(tmt.ARM.hinge_names, 0.0), "one must be free")],
 )
 def test_what_cannot_be_locked(angles, word):
     with pytest.raises(ValueError, match=word):

@@ -65,9 +65,12 @@ def test_a_mimic_has_the_modes_of_both_masses_and_a_lower_limit_than_a_rigid_one
 
 
 def test_a_floating_base_turns_with_the_constraints_that_it_carries():
-    source = FOUR_BARS.replace("<worldbody>", '<worldbody><body><freejoint/><geom fromto="0 0 0 0.2 0 0" mass="3"/>')
+    source = FOUR_BARS.replace(
+        "<worldbody>", '<worldbody><body><freejoint/><geom fromto="0 0 0 0.2 0 0" mass="3"/>'
+    )
     source = source.replace("</worldbody>", "</body></worldbody>").replace(
-        "</actuator>", '<position joint="rocker" kp="20" kv="1"/></actuator><keyframe><key ctrl="0.4 -0.4"/></keyframe>'
+        "</actuator>",
+        '<position joint="rocker" kp="20" kv="1"/></actuator><keyframe><key ctrl="0.4 -0.4"/></keyframe>',
     )  # the servos load the loop
     one = predicted(source)[0]
     assert one.at.small.names == ("crank", "coupler", "rocker") and "discrete" not in one.known
@@ -84,5 +87,7 @@ def test_constraints_at_rest_carry_what_mujoco_says_and_are_stiff_by_turning():
     assert force == pytest.approx(data.qfrc_constraint, abs=1e-8) and np.abs(force).max() > 0.01
     K = springs + turning
     for j, step in enumerate(1e-7 * np.eye(len(K))):
-        ahead, behind = (constraint_terms(rows, coordinates, coordinates.move(at.q, s * step))[0] for s in (1, -1))
+        ahead, behind = (
+            constraint_terms(rows, coordinates, coordinates.move(at.q, s * step))[0] for s in (1, -1)
+        )
         assert -(ahead - behind) / 2e-7 == pytest.approx(K[:, j], rel=1e-3, abs=1e-3 * np.abs(K).max())

@@ -53,7 +53,9 @@ def on_servos(robots):
         left = case.tau - np.array(holding(case.tree, list(end)), float)
         end = end + np.linalg.solve(stiffness(case.tree, end), left)
     assert np.abs(left).max() < 1e-9
-    return Held(SimpleNamespace(tree=case.tree, q=end, tau=case.tau, coordinates=case.coordinates, scene=case.scene))
+    return Held(
+        SimpleNamespace(tree=case.tree, q=end, tau=case.tau, coordinates=case.coordinates, scene=case.scene)
+    )
 
 
 @pytest.mark.parametrize("name", ["gripper", "pendulum_ball", "random", "on servos"])
@@ -66,7 +68,10 @@ def test_the_matrix_is_the_derivative_of_the_acceleration_by_movements(robots, o
         ends.append(np.concatenate([by_q, by_v]))
     differenced = (ends[0] - ends[1]).T / 2e-6
     assert np.abs(at.matrix[n:] - differenced).max() < 1e-7 * np.abs(at.matrix).max()
-    assert np.abs(at.mass_matrix @ at.matrix[n:, :n] + stiffness(at.tree, at.q)).max() < 1e-9 * np.abs(at.matrix).max()
+    assert (
+        np.abs(at.mass_matrix @ at.matrix[n:, :n] + stiffness(at.tree, at.q)).max()
+        < 1e-9 * np.abs(at.matrix).max()
+    )
 
 
 @pytest.mark.parametrize("name", ["gripper", "pendulum_ball", "on servos"])
@@ -90,11 +95,15 @@ def test_a_spherical_pendulum_swings_alike_to_both_sides_and_spins_freely(robots
     assert at.kind == "marginal" and at.stays and at.without_stiffness.sum() == 2
 
 
-@pytest.mark.parametrize("method, limit", [("rk4", 2.785293563), ("explicit_euler", 2), ("semi_implicit_euler", None)])
+@pytest.mark.parametrize(
+    "method, limit", [("rk4", 2.785293563), ("explicit_euler", 2), ("semi_implicit_euler", None)]
+)
 def test_the_limit_of_a_mode_that_only_decays_is_that_of_its_rate(robots, method, limit):
     """Where damping is implicit there is none."""
     kind, dt = held(robots["cart"], "qpos0").limit(method)
-    assert (kind, dt) == (("never_fails", None) if limit is None else ("finite", pytest.approx(limit / 3.0, rel=1e-6)))
+    assert (kind, dt) == (
+        ("never_fails", None) if limit is None else ("finite", pytest.approx(limit / 3.0, rel=1e-6))
+    )
 
 
 def test_a_free_body_is_held_without_gravity_and_no_mode_of_it_grows(robots):
@@ -109,7 +118,11 @@ def test_downhill_a_robot_comes_to_a_posture_that_needs_no_torque_and_stays(robo
     loop = robots["loop"]
     start = loop.posture("qpos0")
     q = at_rest(loop.tree, start)
-    assert np.abs(tmt.gravity_balance(q, loop.tree)).max() < 1e-8 < np.abs(tmt.gravity_balance(start, loop.tree)).max()
+    assert (
+        np.abs(tmt.gravity_balance(q, loop.tree)).max()
+        < 1e-8
+        < np.abs(tmt.gravity_balance(start, loop.tree)).max()
+    )
     assert np.linalg.eigvalsh(stiffness(loop.tree, q)).min() > 0.0
     lift = robot(CART.format(-9.81))
     assert at_rest(lift.tree, lift.posture("qpos0")) is None  # it falls for ever

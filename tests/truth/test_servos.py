@@ -13,7 +13,10 @@ from compare.engines.mujoco.actuators import control_of
 from compare.robots.file import robot_of
 from compare.truth.servos import Driven
 
-ROUNDING, DIFFERENCED = 1e-12, 1e-6  # of the largest force; of the largest derivative, by central differences of NUDGE
+ROUNDING, DIFFERENCED = (
+    1e-12,
+    1e-6,
+)  # of the largest force; of the largest derivative, by central differences of NUDGE
 NUDGE = 1e-5
 
 ARM = """<mujoco><compiler angle="radian"/>
@@ -61,7 +64,9 @@ def assert_the_same(text, rng, q=None, u=None):
     assert np.abs(force - of_mujoco(driven, model, q, np.zeros(n), u)).max() <= ROUNDING * max(1.0, size)
     K, D = np.zeros((2, n, n))
     for k, step in enumerate(NUDGE * np.eye(n)):
-        by_q = [of_mujoco(driven, model, driven.coordinates.move(q, sign * step), 0.0, u) for sign in (-1.0, 1.0)]
+        by_q = [
+            of_mujoco(driven, model, driven.coordinates.move(q, sign * step), 0.0, u) for sign in (-1.0, 1.0)
+        ]
         by_qd = [of_mujoco(driven, model, q, sign * step, u) for sign in (-1.0, 1.0)]
         K[:, k], D[:, k] = ((low - high) / (2.0 * NUDGE) for low, high in (by_q, by_qd))
     slopes = driven.slopes(q, u)
@@ -83,7 +88,10 @@ def test_what_a_flag_switches_off_is_off(stage, rng):
 CUT = {  # a drive whose ranges cut at the posture (0.3, -0.4) under controls of 1, and the forces that are cut
     "a force": (arm('<position joint="a" kp="30" kv="2" forcerange="-5 5"/>'), {0: 5.0}),
     "no force": (arm('<position joint="a" kp="30" kv="2" forcerange="-21.001 21.001"/>'), {}),  # just inside
-    "by the joint": (arm('<position joint="a" kp="30" gear="-2"/>', joint='actuatorfrcrange="-20 9"'), {0: 10.0}),
+    "by the joint": (
+        arm('<position joint="a" kp="30" gear="-2"/>', joint='actuatorfrcrange="-20 9"'),
+        {0: 10.0},
+    ),
 }
 
 
@@ -117,7 +125,10 @@ def test_what_only_rounding_leaves_is_a_rest():
     servo = '<general joint="{}" gainprm="0.7" biastype="affine" biasprm="0.1 -0.3 0"/>'
     driven, _ = driven_of(arm(servo.format("a") + servo.format("b"), gravity=0.0))
     q = np.array([0.1, 0.7])
-    assert driven.at_rest(q, np.array([one.target(angle) for one, angle in zip(driven.drive.actuators, q)]))[1] == 0.0
+    assert (
+        driven.at_rest(q, np.array([one.target(angle) for one, angle in zip(driven.drive.actuators, q)]))[1]
+        == 0.0
+    )
     rod = '<body euler="0.3 0 0"><joint axis="0 1 0" ref="0.1"/><geom size="0.1" pos="0.1 0 0.7"/></body>'
     driven, _ = driven_of(f'<mujoco><compiler angle="radian"/><worldbody>{rod}</worldbody></mujoco>')
     assert driven.at_rest(np.array([0.1 - np.arctan(0.1 / 0.7)]), np.zeros(0))[1] == 0.0

@@ -21,7 +21,9 @@ SCENES = {  # what is not needed, and the scene
 
 
 def test_what_is_not_needed():
-    assert {case.name: needed(case).stays for case in ARM.cases} == {case.name: () for case in ARM.cases} | KNOWN
+    assert {case.name: needed(case).stays for case in ARM.cases} == {
+        case.name: () for case in ARM.cases
+    } | KNOWN
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -35,6 +37,8 @@ def test_what_stays_by_numbers_that_cancel():
     body = {"body_names": ("top",), "body_hinge": (2,), "mass": (1.0,), "com": ((0.0, 0.0, -0.2),)}
     inertia = (np.diag([0.01, 0.01, 0.002]),)
     axes = {"parent": (-1, 0, 1), "offset": np.zeros((3, 3)), "axis": np.eye(3)[[1, 0, 2]]}
-    robot = dataclasses.replace(ARM, name="top", tree=dataclasses.replace(tmt.ARM, **axes, **body, inertia=inertia))
+    robot = dataclasses.replace(
+        ARM, name="top", tree=dataclasses.replace(tmt.ARM, **axes, **body, inertia=inertia)
+    )
     found = needed(robot.case("top", posture=(0, 30, 40)))
     assert set(found.moves) == {"beta"} and found.stays == ("alpha", "gamma")

@@ -41,7 +41,9 @@ def random_small(rng):
     root = rng.normal(size=(n, n))
     on_path = np.tril(rng.random((n, n)) < 0.6, -1)
     springs = K * rng.uniform(0.0, 1.0)
-    return small(root @ root.T + 0.1 * np.eye(n), K, D, damping, springs, on_path | on_path.T | np.eye(n, dtype=bool))
+    return small(
+        root @ root.T + 0.1 * np.eye(n), K, D, damping, springs, on_path | on_path.T | np.eye(n, dtype=bool)
+    )
 
 
 def assert_passes_one(one, name, dt, by):
@@ -105,7 +107,9 @@ KNOWN = {  # what is limited, by which integrator, and the limit in closed form;
 def test_a_limit_in_closed_form(name):
     one, integrator, dt = KNOWN[name]
     limit = one.limit(integrator)
-    assert (limit.limit, limit.dt) == (("none", None) if dt is None else ("finite", pytest.approx(dt, rel=1e-6)))
+    assert (limit.limit, limit.dt) == (
+        ("none", None) if dt is None else ("finite", pytest.approx(dt, rel=1e-6))
+    )
 
 
 @pytest.mark.parametrize("name", EVERY)

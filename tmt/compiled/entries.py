@@ -49,7 +49,9 @@ class Entries:
         for k in self.balls:
             p = [state.load((k + j) * self.width, self.kind) for j in range(4)]
             square = sum((x * x for x in p[1:]), p[0] * p[0])
-            right = right.bits("and", square.compare("ge", SHORTEST)).bits("and", square.compare("le", LONGEST))
+            right = right.bits("and", square.compare("ge", SHORTEST)).bits(
+                "and", square.compare("le", LONGEST)
+            )
         return right.bits("xor", True)
 
     def one(self) -> Code:
@@ -63,7 +65,9 @@ class Entries:
         return code
 
     def many(self, name: str) -> Code:
-        names = dict.fromkeys((*ARRAYS, "out"), POINTER) | dict.fromkeys(("count", *(f"of_{a}" for a in ARRAYS)), INDEX)
+        names = dict.fromkeys((*ARRAYS, "out"), POINTER) | dict.fromkeys(
+            ("count", *(f"of_{a}" for a in ARRAYS)), INDEX
+        )
         code, width, kind = Code(name, names, result=INDEX), self.width, self.kind
         count, state, out = code["count"], code.reserve(kind, self.count), code.reserve(kind, self.results)
         wrong = Variable(code, INDEX, 0)

@@ -33,7 +33,9 @@ class Evaluator:
         if not isinstance(quantity, str) or quantity not in (*QUANTITIES, TERMS):
             raise ValueError(f"quantity is {shown(quantity)}; known are {', '.join([*QUANTITIES, TERMS])}")
         if terms is not None and not callable(terms):
-            raise ValueError(f"terms is {shown(terms)}; a function terms(tree, q, qd) -> (Mbar, h) is expected")
+            raise ValueError(
+                f"terms is {shown(terms)}; a function terms(tree, q, qd) -> (Mbar, h) is expected"
+            )
         self.tree, self.quantity, self.terms = tree, quantity, terms
         self.sizes = tree.coordinates.nq, tree.coordinates.nv, tree.coordinates.nv
         n = len(tree.axis)
@@ -94,7 +96,9 @@ class Evaluator:
     def of_any(self, *given) -> np.ndarray | tuple | None:
         """The quantity of states of any batch shape, arrays of doubles, as tmt's function returns it; None as above."""
         batch = np.broadcast_shapes(*(array.shape[:-1] for array in given))
-        q, *rates = (rows_of(array, batch if k == 0 or array.ndim > 1 else ()) for k, array in enumerate(given))
+        q, *rates = (
+            rows_of(array, batch if k == 0 or array.ndim > 1 else ()) for k, array in enumerate(given)
+        )
         if (found := self.of_rows(q, *rates)) is None:
             return None
         found = found.reshape(batch + self.shape)

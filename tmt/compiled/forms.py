@@ -16,7 +16,10 @@ from tmt.model.values import shown
 from .straight import Traced, trace
 from .trace import Expression
 
-FEW, MANY = 5, 20  # speeds: up to FEW the composite form alone is traced, from MANY on the articulated one alone
+FEW, MANY = (
+    5,
+    20,
+)  # speeds: up to FEW the composite form alone is traced, from MANY on the articulated one alone
 DENSE = 10  # speeds from which solving linear systems and the derivatives of the bias are loops and no longer straight lines
 DYNAMICS = ("mass_matrix", "bias", "gravity_balance", "acceleration")
 
@@ -29,7 +32,11 @@ class Terms:
 
     def __init__(self, tree):
         self.n = len(tree.axis)
-        self.form = articulated.mass_matrix_and_bias if is_shorter_articulated(tree) else composite.mass_matrix_and_bias
+        self.form = (
+            articulated.mass_matrix_and_bias
+            if is_shorter_articulated(tree)
+            else composite.mass_matrix_and_bias
+        )
         if self.n > DENSE:
             self.bias_rates, self.solve_any = self.called_rates, self.called_solution
 
@@ -94,7 +101,9 @@ def checked_terms(terms, tree, q, qd) -> tuple[list, list]:
     try:
         M, h = terms(tree, q, qd)
         M, h = [[row[j] for j in range(n)] for row in (M[i] for i in range(n))], [h[i] for i in range(n)]
-        if wrong := [x for x in (*h, *(x for row in M for x in row)) if not isinstance(x, int | float | Expression)]:
+        if wrong := [
+            x for x in (*h, *(x for row in M for x in row)) if not isinstance(x, int | float | Expression)
+        ]:
             raise TypeError(f"{shown(wrong[0])} is no scalar")
         return M, h
     except Exception as error:
@@ -128,7 +137,9 @@ def is_articulated(stepping: Method, tree) -> bool:
     """Whether the slope of a method can be had from articulated bodies; not if it is another since."""
     if isinstance(stepping, Completed):
         return False
-    kind = next((kind for kind in type(stepping).__mro__ if {"slope", "articulated"} & vars(kind).keys()), None)
+    kind = next(
+        (kind for kind in type(stepping).__mro__ if {"slope", "articulated"} & vars(kind).keys()), None
+    )
     return kind is not None and "articulated" in vars(kind) and stepping.articulates(tree)
 
 

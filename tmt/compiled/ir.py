@@ -105,12 +105,16 @@ class Value:
             how = f"fcmp {'une' if how == 'ne' else 'o' + how}"
         else:
             how = f"icmp {how if how in ('eq', 'ne') else 's' + how}"
-        return self.code.put(wide(FLAG, width_of(self.kind)), f"{how} {self.kind} {self.name}, {self.like(other).name}")
+        return self.code.put(
+            wide(FLAG, width_of(self.kind)), f"{how} {self.kind} {self.name}, {self.like(other).name}"
+        )
 
     def choose(self, yes, no) -> "Value":
         """Of a flag: yes where it is true, else no, at least one of which is a value."""
         kind = (yes if isinstance(yes, Value) else no).kind
-        yes, no = (x if isinstance(x, Value) else Value(self.code, kind, constant(kind, x)) for x in (yes, no))
+        yes, no = (
+            x if isinstance(x, Value) else Value(self.code, kind, constant(kind, x)) for x in (yes, no)
+        )
         return self.code.put(kind, f"select {self.kind} {self.name}, {kind} {yes.name}, {kind} {no.name}")
 
     def cast(self, how: str, kind: str) -> "Value":
@@ -132,7 +136,9 @@ class Value:
             return self
         kind = wide(self.kind, width)
         one = Value(self.code, kind, "undef").with_lane(0, self)
-        return self.code.put(kind, f"shufflevector {kind} {one.name}, {kind} undef, <{width} x i32> zeroinitializer")
+        return self.code.put(
+            kind, f"shufflevector {kind} {one.name}, {kind} undef, <{width} x i32> zeroinitializer"
+        )
 
     def backward(self) -> "Value":
         """The last lane first."""
@@ -178,8 +184,16 @@ class Code:
     arguments: {name: kind}; `self[name]` is the value. attributes: LLVM's, such as "alwaysinline".
     """
 
-    def __init__(self, name: str, arguments: dict, result: str = "void", attributes: str = "", own: bool = False):
-        self.name, self.arguments, self.result, self.attributes, self.own = name, arguments, result, attributes, own
+    def __init__(
+        self, name: str, arguments: dict, result: str = "void", attributes: str = "", own: bool = False
+    ):
+        self.name, self.arguments, self.result, self.attributes, self.own = (
+            name,
+            arguments,
+            result,
+            attributes,
+            own,
+        )
         self.lines, self.first, self.count, self.intrinsics, self.block = [], [], 0, set(), "entry"
 
     def __getitem__(self, name: str) -> Value:
@@ -197,11 +211,15 @@ class Code:
         kind = values[0].kind
         suffix = f"{f'v{width_of(kind)}' * (width_of(kind) > 1)}f64"
         self.intrinsics.add(f"declare {kind} @llvm.{name}.{suffix}({', '.join([kind] * len(values))})")
-        return self.put(kind, f"call {kind} @llvm.{name}.{suffix}({', '.join(f'{kind} {v.name}' for v in values)})")
+        return self.put(
+            kind, f"call {kind} @llvm.{name}.{suffix}({', '.join(f'{kind} {v.name}' for v in values)})"
+        )
 
     def library(self, name: str, *values: Value) -> Value:
         """A function of C's library, of each lane."""
-        self.intrinsics.add(f"declare double @{name}({', '.join(['double'] * len(values))}) nounwind memory(none)")
+        self.intrinsics.add(
+            f"declare double @{name}({', '.join(['double'] * len(values))}) nounwind memory(none)"
+        )
         if width_of(values[0].kind) == 1:
             return self.call(name, *values, kind=DOUBLE)
         result = values[0]
@@ -269,7 +287,9 @@ class Code:
 
     @property
     def text(self) -> str:
-        given = ", ".join(f"{kind} {'noalias ' * (kind == POINTER)}%{name}" for name, kind in self.arguments.items())
+        given = ", ".join(
+            f"{kind} {'noalias ' * (kind == POINTER)}%{name}" for name, kind in self.arguments.items()
+        )
         lines = "\n".join(["entry:", *self.first, *self.lines])
         linkage = "internal " if self.own else ""
         return (

@@ -42,7 +42,9 @@ class Runner:
     def checked(self, dt, tolerance) -> tuple[float, float]:
         """A step and a tolerance as numbers above 0; a method of fixed steps has no tolerance."""
         adaptive = self.stepping.adaptive
-        return positive("dt", dt, "a step in s"), positive("tolerance", tolerance, "a number") if adaptive else 0.0
+        return positive("dt", dt, "a step in s"), positive(
+            "tolerance", tolerance, "a number"
+        ) if adaptive else 0.0
 
     def follow(self, q, qd, tau, dt: float, tolerance: float, every: int) -> tuple[np.ndarray, int]:
         """Fill the paths q (runs, records, nq) and qd (runs, records, nv) from their first states; tau (runs, nv).
@@ -168,5 +170,7 @@ def check(name: str, array, shape: tuple, dtype=np.float64) -> None:
         found = "is not contiguous, aligned and writable"
     else:
         return
-    wanted = f"a contiguous array of {np.dtype(dtype)} of shape ({', '.join(map(str, shape))}) that can be written"
+    wanted = (
+        f"a contiguous array of {np.dtype(dtype)} of shape ({', '.join(map(str, shape))}) that can be written"
+    )
     raise ValueError(f"{name} {found}; {wanted} is expected")

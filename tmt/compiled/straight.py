@@ -34,7 +34,9 @@ class Traced:
     @property
     def length(self) -> float:
         """How many operations it has, those of a linear system that it has solved among them."""
-        solved = (arguments for kind, arguments in map(self.tape.nodes.__getitem__, self.nodes) if kind == "call")
+        solved = (
+            arguments for kind, arguments in map(self.tape.nodes.__getitem__, self.nodes) if kind == "call"
+        )
         return len(self.nodes) + sum(len(arguments) ** 1.5 / 3 for arguments in solved)
 
     @property
@@ -157,7 +159,9 @@ class Steps:
                 both = sincos(value(arguments[0]))
                 made = {item: both[tape.nodes[item][1][1]] for item in self.items[i]}
             elif name == "call":
-                results = called(code, arguments[0], [value(a) for a in arguments[1:]], self.count_of(i), width)
+                results = called(
+                    code, arguments[0], [value(a) for a in arguments[1:]], self.count_of(i), width
+                )
                 made = {item: results.load(tape.nodes[item][1][1] * width, kind) for item in self.items[i]}
             elif i in self.fused:
                 product = self.fused[i]

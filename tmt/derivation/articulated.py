@@ -61,7 +61,9 @@ class Carried(NamedTuple):
     M: Symmetric
 
     def plus(self, other) -> "Carried":
-        return Carried(self.n + other.n, self.f + other.f, self.J.plus(other.J), self.H + other.H, self.M.plus(other.M))
+        return Carried(
+            self.n + other.n, self.f + other.f, self.J.plus(other.J), self.H + other.H, self.M.plus(other.M)
+        )
 
 
 class Rigid(NamedTuple):
@@ -74,7 +76,9 @@ class Rigid(NamedTuple):
     m: object
 
     def plus(self, other) -> "Rigid":
-        return Rigid(self.n + other.n, self.f + other.f, self.J.plus(other.J), self.s + other.s, self.m + other.m)
+        return Rigid(
+            self.n + other.n, self.f + other.f, self.J.plus(other.J), self.s + other.s, self.m + other.m
+        )
 
     @property
     def carried(self) -> Carried:
@@ -172,7 +176,11 @@ def outward(tree, q, qd) -> tuple[list[Frame], list[Rigid]]:
     frames, rigid, only_slides = [], [], {-1: True}
     for i, (kind, at, by) in enumerate(tree.coordinates.joints):
         parent = tree.parent[i]
-        p = frames[parent] if parent >= 0 else Frame(IDENTITY, ZERO, ZERO, ZERO, Vector(*tree.gravity) * -1.0, [])
+        p = (
+            frames[parent]
+            if parent >= 0
+            else Frame(IDENTITY, ZERO, ZERO, ZERO, Vector(*tree.gravity) * -1.0, [])
+        )
         # what only slides carry: the point O of all that hangs on it moves with it
         still = only_slides[parent]
         only_slides[i] = still and kind == "slide"

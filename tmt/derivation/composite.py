@@ -59,7 +59,9 @@ class Distribution(NamedTuple):
         across = min((Vector(1, 0, 0), Vector(0, 1, 0), Vector(0, 0, 1)), key=lambda e: abs(e.dot(axis)))
         across = across - axis * axis.dot(across)
         u = across.dot(self.second @ across) / across.dot(across)
-        return Distribution(0, Vector(0, 0, 0), Matrix([[u, 0, 0], [0, u, 0], [0, 0, u]]) - outer(axis, axis * u))
+        return Distribution(
+            0, Vector(0, 0, 0), Matrix([[u, 0, 0], [0, u, 0], [0, 0, u]]) - outer(axis, axis * u)
+        )
 
     def rounded(self, number) -> "Distribution":
         """The distribution in another type of number, each rounded once; zeros stay plain."""
@@ -67,7 +69,9 @@ class Distribution(NamedTuple):
         def one(x):
             x = Fraction(x)
             return (
-                (x.numerator / x.denominator if number is float else number(x.numerator) / x.denominator) if x else 0.0
+                (x.numerator / x.denominator if number is float else number(x.numerator) / x.denominator)
+                if x
+                else 0.0
             )
 
         vectors = [Vector(*map(one, v)) for v in (self.moment, *self.second)]
@@ -107,7 +111,8 @@ def carried_by_joint(tree) -> list[Distribution]:
             inertia = [[fraction(x) for x in row] for row in tree.inertia[b]]
             half = sum(inertia[i][i] for i in range(3)) / 2
             second = [
-                [(half if i == j else 0) - (inertia[i][j] + inertia[j][i]) / 2 for j in range(3)] for i in range(3)
+                [(half if i == j else 0) - (inertia[i][j] + inertia[j][i]) / 2 for j in range(3)]
+                for i in range(3)
             ]
             own[joint] = own[joint].plus(Distribution(mass, Vector(0, 0, 0), Matrix(second)).moved(com))
     for i in reversed(range(len(axes))):
@@ -223,7 +228,11 @@ def turning(omega, omegad) -> Matrix:
     xx, yy, zz = x * x, y * y, z * z
     xy, xz, yz = x * y, x * z, y * z
     return Matrix(
-        [[(yy + zz) * -1.0, xy - w, xz + v], [xy + w, (xx + zz) * -1.0, yz - u], [xz - v, yz + u, (xx + yy) * -1.0]]
+        [
+            [(yy + zz) * -1.0, xy - w, xz + v],
+            [xy + w, (xx + zz) * -1.0, yz - u],
+            [xz - v, yz + u, (xx + yy) * -1.0],
+        ]
     )
 
 

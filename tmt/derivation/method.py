@@ -22,7 +22,17 @@ of them, qd and tau of nv. Vectors are in the inertial frame unless they are sai
 from typing import NamedTuple
 
 from tmt.derivation.dual import jacobian
-from tmt.derivation.vectors import IDENTITY, ZERO, Matrix, Vector, rotation, solve, total, total_vector, turn_of
+from tmt.derivation.vectors import (
+    IDENTITY,
+    ZERO,
+    Matrix,
+    Vector,
+    rotation,
+    solve,
+    total,
+    total_vector,
+    turn_of,
+)
 
 
 class Frame(NamedTuple):
@@ -62,7 +72,9 @@ def joint_frames(tree, q, qd=None) -> list[Frame]:
         own = [Vector(*axis) for axis in tree.axis[by]]
         if kind == "slide":
             axis = p.turn @ own[0]
-            origin, origin_conv = carried(p, Vector(*tree.offset[i]) + own[0] * (q[at.start] - tree.reference[i]))
+            origin, origin_conv = carried(
+                p, Vector(*tree.offset[i]) + own[0] * (q[at.start] - tree.reference[i])
+            )
             origin_conv = origin_conv + p.omega.cross(axis * (qd[by.start] * 2.0))  # Coriolis
             frames.append(Frame(origin, p.turn, [axis], True, p.omega, origin_conv, p.omega_conv))
             continue
@@ -75,7 +87,9 @@ def joint_frames(tree, q, qd=None) -> list[Frame]:
             turn = p.turn @ rotation(tree.axis[by.start], q[at.start] - tree.reference[i])
             axes = [p.turn @ own[0]]
         spin = total_vector(axis * rate for axis, rate in zip(axes, qd[by]))
-        frames.append(Frame(origin, turn, axes, False, p.omega + spin, origin_conv, p.omega_conv + p.omega.cross(spin)))
+        frames.append(
+            Frame(origin, turn, axes, False, p.omega + spin, origin_conv, p.omega_conv + p.omega.cross(spin))
+        )
     return frames
 
 
@@ -193,7 +207,9 @@ def spring_energy(tree, q):
     if not tree.has_springs:
         return 0.0
     off = tree.coordinates.difference(q, tree.rest)
-    return total(0.5 * k * (x * x) for k, (_, by) in zip(tree.stiffness, tree.coordinates.places) for x in off[by] if k)
+    return total(
+        0.5 * k * (x * x) for k, (_, by) in zip(tree.stiffness, tree.coordinates.places) for x in off[by] if k
+    )
 
 
 def kinetic(parts, qd, armature=()):

@@ -37,7 +37,9 @@ def exact_of_many(tree, name: str, q, qd, tau) -> Pairs:
         return Pairs(*np.empty((2, 0, *shape)))
     found, at = traced(tree, name)
     count, (high, low) = states.shape[1], np.zeros((2, found.rows, 2))
-    high[count : count + found.numbers.shape[1], 0], low[count : count + found.numbers.shape[1], 0] = found.numbers
+    high[count : count + found.numbers.shape[1], 0], low[count : count + found.numbers.shape[1], 0] = (
+        found.numbers
+    )
     values = np.empty((2, len(states), len(at)))
     for k, numbers in enumerate(states):
         high[:count, 0] = numbers
@@ -52,7 +54,9 @@ def traced(tree, name: str) -> tuple[Equations, list[int]]:
     tape, n = Tape(mpmath.mpf), len(tree.axis)
     with mpmath.workdps(DIGITS):
         sizes = tree.coordinates.nq, n, n
-        inputs = [tape.inputs(*(f"{of}{i}" for i in range(size))) for of, size in zip(("q", "qd", "tau"), sizes)]
+        inputs = [
+            tape.inputs(*(f"{of}{i}" for i in range(size))) for of, size in zip(("q", "qd", "tau"), sizes)
+        ]
         state = State(exact_tree(tree, mpmath.mpf), *inputs)
         state.mass_matrix, state.bias = FORMS["composite"](state.tree, state.q, state.qd)
         results = [tape.lift(x) for x in flat(QUANTITIES[name].of(state))]

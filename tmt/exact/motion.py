@@ -123,7 +123,10 @@ def equations(tree, tau, form: str) -> Equations:
     """The equations of a tree under constant torque (nv,), N m, in one of FORMS."""
     tape, coordinates = Tape(mpmath.mpf), tree.coordinates
     with mpmath.workdps(DIGITS):
-        q, qd = (tape.inputs(*(f"{name}{i}" for i in range(size))) for name, size in zip(("q", "qd"), coordinates[1:]))
+        q, qd = (
+            tape.inputs(*(f"{name}{i}" for i in range(size)))
+            for name, size in zip(("q", "qd"), coordinates[1:])
+        )
         exact = exact_tree(tree, mpmath.mpf)
         qdd = method.acceleration(exact, q, qd, [mpmath.mpf(float(v)) for v in tau], FORMS[form])
         rates = [tape.lift(rate) for rate in (*coordinates.component_rates(q, qd), *qdd)]
@@ -149,7 +152,9 @@ def program(tape: Tape, inputs, results) -> tuple[Equations, dict[int, int]]:
             a, b = row[arguments[0]], row[arguments[-1]]
             made = [series.SLOPE, series.SINE, series.COSINE]
             if operation != "sincos":
-                made = [series.SCALE if operation == "*" and is_number(arguments[1]) else OPERATIONS[operation]]
+                made = [
+                    series.SCALE if operation == "*" and is_number(arguments[1]) else OPERATIONS[operation]
+                ]
             code += [(act, rows + k, a, b) for k, act in enumerate(made)]
             row[i], rows = rows, rows + len(made)
     numbers = np.array([pair(tape.nodes[i][1][0]) for i in constant]).reshape(-1, 2)

@@ -151,7 +151,15 @@ def expansion() -> Code:
 
 def evaluation() -> Code:
     """The function of `values_at`."""
-    names = {"high": POINTER, "low": POINTER, "width": INDEX, "th": DOUBLE, "tl": DOUBLE, "state": POINTER, "n": INDEX}
+    names = {
+        "high": POINTER,
+        "low": POINTER,
+        "width": INDEX,
+        "th": DOUBLE,
+        "tl": DOUBLE,
+        "state": POINTER,
+        "n": INDEX,
+    }
     code = Code("values_at", names)
     with code.loop(code["n"]) as numbers:
         h, l = Variable(code, DOUBLE, 0.0), Variable(code, DOUBLE, 0.0)

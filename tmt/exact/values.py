@@ -12,9 +12,13 @@ DIGITS = 50
 
 
 # the fields of a Truth: the quantities, of those with several arrays each by its own name
-FIELDS = {name: (name,) for name in QUANTITIES} | {name: of.parts for name, of in QUANTITIES.items() if of.parts}
+FIELDS = {name: (name,) for name in QUANTITIES} | {
+    name: of.parts for name, of in QUANTITIES.items() if of.parts
+}
 Truth = namedtuple("Truth", [field for fields in FIELDS.values() for field in fields])
-Truth.__doc__ = "Every quantity of one state as object arrays of mpmath numbers; names, shapes and units as in `tmt`."
+Truth.__doc__ = (
+    "Every quantity of one state as object arrays of mpmath numbers; names, shapes and units as in `tmt`."
+)
 
 
 def exact(tree, q, qd, tau) -> Truth:

@@ -23,9 +23,17 @@ LANGUAGES: dict[str, Callable[..., str]] = {
     "python": python.source,
     "matlab": matlab.source,
 }
-SYMBOLIC: dict[str, Callable[..., str]] = {"latex": latex.latex, "html": page.page, "sympy": symbols.python_source}
+SYMBOLIC: dict[str, Callable[..., str]] = {
+    "latex": latex.latex,
+    "html": page.page,
+    "sympy": symbols.python_source,
+}
 OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
-UNITS = {"hinge": "rad, rad/s, N m", "slide": "m, m/s, N", "ball": "quaternion w x y z, rad/s in its own axes, N m"}
+UNITS = {
+    "hinge": "rad, rad/s, N m",
+    "slide": "m, m/s, N",
+    "ball": "quaternion w x y z, rad/s in its own axes, N m",
+}
 # names that a file could not have: words of C, C++ and MATLAB, functions and modules that the files use
 WORDS = """auto bool break case catch char class const continue default delete do double else elseif end enum extern float for
 friend function global goto if inline int long namespace new operator otherwise parfor persistent private public register restrict
@@ -56,7 +64,9 @@ class Function(NamedTuple):
         return {place for place, x in zip(self.inputs, self.traced.inputs) if x.i in nodes}
 
 
-def text(model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str]) -> str:
+def text(
+    model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str]
+) -> str:
     """See `tmt.equations`."""
     checked_model(model)
     known = [*LANGUAGES, *SYMBOLIC]
@@ -108,7 +118,8 @@ def conventions(model: Tree) -> list[str]:
     ]
     for name, (kind, at, by) in zip(model.hinge_names, model.coordinates.joints):
         places = [
-            f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}" for part in (at, by)
+            f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}"
+            for part in (at, by)
         ]
         lines.append(f"  {name}, {kind}, {', '.join(places)}; {UNITS[kind]}")
     return lines
@@ -129,5 +140,11 @@ def function_of(model: Tree, quantity: str) -> Function:
     taken = (model.coordinates.nq, nv, nv)
     results = of.parts or ("out",)
     return Function(
-        quantity, title, of.takes, taken, shape[1:] if of.parts else shape, results, forms.quantity(model, quantity)
+        quantity,
+        title,
+        of.takes,
+        taken,
+        shape[1:] if of.parts else shape,
+        results,
+        forms.quantity(model, quantity),
     )

@@ -26,7 +26,15 @@ def tokens(expr, display) -> list[Token]:
     def rank(factor):
         base = factor.as_base_exp()[0]
         name = display.get(base, "")
-        of_symbol = 0 if name.startswith("m_") else 1 if name.startswith("g") else 3 if name.startswith("\\dot") else 2
+        of_symbol = (
+            0
+            if name.startswith("m_")
+            else 1
+            if name.startswith("g")
+            else 3
+            if name.startswith("\\dot")
+            else 2
+        )
         return (  # a sum before a function: cos q (a + b) could be the cosine of a product
             (4 if base.is_Add else 5 if base.is_Function else of_symbol),
             order(base),
@@ -94,7 +102,9 @@ def formulas(symbolic: Symbolic) -> list:
             rows.append([])
             for j in range(matrix.cols):
                 entry = matrix[i, j] - gravity[i] if gravity is not None else matrix[i, j]
-                formula = tokens(entry, symbolic.display) if entry or gravity is None or not gravity[i] else []
+                formula = (
+                    tokens(entry, symbolic.display) if entry or gravity is None or not gravity[i] else []
+                )
                 if gravity is not None and gravity[i]:
                     formula += [Token("+", "operator")] * bool(formula) + [Token(f"G_{{{i + 1}}}")]
                 rows[-1].append(formula)
@@ -113,14 +123,21 @@ def labelled(letter, rows) -> list:
 
 def fits(rows) -> bool:
     """Whether the entries fit on a line side by side."""
-    return sum(max(map(width, column)) for column in zip(*rows)) + 4 * len(rows[0]) <= WIDTH and len(rows[0]) > 1
+    return (
+        sum(max(map(width, column)) for column in zip(*rows)) + 4 * len(rows[0]) <= WIDTH and len(rows[0]) > 1
+    )
 
 
 def head(symbolic: Symbolic) -> list[str]:
     """The conventions in sentences."""
     sizes = "; ".join(f"{letter}: {title}" for letter, title, _ in formulas(symbolic))
     note = [f"{symbolic.note[0].upper()}{symbolic.note[1:]}."] if symbolic.note else []
-    return [f"{sizes}.", "Forces of dampers D and springs K are not in h.", "Numbers are shown with six digits.", *note]
+    return [
+        f"{sizes}.",
+        "Forces of dampers D and springs K are not in h.",
+        "Numbers are shown with six digits.",
+        *note,
+    ]
 
 
 # LaTeX
@@ -161,10 +178,17 @@ def latex(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
             body = r" \\ ".join(" & ".join(map(in_latex, row)) for row in entries)
             equations.append(rf"\[ {letter} = \begin{{pmatrix}} {body} \end{{pmatrix}} \]")
         else:
-            equations += [rf"\entry{{{name} = {in_latex(formula)}}}" for name, formula in labelled(letter, entries)]
+            equations += [
+                rf"\entry{{{name} = {in_latex(formula)}}}" for name, formula in labelled(letter, entries)
+            ]
     joints = [(f"${symbolic.display[q]}$", escaped(text)) for q, text in zip(symbolic.q, symbolic.joints)]
     rows = [
-        (f"${symbolic.display[symbol]}$", f"{row.value:.6g}", row.unit.replace("2", "$^2$"), escaped(row.meaning))
+        (
+            f"${symbolic.display[symbol]}$",
+            f"{row.value:.6g}",
+            row.unit.replace("2", "$^2$"),
+            escaped(row.meaning),
+        )
         for symbol, row in symbolic.parameters.items()
     ]
     parts = {

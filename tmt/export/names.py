@@ -79,14 +79,18 @@ class Names:
             kind = f"moment of inertia of {self.of.body_names[b]} about {'xyz'[i]}"
             kind = kind if i == j else f"entry {axes} of the inertia tensor of {self.of.body_names[b]}"
             meaning = f"{kind}, at its centre of mass"
-            symbols[i, j] = symbols[j, i] = self.symbol(values[3 * i + j], f"I_{name}_{axes}", tex, "kg m2", meaning)
+            symbols[i, j] = symbols[j, i] = self.symbol(
+                values[3 * i + j], f"I_{name}_{axes}", tex, "kg m2", meaning
+            )
         return [[symbols[i, j] for j in range(3)] for i in range(3)]
 
     def vector(self, values, name, tex, unit, meaning) -> list:
         """Symbols of components with their signs; of a vector along an axis that of its length."""
         values = without_tiny(values)
         if sum(map(bool, values)) == 1:
-            length = self.symbol(max(map(abs, values)), name, tex, unit, f"{meaning}, along {direction(values)}")
+            length = self.symbol(
+                max(map(abs, values)), name, tex, unit, f"{meaning}, along {direction(values)}"
+            )
             return [0 if not value else length if value > 0 else -length for value in values]
         stem = tex.rstrip("}") if "_" in tex else f"{tex}_{{"
         return [
@@ -118,7 +122,9 @@ class Names:
         def lifted(values):
             return [lifted(value) for value in values] if isinstance(values, list) else scalar(values)
 
-        same = {name: getattr(self.of, name) for name in ("parent", "kind", "body_hinge", "coordinates", "moves")}
+        same = {
+            name: getattr(self.of, name) for name in ("parent", "kind", "body_hinge", "coordinates", "moves")
+        }
         return SimpleNamespace(
             **same,
             axis=lifted([axis if self.is_exact else unit(axis) for axis in self.axes]),

@@ -39,9 +39,16 @@ def page(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
                 f'<p class="entry"><math>{in_mathml(Token(name))}<mo>=</mo></math> {in_lines(formula)}</p>'
                 for name, formula in labelled(letter, entries)
             ]
-    joints = [(mathml_of(symbolic.display[q]), html.escape(text)) for q, text in zip(symbolic.q, symbolic.joints)]
+    joints = [
+        (mathml_of(symbolic.display[q]), html.escape(text)) for q, text in zip(symbolic.q, symbolic.joints)
+    ]
     rows = [
-        (mathml_of(symbolic.display[symbol]), f"{row.value:.6g}", row.unit.replace("2", "²"), html.escape(row.meaning))
+        (
+            mathml_of(symbolic.display[symbol]),
+            f"{row.value:.6g}",
+            row.unit.replace("2", "²"),
+            html.escape(row.meaning),
+        )
         for symbol, row in symbolic.parameters.items()
     ]
     tables = [

@@ -27,7 +27,12 @@ class Forms:
         """The shortest expression that is found for a polynomial in symbols, sines and cosines."""
         from sympy import Mul
 
-        count, parts, terms, products = len(self.symbols), defaultdict(lambda: self.ring.functions.zero), [], set()
+        count, parts, terms, products = (
+            len(self.symbols),
+            defaultdict(lambda: self.ring.functions.zero),
+            [],
+            set(),
+        )
         for monomial, number in poly.items():
             parts[monomial[:count]][monomial[count:]] = number
         for monomial, part in parts.items():
@@ -52,7 +57,9 @@ class Forms:
         few, harmonics = len(poly) <= FEW_TERMS, self.harmonics(poly)
         spaces = [(poly, self.angles)] + [(self.of_sums(harmonics), self.sums)] * bool(self.parallel)
         for poly, angles in spaces:
-            squared = [pair for pair in self.ring.places if few and any(monomial[pair[1]] > 1 for monomial in poly)]
+            squared = [
+                pair for pair in self.ring.places if few and any(monomial[pair[1]] > 1 for monomial in poly)
+            ]
             for turned in itertools.product([False, True], repeat=len(squared)):
                 self.ring.check_time()
                 pairs = [pair[::-1] for pair, turn in zip(squared, turned) if turn]
@@ -67,14 +74,19 @@ class Forms:
         if self.ring.exact and len(poly) <= FEW_FACTORED:
             number, factors = poly.factor_list()
             if len(factors) > 1 and angles is self.angles:  # each factor may have a shorter form of its own
-                forms = [self.form(self.ring.reduced(factor, self.ring.places)) ** power for factor, power in factors]
+                forms = [
+                    self.form(self.ring.reduced(factor, self.ring.places)) ** power
+                    for factor, power in factors
+                ]
                 yield Mul(self.number(number), *forms)
 
     def expression(self, poly, angles):
         from sympy import cos, sin
 
         functions = {
-            place: of(angle) for pair, angle in zip(self.ring.places, angles) for place, of in zip(pair, (sin, cos))
+            place: of(angle)
+            for pair, angle in zip(self.ring.places, angles)
+            for place, of in zip(pair, (sin, cos))
         }
         terms = []
         for monomial, number in poly.items():
@@ -95,7 +107,9 @@ class Forms:
         one, result = self.ring.ring.domain.one, Counter()
         for monomial, number in poly.items():
             sines = sum(monomial[place] for place, _ in self.ring.places)
-            parts = {(): number * (-1) ** (sines // 2)}  # of exp(i k q), divided by i where the number of sines is odd
+            parts = {
+                (): number * (-1) ** (sines // 2)
+            }  # of exp(i k q), divided by i where the number of sines is odd
             for s, c in self.ring.places:
                 own = {0: one}
                 # 2 i sin = z - 1/z, 2 cos = z + 1/z with z = exp(i q)
@@ -105,7 +119,9 @@ class Forms:
                         turned[k + 1] += part / 2
                         turned[k - 1] += sign * part / 2
                     own = turned
-                parts = {(*k, more): part * factor for k, part in parts.items() for more, factor in own.items()}
+                parts = {
+                    (*k, more): part * factor for k, part in parts.items() for more, factor in own.items()
+                }
             for k, part in parts.items():
                 sign = next((1 if x > 0 else -1 for x in k if x), 1)
                 result[sines % 2 == 1, tuple(sign * x for x in k)] += part * (sign if sines % 2 else 1)
@@ -115,7 +131,10 @@ class Forms:
     def of_harmonics(self, harmonics):
         from sympy import Add, Mul, cos, sin
 
-        waves = {(is_sine, k): (sin if is_sine else cos)(Add(*map(Mul, k, self.angles))) for is_sine, k in harmonics}
+        waves = {
+            (is_sine, k): (sin if is_sine else cos)(Add(*map(Mul, k, self.angles)))
+            for is_sine, k in harmonics
+        }
         return Add(*(self.number(number) * waves[harmonic] for harmonic, number in harmonics.items()))
 
     def of_sums(self, harmonics):
@@ -136,7 +155,10 @@ class Forms:
             s = s if k[-1] > 0 else -s
             for _ in range(abs(k[-1])):
                 cosine, sine = cosine * c - sine * s, sine * c + cosine * s
-            self.multiples[k] = self.ring.reduced(cosine, self.ring.places), self.ring.reduced(sine, self.ring.places)
+            self.multiples[k] = (
+                self.ring.reduced(cosine, self.ring.places),
+                self.ring.reduced(sine, self.ring.places),
+            )
         return self.multiples[k]
 
 
@@ -170,10 +192,14 @@ def grouped(terms, first, last):
         if count > 1 and (count == len(terms) or factor[0] not in last)
     }
     if not shared:
-        return Add(*(Mul(number, *(base**power for base, power in factors.items())) for number, factors in terms))
+        return Add(
+            *(Mul(number, *(base**power for base, power in factors.items())) for number, factors in terms)
+        )
     base, power = max(shared, key=shared.get)
     size = content([number for number, factors in terms if factors.get(base) == power])
-    inside = [(n / size, {b: p for b, p in fs.items() if b != base}) for n, fs in terms if fs.get(base) == power]
+    inside = [
+        (n / size, {b: p for b, p in fs.items() if b != base}) for n, fs in terms if fs.get(base) == power
+    ]
     outside = [(number, factors) for number, factors in terms if factors.get(base) != power]
     rest = [grouped(outside, first, last)] if outside else []
     return Add(Mul(size, base**power, grouped(inside, first, last)), *rest)

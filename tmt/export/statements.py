@@ -39,7 +39,9 @@ class Writer:
         self.uses = Counter(x.i for x in outputs)
         for i in traced.nodes:
             self.uses.update(self.tape.operands(i))
-        self.known = {x.i: (name, ATOM) for x, name in zip(traced.inputs, inputs)}  # by node: (text, how it is bound)
+        self.known = {
+            x.i: (name, ATOM) for x, name in zip(traced.inputs, inputs)
+        }  # by node: (text, how it is bound)
         self.items = {}  # of a sine and cosine: [(which, node)]
         for i in traced.nodes:
             kind, arguments = self.tape.nodes[i]

@@ -73,7 +73,9 @@ def symbolic(tree: Tree = ARM, quantities=QUANTITIES, seconds: float = 60.0, nam
     try:
         return derived(tree, quantities, Names(tree, False), start + seconds, note)
     except TooLong:
-        raise ValueError(f"symbolic equations of these {len(tree.kind)} joints take more than {seconds:g} s") from None
+        raise ValueError(
+            f"symbolic equations of these {len(tree.kind)} joints take more than {seconds:g} s"
+        ) from None
 
 
 def derived(tree, quantities, names: Names, deadline, note) -> Symbolic:
@@ -118,7 +120,9 @@ def derived(tree, quantities, names: Names, deadline, note) -> Symbolic:
     used = set().union(*(matrix.free_symbols for matrix in entries.values()))
     parameters = {symbol: row for symbol, row in names.parameters.items() if symbol in used}
     display = {s: names.display[s] for s in (*names.q, *names.qd, *parameters)}
-    return Symbolic(names.q, names.qd, tree.hinge_names, names.joints, parameters, names.named, entries, display, note)
+    return Symbolic(
+        names.q, names.qd, tree.hinge_names, names.joints, parameters, names.named, entries, display, note
+    )
 
 
 def parallel_hinges(tree) -> dict:
@@ -167,7 +171,11 @@ def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     matrices = []
     for name, matrix in symbolic.entries.items():
         letter, title = TITLES[name]
-        rows = [",\n".join(f"    [{', '.join(Printer().doprint(entry) for entry in row)}]" for row in matrix.tolist())]
+        rows = [
+            ",\n".join(
+                f"    [{', '.join(Printer().doprint(entry) for entry in row)}]" for row in matrix.tolist()
+            )
+        ]
         symbols = "[*q, *qd]" if name == "bias" else "[*q]"
         own = {"gravity_balance": "gravity"}.get(name, name)
         matrices.append(

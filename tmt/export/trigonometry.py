@@ -4,7 +4,9 @@ import time
 
 from tmt.derivation.vectors import Vector, cos, sin
 
-PRECISION = 120  # bits of coefficients that are not rational: the rounding of a sum is far below that of its doubles
+PRECISION = (
+    120  # bits of coefficients that are not rational: the rounding of a sum is far below that of its doubles
+)
 NOISE = 1e-25  # of the largest coefficient of a polynomial
 LARGEST_PRODUCT = 3_000_000  # pairs of terms in one product: some seconds
 
@@ -25,7 +27,10 @@ class Ring:
 
         domain = QQ if exact else RealField(prec=PRECISION)
         functions = [Dummy() for _ in range(2 * n)]  # sines, then cosines
-        self.ring, self.functions = PolyRing([*symbols, *functions], domain, "lex"), PolyRing(functions, domain, "lex")
+        self.ring, self.functions = (
+            PolyRing([*symbols, *functions], domain, "lex"),
+            PolyRing(functions, domain, "lex"),
+        )
         self.exact, self.deadline = exact, deadline
         self.places = [(i, n + i) for i in range(n)]  # of sine and cosine in self.functions
         self.pairs = [(len(symbols) + s, len(symbols) + c) for s, c in self.places]  # and in self.ring
@@ -56,7 +61,9 @@ class Ring:
     def without_noise(self, poly, noise):
         """The polynomial without coefficients of at most `noise` times the largest."""
         least = noise * max(map(abs, poly.values()), default=0)
-        return poly.ring.from_dict({monomial: number for monomial, number in poly.items() if abs(number) > least})
+        return poly.ring.from_dict(
+            {monomial: number for monomial, number in poly.items() if abs(number) > least}
+        )
 
 
 class Trig:

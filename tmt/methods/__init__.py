@@ -14,7 +14,15 @@ from tmt.methods.implicit import ImplicitRungeKutta
 from tmt.methods.semi_implicit import SemiImplicitEuler as SemiImplicitEuler
 from tmt.methods.semi_implicit import by_speed as by_speed
 from tmt.methods.semi_implicit import lone_speeds as lone_speeds
-from tmt.methods.stepping import Method, advance, checked_sums, checked_tableau, completed, increments, left_over
+from tmt.methods.stepping import (
+    Method,
+    advance,
+    checked_sums,
+    checked_tableau,
+    completed,
+    increments,
+    left_over,
+)
 from tmt.model.coordinates import FLAT
 from tmt.model.values import shown
 
@@ -107,12 +115,16 @@ METHODS = {
     "rk4": RungeKutta(4, *CLASSICAL),  # the assignment's part i
     "rk4_mean_speed": RungeKutta(2, *CLASSICAL, mean_speed=True),  # of order 2 where a ball tumbles
     "dopri8": RungeKutta(order=8, A=dop853.A, b=dop853.B, c=dop853.C),  # Dormand and Prince, fixed step
-    "dopri8_adaptive": AdaptiveRungeKutta(8, dop853.A, dop853.B, dop853.C, errors=(dop853.ERROR_5, dop853.ERROR_3)),
+    "dopri8_adaptive": AdaptiveRungeKutta(
+        8, dop853.A, dop853.B, dop853.C, errors=(dop853.ERROR_5, dop853.ERROR_3)
+    ),
     "explicit_euler": RungeKutta(order=1, A=((),), b=(1.0,), c=(0.0,)),
     "semi_implicit_euler": SemiImplicitEuler(implicit_bias=False),
     "implicit": SemiImplicitEuler(implicit_bias=True, implicit_gains=True),
     "implicitfast": SemiImplicitEuler(implicit_bias=False, lone_bodies=True, implicit_gains=True),
-    "discrete": SemiImplicitEuler(implicit_bias=False, lone_bodies=True, implicit_springs=True, implicit_gains=True),
+    "discrete": SemiImplicitEuler(
+        implicit_bias=False, lone_bodies=True, implicit_springs=True, implicit_gains=True
+    ),
     "implicit_midpoint": ImplicitRungeKutta(order=2, A=((0.5,),), b=(1.0,), c=(0.5,)),
     "gauss_legendre_4": ImplicitRungeKutta(  # Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.7
         order=4,
@@ -126,7 +138,9 @@ METHODS = {
 def method_named(name: str) -> Method:
     """The method of that name in METHODS, as it is there now, with all fields; ValueError if there is none, or no method."""
     if not isinstance(name, str) or name not in METHODS:
-        raise ValueError(f"unknown method {shown(name)}; known are {', '.join(METHODS)}, and for simulate taylor")
+        raise ValueError(
+            f"unknown method {shown(name)}; known are {', '.join(METHODS)}, and for simulate taylor"
+        )
     try:
         return completed(METHODS[name])
     except ValueError as error:

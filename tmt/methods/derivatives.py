@@ -22,7 +22,9 @@ def one_step(stepping, tree, q, qd, tau, dt, *terms):
 def takes_terms(stepping) -> bool:
     """Whether a method's slope is one of tmt's own, which takes another form of the dynamics."""
     kind = next((kind for kind in type(stepping).__mro__ if "slope" in vars(kind)), None)
-    return kind is not None and kind.__module__.split(".")[0] == __name__.split(".")[0] and kind is not Completed
+    return (
+        kind is not None and kind.__module__.split(".")[0] == __name__.split(".")[0] and kind is not Completed
+    )
 
 
 def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:

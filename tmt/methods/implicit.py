@@ -18,7 +18,9 @@ from tmt.derivation.vectors import solve_any
 from tmt.methods.stepping import Method, checked_sums, checked_tableau
 from tmt.model.coordinates import FLAT, normalized, product
 
-ITERATIONS = 50  # Newton's method doubles the correct digits each time: a stage that needs more is not being found
+ITERATIONS = (
+    50  # Newton's method doubles the correct digits each time: a stage that needs more is not being found
+)
 CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size: the next change would be its square
 
 

@@ -78,7 +78,13 @@ class SemiImplicitEuler(Method):
             left = [x + weighted(row, moved) for x, row in zip(left, position_gain)]
         if speed_gain:
             left = [x + weighted(row, [dt * y for y in a]) for x, row in zip(left, speed_gain)]
-        if own := set(range(len(qd))) if self.implicit_bias else lone_speeds(tree) if self.lone_bodies else ():
+        if (
+            own := set(range(len(qd)))
+            if self.implicit_bias
+            else lone_speeds(tree)
+            if self.lone_bodies
+            else ()
+        ):
             ahead, behind = (terms(tree, q, [v + sign * x for v, x in zip(qd, a)])[1] for sign in (1.0, -1.0))
             left = [x + 0.5 * dt * (ahead[i] - behind[i]) if i in own else x for i, x in enumerate(left)]
         return left
@@ -96,7 +102,11 @@ class SemiImplicitEuler(Method):
     def articulates(self, tree) -> bool:
         """Whether all that is implicit acts at single joints alone: then it counts as armature."""
         across = any(
-            g for gain in self.gains_held(tree) for i, row in enumerate(gain) for j, g in enumerate(row) if i != j
+            g
+            for gain in self.gains_held(tree)
+            for i, row in enumerate(gain)
+            for j, g in enumerate(row)
+            if i != j
         )
         return not (self.implicit_bias or (self.lone_bodies and lone_speeds(tree)) or across)
 
@@ -147,7 +157,9 @@ def lone_speeds(tree) -> set:
     for i, kind in enumerate(tree.kind):
         chain = [i - 3, i - 2, i - 1, i]
         free = kind == "ball" and i >= 3 and [tree.kind[j] for j in chain] == ["slide"] * 3 + ["ball"]
-        alone = i not in tree.parent and tree.body_hinge.count(i) == 1 and not {*chain[:3]} & {*tree.body_hinge}
+        alone = (
+            i not in tree.parent and tree.body_hinge.count(i) == 1 and not {*chain[:3]} & {*tree.body_hinge}
+        )
         if free and alone and [tree.parent[j] for j in chain] == [-1, *chain[:3]]:
             lone |= set(range(tree.coordinates.joints[i - 3].qd.start, tree.coordinates.joints[i].qd.stop))
     return lone

@@ -22,8 +22,12 @@ class Method:
     """
 
     order = 1  # the error of a run falls with dt to this power
-    adaptive = False  # chooses its own steps, takes a tolerance and has an `attempt`, as AdaptiveRungeKutta does
-    solves_stages = False  # its stages solve an equation: it has `stage_states` and `finish`, as in implicit.py
+    adaptive = (
+        False  # chooses its own steps, takes a tolerance and has an `attempt`, as AdaptiveRungeKutta does
+    )
+    solves_stages = (
+        False  # its stages solve an equation: it has `stage_states` and `finish`, as in implicit.py
+    )
     damps_implicitly = False  # its slope takes the joint damping at the rates one dt later
 
     @cached_property
@@ -35,7 +39,9 @@ class Method:
     def stages(self) -> int:
         """Evaluations of the dynamics in one step; of a method that solves its stages, in one iteration."""
         if self.solves_stages:
-            raise ValueError("it solves its stages and does not say how many they are; a field stages is expected")
+            raise ValueError(
+                "it solves its stages and does not say how many they are; a field stages is expected"
+            )
         asked = []
 
         def slope(q, qd):
@@ -45,7 +51,9 @@ class Method:
         try:
             self.step(slope, [0.0], [0.0], 1.0)
         except Exception as error:  # a step of the user's own
-            raise ValueError(f"its stages cannot be counted, as its step of one hinge fails: {shown(error)}") from error
+            raise ValueError(
+                f"its stages cannot be counted, as its step of one hinge fails: {shown(error)}"
+            ) from error
         return len(asked)
 
     def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):

@@ -27,7 +27,9 @@ def quantity(function: Callable) -> Callable:
             with np.errstate(all="ignore"):
                 return function(*arguments, **named)
         except MemoryError as error:
-            raise ValueError(f"{function.__name__} of these states does not fit into memory: {error}") from None
+            raise ValueError(
+                f"{function.__name__} of these states does not fit into memory: {error}"
+            ) from None
 
     return evaluated
 
@@ -47,7 +49,9 @@ def states(model, **arrays) -> list:
             one = [f"one number per {each}"] * bool(each)
             one += [f"{'four' if name == 'q' else 'three'} per ball"] * ("ball" in kinds)
             names = ", ".join(model.hinge_names)
-            raise ValueError(f"{name} has shape {array.shape}; (..., {n}) is expected, {', '.join(one)} ({names})")
+            raise ValueError(
+                f"{name} has shape {array.shape}; (..., {n}) is expected, {', '.join(one)} ({names})"
+            )
         if not np.isfinite(array).all():
             raise ValueError(f"{name} has values that are not finite; finite numbers are expected")
         if name == "q":

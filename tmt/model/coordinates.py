@@ -58,7 +58,9 @@ class Coordinates(NamedTuple):
             value
             for kind, at, _ in self.joints
             for value in (
-                self.logarithm(product(conjugate(q0[at]), q1[at])) if kind == "ball" else [q1[at.start] - q0[at.start]]
+                self.logarithm(product(conjugate(q0[at]), q1[at]))
+                if kind == "ball"
+                else [q1[at.start] - q0[at.start]]
             )
         ]
 
@@ -82,7 +84,9 @@ class Coordinates(NamedTuple):
         return [
             value
             for kind, at, by in self.joints
-            for value in ([0.5 * x for x in product(q[at], [0.0, *qd[by]])] if kind == "ball" else [qd[by.start]])
+            for value in (
+                [0.5 * x for x in product(q[at], [0.0, *qd[by]])] if kind == "ball" else [qd[by.start]]
+            )
         ]
 
     def rates(self, u, qd) -> list:

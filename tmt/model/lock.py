@@ -16,7 +16,9 @@ def locked(tree, angles: Mapping):
     """What Tree.lock says."""
     names, joints = tree.hinge_names, tree.coordinates.joints
     if not isinstance(angles, Mapping):
-        raise ValueError(f"lock is given {shown(angles)}; a dict of angles in rad by the names of hinges is expected")
+        raise ValueError(
+            f"lock is given {shown(angles)}; a dict of angles in rad by the names of hinges is expected"
+        )
     if unknown := [name for name in angles if name not in names]:
         raise ValueError(f"there is no hinge {shown(unknown[0])} to lock; the hinges are {', '.join(names)}")
     if len(angles) == len(names):
@@ -76,7 +78,9 @@ def _refuse_fed_back(tree, held, free):
     for name, position in held.items() if tree.position_gain else ():
         l = joints[names.index(name)].qd.start
         for i in free:
-            if position and any(tree.position_gain[k][l] for k in range(*joints[i].qd.indices(len(tree.axis)))):
+            if position and any(
+                tree.position_gain[k][l] for k in range(*joints[i].qd.indices(len(tree.axis)))
+            ):
                 raise ValueError(
                     f"{name!r} cannot be locked at {shown(position)}: its position makes a torque at {names[i]!r} "
                     "(position_gain); a joint that is fed back to itself alone, or 0, is expected"

@@ -44,7 +44,9 @@ def never(tree) -> bool:
     for i, joint in enumerate(joints):
         if min(np.divide(tree.armature[joint.qd], size[joint.qd])) > CLEAR:
             resting.add(i)
-    for joint, mass, inertia in sorted(zip(tree.body_hinge, tree.mass, tree.inertia), key=lambda body: body[0]):
+    for joint, mass, inertia in sorted(
+        zip(tree.body_hinge, tree.mass, tree.inertia), key=lambda body: body[0]
+    ):
         chain = []
         while joint >= 0:
             chain.append(joint)
@@ -73,7 +75,12 @@ def _turn_alone(tree, turning) -> bool:
     outer, *inner = turning
     axes = [tree.axis[tree.coordinates.joints[joint].qd.start] for joint in turning]
     hinges = "ball" not in (tree.kind[joint] for joint in turning)
-    return len(inner) == 1 and hinges and tree.parent[outer] == inner[0] and np.linalg.norm(np.cross(*axes)) > APART
+    return (
+        len(inner) == 1
+        and hinges
+        and tree.parent[outer] == inner[0]
+        and np.linalg.norm(np.cross(*axes)) > APART
+    )
 
 
 def mass_matrices(tree, q) -> np.ndarray:

@@ -128,10 +128,15 @@ class Tree:
             object.__setattr__(self, name, _gain(name, getattr(self, name), self.coordinates))
         if n == 0 or m == 0:
             raise ValueError("a Tree needs at least one joint and one body")
-        for name, hinges, before in (("parent", self.parent, range(n)), ("body_hinge", self.body_hinge, [n] * m)):
+        for name, hinges, before in (
+            ("parent", self.parent, range(n)),
+            ("body_hinge", self.body_hinge, [n] * m),
+        ):
             for i, (hinge, end) in enumerate(zip(hinges, before)):
                 if hinge != int(hinge) or not -1 <= hinge < end:
-                    raise ValueError(f"Tree.{name}[{i}] is {hinge:g}; a whole number from -1 to {end - 1} is expected")
+                    raise ValueError(
+                        f"Tree.{name}[{i}] is {hinge:g}; a whole number from -1 to {end - 1} is expected"
+                    )
             object.__setattr__(self, name, tuple(int(hinge) for hinge in hinges))
         object.__setattr__(self, "axis", tuple(_direction(i, axis) for i, axis in enumerate(self.axis)))
         if min(self.mass) < 0.0:
@@ -151,7 +156,9 @@ class Tree:
                 massive[joint], joint = True, self.parent[joint]
         for kind, name, moves_mass in zip(self.kind, self.hinge_names, massive):
             if not moves_mass:
-                raise ValueError(f"{kind} {name!r} moves nothing that has mass or inertia; Mbar would be singular")
+                raise ValueError(
+                    f"{kind} {name!r} moves nothing that has mass or inertia; Mbar would be singular"
+                )
         singular.check_tree(self)
 
     def __repr__(self) -> str:
@@ -256,7 +263,9 @@ def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows:
 def _check_ball(i: int, axes: np.ndarray, reference: float, rest: Numbers) -> None:
     """Raise ValueError unless joint i can be a ball."""
     if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0.0:
-        raise ValueError(f"the axes of joint {i}, a ball, are {axes.tolist()}; a right-handed frame is expected")
+        raise ValueError(
+            f"the axes of joint {i}, a ball, are {axes.tolist()}; a right-handed frame is expected"
+        )
     if reference:
         raise ValueError(f"Tree.reference[{i}] is {reference:g}; 0 is expected of a ball")
     if abs(math.hypot(*rest) - 1.0) > CLOSE_TO_ONE:

@@ -37,7 +37,9 @@ def names(field, values):
     """The values as a tuple of different strings that can stand in a line."""
     listed = isinstance(values, (list, tuple)) or (isinstance(values, np.ndarray) and values.ndim == 1)
     names = tuple(values) if listed else (None,)
-    if not all(isinstance(name, str) and name.isprintable() for name in names) or len(set(names)) < len(names):
+    if not all(isinstance(name, str) and name.isprintable() for name in names) or len(set(names)) < len(
+        names
+    ):
         raise ValueError(f"Tree.{field} is {shown(values)}; different names are expected")
     return tuple(map(str, names))
 

@@ -11,7 +11,16 @@ from tmt import Tree
 from .. import EngineRecord
 from ..outside.model import File, ReadModel, Unread
 from ..outside.order import near, order_of, wrong_masses
-from .plant import bodies_of, finished, fixed_force, joint_numbers, masses, parsed, set_masses, with_turned_force
+from .plant import (
+    bodies_of,
+    finished,
+    fixed_force,
+    joint_numbers,
+    masses,
+    parsed,
+    set_masses,
+    with_turned_force,
+)
 
 ENGINE = EngineRecord(
     order=50, label="Drake", colour="#D55E00", marker="P", package="pydrake", extra="drake", reads_file=True
@@ -19,9 +28,14 @@ ENGINE = EngineRecord(
 SCHEMES = {"RK2": (2, "runge_kutta2"), "RK3": (3, "runge_kutta3"), "RK5": (5, "runge_kutta5"),
            "implicit Euler": (1, "implicit_euler"), "Radau3": (3, "radau3")}  # fmt: skip
 METHODS = {name: (order, f"drake_{scheme}") for name, (order, scheme) in SCHEMES.items()}
-METHODS |= {f"{name} adaptive": (None, f"drake_{SCHEMES[name][1]}_adaptive") for name in ("RK3", "RK5", "Radau3")}
+METHODS |= {
+    f"{name} adaptive": (None, f"drake_{SCHEMES[name][1]}_adaptive") for name in ("RK3", "RK5", "Radau3")
+}
 METHODS["discrete"] = 1, "semi_implicit_euler"
-ITERATES, ITERATED = ("implicit Euler", "Radau3"), 1e-12  # relative accuracy of their iterations at fixed steps
+ITERATES, ITERATED = (
+    ("implicit Euler", "Radau3"),
+    1e-12,
+)  # relative accuracy of their iterations at fixed steps
 LONGEST = 0.1  # s, of a step of a method that chooses its own: Drake's default
 
 
@@ -143,5 +157,7 @@ class Model(ReadModel):
             except RuntimeError:  # it finds no step, or no solution of its equations
                 break
             states.append(plant.GetPositionsAndVelocities(context))
-        evaluations = steps if method == "discrete" else simulator.get_integrator().get_num_derivative_evaluations()
+        evaluations = (
+            steps if method == "discrete" else simulator.get_integrator().get_num_derivative_evaluations()
+        )
         return self.order.tree_states(*np.split(np.array(states), [len(q)], axis=1)), evaluations

@@ -26,7 +26,9 @@ def parsed(file: File, dt: float):
             plant.WeldFrames(plant.world_frame(), plant.get_body(body).body_frame())
     rotors = {}
     for actuator in map(plant.get_joint_actuator, plant.GetJointActuatorIndices()):
-        rotors[actuator.joint().name()] = actuator.default_reflected_inertia()  # of several the last one counts in M
+        rotors[actuator.joint().name()] = (
+            actuator.default_reflected_inertia()
+        )  # of several the last one counts in M
         plant.RemoveJointActuator(actuator)
     for constraint in plant.GetConstraintIds():
         plant.RemoveConstraint(constraint)
@@ -40,8 +42,13 @@ def needs_text(file: File) -> bool:
     """Whether an MJCF file has no name of the model, which Drake needs, joints without a name, or meshes or includes."""
     if file.path.suffix == ".urdf":
         return False
-    unnamed, root = any(re.fullmatch(r"joint \d+", name) for name in file.names), ElementTree.parse(file.path).getroot()
-    return unnamed or "model" not in root.attrib or any(part.tag in ("mesh", "include") for part in root.iter())
+    unnamed, root = (
+        any(re.fullmatch(r"joint \d+", name) for name in file.names),
+        ElementTree.parse(file.path).getroot(),
+    )
+    return (
+        unnamed or "model" not in root.attrib or any(part.tag in ("mesh", "include") for part in root.iter())
+    )
 
 
 def finished(file: File, dt: float, joints: dict, numbers: dict, rest):

@@ -5,5 +5,7 @@ from .engine import Mujoco
 from .reading import Reading, engine, has_hinges, load, parse, read
 from .source import ModelError
 
-ENGINE = EngineRecord(order=10, label="MuJoCo", colour="#E69F00", marker="s", in_quick_runs=True, from_file=True)
+ENGINE = EngineRecord(
+    order=10, label="MuJoCo", colour="#E69F00", marker="s", in_quick_runs=True, from_file=True
+)
 __all__ = ["ModelError", "Mujoco", "Reading", "engine", "has_hinges", "load", "parse", "read"]

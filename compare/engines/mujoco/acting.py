@@ -103,7 +103,9 @@ class Acting:
         less = 1.0 + (dt * damping + dt * dt * stiffness) * discrete
         jacobian = np.zeros((data.nefc, model.nv))
         if mujoco.mj_isSparse(model):
-            mujoco.mju_sparse2dense(jacobian, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
+            mujoco.mju_sparse2dense(
+                jacobian, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
+            )
         else:
             jacobian[:] = data.efc_J.reshape(jacobian.shape)
         return Rows(
@@ -115,7 +117,9 @@ class Acting:
             softness=R,
         )
 
-    def at(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    def at(
+        self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str
+    ) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Model and data at rest at a posture, under u of each actuator, whose activations, if any, stay as they are."""
         model = mujoco.MjModel.__copy__(self.model)
         model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
@@ -132,7 +136,9 @@ class Acting:
     @property
     def filters(self) -> list[int]:
         """Indices of the activations of filters that act: they decay by themselves."""
-        filters = [i for i, one in enumerate(self.drive.actuators) if one.acts and one.dynamics.startswith("filter")]
+        filters = [
+            i for i, one in enumerate(self.drive.actuators) if one.acts and one.dynamics.startswith("filter")
+        ]
         return [int(self.model.actuator_actadr[i]) for i in filters]
 
     def deviations(

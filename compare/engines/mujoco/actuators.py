@@ -11,7 +11,12 @@ from ...robots.actuators import Actuator, Drive, Tendon
 from .names import OF_A_JOINT, element_name, joint_name, kind_of, number_of_actuators, on, output_of
 from .source import editable_again
 
-WITH_LENGTH = (*OF_A_JOINT, mujoco.mjtTrn.mjTRN_SLIDERCRANK, mujoco.mjtTrn.mjTRN_TENDON, mujoco.mjtTrn.mjTRN_SITE)
+WITH_LENGTH = (
+    *OF_A_JOINT,
+    mujoco.mjtTrn.mjTRN_SLIDERCRANK,
+    mujoco.mjtTrn.mjTRN_TENDON,
+    mujoco.mjtTrn.mjTRN_SITE,
+)
 GAINS = {"FIXED": 1, "AFFINE": 3}  # how many numbers of its law each kind has
 BIASES = {"NONE": 0, "AFFINE": 3}
 DYNAMICS = {"NONE": "none", "INTEGRATOR": "integrator", "FILTER": "filter", "FILTEREXACT": "filterexact"}
@@ -31,7 +36,9 @@ def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Mapping
     passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
     return Drive(
         actuators=tuple(actuator(model, i) for i in range(number_of_actuators(model))),
-        tendons=tuple(one for one in map(partial(tendon, model), range(model.ntendon)) if one.stiffness or one.damping),
+        tendons=tuple(
+            one for one in map(partial(tendon, model), range(model.ntendon)) if one.stiffness or one.damping
+        ),
         compensation=tuple(map(float, model.body_gravcomp[list(bodies)] * passive)),
         controls={keys[k]: u for k, u in stated_controls(model, source).items() if k in keys},
         unknown=unknown_springs(model),
@@ -85,7 +92,9 @@ def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inpu
         return "a plugin"
     for word, known in ((dynamics, DYNAMICS), (gain, GAINS), (bias, BIASES)):
         if word not in known:
-            return {"DCMOTOR": "a DC motor", "USER": "a user-defined law"}.get(word, f"a law of type {word.lower()}")
+            return {"DCMOTOR": "a DC motor", "USER": "a user-defined law"}.get(
+                word, f"a law of type {word.lower()}"
+            )
     if inputs != 1:
         return f"{inputs} controls"
     if np.any(getattr(m, "actuator_delay", np.zeros(i + 1))[i]):

@@ -31,8 +31,12 @@ class Bare:
         self.model = locked_model(path, {}, bare=True)
         switch_off(self.model)
         self.model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
-        self.model.opt.disableflags |= bit("WARMSTART")  # its solver starts from the unconstrained acceleration
-        self.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # of constraints, which are off; both refuse PGS
+        self.model.opt.disableflags |= bit(
+            "WARMSTART"
+        )  # its solver starts from the unconstrained acceleration
+        self.model.opt.solver = (
+            mujoco.mjtSolver.mjSOL_NEWTON
+        )  # of constraints, which are off; both refuse PGS
         if rotors_in_joints and hasattr(self.model, "actuator_armature"):
             self.model.dof_armature += rotors(self.model)
             self.model.actuator_armature[:] = 0.0
@@ -65,6 +69,10 @@ class Bare:
                 inertia = turn @ tensor(m.body_iquat[body], m.body_inertia[body]) @ turn.T
                 carried[carrier[body]].append((m.body_mass[body], at + turn @ m.body_ipos[body], inertia))
         mass, moments = zip(*(together(bodies) for bodies in carried.values()))
-        speeds = {"armature": m.dof_armature, "damping": m.dof_damping, "stiffness": m.jnt_stiffness[m.dof_jntid]}
+        speeds = {
+            "armature": m.dof_armature,
+            "damping": m.dof_damping,
+            "stiffness": m.jnt_stiffness[m.dof_jntid],
+        }
         speeds = {name: values[self.dofs] for name, values in speeds.items()}
         return {"mass": np.array(mass), "moments": np.array(moments)} | speeds

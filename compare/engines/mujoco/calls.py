@@ -46,7 +46,12 @@ class MinimalCalls:
         """
         self.place(q, v, tau)
         mujoco.mj_forward(self.model, self.data)
-        addresses = [self.model._address, self.data._address, self.force.ctypes.data, self.solution.ctypes.data]
+        addresses = [
+            self.model._address,
+            self.data._address,
+            self.force.ctypes.data,
+            self.solution.ctypes.data,
+        ]
 
         def run(*names):
             loop = repeated(library(), names)

@@ -56,14 +56,18 @@ class MujocoDynamics:
 
     def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
         """T_b and B_b, (..., m, 3, nv): mj_jacBodyCom, its rotational part turned into body axes."""
-        pairs = self._each(lambda d: self._of_bodies(lambda T, B, b: mujoco.mj_jacBodyCom(self.model, d, T, B, b)), q)
+        pairs = self._each(
+            lambda d: self._of_bodies(lambda T, B, b: mujoco.mj_jacBodyCom(self.model, d, T, B, b)), q
+        )
         return pairs[..., 0, :, :, :], pairs[..., 1, :, :, :]
 
     def convective_terms(self, q, v) -> tuple[np.ndarray, np.ndarray]:
         """v_conv, world, and w_conv, body axes, (..., m, 3): mj_jacDot times qvel."""
 
         def terms(d):
-            rates = self._of_bodies(lambda T, B, body: mujoco.mj_jacDot(self.model, d, T, B, d.xipos[body], body))
+            rates = self._of_bodies(
+                lambda T, B, body: mujoco.mj_jacDot(self.model, d, T, B, d.xipos[body], body)
+            )
             return rates @ d.qvel[self.dofs]
 
         pairs = self._each(terms, q, v)
@@ -115,7 +119,9 @@ class MujocoDynamics:
         D, has_springs = self.model.dof_damping, self.bare
         passive = "fluid and tendons" if has_springs else "springs, fluid and tendons"
         return {
-            passive: self._each(lambda d: (d.qfrc_passive + D * d.qvel - has_springs * d.qfrc_spring)[self.dofs], q, v),
+            passive: self._each(
+                lambda d: (d.qfrc_passive + D * d.qvel - has_springs * d.qfrc_spring)[self.dofs], q, v
+            ),
             "actuators": self._each(lambda d: d.qfrc_actuator[self.dofs], q, v),
             "constraints and contacts": self._each(lambda d: d.qfrc_constraint[self.dofs], q, v),
         }
@@ -155,14 +161,18 @@ class MujocoDynamics:
 
         def read(states):
             q, v, ended = self.path(starts, states, dt)
-            return Motion(t, q[0, ::every], v[0, ::every], setting.steps * EVALUATIONS[method], ended[0], setting.steps)
+            return Motion(
+                t, q[0, ::every], v[0, ::every], setting.steps * EVALUATIONS[method], ended[0], setting.steps
+            )
 
         return run, read
 
     def path(self, starts, states, dt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q and v of runs (runs, steps + 1, ...), NaN from where one diverges, and why it does, or None."""
         states = np.concatenate([starts[:, None], states], axis=1)
-        states[np.diff(states[:, :, 0], axis=1, prepend=-dt) <= 0.0] = np.nan  # MuJoCo does not step from there
+        states[np.diff(states[:, :, 0], axis=1, prepend=-dt) <= 0.0] = (
+            np.nan
+        )  # MuJoCo does not step from there
         t, ended = dt * np.arange(states.shape[1]), np.full(len(states), None, dtype=object)
         for k, run in enumerate(states):
             states[k], ended[k] = as_far_as_it_goes(t, run, run[0], "a number is not finite")
@@ -184,7 +194,10 @@ class MujocoDynamics:
             data.qpos[self.qpos], data.qvel[self.dofs], torque[:, model.nu + self.dofs] = state
             mujoco.mj_getState(model, data, start, spec)
         # filled, so that the first run does not have to fetch the memory
-        states, sensors = np.full((runs, steps, starts.shape[1]), np.nan), np.zeros((runs, steps, model.nsensordata))
+        states, sensors = (
+            np.full((runs, steps, starts.shape[1]), np.nan),
+            np.zeros((runs, steps, model.nsensordata)),
+        )
         controls = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
         options = {"control_spec": controls, "nstep": steps, "state": states, "sensordata": sensors}
 
@@ -236,7 +249,9 @@ class MujocoDynamics:
         return np.stack([T, self._to_body(B)])
 
 
-def convective_accelerations(dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def convective_accelerations(
+    dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """v_conv, world, and w_conv, body axes, (states, m, 3): accelerations of the bodies at qacc = 0 without gravity.
 
     By mj_objectAcceleration, not mj_jacDot as MujocoDynamics.convective_terms. q (states, nq), v (states, nv).

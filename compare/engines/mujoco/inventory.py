@@ -42,7 +42,12 @@ REASONS = {
     "unusable keyframe": (LEFT_OUT, "not every number is finite"),
     "other": (OFF, "it changes the motion; the equations do not have it"),
 }
-QUIET = ("OVERRIDE", "ENERGY", "FWDINV", "DIAGEXACT")  # enable flags that cannot change a motion without contacts
+QUIET = (
+    "OVERRIDE",
+    "ENERGY",
+    "FWDINV",
+    "DIAGEXACT",
+)  # enable flags that cannot change a motion without contacts
 
 
 def features(m: mujoco.MjModel) -> tuple[Feature, ...]:
@@ -67,10 +72,20 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
     clamped = [i for i in actuators if controls[i] or m.actuator_forcelimited[i] or m.actuator_actlimited[i]]
     constrained, damped, sprung = on(m, "CONSTRAINT"), on(m, "DAMPER"), on(m, "SPRING")
     has_friction = constrained and on(m, "FRICTIONLOSS")
-    flags = {name[7:]: int(bit) for name, bit in mujoco.mjtEnableBit.__members__.items() if name.startswith("mjENBL_")}
-    others = [f"flag {name.lower()}" for name in flags if m.opt.enableflags & flags[name] and name not in QUIET]
+    flags = {
+        name[7:]: int(bit)
+        for name, bit in mujoco.mjtEnableBit.__members__.items()
+        if name.startswith("mjENBL_")
+    }
+    others = [
+        f"flag {name.lower()}" for name in flags if m.opt.enableflags & flags[name] and name not in QUIET
+    ]
     others += ["flag eulerdamp"] * (not on(m, "EULERDAMP"))
-    for field, is_on in (("dof_dampingpoly", damped), ("jnt_stiffnesspoly", sprung), ("jnt_springyield", sprung)):
+    for field, is_on in (
+        ("dof_dampingpoly", damped),
+        ("jnt_stiffnesspoly", sprung),
+        ("jnt_springyield", sprung),
+    ):
         others += [f"{field} of {name}" for name in having(field) if is_on]
     return {
         **{kind: named("joint", [j for j in range(m.njnt) if kind_of(m, j) == kind]) for kind in KINDS},
@@ -135,7 +150,10 @@ def take_away(m: mujoco.MjModel) -> None:
     for name in NOT_HAD_FIELDS:
         if hasattr(m, name):
             getattr(m, name)[:] = 0
-    for name in ("jnt_plasticadr", "tendon_plasticadr"):  # a spring with a plastic state yields, at whatever force
+    for name in (
+        "jnt_plasticadr",
+        "tendon_plasticadr",
+    ):  # a spring with a plastic state yields, at whatever force
         if hasattr(m, name):
             getattr(m, name)[:] = -1
 
@@ -190,7 +208,9 @@ def refuse(m: mujoco.MjModel) -> None:
         raise ValueError(f"a plugin acts on body {element_name(m, 'body', body)!r}; its forces are unknown")
     for tendon in np.flatnonzero(m.tendon_armature):
         name = element_name(m, "tendon", tendon)
-        raise ValueError(f"tendon {name!r} has armature, which couples joints; only that of joints is compared")
+        raise ValueError(
+            f"tendon {name!r} has armature, which couples joints; only that of joints is compared"
+        )
     refuse_numbers(m)
 
 
@@ -198,7 +218,9 @@ def refuse_numbers(m: mujoco.MjModel) -> None:
     """ValueError, in one line, for a number that is not finite, or beyond the range that is judged."""
     for field in NUMBERS:
         least = 0.0 if field in NOT_NEGATIVE else -MOST
-        for name in names_where(m, field, lambda row, least=least: number_outside(row, least, MOST) is not None):
+        for name in names_where(
+            m, field, lambda row, least=least: number_outside(row, least, MOST) is not None
+        ):
             refuse_number(field.partition("_")[2], f" of {name!r}", getattr(m, field), least, MOST)
     for word, values in (("gravity", m.opt.gravity), ("qpos0", m.qpos0), ("qpos_spring", m.qpos_spring)):
         refuse_number(word, "", values, -MOST, MOST)
@@ -213,4 +235,6 @@ def number_outside(values, least: float, most: float) -> float | None:
 def refuse_number(word: str, whose: str, values, least: float, most: float) -> None:
     """ValueError, with the number, where one of some numbers is not in a range."""
     if (number := number_outside(values, least, most)) is not None:
-        raise ValueError(f"{word}{whose} is {number:g}{UNITS.get(word, '')}; expected from {least:g} to {most:g}")
+        raise ValueError(
+            f"{word}{whose} is {number:g}{UNITS.get(word, '')}; expected from {least:g} to {most:g}"
+        )

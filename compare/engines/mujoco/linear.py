@@ -15,7 +15,9 @@ STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
 BAD = [int(getattr(mujoco.mjtWarning, f"mjWARN_BADQ{what}")) for what in ("POS", "VEL", "ACC")]
 
 
-def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str) -> np.ndarray:
+def transition(
+    dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str
+) -> np.ndarray:
     """d(q, qd)+/d(q, qd) of one step of MuJoCo at rest, positions as movements, (2nv, 2nv), by central differences.
 
     q: (nq,) rad, m; tau: (nv,) N m.
@@ -37,14 +39,18 @@ def left_to_itself(dynamics: MujocoDynamics, q, qd, tau, dt: float, steps: int, 
     for _ in range(steps):
         mujoco.mj_step(model, data)
         path.append((data.time, data.qpos[dynamics.qpos], data.qvel[dynamics.dofs]))
-    return dict(zip(("time", "q", "qd"), map(np.array, zip(*path)))) | {"warnings": int(data.warning.number.sum())}
+    return dict(zip(("time", "q", "qd"), map(np.array, zip(*path)))) | {
+        "warnings": int(data.warning.number.sum())
+    }
 
 
 class WholeRun(NamedTuple):
     """A run of a file's model as it is."""
 
     speeds: np.ndarray  # root mean square of all speeds in each part, rad/s and m/s; NaN from where it fails
-    failed_at: float | None  # s: MuJoCo warns of a bad number, and resets it where it may; None: it runs to its end
+    failed_at: (
+        float | None
+    )  # s: MuJoCo warns of a bad number, and resets it where it may; None: it runs to its end
 
 
 def start_of(model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray) -> np.ndarray:

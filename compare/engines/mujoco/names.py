@@ -13,7 +13,13 @@ from tmt.model.coordinates import KINDS as NUMBERS  # of a joint in qpos and in 
 from ...robots.case import Coordinates
 
 # those that the installed version has; discrete came with 3.13
-NAMES = {"Euler": "EULER", "implicitfast": "IMPLICITFAST", "discrete": "DISCRETE", "implicit": "IMPLICIT", "RK4": "RK4"}
+NAMES = {
+    "Euler": "EULER",
+    "implicitfast": "IMPLICITFAST",
+    "discrete": "DISCRETE",
+    "implicit": "IMPLICIT",
+    "RK4": "RK4",
+}
 MEMBERS = {name: getattr(mujoco.mjtIntegrator, f"mjINT_{member}", None) for name, member in NAMES.items()}
 INTEGRATORS = {name: member for name, member in MEMBERS.items() if member is not None}
 EVALUATIONS = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # of the dynamics, in a step
@@ -127,7 +133,9 @@ def rotors(m: mujoco.MjModel) -> np.ndarray:
     for i in map(int, np.flatnonzero(getattr(m, "actuator_armature", np.zeros(0)))):
         if mujoco.mjtTrn(m.actuator_trntype[i]) not in OF_A_JOINT:
             name = element_name(m, "actuator", i)
-            raise ValueError(f"actuator {name!r} has armature and acts on no joint; only that of joints is compared")
+            raise ValueError(
+                f"actuator {name!r} has armature and acts on no joint; only that of joints is compared"
+            )
         added = m.actuator_armature[i] * m.actuator_gear[output_of(m, i), 0] ** 2
         diagonal[m.dof_jntid == m.actuator_trnid[i, 0]] += added
     return diagonal

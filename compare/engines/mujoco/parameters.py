@@ -45,7 +45,9 @@ def parameters(dynamics: MujocoDynamics) -> dict:
     return {
         **{name: float(on(m, flag)) for name, flag in STATED_FLAGS.items()},
         **{name: float(np.abs(getattr(m, field, np.zeros(1))).sum()) for name, field in ABSENT.items()},
-        **{name: getattr(m, f"dof_{name}")[dynamics.dofs] for name in ("damping", "armature", "frictionloss")},
+        **{
+            name: getattr(m, f"dof_{name}")[dynamics.dofs] for name in ("damping", "armature", "frictionloss")
+        },
         **{name: getattr(m, f"jnt_{name}")[joints].astype(float) for name in ("stiffness", "limited")},
         **{name: getattr(m, f"body_{name}")[bodies] for name in ("mass", "gravcomp")},
         **{name: getattr(m.opt, name) for name in ("gravity", "density", "viscosity")},
@@ -66,7 +68,9 @@ def lengths(dynamics: MujocoDynamics) -> dict[str, np.ndarray]:
     m, to_body = dynamics.model, np.zeros(dynamics.model.nbody)
     for body in range(1, m.nbody):
         to_body[body] = to_body[m.body_parentid[body]] + np.linalg.norm(m.body_pos[body])
-    to_joint = np.append(to_body[m.jnt_bodyid] + np.linalg.norm(m.jnt_pos, axis=1), 0.0)  # the last: of no joint, -1
+    to_joint = np.append(
+        to_body[m.jnt_bodyid] + np.linalg.norm(m.jnt_pos, axis=1), 0.0
+    )  # the last: of no joint, -1
     before = to_joint[[last_hinge(m, body) for body in dynamics.bodies]]
     of_bodies = (to_body + np.linalg.norm(m.body_ipos, axis=1))[dynamics.bodies]
     return {"anchor": to_joint[dynamics.joints], "com": before + of_bodies}
@@ -102,7 +106,13 @@ def stated_numbers(source: Path | str, model: mujoco.MjModel) -> list[Stated]:
 
 
 def row_of(
-    place: str, quantity: str, stated, compiled, options: dict[str, bool], size: float | None = None, precision=0.0
+    place: str,
+    quantity: str,
+    stated,
+    compiled,
+    options: dict[str, bool],
+    size: float | None = None,
+    precision=0.0,
 ) -> Stated:
     """A row; of the options that are in force those count that may have changed a number that is not the stated one.
 
@@ -129,19 +139,34 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body, number: int) -> li
         low, high = options.inertiagrouprange
         masses = [geom.mass for geom in body.geoms if low <= geom.group <= high]
         numbers = {"mass": mass, "com": com, "inertia": inertia}
-        unknown = [Stated(place, name, None, compiled, "inertia from geoms") for name, compiled in numbers.items()]
+        unknown = [
+            Stated(place, name, None, compiled, "inertia from geoms") for name, compiled in numbers.items()
+        ]
         if masses and np.isfinite(masses).all():
             stated = float(np.sum(masses))
-            unknown[0] = row_of(place, "mass", stated, mass, total | {"boundmass": stated < options.boundmass})
+            unknown[0] = row_of(
+                place, "mass", stated, mass, total | {"boundmass": stated < options.boundmass}
+            )
         return rows + unknown
     stated_com, stated_inertia, length = stated_inertial(spec, body, com, inertia)
-    moments, precision = float(np.trace(stated_inertia)), TO_PRINCIPAL_AXES if np.isfinite(body.fullinertia[0]) else 0.0
+    moments, precision = (
+        float(np.trace(stated_inertia)),
+        TO_PRINCIPAL_AXES if np.isfinite(body.fullinertia[0]) else 0.0,
+    )
     bounded = {"boundmass": body.mass < options.boundmass}
     return [
         *rows,
         row_of(place, "mass", float(body.mass), mass, from_geoms | total | bounded),
         row_of(place, "com", stated_com, com, from_geoms | aligned, length),
-        row_of(place, "inertia", stated_inertia, inertia, from_geoms | aligned | total | bounds, moments, precision),
+        row_of(
+            place,
+            "inertia",
+            stated_inertia,
+            inertia,
+            from_geoms | aligned | total | bounds,
+            moments,
+            precision,
+        ),
     ]
 
 
@@ -150,8 +175,14 @@ def of_joint(model: mujoco.MjModel, joint, number: int) -> list[Stated]:
     chosen = {"springdamper": bool(np.any(joint.springdamper))}
     pos, turn, length = in_frames(joint.pos, joint.frame)
     axis = turn @ joint.axis / np.linalg.norm(joint.axis)
-    rows = [row_of(name, "anchor", pos, model.jnt_pos[number].copy(), {}, length)] if kind in ("hinge", "ball") else []
-    rows += [row_of(name, "axis", axis, model.jnt_axis[number].copy(), {})] if kind in ("hinge", "slide") else []
+    rows = (
+        [row_of(name, "anchor", pos, model.jnt_pos[number].copy(), {}, length)]
+        if kind in ("hinge", "ball")
+        else []
+    )
+    rows += (
+        [row_of(name, "axis", axis, model.jnt_axis[number].copy(), {})] if kind in ("hinge", "slide") else []
+    )
     fields = {"armature": model.dof_armature[dof], "damping": model.dof_damping[dof]}
     for quantity, compiled in (fields | {"stiffness": model.jnt_stiffness[number]}).items():
         stated = float(np.ravel(getattr(joint, quantity))[0])  # the linear coefficient
@@ -163,7 +194,10 @@ def in_frames(pos, frame) -> tuple[np.ndarray, np.ndarray, float]:
     """A position, (3,), through a frame of the file and those around it, the turn of all, (3, 3), and the sum of lengths."""
     pos, turn, length = np.array(pos, float), np.eye(3), float(np.linalg.norm(pos))
     while frame is not None:
-        R, length = matrix(orientation(frame.quat, frame.alt, frame.compiler)), length + np.linalg.norm(frame.pos)
+        R, length = (
+            matrix(orientation(frame.quat, frame.alt, frame.compiler)),
+            length + np.linalg.norm(frame.pos),
+        )
         pos, turn, frame = frame.pos + R @ pos, R @ turn, frame.frame
     return pos, turn, float(length)
 
@@ -189,7 +223,9 @@ def stated_inertial(spec, body, com: np.ndarray, inertia: np.ndarray) -> tuple[n
     placed = [in_frames(body.ipos, frame) for frame in frames]
     candidates = [(pos, R @ own @ R.T, length) for pos, R, length in placed]
     scale = np.abs(inertia).max() or 1.0
-    return min(candidates, key=lambda one: np.abs(one[0] - com).max() + np.abs(one[1] - inertia).max() / scale)
+    return min(
+        candidates, key=lambda one: np.abs(one[0] - com).max() + np.abs(one[1] - inertia).max() / scale
+    )
 
 
 def tensor(quat: np.ndarray, moments: np.ndarray) -> np.ndarray:

@@ -65,7 +65,9 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
         features=features(model),
         keyframes={name: model.key_qpos[k].copy() for k, name in keys.items()},
         qpos0=model.qpos0.copy(),
-        ranges=tuple(ranges[place.joint] if model.jnt_limited[place.joint] else None for place in joints.values()),
+        ranges=tuple(
+            ranges[place.joint] if model.jnt_limited[place.joint] else None for place in joints.values()
+        ),
         warnings=warnings,
         integrator={member: name for name, member in NAMES.items()}.get(integrator, integrator),
         dt=float(model.opt.timestep),
@@ -107,7 +109,9 @@ def tree_of(whole: mujoco.MjModel, joints: Mapping[str, Place], bodies: list[int
     return tmt.Tree(
         hinge_names=list(joints),
         parent=parents,
-        offset=[anchor - (anchors[before] if before >= 0 else 0.0) for anchor, before in zip(anchors, parents)],
+        offset=[
+            anchor - (anchors[before] if before >= 0 else 0.0) for anchor, before in zip(anchors, parents)
+        ],
         axis=axes,
         damping=model.dof_damping[speeds],
         body_names=[element_name(model, "body", body) for body in bodies],
@@ -142,7 +146,9 @@ def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
     tree = (solution or reading).tree
     bodies = bodies_as_in(solution, reading) if solution else reading.bodies
     model, source, methods = reading.model, reading.source, methods_for(tree)
-    return Mujoco(model, tree.hinge_names, bodies, source, bare=True, warnings=reading.warnings, methods=methods)
+    return Mujoco(
+        model, tree.hinge_names, bodies, source, bare=True, warnings=reading.warnings, methods=methods
+    )
 
 
 def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
@@ -190,7 +196,9 @@ def parse(source: Path | str, tree: tmt.Tree) -> Mujoco:
     kinds = [kind_of(model, j) for j in names.values()]
     if sorted(names) != sorted(hinges) or set(kinds) != {"hinge"}:
         joints = ", ".join(f"{name} ({kind})" for name, kind in zip(names, kinds)) or "none"
-        raise ModelError(f"{name_of(source)} has the joints {joints}; expected exactly the hinges {', '.join(hinges)}")
+        raise ModelError(
+            f"{name_of(source)} has the joints {joints}; expected exactly the hinges {', '.join(hinges)}"
+        )
     for name, hinge in zip(tree.body_names, tree.body_hinge):
         if hinge >= 0 and tree.body_hinge.count(hinge) == 1:
             bodies.append(int(model.jnt_bodyid[names[hinges[hinge]]]))

@@ -25,7 +25,10 @@ def remarks(reading: Reading, has_scenes: bool) -> list[Finding]:
 def of_source(source: Path | str, model: mujoco.MjModel) -> list[Finding]:
     """What is fixed of a URDF; for each option by which the compiler changed stated numbers, where it did, by quantity."""
     root = re.search(r"<(robot|mujoco)\b", text := text_of(source) if isinstance(source, Path) else source)
-    fixed, found = [body for body in range(1, model.nbody) if model.body_mass[body] and not moving(model)[body]], []
+    fixed, found = (
+        [body for body in range(1, model.nbody) if model.body_mass[body] and not moving(model)[body]],
+        [],
+    )
     if root and root[1] == "robot" and '"world"' not in text and fixed:
         values = {"link": element_name(model, "body", fixed[0]), "mass": float(model.body_mass[fixed].sum())}
         found.append(Finding("remarks", "fixed_base", values))
@@ -33,4 +36,6 @@ def of_source(source: Path | str, model: mujoco.MjModel) -> list[Finding]:
     for number in stated_numbers(source, model):
         if number.why and number.stated is not None:
             changed.setdefault(number.why, {}).setdefault(number.quantity, []).append(number.place)
-    return found + [Finding("remarks", "changed", {"why": why, "places": places}) for why, places in changed.items()]
+    return found + [
+        Finding("remarks", "changed", {"why": why, "places": places}) for why, places in changed.items()
+    ]

@@ -105,7 +105,9 @@ def locked_model(source: Path | str | None, positions: Mapping, bare: bool = Fal
             warnings.simplefilter("ignore")  # the compiler's, of the file as it is
             return compiled_without(without_visuals(editable(source)), positions, bare)
     except ValueError as error:
-        raise ModelError(f"MuJoCo cannot compile {name_of(source)} with locked joints {names}: {error}") from None
+        raise ModelError(
+            f"MuJoCo cannot compile {name_of(source)} with locked joints {names}: {error}"
+        ) from None
 
 
 def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> mujoco.MjModel:
@@ -122,7 +124,9 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
     numbers = {joint.name: joint.id for joint in spec.joints}  # a change of the spec takes them away
     # a free joint goes as a whole, and the parts that stay are added
     gone = {joint_name(whole, places[name].joint) for name in positions}
-    for body, number in [(body, body.id) for body in spec.bodies if {joint.name for joint in body.joints} & gone]:
+    for body, number in [
+        (body, body.id) for body in spec.bodies if {joint.name for joint in body.joints} & gone
+    ]:
         axes = data.xmat[number].reshape(3, 3)
         parent, quat = whole.body_parentid[number], np.zeros(4)
         mujoco.mju_mulQuat(quat, data.xquat[parent] * [1.0, -1.0, -1.0, -1.0], data.xquat[number])
@@ -135,10 +139,14 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
                 joint.set_frame(body.add_frame())
                 joint.pos, joint.axis = (data.xanchor[i] - data.xpos[number]) @ axes, data.xaxis[i] @ axes
             elif kind_of(whole, i) == "free":
-                add_parts(body, joint, whole, whole.jnt_dofadr[i], set(parts_of(joint.name)) - set(positions), axes)
+                add_parts(
+                    body, joint, whole, whole.jnt_dofadr[i], set(parts_of(joint.name)) - set(positions), axes
+                )
     clear(spec, gone, bare)
     model = spec.compile()
-    for name, place in joint_places(model).items():  # of springdamper the compiler chooses both by the inertia
+    for name, place in joint_places(
+        model
+    ).items():  # of springdamper the compiler chooses both by the inertia
         before = places[name]
         model.qpos_spring[place.qpos] = whole.qpos_spring[before.qpos]
         model.dof_damping[place.dofs] = whole.dof_damping[before.dofs]
@@ -146,7 +154,9 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
     return model
 
 
-def add_parts(body: mujoco.MjsBody, free, whole: mujoco.MjModel, dof: int, names: set[str], axes: np.ndarray) -> None:
+def add_parts(
+    body: mujoco.MjsBody, free, whole: mujoco.MjModel, dof: int, names: set[str], axes: np.ndarray
+) -> None:
     """Add slides and a ball that a free joint consists of. dof: its first speed; axes: of the body, as columns."""
     if aligns(free):
         why = "is aligned with the inertia of its body: none of its parts can be locked"
@@ -165,7 +175,11 @@ def clear(spec: mujoco.MjSpec, gone: set[str], bare: bool) -> None:
     elements += [a for a in spec.actuators if a.target in gone or (bare and not a.armature)]
     if bare:
         elements += [*spec.tendons, *spec.tuples, *spec.pairs]
-        stated = [body for body in spec.bodies if body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS]
+        stated = [
+            body
+            for body in spec.bodies
+            if body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS
+        ]
         elements += [geom for body in stated for geom in body.geoms]
     for element in (*elements, *[joint for joint in spec.joints if joint.name in gone]):
         spec.delete(element)

@@ -29,29 +29,45 @@ def urdf(source: mujoco.MjModel | Path | str, has_free_bodies: bool = False) -> 
     names = [joint_name(model, j) for j in range(model.njnt)]
     for j, name in enumerate(names):
         if (kind := kind_of(model, j)) not in KINDS and not (has_free_bodies and kind == "free"):
-            raise ValueError(f"joint {name!r} is of type {kind}; a URDF with a fixed base has only hinges and slides")
+            raise ValueError(
+                f"joint {name!r} is of type {kind}; a URDF with a fixed base has only hinges and slides"
+            )
     robot = Element("robot", name="robot")
     SubElement(robot, "link", name="link0")
     origins = [np.zeros(3)]  # of the link of each body, in the frame of the body
     for body in range(1, model.nbody):
         parent, first = int(model.body_parentid[body]), int(model.body_jntadr[body])
-        link, position, turn = f"link{parent}", model.body_pos[body] - origins[parent], matrix(model.body_quat[body])
+        link, position, turn = (
+            f"link{parent}",
+            model.body_pos[body] - origins[parent],
+            matrix(model.body_quat[body]),
+        )
         joints, origin = list(range(first, first + int(model.body_jntnum[body]))) or [None], np.zeros(3)
         for j in joints:
             is_last, anchor, moved, turned = j == joints[-1], np.zeros(3), np.zeros(3), np.eye(3)
             if j is None:
                 joint = Element("joint", name=unused(f"fixed{body}", names), type="fixed")
             elif kind_of(model, j) == "free":
-                joint, position, turn = Element("joint", name=names[j], type="floating"), np.zeros(3), np.eye(3)
+                joint, position, turn = (
+                    Element("joint", name=names[j], type="floating"),
+                    np.zeros(3),
+                    np.eye(3),
+                )
             else:
-                kind, axis, reference = kind_of(model, j), model.jnt_axis[j], model.qpos0[model.jnt_qposadr[j]]
+                kind, axis, reference = (
+                    kind_of(model, j),
+                    model.jnt_axis[j],
+                    model.qpos0[model.jnt_qposadr[j]],
+                )
                 joint = Element("joint", name=names[j], type=KINDS[kind])
                 if kind == "hinge":
                     anchor, turned = model.jnt_pos[j].copy(), about(axis, -reference)
                 else:
                     moved = -reference * axis
                 SubElement(joint, "axis", xyz=text(axis))
-                SubElement(joint, "dynamics", damping=text(model.dof_damping[model.jnt_dofadr[j]]), friction="0")
+                SubElement(
+                    joint, "dynamics", damping=text(model.dof_damping[model.jnt_dofadr[j]]), friction="0"
+                )
                 SubElement(joint, "limit", lower="-" + FAR, upper=FAR, effort=FAR, velocity=FAR)
             child = f"link{body}" if is_last else f"link{body}_{j}"
             SubElement(joint, "origin", frame(position + turn @ (anchor - origin + moved), turn @ turned))

@@ -125,7 +125,9 @@ class OutsideDynamics:
         def read(outcome):
             states, evaluations, seconds, why = outcome
             path, ended = as_far_as_it_goes(t, states, np.concatenate([q, v]), why)
-            return Motion(t, *np.split(path, [self.coordinates.nq], axis=1), evaluations, ended, setting.steps, seconds)
+            return Motion(
+                t, *np.split(path, [self.coordinates.nq], axis=1), evaluations, ended, setting.steps, seconds
+            )
 
         return run, read
 

@@ -60,12 +60,20 @@ def read(key: int, name: str, file: File, tree: tmt.Tree) -> dict:
     for number, values in found.items():
         if np.shape(values) != np.shape(stated[number]):
             raise Unread(f"{number}: {len(values)} values, {len(stated[number])} in the compared model")
-        if not np.abs(values - stated[number]).max(initial=0.0) <= FACTOR * record.eps * size_of(stated, number):
+        if not np.abs(values - stated[number]).max(initial=0.0) <= FACTOR * record.eps * size_of(
+            stated, number
+        ):
             mended[number] = number in model.drops or model.mend(number, stated[number])
     models[key] = model
     has = {name for name in QUANTITIES if getattr(type(model), name) is not getattr(ReadModel, name)}
     has -= set(model.lacks)
-    return {"read": found, "stated": stated, "mended": mended, "seconds": time.perf_counter() - begin, "has": has}
+    return {
+        "read": found,
+        "stated": stated,
+        "mended": mended,
+        "seconds": time.perf_counter() - begin,
+        "has": has,
+    }
 
 
 def each(key: int, quantity: str, *values: np.ndarray) -> np.ndarray:

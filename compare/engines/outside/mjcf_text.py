@@ -47,8 +47,15 @@ def state_inertias(bodies: list[ElementTree.Element], path: Path) -> None:
         raise Unread("its bodies are not all in the text")
     for number, body in enumerate(bodies, start=1):
         if any(map(is_from_file, body)) and body.find("inertial") is None:
-            names = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}  # in MJCF, in the model
-            numbers = {name: np.ravel(getattr(model, f"body_{of}")[number]).tolist() for name, of in names.items()}
+            names = {
+                "pos": "ipos",
+                "quat": "iquat",
+                "mass": "mass",
+                "diaginertia": "inertia",
+            }  # in MJCF, in the model
+            numbers = {
+                name: np.ravel(getattr(model, f"body_{of}")[number]).tolist() for name, of in names.items()
+            }
             numbers = {name: " ".join(map(repr, values)) for name, values in numbers.items()}
             ElementTree.SubElement(body, "inertial", numbers)
 

@@ -18,7 +18,9 @@ class File(NamedTuple):
     """A robot's file, and the joints of the Tree that is compared."""
 
     path: Path  # MJCF or URDF
-    names: tuple[str, ...]  # of the joints; a free joint b is `b x`, `b y`, `b z` (slides) and `b turn` (a ball)
+    names: tuple[
+        str, ...
+    ]  # of the joints; a free joint b is `b x`, `b y`, `b z` (slides) and `b turn` (a ball)
     kinds: tuple[str, ...]  # hinge, slide or ball
 
     @property
@@ -105,12 +107,18 @@ def numbers_of(tree: tmt.Tree) -> dict[str, np.ndarray]:
     groups = [[] for _ in tree.kind]
     for body, joint in enumerate(tree.body_hinge):
         if joint >= 0:
-            groups[joint].append((tree.mass[body], origins[joint] + tree.com[body], np.array(tree.inertia[body])))
+            groups[joint].append(
+                (tree.mass[body], origins[joint] + tree.com[body], np.array(tree.inertia[body]))
+            )
     mass, com, inertia = (np.array(values) for values in zip(*map(combined, groups)))
     each = {"armature": tree.armature, "damping": tree.damping, "stiffness": by_speed(tree, tree.stiffness)}
     each = {name: np.broadcast_to(np.array(values or 0.0, float), nv) for name, values in each.items()}
     each["about_origin"] = mass * ((com - origins) ** 2).sum(axis=1)
-    each |= {"gravity": np.array(tree.gravity, float), "rest": np.array(tree.rest), "reference": np.array(tree.zero)}
+    each |= {
+        "gravity": np.array(tree.gravity, float),
+        "rest": np.array(tree.rest),
+        "reference": np.array(tree.zero),
+    }
     return {"mass": mass, "com": com, "moments": np.linalg.eigvalsh(inertia), "inertia": inertia} | each
 
 

@@ -21,9 +21,14 @@ class OfUrdf(ReadModel):
         except ValueError as error:
             raise Unread(str(error)) from None
         self.file, (self.armature, self.stiffness) = file, np.zeros((2, file.coordinates.nv))
-        places, free = joint_places(model), [f"{name} {part}" for name in file.free for part in ("x", "y", "z", "turn")]
+        places, free = (
+            joint_places(model),
+            [f"{name} {part}" for name in file.free for part in ("x", "y", "z", "turn")],
+        )
         speeds = [(k, name) for k, name in enumerate(file.names) for _ in places[name].dofs]
-        self.at = np.array([file.coordinates.places.joints[k].q.start for k, _ in speeds])  # in q, of each speed
+        self.at = np.array(
+            [file.coordinates.places.joints[k].q.start for k, _ in speeds]
+        )  # in q, of each speed
         self.rest = np.array([model.qpos_spring[places[name].qpos.start] for _, name in speeds])
         self.is_free = np.array([name in free for _, name in speeds])
         self.damping = self.load(text, file)

@@ -11,8 +11,12 @@ from .model import File
 class Order(NamedTuple):
     q: np.ndarray  # (nq,) the place in the Tree's q of each of the engine's numbers
     v: np.ndarray  # (nv,) the same in v
-    turned: tuple[tuple[slice, slice], ...]  # of each free body: speeds of the engine, the quaternion in the Tree's q
-    in_world: bool  # those speeds are in world axes where the Tree's are in body axes; False: the other way round
+    turned: tuple[
+        tuple[slice, slice], ...
+    ]  # of each free body: speeds of the engine, the quaternion in the Tree's q
+    in_world: (
+        bool  # those speeds are in world axes where the Tree's are in body axes; False: the other way round
+    )
 
     def engine(self, q: np.ndarray, *vectors: np.ndarray) -> list[np.ndarray]:
         """q, and vectors of speeds or forces at q, of the Tree as the engine has them."""
@@ -49,7 +53,9 @@ class Order(NamedTuple):
         return states
 
 
-def order_of(file: File, starts: Mapping[int, tuple[int, int]], free_q, free_v, ball_q, in_world: bool) -> Order:
+def order_of(
+    file: File, starts: Mapping[int, tuple[int, int]], free_q, free_v, ball_q, in_world: bool
+) -> Order:
     """The order of an engine.
 
     starts: where the engine's q and v of a joint begin, by its number in the Tree, of a free joint by that of its ball; free_q,
@@ -85,4 +91,6 @@ def near(read: np.ndarray, stated: np.ndarray) -> np.ndarray:
 
 def wrong_masses(read: Mapping[str, np.ndarray], stated: Mapping[str, np.ndarray]) -> list[int]:
     """The joints with another mass or other moments. Where only com and inertia differ, bodies are at another place."""
-    return np.flatnonzero(~near(read["mass"], stated["mass"]) | ~near(read["moments"], stated["moments"])).tolist()
+    return np.flatnonzero(
+        ~near(read["mass"], stated["mass"]) | ~near(read["moments"], stated["moments"])
+    ).tolist()

@@ -152,7 +152,9 @@ class OwnDynamics:
         every = setting.every
 
         def run() -> Motion:
-            return self.run(q, v, tau, setting.duration / setting.steps, setting.steps, method, setting.tolerance)
+            return self.run(
+                q, v, tau, setting.duration / setting.steps, setting.steps, method, setting.tolerance
+            )
 
         def read(motion: Motion) -> Motion:
             t = np.linspace(0.0, setting.duration, GRID + 1)

@@ -47,7 +47,9 @@ class OwnEquations:
         # of each function that was called: whether it takes batches; the time of one state, alone and in a batch, s; its shape
         self.takes_batches: dict[str, bool] = {}
         self.times, self.shapes = {}, {}
-        self.errors: dict[tuple[str, str], list] = {}  # (quantity, error): [first state, text, all states, hashed]
+        self.errors: dict[
+            tuple[str, str], list
+        ] = {}  # (quantity, error): [first state, text, all states, hashed]
 
     def has(self, name: str) -> bool:
         return name in self.functions
@@ -56,7 +58,10 @@ class OwnEquations:
     def problems(self) -> list[Problem]:
         """The errors so far, each once."""
         errors = [(quantity, *error) for (quantity, _), error in self.errors.items()]
-        return [Problem(name, at, f"{text} at {at}{and_more(len(all_of) - 1)}") for name, at, text, all_of in errors]
+        return [
+            Problem(name, at, f"{text} at {at}{and_more(len(all_of) - 1)}")
+            for name, at, text, all_of in errors
+        ]
 
     @property
     def seconds(self) -> float:
@@ -222,7 +227,9 @@ class OwnEquations:
             raise OwnError(f"{name} raised {functions.as_raised(error)}{hint}") from error
         for symbol, before, after in zip(STATE, given, copies):
             changed = np.atleast_2d(before != after).any(axis=1)
-            self.note(name, f"changes its argument {symbol}", [np.atleast_2d(part) for part in given], changed)
+            self.note(
+                name, f"changes its argument {symbol}", [np.atleast_2d(part) for part in given], changed
+            )
         expected = self.shapes.get(name, SHAPES[name](self.coordinates.nv))
         if name != "jacobians":
             return functions.converted(name, value, expected, count)
@@ -245,4 +252,6 @@ class OwnEquations:
         text = what if what.startswith(name) else f"{name} {what}"
         state = state_in_words([part[first] for part in given])
         rows = np.concatenate([part[where] for part in given], axis=1)
-        self.errors.setdefault((name, what), [state, text, set()])[2].update(hash(row.tobytes()) for row in rows)
+        self.errors.setdefault((name, what), [state, text, set()])[2].update(
+            hash(row.tobytes()) for row in rows
+        )

@@ -48,7 +48,9 @@ def functions_of(source: object, coordinates: Coordinates, required: Sequence[st
         if value is not None:
             functions[name] = function_of(name, value, symbols, coordinates)
     if missing := [name for name in required if name not in functions]:
-        raise OwnError(f"{source_name(source)} has no {missing[0]}; expected {' and '.join(map(call, required))}")
+        raise OwnError(
+            f"{source_name(source)} has no {missing[0]}; expected {' and '.join(map(call, required))}"
+        )
     if not functions:
         raise OwnError(f"{source_name(source)} has none of {', '.join(map(call, ARGUMENTS))}")
     return functions
@@ -122,7 +124,10 @@ def of_symbols(name: str, matrix: object, symbols: object, coordinates: Coordina
 
     try:
         nested = [value.tolist() if hasattr(value, "tolist") else value for value in (symbols, matrix)]
-        symbols, entries = sympy.flatten([nested[0]]), [sympy.sympify(entry) for entry in sympy.flatten([nested[1]])]
+        symbols, entries = (
+            sympy.flatten([nested[0]]),
+            [sympy.sympify(entry) for entry in sympy.flatten([nested[1]])],
+        )
     except Exception as error:  # whatever SymPy makes of what is given
         raise OwnError(f"{name} is {shown(matrix)}; expected a SymPy matrix ({shown(str(error))})") from None
     nq, nv = coordinates.nq, coordinates.nv
@@ -148,7 +153,9 @@ def of_symbols(name: str, matrix: object, symbols: object, coordinates: Coordina
     try:
         evaluated = sympy.lambdify(plain, entries, "numpy", cse=True)
     except Exception as error:  # of expressions that have no numbers, such as zoo
-        raise OwnError(f"{name} cannot be evaluated as a function of {', '.join(map(str, plain))}: {error!r}") from None
+        raise OwnError(
+            f"{name} cannot be evaluated as a function of {', '.join(map(str, plain))}: {error!r}"
+        ) from None
 
     def function(*states: np.ndarray) -> np.ndarray:
         columns = [column for state in states for column in np.moveaxis(state, -1, 0)][: len(plain)]

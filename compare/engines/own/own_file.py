@@ -53,7 +53,9 @@ def module_of_file(place: str) -> ModuleType:
         raise OwnFileError(f"{place} is a folder; expected a Python file")
     if not path.is_file():
         neighbours = path.parent.glob("*.py") if path.parent.is_dir() else ()
-        raise OwnFileError(f"{place}: no such file{close_names(path.name, [other.name for other in neighbours])}")
+        raise OwnFileError(
+            f"{place}: no such file{close_names(path.name, [other.name for other in neighbours])}"
+        )
     name = f"compare_own_{path.stem}"  # a name that nothing else has: a file numpy.py shadows no package
     loader = importlib.machinery.SourceFileLoader(name, str(path.resolve()))
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
@@ -71,7 +73,9 @@ def module_named(name: str) -> ModuleType:
         except ModuleNotFoundError:
             spec = None
     if spec is None:
-        raise OwnFileError(f"{name}: no such module{close_names(name, [path.stem for path in Path().glob('*.py')])}")
+        raise OwnFileError(
+            f"{name}: no such module{close_names(name, [path.stem for path in Path().glob('*.py')])}"
+        )
     return importlib.import_module(name)
 
 
@@ -89,7 +93,9 @@ def part_of(module: ModuleType, place: str, name: str) -> object:
 
 def close_names(name: str, known: Sequence[str]) -> str:
     """The names that are close to one, else all if they are few, for a message."""
-    close = difflib.get_close_matches(name, known, 3, 0.6) or (list(known) if len(known) <= SHOWN_NAMES else [])
+    close = difflib.get_close_matches(name, known, 3, 0.6) or (
+        list(known) if len(known) <= SHOWN_NAMES else []
+    )
     return f"; known: {listed(close)}" if close else ""
 
 
@@ -103,7 +109,9 @@ def raised_in(place: str) -> Iterator[None]:
     except SyntaxError as error:
         text = f": {' '.join(error.text.split())[:60]}" if error.text else ""
         where = place if Path(error.filename or place).stem == Path(place).stem else error.filename
-        raise OwnFileError(f"{where}, line {error.lineno}: {type(error).__name__}, {error.msg}{text}") from None
+        raise OwnFileError(
+            f"{where}, line {error.lineno}: {type(error).__name__}, {error.msg}{text}"
+        ) from None
     except BaseException as error:  # also SystemExit: the file may be a script
         if is_interrupt(error):
             raise

@@ -37,7 +37,9 @@ def skipped(robot: Robot) -> Finding | None:
     engines = [Outside(name) for name, record in RECORDS.items() if record.reads_file]
     if any(not engine.unavailable() for engine in engines):
         return None
-    return Finding("engines", "none_installed", {"extras": [RECORDS[engine.name].extra for engine in engines]})
+    return Finding(
+        "engines", "none_installed", {"extras": [RECORDS[engine.name].extra for engine in engines]}
+    )
 
 
 def rows(setup: Setup) -> Result:
@@ -62,7 +64,9 @@ def rows(setup: Setup) -> Result:
         except EngineError as error:
             result.check(label, ENDS, None, 0.0, "", str(error), rule="equal", about=About.ENGINE)
     for reason in dict.fromkeys(absent.values()):
-        result.find("absent", engines=[label for label, why in absent.items() if why == reason], reason=reason)
+        result.find(
+            "absent", engines=[label for label, why in absent.items() if why == reason], reason=reason
+        )
     if result.rows:
         integrators.follow_known(result, setup)
         names, largest = list(dict.fromkeys(row["engine"] for row in result.rows)), {}
@@ -70,7 +74,11 @@ def rows(setup: Setup) -> Result:
             largest[name] = max(row["difference_eps"] for row in result.rows if row["engine"] == name)
         differing = list(dict.fromkeys(row["engine"] for row in result.rows if not row["passed"]))
         failed = {check.scene for check in result.checks if check.quantity.endswith(AS_READ) and check.failed}
-        values = {"engines": names, "differing": differing, "misread": [name for name in names if name in failed]}
+        values = {
+            "engines": names,
+            "differing": differing,
+            "misread": [name for name in names if name in failed],
+        }
         values |= {"largest": largest, "mended": result.curves["mended"]}
         result.headline = result.finding("headline", **values)
         result.top.append(result.finding("answer", **values))
@@ -96,7 +104,13 @@ def compare_numbers(result: Result, robot: Robot, label: str, reading: dict, rec
         if number in OF_BODIES:
             most = np.abs(values - stated).max(initial=0.0)
             result.check(
-                label, f"{number} {AS_READ}", most, tolerance, UNITS[number], rounding=True, about=About.ENGINE
+                label,
+                f"{number} {AS_READ}",
+                most,
+                tolerance,
+                UNITS[number],
+                rounding=True,
+                about=About.ENGINE,
             )
         if number not in reading["mended"] or (number == "inertia" and "moments" in reading["mended"]):
             continue
@@ -108,7 +122,9 @@ def compare_numbers(result: Result, robot: Robot, label: str, reading: dict, rec
             if not abs(a - b) <= tolerance
         ]  # fmt: skip
         result.tables["engines_read"] += rows
-        result.find("read_differently", engine=label, rows=rows, number=number, mended=bool(reading["mended"][number]))
+        result.find(
+            "read_differently", engine=label, rows=rows, number=number, mended=bool(reading["mended"][number])
+        )
         if reading["mended"][number]:
             result.curves.setdefault("mended", {}).setdefault(label, []).append(number)
 
@@ -139,7 +155,10 @@ def compare_quantities(
         if not dynamics.has(quantity.function):
             result.find("no_function", engine=label, quantity=name)
             continue
-        states, exact = [getattr(sample, argument) for argument in quantity.arguments], sample.exact(quantity.function)
+        states, exact = (
+            [getattr(sample, argument) for argument in quantity.arguments],
+            sample.exact(quantity.function),
+        )
         values = found[name] = getattr(dynamics, quantity.function)(*states)
         size = getattr(scale, quantity.scale)
         if name == "qdd":
@@ -148,10 +167,19 @@ def compare_quantities(
         difference, tolerance = exact.distance(values), FACTOR * eps * size
         worst = closest(difference, tolerance)
         units = unit(sample.tree, *quantity.units)
-        in_full = {of: ", ".join(repr(float(x)) for x in getattr(sample, of)[worst[0]]) for of in quantity.arguments}
+        in_full = {
+            of: ", ".join(repr(float(x)) for x in getattr(sample, of)[worst[0]]) for of in quantity.arguments
+        }
         note = "; ".join(f"{of} = ({numbers})" for of, numbers in in_full.items())
         check = result.check(
-            label, f"{name} to exact", difference[worst], tolerance[worst], units, note, True, about=About.ENGINE
+            label,
+            f"{name} to exact",
+            difference[worst],
+            tolerance[worst],
+            units,
+            note,
+            True,
+            about=About.ENGINE,
         )
         theirs = exact.distance(getattr(mujoco, quantity.function)(*states))
         row = {"engine": label, "precision": record.precision, "quantity": name, "unit": units, "states": len(sample.q),
@@ -161,9 +189,14 @@ def compare_quantities(
         for of in ("q", "qd", "tau"):
             row[f"worst_{of}"] = " ".join(repr(float(x)) for x in getattr(sample, of)[worst[0]])
         result.rows.append(row | {"passed": check.passed})
-    if not all(row["passed"] for row in result.rows if row["engine"] == label) and {"Mbar", "bias"} <= found.keys():
+    if (
+        not all(row["passed"] for row in result.rows if row["engine"] == label)
+        and {"Mbar", "bias"} <= found.keys()
+    ):
         values = Values.of(sample.tree, sample.q, sample.qd, found["Mbar"], found["bias"], FACTOR * eps)
-        result.find("cause", engine=label, text=diagnose_stated(sample.tree, None, values, SECONDS).sentence())
+        result.find(
+            "cause", engine=label, text=diagnose_stated(sample.tree, None, values, SECONDS).sentence()
+        )
 
 
 def asked_at(setup: Setup, precision: str) -> Sample:

@@ -24,16 +24,28 @@ EXPERIMENT = Experiment(order=10, serves_own=False)
 # numbers of the whole file; the others are of bodies and joints
 OF_WORLD = (*STATED_FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *ABSENT)
 WHOLE_NUMBERS = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")
-AT_TIMES = ("limited", "contact pairs")  # these act at some states only: causes come after those that always act
-MAY_DIFFER = "contact", "limit", "clamp", "actuator"  # the equations of motion without them do not depend on these
+AT_TIMES = (
+    "limited",
+    "contact pairs",
+)  # these act at some states only: causes come after those that always act
+MAY_DIFFER = (
+    "contact",
+    "limit",
+    "clamp",
+    "actuator",
+)  # the equations of motion without them do not depend on these
 
 
 def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict:
     """The numbers of a Tree by quantity: arrays per joint, speed, position or body, or one. joints, bodies: in this order."""
     (anchors, *_), places = places_of(tree), [tree.coordinates.joints[j] for j in joints]
-    positions, speeds = ([i for place in places for i in range(place[k].start, place[k].stop)] for k in (1, 2))
+    positions, speeds = (
+        [i for place in places for i in range(place[k].start, place[k].stop)] for k in (1, 2)
+    )
     numbers = {-1: -1} | {j: i for i, j in enumerate(joints)}
-    is_sprung = np.repeat([tree.stiffness[j] > 0.0 for j in joints], [at.stop - at.start for _, at, _ in places])
+    is_sprung = np.repeat(
+        [tree.stiffness[j] > 0.0 for j in joints], [at.stop - at.start for _, at, _ in places]
+    )
     return {
         "parent": np.array([numbers[tree.parent[j]] for j in joints]),
         "axis": np.array(tree.axis)[speeds],
@@ -94,7 +106,9 @@ def rows(setup: Setup) -> Result:
         sizes = added.get(quantity, np.abs(numbers).max(axis=1))
         for owner, a, b, size in zip(names, numbers, values, sizes):
             unit, tolerance = unit_of(quantity, owner in slides), FACTOR * EPS * size
-            words = dict(enumerate(("the world", *tree.hinge_names), start=-1)) if quantity == "parent" else {}
+            words = (
+                dict(enumerate(("the world", *tree.hinge_names), start=-1)) if quantity == "parent" else {}
+            )
             causes += compare_number(result, owner, quantity, a, b, unit, tolerance, is_whole, words)
             result.rows += rows_of(owner, quantity, a, b, unit)
     if robot.stated_in:
@@ -114,7 +128,9 @@ def compare_features(result: Result, robot: Robot) -> list[dict]:
     for name, feature in (theirs | ours).items():
         if feature.treatment in (MODELLED, LEFT_OUT) or name in MAY_DIFFER:
             continue
-        number, compiled = (float(features[name].count if name in features else 0) for features in (theirs, ours))
+        number, compiled = (
+            float(features[name].count if name in features else 0) for features in (theirs, ours)
+        )
         if not result.check("file", f"{name}, how many", compiled, number, "", rule="equal").passed:
             text = f"{name}: {number:g} in {robot.stated_in}, {compiled:g} in this file"
             causes.append(cause(2, name, number, compiled, text, 1.0, name))
@@ -127,7 +143,11 @@ def headline(result: Result) -> Finding | None:
     off = [row["difference"] != 0.0 for row in stated_rows if not row.get("asked_by")]
     changed = sum(bool(row.get("asked_by")) and row["difference"] != 0.0 for row in stated_rows)
     failing = [f"{check.quantity} ({check.scene})" for check in result.checks if check.failed]
-    return result.finding("headline", numbers=len(off), off=sum(off), changed=changed, failing=failing) if off else None
+    return (
+        result.finding("headline", numbers=len(off), off=sum(off), changed=changed, failing=failing)
+        if off
+        else None
+    )
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:

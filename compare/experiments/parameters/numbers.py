@@ -12,9 +12,31 @@ from ...judge.scale import EPS, FACTOR
 from ..setup import Setup
 
 # without a counterpart in the equations
-ABSENT = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
-OF_FORCES = (*ABSENT, "stiffness", "density", "viscosity", "gravcomp", "limited", "frictionloss")  # explain a force
-OPTIONS = (*STATED_FLAGS, "order", "parent", "ref", "density", "viscosity", "contact pairs")  # causes of rank 1
+ABSENT = (
+    "contact pairs",
+    "damping beyond linear",
+    "stiffness beyond linear",
+    "actuator damping",
+    "actuator armature",
+)
+OF_FORCES = (
+    *ABSENT,
+    "stiffness",
+    "density",
+    "viscosity",
+    "gravcomp",
+    "limited",
+    "frictionloss",
+)  # explain a force
+OPTIONS = (
+    *STATED_FLAGS,
+    "order",
+    "parent",
+    "ref",
+    "density",
+    "viscosity",
+    "contact pairs",
+)  # causes of rank 1
 OF_BODIES = ("mass", "com", "inertia", "gravcomp")
 UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gravcomp", *ABSENT), "") | {
     "ref": "rad", "anchor": "m", "pos": "m", "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m",
@@ -27,7 +49,11 @@ OF_SLIDES = {"rad": "m", "N m s/rad": "N s/m", "kg m2": "kg", "N m/rad": "N/m", 
 
 def unit_of(quantity: str, slides: bool) -> str:
     """The unit of a number of a body, or of a joint that turns or slides."""
-    return OF_SLIDES.get(UNITS[quantity], UNITS[quantity]) if slides and quantity not in OF_BODIES else UNITS[quantity]
+    return (
+        OF_SLIDES.get(UNITS[quantity], UNITS[quantity])
+        if slides and quantity not in OF_BODIES
+        else UNITS[quantity]
+    )
 
 
 def component(k: int, count: int) -> str:
@@ -38,7 +64,13 @@ def component(k: int, count: int) -> str:
 def rows_of(owner: str, quantity: str, stated: Sequence, compiled: Sequence, unit: str, **more) -> list[dict]:
     """Rows of the table, one for each component. stated: None for a component that is not stated."""
     return [
-        {"of": owner, "quantity": quantity, "component": component(k, len(compiled)), "stated": a, "compiled": b}
+        {
+            "of": owner,
+            "quantity": quantity,
+            "component": component(k, len(compiled)),
+            "stated": a,
+            "compiled": b,
+        }
         | {"difference": None if a is None else b - a, "unit": unit}
         | more
         for k, (a, b) in enumerate(zip(stated, compiled))
@@ -62,7 +94,9 @@ def compare_number(
     order, its sign, its zero); 2: one number.
     """
     difference = np.abs(stated - compiled)
-    value, bound, rule = (compiled[0], stated[0], "equal") if is_whole else (difference.max(), tolerance, "at most")
+    value, bound, rule = (
+        (compiled[0], stated[0], "equal") if is_whole else (difference.max(), tolerance, "at most")
+    )
     result.check(owner, quantity, value, bound, unit, rounding=not is_whole, rule=rule)
     is_flipped = quantity == "axis" and bool(np.abs(stated + compiled).max() <= tolerance)
     causes = []
@@ -75,11 +109,15 @@ def compare_number(
                 values = [f"{float(number)!r} {unit}".rstrip() for number in (a, b)]
             text = f"{place}: stated {values[0]}, compiled {values[1]}" + " (the opposite sign)" * is_flipped
             rank = 1 if is_flipped or quantity in OPTIONS else 2
-            causes.append(cause(rank, place, a, b, text, difference[k] / tolerance if tolerance else np.inf, quantity))
+            causes.append(
+                cause(rank, place, a, b, text, difference[k] / tolerance if tolerance else np.inf, quantity)
+            )
     return causes
 
 
-def cause(rank: int, place: str, stated: float, compiled: float, text: str, size: float, quantity: str) -> dict:
+def cause(
+    rank: int, place: str, stated: float, compiled: float, text: str, size: float, quantity: str
+) -> dict:
     """A cause; size: its difference over its tolerance."""
     compiled = float(compiled) if np.isfinite(compiled) else None
     about = {"rank": rank, "place": place, "stated": float(stated), "found": compiled, "text": text}
@@ -96,7 +134,9 @@ def check_forces(result: Result, setup: Setup, causes: Sequence[dict] = ()) -> l
     for source, force in dynamics.other_forces(sample.q, sample.qd).items():
         allowed = FACTOR * EPS * float(largest) if source == "fluid and tendons" else 0.0
         most = float(np.abs(force).max())
-        check = result.check(sample.name, f"no forces of {source}", most, allowed, "N m", rounding=bool(allowed))
+        check = result.check(
+            sample.name, f"no forces of {source}", most, allowed, "N m", rounding=bool(allowed)
+        )
         if check.failed and not any(cause["quantity"] in OF_FORCES for cause in causes):
             place = f"forces of {source}"
             if source == "actuators":

@@ -60,7 +60,9 @@ def answers(result: Result, robot: Robot) -> list[Finding]:
     for group in groups.values():
         apart = [value for (scene, _), value in result.curves["apart"].items() if scene in group["scenes"]]
         group |= {"apart": max(apart, default=None), "unit": movement_unit(robot.coordinates)}
-    found = [result.finding("answer", joint=joint_word(robot.coordinates), **group) for group in groups.values()]
+    found = [
+        result.finding("answer", joint=joint_word(robot.coordinates), **group) for group in groups.values()
+    ]
     return sorted(found, key=lambda one: bool(one.values["needed"] and one.values["stays"]))
 
 

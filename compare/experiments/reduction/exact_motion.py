@@ -22,7 +22,12 @@ def pendulums(cases: Sequence[Case]) -> list[Case]:
     return [
         case
         for case in cases
-        if (len(case.joints) == 1 and case.coordinates.all_kinds == ("hinge",) and case.is_free and case.scene.gravity)
+        if (
+            len(case.joints) == 1
+            and case.coordinates.all_kinds == ("hinge",)
+            and case.is_free
+            and case.scene.gravity
+        )
         and not (any(case.tree.damping) or case.tree.has_springs)
     ]
 
@@ -49,14 +54,18 @@ def compare_swing(result: Result, setup: Setup, case: Case) -> None:
     result.curves["swings"][case.name] = {"dt": dt, "errors": errors, "orders": orders}
 
 
-def check_falling(result: Result, scene: str, errors: dict[str, Sequence[float]], order: int) -> dict[str, float]:
+def check_falling(
+    result: Result, scene: str, errors: dict[str, Sequence[float]], order: int
+) -> dict[str, float]:
     """Errors fall at the method's order; the measured orders. errors: {engine: rad, each step half the last}.
 
     Measured between the last two errors above 1e-11 rad; with fewer than two there is no check.
     """
     orders = {}
     for engine, values in errors.items():
-        clear = np.argmin([*(not value <= ROUNDED for value in values), False])  # above rounding, from the first on
+        clear = np.argmin(
+            [*(not value <= ROUNDED for value in values), False]
+        )  # above rounding, from the first on
         if clear < 2:
             continue
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -86,5 +86,7 @@ def draw_swing(result: Result, scene: str) -> tuple:
         ax.loglog(dt, values, **look_of(engine), mfc="none", label=f"{LABELS[engine]}, RK4")
     ax.set(xlabel="dt, s", ylabel="maximum error of the angle, rad")
     ax.legend()
-    engines = [{"engine": LABELS[e], "order": orders.get(e), "error": values[-1]} for e, values in errors.items()]
+    engines = [
+        {"engine": LABELS[e], "order": orders.get(e), "error": values[-1]} for e, values in errors.items()
+    ]
     return file_name("reduction", scene), fig, result.finding("swing", scene=capital(scene), engines=engines)

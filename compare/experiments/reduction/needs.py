@@ -82,7 +82,10 @@ def check_smaller(
     judged = np.cumsum(~(width[:, :n].max(axis=1) < NARROW)) == 0
     apart, width = apart[judged], width[judged]
     k, i = closest(apart, width)
-    place, unit = f"{coordinates.speeds[i % n]} at t = {t[k]:.3f} s", coordinates.units[i % n] + ("", "/s")[i // n]
+    place, unit = (
+        f"{coordinates.speeds[i % n]} at t = {t[k]:.3f} s",
+        coordinates.units[i % n] + ("", "/s")[i // n],
+    )
     result.check(where, "smallest model to whole", apart[k, i], width[k, i], unit, place, True)
     until = float(t[judged][-1])
     result.check(where, "time judged", until, required, "s", rule="at least", about=About.PREDICTION)

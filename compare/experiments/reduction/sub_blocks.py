@@ -63,7 +63,13 @@ def scene_name(locked: Sequence[str]) -> str:
 
 
 def check_blocks(
-    result: Result, locked: Sequence[str], quantity: str, pair: str, apart: np.ndarray, scale: np.ndarray, unit: str
+    result: Result,
+    locked: Sequence[str],
+    quantity: str,
+    pair: str,
+    apart: np.ndarray,
+    scale: np.ndarray,
+    unit: str,
 ) -> None:
     """A check of the state that comes closest to its tolerance, 64 eps x scale, and a row. apart, scale: (states,)."""
     tolerance = FACTOR * EPS * scale

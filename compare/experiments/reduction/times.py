@@ -14,7 +14,10 @@ from ...judge.units import renamed
 from ...robots.case import Case
 from ..setup import Setup
 
-TIMED_STEPS = {"tmt": 1024, "mujoco": 128}  # of a run: shorter than the time between interruptions of a busy machine
+TIMED_STEPS = {
+    "tmt": 1024,
+    "mujoco": 128,
+}  # of a run: shorter than the time between interruptions of a busy machine
 MOST_TRACED = 12  # nv up to which operations are counted
 
 
@@ -42,7 +45,10 @@ def time_models(result: Result, models: Sequence[tuple], setup: Setup, rounds: i
 
 
 def time_rows(
-    models: Sequence[tuple], every: Sequence[str], seconds: Mapping[tuple, float], apart: Mapping[tuple, float]
+    models: Sequence[tuple],
+    every: Sequence[str],
+    seconds: Mapping[tuple, float],
+    apart: Mapping[tuple, float],
 ) -> list[dict]:
     """The rows of models, (a case's name, Case or None). every: all joints; seconds: of a run by (name, joints, engine)."""
     rows = []

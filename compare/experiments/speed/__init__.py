@@ -83,7 +83,9 @@ def judged(setup: Setup, cases: Sequence[Case], references, floors, rows_of) -> 
     return result
 
 
-def add_times(setup: Setup, cases: Sequence[Case], references, floors, rows_of) -> tuple[evaluations.Evaluations, list]:
+def add_times(
+    setup: Setup, cases: Sequence[Case], references, floors, rows_of
+) -> tuple[evaluations.Evaluations, list]:
     """The seconds of all rows, the rows of engines that are called, and what `evaluations.costs` times; rows that fail."""
     compiled, failed = evaluations.compiled_evaluations(setup), []
     runs = [prepared(rows_of[case.name], setup) for case in cases]
@@ -121,7 +123,9 @@ def add_absent(result: Result, setup: Setup) -> None:
         groups.setdefault((engine, reason), []).append(method)
     for (engine, reason), names in groups.items():
         whole = len(names) == len(setup.engines[engine].methods)
-        result.find("absent", engine=LABELS.get(engine, engine), methods=[] if whole else names, reason=reason)
+        result.find(
+            "absent", engine=LABELS.get(engine, engine), methods=[] if whole else names, reason=reason
+        )
         row = {"engine": engine, "method": ", ".join(names), "why_not": reason}
         result.rows += [{"scene": scene} | row for scene in result.curves["floors"]]
 

@@ -12,9 +12,14 @@ from ...judge.scale import FACTOR
 Floors = Mapping[str, float]  # {scene: error that rounding leaves, rad}
 
 NEAR_ROUNDING = 30  # a smaller multiple of the error of rounding counts as rounding
-SMALL_ERROR = 0.1  # rad: rounding changes a smaller error by no more than the growth of a small difference predicts
+SMALL_ERROR = (
+    0.1  # rad: rounding changes a smaller error by no more than the growth of a small difference predicts
+)
 EARLY = 1.0  # s: until then chaos has not grown, and errors fall regularly
-REGULAR, CLEAR = 3e-2, 2e-12  # rad: an error up to EARLY between these falls with its order, far above rounding
+REGULAR, CLEAR = (
+    3e-2,
+    2e-12,
+)  # rad: an error up to EARLY between these falls with its order, far above rounding
 LEAST_ORDER = {8: 7.0}  # a bound only: with order 8 rounding comes before the measured order settles
 
 
@@ -37,7 +42,9 @@ def check_orders(result: Result, scenes: Sequence[str], methods: Sequence[Method
             order = order_between(coarse, fine)
             check_order(result, f"{scene}, {method.engine} {method.name}", method.order, order)
             row = {"scene": scene, "engine": method.engine, "method": method.name, "order": method.order}
-            table.append(row | {"measured_order": order, "from_dt_s": coarse["dt_s"], "to_dt_s": fine["dt_s"]})
+            table.append(
+                row | {"measured_order": order, "from_dt_s": coarse["dt_s"], "to_dt_s": fine["dt_s"]}
+            )
     return table
 
 
@@ -55,7 +62,13 @@ def check_order(result: Result, where: str, order: int, measured: float) -> None
     """The measured order is the method's; of order 8 it is at least 7."""
     if least := LEAST_ORDER.get(order):
         result.check(
-            where, f"measured order, nominal {order}", measured, least, "", rule="at least", about=About.PREDICTION
+            where,
+            f"measured order, nominal {order}",
+            measured,
+            least,
+            "",
+            rule="at least",
+            about=About.PREDICTION,
         )
     else:
         name, note = f"deviation from order {order}: error", f"{measured:.2f}"
@@ -98,7 +111,9 @@ def check_smallest_errors(result: Result, floors: Floors, unit: str = "rad") -> 
         ours = min((error for dt, error in by_method["rk4"].items() if dt >= finest), default=np.inf)
         if np.isfinite([theirs, ours]).any() and by_method["rk4"]:
             tolerance = FACTOR * left + (2.0 * ours if np.isfinite(ours) else 0.0)
-            result.check(scene, "smallest error of MuJoCo's RK4, compared with tmt's rk4", theirs, tolerance, unit)
+            result.check(
+                scene, "smallest error of MuJoCo's RK4, compared with tmt's rk4", theirs, tolerance, unit
+            )
 
 
 def gained_nothing(error: float, work: int, best: float, last: int, left: float) -> bool:

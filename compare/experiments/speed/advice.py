@@ -16,7 +16,11 @@ def advice(rows: list[dict], scenes: Sequence[str]) -> list[dict]:
         of_scene = [row for row in rows if row["scene"] == scene and not row["diverged"]]
         for target in TARGETS:
             reach = [row for row in of_scene if row["worst_error_rad"] <= target]
-            theirs, ours, best = cheapest(reach, engine="mujoco"), cheapest(reach, engine="tmt"), cheapest(reach)
+            theirs, ours, best = (
+                cheapest(reach, engine="mujoco"),
+                cheapest(reach, engine="tmt"),
+                cheapest(reach),
+            )
             rk4 = cheapest(reach, engine="mujoco", method="RK4")
             same_step = cheapest(of_scene, engine="tmt", method="rk4", dt_s=rk4["dt_s"]) if rk4 else None
             line = {

@@ -67,7 +67,9 @@ def draw_overview(result: Result) -> tuple[str, Figure, Finding]:
                             path_effects=[withStroke(linewidth=3, foreground="white")])  # fmt: skip
     numbers = target(result)
     ax.axvline(TARGET, color=GREY, linestyle=":", linewidth=1.2)
-    ax.set(xscale="log", yscale="log", xlabel=f"maximum error, {numbers['unit']} (decreasing)", ylabel="time, ms")
+    ax.set(
+        xscale="log", yscale="log", xlabel=f"maximum error, {numbers['unit']} (decreasing)", ylabel="time, ms"
+    )
     ax.invert_xaxis()
     ax.margins(0.06, 0.12)
     fig.legend(loc="outside upper center", ncols=4, fontsize=8, handletextpad=0.4, columnspacing=1.0)

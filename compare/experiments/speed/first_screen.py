@@ -12,7 +12,12 @@ SETTING = ("engine", "method", "seconds", "steps", "dt_s", "tolerance")  # colum
 
 def target(result: Result) -> dict:
     about = {"unit": "rad", "servos_off": False} | result.curves
-    return {"target": TARGET, "scene": about.get("regular"), "unit": about["unit"], "servos_off": about["servos_off"]}
+    return {
+        "target": TARGET,
+        "scene": about.get("regular"),
+        "unit": about["unit"],
+        "servos_off": about["servos_off"],
+    }
 
 
 def error(row: Mapping) -> float:

@@ -22,7 +22,9 @@ from . import accuracy
 from .settings import MOST_SECONDS, coarsest_steps, estimated, methods, settings_of
 
 GROWTH_STEPS = 16  # of the run whose growth is computed, between two recorded times
-EACH_STEP = 12  # nv up to which the growth takes the Jacobian of every step; above, that of one in GROWTH_STEPS
+EACH_STEP = (
+    12  # nv up to which the growth takes the Jacobian of every step; above, that of one in GROWTH_STEPS
+)
 FIRST_STEPS = 512  # a longer run of MuJoCo is timed over its first steps only
 
 
@@ -55,7 +57,10 @@ def rows_of_scene(
                 about = {"scene": case.name, "engine": method.engine, "method": method.name}
                 rows.append(about | {"why_not": str(failed)})
                 break
-            error, work = accuracy.error(rows[-1]), rows[-1]["evaluations"] or rows[-1]["steps"] or 2 * last + 1
+            error, work = (
+                accuracy.error(rows[-1]),
+                rows[-1]["evaluations"] or rows[-1]["steps"] or 2 * last + 1,
+            )
             too_long = method.adaptive and work * estimated(method, case.tree) > MOST_SECONDS[size] / 2
             if RECORDS[method.engine].reads_file:
                 too_long = rows[-1]["seconds"] > MOST_SECONDS[size]
@@ -99,7 +104,11 @@ def floor(case: Case, dynamics: Dynamics) -> float:
 
     dynamics: tmt's, run by RK4 with 1024 steps or as many as the scene needs; ValueError if the run diverges.
     """
-    first = GROWTH_STEPS * GRID * max(1, round(case.duration / 5.0), -(-coarsest_steps(case) // (GROWTH_STEPS * GRID)))
+    first = (
+        GROWTH_STEPS
+        * GRID
+        * max(1, round(case.duration / 5.0), -(-coarsest_steps(case) // (GROWTH_STEPS * GRID)))
+    )
     for steps in (first, 4 * first, 16 * first):
         dt = case.duration / steps
         motion = dynamics.run(*case.start, case.tau, dt, steps, "rk4")
@@ -107,7 +116,9 @@ def floor(case: Case, dynamics: Dynamics) -> float:
             stride = 1 if case.coordinates.nv <= EACH_STEP else GROWTH_STEPS
             grown = growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_STEPS, stride)
             return float(EPS * 10.0 ** grown.max() * max(1.0, np.abs(motion.q).max()))
-    raise ValueError(f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; expected a shorter scene")
+    raise ValueError(
+        f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; expected a shorter scene"
+    )
 
 
 def prepared(rows: list[dict], setup: Setup) -> list[tuple]:

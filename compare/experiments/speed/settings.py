@@ -32,7 +32,8 @@ def scenes_of(robot: Robot) -> list[Case]:
     return [
         case
         for case in robot.cases
-        if "speed" in case.scene.tags or (case.scene.tags == ("own",) and not (robot.is_read and case.is_held))
+        if "speed" in case.scene.tags
+        or (case.scene.tags == ("own",) and not (robot.is_read and case.is_held))
     ]
 
 
@@ -51,7 +52,11 @@ def followed(robot: Robot, size: str) -> list[Case]:
 
 
 def methods(
-    engines: Mapping[str, Engine], size: str, which: str = "all", robot: Robot | None = None, case: Case | None = None
+    engines: Mapping[str, Engine],
+    size: str,
+    which: str = "all",
+    robot: Robot | None = None,
+    case: Case | None = None,
 ) -> list[Method]:
     """The methods of the available engines, which = "all".
 
@@ -64,7 +69,8 @@ def methods(
     return [
         method
         for name, engine in engines.items()
-        if (compiled[name] or size != "quick") and which in ("all", "compiled" if compiled[name] else "called")
+        if (compiled[name] or size != "quick")
+        and which in ("all", "compiled" if compiled[name] else "called")
         for method in (methods_in(engine, case) if case else engine.methods).values()
         if (name, method.name) not in excluded
     ]
@@ -92,7 +98,12 @@ def too_slow(method: Method, robot: Robot, size: str) -> str | None:
     seconds = coarsest_steps(case) * estimated(method, case.tree)
     if seconds > SLOWEST_RUN:
         return f"with {n} speeds its coarsest run would take about {seconds:.1g} s"
-    if size == "quick" and n > QUICK_SPEEDS and method.engine == "tmt" and method_named(method.name).solves_stages:
+    if (
+        size == "quick"
+        and n > QUICK_SPEEDS
+        and method.engine == "tmt"
+        and method_named(method.name).solves_stages
+    ):
         return f"with {n} speeds its code takes too long to compile for a quick run"
     return None
 
@@ -132,7 +143,9 @@ def halvings(method: Method, case: Case, size: str = "full") -> tuple[Setting, .
     if case.robot.is_read:
         affordable = int(MOST_SECONDS[size] / estimated(method, case.tree))
         finest = max(min(finest, affordable), count << (LEAST_SETTINGS[size] - 1))
-    return tuple(Setting(case.duration, steps=count << k) for k in range(max(1, (finest // count).bit_length())))
+    return tuple(
+        Setting(case.duration, steps=count << k) for k in range(max(1, (finest // count).bit_length()))
+    )
 
 
 def coarsest_steps(case: Case) -> int:

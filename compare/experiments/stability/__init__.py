@@ -115,7 +115,9 @@ def is_large(robot: Robot) -> bool:
 def limits_shown(result: Result) -> list[dict]:
     """The rows of the limits, at stable postures if there are any."""
     centres = result.curves.get("centres")
-    return [row for row in result.rows if "predicted_dt_s" in row and (not centres or row["scene"] in centres)]
+    return [
+        row for row in result.rows if "predicted_dt_s" in row and (not centres or row["scene"] in centres)
+    ]
 
 
 def headline(result: Result) -> Finding | None:

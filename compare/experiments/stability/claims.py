@@ -94,9 +94,13 @@ def check_torques(result: Result, robot: Robot, torques: list[dict]) -> None:
         for row in (row for row in of_engine if row["torque"] in CLEAR_TORQUES):
             along = None if row["direction"] is None else row["direction"] * np.sign(row["push_rad_per_s2"])
             text = "departure along the push of the residual (1; against it: -1)"
-            result.check(f"{where}, torque {row['torque']}", text, along, 1, "", rule="equal", about=About.PREDICTION)
+            result.check(
+                f"{where}, torque {row['torque']}", text, along, 1, "", rule="equal", about=About.PREDICTION
+            )
             check_row(result, f"{where}, torque {row['torque']}", row)
-        if engine == "mujoco":  # of TMT no double need be the bias: compiled code rounds its last sum only once
+        if (
+            engine == "mujoco"
+        ):  # of TMT no double need be the bias: compiled code rounds its last sum only once
             quantity = "movement under the engine's own bias"
             result.check(where, quantity, own["moved_rad"], 0.0, "rad", about=About.PREDICTION)
         gone = [row["observed_s"] for row in rows if row["observed_s"] is not None]
@@ -115,7 +119,9 @@ def check_torques(result: Result, robot: Robot, torques: list[dict]) -> None:
 # claim 2
 
 
-def finer_steps(robot: Robot, engines: Mapping[str, Engine], counts: Sequence[int] = STEP_COUNTS) -> list[dict]:
+def finer_steps(
+    robot: Robot, engines: Mapping[str, Engine], counts: Sequence[int] = STEP_COUNTS
+) -> list[dict]:
     """Departure under RK4 against the step, the torque one ulp off to either side at the first joint.
 
     moved_rad: the largest movement in a run of the claims; step_rad: the largest dt |qd| by then; half_ulp_rad: half
@@ -176,7 +182,10 @@ def kept(robot: Robot, engines: Mapping[str, Engine], steps: int = RUN_BEYOND) -
     claims, at = robot.claims, held(robot, robot.claims.kept)
     rest, rows, pushed = np.zeros_like(at.q), [], {}
     for method in rk4_of_both(engines):
-        tau, dynamics = np.nextafter(own_torque(method, engines, at), np.inf), engines[method.engine].of(at.case)
+        tau, dynamics = (
+            np.nextafter(own_torque(method, engines, at), np.inf),
+            engines[method.engine].of(at.case),
+        )
         for dt in STEPS_BEYOND:
             with np.errstate(over="ignore", invalid="ignore"):
                 motion = dynamics.run(at.q, rest, tau, dt, steps, method.name)
@@ -200,14 +209,23 @@ def check_kept(result: Result, robot: Robot, runs: dict) -> None:
         where = f"{claims.kept}, {who(row)}, dt = {row['dt_s']:.4g} s, torque {row['torque']}"
         time = row["run_s"] if row["observed_s"] is None else row["observed_s"]
         what = f"time within {LEFT:g} rad, below the limit"
-        stays &= result.check(where, what, time, row["run_s"], "s", rule="at least", about=About.PREDICTION).passed
-    ends, leaves_end = {LABELS[name]: float(np.abs(a).max()) for name, a in runs["acceleration_at_end"].items()}, False
+        stays &= result.check(
+            where, what, time, row["run_s"], "s", rule="at least", about=About.PREDICTION
+        ).passed
+    ends, leaves_end = (
+        {LABELS[name]: float(np.abs(a).max()) for name, a in runs["acceleration_at_end"].items()},
+        False,
+    )
     for label, size in ends.items():
         quantity = f"acceleration that {claims.kept}'s torque gives a {claims.end} {robot.name}"
         options = {"rule": "at least", "about": About.PREDICTION}
-        leaves_end |= result.check(f"{claims.end}, {label}", quantity, size, PUSHED, "rad/s2", **options).passed
+        leaves_end |= result.check(
+            f"{claims.end}, {label}", quantity, size, PUSHED, "rad/s2", **options
+        ).passed
     above = [row for row in rows if row["dt_s"] > limit]
-    moves = bool(above) and all(row["observed_s"] is not None or (row["moved_rad"] or 0.0) > MOVED for row in above)
+    moves = bool(above) and all(
+        row["observed_s"] is not None or (row["moved_rad"] or 0.0) > MOVED for row in above
+    )
     result.find(
         "claim_3", reproduced=("bounded" if leaves_end else "yes") if stays and moves else "no", posture=claims.kept,
         end=claims.end, noun=robot.noun, limit=limit, rate=runs["fastest"], above=len(above), ends=ends,

@@ -13,7 +13,9 @@ from .subjects import unit_of_movements, who
 
 LONGEST_DEPARTURE = 12.0  # s
 PERTURBATIONS = tuple(10.0**-k for k in (2, 4, 6, 8, 10, 12))  # rad, of the angles at the start
-ABOVE_ROUNDING = 1e-7  # rad: of a file's robot only larger perturbations, which rounding of its forces does not change
+ABOVE_ROUNDING = (
+    1e-7  # rad: of a file's robot only larger perturbations, which rounding of its forces does not change
+)
 # rad, as the error of torque that moves the equilibrium as far; less is a few ulps
 TORQUE_ERRORS = (1e-13, 1e-14, 3e-15)
 DEPARTURE_TOLERANCE = 0.03  # s, or one step: how near the prediction an observed departure is to be
@@ -73,7 +75,9 @@ def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tupl
     sizes = [(size, is_push) for size, is_push in sizes if size > ABOVE_ROUNDING or not robot.is_read]
     moved = np.array([size * shape * is_push for size, is_push in sizes])
     # an error of torque that moves the equilibrium by size x shape, as far as doubles can say it
-    errors = np.array([size * at.mass_matrix @ shape * rate.real**2 * (not is_push) for size, is_push in sizes])
+    errors = np.array(
+        [size * at.mass_matrix @ shape * rate.real**2 * (not is_push) for size, is_push in sizes]
+    )
     for method in (method for method in methods if is_led(at, method.scheme, dt)):
         torques = own_torque(method, engines, at) + errors
         expected = predicted(at, method.scheme, dt, moved, residual(method, engines, at, torques))
@@ -121,7 +125,9 @@ def check_row(result: Result, where: str, row: dict) -> None:
     missing = {"observed_s": "the run stays", "predicted_s": "the prediction stays"}
     note = " and ".join(text for key, text in missing.items() if row[key] is None)
     quantity = "departure, observed - predicted"
-    result.check(where, quantity, None if off is None else abs(off), near(row), "s", note, about=About.PREDICTION)
+    result.check(
+        where, quantity, None if off is None else abs(off), near(row), "s", note, about=About.PREDICTION
+    )
 
 
 def near(row: dict) -> float:

@@ -16,7 +16,10 @@ from ...truth.steps import is_runge_kutta
 from ..setup import Setup
 from .subjects import DAMPINGS, coarsest_case, subjects_of
 
-FINE_STEP, FINE_DAMPED_STEP = 1e-2, 5e-4  # s, of steps whose amplification is compared; the second with much damping
+FINE_STEP, FINE_DAMPED_STEP = (
+    1e-2,
+    5e-4,
+)  # s, of steps whose amplification is compared; the second with much damping
 MOST_OF_A_STEP = 100.0  # fold: later stages are too far away for a difference quotient
 SLOW = 1e-3  # 1/s: slower rates are not reported
 
@@ -40,10 +43,16 @@ def check_equilibria(result: Result, setup: Setup) -> None:
                     continue
                 theirs = transition(mujoco.of(at.case), at.q, at.tau, dt, method.name)
                 rounded = 0.0
-                if robot.is_read:  # the scale of its forces has their reach, which may be far more than the angles
-                    rounded = step_rounding(stepping, at.tree, at.q[None], np.zeros((1, at.nv)), at.tau, dt).max()
+                if (
+                    robot.is_read
+                ):  # the scale of its forces has their reach, which may be far more than the angles
+                    rounded = step_rounding(
+                        stepping, at.tree, at.q[None], np.zeros((1, at.nv)), at.tau, dt
+                    ).max()
                 where = f"{name}, {method.name}, dt = {dt:.4g} s, damping {damping:g}"
-                check_amplification(result, where, at.sizes, at.step(method.scheme, dt), theirs, float(rounded))
+                check_amplification(
+                    result, where, at.sizes, at.step(method.scheme, dt), theirs, float(rounded)
+                )
 
 
 def check_amplification(

@@ -50,7 +50,9 @@ def limits_in(ax: Axes, rows: list[dict], known: dict, most: int | None = None) 
             mark = "X" if failed else "s" if is_mujoco else "o"
             colour = RED if failed else ORANGE if is_mujoco else BLUE
             shift = 0.17 if is_mujoco else -0.17
-            ax.plot(number_or_nan(row["observed_dt_s"]), place + shift, mark, color=(colour, 0.85), markersize=4.5)
+            ax.plot(
+                number_or_nan(row["observed_dt_s"]), place + shift, mark, color=(colour, 0.85), markersize=4.5
+            )
         if all(row["limit"] != "finite" for row in mine):
             count = sum(row["limit"] == "never_fails" for row in mine)
             some = f"no limit at {count} of {len(mine)}" if count else "fails at every step"
@@ -61,7 +63,9 @@ def limits_in(ax: Axes, rows: list[dict], known: dict, most: int | None = None) 
     ax.tick_params(axis="y", labelsize=8)
     ax.set(xscale="log", xlim=(low, high))
     ticks = [m * 10.0**k for k in range(-5, 4) for m in ((1, 2, 5) if high / low < 100 else (1,))]
-    ax.set_xticks([tick for tick in ticks if low < tick < high], [f"{tick:g}" for tick in ticks if low < tick < high])
+    ax.set_xticks(
+        [tick for tick in ticks if low < tick < high], [f"{tick:g}" for tick in ticks if low < tick < high]
+    )
     ax.minorticks_off()
     return [
         *ax.plot([], [], "|", color=GREY, markersize=9, label="predicted"),
@@ -104,7 +108,9 @@ def draw_limits(result: Result, robot: Robot, rows: list[dict]) -> tuple[str, Fi
     first = [row for row in rows if (row["scene"], row["damping"], row["engine"]) == (*panels[0], "tmt")]
     finite = [row for row in first if row["predicted_dt_s"]]
     products = {look(row["method"])[2]: row["predicted_dt_s"] * row["mode_per_s"] for row in finite}
-    caption = result.finding("figure_limits", posture=panels[0][0], products=products, **values, **summary(rows))
+    caption = result.finding(
+        "figure_limits", posture=panels[0][0], products=products, **values, **summary(rows)
+    )
     return "stability_limits", fig, caption
 
 
@@ -119,15 +125,21 @@ def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     methods = list(dict.fromkeys((row["engine"], row["method"]) for row in rows))
     for ax, dt in zip(axes, steps):
         for k, (engine, method) in enumerate(methods):
-            mine = [row for row in rows if (row["dt_s"], row["engine"], row["method"]) == (dt, engine, method)]
+            mine = [
+                row for row in rows if (row["dt_s"], row["engine"], row["method"]) == (dt, engine, method)
+            ]
             mine.sort(key=perturbation)
             sizes = [perturbation(row)[0] for row in mine]
-            observed, predicted = ([number_or_nan(row[key]) for row in mine] for key in ("observed_s", "predicted_s"))
+            observed, predicted = (
+                [number_or_nan(row[key]) for row in mine] for key in ("observed_s", "predicted_s")
+            )
             label = f"{LABELS[engine]}: {look(method)[2] if engine == 'tmt' else method}"
             colour, dash, _ = look(method)
             if engine == "tmt":
                 ax.plot(sizes, predicted, linestyle=dash, color=colour, linewidth=1)
-                ax.plot(sizes, observed, MARKS[k % 6], color=colour, mfc="none", markersize=11 - k, label=label)
+                ax.plot(
+                    sizes, observed, MARKS[k % 6], color=colour, mfc="none", markersize=11 - k, label=label
+                )
             else:
                 ax.plot(sizes, observed, MUJOCO_MARKS[k % 3], color="black", markersize=5, label=label)
         ax.set(xscale="log", ylim=(0, None), title=f"dt = {dt:.4g} s")
@@ -146,7 +158,9 @@ def draw_claims(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     finer = [row for row in rows if row["claim"] == 2]
     fig = Figure(figsize=(WIDTH, 3.4), layout="constrained")
     axes = fig.subplots(1, 1 + bool(finer), squeeze=False)[0]
-    draw_torques(axes[0], [row for row in rows if row["claim"] == 1 and row["torque"].startswith(VARIANT)], robot)
+    draw_torques(
+        axes[0], [row for row in rows if row["claim"] == 1 and row["torque"].startswith(VARIANT)], robot
+    )
     if finer:
         draw_finer_steps(axes[1], finer, robot)
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=8)
@@ -166,7 +180,10 @@ def draw_torques(ax: Axes, rows: list[dict], robot: Robot) -> None:
     predicted = sorted((row["push_rad_per_s2"] * 1e14, number_or_nan(row["predicted_s"])) for row in rows)
     ax.plot(*np.array(predicted).reshape(-1, 2).T, color="black", linewidth=0.8, label="predicted")
     ax.axvline(0.0, color="black", linewidth=0.5)
-    ax.set(title=f"claim 1: {robot.claims.left}", xlabel="initial acceleration of the unstable mode, 1e-14 rad/s2")
+    ax.set(
+        title=f"claim 1: {robot.claims.left}",
+        xlabel="initial acceleration of the unstable mode, 1e-14 rad/s2",
+    )
     ax.set_ylabel(f"time until a movement of {LEFT:g} rad, s")
 
 
@@ -175,7 +192,10 @@ def draw_finer_steps(ax: Axes, rows: list[dict], robot: Robot) -> None:
     duration = robot.claims.duration
     for engine, sign in dict.fromkeys((row["engine"], row["ulps"]) for row in rows):
         mine = [row for row in rows if (row["engine"], row["ulps"]) == (engine, sign)]
-        counts, times = [duration / row["dt_s"] for row in mine], [number_or_nan(row["observed_s"]) for row in mine]
+        counts, times = (
+            [duration / row["dt_s"] for row in mine],
+            [number_or_nan(row["observed_s"]) for row in mine],
+        )
         fill = "full" if engine == "tmt" else "none"
         ax.plot(counts, times, "-" if sign > 0 else "--", color=COLOURS[engine])
         for row, count, time in zip(mine, counts, times):

@@ -17,10 +17,16 @@ LINEAR_DEVIATION = 1e-6  # rad, at the start
 GROWTH_STEPS = 2000  # of a run
 GROWTH_ALLOWED = 100.0  # fold, of the deviation
 FAR = 1e4  # growth beyond which a motion is not linear any more
-GROWTH_MARGIN = 1e-3  # relative: a mode that grows by less from the second to the last quarter of a run does not grow
+GROWTH_MARGIN = (
+    1e-3  # relative: a mode that grows by less from the second to the last quarter of a run does not grow
+)
 DECAYED = 1e-3  # of its share at the start: a mode below that has decayed, and rounding and its square are what is left
-TRIED_ABOUT = np.array([0.5, 0.997, 1.004, 2.0])  # times the predicted limit: among which the observed one is sought
-TRIED_OF_FASTEST = np.array([0.1, 1.0, 10.0])  # times the time in which the fastest mode moves, if none is predicted
+TRIED_ABOUT = np.array(
+    [0.5, 0.997, 1.004, 2.0]
+)  # times the predicted limit: among which the observed one is sought
+TRIED_OF_FASTEST = np.array(
+    [0.1, 1.0, 10.0]
+)  # times the time in which the fastest mode moves, if none is predicted
 BISECTED = 1e-4  # relative, to which it is then bisected
 LIMIT_TOLERANCE = 1e-3  # relative, of an observed limit to the predicted one
 KINDS = {"never_fails": "never fails", "always_fails": "fails at every step", "finite": "has a limit"}
@@ -76,7 +82,9 @@ def observed_limit(
     return "finite", float(low)
 
 
-def shares(method: Method, engines: Mapping[str, Engine], at: Held, dt: float, steps: int) -> list[np.ndarray]:
+def shares(
+    method: Method, engines: Mapping[str, Engine], at: Held, dt: float, steps: int
+) -> list[np.ndarray]:
     """Shares of the modes in the deviation, over those at the start, in the second and the last quarter of a run, (2n,).
 
     All modes start alike, each with an angle of up to 1e-6 rad. The modes are those of the equations of motion, not of
@@ -91,7 +99,9 @@ def shares(method: Method, engines: Mapping[str, Engine], at: Held, dt: float, s
     with np.errstate(over="ignore", invalid="ignore"):
         motion = dynamics.run(at.moved(start[:n]), start[n:], at.tau, float(dt), 4 * quarter, method.name)
         parts = (slice(0, 1), slice(quarter + 1, 2 * quarter + 1), slice(3 * quarter + 1, None))
-        deviations = (np.concatenate([difference(motion.q[part], at.q), motion.v[part]], axis=1) for part in parts)
+        deviations = (
+            np.concatenate([difference(motion.q[part], at.q), motion.v[part]], axis=1) for part in parts
+        )
         first, *later = (np.abs(off @ at.measures.T) ** 2 for off in deviations)
         seen = is_seen(at.modes[0][~at.without_stiffness], at.small, quarter * dt)
         return [np.sqrt(weight @ part / first[0])[seen] for part in later]
@@ -137,7 +147,10 @@ def is_shown(at: Held, tolerance: float, duration: float = np.inf, rate: float =
     """
     modes = at.modes[0][~at.without_stiffness]
     slow = np.isclose(np.abs(modes), rate)[~is_seen(modes, at.small, duration)].any()
-    pushed = slope_rounding(METHODS["rk4"], at.tree, at.q[None], np.zeros((1, at.nv)), at.tau, 1.0)[2].max() / FACTOR
+    pushed = (
+        slope_rounding(METHODS["rk4"], at.tree, at.q[None], np.zeros((1, at.nv)), at.tau, 1.0)[2].max()
+        / FACTOR
+    )
     lost = pushed > GROWTH_MARGIN * LINEAR_DEVIATION * np.abs(modes).min(initial=np.inf) ** 2
     return not (tolerance > MOST_TOLERANCE or slow or lost)
 
@@ -172,7 +185,9 @@ def check_limits(result: Result, rows: Sequence[dict]) -> None:
         else:
             quantity = f"runs in which it {KINDS[row['limit']]}, as predicted"
             same = int(seen == row["limit"])
-            passed = result.check(where, quantity, same, 1, "runs", rule="equal", about=About.PREDICTION).passed
+            passed = result.check(
+                where, quantity, same, 1, "runs", rule="equal", about=About.PREDICTION
+            ).passed
         result.rows.append(row | {"passed": passed})
     result.shown = [name for name in (rows[0] if rows else ()) if name != "criterion"]
     if not_shown:

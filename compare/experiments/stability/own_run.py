@@ -19,10 +19,17 @@ LASTS, LEAST_STEPS, MOST_STEPS = 2.0, 1000, 20_000  # s, and between which numbe
 LONGER = 3.0  # fold: where it has not come to rest it is run so long
 PARTS = 4  # of a run: the speeds of each are averaged
 FINER = 16  # the step over the finer one
-PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
+PUSH = (
+    1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
+)
 CALM = 1e-3  # rad/s or m/s, root of the mean square
 FASTER = 10.0  # fold, than at the finer step: what moves on by the step alone
-FULL_MODEL = ("full_model_rms_speed", "full_model_warnings", "full_model_resets", "full_model_calm")  # columns
+FULL_MODEL = (
+    "full_model_rms_speed",
+    "full_model_warnings",
+    "full_model_resets",
+    "full_model_calm",
+)  # columns
 AT_OWN, AT_REQUESTED = "stable in its own run", "stable in its run"
 
 
@@ -61,7 +68,12 @@ def own_run(key: str, dt: float, integrator: str, reading: Reading) -> dict:
         finer = run(finer_dt)
         outcome = "worse" if is_worse(own, finer) else "fails" if own.failed_at else "alike"
     failed = own.failed_at is not None
-    values = number_or_none(own.speeds[-1]), int(failed), int(failed and on(reading.model, "AUTORESET")), is_calm(own)
+    values = (
+        number_or_none(own.speeds[-1]),
+        int(failed),
+        int(failed and on(reading.model, "AUTORESET")),
+        is_calm(own),
+    )
     return {
         "start": names_of_keys(reading).get(key, "qpos0"), "dt_s": dt, "integrator": integrator, "outcome": outcome,
         "failed_at_s": own.failed_at, **dict(zip(FULL_MODEL, values)), "finer_dt_s": finer and finer_dt,
@@ -90,7 +102,9 @@ def add(result: Result, work: Sequence) -> None:
         for row in rows:
             note = f"{1e3 * row['dt_s']:.4g} ms with {row['integrator']}"
             passed = row["outcome"] in ("alike", "calm")
-            result.check(row["start"], quantity, 1 if passed else None, 1, "runs", note, rule="equal", about=About.STEP)
+            result.check(
+                row["start"], quantity, 1 if passed else None, 1, "runs", note, rule="equal", about=About.STEP
+            )
         result.tables.setdefault("own_run", []).extend(rows)
         others = sum(row["outcome"] == rows[0]["outcome"] for row in rows[1:])
         values = {name: rows[0][name] for name in rows[0] if name not in FULL_MODEL[1:]}

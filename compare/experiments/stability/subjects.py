@@ -32,10 +32,14 @@ class Subjects(NamedTuple):
 def subjects_of(robot: Robot) -> Subjects:
     """What is examined of a robot; of a file's one centre and one saddle, and the rest to which it sinks."""
     names = posture_names(robot)[:MOST_POSTURES]
-    postures, positions = ({name: of[name] for name in names if name in of} for of in (robot.postures, robot.positions))
+    postures, positions = (
+        {name: of[name] for name in names if name in of} for of in (robot.postures, robot.positions)
+    )
     if robot.is_read and not floats(robot.tree):
         rest = at_rest(robot.tree, robot.posture(names[0]))
-        known = (robot.coordinates.difference(rest, robot.posture(name)) for name in names if rest is not None)
+        known = (
+            robot.coordinates.difference(rest, robot.posture(name)) for name in names if rest is not None
+        )
         if rest is not None and min(np.abs(apart).max() for apart in known) > 1e-6:
             positions[REST if REST not in names else f"{REST} without torque"] = tuple(map(float, rest))
     robot = replace(robot, postures=postures, positions=positions)
@@ -47,7 +51,9 @@ def subjects_of(robot: Robot) -> Subjects:
     return Subjects(robot, centres[:1], saddles[:1]) if robot.is_read else Subjects(robot, centres, saddles)
 
 
-def methods_of(engines: Mapping[str, Engine], robot: Robot, schemes: tuple[str, ...] = ()) -> tuple[Method, ...]:
+def methods_of(
+    engines: Mapping[str, Engine], robot: Robot, schemes: tuple[str, ...] = ()
+) -> tuple[Method, ...]:
     """The fixed-step methods of tmt and of MuJoCo; of a file's robot without tmt's that solve stages.
 
     schemes: only these, and of MuJoCo's methods that are the same scheme only the first.

@@ -20,7 +20,11 @@ from . import energy, motion, true_motion
 from .runs import follow, recorded
 
 EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=True, overview="scenes")
-SECONDS_OF_OWN = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all runs of a user's own equations together, about
+SECONDS_OF_OWN = {
+    "full": 20.0,
+    "quick": 4.0,
+    "small": 2.0,
+}  # of all runs of a user's own equations together, about
 OVERHEAD_OF_OWN = 1e-4  # s of an evaluation in a run, about, beyond the equations themselves
 STAGES_OF_RK4 = 4  # evaluations in a step of RK4
 skipped = leaves_no_digits
@@ -39,7 +43,9 @@ def begin(setup: Setup) -> None:
         spread, finer = map, setup.finer[:1]
         cases, left_out = within_time(setup, cases)
     # not of a file's robot, whose scenes have steps of their own
-    true = [case for case in cases if "speed" in case.scene.tags and not robot.is_read and case.steps == RECORDS]
+    true = [
+        case for case in cases if "speed" in case.scene.tags and not robot.is_read and case.steps == RECORDS
+    ]
     steps = setup.of(energy.STEPS, energy.FEW_STEPS, energy.FEW_STEPS)
     setup.background["trajectory"] = {
         "runs": spread(partial(follow, engines=engines, finer=finer), cases),

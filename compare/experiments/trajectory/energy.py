@@ -35,7 +35,9 @@ def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[i
             orders = check_order(result, case, f"{case.name}, {method.name}", method.order, drifts)
             about = {"scene": case.name, "integrator": method.name, "dt_s": DURATION / counts[-1]}
             for engine, (_, drift) in drifts.items():
-                rows.append(about | {"engine": engine, "drift_J": number_or_none(drift), "order": orders.get(engine)})
+                rows.append(
+                    about | {"engine": engine, "drift_J": number_or_none(drift), "order": orders.get(engine)}
+                )
     return result
 
 
@@ -71,5 +73,7 @@ def check_order(
     for engine, (coarser, finer) in drifts.items():
         orders[engine] = float(np.log2(coarser / finer)) if coarser > 0.0 and finer > 0.0 else None
         of_engine, name = f"{where}, {LABELS[engine]}, {DURATION:g} s", "order of the drift of energy"
-        result.check(of_engine, name, orders[engine], order - ORDER_MARGIN, "", rule="at least", about=About.PREDICTION)
+        result.check(
+            of_engine, name, orders[engine], order - ORDER_MARGIN, "", rule="at least", about=About.PREDICTION
+        )
     return orders

@@ -56,7 +56,11 @@ def draw_motion(result: Result) -> tuple[str, Animation, Finding]:
     scenes = result.curves["drawn"][:2]
     engines = [LABELS[name] for name in scenes[0].points]
     seen = [{"name": scene.scene, "run": scene.run, "seen": scene.seen.values} for scene in scenes]
-    return "motion", Animation(scenes, result.label), result.finding("figure_motion", engines=engines, scenes=seen)
+    return (
+        "motion",
+        Animation(scenes, result.label),
+        result.finding("figure_motion", engines=engines, scenes=seen),
+    )
 
 
 def one_picture(scene: Drawn, k: int, still: Image.Image, paths: Sequence[np.ndarray]) -> Image.Image:
@@ -77,7 +81,9 @@ def words_of_picture(scene: Drawn, k: int) -> tuple[str, str, str]:
     """The text of the k-th picture: its time; the engines' difference, or which has diverged; which has left by then."""
     lost = [name for name, path in scene.points.items() if not np.isfinite(path[k]).all()]
     apart = "; ".join(f"{capital(LABELS[name])} has diverged" for name in lost)
-    left = [(time, LABELS[name]) for name, time in scene.left.items() if time is not None and time <= scene.t[k]]
+    left = [
+        (time, LABELS[name]) for name, time in scene.left.items() if time is not None and time <= scene.t[k]
+    ]
     gone = "; ".join(f"{capital(name)} has left at {time:.2f} s" for time, name in sorted(left))
     apart = apart or f"largest difference of a joint: {scene.apart[k]:.2g} {scene.unit}"
     return f"t = {scene.t[k]:.2f} s", apart, gone

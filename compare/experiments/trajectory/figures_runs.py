@@ -59,17 +59,23 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, Finding]:
     axes = fig.subplots(3, len(columns), sharex=True, sharey="row", squeeze=False)
     for column, c in zip(axes.T, columns):
         for row, ax in enumerate(column[:2]):
-            paths = [(name, c[name][row] if row else drawable(case, c[name][0])) for name in case.robot.compared]
+            paths = [
+                (name, c[name][row] if row else drawable(case, c[name][0])) for name in case.robot.compared
+            ]
             paths = [until_diverged(c, name, path) for name, path in paths]
             over_time(ax, c["t"], *paths, case, shown, 64 // len(columns))
         step = step_in_words(case, steps)
-        column[0].set_title(f"{c['integrator']}, {step}" if len(columns) < 4 else f"{c['integrator']}\n{step}")
+        column[0].set_title(
+            f"{c['integrator']}, {step}" if len(columns) < 4 else f"{c['integrator']}\n{step}"
+        )
         draw_difference(column[2], c, case, result.label)
     values = np.concatenate([line.get_ydata() for ax in axes[2] for line in ax.lines])
     values = values[np.isfinite(values)]
     if (values <= DRAWN_ZERO).any():
         zero_at_the_end(axes[2, 0].yaxis, DRAWN_ZERO, values.max(), most=6)
-    place, speed = ("angle", "rate") if unit == "rad" and not case.coordinates.has_balls else ("position", "speed")
+    place, speed = (
+        ("angle", "rate") if unit == "rad" and not case.coordinates.has_balls else ("position", "speed")
+    )
     label_axis(axes[0, 0], place, unit)
     label_axis(axes[1, 0], speed, " or ".join(f"{part}/s" for part in unit.split(" or ")))
     axes[2, 0].set_ylabel(f"{place}: difference, {unit}" if unit == "rad" else f"difference, {unit}")
@@ -89,12 +95,16 @@ def draw_difference(ax: Axes, c: dict, case: Case, label: str) -> None:
     if c["judged_until_s"] < case.duration:
         ax.axvspan(c["judged_until_s"], case.duration, **NOT_JUDGED)
     ax.set(xlabel="time, s", xlim=(0, case.duration))
-    ax.xaxis.set_major_locator(MaxNLocator(3, prune="upper"))  # its last number would overlap the next column's first
+    ax.xaxis.set_major_locator(
+        MaxNLocator(3, prune="upper")
+    )  # its last number would overlap the next column's first
 
 
 def add_legend(fig: Figure, axes: np.ndarray, long: bool) -> None:
     """The legend of a run above its panels. long: it has long names."""
-    handles, labels = (a + b for a, b in zip(*(ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0]))))
+    handles, labels = (
+        a + b for a, b in zip(*(ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0])))
+    )
     if any(ax.patches for ax in axes[2]):
         handles, labels = [*handles, Patch(**NOT_JUDGED)], [*labels, "not judged"]
     columns, high = LEGEND_COLUMNS - long, axes[0, 0].get_title().count("\n")

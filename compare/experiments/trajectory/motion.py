@@ -20,9 +20,13 @@ class Drawn(NamedTuple):
     scene: str
     run: str  # method and step
     t: np.ndarray  # (frames,) s
-    points: dict  # of each engine (frames, points, 2): to the right and up, m; NaN from where it has diverged on
+    points: (
+        dict  # of each engine (frames, points, 2): to the right and up, m; NaN from where it has diverged on
+    )
     links: list  # pairs of points that a stick joins
-    apart: np.ndarray  # (frames,): the largest difference of the engines in any joint; NaN if one has diverged
+    apart: (
+        np.ndarray
+    )  # (frames,): the largest difference of the engines in any joint; NaN if one has diverged
     unit: str  # of that
     ended: dict  # of each engine: time of divergence, s, or None
     left: dict  # of each engine: time when a held robot left its posture, s, or None

@@ -91,7 +91,9 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide
     return TmtSide(t, q, v, width, widest, ended, times[single], states, stepped, tolerance)
 
 
-def one_step(dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str) -> list:
+def one_step(
+    dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str
+) -> list:
     """q and v one step after each of the states."""
     motion = dynamics.run(*states, tau, dt, 1, method)
     return [motion.q[:, 1], motion.v[:, 1]]
@@ -121,7 +123,9 @@ def compare_runs(
         for level, ours, other, tolerance, at in levels:
             movement = coordinates.difference(ours[0], other[0])
             difference = np.concatenate([movement, ours[1] - other[1]], axis=-1)
-            check_level(result, where, about | {"level": level}, coordinates, difference, tolerance, at, ending)
+            check_level(
+                result, where, about | {"level": level}, coordinates, difference, tolerance, at, ending
+            )
         if len(mine.at) and (mine.step_tolerance.min(axis=0) >= mine.widest).any():
             result.not_judged(where, "one step", say(result.finding("wide_step")))
         alive = times[times < ends_first(ends)][-1]
@@ -144,7 +148,10 @@ def compare_runs(
                 "band": width,
                 "judged_until_s": until,
                 "ended": ends,
-                "left": {name: departure(t, mine.q, coordinates), "mujoco": departure(t, theirs[0], coordinates)},
+                "left": {
+                    name: departure(t, mine.q, coordinates),
+                    "mujoco": departure(t, theirs[0], coordinates),
+                },
             },
         )
 
@@ -163,7 +170,9 @@ def judged(times: np.ndarray, narrow: np.ndarray, ends: Mapping[str, float | Non
     return max(1, int(np.argmin(np.append(narrow.all(axis=1) & alive, False))))
 
 
-def check_time_judged(result: Result, where: str, case: Case, until: float, required: float, alive: float) -> None:
+def check_time_judged(
+    result: Result, where: str, case: Case, until: float, required: float, alive: float
+) -> None:
     """A run is judged for the time that its scene states, or for a tenth of it while it is alive; else it is not judged.
 
     until: when it is no more judged; alive: the last recorded time before one of both runs diverges, s.

@@ -45,7 +45,9 @@ def find_errors(result: Result, robot: Robot, references: Mapping[str, Reference
             first, second = deviations(case, curve).values()
         elif case.name in references:
             true, joints = references[case.name], range(len(case.joints))
-            first, second = (number_or_none(true.error(curve[name][0], joints).max()) for name in robot.compared)
+            first, second = (
+                number_or_none(true.error(curve[name][0], joints).max()) for name in robot.compared
+            )
         else:
             continue
         errors[case.name] = first, second
@@ -54,7 +56,9 @@ def find_errors(result: Result, robot: Robot, references: Mapping[str, Reference
         scenes.append(about | {"far": is_far(errors[case.name], difference)})
     result.curves["errors"] = errors
     if any(name in references for name in errors):  # held scenes have their own findings
-        result.find("errors", labels=[LABELS[name] for name in robot.compared], scenes=scenes, times=SAYS_NOTHING)
+        result.find(
+            "errors", labels=[LABELS[name] for name in robot.compared], scenes=scenes, times=SAYS_NOTHING
+        )
 
 
 def is_far(errors: tuple, difference: float) -> bool:
@@ -66,7 +70,9 @@ def difference_while_judged(curve: dict, case: Case) -> float:
     """The largest difference of the engines while they are judged, rad or m."""
     last = int(np.searchsorted(curve["t"], curve["judged_until_s"] * (1 + 1e-9), side="right"))
     states = slice(0, last, curve["every"])
-    return float(moved_from(*(curve[name][0][states] for name in case.robot.compared), case.coordinates).max())
+    return float(
+        moved_from(*(curve[name][0][states] for name in case.robot.compared), case.coordinates).max()
+    )
 
 
 def find_departures(result: Result, robot: Robot, engines: Mapping[str, Engine]) -> None:

@@ -18,7 +18,9 @@ STICK_BYTES = 48  # of a stick in the picture without script
 LARGEST_STRIDE = 8  # every eighth picture of each scene is shown before scenes are left out
 DRAWN_IN = "trajectory"  # the experiment whose scenes are drawn
 WIDE, HIGH, BORDER = 1000, 480, 45  # of the drawing, in its own units
-SCRIPT = Markup((Path(__file__).parent / "motion.js").read_text(encoding="utf-8"))  # the only one that the page may run
+SCRIPT = Markup(
+    (Path(__file__).parent / "motion.js").read_text(encoding="utf-8")
+)  # the only one that the page may run
 FEW_STICKS = 6  # up to which they are drawn wide
 SHOWN_FOR = 5.0  # s, at least about: a shorter scene is shown slower
 UNDER = 0.9  # of motion shown at its own speed
@@ -42,7 +44,13 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
     links, still = scenes[0]["links"], stride * scenes[0]["still"]
     first, second = (outline(path[still], links) for path in on_page(drawn[0]))
     wide, ring = (20, 16) if len(links) <= FEW_STICKS else (9, 7)
-    values = {"ours": engines[0], "theirs": engines[1], "scenes": scenes, "data": Markup(data), "noun": robot.noun}
+    values = {
+        "ours": engines[0],
+        "theirs": engines[1],
+        "scenes": scenes,
+        "data": Markup(data),
+        "noun": robot.noun,
+    }
     values |= {"width": WIDE, "height": HIGH, "wide": wide, "ring": ring, "first": first, "second": second}
     values |= {"stride": stride, "left_out": [one.scene for one in drawn[len(scenes) :]]}
     text = environment().get_template("motion.html.jinja").render(values)
@@ -109,4 +117,6 @@ def shorter(pictures: Sequence, others: Sequence) -> list:
 
 
 def outline(picture: Sequence[int], links: Sequence) -> str:
-    return "".join(f"M{picture[2 * i]} {picture[2 * i + 1]}L{picture[2 * j]} {picture[2 * j + 1]}" for i, j in links)
+    return "".join(
+        f"M{picture[2 * i]} {picture[2 * i + 1]}L{picture[2 * j]} {picture[2 * j + 1]}" for i, j in links
+    )

@@ -25,7 +25,9 @@ def verdicts(check, *arguments):
 def test_sub_blocks_agree_within_64_eps(apart, passes):
     scale = np.array([2.0, 1e-3, 5.0])
     off = np.array([0.0, apart * EPS * 1e-3, 0.0])  # in the state with the small scale
-    found = verdicts(sub_blocks.check_blocks, ("beta",), "Mbar", "reduced, TMT to MuJoCo", off, scale, "kg m2")
+    found = verdicts(
+        sub_blocks.check_blocks, ("beta",), "Mbar", "reduced, TMT to MuJoCo", off, scale, "kg m2"
+    )
     assert found == {"Mbar, reduced, TMT to MuJoCo": passes}
 
 
@@ -39,7 +41,9 @@ def test_the_smallest_model_is_judged_while_the_band_is_narrow(apart, width, req
     t = np.arange(6.0)
     off, band = np.zeros((6, 4)), np.full((6, 4), 1e-9)
     off[4, 1], band[4, 1] = apart, width
-    found = verdicts(needs.check_smaller, "zero, free", Coordinates(("alpha", "gamma")), t, off, band, required)
+    found = verdicts(
+        needs.check_smaller, "zero, free", Coordinates(("alpha", "gamma")), t, off, band, required
+    )
     assert found == {"smallest model to whole": within, "time judged": long_enough}
 
 
@@ -100,7 +104,11 @@ def test_a_pendulum_that_shows_nothing_is_left_out(engines, scene):
 def test_the_table_has_the_times_of_each_engine_and_the_largest_gain():
     """Of a scene with a smaller model and of one that needs no run."""
     cases, seconds = {case.name: case for case in ARM.cases}, {}
-    free, held, planar = cases["zero, free"], cases["bent, held"], cases["elbow swing"]  # stands for the smaller model
+    free, held, planar = (
+        cases["zero, free"],
+        cases["bent, held"],
+        cases["elbow swing"],
+    )  # stands for the smaller model
     for engine, steps, whole, small in (("tmt", 1024, 300e-9, 100e-9), ("mujoco", 128, 6000e-9, 4000e-9)):
         for case, of, taken in ((free, free, whole), (held, held, whole), (free, planar, small)):
             seconds[case.name, of.joints, engine] = steps * taken
@@ -115,4 +123,9 @@ def test_the_table_has_the_times_of_each_engine_and_the_largest_gain():
     assert [rows[free.name, nv, "tmt"]["max_difference_rad"] for nv in (1, 3)] == [1e-12, None]
 
     best = times.largest_gain(table, 3)
-    assert (best["engine"], best["scene"], best["nv"], best["speedup"]) == ("tmt", "zero, free", 1, pytest.approx(3.0))
+    assert (best["engine"], best["scene"], best["nv"], best["speedup"]) == (
+        "tmt",
+        "zero, free",
+        1,
+        pytest.approx(3.0),
+    )

@@ -51,7 +51,9 @@ def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_do
     log = []
     for name, said in (("untimed", "computed"), ("time_models", "timed")):
         given = Result("reduction", curves={"needs": {}}), []
-        monkeypatch.setattr(reduction, name, lambda *_, said=said, given=given, **__: log.append(said) or given)
+        monkeypatch.setattr(
+            reduction, name, lambda *_, said=said, given=given, **__: log.append(said) or given
+        )
     setup = dataclasses.replace(setup, quiet=lambda: log.append("quiet"), background={})
     reduction.begin(setup)
     reduction.rows(setup)
@@ -92,7 +94,10 @@ def test_each_pair_has_its_own_models_and_the_bias_is_compared_in_motion(mujoco)
 
     wrong = Faster(mujoco.model, mujoco.joints, mujoco.bodies, mujoco.source)
     off = [check for check in blocks(Setup.small(ARM, engines(wrong))).checks if not check.passed]
-    assert {check.quantity for check in off} == {"bias, MuJoCo, reduced to whole", "bias, reduced, TMT to MuJoCo"}
+    assert {check.quantity for check in off} == {
+        "bias, MuJoCo, reduced to whole",
+        "bias, reduced, TMT to MuJoCo",
+    }
 
 
 @pytest.mark.parametrize("model, joints", [("gripper", 4), ("free_body", 4), ("pendulum_ball", 2)])
@@ -122,7 +127,10 @@ def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
 def test_the_planar_arm_moves_as_the_whole_one(engines):
     case, setup, result = ARM.cases[0], Setup.small(ARM, engines), Result("reduction", curves={"apart": {}})
     smaller = reduced(case)
-    assert smaller.joints == ("alpha", "gamma") and times.operations(tmt.ARM) > 2 * times.operations(smaller.tree) > 0
+    assert (
+        smaller.joints == ("alpha", "gamma")
+        and times.operations(tmt.ARM) > 2 * times.operations(smaller.tree) > 0
+    )
     needs.compare_smaller(result, case, smaller, setup)
     assert len(result.checks) == 6 and failed(result) == []
     # a planar arm that starts elsewhere is another motion
@@ -155,7 +163,9 @@ def test_of_a_users_own_scene_nothing_is_expected_but_agreement(engines):
 def test_a_held_posture_with_springs_needs_nothing():
     held = next(case for case in of_file(PATHS["gripper"]).robot.cases if case.is_held)
     assert held.tree.has_springs and needed(held).stays == held.joints
-    rigid = held.changed(torque=tuple(tmt.gravity_balance(held.posture, held.whole)))  # without what the springs need
+    rigid = held.changed(
+        torque=tuple(tmt.gravity_balance(held.posture, held.whole))
+    )  # without what the springs need
     assert needed(rigid).stays == ()
 
 
@@ -177,4 +187,6 @@ def test_what_takes_too_long_to_decide_is_neither_needed_nor_locked(monkeypatch)
     case, result = ARM.cases[0], Result("reduction", curves={"needs": {}, "apart": {}})
     needs.of_case(result, case, None)
     (answer,) = reduction.answers(result, ARM)
-    assert answer.values["undecided"] == ARM.joints and answer.values["needed"] == answer.values["stays"] == ()
+    assert (
+        answer.values["undecided"] == ARM.joints and answer.values["needed"] == answer.values["stays"] == ()
+    )

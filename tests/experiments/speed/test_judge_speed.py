@@ -30,7 +30,10 @@ def known_rows():
     rows = [row("scipy", "DOP853", 1e-9, 500, 1e-4), row("mujoco", "implicit", None, 64, 1e-9)]
     for k in range(5):
         steps, error = 64 << k, 2e-2 / 16**k
-        rows += [row("mujoco", "RK4", error, steps, 20e-3 * 2**k), row("tmt", "rk4", error, steps, 1e-3 * 2**k)]
+        rows += [
+            row("mujoco", "RK4", error, steps, 20e-3 * 2**k),
+            row("tmt", "rk4", error, steps, 1e-3 * 2**k),
+        ]
         rows += [row("mujoco", "Euler", 0.5 / 2**k, steps, 4e-3 * 2**k)]
         rows += [row("tmt", "dopri8", error**2, steps, 2e-3 * 2**k)]
     return rows
@@ -135,7 +138,12 @@ def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
 
 
 def test_the_gain_is_that_of_the_integrator_times_that_of_the_kernel_times_that_of_the_method():
-    settings = ("mujoco", "RK4", 8e-3), ("mujoco", "Euler", 2e-3), ("tmt", "rk4", 4e-3), ("tmt", "dopri8", 1e-3)
+    settings = (
+        ("mujoco", "RK4", 8e-3),
+        ("mujoco", "Euler", 2e-3),
+        ("tmt", "rk4", 4e-3),
+        ("tmt", "dopri8", 1e-3),
+    )
     line = advice.advice([row(*of, 1e-4, 64, seconds) for *of, seconds in settings], ["bent, free"])[0]
     parts = [line[f"{part}_part"] for part in ("integrator", "kernel", "method")]
     assert parts == pytest.approx([0.25, 2.0, 4.0]) and line["ratio"] == pytest.approx(np.prod(parts))

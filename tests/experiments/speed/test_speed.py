@@ -51,13 +51,18 @@ def test_scenes_are_those_with_the_tag_and_a_users_own():
     names = [case.name for case in settings.scenes_of(MINE)]
     assert names == ["zero, free", "ball catch, free", "bent, free", "bent, damped", "my swing"]
     alone = dataclasses.replace(ARM, scenes=(OWN,))
-    assert settings.coarsest_steps(settings.scenes_of(MINE)[-1]) == 128  # of 100 steps: a multiple of the grid
+    assert (
+        settings.coarsest_steps(settings.scenes_of(MINE)[-1]) == 128
+    )  # of 100 steps: a multiple of the grid
     assert (settings.regular_of(MINE).name, settings.regular_of(alone).name) == ("bent, free", "my swing")
     sizes = {"full": names, "quick": ["bent, free", "my swing"], "small": ["zero, free", "bent, free"]}
     for size, expected in sizes.items():
         assert [case.name for case in settings.followed(MINE, size)] == expected
     # held scenes of a file are not followed
-    assert [case.name for case in settings.followed(GRIPPER, "full")] == ["open, let go", "open, step of the servos"]
+    assert [case.name for case in settings.followed(GRIPPER, "full")] == [
+        "open, let go",
+        "open, step of the servos",
+    ]
     assert speed.skipped(ARM) is None
     assert speed.skipped(dataclasses.replace(ARM, scenes=())).kind == "no_scene"
 
@@ -65,9 +70,15 @@ def test_scenes_are_those_with_the_tag_and_a_users_own():
 def test_methods_are_those_of_the_engines_that_are_there(engines):
     full, quick = (settings.methods(engines, size) for size in ("full", "quick"))
     there = [engine for engine in engines.values() if engine.unavailable() is None]
-    assert full == settings.methods(engines, "small") == [m for engine in there for m in engine.methods.values()]
+    assert (
+        full == settings.methods(engines, "small") == [m for engine in there for m in engine.methods.values()]
+    )
     assert quick == [m for m in full if m.engine in ("mujoco", "tmt")] and len(quick) < len(full)
-    split = [settings.methods(engines, size, which) for size in ("full", "quick") for which in ("compiled", "called")]
+    split = [
+        settings.methods(engines, size, which)
+        for size in ("full", "quick")
+        for which in ("compiled", "called")
+    ]
     assert split == [quick, [m for m in full if m not in quick], quick, []]
 
 
@@ -84,7 +95,9 @@ def test_a_step_response_is_followed_from_coarse_steps_on_by_the_schemes_that_it
 def test_what_takes_too_long_is_left_out(engines):
     assert Heyoka().too_long(HUMANOID.tree) and Heyoka().too_long(ARM.tree) is None
     slow = settings.left_out(engines, "full", HUMANOID)
-    assert slow and not {(m.engine, m.name) for m in settings.methods(engines, "full", "all", HUMANOID)} & set(slow)
+    assert slow and not {
+        (m.engine, m.name) for m in settings.methods(engines, "full", "all", HUMANOID)
+    } & set(slow)
     implicit, arm7 = ("tmt", "implicit_midpoint"), robot_in("arm7")
     assert [implicit in settings.left_out(engines, size, arm7) for size in ("quick", "full")] == [True, False]
 
@@ -131,7 +144,9 @@ def test_rounding_leaves_eps_times_the_growth(engines, of_gripper):
     assert np.abs(growth(*given) - growth(*given, stride=given[-1])).max() < 0.1
 
 
-def test_beyond_the_digits_of_the_reference_nothing_is_judged(engines, of_gripper, known_reference, monkeypatch):
+def test_beyond_the_digits_of_the_reference_nothing_is_judged(
+    engines, of_gripper, known_reference, monkeypatch
+):
     truth, method = reference.in_doubles(FREE)._replace(why="too stiff"), of_gripper["tmt"].methods["dopri8"]
     row = runs.row_of_run(FREE, of_gripper, method, settings.halvings(method, FREE)[1], truth, 0.0, 1e-11)
     assert row["worst_error_rad"] == row["error_rad"] == 1e-11 and not row["diverged"]
@@ -149,12 +164,18 @@ def test_a_small_run_takes_every_path(engines, small):
     assert list(table.columns) == speed.COLUMNS and (ran.seconds > 0.0).all()
     assert {*zip(ran.engine, ran.method)} == {(m.engine, m.name) for m in settings.methods(engines, "full")}
     diverged = ran[ran.diverged.astype(bool)]
-    assert len(diverged) and diverged[["error_rad", "worst_error_rad", "energy_error_J"]].isna().all(axis=None)
+    assert len(diverged) and diverged[["error_rad", "worst_error_rad", "energy_error_J"]].isna().all(
+        axis=None
+    )
     costs = pd.DataFrame(result.tables["evaluations"])
     timed = costs[costs.why_not.isna()]
     assert {"forward_dynamics", "rk4_step"} == set(timed.quantity)
     assert (timed.ns_per_state > 0.0).all() and costs[costs.why_not.notna()].ns_per_state.isna().all()
-    coarse = ran[(ran.steps == 64) & ran.method.isin(("rk4", "RK4"))].set_index(["scene", "engine"]).worst_error_rad
+    coarse = (
+        ran[(ran.steps == 64) & ran.method.isin(("rk4", "RK4"))]
+        .set_index(["scene", "engine"])
+        .worst_error_rad
+    )
     assert list(coarse["zero, free"]) == pytest.approx([1.6, 1.6], abs=0.1)
     assert list(coarse["bent, free"]) == pytest.approx([0.27, 0.27], abs=0.01)
 
@@ -165,7 +186,10 @@ def test_a_run_without_timings_has_the_checks_only_and_sees_a_wrong_model(engine
     assert all(row["seconds"] is None for row in result.rows) and list(speed.figures(result, ARM)) == []
     checks = untimed_speed(setup_of(XML.replace('mass="1.5"', 'mass="1.50001"'))).checks
     failed = {check.quantity for check in checks if not check.passed}
-    assert {"smallest error of MuJoCo's RK4, compared with tmt's rk4", "the same error as tmt's rk4"} <= failed
+    assert {
+        "smallest error of MuJoCo's RK4, compared with tmt's rk4",
+        "the same error as tmt's rk4",
+    } <= failed
 
 
 def test_a_reference_in_doubles_measures_turns_and_no_quaternions():

@@ -66,7 +66,9 @@ def finer_rows(moved=0.0, directions=(1, -1), times=(5.0, 6.0)):
 ])  # fmt: skip
 def test_claim_2(result, changed, word, passes):
     claims.check_finer_steps(result, ARM, finer_rows(**changed))
-    assert result.notes[-1].values["reproduced"] == word and [check.passed for check in result.checks] == 4 * [passes]
+    assert result.notes[-1].values["reproduced"] == word and [
+        check.passed for check in result.checks
+    ] == 4 * [passes]
 
 
 def kept_runs(observed=None, largest=0.06, acceleration=50.0):
@@ -98,5 +100,7 @@ def test_claim_3(result, changed, word, failing):
     (1.0, 1.0 + 0.999 * 5 / 64, [True]), (1.0, 1.0 + 1.001 * 5 / 64, [False]), (1.0, None, [False]), (None, None, []),
 ])  # fmt: skip
 def test_a_reset_is_caught_within_a_step(result, reset, caught, passes):
-    failure.check_reset(result, FREE, {"resets": int(reset is not None), "first_reset_s": reset, "caught_s": caught})
+    failure.check_reset(
+        result, FREE, {"resets": int(reset is not None), "first_reset_s": reset, "caught_s": caught}
+    )
     assert [check.passed for check in result.checks] == passes

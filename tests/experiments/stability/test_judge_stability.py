@@ -16,7 +16,9 @@ from compare.truth.linear import held
     (INSIDE * 64 * 2.0**-52 * 3.0 * 7.0 / 1e-6, 0.0, True), (OUTSIDE * 64 * 2.0**-52 * 3.0 * 7.0 / 1e-6, 0.0, False),
     (INSIDE * 1e-9 / 1e-6, 1e-9, True), (OUTSIDE * 1e-9 / 1e-6, 1e-9, False), (np.nan, 0.0, False),
 ])  # fmt: skip
-def test_amplification_within_the_rounding_of_a_difference_quotient_or_of_a_step(result, off, rounded, passes):
+def test_amplification_within_the_rounding_of_a_difference_quotient_or_of_a_step(
+    result, off, rounded, passes
+):
     ours, q = np.diag([3.0, -7.0]), np.array([1.0, -2.0])
     equilibria.check_amplification(result, "", q, ours, ours + [[0.0, off], [0.0, 0.0]], rounded)
     assert only(result) is passes
@@ -110,7 +112,9 @@ def test_the_linear_map_says_when_a_tenth_of_a_radian_is_reached():
     values, vectors = at.modes
     shape = size * vectors[:3, 0].real / np.abs(vectors[:3, 0]).max()
     (found,) = departure.predicted(at, "rk4", 1e-3, shape[None], np.zeros((1, 3)))
-    assert found == pytest.approx(np.arccosh(0.1 / size + 1.0) / values[0].real, abs=2e-3)  # cosh - 1, from rest
+    assert found == pytest.approx(
+        np.arccosh(0.1 / size + 1.0) / values[0].real, abs=2e-3
+    )  # cosh - 1, from rest
 
 
 @pytest.mark.parametrize("joints, reach, count", [(4, 2, 625), (5, 1, 243)])

@@ -120,7 +120,9 @@ def test_constraints_of_a_sparse_jacobian_and_a_pickled_model():
     at, found = posture_of(SPARSE)
     dense, _ = posture_of(SPARSE.replace("sparse", "dense"))
     assert np.array_equal(*(one.rows(one.q, 1e-3, "Euler").jacobian for one in (at, dense)))
-    assert "data" not in acting_at(found, at).__getstate__()  # one with a plugin ends the process that reads it
+    assert (
+        "data" not in acting_at(found, at).__getstate__()
+    )  # one with a plugin ends the process that reads it
 
 
 def test_a_robot_of_many_speeds_has_its_servo_limits_alone(quick):

@@ -94,7 +94,9 @@ def method(engines):
 def test_predicted_and_observed_limits_agree(engines, method):
     ours = [method("tmt", scheme) for scheme in ("semi_implicit_euler", "implicit_midpoint")]
     rows = limits.limit_rows(BENT, engines, (*ours, method("mujoco", "RK4")))
-    assert [row["seen"] for row in rows] == [row["limit"] for row in rows] == ["finite", "never_fails", "finite"]
+    assert (
+        [row["seen"] for row in rows] == [row["limit"] for row in rows] == ["finite", "never_fails", "finite"]
+    )
     for row in (rows[0], rows[2]):
         assert row["observed_dt_s"] == pytest.approx(row["predicted_dt_s"], rel=limits.LIMIT_TOLERANCE)
     # a forearm of another mass has another one
@@ -105,7 +107,9 @@ def test_predicted_and_observed_limits_agree(engines, method):
     assert row["seen"] == "finite" and row["observed_dt_s"] == pytest.approx(row["predicted_dt_s"], rel=5e-4)
 
 
-def test_departure_is_predicted_where_no_other_mode_grows_faster_than_that_of_the_saddle(engines, method, result):
+def test_departure_is_predicted_where_no_other_mode_grows_faster_than_that_of_the_saddle(
+    engines, method, result
+):
     rows = departure.departures(5 / 64, BALL, engines, (method("tmt", "rk4"), method("mujoco", "Euler")))
     assert len({row["observed_s"] for row in rows}) > 8  # the arm left, at other times from other starts
     departure.check_departures(result, rows)
@@ -141,7 +145,9 @@ def test_a_reset_is_caught(engines):
 def test_a_small_run_fills_every_table(small):
     small = small("stability")
     assert set(small.tables) == {"departure", "stability_claims"}
-    reproduced = [(note.kind, note.values["reproduced"]) for note in small.notes if note.kind.startswith("claim_")]
+    reproduced = [
+        (note.kind, note.values["reproduced"]) for note in small.notes if note.kind.startswith("claim_")
+    ]
     assert reproduced == [("claim_1", True), ("claim_2", "yes"), ("claim_3", "bounded")]
     assert any("silent" in check.quantity for check in small.checks)
 
@@ -150,7 +156,9 @@ def test_a_small_run_fills_every_table(small):
     ("upright", "centres", ["stability_departure"]), ("hanging", "saddles", ["stability_limits"]),
 ])  # fmt: skip
 def test_what_a_robot_lacks_is_left_out_with_a_reason(engines, posture, without, drawn):
-    robot = dataclasses.replace(ARM, claims=None, kinds={}, scenes=(), postures={"one": ARM.postures[posture]})
+    robot = dataclasses.replace(
+        ARM, claims=None, kinds={}, scenes=(), postures={"one": ARM.postures[posture]}
+    )
     result = stability.rows(Setup.quick(robot, engines))
     assert result.checks and all(check.passed for check in result.checks)
     (examined,) = (note.values for note in result.notes if note.kind == "examined")

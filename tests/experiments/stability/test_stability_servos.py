@@ -234,7 +234,9 @@ def test_a_saddle_has_a_rate_and_neither_a_joint_that_limits_nor_an_answer():
 def test_runs_have_the_weight_and_the_cuts_of_the_rest():
     at, found = posture_of(FLOATING)
     assert not predicted.acting_at(found, at).model.opt.gravity.any()
-    at, found = posture_of(swing('<position name="s" joint="swing" kp="1000" forcerange="-1 1"/>', com="0.5 0 0"))
+    at, found = posture_of(
+        swing('<position name="s" joint="swing" kp="1000" forcerange="-1 1"/>', com="0.5 0 0")
+    )
     assert predicted.acting_at(found, at).model.actuator_biasprm[0, 0] == pytest.approx(-1.0)
 
 

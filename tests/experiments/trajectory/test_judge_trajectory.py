@@ -50,7 +50,9 @@ def test_a_band_judges_nothing_that_moves_less():
         return widest_judged(free, q, v)
 
     assert np.allclose(widest(lift=2e-4, speeds=(3.0, 0, 0, 0)), [2e-4, 1e-3, 1e-3, 1e-3, 3.0, *[np.inf] * 3])
-    assert np.allclose(widest(lift=0.5, turn=1.0, speeds=(3.0, 2.0, 1e-9, 0)), [*[1e-3] * 4, 3.0, 2.0, 2.0, 2.0])
+    assert np.allclose(
+        widest(lift=0.5, turn=1.0, speeds=(3.0, 2.0, 1e-9, 0)), [*[1e-3] * 4, 3.0, 2.0, 2.0, 2.0]
+    )
     slow, rounded = widest(1.0, 4e-4, (1.0, 2e-2, 1e-3, 0)), widest(2.0, 1e-12, (1.0, 1e-12, 0, 0))
     assert np.allclose(slow, [1e-3, *[4e-4] * 3, 1.0, 2e-2, 1e-3, 2e-2])
     assert np.allclose(rounded, [*[1e-3] * 4, 1.0, *[np.inf] * 3])
@@ -78,14 +80,20 @@ def level(difference, bar):
 
 
 @pytest.mark.parametrize("off, bar", [(0.999, 1.0), (1.001, 1.0), (np.nan, 1.0), (0.0, 0.0), (1e-300, 0.0)])
-@pytest.mark.parametrize("place, name, unit", [(0, "lift", "m"), (3, "head z", "rad"), (5, "head x", "rad/s")])
+@pytest.mark.parametrize(
+    "place, name, unit", [(0, "lift", "m"), (3, "head z", "rad"), (5, "head x", "rad/s")]
+)
 def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(place, name, unit, off, bar):
     differences = np.zeros((3, 8))
     differences[1, place] = off
     check, row = level(differences, bar)
     assert check.passed is (off in (0.999, 0.0)) and row["worst_difference"] == check.value
     if bar:
-        assert (check.unit, row["worst_unit"]) == (unit, unit) and check.note.startswith(name) and "0.500" in check.note
+        assert (
+            (check.unit, row["worst_unit"]) == (unit, unit)
+            and check.note.startswith(name)
+            and "0.500" in check.note
+        )
 
 
 def test_a_row_has_the_largest_movement_beside_the_worst_component():
@@ -179,4 +187,7 @@ def test_a_torque_that_does_not_hold_is_not_rounding(engines):
     q, left_over = HELD.q, 1.0 - 1.62 / 9.81
     falls = np.abs(np.linalg.solve(tmt.mass_matrix(q), left_over * tmt.gravity_balance(q)))
     assert pushes[1][0] <= moon["allowed"] and np.isclose(pushes[1][1], falls, rtol=1e-9).any()
-    assert [[engine["holds"] for engine in of["engines"]] for of in (earth, moon)] == [[True, True], [True, False]]
+    assert [[engine["holds"] for engine in of["engines"]] for of in (earth, moon)] == [
+        [True, True],
+        [True, False],
+    ]

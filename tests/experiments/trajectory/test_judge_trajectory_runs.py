@@ -42,7 +42,9 @@ def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco):
     assert checks[name].tolerance in getattr(damped, field) and np.array_equal(damped.at, damped.t)
     for more, passes in ((1.01, True), (0.99, False)):
         tight = judged_with(mujoco, damped._replace(**{field: more * used * getattr(damped, field)}))
-        assert {quantity for quantity, check in tight.items() if not check.passed} == (set() if passes else {name})
+        assert {quantity for quantity, check in tight.items() if not check.passed} == (
+            set() if passes else {name}
+        )
 
 
 def test_an_open_loop_is_judged_up_to_its_last_state(mujoco):
@@ -77,7 +79,9 @@ def test_a_step_that_ends_faster_than_half_a_turn_is_not_compared_alone(mujoco):
     far = FREE.changed(duration=20.0, dt=10.0, judged=0.0, tags=("own",))
     mine = side(far)
     assert 0.0 not in mine.at and 0.0 in side(FREE).at
-    assert [name for name, check in judged_with(mujoco, mine, far).items() if not check.judged] == ["open loop"]
+    assert [name for name, check in judged_with(mujoco, mine, far).items() if not check.judged] == [
+        "open loop"
+    ]
 
 
 @pytest.mark.parametrize("judged, passes", [(3.04, True), (3.05, False)])
@@ -117,9 +121,16 @@ def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the
     long = robot_of(reading.read(chain(40)), "chain.xml")
     case = long.case("c", duration=1.0, dt=1 / 512)
     coarse, fine = FREE, FREE.changed(dt=5 / 8193)
-    assert runs.step_counts(coarse, (1, 16, 128)) == [64, 1024, 8192] and runs.step_counts(fine, (1, 2)) == [8193]
+    assert runs.step_counts(coarse, (1, 16, 128)) == [64, 1024, 8192] and runs.step_counts(fine, (1, 2)) == [
+        8193
+    ]
     assert runs.steps_afforded(case) == 2_700_000 // 6400 and runs.step_counts(case, (1, 2)) == [512]
-    assert [runs.recorded(FREE.changed(duration=n / 64, dt=1 / 64)) for n in (5, 65, 130, 512)] == [5, 65, 65, 64]
+    assert [runs.recorded(FREE.changed(duration=n / 64, dt=1 / 64)) for n in (5, 65, 130, 512)] == [
+        5,
+        65,
+        65,
+        64,
+    ]
 
 
 def result_of(curve, **curves) -> Result:
@@ -133,7 +144,10 @@ def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
     result = result_of(curve)
     caption = figures_runs.draw_held(result, HELD, 2)[2].values
     engines = [{"label": "TMT", "left": None, "error": 0.1}, {"label": "MuJoCo", "left": 4.0, "error": 0.2}]
-    assert caption["engines"] == engines and (caption["judged"], caption["apart"]) == (2.5, pytest.approx(0.05))
+    assert caption["engines"] == engines and (caption["judged"], caption["apart"]) == (
+        2.5,
+        pytest.approx(0.05),
+    )
 
     about = {"scene": HELD.name, "level": "open loop", "engine_integrator": "RK4", "dt_s": 5 / 64}
     ends = ((None, 0.25), (0.0, None), (None, 0.125))
@@ -161,6 +175,9 @@ def test_a_ball_is_drawn_by_its_turn_from_the_start():
     values = figures_runs.drawable(case, q)
     for kind, at, by in case.coordinates.places.joints:
         if kind == "ball":
-            assert values[:3, by] == pytest.approx(turns[:3, None] * np.ones(3)) and np.isnan(values[3, by]).all()
+            assert (
+                values[:3, by] == pytest.approx(turns[:3, None] * np.ones(3))
+                and np.isnan(values[3, by]).all()
+            )
         else:
             assert values[:, by] == pytest.approx(q[:, at])

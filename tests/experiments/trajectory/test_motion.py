@@ -62,7 +62,9 @@ def test_a_free_body_is_a_cross_that_turns_with_it():
     points, links = stick_figure(robot, a_quarter_about_z, crosses=True)
     before, after = points[:, -3:] - points[:, :1]
     assert links[-3:] == [(0, 2), (0, 3), (0, 4)] and np.abs(before).max() > 0.1
-    np.testing.assert_allclose(after, before @ [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], atol=1e-15)
+    np.testing.assert_allclose(
+        after, before @ [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], atol=1e-15
+    )
 
 
 def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_and_up_is_up():
@@ -74,7 +76,10 @@ def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_a
 
 
 def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(drawn, tmp_path):
-    left, right = np.array([[-1.0, 1.0], [-1.0, 1.5], [-1.0, 2.0]]), np.array([[1.0, -1.0], [1.5, -1.0], [2.0, -1.0]])
+    left, right = (
+        np.array([[-1.0, 1.0], [-1.0, 1.5], [-1.0, 2.0]]),
+        np.array([[1.0, -1.0], [1.5, -1.0], [2.0, -1.0]]),
+    )
     points = {"tmt": np.stack([left] * 3), "mujoco": np.stack([right, left, np.nan * right])}
     scene = drawn._replace(t=drawn.t[:3], apart=drawn.apart[:3], points=points)
     name, figure, _ = gif.draw_motion(Result("trajectory", curves={"drawn": [scene]}))

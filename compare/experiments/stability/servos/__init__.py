@@ -82,7 +82,9 @@ def add(result: Result, setup: Setup, work: dict) -> None:
         requested, by_name = limit_rows(predictions, dt, name), {one.at.name: one.at for one in predictions}
         for row in findings.known(requested, name):
             if row["stable_at_file_dt"]:
-                row["step_response_error"] = response.response_error(by_name[row["posture"]], name, reading, dt)
+                row["step_response_error"] = response.response_error(
+                    by_name[row["posture"]], name, reading, dt
+                )
         findings.find_answer(result, requested, predictions, requested=True)
         if setup.robot.drive.feeds_back:
             check_step(result, requested, AT_REQUESTED_STEP)
@@ -111,7 +113,10 @@ def check_observed(result: Result, row: dict, kind: str) -> None:
         return
     off = apart(row)
     note = f"predicted: {row['limit']}, observed: {kind}" if off is None else ""
-    where, quantity = f"{row['posture']}, {row['integrator']}", "step limit with servos, observed / predicted - 1"
+    where, quantity = (
+        f"{row['posture']}, {row['integrator']}",
+        "step limit with servos, observed / predicted - 1",
+    )
     result.check(where, quantity, off, OBSERVED_WITHIN, "", note, about=About.PREDICTION)
 
 

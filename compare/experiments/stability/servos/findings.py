@@ -69,8 +69,13 @@ def find_notes(result: Result, rows: Sequence[dict], predictions: Sequence[Predi
     if integrators := [mine[0] | {"error": error} for mine, error in zip(of_each, errors) if mine]:
         values = {"dt": rows[0]["file_dt_s"], "seconds": response.LASTS, "up_to": LIMIT_UP_TO}
         result.find("integrators", "servos", integrators=integrators, **values)
-    resting, robot = [prediction.at for prediction in predictions if prediction.limits], predictions[0].at.robot
+    resting, robot = (
+        [prediction.at for prediction in predictions if prediction.limits],
+        predictions[0].at.robot,
+    )
     moved = {at.name: at.away(at.start) for at in resting if at.away(at.start) > RESTS_WITHIN}
     cut = {at.name: [robot.drive.actuators[i].name for i in at.cut] for at in resting if at.cut}
     if moved or cut:
-        result.find("rests", "servos", moved=moved, unit=" or ".join(dict.fromkeys(robot.coordinates.units)), cut=cut)
+        result.find(
+            "rests", "servos", moved=moved, unit=" or ".join(dict.fromkeys(robot.coordinates.units)), cut=cut
+        )

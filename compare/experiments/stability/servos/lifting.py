@@ -38,8 +38,12 @@ def less_damping(acting: Acting, at: Posture, integrator: str, dt: float) -> tup
     """One cap of all kv, relative to the inertia along the length of each actuator: those above it change."""
     small, actuators = at.small, at.robot.drive.actuators
     moments = at.driven.along(at.q).moments[: len(at.u), at.kept]
-    ease = np.einsum("ki,ik->k", moments, np.linalg.solve(small.M, moments.T))  # 1 over the inertia along each length
-    able = [one.acts and i not in at.cut and not one.gain[2] for i, one in enumerate(actuators)] & (ease > 0.0)
+    ease = np.einsum(
+        "ki,ik->k", moments, np.linalg.solve(small.M, moments.T)
+    )  # 1 over the inertia along each length
+    able = [one.acts and i not in at.cut and not one.gain[2] for i, one in enumerate(actuators)] & (
+        ease > 0.0
+    )
     now = np.array([max(one.damping(u), 0.0) for one, u in zip(actuators, at.u)]) * able
 
     def capped(share: float) -> np.ndarray:

@@ -11,7 +11,11 @@ from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO, bisected
 from .predicted import acting_at
 
-MOVED_BY, MOVED_LEAST, MOVED_MOST = 1e-6, 1e-8, 1e-5  # rad or m at the start, of a joint of middling inertia; of any
+MOVED_BY, MOVED_LEAST, MOVED_MOST = (
+    1e-6,
+    1e-8,
+    1e-5,
+)  # rad or m at the start, of a joint of middling inertia; of any
 SOUGHT_FROM = 1e-7  # s: from which the limit is sought
 SOUGHT_BY = 4.0  # from one step to the next, upwards, until one fails
 SOUGHT_STEPS, NARROWED_STEPS = 400, 4000  # of a run: upwards, and where the limit is narrowed
@@ -19,7 +23,9 @@ SOFTLY = 0.01  # of a deviation at the start where soft constraints are, which r
 APART = 0.01  # of a deviation at the start: what constraints do not allow, which they answer with much
 RUN_PARTS = 8  # of a run: after each it ends if the deviation has grown far
 GROWN_FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
-GROWN_STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
+GROWN_STILL = (
+    3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
+)
 OBSERVED_WITHIN = 0.01  # relative
 NARROWED = 1e-3  # relative, between a step that holds and one that does not
 
@@ -32,7 +38,9 @@ def limit(at: Posture, integrator: str, reading: Reading) -> tuple[str, float | 
     acting = acting_at(reading, at)
     count = int(np.log(LIMIT_UP_TO / SOUGHT_FROM) / np.log(SOUGHT_BY)) + 2
     tried = LIMIT_UP_TO / SOUGHT_BY ** np.arange(count)[::-1]  # the first at most SOUGHT_FROM
-    failed = next((k for k, dt in enumerate(tried) if grows_in_runs(acting, at, integrator, dt, SOUGHT_STEPS)), count)
+    failed = next(
+        (k for k, dt in enumerate(tried) if grows_in_runs(acting, at, integrator, dt, SOUGHT_STEPS)), count
+    )
     # a short run may not show what hardly grows: the longest step that held is tried once more
     while failed and grows_in_runs(acting, at, integrator, tried[failed - 1]):
         failed -= 1
@@ -42,7 +50,9 @@ def limit(at: Posture, integrator: str, reading: Reading) -> tuple[str, float | 
     return "finite", bisected(lambda dt: not grows_in_runs(acting, at, integrator, dt), low, high, NARROWED)
 
 
-def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = NARROWED_STEPS) -> bool:
+def grows_in_runs(
+    acting: Acting, at: Posture, integrator: str, dt: float, steps: int = NARROWED_STEPS
+) -> bool:
     """Whether a small random deviation from rest grows in a run."""
     sizes = []
     with np.errstate(over="ignore", invalid="ignore"):

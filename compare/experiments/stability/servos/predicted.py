@@ -14,18 +14,31 @@ from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO, Limit
 from ..own_run import FULL_MODEL
 
-MOST_RESTS, SAME_REST = 4, 1e-3  # of limits, each at the rest with the one before; steps that are one, relative
-STILL_THERE, GIVEN_WAY = 1e-6, 0.01  # rad or m: by less nothing moves; by more the limit is that of another posture
+MOST_RESTS, SAME_REST = (
+    4,
+    1e-3,
+)  # of limits, each at the rest with the one before; steps that are one, relative
+STILL_THERE, GIVEN_WAY = (
+    1e-6,
+    0.01,
+)  # rad or m: by less nothing moves; by more the limit is that of another posture
 ASIDE_OF_LIMIT = 1e-2  # of a limit: where a step of MuJoCo is compared
-KNOWN, COUPLED = ("finite", "none"), "coupled"  # kinds of limits; of discrete with a free base and soft constraints
-OUT_OF_RANGE = 1e-3  # rad or m: a rest farther beyond the range of a joint is one on its limit, which is off here
+KNOWN, COUPLED = (
+    ("finite", "none"),
+    "coupled",
+)  # kinds of limits; of discrete with a free base and soft constraints
+OUT_OF_RANGE = (
+    1e-3  # rad or m: a rest farther beyond the range of a joint is one on its limit, which is off here
+)
 ADHESION = "a transmission of type body"  # it acts in contacts alone
 
 
 class Prediction(NamedTuple):
     at: Posture
     why: str  # there are no limits, if there are none
-    there: dict[str, Posture]  # by integrator: at rest with the step that is the limit; none where it does not rest
+    there: dict[
+        str, Posture
+    ]  # by integrator: at rest with the step that is the limit; none where it does not rest
     limits: dict[str, Limit]  # by integrator
 
     @property
@@ -66,7 +79,9 @@ def predicted_at(robot: Robot, name: str, reading: Reading) -> Prediction:
 
 def unmodelled(robot: Robot) -> dict[str, str]:
     """What may brake, push or pull a robot in the air and has no law here, by name, and what it is."""
-    fluid = {name: "fluid" for feature in robot.features if feature.feature == "fluid" for name in feature.names}
+    fluid = {
+        name: "fluid" for feature in robot.features if feature.feature == "fluid" for name in feature.names
+    }
     return {name: reason for name, reason in robot.drive.refused.items() if reason != ADHESION} | fluid
 
 
@@ -85,7 +100,9 @@ def limit_at(at: Posture, integrator: str) -> tuple[Posture, Limit]:
     """The limit, and the posture at rest with a step so long: where soft constraints are loaded, a longer step softens them."""
     if not at.small.names:
         return at, Limit("drifts")
-    if integrator == "discrete" and at.small.couple and at.base:  # it lets a free base and soft constraints act at once
+    if (
+        integrator == "discrete" and at.small.couple and at.base
+    ):  # it lets a free base and soft constraints act at once
         return at, Limit(COUPLED)
     limit = at.small.limit(integrator)
     for _ in range(MOST_RESTS):
@@ -138,7 +155,9 @@ def radius_apart(acting: Acting, at: Posture, integrator: str, dt: float) -> flo
     for step in (dt * (1.0 - ASIDE_OF_LIMIT), dt * (1.0 + ASIDE_OF_LIMIT)):
         A = acting.transition(at.q, at.u, step, integrator)[np.ix_(kept, kept)]
         theirs = float(np.abs(np.linalg.eigvals(A)).max())
-        decays = [np.exp(-step / tau) if is_exact else abs(1.0 - step / tau) for _, tau, is_exact in small.poles]
+        decays = [
+            np.exp(-step / tau) if is_exact else abs(1.0 - step / tau) for _, tau, is_exact in small.poles
+        ]
         own = max(small.growth(integrator, step) if small.names else 0.0, *decays, 0.0)
         apart.append(abs(max(theirs, least) - max(own, least)))
     return max(apart)
