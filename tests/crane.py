@@ -49,10 +49,10 @@ MOMENTS = (
     (0.002, 0.0018, 0.0009),
 )
 TREE = tmt.Tree(
-    hinge_names=("swing", "lift", "bend", "twist"),  # the file has twist before bend
+    joint_names=("swing", "lift", "bend", "twist"),  # the file has twist before bend
     parent=(-1, 0, 1, 1), offset=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -0.4), (0.0, 0.0, 0.3)),
     axis=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0), (0.6, 0.0, 0.8)), damping=(0.0,) * 4,
-    body_names=("foot", "boom", "jib", "hook", "weight"), body_hinge=(-1, 1, 2, 2, 3),
+    body_names=("foot", "boom", "jib", "hook", "weight"), body_joint=(-1, 1, 2, 2, 3),
     mass=(4.0, 2.0, 1.2, 0.3, 0.5),
     com=((0.0, 0.1, -0.5), (0.02, 0.0, -0.2), (0.0, 0.01, -0.15), (0.03, 0.0, -0.3), (0.0, 0.05, -0.08)),
     inertia=tuple(np.diag(moments).tolist() for moments in MOMENTS), gravity=(0.0, 0.0, -9.81),

@@ -53,7 +53,7 @@ def derived(tree: tmt.Tree, q, qd, factors: dict | None = None, slip: str = "", 
     for b, mass in enumerate(tree.mass):
         factor = {term: (factors or {}).get((b, term), 1.0) for term in OF_TERM}
         I, c, slips = np.array(tree.inertia[b]), np.array(tree.com[b]), slip if b in bodies else ""
-        turn = turns[tree.body_hinge[b]]
+        turn = turns[tree.body_joint[b]]
         R = np.array([[x + np.zeros(len(q)) for x in row] for row in turn]).transpose(2, 0, 1)
         Rt, own_w, own_alpha, own_B = np.swapaxes(R, 1, 2), w[:, b], alpha[:, b], B[:, b]
         if slips == "not turned":
@@ -101,7 +101,7 @@ def tree_numbers(tree: tmt.Tree) -> Iterator[tuple[str, str, tuple, float]]:
                 (b, *map("xyz".index, name)),
                 np.abs(tree.inertia[b]).max(),
             )
-    for i, joint in enumerate(tree.hinge_names):
+    for i, joint in enumerate(tree.joint_names):
         for k, axis in enumerate("xyz"):
             yield f"offset {axis} of {joint}", "offset", (i, k), length
             yield f"axis {axis} of {joint}", "axis", (i, k), 1.0
@@ -123,7 +123,7 @@ def changed(tree: tmt.Tree, number: tuple, rng: np.random.Generator) -> tuple[tm
 
 
 def faults_of(robot: str, tree: tmt.Tree, rng: np.random.Generator) -> list[Fault]:
-    found, names, n, bodies = [], tree.hinge_names, len(tree.axis), range(len(tree.mass))
+    found, names, n, bodies = [], tree.joint_names, len(tree.axis), range(len(tree.mass))
 
     def add(kind, place, make, *values, **more):
         found.append(Fault(robot, tree, kind, place, values, partial(make, **more)))
@@ -158,12 +158,12 @@ def random_tree(rng: np.random.Generator) -> tmt.Tree:
         np.einsum("nii->n", second)[:, None, None] * np.eye(3) - (second + np.swapaxes(second, 1, 2)) / 2.0
     )
     return tmt.Tree(
-        hinge_names=tuple(f"j{i}" for i in range(n)),
+        joint_names=tuple(f"j{i}" for i in range(n)),
         kind=("hinge", *(str(kind) for kind in rng.choice(["hinge", "slide"], n - 1, p=[0.75, 0.25]))),
         parent=(-1, *(i - 1 if rng.random() < 0.8 else int(rng.integers(-1, i)) for i in range(1, n))),
         offset=rng.uniform(-0.5, 0.5, (n, 3)).tolist(), axis=rng.normal(size=(n, 3)).tolist(),
         damping=(0.0,) * n,
-        body_names=tuple(f"b{i}" for i in range(n)), body_hinge=tuple(range(n)),
+        body_names=tuple(f"b{i}" for i in range(n)), body_joint=tuple(range(n)),
         mass=(10.0 ** rng.uniform(-1.0, 1.0, n)).tolist(), com=rng.uniform(-0.3, 0.3, (n, 3)).tolist(),
         inertia=inertia.tolist(), gravity=rng.uniform(-10.0, 10.0, 3).tolist(),
         armature=(rng.uniform(0.0, 0.5, n) * (rng.random(n) < 0.3)).tolist(),

@@ -50,7 +50,7 @@ def test_another_robot_has_its_own_joints_and_its_postures_in_degrees():
         error = refused(two, **{field: value})
         assert error.field == field and "beta" in error.accepted and "alpha" not in error.accepted
     case = Case(two, Scene("low", "low", speed=(0, 180), locked=("beta",)))
-    assert case.joints == case.tree.hinge_names == case.coordinates.names == ("gamma",)
+    assert case.joints == case.tree.joint_names == case.coordinates.names == ("gamma",)
     assert case.q.tolist() == [np.pi / 2] and case.v.tolist() == [np.pi] and case.locked == {"beta": 0.0}
     assert two.case().q.tolist() == [0.0, 0.0] and two.case().joints == ("beta", "gamma")
 

@@ -24,7 +24,7 @@ ONE = replace(
 def reading_of(tree, **more):
     """What a reader gives of a tree, with changes."""
     known = {"name": "", "source": "text", "tree": tree, "features": ("one",), "keyframes": {}, "dt": 0.002}
-    known |= {"drive": Drive(), "qpos0": np.array(tree.zero), "ranges": (None,) * len(tree.hinge_names)}
+    known |= {"drive": Drive(), "qpos0": np.array(tree.zero), "ranges": (None,) * len(tree.joint_names)}
     return SimpleNamespace(**known | more)
 
 

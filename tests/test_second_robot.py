@@ -18,4 +18,4 @@ def test_all_experiments_pass_and_draw_and_the_report_is_of_this_robot(shared):
         assert all(made.sizes[figure] > 5000 and caption for figure, caption in section.figures)
     text, results = made.texts["report.md"], json.loads(made.texts["results.json"])
     assert not re.search(r"alpha|gamma|forearm|ball catch|assignment|α", text)
-    assert all(joint in text for joint in TREE.hinge_names) and results["passed"]
+    assert all(joint in text for joint in TREE.joint_names) and results["passed"]

@@ -11,9 +11,9 @@ from tmt.exact.values import DIGITS
 
 def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free"), most=2) -> Tree:
     """Bodies on one to `most` joints each, with all that a Tree may have; "free": the first is free."""
-    parent, offset, axis, kind, body_hinge, inertias = [], [], [], [], [], []
+    parent, offset, axis, kind, body_joint, inertias = [], [], [], [], [], []
     for b in range(bodies):
-        before, is_free = -1 if b == 0 else int(rng.choice([-1, *body_hinge])), "free" in kinds and b == 0
+        before, is_free = -1 if b == 0 else int(rng.choice([-1, *body_joint])), "free" in kinds and b == 0
         others = [name for name in kinds if name != "free"]
         chosen = ["slide"] * 3 + ["ball"] if is_free else list(rng.choice(others, rng.integers(1, most + 1)))
         if chosen == ["ball", "ball"]:  # in one body they are singular
@@ -26,15 +26,15 @@ def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free"), most=
             frame, _ = np.linalg.qr(rng.normal(size=(3, 3)))
             frame *= np.linalg.det(frame)
             axis += list(frame) if name == "ball" else [np.eye(3)[len(axis)] if is_free else frame[0]]
-        body_hinge.append(before)
+        body_joint.append(before)
         inertias.append(possible_tensor(rng))
     n, nv = len(parent), len(axis)
     rest = [
         x for name in kind for x in (unit_quaternion(rng) if name == "ball" else [rng.uniform(-0.5, 0.5)])
     ]
     return Tree(
-        hinge_names=[f"{name}{i}" for i, name in enumerate(kind)], parent=parent, offset=offset, axis=axis,
-        damping=rng.uniform(0.0, 0.5, nv), **random_bodies(rng, body_hinge, inertias), kind=kind, rest=rest,
+        joint_names=[f"{name}{i}" for i, name in enumerate(kind)], parent=parent, offset=offset, axis=axis,
+        damping=rng.uniform(0.0, 0.5, nv), **random_bodies(rng, body_joint, inertias), kind=kind, rest=rest,
         armature=rng.uniform(0.0, 0.1, nv) * rng.integers(0, 2, nv),
         stiffness=rng.uniform(0.0, 3.0, n) * rng.integers(0, 2, n),
         reference=[0.0 if name == "ball" else rng.uniform(-0.5, 0.5) for name in kind],
@@ -53,7 +53,7 @@ def small_tree() -> Tree:
     """A hinge and a ball on a slide, with springs, damping and a controller."""
     rng = np.random.default_rng(48)
     tree = tree_of_kinds(rng, bodies=3, kinds=("hinge", "slide", "ball"))
-    flat = [kind != "ball" for kind, _, by in tree.coordinates.joints for _ in range(by.start, by.stop)]
+    flat = [joint.kind != "ball" for joint in tree.coordinates.joints for _ in tree.axis[joint.qd]]
     gains = (np.eye(len(flat)) + 0.2 * rng.normal(size=(2, len(flat), len(flat)))) * np.outer(flat, flat)
     return replace(tree, stiffness=(1.0, 2.0, 3.0), position_gain=gains[0], speed_gain=gains[1])
 
@@ -61,8 +61,8 @@ def small_tree() -> Tree:
 def wrist() -> Tree:
     """Three hinges through one point, z y z: Mbar is singular where the second is at zero."""
     return Tree(
-        hinge_names=("a", "b", "c"), parent=(-1, 0, 1), offset=np.zeros((3, 3)), axis=((0, 0, 1), (0, 1, 0), (0, 0, 1)),
-        damping=(0.0,) * 3, body_names=["hand"], body_hinge=[2], mass=[1.0], com=[(0.1, 0.0, 0.2)],
+        joint_names=("a", "b", "c"), parent=(-1, 0, 1), offset=np.zeros((3, 3)), axis=((0, 0, 1), (0, 1, 0), (0, 0, 1)),
+        damping=(0.0,) * 3, body_names=["hand"], body_joint=[2], mass=[1.0], com=[(0.1, 0.0, 0.2)],
         inertia=[np.diag([0.01, 0.02, 0.025])], gravity=(0, 0, -9.81),
     )  # fmt: skip
 
@@ -72,13 +72,13 @@ def possible_tensor(rng) -> np.ndarray:
     return sum(np.dot(r, r) * np.eye(3) - np.outer(r, r) for r in rng.uniform(-0.1, 0.1, (6, 3)))
 
 
-def random_bodies(rng, body_hinge, inertias) -> dict:
+def random_bodies(rng, body_joint, inertias) -> dict:
     """What a Tree says of bodies on these joints, and gravity."""
-    count = len(body_hinge)
+    count = len(body_joint)
     mass, com = rng.uniform(0.5, 2.0, count), rng.uniform(-0.3, 0.3, (count, 3))
     bodies = {
         "body_names": [f"body{b}" for b in range(count)],
-        "body_hinge": body_hinge,
+        "body_joint": body_joint,
         "mass": mass,
         "com": com,
     }

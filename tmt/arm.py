@@ -28,13 +28,13 @@ def _diagonal(moments: tuple[float, float, float]) -> Rows:
 
 
 ARM = Tree(
-    hinge_names=("alpha", "beta", "gamma"),  # shoulder, shoulder, elbow
+    joint_names=("alpha", "beta", "gamma"),  # shoulder, shoulder, elbow
     parent=(-1, 0, 1),
     offset=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -D)),
     axis=((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),  # y, x, y
     damping=(0.0, 0.0, 0.0),
     body_names=("upper arm", "forearm"),
-    body_hinge=(1, 2),
+    body_joint=(1, 2),
     mass=(M1, M2),
     com=((0.0, 0.0, -COM1), (COM2, 0.0, 0.0)),
     inertia=(_diagonal(I1), _diagonal(I2)),

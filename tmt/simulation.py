@@ -211,7 +211,8 @@ def reasons(
         path, speeds = between(run, record) if last and between else (q[run, record:], qd[run, record:])
         code = int(codes[run])
         reach = max(
-            (max(abs(path[last, at][0]), dt * abs(speeds[last, by][0])) for _, at, by in hinges), default=0.0
+            (max(abs(path[last, joint.q][0]), dt * abs(speeds[last, joint.qd][0])) for joint in hinges),
+            default=0.0,
         )
         if code in (OVERFLOW, NEWTON) and reach > 2.0**48:
             code = TURNED  # within the step: there is no sine at its stages

@@ -203,7 +203,7 @@ def message(given: Given) -> str:
         "remarks": [say(remark) for remark in remarks(given.reading, has_scenes=False)],
         "rounded": None if why.is_found or given.rtol else rounded(given),
         "hinge": next(
-            (name for name, kind in zip(given.tree.hinge_names, given.tree.kind) if kind == "hinge"), ""
+            (name for name, kind in zip(given.tree.joint_names, given.tree.kind) if kind == "hinge"), ""
         ),
     }
     text = block("agreement", "message", **values)

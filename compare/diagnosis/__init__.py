@@ -58,7 +58,7 @@ def diagnose_stated(
     found = diagnose(tree, values.q, values.qd, given, allowed, seconds, bias)
     if joints is None or joints.is_same:
         return found
-    coordinates, causes = Coordinates(tree.hinge_names, tree.kind), []
+    coordinates, causes = Coordinates(tree.joint_names, tree.kind), []
     change = Change("order", "joints", ", ".join(map(str, joints.joints)), "those of the model")
     for cause in found.causes:
         both = cause.joints and joints.after(cause.joints, coordinates)

@@ -117,7 +117,7 @@ class Compared:
     def details(self) -> tuple[dict, ...]:
         """The coefficients that differ, for the template: in terms, or both numbers where they are furthest apart."""
         q, tree, details = self.equations.q, self.equations.tree, []
-        names = Coordinates(tree.hinge_names, tree.kind).positions
+        names = Coordinates(tree.joint_names, tree.kind).positions
         for one, terms in list(zip(self.differing, self.terms))[:SHOWN]:
             k = int(np.argmax(np.abs(one.off)))
             at = [f"{name} = {value:.6g}" for name, value in list(zip(names, q[k]))[:SHOWN]]

@@ -50,7 +50,7 @@ class Equations:
 
     @property
     def names(self) -> tuple[str, ...]:
-        return Coordinates(self.tree.hinge_names, self.tree.kind).speeds
+        return Coordinates(self.tree.joint_names, self.tree.kind).speeds
 
     @property
     def entries(self) -> list[tuple]:
@@ -70,7 +70,7 @@ class Equations:
             row[last] = row[last] + np.asarray(added)[:, None]
         for k in {path.index[0] for path in changes or {} if path.field == "axis"}:
             numbers["axis"][k] = unit_direction(*numbers["axis"][k])
-        kept = {name: getattr(self.tree, name) for name in ("parent", "coordinates", "body_hinge", "moves")}
+        kept = {name: getattr(self.tree, name) for name in ("parent", "coordinates", "body_joint", "moves")}
         changed = SimpleNamespace(**numbers, **kept)
         return self.summed(changed, method.bodies(changed, list(self.q.T), list(self.qd.T)))
 

@@ -95,17 +95,19 @@ def forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Place]:
         return Place(2, "number", name, stated, unit, 1.0, column=force, least=least)
 
     joints = tree.coordinates.joints
-    for i, (name, (kind, at, by)) in enumerate(zip(tree.hinge_names, joints)):
-        of_damping, of_stiffness, of_force = UNITS_OF_FORCES[kind]
-        for v in range(by.start, by.stop):
-            axis = name if kind != "ball" else f"{name} {XYZ[v - by.start]}"
+    for i, (name, joint) in enumerate(zip(tree.joint_names, joints)):
+        of_damping, of_stiffness, of_force = UNITS_OF_FORCES[joint.kind]
+        for v in range(joint.qd.start, joint.qd.stop):
+            axis = name if joint.kind != "ball" else f"{name} {XYZ[v - joint.qd.start]}"
             own, speed = np.eye(qd.shape[1])[v], qd[:, v : v + 1]
             yield place(f"damping of {axis}", of_damping, tree.damping[v], speed * own)
             yield place(f"friction of {axis}", of_force, 0.0, np.sign(speed) * own)
             yield place(f"constant force at {axis}", of_force, 0.0, np.ones_like(speed) * own, -np.inf)
-            if kind != "ball":
-                rest = tree.rest[at.start] if tree.stiffness[i] else tree.reference[i]
-                yield place(f"stiffness of {axis}", of_stiffness, tree.stiffness[i], (q[:, at] - rest) * own)
+            if joint.kind != "ball":
+                rest = tree.rest[joint.q.start] if tree.stiffness[i] else tree.reference[i]
+                yield place(
+                    f"stiffness of {axis}", of_stiffness, tree.stiffness[i], (q[:, joint.q] - rest) * own
+                )
     if len(joints) > 1:
         yield place("damping added to every joint", "N m s/rad", 0.0, qd)
 
@@ -132,24 +134,24 @@ def numbers(equations: Equations) -> list[Place]:
             mirrored = () if i == j else ((Path("inertia", (b, j, i)), 1.0),)
             least = 0.0 if i == j else -np.inf
             add(f"inertia {name} of {body}", "inertia", (b, i, j), "kg m2", size, *mirrored, least=least)
-    carried = [[b for b, joint in enumerate(tree.body_hinge) if joint == i] for i in range(len(tree.parent))]
+    carried = [[b for b, joint in enumerate(tree.body_joint) if joint == i] for i in range(len(tree.parent))]
     following = [[j for j, parent in enumerate(tree.parent) if parent == i] for i in range(len(tree.parent))]
-    for i, (joint, (kind, _, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
+    for i, (name, joint) in enumerate(zip(tree.joint_names, tree.coordinates.joints)):
         for k, axis in enumerate(XYZ):
-            add(f"offset {axis} of {joint}", "offset", (i, k), "m", length)
-            if kind != "slide":
+            add(f"offset {axis} of {name}", "offset", (i, k), "m", length)
+            if joint.kind != "slide":
                 stays = [(Path("com", (b, k)), -1.0) for b in carried[i]]
                 stays += [(Path("offset", (j, k)), -1.0) for j in following[i]]
-                add(f"anchor {axis} of {joint}", "offset", (i, k), "m", length, *stays)
-        if kind != "ball":
-            unit, size = ("m", length) if kind == "slide" else ("rad", 1.0)
-            add(f"zero of {joint}", "reference", (i,), unit, size, rank=1, kind=OF_ZERO)
+                add(f"anchor {axis} of {name}", "offset", (i, k), "m", length, *stays)
+        if joint.kind != "ball":
+            unit, size = ("m", length) if joint.kind == "slide" else ("rad", 1.0)
+            add(f"zero of {name}", "reference", (i,), unit, size, rank=1, kind=OF_ZERO)
             for k, axis in enumerate(XYZ):
-                add(f"axis {axis} of {joint}", "axis", (by.start, k), "", 0.5)
-        for speed in range(by.start, by.stop):
-            rotor, scale = ("kg", 1.0) if kind == "slide" else ("kg m2", length**2)
-            name = joint if kind != "ball" else f"{joint} {XYZ[speed - by.start]}"
-            add(f"armature of {name}", "armature", (speed,), rotor, stated["mass"].max() * scale, least=0.0)
+                add(f"axis {axis} of {name}", "axis", (joint.qd.start, k), "", 0.5)
+        for speed in range(joint.qd.start, joint.qd.stop):
+            rotor, scale = ("kg", 1.0) if joint.kind == "slide" else ("kg m2", length**2)
+            axis = name if joint.kind != "ball" else f"{name} {XYZ[speed - joint.qd.start]}"
+            add(f"armature of {axis}", "armature", (speed,), rotor, stated["mass"].max() * scale, least=0.0)
     for k, axis in enumerate(XYZ):
         add(f"gravity {axis}", "gravity", (k,), "m/s2", 9.81)
     return places
@@ -176,7 +178,7 @@ def parts_of_terms(equations: Equations) -> Iterator[Place]:
         return
     entries = [entry_name(entry, equations.names) for entry in equations.entries[:count]]
     lengths = [
-        (f"offset of {name}", ("offset", i)) for i, name in enumerate(tree.hinge_names) if tree.parent[i] >= 0
+        (f"offset of {name}", ("offset", i)) for i, name in enumerate(tree.joint_names) if tree.parent[i] >= 0
     ]
 
     def alone(*kept: tuple[str, int]) -> np.ndarray:

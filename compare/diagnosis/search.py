@@ -112,7 +112,7 @@ def of_fitted(fitted: Fitted, rank: int, search: Search) -> Cause:
     """A number, a term or a coefficient, or two of them; of zeros of joints with the joints to state."""
     changes, joints = [place.changed(change) for place, change in zip(fitted.places, fitted.changes)], None
     if all(place.kind == OF_ZERO for place in fitted.places):
-        coordinates = Coordinates(search.equations.tree.hinge_names, search.equations.tree.kind)
+        coordinates = Coordinates(search.equations.tree.joint_names, search.equations.tree.kind)
         zeros = {change.place: change.explains - change.stated for change in changes}
         stated = []
         for name, kind in zip(coordinates.names, coordinates.all_kinds):

@@ -42,7 +42,7 @@ def changed_bodies(
     """Each slip by its name, made in every body."""
     tree, q, qd = equations.tree, list(equations.q.T), equations.qd
     frames = method.joint_frames(tree, q)
-    turns = [frames[joint].turn if joint >= 0 else method.IDENTITY for joint in tree.body_hinge]
+    turns = [frames[joint].turn if joint >= 0 else method.IDENTITY for joint in tree.body_joint]
     world = [turned(b, R) for b, R in zip(bodies, turns)]
     moved = [Matrix(m * (np.dot(c, c) * np.eye(3) - np.outer(c, c))) for m, c in zip(tree.mass, tree.com)]
     alone = zip(*(method.bodies(tree, q, list((qd * unit).T)) for unit in np.eye(equations.nv)))

@@ -90,7 +90,7 @@ def absolute_angles(tree: tmt.Tree) -> np.ndarray | None:
 
 def conventions(tree: tmt.Tree) -> Iterator[Variant]:
     """Order, senses and units of the joints; the order and the senses of a few together, rank 3."""
-    names, kinds = tree.hinge_names, dict(zip(tree.hinge_names, tree.kind))
+    names, kinds = tree.joint_names, dict(zip(tree.joint_names, tree.kind))
     coordinates, straight = Coordinates(names, tree.kind), [name for name in names if kinds[name] != "ball"]
 
     def convention(rank, kind, name, stated, explains, order=names, turned=(), units=None) -> Variant:

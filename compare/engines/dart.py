@@ -44,16 +44,16 @@ class Model(OfUrdf):
             {},
             {},
         )  # by their numbers in the Tree; quaternions by the first of DART's numbers
-        for k, (name, (kind, at, by)) in enumerate(zip(file.names, file.coordinates.places.joints)):
-            joint = self.skeleton.getJoint(name.removesuffix(" turn") if kind == "ball" else name)
+        for k, (name, place) in enumerate(zip(file.names, file.coordinates.places.joints)):
+            joint = self.skeleton.getJoint(name.removesuffix(" turn") if place.kind == "ball" else name)
             if joint is None:  # a part of a free joint
                 continue
             self.joints[k], own = joint, joint.getIndexInSkeleton(0)
-            q[own], v[own] = at.start, by.start
-            if kind == "ball":
-                self.free[own] = at
-                q[own : own + 6] = np.r_[at.start : at.start + 3, at.start - 3 : at.start]
-                v[own : own + 6] = np.r_[by, by.start - 3 : by.start]
+            q[own], v[own] = place.q.start, place.qd.start
+            if place.kind == "ball":
+                self.free[own] = place.q
+                q[own : own + 6] = np.r_[place.q.start : place.q.start + 3, place.q.start - 3 : place.q.start]
+                v[own : own + 6] = np.r_[place.qd, place.qd.start - 3 : place.qd.start]
         turned = tuple((slice(own, own + 3), at) for own, at in self.free.items())
         self.order = Order(q, v, turned, in_world=True)
         numbered = {joint.getIndexInSkeleton(0): joint for joint in self.joints.values()}

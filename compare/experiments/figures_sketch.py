@@ -59,16 +59,18 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
 def draw_joints(ax, robot: Robot, arrows: np.ndarray, few: bool) -> None:
     """Arrows along hinges and, with a dashed line, along slides; circles for balls; of few joints each has its name."""
     lines = joint_lines(robot)
-    for joint, (kind, _, by) in zip(robot.joints, robot.tree.coordinates.joints):
-        colour, (origin, axis) = lines[joint][0] if few else KIND_COLOURS[kind], arrows[by.start]
-        if kind == "ball":
+    for name, joint in zip(robot.joints, robot.tree.coordinates.joints):
+        colour, (origin, axis) = lines[name][0] if few else KIND_COLOURS[joint.kind], arrows[joint.qd.start]
+        if joint.kind == "ball":
             ax.plot(*origin[:, None], marker="o", markersize=11, color=colour, fillstyle="none")
         else:
             ax.quiver(*origin, *axis, color=colour, linewidth=2 if few else 1.2, arrow_length_ratio=0.2)
-        if kind == "slide":
+        if joint.kind == "slide":
             ax.plot(*np.stack([origin - axis, origin]).T, color=colour, linewidth=1.2, linestyle="--")
         if few:
-            ax.text(*(origin + (1.3 if kind != "ball" else 0.3) * axis), robot.symbol(joint), color=colour)
+            ax.text(
+                *(origin + (1.3 if joint.kind != "ball" else 0.3) * axis), robot.symbol(name), color=colour
+            )
 
 
 def axes(robot: Robot, q: np.ndarray, length: float) -> np.ndarray:

@@ -76,9 +76,9 @@ def step_rounding(
 def of_positions(tree: Tree, q: np.ndarray) -> np.ndarray:
     """The sizes of which the sum of a position and its change has 8 eps of rounding, (states, nv)."""
     sizes = np.full((len(q), tree.coordinates.nv), OF_A_BALL / (8 * EPS))
-    for kind, at, by in tree.coordinates.joints:
-        if kind != "ball":
-            sizes[:, by] = np.abs(q[:, at])
+    for joint in tree.coordinates.joints:
+        if joint.kind != "ball":
+            sizes[:, joint.qd] = np.abs(q[:, joint.q])
     return sizes
 
 

@@ -118,8 +118,7 @@ def work(case: Case, q: np.ndarray) -> np.ndarray:
 
 def fed_back_at(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     """The torque of a controller's position gains at positions q (..., nq), N m or N, (..., nv), to be subtracted."""
-    at = [at.start for at, by in tree.coordinates.places for _ in range(by.start, by.stop)]
-    return q[..., at] @ np.array(tree.position_gain).T
+    return q[..., tree.coordinates.first_positions] @ np.array(tree.position_gain).T
 
 
 def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
@@ -144,9 +143,7 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     if tree.has_springs:
         stretch = coordinates.difference(q[0], np.array(tree.rest))
         exchange = exchange + tmt.spring_torque(q[0], tree) @ stretch / 2.0
-    slides = [
-        i for kind, _, by in coordinates.places.joints if kind == "slide" for i in range(by.start, by.stop)
-    ]
+    slides = [joint.qd.start for joint in coordinates.places.joints if joint.kind == "slide"]
     weight = np.linalg.norm(tree.gravity) * np.sum(tree.mass)
     lifted = weight * np.abs(coordinates.difference(q, q[0])[:, slides]).sum(axis=1)
     stiff = np.sum(tree.stiffness) + (np.trace(tree.position_gain) if tree.position_gain else 0.0)

@@ -30,7 +30,7 @@ def levers(tree: tmt.Tree, q: ArrayLike | None = None) -> tuple[np.ndarray, np.n
         lengths.append(np.linalg.norm(tree.offset[i]) + moved)
     from_joints = [[0.0] * len(lengths) for _ in tree.mass]
     from_origin = np.zeros((*q.shape[:-1], len(tree.mass)))
-    for b, (joint, com) in enumerate(zip(tree.body_hinge, tree.com)):
+    for b, (joint, com) in enumerate(zip(tree.body_joint, tree.com)):
         distance = np.linalg.norm(com)
         while joint >= 0:
             if tree.kind[joint] != "slide":
@@ -83,9 +83,7 @@ def acceleration_scale(
 
 def gain_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """|P| |q| + |S| |qd| of a controller's gains, N m or N, (..., nv)."""
-    positions = np.abs(q)[
-        ..., [at.start for at, by in tree.coordinates.places for _ in range(by.start, by.stop)]
-    ]
+    positions = np.abs(q)[..., tree.coordinates.first_positions]
     gains = zip((tree.position_gain, tree.speed_gain), (positions, np.abs(qd)))
     return sum((values @ np.abs(gain).T for gain, values in gains if gain), np.zeros(np.shape(qd)))
 
@@ -93,6 +91,8 @@ def gain_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
 def spring_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     """k (|q| + |rest|) of the springs, N m or N, (..., nv); for a ball, which turns by pi at most, k pi."""
     scale = np.zeros((*q.shape[:-1], tree.coordinates.nv))
-    for k, (kind, at, by) in zip(tree.stiffness, tree.coordinates.joints):
-        scale[..., by] = k * (np.pi if kind == "ball" else np.abs(q[..., at]) + np.abs(tree.rest[at.start]))
+    for k, joint in zip(tree.stiffness, tree.coordinates.joints):
+        scale[..., joint.qd] = k * (
+            np.pi if joint.kind == "ball" else np.abs(q[..., joint.q]) + np.abs(tree.rest[joint.q.start])
+        )
     return scale

@@ -87,7 +87,7 @@ class Robot:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        return self.tree.hinge_names
+        return self.tree.joint_names
 
     @property
     def compared(self) -> tuple[str, str]:
@@ -151,7 +151,7 @@ class Robot:
 
         return replace(
             self,
-            tree=replace(self.tree, hinge_names=tuple(names)),
+            tree=replace(self.tree, joint_names=tuple(names)),
             scenes=tuple(replace(scene, locked=renamed(scene.locked)) for scene in self.scenes),
             symbols={called[joint]: symbol for joint, symbol in self.symbols.items()},
             printed=tuple(item._replace(sizes=renamed(item.sizes)) for item in self.printed),

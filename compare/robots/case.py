@@ -192,9 +192,7 @@ class Case:
         if self.scene.torque != "servos":
             return None
         whole = self.robot.coordinates
-        q = np.array(
-            [self.posture[at.start] for at, by in whole.places.places for _ in range(by.start, by.stop)]
-        )
+        q = self.posture[whole.places.first_positions]
         targets = whole.from_degrees(np.broadcast_to(self.scene.targets, whole.nv), positions=False)
         return controller(self.robot.drive, self.scene.posture, q, targets)
 

@@ -107,22 +107,22 @@ class Coordinates(NamedTuple):
         if not ranges and set(self.all_kinds) == {"hinge"}:
             return rng.uniform(-np.pi, np.pi, (count, self.nq))
         q = np.empty((count, self.nq))
-        for (kind, at, _), limits in zip(self.places.joints, ranges or (None,) * len(self.names)):
-            if kind == "ball":
+        for joint, limits in zip(self.places.joints, ranges or (None,) * len(self.names)):
+            if joint.kind == "ball":
                 turns = rng.normal(size=(count, 4))
-                q[:, at] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+                q[:, joint.q] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
             else:
-                q[:, at.start] = rng.uniform(
-                    *(limits or {"hinge": (-np.pi, np.pi), "slide": (-0.5, 0.5)}[kind]), count
+                q[:, joint.q.start] = rng.uniform(
+                    *(limits or {"hinge": (-np.pi, np.pi), "slide": (-0.5, 0.5)}[joint.kind]), count
                 )
         return q
 
     def from_degrees(self, values: ArrayLike, positions: bool) -> np.ndarray:
         """Positions (nq,) or speeds (nv,) in SI units; angles of scenes are in deg."""
         values = np.array(values, dtype=float)
-        for kind, at, by in self.places.joints:
-            if kind == "hinge" or (kind == "ball" and not positions):
-                place = at if positions else by
+        for joint in self.places.joints:
+            if joint.kind == "hinge" or (joint.kind == "ball" and not positions):
+                place = joint.q if positions else joint.qd
                 values[place] = np.radians(values[place])
         return values
 

@@ -69,7 +69,7 @@ def robot_of_solution(
 
     names: of the file's joints, in the order of the solution's. Actuators do not act: those of the file may differ.
     """
-    solution = replace(solution, tree=replace(solution.tree, hinge_names=tuple(names)), drive=Drive())
+    solution = replace(solution, tree=replace(solution.tree, joint_names=tuple(names)), drive=Drive())
     stated = {"stated_in": whose, "features_stated": tuple(solution.features)}
     of_file = {"mjcf": reading.source, "features": tuple(reading.features)}
     robot = replace(robot_of(solution, shown), **stated, **of_file)
@@ -89,11 +89,11 @@ def names_of_keys(reading: Reading) -> dict[str, str]:
 
 def named_positions(reading: Reading, names: Mapping[str, str]) -> dict[str, tuple]:
     """Postures by name, (nq,) each: keyframes, qpos0, the middle of the ranges; of equal postures only the first."""
-    coordinates = Coordinates(reading.tree.hinge_names, reading.tree.kind)
+    coordinates = Coordinates(reading.tree.joint_names, reading.tree.kind)
     middle = np.array(reading.qpos0, dtype=float)
-    for (kind, at, _), limits in zip(coordinates.places.joints, reading.ranges):
-        if limits and kind != "ball":
-            middle[at] = np.mean(limits)
+    for joint, limits in zip(coordinates.places.joints, reading.ranges):
+        if limits and joint.kind != "ball":
+            middle[joint.q] = np.mean(limits)
     own = dict(zip(OWN_POSTURES, (reading.qpos0, middle)))
     positions = {}
     for name, q in ({names[key]: q for key, q in reading.keyframes.items()} | own).items():
@@ -113,7 +113,7 @@ def scenes_from(
     compared on a thrown free body, because one that is let go may only fall.
     start, q: the posture, name and (nq,); dt: step of the file, s; drive: its actuators.
     """
-    coordinates = Coordinates(tree.hinge_names, tree.kind)
+    coordinates = Coordinates(tree.joint_names, tree.kind)
     mass_matrix, weight = map(np.array, mass_matrix_and_bias(tree, q.tolist(), [0.0] * coordinates.nv))
     root = np.sqrt(
         np.where(np.diag(mass_matrix) > 0.0, np.diag(mass_matrix), 1.0)
@@ -148,8 +148,7 @@ def servo_scenes(
 
     A robot with a free body has no gravity in them. If a servo is too fast for MAX_STEPS_OF_A_FILE, methods are not compared.
     """
-    joints = tree.coordinates.joints
-    positions = np.array([q[at.start] for _, at, by in joints for _ in range(by.start, by.stop)])
+    positions = np.array(q)[tree.coordinates.first_positions]
     acting = controller(drive, start, positions)
     if not acting.position_gain.any():
         return []
@@ -160,7 +159,8 @@ def servo_scenes(
     )
     free = bool(free_joints(tree))
     settings = {"gravity": not free, "duration": SERVOS_ACT, "dt": SERVOS_ACT / count, "judged": 0.0}
-    moved = tuple(MOVED_TARGETS[kind] for kind, _, by in joints for _ in range(by.start, by.stop))
+    kinds = (joint.kind for joint in tree.coordinates.joints for _ in tree.axis[joint.qd])
+    moved = tuple(MOVED_TARGETS[kind] for kind in kinds)
     followed = ("speed",) if least <= count else ()
     return [
         Scene(f"{start}, held by servos", start, "servos", tags=("own", "full only"), **settings),

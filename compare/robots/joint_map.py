@@ -53,8 +53,8 @@ class JointMap:
         places = dict(zip(coordinates.names, coordinates.places.joints))
         self.joints = tuple(joints)
         chosen = [places[joint.name] for joint in joints]
-        self.q = np.array([i for kind, at, by in chosen for i in range(at.start, at.stop)], int)
-        self.v = np.array([i for kind, at, by in chosen for i in range(by.start, by.stop)], int)
+        self.q = np.array([i for place in chosen for i in range(place.q.start, place.q.stop)], int)
+        self.v = np.array([i for place in chosen for i in range(place.qd.start, place.qd.stop)], int)
         self.sign, self.zero, self.sense = np.ones(len(self.q)), np.zeros(len(self.q)), np.ones(len(self.v))
         self.of_q, self.of_v = np.ones(len(self.q)), np.ones(len(self.v))
         at = by = 0
@@ -195,15 +195,15 @@ def matched_joints(reference: tmt.Tree, tree: tmt.Tree, whose: str) -> Matched:
     """The joints of a tree for those of the reference, called `whose`: by name, else by place, axis and type. See Unmatched."""
     from scipy.optimize import linear_sum_assignment  # slow import
 
-    pairs = same_names(reference.hinge_names, tree.hinge_names)
-    left = [i for i in range(len(reference.hinge_names)) if i not in pairs]
-    free = [j for j in range(len(tree.hinge_names)) if j not in pairs.values()]
+    pairs = same_names(reference.joint_names, tree.joint_names)
+    left = [i for i in range(len(reference.joint_names)) if i not in pairs]
+    free = [j for j in range(len(tree.joint_names)) if j not in pairs.values()]
     costs = costs_of(reference, tree)
     rows, columns = linear_sum_assignment(costs[np.ix_(left, free)])
     pairs |= {left[i]: free[j] for i, j in zip(rows, columns) if costs[left[i], free[j]] < OTHER_TYPE}
     refuse_unmatched(reference, tree, pairs, whose)
-    names = tuple(tree.hinge_names[pairs[i]] for i in range(len(reference.hinge_names)))
-    other = [f"{name} as {right}" for name, right in zip(names, reference.hinge_names) if name != right]
+    names = tuple(tree.joint_names[pairs[i]] for i in range(len(reference.joint_names)))
+    other = [f"{name} as {right}" for name, right in zip(names, reference.joint_names) if name != right]
     return Matched(names, tuple(other))
 
 
@@ -242,14 +242,14 @@ def places_of(tree: tmt.Tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     for parent, offset in zip(tree.parent, tree.offset):
         anchors.append(np.add(offset, anchors[parent] if parent >= 0 else 0.0))
         depths.append(depths[parent] + 1 if parent >= 0 else 0)
-    axes = [tree.axis[by.start] for _, _, by in tree.coordinates.joints]
+    axes = [tree.axis[joint.qd.start] for joint in tree.coordinates.joints]
     return np.array(anchors), np.array(depths), np.array(axes)
 
 
 def refuse_unmatched(reference: tmt.Tree, tree: tmt.Tree, pairs: Mapping[int, int], whose: str) -> None:
     """Unmatched, if a joint is missing, additional, or of another kind."""
-    ours, theirs = (dict(zip(one.hinge_names, one.kind)) for one in (reference, tree))
-    pairs_of_names = [(reference.hinge_names[i], tree.hinge_names[j]) for i, j in sorted(pairs.items())]
+    ours, theirs = (dict(zip(one.joint_names, one.kind)) for one in (reference, tree))
+    pairs_of_names = [(reference.joint_names[i], tree.joint_names[j]) for i, j in sorted(pairs.items())]
     wrong = [
         f"joint {name} is a {theirs[name]}, expected a {ours[expected]} as in {whose}"
         for expected, name in pairs_of_names

@@ -110,12 +110,12 @@ def with_unit_quaternions(where: str, q: object, robot: Robot) -> object:
     if not are_numbers(q) or len(q) != robot.coordinates.nq:
         return q
     position = np.array(q, dtype=float)
-    for name, (kind, at, _) in zip(robot.joints, robot.coordinates.places.joints):
-        length = float(np.linalg.norm(position[at])) if kind == "ball" else 1.0
+    for name, joint in zip(robot.joints, robot.coordinates.places.joints):
+        length = float(np.linalg.norm(position[joint.q])) if joint.kind == "ball" else 1.0
         if not abs(length - 1.0) <= NEARLY_ONE:
             text = f"q is {in_toml(q)}; the quaternion of {name} has length {length:.6g}, expected 1"
             raise SceneError(f"{where}: {text}")
-        position[at] /= length
+        position[joint.q] /= length
     return tuple(map(float, position))
 
 

@@ -97,8 +97,12 @@ def largest_speeds_and_torques(robot: Robot) -> np.ndarray:
     if not robot.ranges:
         return np.full((2, robot.coordinates.nv), 10.0)
     speeds = []
-    for (kind, _, by), limits in zip(robot.coordinates.places.joints, robot.ranges):
-        low, high = limits if limits and kind != "ball" else (0.0, 1.0 if kind == "slide" else 2.0 * np.pi)
-        speeds += [high - low] * (by.stop - by.start)
+    for joint, limits in zip(robot.coordinates.places.joints, robot.ranges):
+        low, high = (
+            limits
+            if limits and joint.kind != "ball"
+            else (0.0, 1.0 if joint.kind == "slide" else 2.0 * np.pi)
+        )
+        speeds += [high - low] * (joint.qd.stop - joint.qd.start)
     mass_matrix, _ = mass_matrix_and_bias(robot.tree, robot.tree.zero, [0.0] * robot.coordinates.nv)
     return np.array([speeds, 10.0 * np.diag(mass_matrix)])

@@ -32,7 +32,7 @@ def stick_figure(
     points = [along_run(frame.origin, q) for frame in frames]
     links = [(up, j) for j, up in enumerate(tree.parent) if up >= 0 and not {j, up} <= free]
     coms = literal.com_positions(q, tree)
-    for body, joint in enumerate(tree.body_hinge):
+    for body, joint in enumerate(tree.body_joint):
         if joint >= 0 and joint not in tree.parent:
             ends = [coms[:, body]]
             if crosses and tree.kind[joint] == "ball":  # radius of a solid sphere of this mass and inertia

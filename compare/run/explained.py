@@ -59,7 +59,7 @@ def of_own_numbers(setup: Setup) -> Setup | None:
     """The same with the file's own numbers in tmt's equations, without the forces that these do not have; None: not possible."""
     reading = setup.reading or read(Path(setup.robot.mjcf))
     stated, tree = setup.robot.tree, reading.tree
-    if (tree.hinge_names, tree.kind, tree.parent) != (stated.hinge_names, stated.kind, stated.parent):
+    if (tree.joint_names, tree.kind, tree.parent) != (stated.joint_names, stated.kind, stated.parent):
         return None
     robot = dataclasses.replace(setup.robot, tree=tree)
     return dataclasses.replace(

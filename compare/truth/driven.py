@@ -43,7 +43,7 @@ class Posture:
         tree, drive = self.robot.tree, self.robot.drive
         if self.lone:
             parts = list(drive.compensation or (0.0,) * len(tree.mass))
-            for body, hinge in enumerate(tree.body_hinge):
+            for body, hinge in enumerate(tree.body_joint):
                 if hinge >= 0 and tree.coordinates.joints[hinge].qd.start in self.lone:
                     parts[body] = 1.0
             drive = replace(drive, compensation=tuple(parts))
@@ -106,7 +106,7 @@ class Posture:
         """How far the rest is beyond the range of a joint, rad or m."""
         joints = zip(self.robot.coordinates.places.joints, self.robot.ranges)
         limited = [
-            (self.q[at.start], limits) for (kind, at, _), limits in joints if limits and kind != "ball"
+            (self.q[joint.q.start], limits) for joint, limits in joints if limits and joint.kind != "ball"
         ]
         return float(max((max(low - q, q - high) for q, (low, high) in limited), default=0.0))
 
@@ -167,5 +167,5 @@ class Posture:
 def floating(tree: tmt.Tree) -> list[list[int]]:
     """The six speeds of each free joint: three slides that carry nothing else, and a ball, from the world."""
     joints, free = tree.coordinates.joints, [i for i in free_joints(tree) if tree.parent[i] == -1]
-    alone = [i for i in free if not {i, i + 1, i + 2} & {*tree.body_hinge}]
+    alone = [i for i in free if not {i, i + 1, i + 2} & {*tree.body_joint}]
     return [list(range(joints[i].qd.start, joints[i + 3].qd.stop)) for i in alone]

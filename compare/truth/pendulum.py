@@ -15,7 +15,7 @@ def pendulum(tree: tmt.Tree) -> tuple[float, float]:
     axis, gravity = np.array(tree.axis[0]), np.array(tree.gravity)
     inertia, moment = tree.armature[0], np.zeros(3)
     for hinge, mass, com, tensor in zip(
-        tree.body_hinge, tree.mass, np.array(tree.com), np.array(tree.inertia)
+        tree.body_joint, tree.mass, np.array(tree.com), np.array(tree.inertia)
     ):
         if hinge == 0:
             inertia += axis @ tensor @ axis + mass * np.sum(np.cross(axis, com) ** 2)

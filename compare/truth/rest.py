@@ -61,7 +61,7 @@ def weight(tree: tmt.Tree, q: np.ndarray, mass: Sequence[float], gravity: Sequen
     """
     frames, carrying = method.joint_frames(tree, q.tolist()), carries(tree)
     masses, moments = np.zeros(len(frames)), np.zeros((len(frames), 3))
-    for m, com, j in zip(mass, tree.com, tree.body_hinge):
+    for m, com, j in zip(mass, tree.com, tree.body_joint):
         if j >= 0:
             masses[j] += m
             moments[j] += m * (

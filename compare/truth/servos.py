@@ -64,7 +64,7 @@ class Driven:
 
     @property
     def coordinates(self) -> Coordinates:
-        return Coordinates(self.tree.hinge_names, self.tree.kind)
+        return Coordinates(self.tree.joint_names, self.tree.kind)
 
     def weight(self, q: np.ndarray) -> Weight:
         """The weight at a posture, without what is compensated."""
@@ -79,9 +79,9 @@ class Driven:
         """
         places = self.coordinates.places
         single, n = np.zeros(places.nv), places.nv
-        for kind, at, by in places.joints:
-            if kind != "ball":
-                single[by] = q[at]
+        for joint in places.joints:
+            if joint.kind != "ball":
+                single[joint.qd] = q[joint.q]
         every = (*self.drive.actuators, *self.drive.tendons)
         turning = [i for i, item in enumerate(every) if item.moment is None] if self.ask else []
         moments = np.array([item.moment or (0.0,) * n for item in every]).reshape(-1, n)

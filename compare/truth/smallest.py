@@ -62,8 +62,8 @@ def forces(
     """
     q, qd, joints = list(q), list(qd), dict(zip(case.joints, tree.coordinates.joints))
     for name in still:
-        _, at, by = joints[name]
-        q[at], qd[by] = start[at], [mpmath.mpf(0)] * len(qd[by])
+        joint = joints[name]
+        q[joint.q], qd[joint.qd] = start[joint.q], [mpmath.mpf(0)] * len(qd[joint.qd])
     springs, tau = [0.0] * len(qd), [mpmath.mpf(float(torque)) for torque in case.tau]
     if tree.has_springs:
         springs = method.spring_torque(tree, q)

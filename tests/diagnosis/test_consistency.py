@@ -18,7 +18,7 @@ SYMMETRIC, DEFINITE, GRADIENT, EVEN, QUADRATIC, POWER = range(6)  # in the order
 
 
 def asked(mass_matrix=tmt.mass_matrix, bias=tmt.bias, tree=ARM):
-    coordinates, rng = Coordinates(tree.hinge_names, tree.kind), np.random.default_rng(0)
+    coordinates, rng = Coordinates(tree.joint_names, tree.kind), np.random.default_rng(0)
     q = coordinates.move(np.tile(tree.zero, (12, 1)), rng.uniform(-2.0, 2.0, (12, coordinates.nv)))
     return conditions(mass_matrix, bias, coordinates, q, rng.uniform(-3.0, 3.0, (12, coordinates.nv)))
 

@@ -134,8 +134,8 @@ def test_of_fewer_than_four_positions_no_cause_is_told(count, too_few):
 
 # two rods in a plane: M is 1.7 + cos(knee), 0.35 + cos(knee) / 2, 0.35
 TREE = tmt.Tree(
-    hinge_names=("hip", "knee"), parent=(-1, 0), offset=((0.0, 0.0, 0.0), (0.0, 0.0, -1.0)), axis=((0.0, 1.0, 0.0),) * 2,
-    damping=(0.0, 0.0), body_names=("upper", "lower"), body_hinge=(0, 1), mass=(1.0, 1.0), com=((0.0, 0.0, -0.5),) * 2,
+    joint_names=("hip", "knee"), parent=(-1, 0), offset=((0.0, 0.0, 0.0), (0.0, 0.0, -1.0)), axis=((0.0, 1.0, 0.0),) * 2,
+    damping=(0.0, 0.0), body_names=("upper", "lower"), body_joint=(0, 1), mass=(1.0, 1.0), com=((0.0, 0.0, -0.5),) * 2,
     inertia=(np.diag([0.1, 0.1, 0.01]).tolist(),) * 2, gravity=(0.0, 0.0, -9.81),
 )  # fmt: skip
 RODS, SPEEDS = states(TREE)
@@ -237,7 +237,7 @@ def test_slides_have_powers():
         "axis": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
         "offset": ((0.0,) * 3,) * 2,
     }
-    tree = replace(TREE, hinge_names=("cart", "rod"), **cart)
+    tree = replace(TREE, joint_names=("cart", "rod"), **cart)
     given = values(tree, RODS, SPEEDS)
     given[:, 0] += 0.3 * HIP * np.cos(KNEE)
     (cause,) = diagnosis(given, tree).causes

@@ -31,8 +31,8 @@ def case_of(tree: tmt.Tree, locked=None, damping=0.0, gravity=True):
     """A case of a Tree, as far as MuJoCo's engine asks it; tree is that without the locked joints."""
     return SimpleNamespace(
         tree=tree, locked=locked or {}, scene=SimpleNamespace(gravity=gravity, damping=damping),
-        controller=None, added_damping=np.full(len(tree.axis), damping), joints=tree.hinge_names,
-        coordinates=Coordinates(tree.hinge_names, tree.kind),
+        controller=None, added_damping=np.full(len(tree.axis), damping), joints=tree.joint_names,
+        coordinates=Coordinates(tree.joint_names, tree.kind),
     )  # fmt: skip
 
 

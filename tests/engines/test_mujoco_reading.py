@@ -31,7 +31,7 @@ def assert_locked(reading, names, rng):
     """MuJoCo with these joints locked at random positions is tmt's Tree with them locked there."""
     tree = reading.tree
     q, _, _ = random_state(rng, tree)
-    at = dict(zip(tree.hinge_names, (q[joint.q] for joint in tree.coordinates.joints)))
+    at = dict(zip(tree.joint_names, (q[joint.q] for joint in tree.coordinates.joints)))
     positions = {name: tuple(at[name]) if len(at[name]) > 1 else float(at[name][0]) for name in names}
     smaller = tree.lock(positions)
     dynamics = engine(reading).of(case_of(smaller, positions))
@@ -43,7 +43,7 @@ def assert_locked(reading, names, rng):
 def test_a_file_with_every_kind_of_joint():
     reading = read(PATHS["mixed"])
     tree = reading.tree
-    assert ", ".join(tree.hinge_names[:7]) == "track, swing, joint 2, base x, base y, base z, base turn"
+    assert ", ".join(tree.joint_names[:7]) == "track, swing, joint 2, base x, base y, base z, base turn"
     assert tree.body_names == ("carriage", "body 3", "base", "tail", "tip", "leg", "foot")
     assert tree.parent == (-1, 0, 1, -1, 3, 4, 5, 6, 6, 8, 9)
     assert np.allclose(tree.rest[:10], [0.05, 0.0, 0.6, *reading.qpos0[3:10]])  # a free base has no spring
@@ -78,7 +78,7 @@ def test_a_point_mass_that_is_fixed_to_a_body_counts(rng):
 @pytest.mark.parametrize("path", PUBLISHED, ids=lambda path: path.name)
 def test_a_published_file_is_the_same_in_both_and_with_joints_locked(path, rng):
     reading = compared(path, rng, states=1)
-    assert_locked(reading, [name for name in reading.tree.hinge_names if rng.random() < 0.3], rng)
+    assert_locked(reading, [name for name in reading.tree.joint_names if rng.random() < 0.3], rng)
     for row in stated_numbers(reading.source, reading.model):
         if row.stated is not None and not row.why:
             assert np.allclose(row.stated, row.compiled, rtol=1e-6, atol=1e-12), row
@@ -169,14 +169,14 @@ def test_what_has_no_name_is_called_by_its_kind_and_number():
     found = read(
         mjcf(body, after='<keyframe><key name="k" qpos="0 0 2 0 0"/><key qpos="2 0 0 0 0"/></keyframe>')
     )
-    assert found.tree.hinge_names == ("w", "joint 1")
+    assert found.tree.joint_names == ("w", "joint 1")
     keys = {"k": [0.0, 0.0, 1.0, 0.0, 0.0], "key 1": [1.0, 0.0, 0.0, 0.0, 0.0]}  # quaternions of length 1
     assert {name: q.tolist() for name, q in found.keyframes.items()} == keys
 
 
 def test_a_joint_without_a_name_does_not_get_that_of_another():
     text = mjcf(TWO.replace('name="j"', "").replace('name="k"', 'name="joint 0"'))
-    assert read(text).tree.hinge_names[1] == "joint 0"
+    assert read(text).tree.joint_names[1] == "joint 0"
 
 
 def test_a_flex_without_elasticity_is_compared(rng):
@@ -191,7 +191,7 @@ def test_a_flex_without_elasticity_is_compared(rng):
 def test_a_joint_alone_and_left_alone(name, rng):
     reading = read(PATHS["mixed"])
     assert_locked(reading, [name], rng)
-    assert_locked(reading, [other for other in reading.tree.hinge_names if other != name], rng)
+    assert_locked(reading, [other for other in reading.tree.joint_names if other != name], rng)
 
 
 @pytest.mark.parametrize("parts", [["x", "z"], ["y", "turn"], ["x", "y", "z"], ["x", "y", "z", "turn"]])

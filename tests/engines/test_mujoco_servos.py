@@ -54,7 +54,7 @@ LAWS = {  # actuators, what the keyframe states, and how many take part
 def differences(robot, known, dt, integrators=None):
     """{integrator: (scheme, how far MuJoCo's run is from tmt's)} where its servos' targets are moved."""
     tree, start = robot.tree, next(iter(robot.positions))
-    moved = tuple(MOVED[kind] for kind, _, by in tree.coordinates.joints for _ in range(by.start, by.stop))
+    moved = tuple(MOVED[joint.kind] for joint in tree.coordinates.joints for _ in tree.axis[joint.qd])
     case = robot.case("step", posture=start, torque="servos", targets=moved, gravity="ball" not in tree.kind)
     ours, theirs, found = Tmt().of(case), known.of(case), {}
     speed = np.random.default_rng(1).normal(size=len(case.v)) * 0.1

@@ -112,7 +112,7 @@ def test_sympy_matrices_with_their_symbols(source, rng):
 def test_a_value_may_have_further_axes_of_length_1_and_be_of_any_numbers(tree, form, rng):
     """A batch is not mixed up with it: of h (n, states) the states are asked one by one."""
     M, h = (lambda q: form(tmt.mass_matrix(q, tree))), (lambda q, v: form(tmt.bias(q, v, tree)))
-    own = OwnEquations({"mass_matrix": M, "bias": h}, Coordinates(tree.hinge_names))
+    own = OwnEquations({"mass_matrix": M, "bias": h}, Coordinates(tree.joint_names))
     q, v = rng.uniform(-2.0, 2.0, (2, 7, len(tree.axis)))
     assert np.allclose(own.mass_matrix(q), tmt.mass_matrix(q, tree), rtol=1e-14, atol=1e-15)
     assert np.allclose(own.bias(q, v), tmt.bias(q, v, tree), rtol=1e-13, atol=1e-15)

@@ -49,7 +49,7 @@ def test_a_base_is_free_if_a_joint_frees_it_else_it_is_said_to_be_fixed(
     base, kind, inertial, joints, fixed, tmp_path
 ):
     (tmp_path / "r.urdf").write_text(urdf(base, kind, inertial))
-    assert len(read(tmp_path / "r.urdf").tree.hinge_names) == joints
+    assert len(read(tmp_path / "r.urdf").tree.joint_names) == joints
     assert said(tmp_path / "r.urdf").get("fixed_base") == fixed
 
 

@@ -44,7 +44,7 @@ def assert_the_same(source, rng, states=5):
     text, tree = urdf(reading.model).replace("</robot>", f"{COMPILER}</robot>"), reading.tree
     model = mujoco.MjModel.from_xml_string(text)
     model.opt.gravity = tree.gravity
-    numbers = [model.joint(name).id for name in tree.hinge_names]
+    numbers = [model.joint(name).id for name in tree.joint_names]
     assert (model.dof_damping[numbers] == tree.damping).all()
     data, dense = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     q = reading.qpos0 + rng.uniform(-3.0, 3.0, (states, model.nv))

@@ -19,8 +19,8 @@ from tmt.model.coordinates import coordinates_of
 EPS = 2.0**-52
 EULER = METHODS["semi_implicit_euler"]
 TURN = tmt.Tree(  # one hinge without gravity: a linear system, and nothing but a sum of roundings
-    hinge_names=("turn",), parent=(-1,), offset=((0.0, 0.0, 0.0),), axis=((0.0, 0.0, 1.0),), damping=(0.0,),
-    body_names=("disc",), body_hinge=(0,), mass=(1.0,),
+    joint_names=("turn",), parent=(-1,), offset=((0.0, 0.0, 0.0),), axis=((0.0, 0.0, 1.0),), damping=(0.0,),
+    body_names=("disc",), body_joint=(0,), mass=(1.0,),
     com=((0.0, 0.0, 0.0),), inertia=(((1.0, 0, 0), (0, 1.0, 0), (0, 0, 2.0)),),
     gravity=(0.0, 0.0, 0.0),
 )  # fmt: skip
@@ -90,8 +90,8 @@ def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
 def test_a_bound_is_of_one_joint_in_its_unit():
     """A heavy cart with a light disc: the cart's bound in m/s2 knows nothing of the disc's in rad/s2."""
     link = dataclasses.replace(
-        TURN, hinge_names=("rail", "turn"), parent=(-1, 0), offset=((0.0, 0.0, 0.0),) * 2, kind=("slide", "hinge"),
-        axis=((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), damping=(0.0, 0.0), body_names=("cart", "disc"), body_hinge=(0, 1),
+        TURN, joint_names=("rail", "turn"), parent=(-1, 0), offset=((0.0, 0.0, 0.0),) * 2, kind=("slide", "hinge"),
+        axis=((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), damping=(0.0, 0.0), body_names=("cart", "disc"), body_joint=(0, 1),
         mass=(50.0, 0.0), com=((0.0, 0.0, 0.0),) * 2, inertia=(TURN.inertia[0], tuple(map(tuple, 1e-12 * np.eye(3)))),
         armature=(), stiffness=(), rest=(), reference=(),
     )  # fmt: skip
@@ -146,8 +146,8 @@ def test_the_rounding_of_a_turn_is_that_of_a_product_of_quaternions():
 
 def test_a_slide_is_rounded_by_its_length_and_a_ball_by_a_whole_turn():
     tree = dataclasses.replace(
-        TURN, hinge_names=("lift", "head"), parent=(-1, 0), offset=((0.0, 0.0, 0.0),) * 2, kind=("slide", "ball"),
-        axis=((0.0, 0.0, 1.0), *np.eye(3)), damping=(0.0,) * 4, body_hinge=(1,), armature=(), stiffness=(), rest=(),
+        TURN, joint_names=("lift", "head"), parent=(-1, 0), offset=((0.0, 0.0, 0.0),) * 2, kind=("slide", "ball"),
+        axis=((0.0, 0.0, 1.0), *np.eye(3)), damping=(0.0,) * 4, body_joint=(1,), armature=(), stiffness=(), rest=(),
         reference=(),
     )  # fmt: skip
     q, qd = np.array([[2.0, 0.6, 0.0, 0.8, 0.0]]), np.array([[1.0, 0.0, 0.0, 4.0]])

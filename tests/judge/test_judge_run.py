@@ -70,7 +70,7 @@ def alone(kind, **more) -> tmt.Tree:
     axis = np.eye(3) if kind == "ball" else [(0.0, 0.0, 1.0)]
     given = {"gravity": (0.0, 0.0, 0.0), "damping": (0.0,) * len(axis)} | more
     return tmt.Tree(
-        hinge_names=("joint",), parent=(-1,), offset=((0.0, 0.0, 0.0),), axis=axis, body_names=("ball",), body_hinge=(0,),
+        joint_names=("joint",), parent=(-1,), offset=((0.0, 0.0, 0.0),), axis=axis, body_names=("ball",), body_joint=(0,),
         mass=(2.0,), com=((0.0, 0.0, 0.0),), inertia=(np.eye(3) * 0.5,), kind=(kind,), **given,
     )  # fmt: skip
 

@@ -11,10 +11,10 @@ from tmt import literal
 
 MOMENTS = ((0.02, 0.03, 0.04), (0.001, 0.002, 0.002), (0.01, 0.01, 0.02))
 TREE = tmt.Tree(  # a slide, on it a hinge, on that a ball; and a hinge of its own beside them
-    hinge_names=("rail", "swing", "wrist", "lid"), parent=(-1, 0, 1, -1),
+    joint_names=("rail", "swing", "wrist", "lid"), parent=(-1, 0, 1, -1),
     offset=((0.0, 0.0, 0.3), (0.0, 0.2, 0.0), (0.4, 0.0, 0.0), (0.0, -0.6, 0.0)),
     axis=((1.0, 0.0, 0.0), (0.0, 0.6, 0.8), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
-    damping=(0.4, 0.0, 0.1, 0.1, 0.1, 0.0), body_names=("cart", "bob", "door"), body_hinge=(0, 2, 3),
+    damping=(0.4, 0.0, 0.1, 0.1, 0.1, 0.0), body_names=("cart", "bob", "door"), body_joint=(0, 2, 3),
     mass=(2.0, 0.5, 1.5), com=((0.0, 0.0, 0.1), (0.0, 0.0, -0.2), (0.3, 0.0, 0.0)),
     inertia=tuple(tuple(map(tuple, np.diag(moments))) for moments in MOMENTS), gravity=(0.0, 3.0, -4.0),
     kind=("slide", "hinge", "ball", "hinge"), armature=(0.3, 0.02, 0.0, 0.0, 0.0, 0.0),

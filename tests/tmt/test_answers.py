@@ -119,8 +119,8 @@ def test_numbers_in_any_form_are_taken(convert):
 
 
 BALL = tmt.Tree(
-    hinge_names=("ball",), parent=(-1,), offset=((0, 0, 0),), axis=np.eye(3), damping=(0, 0, 0), body_names=("body",),
-    body_hinge=(0,), mass=(1,), com=((0, 0, 0.1),), inertia=(np.eye(3),), gravity=(0, 0, -9.81), kind=("ball",),
+    joint_names=("ball",), parent=(-1,), offset=((0, 0, 0),), axis=np.eye(3), damping=(0, 0, 0), body_names=("body",),
+    body_joint=(0,), mass=(1,), com=((0, 0, 0.1),), inertia=(np.eye(3),), gravity=(0, 0, -9.81), kind=("ball",),
 )  # fmt: skip
 WRIST, Z = dataclasses.replace(wrist(), inertia=[np.eye(3)]), np.zeros(3)
 TURNS = np.array([[1.0, 0.0, 0.0, 0.0]] * 10)

@@ -79,7 +79,7 @@ def test_jacobians_and_convective_terms_are_derivatives_of_what_moves(drawn):
 
     def turns(q):
         return np.array(
-            [[list(row) for row in method.joint_frames(tree, list(q))[h].turn] for h in tree.body_hinge]
+            [[list(row) for row in method.joint_frames(tree, list(q))[h].turn] for h in tree.body_joint]
         )
 
     T, B = tmt.jacobians(q, tree)
@@ -125,7 +125,7 @@ def test_a_locked_tree_is_the_sub_block_of_the_whole(drawn, data):
     joints = tree.coordinates.joints
     locked = data.draw(st.sets(st.integers(0, len(joints) - 1), max_size=len(joints) - 1))
     held = {
-        tree.hinge_names[i]: q[joints[i].q] if tree.kind[i] == "ball" else float(q[joints[i].q][0])
+        tree.joint_names[i]: q[joints[i].q] if tree.kind[i] == "ball" else float(q[joints[i].q][0])
         for i in locked
     }
     free = [joint for i, joint in enumerate(joints) if i not in locked]
@@ -133,7 +133,7 @@ def test_a_locked_tree_is_the_sub_block_of_the_whole(drawn, data):
     by = [k for joint in free for k in range(joint.qd.start, joint.qd.stop)]
     qd[[k for k in range(len(qd)) if k not in by]] = 0.0
     smaller, state = tree.lock(held), (q[at], qd[by])
-    assert smaller.hinge_names == tuple(name for i, name in enumerate(tree.hinge_names) if i not in locked)
+    assert smaller.joint_names == tuple(name for i, name in enumerate(tree.joint_names) if i not in locked)
     assert smaller.damping == tuple(tree.damping[k] for k in by)
     for found, whole in (
         (tmt.mass_matrix(q[at], smaller), tmt.mass_matrix(q, tree)[np.ix_(by, by)]),
@@ -218,8 +218,12 @@ class Lagrange:
             xd, Rd = (x1 - x0) / (2 * TINY), (R1 - R0) / (2 * TINY)
             J = np.trace(inertia) / 2 * IDENTITY - inertia
             T += mass * (xd @ xd) / 2 + np.sum((Rd @ J) * Rd) / 2
-        for kind, at, by in self.joints:  # of a ball omega = 2 |pd|
-            T += self.armature[by.start] * (qd[at] @ qd[at]) * (2 if kind == "ball" else mpmath.mpf(1) / 2)
+        for joint in self.joints:  # of a ball omega = 2 |pd|
+            T += (
+                self.armature[joint.qd.start]
+                * (qd[joint.q] @ qd[joint.q])
+                * (2 if joint.kind == "ball" else mpmath.mpf(1) / 2)
+            )
         return T
 
     def potential(self, q):
@@ -228,38 +232,40 @@ class Lagrange:
     def of_springs(self, q):
         """Energy by how far each joint is from the rest of its spring: of a ball the angle of one turn."""
         energy = 0
-        for k, (kind, at, _) in zip(self.stiffness, self.joints):
-            off = q[at.start] - self.rest[at.start]
-            if kind == "ball":
-                off = 2 * mpmath.acos(abs(unit(q[at]) @ unit(self.rest[at])))
+        for k, joint in zip(self.stiffness, self.joints):
+            off = q[joint.q.start] - self.rest[joint.q.start]
+            if joint.kind == "ball":
+                off = 2 * mpmath.acos(abs(unit(q[joint.q]) @ unit(self.rest[joint.q])))
             energy += k * off**2 / 2
         return energy
 
     def places(self, q) -> list:
         """Of each body: its CoM in the world, and its rotation matrix."""
         frames = {-1: (0 * IDENTITY[0], IDENTITY)}
-        for i, (kind, at, by) in enumerate(self.joints):
+        for i, joint in enumerate(self.joints):
             x, R = frames[self.tree.parent[i]]
-            x, axis = x + R @ self.offset[i], unit(self.axis[by.start])
-            if kind == "ball":
-                third = unit(np.cross(axis, self.axis[by][1]))
+            x, axis = x + R @ self.offset[i], unit(self.axis[joint.qd.start])
+            if joint.kind == "ball":
+                third = unit(np.cross(axis, self.axis[joint.qd][1]))
                 frame = np.array([axis, np.cross(third, axis), third])  # its rows are the axes
-                R = R @ frame.T @ turn(*q[at]) @ frame
-            elif kind == "slide":
-                x = x + R @ axis * (q[at.start] - self.reference[i])
+                R = R @ frame.T @ turn(*q[joint.q]) @ frame
+            elif joint.kind == "slide":
+                x = x + R @ axis * (q[joint.q.start] - self.reference[i])
             else:
-                half = (q[at.start] - self.reference[i]) / 2
+                half = (q[joint.q.start] - self.reference[i]) / 2
                 R = R @ turn(mpmath.cos(half), *(axis * mpmath.sin(half)))
             frames[i] = x, R
-        carriers = [frames[joint] for joint in self.tree.body_hinge]
+        carriers = [frames[joint] for joint in self.tree.body_joint]
         return [(x + R @ com, R) for (x, R), com in zip(carriers, self.com)]
 
     def tangents(self, q) -> np.ndarray:
         """N', (nv, nq): qd = N u."""
         N = mp(np.zeros((len(q), len(self.axis))))
-        for kind, at, by in self.joints:
-            w, x, y, z = q[at] / 2 if kind == "ball" else 4 * [mpmath.mpf(1)]
-            N[at, by] = [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]] if kind == "ball" else w
+        for joint in self.joints:
+            w, x, y, z = q[joint.q] / 2 if joint.kind == "ball" else 4 * [mpmath.mpf(1)]
+            N[joint.q, joint.qd] = (
+                [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]] if joint.kind == "ball" else w
+            )
         return N.T
 
 

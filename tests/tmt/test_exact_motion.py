@@ -19,8 +19,8 @@ from tmt.exact.tree import exact_tree, of_length_1
 
 DIGITS, COLUMNS = 45, 9  # of the extrapolation: order 18
 ONE_HINGE = tmt.Tree(
-    hinge_names=["swing"], parent=[-1], offset=[(0.0, 0.0, 0.0)], axis=[(0.0, 1.0, 0.0)], damping=[0.0], body_names=["bob"],
-    body_hinge=[0], mass=[1.0], com=[(0.0, 0.0, -0.5)], inertia=[np.diag([1.0, 0.75, 0.5])], gravity=(0.0, 0.0, -8.0),
+    joint_names=["swing"], parent=[-1], offset=[(0.0, 0.0, 0.0)], axis=[(0.0, 1.0, 0.0)], damping=[0.0], body_names=["bob"],
+    body_joint=[0], mass=[1.0], com=[(0.0, 0.0, -0.5)], inertia=[np.diag([1.0, 0.75, 0.5])], gravity=(0.0, 0.0, -8.0),
 )  # fmt: skip
 
 

@@ -119,7 +119,7 @@ COMMENTS = {  # and where names are text
 
 
 def test_names_that_are_pieces_of_programs_stay_in_comments_and_texts(tmp_path):
-    tree = replace(tmt.ARM.lock({"alpha": 0.0}), hinge_names=NAMES[:2], body_names=NAMES[2:])
+    tree = replace(tmt.ARM.lock({"alpha": 0.0}), joint_names=NAMES[:2], body_names=NAMES[2:])
     for language, comment in COMMENTS.items():
         text = tmt.equations(tree, language, ["mass_matrix"], head=[LINE, *NAMES])
         (tmp_path / language).write_text(text)

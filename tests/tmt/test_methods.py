@@ -167,7 +167,7 @@ def test_which_gains_are_implicit(name, speed, position):
 def test_a_controller_adds_to_the_torque(rng):
     """Of hinges and slides beside a ball too; of no gains a Tree says nothing."""
     place, speed, torque = random_state(rng, SMALL)
-    values = [place[at.start] for at, by in SMALL.coordinates.places for _ in range(by.start, by.stop)]
+    values = [place[i] for i in SMALL.coordinates.first_positions]
     wanted = torque - np.array(SMALL.position_gain) @ values - np.array(SMALL.speed_gain) @ speed
     plain = dataclasses.replace(SMALL, position_gain=(), speed_gain=())
     found, expected = (

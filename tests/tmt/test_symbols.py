@@ -105,8 +105,8 @@ def test_rounding_of_a_compiled_model_makes_no_terms(rng):
     """Axes and offsets that are a few eps off."""
     tree, clean = planar(3), symbolic(planar(3))
     noisy = Tree(
-        tree.hinge_names, tree.parent, np.array(tree.offset) * (1 + 2 * EPS) + 1e-17, np.array(tree.axis) + [1e-16, 0, -3e-16],
-        tree.damping, tree.body_names, tree.body_hinge, tree.mass, np.array(tree.com) + 1e-17, tree.inertia, tree.gravity,
+        tree.joint_names, tree.parent, np.array(tree.offset) * (1 + 2 * EPS) + 1e-17, np.array(tree.axis) + [1e-16, 0, -3e-16],
+        tree.damping, tree.body_names, tree.body_joint, tree.mass, np.array(tree.com) + 1e-17, tree.inertia, tree.gravity,
     )  # fmt: skip
     symbols = symbolic(noisy)
     assert symbols.entries == clean.entries and symbols.parameters == clean.parameters
@@ -249,11 +249,11 @@ def test_what_is_printed_in_latex_and_on_the_page_has_the_values(tree, rtol, rng
 
 
 def test_symbols_of_names_that_are_alike_are_different(tmp_path):
-    names = {"hinge_names": ("p q", "p_q", "p-q"), "body_names": ("a", "a_x", "a b")}
+    names = {"joint_names": ("p q", "p_q", "p-q"), "body_names": ("a", "a_x", "a b")}
     tree = replace(planar(3), com=((0.1, 0.2, 0.3), (0.4, 0, 0), (0, 0.1, 0.2)), **names)
     assert_right(symbolic(tree), tree, np.random.default_rng(0), 5)
     for joints in (("µ", "μ", "x²"), ("{text}", "a_{b}", "%")):
-        tree = replace(planar(3), hinge_names=joints)
+        tree = replace(planar(3), joint_names=joints)
         found = {}
         exec(python_source(symbolic(tree)), found)
         assert len(set(found["q"])) == 3

@@ -25,12 +25,12 @@ X, Y, Z = np.eye(3)
 REFUSED = [  # changes of the arm, and a word of what is said
     ({"mass": (1.9, np.nan)}, "finite"), ({"mass": (1.9, -1.0)}, "at least 0"),
     ({"mass": ("1.9", "1.5")}, "numbers"), ({"axis": (Y, 0 * X, Y)}, r"axis\[1\]"),
-    ({"parent": (-1, 2, 1)}, r"parent\[1\]"), ({"body_hinge": (1, 1)}, "'gamma'"),
+    ({"parent": (-1, 2, 1)}, r"parent\[1\]"), ({"body_joint": (1, 1)}, "'gamma'"),
     ({"damping": (0, -1, 0)}, "damping"), ({"inertia": (np.diag([1, 1, 2 + 1e-9]), np.eye(3))}, "larger"),
     ({"inertia": ([[1, 1e-9, 0], [0, 1, 0], [0, 0, 1]], np.eye(3))}, "symmetric"),
     ({"mass": (1.9, 0), "inertia": (np.eye(3), np.zeros((3, 3)))}, "'gamma'"),
     ({"mass": (1e-320, 1e-320), "inertia": np.zeros((2, 3, 3))}, "doubles"),
-    ({"hinge_names": ("a", "b", "a")}, "names"), ({"colour": 3}, "'colour'"),
+    ({"joint_names": ("a", "b", "a")}, "names"), ({"colour": 3}, "'colour'"),
     ({"position_gain": np.zeros((2, 3))}, "position_gain"),
 ]  # fmt: skip
 OF_KINDS = [  # changes of a slide on a ball
@@ -82,8 +82,8 @@ def chain(axes, com=(0.3, 0.1, 0.2), inertia=None, offsets=None):
     """One body, a point where it has no inertia, that hangs on hinges in a row."""
     n, inertia = len(axes), np.zeros((3, 3)) if inertia is None else inertia
     return tmt.Tree(
-        hinge_names=[f"h{i}" for i in range(n)], parent=range(-1, n - 1), offset=np.zeros((n, 3)) if offsets is None else offsets,
-        axis=axes, damping=np.zeros(n), body_names=["body"], body_hinge=[n - 1], mass=[2.0], com=[com], inertia=[inertia],
+        joint_names=[f"h{i}" for i in range(n)], parent=range(-1, n - 1), offset=np.zeros((n, 3)) if offsets is None else offsets,
+        axis=axes, damping=np.zeros(n), body_names=["body"], body_joint=[n - 1], mass=[2.0], com=[com], inertia=[inertia],
         gravity=(0, 0, -9.81),
     )  # fmt: skip
 
@@ -121,7 +121,7 @@ def test_a_body_with_inertia_for_every_hinge_is_never_singular(rng):
 def test_a_hinge_locked_at_zero_rounds_nothing():
     planar, arm = tmt.ARM.lock({"beta": 0.0}), tmt.ARM
     assert (planar.offset, planar.axis) == (arm.offset[::2], arm.axis[::2])
-    assert (planar.parent, planar.body_hinge) == ((-1, 0), (0, 1))
+    assert (planar.parent, planar.body_joint) == ((-1, 0), (0, 1))
     assert (planar.com, planar.inertia, planar.mass) == (arm.com, arm.inertia, arm.mass) and arm.lock(
         {}
     ) == arm
@@ -129,8 +129,21 @@ def test_a_hinge_locked_at_zero_rounds_nothing():
 
 @pytest.mark.parametrize(
     "angles, word",
-    [({"wrist": 0.0}, "'wrist'"), (dict.fromkeys(tmt.ARM.hinge_names, 0.0), "one must be free")],
+    [({"wrist": 0.0}, "'wrist'"), (dict.fromkeys(tmt.ARM.joint_names, 0.0), "one must be free")],
 )
 def test_what_cannot_be_locked(angles, word):
     with pytest.raises(ValueError, match=word):
         tmt.ARM.lock(angles)
+
+
+def test_former_names_of_fields_are_accepted_and_deprecated():
+    values = {
+        ("hinge_names" if name == "joint_names" else name): value for name, value in vars(tmt.ARM).items()
+    }
+    with pytest.warns(DeprecationWarning, match="joint_names"):
+        assert tmt.Tree(**values) == tmt.ARM
+    with pytest.warns(DeprecationWarning, match="body_joint"):
+        assert tmt.ARM.body_hinge == tmt.ARM.body_joint
+    with pytest.warns(DeprecationWarning):
+        renamed = dataclasses.replace(tmt.ARM, hinge_names=("a", "b", "c"))
+    assert renamed.joint_names == ("a", "b", "c")

@@ -34,7 +34,7 @@ def test_what_is_not_needed_in_a_scene(name):
 
 def test_what_stays_by_numbers_that_cancel():
     """A round top on crossed hinges: alpha and gamma never move, since c (I s) - s (I c) is 0."""
-    body = {"body_names": ("top",), "body_hinge": (2,), "mass": (1.0,), "com": ((0.0, 0.0, -0.2),)}
+    body = {"body_names": ("top",), "body_joint": (2,), "mass": (1.0,), "com": ((0.0, 0.0, -0.2),)}
     inertia = (np.diag([0.01, 0.01, 0.002]),)
     axes = {"parent": (-1, 0, 1), "offset": np.zeros((3, 3)), "axis": np.eye(3)[[1, 0, 2]]}
     robot = dataclasses.replace(

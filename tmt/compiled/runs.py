@@ -87,8 +87,8 @@ class Step:
         nq, n, order = self.nq, self.n, self.stepping.order
         count = self.add_step("attempt")
         scales = []  # of each component of an error: the number of the state in whose units it is; None: an angle of a turn
-        for kind, at, by in self.tree.coordinates.joints:
-            scales += [None if kind == "ball" else at.start] * (by.stop - by.start)
+        for joint in self.tree.coordinates.joints:
+            scales += [None if joint.kind == "ball" else joint.q.start] * (joint.qd.stop - joint.qd.start)
         scales += range(nq, nq + n)
 
         def advance(code, state, new, dt, evaluations):

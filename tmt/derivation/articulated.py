@@ -174,7 +174,7 @@ def outward(tree, q, qd) -> tuple[list[Frame], list[Rigid]]:
     """The frames of all joints, and what each carries itself."""
     own = rounded_once(tree, float)[0]
     frames, rigid, only_slides = [], [], {-1: True}
-    for i, (kind, at, by) in enumerate(tree.coordinates.joints):
+    for i, joint in enumerate(tree.coordinates.joints):
         parent = tree.parent[i]
         p = (
             frames[parent]
@@ -183,23 +183,23 @@ def outward(tree, q, qd) -> tuple[list[Frame], list[Rigid]]:
         )
         # what only slides carry: the point O of all that hangs on it moves with it
         still = only_slides[parent]
-        only_slides[i] = still and kind == "slide"
+        only_slides[i] = still and joint.kind == "slide"
         r = ZERO if still else p.r + p.turn @ Vector(*tree.offset[i])
-        axes = [Vector(*axis) for axis in tree.axis[by]]
-        if kind == "slide":
+        axes = [Vector(*axis) for axis in tree.axis[joint.qd]]
+        if joint.kind == "slide":
             axis = p.turn @ axes[0]
-            r = r if still else r + axis * (q[at.start] - tree.reference[i])
-            a = p.a + p.omega.cross(axis) * (2.0 * qd[by.start])  # Coriolis
+            r = r if still else r + axis * (q[joint.q.start] - tree.reference[i])
+            a = p.a + p.omega.cross(axis) * (2.0 * qd[joint.qd.start])  # Coriolis
             frame = Frame(p.turn, r, p.omega, p.omegad, a, [(ZERO, axis)])
         else:
-            if kind == "ball":
+            if joint.kind == "ball":
                 to_own = Matrix(axes)
-                turn = p.turn @ (to_own.transposed @ turn_of(q[at]) @ to_own)
+                turn = p.turn @ (to_own.transposed @ turn_of(q[joint.q]) @ to_own)
             else:
-                turn = p.turn @ rotation(tree.axis[by.start], q[at.start] - tree.reference[i])
-            axes = [(turn if kind == "ball" else p.turn) @ axis for axis in axes]
+                turn = p.turn @ rotation(tree.axis[joint.qd.start], q[joint.q.start] - tree.reference[i])
+            axes = [(turn if joint.kind == "ball" else p.turn) @ axis for axis in axes]
             spin = ZERO
-            for axis, rate in zip(axes, qd[by]):
+            for axis, rate in zip(axes, qd[joint.qd]):
                 spin = spin + axis * rate
             omega, omegad = p.omega + spin, p.omegad + p.omega.cross(spin)
             # the acceleration is handed on where the joint is

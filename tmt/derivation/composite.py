@@ -102,10 +102,10 @@ def carried_by_joint(tree) -> list[Distribution]:
     numbers of the outer bodies become zeros, and what reaches the world drops out.
     """
     joints = tree.coordinates.joints
-    axes = [Vector(*map(fraction, tree.axis[by.start])) for _, _, by in joints]
+    axes = [Vector(*map(fraction, tree.axis[joint.qd.start])) for joint in joints]
     offsets = [Vector(*map(fraction, v)) for v in tree.offset]
     own = [NOTHING] * len(axes)
-    for b, joint in enumerate(tree.body_hinge):
+    for b, joint in enumerate(tree.body_joint):
         if joint >= 0:
             mass, com = fraction(tree.mass[b]), Vector(*map(fraction, tree.com[b]))
             inertia = [[fraction(x) for x in row] for row in tree.inertia[b]]
@@ -144,15 +144,15 @@ def mass_matrix_and_bias(tree, q, qd, number=float) -> tuple[list, list]:
 
     # outward: each frame's motion at qdd = 0, in its own axes
     motions = []
-    for i, (kind, _, by) in enumerate(joints):
+    for i, joint in enumerate(joints):
         to_child = turns[i].transposed
         if tree.parent[i] >= 0:
             a, omega, omegad, P = motions[tree.parent[i]]
             a, omega, omegad = a + P @ offsets[i], to_child @ omega, to_child @ omegad
         else:
             a, omega, omegad = Vector(*tree.gravity) * -1.0, ZERO, ZERO
-        moving = total_vector(axis * rate for axis, rate in zip(axes[by], qd[by]))
-        if kind == "slide":
+        moving = total_vector(axis * rate for axis, rate in zip(axes[joint.qd], qd[joint.qd]))
+        if joint.kind == "slide":
             motions.append((a + omega.cross(moving * 2.0), omega, omegad, turning(omega, omegad)))
             continue
         a, omegad, omega = to_child @ a, omegad + omega.cross(moving), omega + moving
@@ -195,8 +195,8 @@ def rounded_once(tree, number) -> tuple[list, list, list]:
     """What each joint carries itself, and the part of it that is not even about a hinge, and the part that is."""
     exact = carried_by_joint(tree)
     even = [
-        d.even_about(Vector(*map(fraction, tree.axis[by.start]))) if kind == "hinge" else NOTHING
-        for d, (kind, _, by) in zip(exact, tree.coordinates.joints)
+        d.even_about(Vector(*map(fraction, tree.axis[joint.qd.start]))) if joint.kind == "hinge" else NOTHING
+        for d, joint in zip(exact, tree.coordinates.joints)
     ]
     uneven = [d.less(e) for d, e in zip(exact, even)]
     return tuple([d.rounded(number) for d in ds] for ds in (exact, uneven, even))
@@ -204,15 +204,15 @@ def rounded_once(tree, number) -> tuple[list, list, list]:
 
 def placed(tree, i, q) -> tuple[Vector, Matrix]:
     """Origin and turn of joint i's frame in its parent's."""
-    kind, at, by = tree.coordinates.joints[i]
+    joint = tree.coordinates.joints[i]
     offset = Vector(*tree.offset[i])
-    if kind == "ball":
-        frame = Matrix(tree.axis[by])
-        return offset, frame.transposed @ turn_of(q[at]) @ frame
-    off = q[at.start] - tree.reference[i]
-    if kind == "slide":
-        return offset + Vector(*tree.axis[by.start]) * off, IDENTITY
-    return offset, rotation(tree.axis[by.start], off)
+    if joint.kind == "ball":
+        frame = Matrix(tree.axis[joint.qd])
+        return offset, frame.transposed @ turn_of(q[joint.q]) @ frame
+    off = q[joint.q.start] - tree.reference[i]
+    if joint.kind == "slide":
+        return offset + Vector(*tree.axis[joint.qd.start]) * off, IDENTITY
+    return offset, rotation(tree.axis[joint.qd.start], off)
 
 
 def handed_down(turn, offset, force, moment):

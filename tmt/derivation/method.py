@@ -67,26 +67,26 @@ def joint_frames(tree, q, qd=None) -> list[Frame]:
     """The n joints' frames at positions q (rad, m) and speeds qd (per s, default at rest), walked outward."""
     qd = [0.0] * len(tree.axis) if qd is None else qd
     frames = []
-    for i, (kind, at, by) in enumerate(tree.coordinates.joints):
+    for i, joint in enumerate(tree.coordinates.joints):
         p = frames[tree.parent[i]] if tree.parent[i] >= 0 else WORLD
-        own = [Vector(*axis) for axis in tree.axis[by]]
-        if kind == "slide":
+        own = [Vector(*axis) for axis in tree.axis[joint.qd]]
+        if joint.kind == "slide":
             axis = p.turn @ own[0]
             origin, origin_conv = carried(
-                p, Vector(*tree.offset[i]) + own[0] * (q[at.start] - tree.reference[i])
+                p, Vector(*tree.offset[i]) + own[0] * (q[joint.q.start] - tree.reference[i])
             )
-            origin_conv = origin_conv + p.omega.cross(axis * (qd[by.start] * 2.0))  # Coriolis
+            origin_conv = origin_conv + p.omega.cross(axis * (qd[joint.qd.start] * 2.0))  # Coriolis
             frames.append(Frame(origin, p.turn, [axis], True, p.omega, origin_conv, p.omega_conv))
             continue
         origin, origin_conv = carried(p, Vector(*tree.offset[i]))
-        if kind == "ball":  # its axes turn with it
+        if joint.kind == "ball":  # its axes turn with it
             frame = Matrix(own)
-            turn = p.turn @ (frame.transposed @ turn_of(q[at]) @ frame)
+            turn = p.turn @ (frame.transposed @ turn_of(q[joint.q]) @ frame)
             axes = [turn @ axis for axis in own]
         else:
-            turn = p.turn @ rotation(tree.axis[by.start], q[at.start] - tree.reference[i])
+            turn = p.turn @ rotation(tree.axis[joint.qd.start], q[joint.q.start] - tree.reference[i])
             axes = [p.turn @ own[0]]
-        spin = total_vector(axis * rate for axis, rate in zip(axes, qd[by]))
+        spin = total_vector(axis * rate for axis, rate in zip(axes, qd[joint.qd]))
         frames.append(
             Frame(origin, turn, axes, False, p.omega + spin, origin_conv, p.omega_conv + p.omega.cross(spin))
         )
@@ -104,7 +104,7 @@ def bodies(tree, q, qd=None) -> list[Body]:
     """T_b, B_b and the convective terms of every body, at positions q and speeds qd (default at rest)."""
     frames = joint_frames(tree, q, qd)
     result = []
-    for b, joint in enumerate(tree.body_hinge):
+    for b, joint in enumerate(tree.body_joint):
         frame = frames[joint] if joint >= 0 else WORLD
         x, v_conv = carried(frame, Vector(*tree.com[b]))
         to_body = frame.turn.transposed
@@ -170,12 +170,12 @@ def bias_rates(tree, q, qd, terms=mass_matrix_and_bias) -> list:
 def spring_torque(tree, q) -> list:
     """k (q - rest) (nv, N m or N), which springs take off the force; of a ball k times the movement from its rest."""
     off = tree.coordinates.difference(q, tree.rest) if tree.has_springs else [0.0] * len(tree.axis)
-    return [k * x for k, (_, by) in zip(tree.stiffness, tree.coordinates.places) for x in off[by]]
+    return [k * x for k, joint in zip(tree.stiffness, tree.coordinates.joints) for x in off[joint.qd]]
 
 
 def fed_back(tree, q, qd) -> list:
     """P q + S qd (nv, N m or N), which a linear controller takes off the force; no entry of P is that of a ball."""
-    positions = [q[at.start] for at, by in tree.coordinates.places for _ in range(by.start, by.stop)]
+    positions = [q[i] for i in tree.coordinates.first_positions]
     terms = [[] for _ in qd]
     for gain, values in ((tree.position_gain, positions), (tree.speed_gain, qd)):
         for own, row in zip(terms, gain):
@@ -208,7 +208,10 @@ def spring_energy(tree, q):
         return 0.0
     off = tree.coordinates.difference(q, tree.rest)
     return total(
-        0.5 * k * (x * x) for k, (_, by) in zip(tree.stiffness, tree.coordinates.places) for x in off[by] if k
+        0.5 * k * (x * x)
+        for k, joint in zip(tree.stiffness, tree.coordinates.joints)
+        for x in off[joint.qd]
+        if k
     )
 
 

@@ -29,10 +29,10 @@ def exact_tree(tree: Tree, number: Callable) -> SimpleNamespace:
         return tuple(map(lifted, value)) if isinstance(value, tuple) else number(value)
 
     axis = []
-    for kind, _, by in tree.coordinates.joints:
-        own = [Vector(*map(number, direction)) for direction in tree.axis[by]]
+    for joint in tree.coordinates.joints:
+        own = [Vector(*map(number, direction)) for direction in tree.axis[joint.qd]]
         axis.append(_unit(own[0]))
-        if kind == "ball":
+        if joint.kind == "ball":
             axis.append(_unit(own[1] - axis[-1] * axis[-1].dot(own[1])))
             axis.append(axis[-2].cross(axis[-1]))
     numbers = {name: lifted(getattr(tree, name)) for name in NUMBERS}
@@ -42,7 +42,7 @@ def exact_tree(tree: Tree, number: Callable) -> SimpleNamespace:
         axis=tuple(map(tuple, axis)),
         parent=tree.parent,
         kind=tree.kind,
-        body_hinge=tree.body_hinge,
+        body_joint=tree.body_joint,
         coordinates=Analytic(*tree.coordinates),
         moves=tree.moves,
         has_springs=tree.has_springs,

@@ -116,12 +116,12 @@ def conventions(model: Tree) -> list[str]:
         f"Numbers of the model: sha256 {digest(model)}.",
         "Joint, kind, place in q, place in qd and tau (from 0); units of q, qd, tau:",
     ]
-    for name, (kind, at, by) in zip(model.hinge_names, model.coordinates.joints):
+    for name, joint in zip(model.joint_names, model.coordinates.joints):
         places = [
             f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}"
-            for part in (at, by)
+            for part in (joint.q, joint.qd)
         ]
-        lines.append(f"  {name}, {kind}, {', '.join(places)}; {UNITS[kind]}")
+        lines.append(f"  {name}, {joint.kind}, {', '.join(places)}; {UNITS[joint.kind]}")
     return lines
 
 

@@ -33,21 +33,21 @@ class Names:
     def __init__(self, tree: Tree, named: bool):
         self.of, self.named, self.parameters, self.display, self.joints = tree, named, {}, {}, []
         self.axes = [[number(meant(x)) for x in without_tiny(axis)] for axis in tree.axis]
-        self.add_joints(identifiers(tree.hinge_names), GREEK.issuperset(tree.hinge_names))
+        self.add_joints(identifiers(tree.joint_names), GREEK.issuperset(tree.joint_names))
         self.gravity = self.vector(tree.gravity, "g", "g", "m/s2", "gravity")
         count = itertools.count(1)
         self.offsets = [self.offset(i, count) for i in range(len(tree.kind))]
-        joints, bodies = identifiers(tree.hinge_names), identifiers(tree.body_names)
+        joints, bodies = identifiers(tree.joint_names), identifiers(tree.body_names)
         self.mass, self.com, self.inertia = [], [], []
         for b, (name, body) in enumerate(zip(bodies, tree.body_names)):
-            index, joint = f"{{{b + 1}}}", tree.body_hinge[b]
-            meaning = f"centre of mass of {body} from {tree.hinge_names[joint]}" if joint >= 0 else ""
+            index, joint = f"{{{b + 1}}}", tree.body_joint[b]
+            meaning = f"centre of mass of {body} from {tree.joint_names[joint]}" if joint >= 0 else ""
             self.mass.append(self.symbol(tree.mass[b], f"m_{name}", f"m_{index}", "kg", f"mass of {body}"))
             self.com.append(self.vector(tree.com[b], f"c_{name}", f"c_{index}", "m", meaning))
             self.inertia.append(self.tensor(b, name))
         self.armature = []
         for i, (joint, rotor) in enumerate(zip(joints, tree.armature)):
-            unit, meaning = "kg" if tree.kind[i] == "slide" else "kg m2", f"armature of {tree.hinge_names[i]}"
+            unit, meaning = "kg" if tree.kind[i] == "slide" else "kg m2", f"armature of {tree.joint_names[i]}"
             self.armature.append(self.symbol(rotor, f"J_{joint}", f"J_{{{i + 1}}}", unit, meaning))
 
     def add_joints(self, names, greek):
@@ -57,7 +57,7 @@ class Names:
         self.q = [sympy.Symbol(name if greek else f"q_{name}") for name in names]
         self.qd = [sympy.Symbol(f"{name}dot" if greek else f"qd_{name}") for name in names]
         for i, (q, qd, axis) in enumerate(zip(self.q, self.qd, self.axes)):
-            name, hinge = self.of.hinge_names[i], self.of.kind[i] == "hinge"
+            name, hinge = self.of.joint_names[i], self.of.kind[i] == "hinge"
             letter, index = (f"\\{name}", "") if greek else ("q", f"_{{{i + 1}}}")
             self.display |= {q: letter + index, qd: f"\\dot{{{letter}}}{index}"}
             words = "angle of {} about {}, rad" if hinge else "position of {} along {}, m"
@@ -68,7 +68,7 @@ class Names:
         before, values = self.of.parent[i], self.of.offset[i]
         if before < 0 or not any(values):
             return [0, 0, 0]
-        at, meaning = next(count), f"from {self.of.hinge_names[before]} to {self.of.hinge_names[i]}"
+        at, meaning = next(count), f"from {self.of.joint_names[before]} to {self.of.joint_names[i]}"
         return self.vector(values, f"l_{at}", f"l_{{{at}}}", "m", meaning)
 
     def tensor(self, b, name):
@@ -123,7 +123,7 @@ class Names:
             return [lifted(value) for value in values] if isinstance(values, list) else scalar(values)
 
         same = {
-            name: getattr(self.of, name) for name in ("parent", "kind", "body_hinge", "coordinates", "moves")
+            name: getattr(self.of, name) for name in ("parent", "kind", "body_joint", "coordinates", "moves")
         }
         return SimpleNamespace(
             **same,

@@ -61,7 +61,7 @@ def symbolic(tree: Tree = ARM, quantities=QUANTITIES, seconds: float = 60.0, nam
         raise ValueError("symbolic equations need SymPy: pip install sympy") from None
     if unknown := [name for name in quantities if name not in QUANTITIES]:
         raise ValueError(f"unknown quantity {unknown[0]!r}; known: {', '.join(QUANTITIES)}")
-    for name, kind in zip(tree.hinge_names, tree.kind):
+    for name, kind in zip(tree.joint_names, tree.kind):
         if kind == "ball":
             raise ValueError(f"symbolic equations need hinges and slides; joint {name} is a ball")
     start, note = time.monotonic(), ""
@@ -121,7 +121,7 @@ def derived(tree, quantities, names: Names, deadline, note) -> Symbolic:
     parameters = {symbol: row for symbol, row in names.parameters.items() if symbol in used}
     display = {s: names.display[s] for s in (*names.q, *names.qd, *parameters)}
     return Symbolic(
-        names.q, names.qd, tree.hinge_names, names.joints, parameters, names.named, entries, display, note
+        names.q, names.qd, tree.joint_names, names.joints, parameters, names.named, entries, display, note
     )
 
 

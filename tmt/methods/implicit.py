@@ -117,8 +117,8 @@ def placed(joints, q, moved, balls) -> list:
     if not balls:
         return [x + y for x, y in zip(q, moved)]
     balls, result = iter(balls), []
-    for kind, at, by in joints.joints:
-        result += next(balls) if kind == "ball" else [q[at.start] + moved[by.start]]
+    for joint in joints.joints:
+        result += next(balls) if joint.kind == "ball" else [q[joint.q.start] + moved[joint.qd.start]]
     return result
 
 

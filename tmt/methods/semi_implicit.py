@@ -158,7 +158,7 @@ def lone_speeds(tree) -> set:
         chain = [i - 3, i - 2, i - 1, i]
         free = kind == "ball" and i >= 3 and [tree.kind[j] for j in chain] == ["slide"] * 3 + ["ball"]
         alone = (
-            i not in tree.parent and tree.body_hinge.count(i) == 1 and not {*chain[:3]} & {*tree.body_hinge}
+            i not in tree.parent and tree.body_joint.count(i) == 1 and not {*chain[:3]} & {*tree.body_joint}
         )
         if free and alone and [tree.parent[j] for j in chain] == [-1, *chain[:3]]:
             lone |= set(range(tree.coordinates.joints[i - 3].qd.start, tree.coordinates.joints[i].qd.stop))

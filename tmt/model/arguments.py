@@ -48,7 +48,7 @@ def states(model, **arrays) -> list:
             each = " or ".join(kind for kind in kinds if kind != "ball")
             one = [f"one number per {each}"] * bool(each)
             one += [f"{'four' if name == 'q' else 'three'} per ball"] * ("ball" in kinds)
-            names = ", ".join(model.hinge_names)
+            names = ", ".join(model.joint_names)
             raise ValueError(
                 f"{name} has shape {array.shape}; (..., {n}) is expected, {', '.join(one)} ({names})"
             )
@@ -58,7 +58,7 @@ def states(model, **arrays) -> list:
             for joint in coordinates.balls:
                 off = np.abs(np.linalg.norm(array[..., joint.q], axis=-1) - 1.0)
                 if off.size and off.max() > CLOSE_TO_ONE:
-                    ball = model.hinge_names[coordinates.joints.index(joint)]
+                    ball = model.joint_names[coordinates.joints.index(joint)]
                     found = array[..., joint.q].reshape(-1, 4)[np.argmax(off)]
                     wanted = "a quaternion w, x, y, z of length 1 is expected"
                     raise ValueError(f"q of {ball!r} is {found.tolist()}; {wanted}")

@@ -38,29 +38,29 @@ class Coordinates(NamedTuple):
         return [joint for joint in self.joints if joint.kind == "ball"]
 
     @property
-    def places(self) -> list[tuple[slice, slice]]:
-        """Of each joint, in q and in qd."""
-        return [(joint.q, joint.qd) for joint in self.joints]
+    def first_positions(self) -> list[int]:
+        """For each speed (nv,) the number in q of its joint's first position: of a hinge or slide its only one."""
+        return [joint.q.start for joint in self.joints for _ in range(joint.qd.start, joint.qd.stop)]
 
     def move(self, q, u) -> list:
         """The position after a movement u from q, quaternions of length 1."""
         moved = []
-        for kind, at, by in self.joints:
-            if kind == "ball":
-                moved += normalized(product(q[at], exponential(u[by])))
+        for joint in self.joints:
+            if joint.kind == "ball":
+                moved += normalized(product(q[joint.q], exponential(u[joint.qd])))
             else:
-                moved.append(q[at.start] + u[by.start])
+                moved.append(q[joint.q.start] + u[joint.qd.start])
         return moved
 
     def difference(self, q1, q0) -> list:
         """The movement from q0 to q1, (nv,): of a ball the shortest."""
         return [
             value
-            for kind, at, _ in self.joints
+            for joint in self.joints
             for value in (
-                self.logarithm(product(conjugate(q0[at]), q1[at]))
-                if kind == "ball"
-                else [q1[at.start] - q0[at.start]]
+                self.logarithm(product(conjugate(q0[joint.q]), q1[joint.q]))
+                if joint.kind == "ball"
+                else [q1[joint.q.start] - q0[joint.q.start]]
             )
         ]
 
@@ -73,9 +73,11 @@ class Coordinates(NamedTuple):
         """The movement that changes q by small dq, linear in dq."""
         return [
             value
-            for kind, at, _ in self.joints
+            for joint in self.joints
             for value in (
-                [2.0 * x for x in product(conjugate(q[at]), dq[at])[1:]] if kind == "ball" else [dq[at.start]]
+                [2.0 * x for x in product(conjugate(q[joint.q]), dq[joint.q])[1:]]
+                if joint.kind == "ball"
+                else [dq[joint.q.start]]
             )
         ]
 
@@ -83,9 +85,11 @@ class Coordinates(NamedTuple):
         """dq/dt at speeds qd, (nq,): of a ball p o (0, omega) / 2."""
         return [
             value
-            for kind, at, by in self.joints
+            for joint in self.joints
             for value in (
-                [0.5 * x for x in product(q[at], [0.0, *qd[by]])] if kind == "ball" else [qd[by.start]]
+                [0.5 * x for x in product(q[joint.q], [0.0, *qd[joint.qd]])]
+                if joint.kind == "ball"
+                else [qd[joint.qd.start]]
             )
         ]
 
@@ -93,8 +97,12 @@ class Coordinates(NamedTuple):
         """du/dt at speeds qd, of a motion that has moved by u."""
         return [
             value
-            for kind, _, at in self.joints
-            for value in (inverse_derivative(u[at], qd[at]) if kind == "ball" else [qd[at.start]])
+            for joint in self.joints
+            for value in (
+                inverse_derivative(u[joint.qd], qd[joint.qd])
+                if joint.kind == "ball"
+                else [qd[joint.qd.start]]
+            )
         ]
 
 

@@ -14,7 +14,7 @@ CLOSE_TO_ONE = 1e-6  # how far the length of a quaternion may be from 1
 
 def locked(tree, angles: Mapping):
     """What Tree.lock says."""
-    names, joints = tree.hinge_names, tree.coordinates.joints
+    names, joints = tree.joint_names, tree.coordinates.joints
     if not isinstance(angles, Mapping):
         raise ValueError(
             f"lock is given {shown(angles)}; a dict of angles in rad by the names of hinges is expected"
@@ -44,17 +44,17 @@ def locked(tree, angles: Mapping):
 
     _refuse_fed_back(tree, held, free)
     before = {i: frame(tree.parent[i]) for i in free}
-    carried = [frame(joint) for joint in tree.body_hinge]
+    carried = [frame(joint) for joint in tree.body_joint]
     at = [k for i in free for k in range(*joints[i].q.indices(len(tree.rest)))]
     by = [(i, k) for i in free for k in range(*joints[i].qd.indices(len(tree.axis)))]
     return replace(
         tree,
-        hinge_names=[names[i] for i in free],
+        joint_names=[names[i] for i in free],
         parent=[before[i][0] for i in free],
         offset=[tuple(_moved(*before[i][1:], tree.offset[i])) for i in free],
         axis=[tuple(_moved(ZERO, before[i][2], tree.axis[k])) for i, k in by],
         damping=[tree.damping[k] for _, k in by],
-        body_hinge=[carrier for carrier, _, _ in carried],
+        body_joint=[carrier for carrier, _, _ in carried],
         com=[tuple(_moved(origin, turn, com)) for com, (_, origin, turn) in zip(tree.com, carried)],
         inertia=[_turned(turn, inertia) for inertia, (_, _, turn) in zip(tree.inertia, carried)],
         kind=[tree.kind[i] for i in free],
@@ -74,7 +74,7 @@ def _gains_of_free(gain, by) -> list:
 
 def _refuse_fed_back(tree, held, free):
     """Raise ValueError if the position of a locked joint makes a torque at a free one: a Tree has no place for it."""
-    names, joints = tree.hinge_names, tree.coordinates.joints
+    names, joints = tree.joint_names, tree.coordinates.joints
     for name, position in held.items() if tree.position_gain else ():
         l = joints[names.index(name)].qd.start
         for i in free:
@@ -89,14 +89,14 @@ def _refuse_fed_back(tree, held, free):
 
 def _placed(tree, i, position):
     """Where joint i at a position puts the frame that it carries, in the parent's frame: origin, and turn if there is one."""
-    kind, _, by = tree.coordinates.joints[i]
-    if kind == "ball":
-        own = Matrix(tree.axis[by]).transposed
+    joint = tree.coordinates.joints[i]
+    if joint.kind == "ball":
+        own = Matrix(tree.axis[joint.qd]).transposed
         return tree.offset[i], own @ turn_of(position) @ own.transposed if any(position[1:]) else None
-    off, axis = position - tree.reference[i], tree.axis[by.start]
-    if kind == "slide" and off:
+    off, axis = position - tree.reference[i], tree.axis[joint.qd.start]
+    if joint.kind == "slide" and off:
         return Vector(*tree.offset[i]) + Vector(*axis) * off, None
-    return tree.offset[i], rotation(axis, off) if off and kind == "hinge" else None
+    return tree.offset[i], rotation(axis, off) if off and joint.kind == "hinge" else None
 
 
 def _moved(origin, turn, point):

@@ -21,7 +21,7 @@ APART = 1e-3  # sine of the angle between two axes that are clearly not parallel
 def scales(tree) -> np.ndarray:
     """The largest value of each Mbar_ii, kg m2, (nv,): with all that the joint carries stretched out, slides by 1 m."""
     sums, joints = np.array(tree.armature), tree.coordinates.joints
-    for mass, com, inertia, joint in zip(tree.mass, tree.com, tree.inertia, tree.body_hinge):
+    for mass, com, inertia, joint in zip(tree.mass, tree.com, tree.inertia, tree.body_joint):
         reach, spread = math.hypot(*com), sum(abs(inertia[i][i]) for i in range(3))
         while joint >= 0:
             slides = tree.kind[joint] == "slide"
@@ -45,7 +45,7 @@ def never(tree) -> bool:
         if min(np.divide(tree.armature[joint.qd], size[joint.qd])) > CLEAR:
             resting.add(i)
     for joint, mass, inertia in sorted(
-        zip(tree.body_hinge, tree.mass, tree.inertia), key=lambda body: body[0]
+        zip(tree.body_joint, tree.mass, tree.inertia), key=lambda body: body[0]
     ):
         chain = []
         while joint >= 0:
@@ -112,7 +112,7 @@ def found(tree, M) -> np.ndarray:
 def reason(tree, moving) -> str:
     """Which joints, as given by `found`, move without moving mass, in words."""
     chosen = [i for i, moves in enumerate(moving) if moves]
-    names = [repr(tree.hinge_names[i]) for i in chosen]
+    names = [repr(tree.joint_names[i]) for i in chosen]
     kinds = {tree.kind[i] for i in chosen}
     kind = kinds.pop() if len(kinds) == 1 else "joint"
     if len(names) == 1:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from tmt.model import singular
 from tmt.model.coordinates import KINDS, Coordinates, coordinates_of
 from tmt.model.lock import CLOSE_TO_ONE, locked
+from tmt.model.renamed import accepts_former_names
 from tmt.model.values import names, numbers_of, shown
 
 OPTIONAL = ("reference", "armature", "stiffness", "rest")  # fields that may be left out
@@ -21,6 +22,7 @@ Numbers = tuple[float, ...]
 Rows = tuple[Numbers, ...]
 
 
+@accepts_former_names({"hinge_names": "joint_names", "body_hinge": "body_joint"})
 @dataclass(frozen=True)
 class Tree:
     """A tree of n joints and m rigid bodies; at their reference positions every frame is parallel to the inertial frame.
@@ -32,7 +34,7 @@ class Tree:
 
     Parameters
     ----------
-    hinge_names : (n,)
+    joint_names : (n,)
         Of all joints.
     parent : (n,)
         Index of the joint before this one, always a smaller one; -1: fixed to the world.
@@ -43,7 +45,7 @@ class Tree:
     damping : (nv,), N m s/rad or N s/m
         Force -damping * qd.
     body_names : (m,)
-    body_hinge : (m,)
+    body_joint : (m,)
         Index of the last joint that moves the body; -1: fixed to the world.
     mass : (m,), kg
     com : (m, 3), m
@@ -73,8 +75,8 @@ class Tree:
     Examples
     --------
     >>> pendulum = tmt.Tree(
-    ...     hinge_names=["hip"], parent=[-1], offset=[(0, 0, 0)], axis=[(0, 1, 0)], damping=[0.1],
-    ...     body_names=["rod"], body_hinge=[0], mass=[1.0], com=[(0, 0, -0.5)], inertia=[np.diag([0.1, 0.1, 0.01])],
+    ...     joint_names=["hip"], parent=[-1], offset=[(0, 0, 0)], axis=[(0, 1, 0)], damping=[0.1],
+    ...     body_names=["rod"], body_joint=[0], mass=[1.0], com=[(0, 0, -0.5)], inertia=[np.diag([0.1, 0.1, 0.01])],
     ...     gravity=(0, 0, -9.81),
     ... )
     >>> print(tmt.mass_matrix([0.0], pendulum))  # 0.1 + 1 kg (0.5 m)^2
@@ -83,13 +85,13 @@ class Tree:
     (2.0,)
     """
 
-    hinge_names: tuple[str, ...]
+    joint_names: tuple[str, ...]
     parent: tuple[int, ...]
     offset: Rows
     axis: Rows
     damping: Numbers
     body_names: tuple[str, ...]
-    body_hinge: tuple[int, ...]
+    body_joint: tuple[int, ...]
     mass: Numbers
     com: Rows
     inertia: tuple[Rows, ...]
@@ -102,21 +104,15 @@ class Tree:
     position_gain: Rows = ()
     speed_gain: Rows = ()
 
-    def __new__(cls, *values: Any, **named: Any) -> "Tree":
-        known = [field.name for field in fields(cls)]
-        if unknown := [name for name in named if name not in known]:
-            raise ValueError(f"a Tree has no field {unknown[0]!r}; its fields are {', '.join(known)}")
-        return super().__new__(cls)
-
     def __post_init__(self) -> None:
-        for name in ("hinge_names", "body_names"):
+        for name in ("joint_names", "body_names"):
             object.__setattr__(self, name, names(name, getattr(self, name)))
-        n, m = len(self.hinge_names), len(self.body_names)
+        n, m = len(self.joint_names), len(self.body_names)
         object.__setattr__(self, "kind", _kinds(self.kind, n))
         nq, nv = self.coordinates.nq, self.coordinates.nv
         shapes = {
             "parent": (n,), "offset": (n, 3), "axis": (nv, 3), "damping": (nv,),
-            "body_hinge": (m,), "mass": (m,), "com": (m, 3), "inertia": (m, 3, 3), "gravity": (3,),
+            "body_joint": (m,), "mass": (m,), "com": (m, 3), "inertia": (m, 3, 3), "gravity": (3,),
             "reference": (n,), "armature": (nv,), "stiffness": (n,), "rest": (nq,),
         }  # fmt: skip
         for name, shape in shapes.items():
@@ -128,16 +124,16 @@ class Tree:
             object.__setattr__(self, name, _gain(name, getattr(self, name), self.coordinates))
         if n == 0 or m == 0:
             raise ValueError("a Tree needs at least one joint and one body")
-        for name, hinges, before in (
+        for name, joints, ends in (
             ("parent", self.parent, range(n)),
-            ("body_hinge", self.body_hinge, [n] * m),
+            ("body_joint", self.body_joint, [n] * m),
         ):
-            for i, (hinge, end) in enumerate(zip(hinges, before)):
-                if hinge != int(hinge) or not -1 <= hinge < end:
+            for i, (joint, end) in enumerate(zip(joints, ends)):
+                if joint != int(joint) or not -1 <= joint < end:
                     raise ValueError(
-                        f"Tree.{name}[{i}] is {hinge:g}; a whole number from -1 to {end - 1} is expected"
+                        f"Tree.{name}[{i}] is {joint:g}; a whole number from -1 to {end - 1} is expected"
                     )
-            object.__setattr__(self, name, tuple(int(hinge) for hinge in hinges))
+            object.__setattr__(self, name, tuple(int(joint) for joint in joints))
         object.__setattr__(self, "axis", tuple(_direction(i, axis) for i, axis in enumerate(self.axis)))
         if min(self.mass) < 0.0:
             raise ValueError(f"Tree.mass is {shown(self.mass)}; masses of at least 0 kg are expected")
@@ -145,16 +141,16 @@ class Tree:
             if min(getattr(self, name)) < 0.0:
                 values = shown(getattr(self, name))
                 raise ValueError(f"Tree.{name} is {values}; values of at least 0 {unit} are expected")
-        for i, (kind, at, by) in enumerate(self.coordinates.joints):
-            if kind == "ball":
-                _check_ball(i, np.array(self.axis[by]), self.reference[i], self.rest[at])
+        for i, joint in enumerate(self.coordinates.joints):
+            if joint.kind == "ball":
+                _check_ball(i, np.array(self.axis[joint.qd]), self.reference[i], self.rest[joint.q])
         for name, inertia in zip(self.body_names, self.inertia):
             _check_inertia(name, np.array(inertia))
         massive = [any(self.armature[joint.qd]) for joint in self.coordinates.joints]
-        for mass, inertia, joint in zip(self.mass, self.inertia, self.body_hinge):
+        for mass, inertia, joint in zip(self.mass, self.inertia, self.body_joint):
             while joint >= 0 and (mass or np.any(inertia)):
                 massive[joint], joint = True, self.parent[joint]
-        for kind, name, moves_mass in zip(self.kind, self.hinge_names, massive):
+        for kind, name, moves_mass in zip(self.kind, self.joint_names, massive):
             if not moves_mass:
                 raise ValueError(
                     f"{kind} {name!r} moves nothing that has mass or inertia; Mbar would be singular"
@@ -221,7 +217,7 @@ class Tree:
         Examples
         --------
         >>> forearm = tmt.ARM.lock({"alpha": 0.0, "beta": 0.0})
-        >>> print(forearm.hinge_names, tmt.mass_matrix([0.0], forearm).round(9))
+        >>> print(forearm.joint_names, tmt.mass_matrix([0.0], forearm).round(9))
         ('gamma',) [[0.05275]]
         """
         return locked(self, angles)
@@ -229,7 +225,7 @@ class Tree:
     def moves(self, body: int) -> list[bool]:
         """Which of the n joints move the body: those on its path to the world."""
         on_path = [False] * len(self.parent)
-        joint = self.body_hinge[body]
+        joint = self.body_joint[body]
         while joint >= 0:
             on_path[joint] = True
             joint = self.parent[joint]
@@ -253,8 +249,8 @@ def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows:
         return ()
     rows = numbers_of(name, values, (coordinates.nv, coordinates.nv))
     fed = np.array(rows) != 0.0
-    for i, (kind, _, by) in enumerate(coordinates.joints):
-        if kind == "ball" and (fed[by].any() or fed[:, by].any()):
+    for i, joint in enumerate(coordinates.joints):
+        if joint.kind == "ball" and (fed[joint.qd].any() or fed[:, joint.qd].any()):
             why = "a ball; of hinges and slides alone is it accepted"
             raise ValueError(f"Tree.{name} has an entry of joint {i}, {why}")
     return rows if fed.any() else ()

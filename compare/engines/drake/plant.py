@@ -60,11 +60,11 @@ def finished(file: File, dt: float, joints: dict, numbers: dict, rest):
     for joint in joints_of(plant):
         if joint.type_name() not in springs:
             continue
-        _, at, by = file.coordinates.places.joints[joints[joint.index()]]
-        if inertia := numbers["armature"][by.start]:
+        place = file.coordinates.places.joints[joints[joint.index()]]
+        if inertia := numbers["armature"][place.qd.start]:
             plant.AddJointActuator(f"rotor of {joint.name()}", joint).set_default_rotor_inertia(inertia)
-        if rest is not None and (stiffness := numbers["stiffness"][by.start]):
-            plant.AddForceElement(springs[joint.type_name()](joint, rest[at.start], stiffness))
+        if rest is not None and (stiffness := numbers["stiffness"][place.qd.start]):
+            plant.AddForceElement(springs[joint.type_name()](joint, rest[place.q.start], stiffness))
     plant.Finalize()
     return plant
 

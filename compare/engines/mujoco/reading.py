@@ -107,7 +107,7 @@ def tree_of(whole: mujoco.MjModel, joints: Mapping[str, Place], bodies: list[int
     inertia = [R @ np.diag(moments) @ R.T for R, moments in zip(turns, model.body_inertia[bodies])]
     speeds = [i for place in joints.values() for i in place.dofs]
     return tmt.Tree(
-        hinge_names=list(joints),
+        joint_names=list(joints),
         parent=parents,
         offset=[
             anchor - (anchors[before] if before >= 0 else 0.0) for anchor, before in zip(anchors, parents)
@@ -115,7 +115,7 @@ def tree_of(whole: mujoco.MjModel, joints: Mapping[str, Place], bodies: list[int
         axis=axes,
         damping=model.dof_damping[speeds],
         body_names=[element_name(model, "body", body) for body in bodies],
-        body_hinge=hangs,
+        body_joint=hangs,
         mass=model.body_mass[bodies],
         com=[data.xipos[body] - anchors[joint] for body, joint in zip(bodies, hangs)],
         inertia=[(tensor + tensor.T) / 2.0 for tensor in inertia],
@@ -147,14 +147,14 @@ def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
     bodies = bodies_as_in(solution, reading) if solution else reading.bodies
     model, source, methods = reading.model, reading.source, methods_for(tree)
     return Mujoco(
-        model, tree.hinge_names, bodies, source, bare=True, warnings=reading.warnings, methods=methods
+        model, tree.joint_names, bodies, source, bare=True, warnings=reading.warnings, methods=methods
     )
 
 
 def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
     """The numbers of the bodies of a file in the order of those of a solution: on the same joint, by name or by their order."""
     numbers = {}
-    for joint in solution.tree.hinge_names:
+    for joint in solution.tree.joint_names:
         bodies, stated = moved_by(reading, joint), moved_by(solution, joint)
         if len(bodies) != len(stated):
             counts = f"bodies with mass on joint {joint}: {len(bodies)}, in the solution {len(stated)}"
@@ -167,8 +167,8 @@ def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
 def moved_by(reading: Reading, joint: str) -> dict[str, int]:
     """The bodies that a joint of the Tree carries: their numbers by name."""
     tree = reading.tree
-    bodies = zip(tree.body_names, reading.bodies, tree.body_hinge)
-    return {name: body for name, body, hinge in bodies if tree.hinge_names[hinge] == joint}
+    bodies = zip(tree.body_names, reading.bodies, tree.body_joint)
+    return {name: body for name, body, hinge in bodies if tree.joint_names[hinge] == joint}
 
 
 def has_hinges(path: str | Path, names: Sequence[str]) -> bool:
@@ -187,7 +187,7 @@ def parse(source: Path | str, tree: tmt.Tree) -> Mujoco:
 
     The body that a hinge moves is known by the hinge; one of several on a hinge, or fixed to the world, by its name.
     """
-    (model, warnings), hinges, bodies = compiled(source), tree.hinge_names, []
+    (model, warnings), hinges, bodies = compiled(source), tree.joint_names, []
     try:
         refuse_numbers(model)
     except ValueError as error:
@@ -199,8 +199,8 @@ def parse(source: Path | str, tree: tmt.Tree) -> Mujoco:
         raise ModelError(
             f"{name_of(source)} has the joints {joints}; expected exactly the hinges {', '.join(hinges)}"
         )
-    for name, hinge in zip(tree.body_names, tree.body_hinge):
-        if hinge >= 0 and tree.body_hinge.count(hinge) == 1:
+    for name, hinge in zip(tree.body_names, tree.body_joint):
+        if hinge >= 0 and tree.body_joint.count(hinge) == 1:
             bodies.append(int(model.jnt_bodyid[names[hinges[hinge]]]))
         elif (number := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)) >= 0:
             bodies.append(number)

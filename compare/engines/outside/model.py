@@ -105,7 +105,7 @@ def numbers_of(tree: tmt.Tree) -> dict[str, np.ndarray]:
     nv = tree.coordinates.nv
     origins, *_ = places_of(tree)  # of the joints, at the reference positions
     groups = [[] for _ in tree.kind]
-    for body, joint in enumerate(tree.body_hinge):
+    for body, joint in enumerate(tree.body_joint):
         if joint >= 0:
             groups[joint].append(
                 (tree.mass[body], origins[joint] + tree.com[body], np.array(tree.inertia[body]))

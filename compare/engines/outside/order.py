@@ -64,14 +64,14 @@ def order_of(
     places = file.coordinates.places
     q, v, turned = np.zeros(places.nq, int), np.zeros(places.nv, int), []
     for k, (start_q, start_v) in starts.items():
-        _, at, by = places.joints[k]
-        at, by = np.r_[at], np.r_[by]
+        joint = places.joints[k]
+        of_q, of_v = np.r_[joint.q], np.r_[joint.qd]
         if file.names[k].removesuffix(" turn") in file.free:
-            turned.append((slice(start_v, start_v + 3), places.joints[k].q))
-            at, by = (at[0] - 3 + np.array(free_q)), (by[0] - 3 + np.array(free_v))
-        elif len(at) == 4:
-            at = at[list(ball_q)]
-        q[start_q : start_q + len(at)], v[start_v : start_v + len(by)] = at, by
+            turned.append((slice(start_v, start_v + 3), joint.q))
+            of_q, of_v = of_q[0] - 3 + np.array(free_q), of_v[0] - 3 + np.array(free_v)
+        elif len(of_q) == 4:
+            of_q = of_q[list(ball_q)]
+        q[start_q : start_q + len(of_q)], v[start_v : start_v + len(of_v)] = of_q, of_v
     return Order(q, v, tuple(turned), in_world)
 
 

@@ -78,7 +78,7 @@ def source_name(source: object) -> str:
 
 def names_of(source: object) -> Sequence[str] | None:
     """The joints that the source states, in its own order; None if it states none."""
-    names = source.hinge_names if isinstance(source, tmt.Tree) else attribute(source, "joint_names")
+    names = source.joint_names if isinstance(source, tmt.Tree) else attribute(source, "joint_names")
     try:
         return names if names is None or isinstance(names, str) else list(names)
     except TypeError:
@@ -89,7 +89,7 @@ def of_tree(tree: tmt.Tree, coordinates: Coordinates) -> dict[str, Callable]:
     own = tree.coordinates
     if (own.nq, own.nv) != (coordinates.nq, coordinates.nv):
         raise OwnError(
-            f"the Tree has {own.nq} positions and {own.nv} speeds ({', '.join(tree.hinge_names)}); "
+            f"the Tree has {own.nq} positions and {own.nv} speeds ({', '.join(tree.joint_names)}); "
             f"expected {coordinates.nq} and {coordinates.nv} ({', '.join(coordinates.names)})"
         )
     return {name: partial(getattr(tmt, OF_A_TREE.get(name, name)), model=tree) for name in ARGUMENTS}

@@ -136,7 +136,7 @@ def named_after(robot: Robot, number: str) -> list[str]:
     joints, tree = robot.joints, robot.tree
     if number in ENTRIES:
         names = [
-            some_of([body for body, at in zip(tree.body_names, tree.body_hinge) if at == k]) or joints[k]
+            some_of([body for body, at in zip(tree.body_names, tree.body_joint) if at == k]) or joints[k]
             for k in range(len(joints))
         ]
         return [name for name in names for _ in range(ENTRIES[number])]

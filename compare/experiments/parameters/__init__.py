@@ -39,12 +39,11 @@ MAY_DIFFER = (
 def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict:
     """The numbers of a Tree by quantity: arrays per joint, speed, position or body, or one. joints, bodies: in this order."""
     (anchors, *_), places = places_of(tree), [tree.coordinates.joints[j] for j in joints]
-    positions, speeds = (
-        [i for place in places for i in range(place[k].start, place[k].stop)] for k in (1, 2)
-    )
+    positions = [i for place in places for i in range(place.q.start, place.q.stop)]
+    speeds = [i for place in places for i in range(place.qd.start, place.qd.stop)]
     numbers = {-1: -1} | {j: i for i, j in enumerate(joints)}
     is_sprung = np.repeat(
-        [tree.stiffness[j] > 0.0 for j in joints], [at.stop - at.start for _, at, _ in places]
+        [tree.stiffness[j] > 0.0 for j in joints], [place.q.stop - place.q.start for place in places]
     )
     return {
         "parent": np.array([numbers[tree.parent[j]] for j in joints]),
@@ -64,9 +63,9 @@ def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> 
 
 def stated(tree: tmt.Tree) -> dict:
     """The quantities of `parameters` by the stated numbers of hinges, arrays per hinge, per body, or one; the others are 0."""
-    numbers = numbers_of(tree, range(len(tree.hinge_names)), range(len(tree.body_names)))
+    numbers = numbers_of(tree, range(len(tree.joint_names)), range(len(tree.body_names)))
     del numbers["rest"]
-    return dict.fromkeys(STATED_FLAGS, 1.0) | {"order": range(len(tree.hinge_names))} | numbers
+    return dict.fromkeys(STATED_FLAGS, 1.0) | {"order": range(len(tree.joint_names))} | numbers
 
 
 def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
@@ -74,9 +73,9 @@ def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
     if quantity in OF_WORLD:
         return ("world",)
     if quantity in ("axis", "damping", "armature", "rest"):
-        coordinates = Coordinates(tree.hinge_names, tree.kind)
+        coordinates = Coordinates(tree.joint_names, tree.kind)
         return coordinates.positions if quantity == "rest" else coordinates.speeds
-    return tree.body_names if quantity in OF_BODIES else tree.hinge_names
+    return tree.body_names if quantity in OF_BODIES else tree.joint_names
 
 
 def rows(setup: Setup) -> Result:
@@ -88,7 +87,7 @@ def rows(setup: Setup) -> Result:
     tree, dynamics, causes = robot.tree, setup.compared()["mujoco"], []
     added = lengths(dynamics)
     if robot.stated_in:  # a solution: its joints and bodies are looked up in the file
-        joints = [reading.tree.hinge_names.index(name) for name in tree.hinge_names]
+        joints = [reading.tree.joint_names.index(name) for name in tree.joint_names]
         bodies = [reading.bodies.index(body) for body in setup.engines["mujoco"].bodies]
         numbers_stated = numbers_of(tree, range(len(joints)), range(len(bodies)))
         compiled = numbers_of(reading.tree, joints, bodies)
@@ -96,7 +95,7 @@ def rows(setup: Setup) -> Result:
         added = {name: values + reach for name, values in added.items()}
     else:
         numbers_stated, compiled = stated(tree), parameters(dynamics)
-    slides = {joint for joint, kind in zip(tree.hinge_names, tree.kind) if kind == "slide"}
+    slides = {joint for joint, kind in zip(tree.joint_names, tree.kind) if kind == "slide"}
     for quantity in (name for name in UNITS if name in compiled):
         values = np.asarray(compiled[quantity], dtype=float)
         numbers = np.broadcast_to(np.asarray(numbers_stated.get(quantity, 0.0), dtype=float), values.shape)
@@ -107,7 +106,7 @@ def rows(setup: Setup) -> Result:
         for owner, a, b, size in zip(names, numbers, values, sizes):
             unit, tolerance = unit_of(quantity, owner in slides), FACTOR * EPS * size
             words = (
-                dict(enumerate(("the world", *tree.hinge_names), start=-1)) if quantity == "parent" else {}
+                dict(enumerate(("the world", *tree.joint_names), start=-1)) if quantity == "parent" else {}
             )
             causes += compare_number(result, owner, quantity, a, b, unit, tolerance, is_whole, words)
             result.rows += rows_of(owner, quantity, a, b, unit)

@@ -52,9 +52,9 @@ def subsets(joints: Sequence[str], most: int) -> list[tuple[str, ...]]:
 def posture_of(coordinates: Coordinates, q: np.ndarray) -> tuple[float, ...]:
     """A position (nq,) with hinges in deg, as in a scene."""
     posture = np.array(q, dtype=float)
-    for kind, at, _ in coordinates.places.joints:
-        if kind == "hinge":
-            posture[at] = np.degrees(posture[at])
+    for joint in coordinates.places.joints:
+        if joint.kind == "hinge":
+            posture[joint.q] = np.degrees(posture[joint.q])
     return tuple(posture)
 
 

@@ -171,12 +171,12 @@ def drawable(case: Case, q: np.ndarray) -> np.ndarray:
     if not coordinates.has_balls:
         return q
     values = coordinates.difference(q, q[0])
-    for kind, at, by in coordinates.places.joints:
-        if kind != "ball":
-            values[:, by] = q[:, at]
+    for joint in coordinates.places.joints:
+        if joint.kind != "ball":
+            values[:, joint.qd] = q[:, joint.q]
             continue
-        jumps = np.linalg.norm(np.diff(values[:, by], axis=0), axis=1) > np.pi
-        values[1:, by][jumps] = np.nan
+        jumps = np.linalg.norm(np.diff(values[:, joint.qd], axis=0), axis=1) > np.pi
+        values[1:, joint.qd][jumps] = np.nan
     return values
 
 

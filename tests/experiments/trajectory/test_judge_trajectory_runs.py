@@ -173,11 +173,11 @@ def test_a_ball_is_drawn_by_its_turn_from_the_start():
     turns = np.array([0.0, 0.1, 1.75, 1.85])
     q = case.coordinates.move(case.q, turns[:, None] * np.ones(case.coordinates.nv))
     values = figures_runs.drawable(case, q)
-    for kind, at, by in case.coordinates.places.joints:
-        if kind == "ball":
+    for joint in case.coordinates.places.joints:
+        if joint.kind == "ball":
             assert (
-                values[:3, by] == pytest.approx(turns[:3, None] * np.ones(3))
-                and np.isnan(values[3, by]).all()
+                values[:3, joint.qd] == pytest.approx(turns[:3, None] * np.ones(3))
+                and np.isnan(values[3, joint.qd]).all()
             )
         else:
-            assert values[:, by] == pytest.approx(q[:, at])
+            assert values[:, joint.qd] == pytest.approx(q[:, joint.q])

@@ -18,7 +18,7 @@ EDITS = (
     Edit("run.explained", "explained", "check.value is not None and _1", "_1", "what is no number is explained"),
     Edit("run.explained", "explained", "check.quantity.startswith(('TMT', 'exact'))", "False",
          "a file explains the numbers of the stated robot"),
-    Edit("run.explained", "of_own_numbers", "(tree.hinge_names, tree.kind, tree.parent) != _1", "False",
+    Edit("run.explained", "of_own_numbers", "(tree.joint_names, tree.kind, tree.parent) != _1", "False",
          "the numbers of another tree are those of this one"),
     Edit("run.explained", "lifted_less_work", "np.full(len(q), np.nan)", "np.zeros(len(q))",
          "the potential of balls is explained"),
