@@ -26,7 +26,7 @@ if __name__ == "__main__":
 import shlex
 
 from .cli.command_line import EQUATIONS, FLEET, request
-from .process.crash import Refused, described
+from .core.errors import Refused, described
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -14,7 +14,7 @@ OF_TMT = sorted((ROOT / "tmt").rglob("*.py"))
 PAGE = ROOT / "ARCHITECTURE.md"
 DIAGRAM = re.compile(r"(?<=```mermaid\n).*?(?=```)", re.DOTALL)
 SHARED = {
-    "compare.report.text",
+    "compare.core.text",
     "compare.report.style",
 }  # for all: words from templates, the style of figures
 

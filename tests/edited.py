@@ -5,10 +5,10 @@ The arm; a cart with a slide, a hinge and a ball on it; a free stone.
 
 from models import PATHS
 
+from compare.core.check import Result
 from compare.engines.mujoco import Mujoco, parse, reading
 from compare.experiments import speed
 from compare.experiments.speed import runs, settings
-from compare.judge.check import Result
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.run.examine import Setup, engines

@@ -1,6 +1,6 @@
 """Sections of plain checks, for tests of what is said of them: test_references, and those of report."""
 
-from compare.judge.check import Result
+from compare.core.check import Result
 from compare.report.verdict import Section
 
 

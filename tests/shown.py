@@ -7,8 +7,8 @@ from textwrap import dedent
 
 import tmt
 from compare.cli.command_line import EXAMPLES, help_of
+from compare.core.text import block
 from compare.experiments import EXPERIMENTS
-from compare.report.text import block
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -12,10 +12,10 @@ from types import SimpleNamespace
 from crane import crane
 from in_process import InProcess
 
+from compare.core.text import say
 from compare.engines.mujoco import load
 from compare.experiments import EXPERIMENTS, module, skipped
 from compare.report import files, verdict
-from compare.report.text import say
 from compare.robots.arm import ARM
 from compare.run import examine as experiment
 

@@ -37,7 +37,7 @@ from functools import partial
 
 from matplotlib.figure import Figure
 
-from ..judge.check import Result
+from ..core.check import Result
 from . import Experiment
 
 EXPERIMENT = Experiment(order=45)

@@ -14,10 +14,10 @@ from sections import section
 
 from compare.__main__ import main
 from compare.cli import command_line
+from compare.core.check import Result
+from compare.core.text import environment
 from compare.experiments import EXPERIMENTS, Experiment
-from compare.judge.check import Result
 from compare.report.terminal import Terminal
-from compare.report.text import environment
 from compare.robots.arm import ARM
 from compare.run import command, drawing
 from compare.run import examine as experiment

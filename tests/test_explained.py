@@ -10,9 +10,9 @@ from small_runs import Lines
 from test_own_reference import IDLE, examined
 from test_own_reference import folder as folder
 
+from compare.core.check import Result
 from compare.engines.mujoco.dynamics import MujocoDynamics
 from compare.experiments.setup import Setup, engines
-from compare.judge.check import Result
 from compare.report.verdict import Section
 from compare.run.examine import examine
 from compare.run.explained import explained, lifted_less_work
@@ -119,7 +119,7 @@ def test_what_no_cause_explains(tmp_path, monkeypatch):
     other = replace(robot, tree=replace(robot.tree, parent=(-1, 0, 0)))
     assert explained(replace(setup, robot=other), printed) == []
     monkeypatch.setattr("compare.run.explained.what_follows", lambda setup: {"equations": True})
-    own = SimpleNamespace(robot=SimpleNamespace(own=("mass_matrix",)), background={})
+    own = SimpleNamespace(robot=SimpleNamespace(own=("mass_matrix",)))
     assert [check.value for check in explained(own, section_of("mass", ("M", None), ("M", 2.0)))] == [2.0]
     balls = SimpleNamespace(coordinates=SimpleNamespace(has_balls=True))
     assert np.isnan(lifted_less_work(balls, np.zeros((2, 4)))).all()

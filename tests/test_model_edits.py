@@ -10,8 +10,8 @@ from math import pi
 import pytest
 from edited import XML, setup_of, untimed_speed
 
+from compare.core.check import Result
 from compare.experiments import module, parameters, reduction, stability, trajectory
-from compare.judge.check import Result
 from compare.report.verdict import Section
 from compare.robots.arm import ARM
 from compare.run.examine import Setup, new_causes

@@ -14,10 +14,10 @@ from models import PATHS
 from small_runs import InProcess, Lines
 
 from compare.__main__ import main
+from compare.core.text import say
 from compare.engines.own.own_file import OwnFileError, own_object
 from compare.experiments import EXPERIMENTS, skipped
 from compare.experiments.setup import Setup, engines
-from compare.report.text import say
 from compare.run import examine as experiment
 from compare.run.reference import compared_with
 

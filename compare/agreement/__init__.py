@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..core.text import block, say
 from ..engines.own import ARGUMENTS, state_in_words
-from ..judge.check import over
-from ..report.text import block, say
+from ..judge.agree import over
 from .given import Given, State
 from .why import Why, cause_of
 

@@ -12,11 +12,11 @@ import numpy as np
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.values import real_numbers, shown
 
+from ..core.text import say
 from ..engines.own import ARGUMENTS, OwnEquations, in_shape, is_function, numbers_of
-from ..judge.check import over
+from ..judge.agree import over
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
-from ..report.text import say
 from ..robots.file import robot_of
 from ..robots.joint_map import JointMap, joint_map
 from ..robots.states import random

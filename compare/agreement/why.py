@@ -7,13 +7,13 @@ import numpy as np
 
 from tmt import literal
 
+from ..core.finding import Finding
+from ..core.text import say
 from ..diagnosis import STATES_ASKED, Values, diagnose_stated
 from ..diagnosis.cause import LEAST_STATES
 from ..diagnosis.consistency import conditions, symmetric
 from ..diagnosis.forces import causes_of_forces, force_left_over
 from ..engines.own import QUICK
-from ..judge.finding import Finding
-from ..report.text import say
 from .given import Given
 
 SECONDS_OF_CAUSE = 10.0  # of a search

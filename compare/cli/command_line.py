@@ -7,9 +7,10 @@ from difflib import get_close_matches
 from textwrap import fill
 from typing import NamedTuple, NoReturn
 
+from ..core.text import block
+from ..core.words import in_one_line
 from ..experiments import EXPERIMENTS
-from ..process.streams import PROGRAM, in_one_line
-from ..report.text import block
+from ..process.streams import PROGRAM
 
 FLEET, EQUATIONS = "fleet", "equations"  # further commands, with options of their own
 LINE_WIDTH = 80

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..judge.finding import Finding
-from ..report.text import say
+from ..core.finding import Finding
+from ..core.text import say
 from ..robots.joint_map import JointMap
 
 TEMPLATE = "causes"

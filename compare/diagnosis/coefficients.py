@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..judge.finding import Finding
-from ..judge.words import listed
-from ..report.text import apart, say
+from ..core.finding import Finding
+from ..core.text import apart, say
+from ..core.words import listed
 from ..robots.coordinates import Coordinates
 from .cause import TEMPLATE, Cause, Change, cause_of
 from .model import MOST_SPEEDS, Equations, coefficients_of

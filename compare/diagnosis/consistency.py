@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..judge.check import closest
-from ..judge.finding import Finding
+from ..core.finding import Finding
+from ..core.text import say
+from ..judge.agree import closest
 from ..judge.scale import EPS, FACTOR
-from ..report.text import say
 from ..robots.coordinates import Coordinates
 from .cause import TEMPLATE
 

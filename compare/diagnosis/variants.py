@@ -12,7 +12,7 @@ import numpy as np
 import tmt
 from tmt import literal
 
-from ..judge.words import listed
+from ..core.words import listed
 from ..robots.coordinates import Coordinates
 from ..robots.joint_map import PER_UNIT, Joint, JointMap
 from .cause import Change

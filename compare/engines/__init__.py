@@ -22,7 +22,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..judge.records import records_in
+from ..core.records import records_in
 from ..robots.case import Case, Coordinates
 
 GRID = 64  # number of equal intervals at whose ends a prepared run is read

@@ -9,7 +9,7 @@ NAME.md.jinja: a macro for its help, title, claim, tolerance, and for each kind 
     overview(results, robot)                 draws its picture of the first screen (of a record with `overview`)
     claim_values(robot) -> dict              what the macros claim and tolerance take in addition to the robot (optional)
     skipped(robot) -> Finding | None         why it does not apply to a robot (optional)
-    begin(setup)                             starts long work (optional)
+    begin(setup) -> Work                     starts long work (optional), which rows(setup, work) takes up
 """
 
 import importlib
@@ -18,8 +18,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from ..judge.finding import Finding
-from ..judge.records import records_in
+from ..core.finding import Finding
+from ..core.records import records_in
 
 if TYPE_CHECKING:  # for --help, the names are enough
     from ..robots import Robot

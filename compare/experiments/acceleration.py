@@ -7,8 +7,9 @@ from tmt import literal
 from tmt.derivation import method
 from tmt.derivation.dual import seeded
 
+from ..core.check import Result
 from ..engines import WHOSE
-from ..judge.check import Result
+from ..judge.agree import agree
 from ..judge.entries import unit
 from . import Experiment
 from .quantities import check_wide, compared, figures, headline, overview
@@ -32,19 +33,25 @@ def rows(setup: Setup) -> Result:
         inertia = np.einsum("sij,sj->si", ours.mass_matrix(q), engine_qdd)
         springs = literal.spring_torque(q, tree) if tree.has_springs else 0.0
         back = inertia + comparison.values("bias")[0] + drag + springs
-        result.agree(sample, f"tau from MuJoCo's qdd by {result.label}", torques, back, tau, closing)
-        result.agree(
-            sample, f"tau from {whose} qdd by mj_inverse", torques, tau, theirs.inverse(q, qd, qdd), closing
+        agree(result, sample, f"tau from MuJoCo's qdd by {result.label}", torques, back, tau, closing)
+        agree(
+            result,
+            sample,
+            f"tau from {whose} qdd by mj_inverse",
+            torques,
+            tau,
+            theirs.inverse(q, qd, qdd),
+            closing,
         )
         if "energy" in robot.own:  # which may be zero at any position
             zero, rest = np.array(tree.zero)[None], np.zeros((1, tree.coordinates.nv))
             above = (engine.energy(q, qd) - engine.energy(zero, rest) for engine in (ours, theirs))
-            result.agree(sample, "energy above the zero position's", "J", *above, scale.energy)
+            agree(result, sample, "energy above the zero position's", "J", *above, scale.energy)
 
         power, size = np.einsum("si,si->s", tau - drag, qd), np.einsum("si,si->s", closing, np.abs(qd))
         for engine, accelerations in ((whose, qdd), (WHOSE["mujoco"], engine_qdd)):
             gained = energy_rate(tree, q, qd, accelerations)
-            result.agree(sample, f"dE/dt - {work} at {engine} qdd", "W", gained, power, size)
+            agree(result, sample, f"dE/dt - {work} at {engine} qdd", "W", gained, power, size)
     return result
 
 

@@ -1,7 +1,7 @@
 """What explains a difference in Mbar, h and accelerations: of a file's robot and its reference, or of the user's equations."""
 
 from collections.abc import Iterator
-from functools import partial
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -9,15 +9,16 @@ import numpy as np
 import tmt
 from tmt import literal
 
+from ..core.check import Result
+from ..core.finding import Finding
+from ..core.text import say
 from ..diagnosis import STATES_ASKED, Diagnosis, Values, diagnose_stated, packed
 from ..diagnosis.cause import Cause
 from ..diagnosis.consistency import Condition, conditions
 from ..diagnosis.forces import causes_of_forces, force_left_over
 from ..engines.own import QUICK, OwnDynamics
-from ..judge.check import Result, over
-from ..judge.finding import Finding
+from ..judge.agree import over
 from ..judge.scale import EPS, FACTOR
-from ..report.text import say
 from ..robots import Robot
 from ..robots.states import Sample
 from . import Experiment
@@ -62,14 +63,9 @@ class Found(NamedTuple):
         return "option" if self.engine == "own" else ""
 
 
+@lru_cache(maxsize=2)
 def diagnosed(setup: Setup) -> Found:
     """What explains the difference of the engine that is compared with the robot's Tree; computed once."""
-    if "diagnosis" not in setup.background:
-        setup.background["diagnosis"] = search(setup)
-    return setup.background["diagnosis"]
-
-
-def search(setup: Setup) -> Found:
     tree, sample, is_own = setup.robot.tree, setup.random.first(STATES_ASKED), bool(setup.robot.own)
     name = "own" if is_own else "mujoco"
     given, (q, qd, tau) = setup.engines[name].of(setup.robot.case()), (sample.q, sample.qd, sample.tau)

@@ -4,8 +4,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from ..judge.check import Result, largest_known
-from ..judge.finding import Finding
+from ..core.check import Result, largest_known
+from ..core.finding import Finding
 from ..judge.scale import EPS, FACTOR
 from ..report.style import BLUE, GREEN, GREY, ORANGE, RED, WIDTH, zero_at_the_end
 

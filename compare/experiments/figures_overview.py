@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from ..judge.check import Result, largest_known
-from ..judge.finding import Finding
+from ..core.check import Result, largest_known
+from ..core.finding import Finding
 from ..judge.scale import FACTOR
 from ..report.style import BLUE, ORANGE, RED
 

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from tmt import literal
 from tmt.derivation import method
 
-from ..judge.finding import Finding
+from ..core.finding import Finding
 from ..report.style import BLUE, GREEN, GREY, RED, WIDTH, file_name, joint_lines
 from ..robots import Robot
 from ..robots.coordinates import free_joints

@@ -4,7 +4,8 @@ import numpy as np
 
 from tmt import literal
 
-from ..judge.check import Result
+from ..core.check import Result
+from ..judge.agree import agree
 from ..judge.entries import unit
 from . import Experiment
 from .quantities import compared, figures, headline
@@ -23,9 +24,9 @@ def rows(setup: Setup) -> Result:
         sample, scale, (held, *_) = comparison.sample, comparison.scale, comparison.values("holding torque")
         if "gravity" in setup.robot.own:
             still = ours.bias(sample.q, np.zeros(tree.coordinates.nv))
-            result.agree(sample, "yours: gravity - bias at rest", units, held, still, scale.weight)
+            agree(result, sample, "yours: gravity - bias at rest", units, held, still, scale.weight)
         if tree.has_springs:
             held, size = held + literal.spring_torque(sample.q, tree), scale.weight + scale.springs
             engine_held = theirs.inverse(sample.q, 0.0, 0.0)
-            result.agree(sample, "holding torque, springs too", units, held, engine_held, size)
+            agree(result, sample, "holding torque, springs too", units, held, engine_held, size)
     return result

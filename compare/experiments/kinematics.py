@@ -1,7 +1,7 @@
 """Positions, angular velocities, Jacobians and convective terms."""
 
-from ..judge.check import Result
-from ..judge.finding import Finding
+from ..core.check import Result
+from ..core.finding import Finding
 from ..robots import Robot
 from . import Experiment
 from .quantities import QUANTITIES, compared, figures, headline

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..judge.check import Result, over
+from ..core.check import Result
+from ..judge.agree import over
 from ..judge.scale import EPS, FACTOR
 from . import Experiment
 from .quantities import compared, figures, headline, overview

@@ -7,9 +7,9 @@ import numpy as np
 
 from tmt.exact.values import distance, exact
 
+from ..core.check import Result
+from ..core.finding import Finding
 from ..engines import Dynamics
-from ..judge.check import Result
-from ..judge.finding import Finding
 from ..judge.scale import EPS, FACTOR, acceleration_scale, gravity_scale, mass_scale
 from ..robots import Printed, Robot
 from . import Experiment

@@ -9,14 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.check import Result
+from ..core.finding import Finding
+from ..core.text import say
 from ..engines import LABELS
 from ..engines.mujoco.dynamics import convective_accelerations
 from ..engines.tmt import Compiled
-from ..judge.check import Result
+from ..judge.agree import agree
 from ..judge.entries import Entries, unit
-from ..judge.finding import Finding
 from ..judge.scale import EPS, FACTOR
-from ..report.text import say
 from ..robots import Robot
 from ..robots.states import MOST_SPEEDS, Sample
 from .setup import Setup
@@ -90,9 +91,9 @@ class Comparison:
             units = quantity.units
             named = units[0] if len(units) == 1 else unit(self.robot.tree, *units)
             exact = self.sample.exact(quantity.function, quantity.part)
-            result.agree(self.sample, name, named, ours, theirs, size, exact)
+            agree(result, self.sample, name, named, ours, theirs, size, exact)
             for values in compiled:
-                result.agree(self.sample, f"{name}, compiled", named, values, theirs, size)
+                agree(result, self.sample, f"{name}, compiled", named, values, theirs, size)
 
 
 def compared(setup: Setup, experiment: str, *names: str) -> tuple[Result, list[Comparison]]:

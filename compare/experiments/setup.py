@@ -1,11 +1,11 @@
 """The setup of an experiment: the robot, the engines, and the size of the run."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
+from ..core.finding import Finding
 from ..engines import Dynamics, Engine, compared, made
-from ..judge.finding import Finding
 from ..robots import Robot
 from ..robots import states as samples
 from ..robots.case import Case
@@ -23,7 +23,7 @@ def nothing(*_: object) -> None:
     """Do nothing."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Setup:
     robot: Robot
     engines: Mapping[str, Engine]
@@ -33,7 +33,6 @@ class Setup:
     reading: object | None = None  # of a robot's file, see engines.mujoco.reading
     quiet: Callable = nothing  # waits until nothing else runs: for timings
     progress: Callable = nothing  # reports the progress of long work
-    background: dict = field(default_factory=dict)  # work under way, by name
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
     alone: bool = False  # whether the experiment runs by itself, and may take longer than in `all`
     step: tuple[float, str] | None = None  # stability: step, s, and integrator of MuJoCo to be checked

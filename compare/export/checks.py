@@ -8,12 +8,12 @@ import numpy as np
 from tmt.compiled import evaluator
 from tmt.exact.many import exact_of_many
 
+from ..core import timing
 from ..engines import Dynamics
 from ..engines.mujoco.calls import MinimalCalls
 from ..engines.mujoco.dynamics import convective_accelerations
 from ..experiments.quantities import QUANTITIES
-from ..judge import timing
-from ..judge.check import closest
+from ..judge.agree import closest
 from ..judge.entries import Entries, unit
 from ..judge.scale import FACTOR
 from ..robots import Robot

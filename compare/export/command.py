@@ -14,12 +14,12 @@ import tmt
 from tmt.export import is_word
 
 from ..cli.command_line import EQUATIONS, Option, command_parser, expected
+from ..core.errors import Refused
+from ..core.text import block
+from ..core.words import in_one_line
 from ..process import interrupt
-from ..process.crash import Refused
-from ..process.streams import in_one_line
 from ..report.provenance import installed
 from ..report.terminal import Terminal
-from ..report.text import block
 
 FILES = {  # of each language: the endings of the files, and what tmt.equations calls their languages
     "c": {".c": "c", ".h": "c header"},

@@ -9,8 +9,8 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
+from ..core.errors import ROOT, Refused
 from ..process import interrupt
-from ..process.crash import ROOT, Refused
 from ..report.folder import fcntl, lock, what_is_wrong
 from ..report.provenance import installed
 from .models import unpacked

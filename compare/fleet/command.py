@@ -11,9 +11,9 @@ from tmt.compiled.cores import cores
 
 from ..cli import command_line as cli
 from ..cli.command_line import FLEET, PROGRAM, Option
+from ..core.errors import Refused
+from ..core.words import in_one_line
 from ..experiments import EXPERIMENTS, TIMED
-from ..process.crash import Refused
-from ..process.streams import in_one_line
 from ..report.terminal import Terminal
 
 SENT = "reference of the fleet"  # folder of the solution in a bundle

@@ -18,8 +18,8 @@ from pathlib import Path
 
 from pebble import ProcessExpired, ProcessPool
 
+from ..core.errors import Refused, described, how_ended
 from ..process import interrupt
-from ..process.crash import Refused, described, how_ended
 from ..process.workers import end_with_parent
 from .cache import RESUME, program
 

@@ -7,9 +7,9 @@ from glob import glob, has_magic
 from pathlib import Path
 from typing import NamedTuple
 
-from ..process.crash import Refused
+from ..core.errors import Refused
+from ..core.words import in_one_line, readable
 from ..process.parts import elements_of, is_pipe, needed_by
-from ..process.streams import in_one_line, readable
 
 MODEL_ELEMENTS = "mujoco", "robot"  # root elements of MJCF and of URDF
 

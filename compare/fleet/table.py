@@ -9,13 +9,13 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
-from ..judge.check import About
-from ..judge.finding import Finding
-from ..process.crash import Refused
-from ..process.streams import in_one_line
+from ..core.check import About
+from ..core.errors import Refused
+from ..core.finding import Finding
+from ..core.text import block, environment, say
+from ..core.words import in_one_line
 from ..report import files
 from ..report.provenance import OURS, commit, installed
-from ..report.text import block, environment, say
 from ..report.verdict import Section, failures, worst
 from ..run.reference import SOLUTION, Reference
 from .cache import write_whole

@@ -9,12 +9,12 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
+from ..core.text import say
 from ..engines.mujoco import ModelError, read
 from ..experiments import TIMED, skipped
 from ..process.workers import Clock
 from ..report import folder, provenance
 from ..report.terminal import Terminal
-from ..report.text import say
 from ..robots.case import SEED
 from ..run import examine as experiment
 from ..run.command import write_report

@@ -4,8 +4,8 @@ import numpy as np
 
 import tmt
 
+from ..core.check import About, Result
 from ..robots.case import Case, Coordinates, rates_at
-from .check import About, Result
 from .entries import Entries
 from .rounding import NARROW
 from .scale import EPS, FACTOR, gravity_scale

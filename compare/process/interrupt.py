@@ -15,7 +15,7 @@ from contextlib import suppress
 from multiprocessing import resource_tracker
 from typing import NoReturn
 
-from .crash import how_ended
+from ..core.errors import how_ended
 
 CAN_BLOCK = hasattr(signal, "pthread_sigmask")
 undo = []  # functions to call before the process ends, last first

@@ -3,6 +3,8 @@
 import os
 import sys
 
+from ..core.words import in_one_line
+
 PROGRAM = "python -m compare"
 
 
@@ -40,16 +42,6 @@ class Stream:
     @property
     def encoding(self):
         return getattr(self.stream, "encoding", None) or "utf-8"
-
-
-def readable(text: str) -> str:
-    """Text without surrogates: bytes that the locale could not decode are read as UTF-8 or escaped."""
-    return text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
-
-
-def in_one_line(text: str) -> str:
-    """Readable text in which control characters are escaped."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in readable(text))
 
 
 def say_error(line: str) -> None:

@@ -12,8 +12,8 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 
+from ..core.errors import place
 from . import interrupt
-from .crash import place
 
 
 class Clock:

@@ -11,14 +11,14 @@ import pandas as pd
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
+from ..core.check import Check
+from ..core.text import block, count, environment
+from ..core.words import capital
 from ..experiments import EXPERIMENTS, Experiment
-from ..judge.check import Check
-from ..judge.words import capital
 from .images import embedded
 from .motion import SCRIPT, motion_in_html
 from .questions import answers
 from .tables import TITLES, closest_checks, of_causes, origins, records, shortened, shown
-from .text import block, count, environment
 from .verdict import Parts, Report, Section, failures, headline, outcome, passed, standing
 
 MOST_ROWS, MOST_IN_MARKDOWN = 40, 6  # of a table; its file has all

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.text import escaped
 from .document import Document, joined
 from .folder import files, save
-from .text import escaped
 from .verdict import Parts, Report, passed
 
 COMPUTED = "=", "+", "-", "@", "\t", "\r"  # how the texts begin that a spreadsheet would compute

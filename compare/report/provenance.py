@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from ..judge.timing import vectors
-from ..process.streams import readable
+from ..core.timing import vectors
+from ..core.words import readable
 from ..process.workers import Clock
 
 OURS = "arm-tmt-mujoco"

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
-from ..judge.check import Result
-from ..judge.finding import Finding
-from .text import say
+from ..core.check import Result
+from ..core.finding import Finding
+from ..core.text import say
 from .verdict import Section
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
-from ..judge.check import Check
+from ..core.check import Check
 from .verdict import Section
 
 DIGITS = dict.fromkeys(

@@ -12,8 +12,9 @@ from textwrap import fill
 from rich.console import Console
 from rich.text import Text
 
+from ..core.words import in_one_line
 from ..process import interrupt
-from ..process.streams import Stream, in_one_line
+from ..process.streams import Stream
 
 EMPTY_LINE, SHOW_CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the cursor that was hidden
 

@@ -4,11 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeVar
 
-from ..judge.check import ENDS, About, Check, Result
-from ..judge.finding import Finding
-from ..judge.words import capital
-from ..process.crash import described
-from .text import block, say
+from ..core.check import ENDS, About, Check, Result
+from ..core.errors import described
+from ..core.finding import Finding
+from ..core.rows import Row
+from ..core.text import block, say
+from ..core.words import capital
 
 Value = TypeVar("Value")
 
@@ -34,7 +35,11 @@ class Section:
     def tables(self) -> dict:
         """Its tables that have rows, by their names; its own first."""
         tables = {self.name: self.result.rows} | self.result.tables
-        return {name: rows for name, rows in tables.items() if rows}
+        return {name: as_records(rows) for name, rows in tables.items() if rows}
+
+
+def as_records(rows: list) -> list[dict]:
+    return [row.record() for row in rows] if isinstance(rows, list) and isinstance(rows[0], Row) else rows
 
 
 class Report(NamedTuple):

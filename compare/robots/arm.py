@@ -7,7 +7,7 @@ import numpy as np
 
 import tmt
 
-from ..judge.finding import Finding
+from ..core.finding import Finding
 from . import Claims, Printed, Question, Robot
 from .case import Scene
 

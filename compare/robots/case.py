@@ -12,7 +12,7 @@ from tmt import literal
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.tree import GAINS
 
-from ..judge.words import some_of
+from ..core.words import some_of
 from .actuators import Controller, controller
 from .coordinates import KINDS as KINDS
 from .coordinates import Coordinates

@@ -13,7 +13,7 @@ import numpy as np
 
 import tmt
 
-from ..judge.words import listed, some_of
+from ..core.words import listed, some_of
 from .coordinates import Coordinates
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}

@@ -6,7 +6,7 @@ import numpy as np
 
 from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
 
-from ..judge.finding import Finding
+from ..core.finding import Finding
 from . import Robot
 from .case import SEED
 

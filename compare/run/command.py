@@ -6,16 +6,16 @@ import time
 from functools import partial
 from pathlib import Path
 
+from ..core.errors import Refused
+from ..core.finding import Finding
+from ..core.text import say
 from ..engines.mujoco import ModelError
 from ..engines.own.own_file import OwnFileError
 from ..experiments import EXPERIMENTS, skipped
-from ..judge.finding import Finding
-from ..process.crash import Refused
 from ..process.streams import say_error
 from ..process.workers import WorkerEnded, load_modules, start_workers
 from ..report.folder import FolderError, new_report
 from ..report.terminal import Terminal
-from ..report.text import say
 from ..robots.case import SEED
 from ..robots.scene_file import SceneError, read_scenes
 from ..robots.states import MOST_SPEEDS

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.check import Result
+from ..core.text import say
 from ..experiments import EXPERIMENTS, module
-from ..judge.check import Result
 from ..report import images
 from ..report.folder import writing
-from ..report.text import say
 from ..report.verdict import Section
 from ..robots import Robot
 

@@ -5,14 +5,14 @@ from functools import partial
 from pathlib import Path
 from types import ModuleType
 
+from ..core.check import ENDS, About, Result
+from ..core.errors import described
+from ..core.finding import Finding
+from ..core.text import block, say
 from ..experiments import EXPERIMENTS, TIMED, Experiment, module
 from ..experiments.setup import Setup, engines
-from ..judge.check import ENDS, About, Result
-from ..judge.finding import Finding
-from ..process.crash import described
 from ..process.workers import Clock, WorkerEnded, Workers, load_modules
 from ..report.terminal import Terminal
-from ..report.text import block, say
 from ..report.verdict import STATES_CAUSES, Section, failures
 from ..robots.states import MOST_SPEEDS
 from .drawing import draw, quiet, results_needed
@@ -55,12 +55,12 @@ def examine(
     clock = clock or Clock()
     (folder / "figures").mkdir()
     sections, drawings, waiting, causes, reasons = [], [], [], [], {}
-    own, reported, crashed = setup.engines.get("own"), set(), {}
+    own, reported, crashed, work = setup.engines.get("own"), set(), {}, {}
     is_large = setup.robot.coordinates.nv > MOST_SPEEDS  # its first answers come before any long work begins
     for name in names:
         if hasattr(module(name), "begin") and not is_large:
             with clock.of(name):
-                _, crashed[name] = attempt(name, module(name).begin, setup)
+                work[name], crashed[name] = attempt(name, module(name).begin, setup)
     clock.ends(START)
     last = ("kinematics", *TIMED) if is_large else TIMED
     order = sorted(names, key=last.__contains__)
@@ -79,7 +79,7 @@ def examine(
             setup.progress(block(name, "summary"))
             section, crash = None, crashed.get(name)
             if not crash:
-                section, crash = attempt(name, partial(section_of, name), setup)
+                section, crash = attempt(name, partial(section_of, name, work=work.get(name)), setup)
             sections.append(section or Section(name, name, "", "", crash))
             if own:
                 add_problems(sections[-1].result, own.equations.problems, reported)
@@ -118,9 +118,10 @@ def examine(
     return sorted(sections, key=lambda section: names.index(section.name)), causes, reasons
 
 
-def section_of(name: str, setup: Setup) -> Section:
+def section_of(name: str, setup: Setup, work: object = None) -> Section:
     experiment = module(name)
-    return Section(name, *texts(name, experiment, setup), with_headline(experiment, experiment.rows(setup)))
+    result = experiment.rows(setup) if work is None else experiment.rows(setup, work)
+    return Section(name, *texts(name, experiment, setup), with_headline(experiment, result))
 
 
 def with_headline(experiment: ModuleType, result: Result) -> Result:

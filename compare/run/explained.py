@@ -1,15 +1,16 @@
 """Which failing checks are gone when the causes are mended; a second, independent error is not hidden behind the first."""
 
 import dataclasses
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
+from ..core.check import Check, Result
 from ..engines.mujoco import engine, read
 from ..engines.own import OwnDynamics
 from ..experiments import module
 from ..experiments.setup import Setup, engines
-from ..judge.check import Check, Result
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..report.verdict import STATES_CAUSES, Section, failures
@@ -35,9 +36,7 @@ def explained(setup: Setup, section: Section) -> list[Check]:
     if section.name in STATES_CAUSES or not checks:
         return []
     if setup.robot.own:
-        if "follows" not in setup.background:
-            setup.background["follows"] = what_follows(setup)
-        follows = setup.background["follows"]
+        follows = what_follows(setup)
         return [check for check in checks if check.value is not None and follows[kind_of(check)]]
     mended = of_own_numbers(setup)
     if mended is None:
@@ -55,6 +54,7 @@ def explained(setup: Setup, section: Section) -> list[Check]:
     return [check for check in checks if not check.quantity.startswith(("TMT", "exact"))]
 
 
+@lru_cache(maxsize=2)
 def of_own_numbers(setup: Setup) -> Setup | None:
     """The same with the file's own numbers in tmt's equations, without the forces that these do not have; None: not possible."""
     reading = setup.reading or read(Path(setup.robot.mjcf))
@@ -62,16 +62,13 @@ def of_own_numbers(setup: Setup) -> Setup | None:
     if (tree.joint_names, tree.kind, tree.parent) != (stated.joint_names, stated.kind, stated.parent):
         return None
     robot = dataclasses.replace(setup.robot, tree=tree)
-    return dataclasses.replace(
-        setup, robot=robot, engines=engines(engine(reading)), reading=reading, background={}
-    )
+    return dataclasses.replace(setup, robot=robot, engines=engines(engine(reading)), reading=reading)
 
 
+@lru_cache
 def compared_again(mended: Setup, name: str) -> Result:
     """The result of an experiment, computed once."""
-    if name not in mended.background:
-        mended.background[name] = module(name).rows(mended)
-    return mended.background[name]
+    return module(name).rows(mended)
 
 
 def kind_of(check: Check) -> str:
@@ -85,6 +82,7 @@ def kind_of(check: Check) -> str:
     return "motion"
 
 
+@lru_cache(maxsize=2)
 def what_follows(setup: Setup) -> dict[str, bool]:
     """What of a user's own equations is explained by the causes of M and h, by the kinds of `kind_of`.
 

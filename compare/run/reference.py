@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.text import say
+from ..core.words import in_one_line
 from ..engines import Engine
 from ..engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, load, read
 from ..engines.mujoco.names import integrator_by_name
 from ..engines.mujoco.remarks import of_source, remarks
 from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import OwnFileError, aside, own_object, raised_in
-from ..process.streams import in_one_line
-from ..report.text import say
 from ..robots import Robot
 from ..robots.arm import ARM
 from ..robots.case import SEED

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import tmt
+from compare.core.text import apart
 from compare.diagnosis import diagnose, packed
 from compare.diagnosis.places import OF_ZERO, Place
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
-from compare.report.text import apart
 
 
 def states(tree=tmt.ARM, seed=0, count=16):

@@ -14,11 +14,11 @@ import pytest
 from edited import setup_of
 
 from compare import engines
+from compare.core.check import About, Result
 from compare.engines import EngineRecord, Method
 from compare.engines.outside.model import numbers_of, size_of, together
 from compare.engines.tmt import TmtDynamics
 from compare.experiments.engines import compare_numbers, compare_quantities, integrators
-from compare.judge.check import About, Result
 from compare.judge.entries import Entries
 from compare.judge.scale import FACTOR
 from compare.robots.arm import ARM

@@ -7,9 +7,9 @@ import pytest
 from edited import setup_of
 
 import tmt
+from compare.core.check import Result
 from compare.experiments import acceleration, gravity, kinematics, mass
 from compare.experiments.quantities import QUANTITIES, check_wide
-from compare.judge.check import Result
 from compare.run.examine import Setup
 from tmt import literal
 

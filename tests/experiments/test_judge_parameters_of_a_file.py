@@ -6,12 +6,12 @@ import pytest
 from edited import XML, setup_of
 from models import PATHS
 
+from compare.core.check import Result
 from compare.engines.mujoco import engine, read
 from compare.engines.mujoco.parameters import Stated, row_of
 from compare.experiments import parameters
 from compare.experiments.parameters.numbers import compare_number
 from compare.experiments.setup import Setup, engines
-from compare.judge.check import Result
 from compare.judge.scale import EPS
 from compare.robots.file import robot_of
 from compare.run.reference import compared_with

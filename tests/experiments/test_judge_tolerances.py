@@ -9,11 +9,11 @@ from edited import MOON, setup_of
 from judged import verdicts
 
 import tmt
+from compare.core.check import Result
 from compare.engines.mujoco import parse
 from compare.experiments import acceleration, gravity, kinematics, mass, published
 from compare.experiments.parameters.numbers import check_forces
 from compare.experiments.quantities import QUANTITIES
-from compare.judge.check import Result
 from compare.judge.entries import Entries
 from compare.robots.arm import ARM, PRINTED
 from compare.robots.states import Sample

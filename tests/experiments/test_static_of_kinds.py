@@ -5,12 +5,12 @@ import pytest
 from edited import CART, STONE, setup_between
 from models import random_tree
 
+from compare.core.check import Result
+from compare.core.text import say
 from compare.experiments import acceleration, figures_sketch, gravity, kinematics, mass
 from compare.experiments import figures as draw
-from compare.judge.check import Result
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
-from compare.report.text import say
 
 MODULES = (kinematics, mass, gravity, acceleration)
 BODY = '<inertial pos="0.1 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/></body></worldbody></mujoco>'

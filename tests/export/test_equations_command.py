@@ -11,10 +11,10 @@ from models import PATHS
 import compare
 import tmt
 from compare.__main__ import main
+from compare.core.errors import Refused
 from compare.export import checks
 from compare.export.command import FILES, identifier
 from compare.export.programs import PROGRAMS, NotRun, Program, PythonProgram, WrongProgram
-from compare.process.crash import Refused
 from compare.robots.arm import ARM
 from compare.run.reference import compared_with
 from tmt.derivation.quantities import QUANTITIES

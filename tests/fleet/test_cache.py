@@ -2,9 +2,9 @@
 
 import pytest
 
+from compare.core.errors import Refused
 from compare.fleet import cache as module
 from compare.fleet.cache import locked, write_whole
-from compare.process.crash import Refused
 
 
 def test_a_folder_is_for_one_fleet_at_a_time_and_what_cannot_be_written_is_said(tmp_path):

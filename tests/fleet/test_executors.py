@@ -13,9 +13,9 @@ import runs
 import toy
 from toy import soon
 
+from compare.core.errors import Refused
 from compare.fleet import executors as module
 from compare.fleet.executors import Cluster, Pool
-from compare.process.crash import Refused
 
 HERE = Path(__file__).resolve().parent
 

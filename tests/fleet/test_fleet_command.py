@@ -14,8 +14,8 @@ import runs
 from toy import soon
 
 from compare.__main__ import main
+from compare.core.errors import Refused
 from compare.fleet.table import FLEET_COLUMNS
-from compare.process.crash import Refused
 
 NAME = "a b#ü.xml" if sys.getfilesystemencoding() == "utf-8" else "a b#u.xml"  # of a file that agrees
 MODELS = runs.ROOT / "tests" / "models"

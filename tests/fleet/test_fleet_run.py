@@ -9,12 +9,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from compare.core.errors import described
 from compare.fleet.command import solution_files
 from compare.fleet.models import found_models, place_of_report
 from compare.fleet.run import AHEAD, Run
 from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, REFUSED
 from compare.fleet.task import FleetOptions
-from compare.process.crash import described
 
 PENDULUM = ("<mujoco><worldbody><body name='b'><joint name='j' axis='0 1 0'/><inertial pos='0 0 {}' mass='1' "
             "diaginertia='1 1 1'/></body></worldbody></mujoco>")  # fmt: skip

@@ -10,10 +10,10 @@ from urllib.parse import unquote
 
 import pytest
 
+from compare.core.check import AT_OWN_STEP, ENDS, About, Result
 from compare.fleet import table
 from compare.fleet.models import place_of_report
 from compare.fleet.table import AGREE, BROKE, DIFFER, FLEET_COLUMNS, ITSELF, NOT_JUDGED, REFUSED, UNCONFIRMED
-from compare.judge.check import AT_OWN_STEP, ENDS, About, Result
 from compare.report import files
 from compare.report.verdict import Section
 from compare.run.reference import Reference

@@ -10,8 +10,8 @@ import pytest
 from mujoco import MjModel
 from PIL import Image
 
+from compare.core.errors import Refused
 from compare.fleet.models import bundle, found_models, place_of_report, unpacked
-from compare.process.crash import Refused
 
 MODEL = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from compare.judge.check import Result, closest, worst_of_each
+from compare.core.check import Result
+from compare.judge.agree import agree, closest, worst_of_each
 from compare.robots.arm import ARM
 from compare.robots.states import Sample
 from tmt.exact.many import Pairs
@@ -21,7 +22,7 @@ def agreed(ours, theirs, scale, exact=None):
     """The checks and the row of one quantity, (states, ...)."""
     result, of = Result("mass"), sample(len(ours), exact=0 if exact is None else 2)
     exact = np.zeros((0, 1)) if exact is None else np.array(exact)[:, None]
-    result.agree(of, "Mbar", "kg m2", np.array(ours), np.array(theirs), scale, Pairs(exact, 0.0 * exact))
+    agree(result, of, "Mbar", "kg m2", np.array(ours), np.array(theirs), scale, Pairs(exact, 0.0 * exact))
     return result.checks, result.rows[0]
 
 

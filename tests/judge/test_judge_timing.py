@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from compare.judge import timing
+from compare.core import timing
 
 
 def test_what_is_compared_is_called_in_turns_and_the_first_call_is_not_counted(monkeypatch):

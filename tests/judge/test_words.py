@@ -1,6 +1,6 @@
 """Names and numbers as parts of sentences."""
 
-from compare.judge.words import listed, milliseconds, scene_of, some_of
+from compare.core.words import listed, milliseconds, scene_of, some_of
 
 
 def test_a_check_belongs_to_the_scene_of_the_longest_name():

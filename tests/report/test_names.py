@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from compare.__main__ import main
-from compare.process.streams import in_one_line
+from compare.core.text import cell, escaped
+from compare.core.words import in_one_line
 from compare.report import files, style
 from compare.report.terminal import Terminal
-from compare.report.text import cell, escaped
 
 MARKDOWN = MarkdownIt("commonmark", {"html": True}).enable(["table", "strikethrough"])
 ATTACK = "<img src=x onerror=document.documentElement.id='run'>"

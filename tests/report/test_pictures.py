@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from PIL import Image
 from sections import section
 
+from compare.core.check import About
+from compare.core.text import environment
 from compare.experiments.trajectory.motion import Drawn
-from compare.judge.check import About
 from compare.report import images, motion, style
-from compare.report.text import environment
 from compare.robots.arm import ARM
 
 

@@ -9,13 +9,13 @@ from models import PATHS
 from sections import BAD, GOOD, section
 from small_runs import Lines
 
+from compare.core.check import About, Result
+from compare.core.text import say
 from compare.engines.mujoco.reading import read
 from compare.experiments import figures_overview, module, stability
 from compare.experiments.speed import first_screen as of_speed
-from compare.judge.check import About, Result
 from compare.report.questions import answers, true_errors
 from compare.report.style import BLUE, ORANGE, RED
-from compare.report.text import say
 from compare.report.verdict import failures, headline, outcome, passed, standing, verdict
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of

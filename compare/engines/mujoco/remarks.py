@@ -5,7 +5,7 @@ from pathlib import Path
 
 import mujoco
 
-from ...judge.finding import Finding
+from ...core.finding import Finding
 from .inventory import LEFT_OUT, OFF, OPEN
 from .names import element_name, moving
 from .parameters import stated_numbers

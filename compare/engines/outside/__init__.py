@@ -22,7 +22,7 @@ from types import ModuleType
 
 import numpy as np
 
-from ...judge.words import listed
+from ...core.words import listed
 from ...robots.case import Case
 from .. import GRID, RECORDS, Engine, Method, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
 from .answers import LIMIT, answer, started

@@ -9,9 +9,9 @@ import numpy as np
 
 import tmt
 
+from ...core.errors import described
+from ...core.words import in_one_line
 from ...judge.scale import FACTOR
-from ...process.crash import described
-from ...process.streams import in_one_line
 from ...process.workers import begin
 from .. import RECORDS
 from .model import EngineError, File, ReadModel, Unread, numbers_of, size_of

@@ -16,8 +16,8 @@ from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from types import ModuleType
 
-from ...judge.words import listed
-from ...process.crash import described
+from ...core.errors import described
+from ...core.words import listed
 from ...process.interrupt import is_interrupt
 from .functions import OwnError
 

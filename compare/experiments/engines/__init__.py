@@ -5,15 +5,16 @@ from functools import partial
 
 import numpy as np
 
+from ...core.check import ENDS, About, Result
+from ...core.finding import Finding
+from ...core.words import some_of
 from ...diagnosis import Values, diagnose_stated
 from ...engines import LABELS, RECORDS, Engine, EngineRecord
 from ...engines.outside import Outside, OutsideDynamics
 from ...engines.outside.model import EngineError, TooLong, Unread, size_of
-from ...judge.check import ENDS, About, Result, closest, over
+from ...judge.agree import closest, over
 from ...judge.entries import Entries, unit
-from ...judge.finding import Finding
 from ...judge.scale import EPS, FACTOR
-from ...judge.words import some_of
 from ...robots import Robot
 from ...robots.states import Sample
 from .. import Experiment

@@ -2,9 +2,9 @@
 
 from matplotlib.figure import Figure
 
+from ...core.check import Result
+from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
-from ...judge.check import Result
-from ...judge.finding import Finding
 from ...judge.scale import FACTOR
 from ...report.style import RED, WIDTH
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from tmt.methods import METHODS
 
+from ...core.check import About, Result
 from ...engines import GRID, LABELS, RECORDS, Engine, Method, Motion, Setting
 from ...engines.outside.model import TooLong, Unread
-from ...judge.check import About, Result, closest
+from ...judge.agree import closest
 from ...judge.rounding import step_rounding
 from ...judge.run import ORDER_MARGIN
 from ...judge.scale import EPS

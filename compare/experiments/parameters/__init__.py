@@ -7,10 +7,10 @@ import numpy as np
 
 import tmt
 
+from ...core.check import Result
+from ...core.finding import Finding
 from ...engines.mujoco.inventory import LEFT_OUT, MODELLED
 from ...engines.mujoco.parameters import STATED_FLAGS, lengths, parameters
-from ...judge.check import Result
-from ...judge.finding import Finding
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...robots.case import Coordinates

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...core.check import Result
 from ...engines.mujoco.parameters import stated_numbers
-from ...judge.check import Result
 from ..setup import Setup
 from .numbers import check_forces, compare_number, rows_of, unit_of
 

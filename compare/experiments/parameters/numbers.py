@@ -6,8 +6,8 @@ import numpy as np
 
 from tmt import literal
 
+from ...core.check import Result
 from ...engines.mujoco.parameters import STATED_FLAGS
-from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
 from ..setup import Setup
 

@@ -6,9 +6,9 @@ from functools import partial
 
 from tmt.exact.values import DIGITS
 
+from ...core.check import About, Result
+from ...core.finding import Finding
 from ...engines.mujoco import ModelError
-from ...judge.check import About, Result
-from ...judge.finding import Finding
 from ...judge.rounding import NARROW
 from ...judge.run import movement_unit
 from ...judge.scale import FACTOR
@@ -29,17 +29,15 @@ def claim_values(robot: Robot) -> dict:
     return words | {"digits": DIGITS, "eps": FACTOR, "narrow": NARROW}
 
 
-def begin(setup: Setup) -> None:
+def begin(setup: Setup) -> Iterator:
     """Start everything that is not timed, in parallel with other work."""
-    alone = replace(setup, map=map, quiet=nothing, progress=nothing, background={}, reading=None)
-    setup.background["reduction"] = setup.map(untimed, [alone])
+    alone = replace(setup, map=map, quiet=nothing, progress=nothing, reading=None)
+    return setup.map(untimed, [alone])
 
 
-def rows(setup: Setup) -> Result:
+def rows(setup: Setup, work: Iterator | None = None) -> Result:
     """Sub-blocks with joints locked; what each case needs, its runs and times; exact solutions."""
-    if "reduction" not in setup.background:
-        begin(setup)
-    ((result, models),) = setup.background.pop("reduction")
+    ((result, models),) = begin(setup) if work is None else work
     if models is not None:
         setup.quiet()
         time_models(result, models, setup, rounds=setup.of(64, 16, 2))

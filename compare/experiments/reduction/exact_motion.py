@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...core.check import About, Result
 from ...engines import LABELS
-from ...judge.check import About, Result
 from ...judge.run import MOVES, ORDER_MARGIN
 from ...robots.case import Case
 from ...truth.pendulum import pendulum, swing

@@ -4,9 +4,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ...core.check import Result
+from ...core.words import capital
 from ...engines import COLOURS, LABELS, MARKS
-from ...judge.check import Result
-from ...judge.words import capital
 from ...report.style import BLUE, GREY, ORANGE, WIDTH, file_name
 from ...robots import Robot
 

@@ -4,8 +4,9 @@ import numpy as np
 
 import tmt
 
+from ...core.check import About, Result
 from ...engines import LABELS
-from ...judge.check import About, Result, closest
+from ...judge.agree import closest
 from ...judge.rounding import NARROW, band
 from ...judge.run import check_movement, deviation, required_time, step_in_words
 from ...robots.case import Case, Coordinates

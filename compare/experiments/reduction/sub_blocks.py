@@ -5,7 +5,8 @@ from itertools import combinations
 
 import numpy as np
 
-from ...judge.check import Result, closest, worst_of_each
+from ...core.check import Result
+from ...judge.agree import closest, worst_of_each
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots.case import SEED, Case, Coordinates

@@ -6,11 +6,11 @@ from functools import lru_cache
 import tmt
 from tmt.compiled import evaluator
 
+from ...core.check import Result
+from ...core.timing import fastest
+from ...core.units import renamed
 from ...engines import Engine, Method, Setting, same_scheme
-from ...judge.check import Result
 from ...judge.run import movement_unit
-from ...judge.timing import fastest
-from ...judge.units import renamed
 from ...robots.case import Case
 from ..setup import Setup
 

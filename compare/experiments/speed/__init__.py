@@ -3,14 +3,14 @@
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
+from ...core import timing
+from ...core.check import Result
+from ...core.finding import Finding
+from ...core.units import renamed
+from ...core.words import scene_begins
 from ...engines import GRID, IN_QUICK_RUNS, LABELS, RECORDS, methods_in
-from ...judge import timing
-from ...judge.check import Result
-from ...judge.finding import Finding
 from ...judge.run import leaves_no_digits, movement_unit
 from ...judge.scale import EPS, FACTOR
-from ...judge.units import renamed
-from ...judge.words import scene_begins
 from ...robots import Robot
 from ...robots.case import Case
 from ...truth.reference import LOST, has_no_reference
@@ -36,16 +36,14 @@ def skipped(robot: Robot) -> Finding | str | None:
     return leaves_no_digits(robot) or has_no_reference(robot)
 
 
-def begin(setup: Setup) -> None:
+def begin(setup: Setup) -> tuple:
     """Start measuring the errors of MuJoCo and tmt, in parallel with other work: they are timed later."""
-    setup.background["speed"] = measured(setup, followed(setup.robot, setup.size))
+    return measured(setup, followed(setup.robot, setup.size))
 
 
-def rows(setup: Setup) -> Result:
+def rows(setup: Setup, work: tuple | None = None) -> Result:
     """Errors, times, orders, the error of rounding, and the cheapest settings."""
-    if "speed" not in setup.background:
-        begin(setup)
-    cases, scenes = setup.background.pop("speed")
+    cases, scenes = begin(setup) if work is None else work
     by_scene = {name: parts for name, *parts in scenes}
     references, floors, rows_of = ({case.name: by_scene[case.name][k] for case in cases} for k in range(3))
     compiled, failed = add_times(setup, cases, references, floors, rows_of)

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ...core.check import About, Result
 from ...engines import Method
-from ...judge.check import About, Result
 from ...judge.run import ORDER_MARGIN
 from ...judge.scale import FACTOR
 

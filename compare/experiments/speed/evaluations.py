@@ -9,7 +9,7 @@ import tmt
 from tmt.compiled import evaluator, runner
 from tmt.compiled.cores import cores
 
-from ...judge import timing
+from ...core import timing
 from ...robots.case import SEED
 from ..setup import Setup
 

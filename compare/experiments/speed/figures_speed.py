@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
+from ...core.check import Result
+from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
-from ...judge.check import Result
-from ...judge.finding import Finding
 from ...report.style import GREY, WIDTH, file_name
 from ..figures_overview import chart
 from .first_screen import TARGET, best_rows, cheapest, error, front, target, within_target

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from ...judge import units
-from ...judge.check import Result
+from ...core import units
+from ...core.check import Result
 
 TARGET = 1e-6  # rad or m: the error for which the cheapest setting is named
 NOT_SOLVED = 1.0  # rad or m: a run with a larger error is none

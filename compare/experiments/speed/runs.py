@@ -9,9 +9,9 @@ import numpy as np
 import tmt
 from tmt.methods import METHODS
 
+from ...core import timing
 from ...engines import GRID, RECORDS, Dynamics, Engine, Method, Setting
 from ...engines.outside.model import EngineError
-from ...judge import timing
 from ...judge.rounding import growth
 from ...judge.run import diverged_at
 from ...judge.scale import EPS

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from itertools import product
 
-from ...judge.check import Result
-from ...judge.finding import Finding
+from ...core.check import Result
+from ...core.finding import Finding
 from ...judge.run import leaves_no_digits
 from ...robots import Robot
 from ...robots.case import Case
@@ -37,12 +37,11 @@ def reset_case(subjects: Subjects) -> Case | None:
     return None if robot.is_read or not centres else robot.case(f"{centres[0]}, free", posture=centres[0])
 
 
-def begin(setup: Setup) -> None:
+def begin(setup: Setup) -> dict:
     """Start the runs. A quick run takes fewer methods and scenes, and no fine steps."""
     own = {"own run": own_run.begin(setup), "servos": servos.begin(setup)}
     if is_large(setup.robot):
-        setup.background["stability"] = own
-        return
+        return own
     engines, of, subjects = setup.engines, setup.of, subjects_of(setup.robot)
     robot, centres, saddles = subjects
     few = methods_of(engines, robot, SCHEMES)
@@ -62,7 +61,7 @@ def begin(setup: Setup) -> None:
     def start(function, items, **more):
         return setup.map(partial(function, engines=engines, **more), items)
 
-    setup.background["stability"] = own | {
+    return own | {
         "limits": start(limits.limit_rows, at, methods=methods, steps=steps),
         "departure": start(departure.departures, dts if saddles else (), at=saddle, methods=few),
         "torques": start(claims.holding_torques, claimed),
@@ -72,12 +71,10 @@ def begin(setup: Setup) -> None:
     }
 
 
-def rows(setup: Setup) -> Result:
+def rows(setup: Setup, work: dict | None = None) -> Result:
     """Step limits; departures; the claims; a failure without a warning."""
     result = Result("stability")
-    if "stability" not in setup.background:
-        begin(setup)
-    work = setup.background.pop("stability")
+    work = begin(setup) if work is None else work
     own_run.add(result, work["own run"])
     if work["servos"]:
         servos.add(result, setup, work["servos"])

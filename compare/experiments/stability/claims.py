@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from ...core.check import About, Result
 from ...engines import LABELS, Engine
-from ...judge.check import About, Result
 from ...judge.run import LEFT, departure, deviation, number_or_none
 from ...robots import Robot
 from ...truth.linear import Held, held

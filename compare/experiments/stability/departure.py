@@ -5,8 +5,8 @@ from itertools import product
 
 import numpy as np
 
+from ...core.check import About, Result
 from ...engines import Engine, Method
-from ...judge.check import About, Result
 from ...judge.run import LEFT, departure
 from ...truth.linear import NEGLIGIBLE, Held
 from .subjects import unit_of_movements, who

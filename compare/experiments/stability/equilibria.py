@@ -6,9 +6,9 @@ import numpy as np
 
 from tmt.methods import METHODS
 
+from ...core.check import Result
 from ...engines import one_of_each_scheme
 from ...engines.mujoco.linear import NUDGE, transition
-from ...judge.check import Result
 from ...judge.rounding import step_rounding
 from ...judge.scale import EPS, FACTOR
 from ...truth.linear import held, posture_names

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...core.check import About, Result
 from ...engines import LABELS, Engine
 from ...engines.mujoco.linear import left_to_itself
-from ...judge.check import About, Result
 from ...judge.run import diverged_at, step_in_words
 from ...robots.case import Case
 

@@ -4,9 +4,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ...core.check import Result
+from ...core.finding import Finding
 from ...engines import COLOURS, LABELS
-from ...judge.check import Result
-from ...judge.finding import Finding
 from ...judge.run import LEFT, number_or_nan
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...robots import Robot

@@ -6,8 +6,8 @@ import numpy as np
 
 from tmt.methods import METHODS
 
+from ...core.check import About, Result
 from ...engines import Engine, Method
-from ...judge.check import About, Result
 from ...judge.rounding import slope_rounding
 from ...judge.scale import FACTOR
 from ...truth.linear import Held

@@ -5,10 +5,10 @@ from functools import partial
 
 import numpy as np
 
+from ...core.check import About, Result
 from ...engines.mujoco import Reading
 from ...engines.mujoco.linear import WholeRun, start_of, whole_run
 from ...engines.mujoco.names import on
-from ...judge.check import About, Result
 from ...judge.run import number_or_none
 from ...robots.case import SEED
 from ...robots.file import names_of_keys

@@ -5,10 +5,10 @@ from functools import partial
 
 import numpy as np
 
+from ...core.check import Result, largest_known
+from ...core.finding import Finding
 from ...engines import LABELS, Engine
 from ...engines.mujoco.names import INTEGRATORS
-from ...judge.check import Result, largest_known
-from ...judge.finding import Finding
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES, leaves_no_digits, movement_unit
 from ...robots import Robot
@@ -34,7 +34,7 @@ def claim_values(robot: Robot) -> dict:
     return {"narrow": NARROW, "moves": MOVES, "unit": movement_unit(robot.coordinates)}
 
 
-def begin(setup: Setup) -> None:
+def begin(setup: Setup) -> dict:
     """Start the long work, in parallel, while other experiments compute. A quick run takes fewer scenes."""
     robot, engines = setup.robot, setup.engines
     cases = [case for case in robot.cases if not (setup.is_quick and "full only" in case.scene.tags)]
@@ -47,7 +47,7 @@ def begin(setup: Setup) -> None:
         case for case in cases if "speed" in case.scene.tags and not robot.is_read and case.steps == RECORDS
     ]
     steps = setup.of(energy.STEPS, energy.FEW_STEPS, energy.FEW_STEPS)
-    setup.background["trajectory"] = {
+    return {
         "runs": spread(partial(follow, engines=engines, finer=finer), cases),
         "energy": spread(partial(energy.measure_energy, engines=engines, steps=steps), [robot]),
         "true": ([case.name for case in true], spread(reference, true)),
@@ -74,16 +74,14 @@ def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], list[F
     return able, [Finding("trajectory", "own_left_out", values)] if unlike or slow else []
 
 
-def rows(setup: Setup) -> Result:
+def rows(setup: Setup, work: dict | None = None) -> Result:
     """Each scene, integrator and step: single steps and open loop; then departures, errors and the drift of the energy."""
     robot = setup.robot
     result = Result("trajectory", label=LABELS[robot.compared[0]], shown=[
         "scene", "engine_integrator", "dt_s", "level", "largest_difference", "unit", "difference_over_band",
         "judged_until_s", "required_s", "diverged_at_s", "twin_diverged_at_s",
     ])  # fmt: skip
-    if "trajectory" not in setup.background:
-        begin(setup)
-    work = setup.background.pop("trajectory")
+    work = begin(setup) if work is None else work
     (drifts,) = work["energy"]
     result.checks, result.tables["energy"] = drifts.checks, drifts.tables["energy"]
     runs = result.curves["runs"] = {}

@@ -6,8 +6,8 @@ import numpy as np
 
 from tmt import literal
 
+from ...core.check import About, Result
 from ...engines import LABELS, Dynamics, Engine, compared, one_of_each_scheme, same_scheme
-from ...judge.check import About, Result
 from ...judge.run import ORDER_MARGIN, number_or_none
 from ...judge.scale import EPS, FACTOR, gravity_scale
 from ...robots import Robot

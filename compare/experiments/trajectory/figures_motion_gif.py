@@ -12,10 +12,10 @@ import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from ...core.check import Result
+from ...core.finding import Finding
+from ...core.words import capital
 from ...engines import LABELS
-from ...judge.check import Result
-from ...judge.finding import Finding
-from ...judge.words import capital
 from ...report.style import BLUE, ORANGE
 from .motion import Drawn
 

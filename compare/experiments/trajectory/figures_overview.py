@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from ...judge.check import About, Result, largest_known
-from ...judge.finding import Finding
-from ...judge.words import scene_of
+from ...core.check import About, Result, largest_known
+from ...core.finding import Finding
+from ...core.words import scene_of
 from ...report.style import BLUE, GREY, ORANGE, RED
 from ...robots import Robot
 from ..figures_overview import MOST_ROWS, beyond_tolerance, chart, named_rows

@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from ...core.check import Result, largest_known
+from ...core.finding import Finding
+from ...core.words import scene_begins
 from ...engines import LABELS
-from ...judge.check import Result, largest_known
-from ...judge.finding import Finding
 from ...judge.run import LEFT, moved_from, movement_unit, step_in_words
-from ...judge.words import scene_begins
 from ...report.style import GREY, LINES, ORANGE, WIDTH, file_name, zero_at_the_end
 from ...robots.case import Case
 from .true_motion import difference_while_judged

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core.finding import Finding
 from ...engines import LABELS
-from ...judge.finding import Finding
 from ...judge.run import LEFT, movement_unit, step_in_words
 from ...robots import Robot
 from ...robots.case import Case

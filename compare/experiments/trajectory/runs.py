@@ -7,12 +7,13 @@ import numpy as np
 
 from tmt.methods import METHODS
 
+from ...core.check import About, Result
+from ...core.text import say
 from ...engines import LABELS, Dynamics, Engine, Method, compared, methods_in
 from ...judge import run
-from ...judge.check import About, Result, closest
+from ...judge.agree import closest
 from ...judge.rounding import NARROW, band, step_rounding
 from ...judge.run import departure
-from ...report.text import say
 from ...robots.case import Case, Coordinates
 
 STEPS_AT_MOST = 8192  # of a run that is finer than the scene's own

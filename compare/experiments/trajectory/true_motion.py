@@ -6,11 +6,11 @@ import numpy as np
 
 from tmt.methods import METHODS
 
+from ...core.check import Result
+from ...core.words import scene_begins
 from ...engines import LABELS, Engine, compared
-from ...judge.check import Result
 from ...judge.rounding import slope_rounding
 from ...judge.run import LEFT, deviation, moved_from, movement_unit, number_or_none
-from ...judge.words import scene_begins
 from ...robots import Robot
 from ...robots.case import Case
 from ...truth.reference import Reference

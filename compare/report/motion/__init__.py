@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from ...judge.words import capital, scene_of
-from ..text import environment, say
+from ...core.text import environment, say
+from ...core.words import capital, scene_of
 from ..verdict import Section, failures
 
 MOST_BYTES = 280_000  # of the motion in the page

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from edited import XML
 
+from compare.core.check import Result
 from compare.engines.mujoco import parse
 from compare.experiments.reduction import exact_motion, needs, sub_blocks, times
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
-from compare.judge.check import Result
 from compare.judge.scale import EPS
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates

@@ -8,12 +8,12 @@ from edited import XML, setup_of
 from models import PATHS, chain
 
 import tmt
+from compare.core.check import Result
+from compare.core.text import say
 from compare.engines.mujoco import Mujoco, engine, read
 from compare.experiments import reduction
 from compare.experiments.reduction import needs, sub_blocks, times
 from compare.experiments.setup import Setup, engines
-from compare.judge.check import Result
-from compare.report.text import say
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.truth.smallest import needed, reduced
@@ -54,10 +54,9 @@ def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_do
         monkeypatch.setattr(
             reduction, name, lambda *_, said=said, given=given, **__: log.append(said) or given
         )
-    setup = dataclasses.replace(setup, quiet=lambda: log.append("quiet"), background={})
-    reduction.begin(setup)
-    reduction.rows(setup)
-    assert log == ["computed", "quiet", "timed"] and setup.background == {}
+    setup = dataclasses.replace(setup, quiet=lambda: log.append("quiet"))
+    reduction.rows(setup, reduction.begin(setup))
+    assert log == ["computed", "quiet", "timed"]
 
 
 # locked joints

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compare.core.check import Result
 from compare.engines import Method, Setting
 from compare.experiments import speed
 from compare.experiments.speed import accuracy, advice, evaluations, runs
-from compare.judge.check import Result
 
 RK4 = Method("tmt", "rk4", 4, "rk4")
 COMPARED = "smallest error of MuJoCo's RK4, compared with tmt's rk4"

@@ -1,6 +1,6 @@
 import pytest
 
-from compare.judge.check import Result
+from compare.core.check import Result
 
 
 @pytest.fixture

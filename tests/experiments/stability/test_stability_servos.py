@@ -7,6 +7,7 @@ import pytest
 from models import PATHS
 from servo_models import FILTERED, FLOATING, FORK, INERTIA, hinge, posture_of
 
+from compare.core.check import AT_OWN_STEP, Result
 from compare.engines.mujoco import reading
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments.setup import Setup
@@ -17,7 +18,6 @@ from compare.experiments.stability.servos.findings import verdict
 from compare.experiments.stability.servos.lifting import lifts
 from compare.experiments.stability.servos.observed import grows_in_runs
 from compare.experiments.stability.servos.predicted import acting_at
-from compare.judge.check import AT_OWN_STEP, Result
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 

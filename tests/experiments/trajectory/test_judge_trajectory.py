@@ -8,9 +8,9 @@ import pytest
 from trajectory_curves import CASES, FREE, HELD, run_of
 
 import tmt
+from compare.core.check import Result
 from compare.engines.mujoco import parse
 from compare.experiments.trajectory import energy, runs, true_motion
-from compare.judge.check import Result
 from compare.judge.run import check_movement, required_time, widest_judged
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates

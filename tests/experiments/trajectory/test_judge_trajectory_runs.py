@@ -7,12 +7,12 @@ from models import chain, random_tree
 from trajectory_curves import CASES, DAMPED, FREE, HELD, run_of
 
 import tmt
+from compare.core.check import Result
 from compare.engines.mujoco import parse, reading
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
 from compare.experiments import trajectory
 from compare.experiments.trajectory import figures_runs, runs
-from compare.judge.check import Result
 from compare.judge.run import diverged_at
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of

@@ -6,11 +6,11 @@ from models import PATHS, chain
 from PIL import Image
 from trajectory_curves import CASES
 
+from compare.core.check import Result
 from compare.engines.mujoco import reading
 from compare.experiments.trajectory import figures_motion_gif as gif
 from compare.experiments.trajectory import motion
 from compare.experiments.trajectory.runs import follow
-from compare.judge.check import Result
 from compare.robots.arm import landmarks
 from compare.robots.file import robot_of
 from compare.robots.stick import as_seen, stick_figure

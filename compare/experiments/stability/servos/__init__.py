@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from ....judge.check import AT_OWN_STEP, AT_REQUESTED_STEP, About, Result
+from ....core.check import AT_OWN_STEP, AT_REQUESTED_STEP, About, Result
 from ....truth.linear import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from ...setup import Setup

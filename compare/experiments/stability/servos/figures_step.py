@@ -2,9 +2,9 @@
 
 from matplotlib.figure import Figure
 
-from ....judge.check import Result
-from ....judge.finding import Finding
-from ....judge.words import milliseconds
+from ....core.check import Result
+from ....core.finding import Finding
+from ....core.words import milliseconds
 from ....report.style import BLUE, GREEN, ORANGE, PINK, RED, WIDTH
 from ....robots import Robot
 from .response import LASTS

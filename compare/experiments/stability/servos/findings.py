@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from ....core.check import Result
 from ....engines.mujoco.names import INTEGRATORS
-from ....judge.check import Result
 from ....truth.step_limits import LIMIT_UP_TO
 from . import response
 from .predicted import COUPLED, KNOWN, Prediction, limit_rows, unmodelled

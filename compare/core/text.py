@@ -16,9 +16,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_eval_con
 from jinja2.nodes import EvalContext
 from markupsafe import Markup
 
-from ..judge.finding import Finding
-from ..judge.words import capital, listed, milliseconds, some_of
-from ..process.streams import in_one_line
+from .finding import Finding
+from .words import capital, in_one_line, listed, milliseconds, some_of
 
 # what Markdown, GitHub's kind of it or HTML take for markup: anywhere, at the edge of a word, at the beginning of a text
 MARKUP = re.compile(

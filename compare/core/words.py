@@ -13,6 +13,16 @@ def scene_begins(name: str, robot) -> str:
     return f"Scene {name}" if is_own else capital(name)
 
 
+def readable(text: str) -> str:
+    """Text without surrogates: bytes that the locale could not decode are read as UTF-8 or escaped."""
+    return text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+
+
+def in_one_line(text: str) -> str:
+    """Readable text in which control characters are escaped."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in readable(text))
+
+
 def listed(words: Sequence[str]) -> str:
     """a, b and c."""
     return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))

@@ -1,0 +1,1 @@
+"""What every part of compare needs and none owns; it imports nothing of the others."""
