@@ -80,11 +80,11 @@ def first_of(reasons: Sequence[str]) -> str:
 def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
     """Whether the file's step is stable in its runs and with its own servos, None if unknown; the smallest limit, s."""
     rows = [row for section in sections for row in section.result.tables.get("step_limits", ())]
-    own = [row for row in rows if row["integrator"] == row["file_integrator"]]
-    stable = [row["stable_at_file_dt"] for row in own if row["stable_at_file_dt"] is not None]
+    own = [row for row in rows if row.integrator == row.file_integrator]
+    stable = [row.stable_at_file_dt for row in own if row.stable_at_file_dt is not None]
     runs = [row for section in sections for row in section.result.tables.get("own_run", ())]
-    stable += [row["outcome"] in ("calm", "alike") for row in runs]
-    limits = [row["predicted_dt_s"] for row in own if row["limit"] == "finite"]
+    stable += [row.outcome in ("calm", "alike") for row in runs]
+    limits = [row.predicted_dt for row in own if row.limit == "finite"]
     return (all(stable) if stable else None), min(limits, default=None)
 
 

@@ -1,10 +1,10 @@
 """Stability: where each method fails, predicted from one step of it and shown in runs, with all joints together."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import product
+from itertools import chain, product
+from typing import NamedTuple
 
-from ...core.check import Result
 from ...core.finding import Finding
 from ...judge.run import leaves_no_digits
 from ...robots import Robot
@@ -13,7 +13,12 @@ from ...truth.linear import held
 from .. import Experiment
 from ..setup import Setup
 from . import claims, departure, failure, limits, own_run, servos
+from .claims import KeptRuns
 from .equilibria import check_equilibria
+from .failure import OwnReset
+from .limits import Observed
+from .own_run import OwnRuns
+from .rows import DepartureRow, FinerRow, LimitRow, StabilityResult, TorqueRow
 from .subjects import DAMPINGS, SCHEMES, Subjects, coarsest_case, methods_of, subjects_of, unit_of_movements
 
 EXPERIMENT = Experiment(order=100, serves_own=False, options=("--dt", "--integrator"), overview="limits")
@@ -37,11 +42,24 @@ def reset_case(subjects: Subjects) -> Case | None:
     return None if robot.is_read or not centres else robot.case(f"{centres[0]}, free", posture=centres[0])
 
 
-def begin(setup: Setup) -> dict:
+class Work(NamedTuple):
+    """What `begin` starts: the runs of the whole file and with servos, and those of `rows` at postures without them."""
+
+    own_runs: Sequence[OwnRuns]
+    with_servos: servos.Work | None
+    limits: Iterable[list[Observed]] = ()
+    departures: Iterable[list[DepartureRow]] = ()
+    torques: Iterable[list[TorqueRow]] = ()
+    finer: Iterable[list[FinerRow]] = ()
+    kept: Iterable[KeptRuns] = ()
+    resets: Iterable[OwnReset] = ()
+
+
+def begin(setup: Setup) -> Work:
     """Start the runs. A quick run takes fewer methods and scenes, and no fine steps."""
-    own = {"own run": own_run.begin(setup), "servos": servos.begin(setup)}
+    work = Work(own_run.begin(setup), servos.begin(setup))
     if is_large(setup.robot):
-        return own
+        return work
     engines, of, subjects = setup.engines, setup.of, subjects_of(setup.robot)
     robot, centres, saddles = subjects
     few = methods_of(engines, robot, SCHEMES)
@@ -61,38 +79,41 @@ def begin(setup: Setup) -> dict:
     def start(function, items, **more):
         return setup.map(partial(function, engines=engines, **more), items)
 
-    return own | {
-        "limits": start(limits.limit_rows, at, methods=methods, steps=steps),
-        "departure": start(departure.departures, dts if saddles else (), at=saddle, methods=few),
-        "torques": start(claims.holding_torques, claimed),
-        "finer": start(claims.finer_steps, slow, counts=of(claims.STEP_COUNTS, (), (32, 64, 128, 4096))),
-        "kept": start(claims.kept, slow),
-        "reset": start(failure.own_reset, free),
-    }
+    return work._replace(
+        limits=start(limits.limit_rows, at, methods=methods, steps=steps),
+        departures=start(departure.departures, dts if saddles else (), at=saddle, methods=few),
+        torques=start(claims.holding_torques, claimed),
+        finer=start(claims.finer_steps, slow, counts=of(claims.STEP_COUNTS, (), (32, 64, 128, 4096))),
+        kept=start(claims.kept, slow),
+        resets=start(failure.own_reset, free),
+    )
 
 
-def rows(setup: Setup, work: dict | None = None) -> Result:
+def rows(setup: Setup, work: Work | None = None) -> StabilityResult:
     """Step limits; departures; the claims; a failure without a warning."""
-    result = Result("stability")
+    result = StabilityResult("stability")
     work = begin(setup) if work is None else work
-    own_run.add(result, work["own run"])
-    if work["servos"]:
-        servos.add(result, setup, work["servos"])
+    own_run.add(result, work.own_runs)
+    if work.with_servos:
+        servos.add(result, setup, work.with_servos)
     if is_large(setup.robot):
         result.top.append(result.finding("large", speeds=setup.robot.coordinates.nv, most=MOST_SPEEDS))
         return result
     subjects = subjects_of(setup.robot)
     robot = subjects.robot
     methods = methods_of(setup.engines, robot)
-    result.curves |= {"centres": subjects.centres, "schemes": {(m.engine, m.name): m.scheme for m in methods}}
-    limits.check_limits(result, [row for part in work["limits"] for row in part])
+    result.centres = subjects.centres
+    result.schemes = {(method.engine, method.name): method.scheme for method in methods}
+    limits.check_limits(result, list(chain.from_iterable(work.limits)))
     check_equilibria(result, setup)
-    departure.check_departures(result, [row for part in work["departure"] for row in part])
-    checks = {"torques": claims.check_torques, "finer": claims.check_finer_steps, "kept": claims.check_kept}
-    for name, check in checks.items():
-        for runs in work[name]:
-            check(result, robot, runs)
-    for run in work["reset"]:
+    departure.check_departures(result, list(chain.from_iterable(work.departures)))
+    for torques in work.torques:
+        claims.check_torques(result, robot, torques)
+    for finer in work.finer:
+        claims.check_finer_steps(result, robot, finer)
+    for kept in work.kept:
+        claims.check_kept(result, robot, kept)
+    for run in work.resets:
         failure.check_reset(result, reset_case(subjects), run)
     result.find(
         "examined", noun=robot.noun, is_read=robot.is_read, centres=subjects.centres, saddles=subjects.saddles,
@@ -109,29 +130,26 @@ def is_large(robot: Robot) -> bool:
     return robot.is_read and robot.coordinates.nv > MOST_SPEEDS
 
 
-def limits_shown(result: Result) -> list[dict]:
+def limits_shown(result: StabilityResult) -> list[LimitRow]:
     """The rows of the limits, at stable postures if there are any."""
-    centres = result.curves.get("centres")
-    return [
-        row for row in result.rows if "predicted_dt_s" in row and (not centres or row["scene"] in centres)
-    ]
+    return [row for row in result.rows if not result.centres or row.scene in result.centres]
 
 
-def headline(result: Result) -> Finding | None:
+def headline(result: StabilityResult) -> Finding | None:
     """How many limits of the step are as predicted, and the largest relative difference."""
     counts = limits.summary(limits_shown(result))
     return result.finding("headline", **counts) if counts["known"] or counts["wrong"] else None
 
 
-def figures(result: Result, robot: Robot) -> Iterator[partial]:
+def figures(result: StabilityResult, robot: Robot) -> Iterator[partial]:
     # matplotlib is for the process that draws
     from . import figures_stability as drawing
     from .servos.figures_step import draw_step_response
 
     rows = limits_shown(result)
-    if any(result.curves.get("step response", {"lines": {}})["lines"].values()):
+    if result.step_response and any(result.step_response.lines.values()):
         yield partial(draw_step_response, result, robot)
-    if result.curves.get("centres") and any(row["predicted_dt_s"] or row["observed_dt_s"] for row in rows):
+    if result.centres and any(row.predicted_dt or row.observed_dt for row in rows):
         yield partial(drawing.draw_limits, result, robot, rows)
     if "departure" in result.tables:
         yield partial(drawing.draw_departure, result, robot)
@@ -139,10 +157,12 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
         yield partial(drawing.draw_claims, result, robot)
 
 
-def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
+def overview(results: Mapping[str, StabilityResult], robot: Robot) -> Iterator[partial]:
     from .figures_stability import draw_overview  # matplotlib is for the process that draws
 
-    driven = servos.limits_in_use(results["stability"].tables.get("step_limits", ()))
-    rows = driven if robot.drive.feeds_back and driven else limits_shown(results["stability"])
-    if any(row["predicted_dt_s"] or row["observed_dt_s"] or row["passed"] is False for row in rows):
-        yield partial(draw_overview, results["stability"], robot, rows)
+    result, file_dt = results["stability"], None
+    rows, driven = limits_shown(result), result.tables.get("step_limits", ())
+    if robot.drive.feeds_back and servos.limits_in_use(driven):
+        rows, file_dt = servos.limits_in_use(driven), driven[0].file_dt
+    if any(row.predicted_dt or row.observed_dt or row.passed is False for row in rows):
+        yield partial(draw_overview, result, robot, rows, file_dt)

@@ -5,6 +5,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from ...judge.run import LEFT, departure, deviation, number_or_none
 from ...robots import Robot
 from ...truth.linear import Held, held
 from .departure import check_row, own_torque, predicted, residual, variants
-from .subjects import fraction, rk4_of_both, who
+from .rows import ClaimRow, FinerRow, KeptRow, TorqueRow
+from .subjects import fraction, rk4_of_both
 
 CLEAR_ULPS = 16  # of each component: a push that rounding of the bias on the way cannot turn round
 VARIANT, NEAREST = "variant", "nearest to own bias"  # names of torques
@@ -30,17 +32,17 @@ MOVED = 1e-3  # rad: beyond its limit of the step a held robot moves by more
 PUSHED = 1.0  # rad/s2: a robot that a torque accelerates by as much does not stay where it rests
 
 
-def add_rows(result: Result, rows: list[dict]) -> None:
+def add_rows(result: Result, rows: Sequence[ClaimRow]) -> None:
     result.tables.setdefault("stability_claims", []).extend(rows)
 
 
 # claim 1
 
 
-def holding_torques(robot: Robot, engines: Mapping[str, Engine]) -> list[dict]:
+def holding_torques(robot: Robot, engines: Mapping[str, Engine]) -> list[TorqueRow]:
     """All torques within one ulp of TMT's holding torque by RK4; then own biases; then 16 ulps.
 
-    push_rad_per_s2: what the residual, the torque beyond the one that holds, does to the fastest unstable mode.
+    push: what the residual, the torque beyond the one that holds, does to the fastest unstable mode.
     """
     claims, at = robot.claims, held(robot, robot.claims.left)
     steps = round(WATCHED * claims.duration / claims.dt)
@@ -57,12 +59,11 @@ def holding_torques(robot: Robot, engines: Mapping[str, Engine]) -> list[dict]:
         expected = predicted(at, method.scheme, claims.dt, rest, off)
         for k, path in enumerate(motion.q):
             left = departure(motion.t, path)
-            rows.append({
-                "claim": 1, "scene": at.name, "engine": method.engine, "method": method.name, "dt_s": claims.dt,
-                "torque": names[k],
-                "push_rad_per_s2": float(pushes(at) @ off[k]), "predicted_s": expected[k], "observed_s": left,
-                "direction": side(path, left, claims.dt), "moved_rad": number_or_none(deviation(path, at.q)),
-            })  # fmt: skip
+            rows.append(TorqueRow(
+                scene=at.name, engine=method.engine, method=method.name, dt=claims.dt, torque=names[k],
+                push=float(pushes(at) @ off[k]), predicted=expected[k], observed=left,
+                direction=side(path, left, claims.dt), moved=number_or_none(deviation(path, at.q)),
+            ))  # fmt: skip
     return rows
 
 
@@ -82,32 +83,32 @@ def pushes(at: Held) -> np.ndarray:
     return (measure[n:] / np.linalg.norm(measure[n:])).real @ np.linalg.inv(at.mass_matrix)
 
 
-def check_torques(result: Result, robot: Robot, torques: list[dict]) -> None:
+def check_torques(result: Result, robot: Robot, torques: list[TorqueRow]) -> None:
     """Claim 1: the posture is left after about the claimed time, because of rounding."""
     add_rows(result, torques)
     claims, reproduced, values = robot.claims, True, []
-    for engine, method in dict.fromkeys((row["engine"], row["method"]) for row in torques):
-        of_engine = [row for row in torques if row["engine"] == engine]
-        rows = [row for row in of_engine if row["torque"].startswith(VARIANT)]
-        (own,) = (row for row in of_engine if row["torque"] == NEAREST)
+    for engine, method in dict.fromkeys((row.engine, row.method) for row in torques):
+        of_engine = [row for row in torques if row.engine == engine]
+        rows = [row for row in of_engine if row.torque.startswith(VARIANT)]
+        (own,) = (row for row in of_engine if row.torque == NEAREST)
         where, first = f"{claims.left}, {LABELS[engine]} {method}", len(result.checks)
-        for row in (row for row in of_engine if row["torque"] in CLEAR_TORQUES):
-            along = None if row["direction"] is None else row["direction"] * np.sign(row["push_rad_per_s2"])
+        for row in (row for row in of_engine if row.torque in CLEAR_TORQUES):
+            along = None if row.direction is None else row.direction * np.sign(row.push)
             text = "departure along the push of the residual (1; against it: -1)"
             result.check(
-                f"{where}, torque {row['torque']}", text, along, 1, "", rule="equal", about=About.PREDICTION
+                f"{where}, torque {row.torque}", text, along, 1, "", rule="equal", about=About.PREDICTION
             )
-            check_row(result, f"{where}, torque {row['torque']}", row)
+            check_row(result, f"{where}, torque {row.torque}", row)
         if (
             engine == "mujoco"
         ):  # of TMT no double need be the bias: compiled code rounds its last sum only once
             quantity = "movement under the engine's own bias"
-            result.check(where, quantity, own["moved_rad"], 0.0, "rad", about=About.PREDICTION)
-        gone = [row["observed_s"] for row in rows if row["observed_s"] is not None]
+            result.check(where, quantity, own.moved, 0.0, "rad", about=About.PREDICTION)
+        gone = [row.observed for row in rows if row.observed is not None]
         close = sum(abs(time - claims.left_after) <= ABOUT_SO_LATE for time in gone)
         reproduced &= 2 * close > len(rows) and all(check.passed for check in result.checks[first:])
         values.append({
-            "label": LABELS[engine], "count": len(rows), "leave": len(gone), "close": close, "own_moved": own["moved_rad"],
+            "label": LABELS[engine], "count": len(rows), "leave": len(gone), "close": close, "own_moved": own.moved,
             "times": (min(gone), max(gone)) if gone else None,
         })  # fmt: skip
     result.find(
@@ -121,10 +122,10 @@ def check_torques(result: Result, robot: Robot, torques: list[dict]) -> None:
 
 def finer_steps(
     robot: Robot, engines: Mapping[str, Engine], counts: Sequence[int] = STEP_COUNTS
-) -> list[dict]:
+) -> list[FinerRow]:
     """Departure under RK4 against the step, the torque one ulp off to either side at the first joint.
 
-    moved_rad: the largest movement in a run of the claims; step_rad: the largest dt |qd| by then; half_ulp_rad: half
+    moved: the largest movement in a run of the claims; step: the largest dt |qd| by then; half_ulp: half
     a unit in the last place of the angle that it would have to change.
     """
     claims, at = robot.claims, held(robot, robot.claims.left)
@@ -139,42 +140,51 @@ def finer_steps(
                 motion = dynamics.run(at.q, rest, tau, dt, round(WATCHED * count), method.name)
                 left = departure(motion.t, motion.q)
                 i = int(np.argmax(np.abs(motion.v[count]) / np.spacing(np.abs(at.q))))
-                rows.append({
-                    "claim": 2, "scene": at.name, "engine": method.engine, "method": method.name, "dt_s": dt, "ulps": int(sign),
-                    "observed_s": left, "direction": side(motion.q, left, dt),
-                    "moved_rad": number_or_none(deviation(motion.q[: count + 1], at.q)),
-                    "step_rad": number_or_none(dt * abs(motion.v[count, i])),
-                    "half_ulp_rad": 0.5 * float(np.spacing(abs(at.q[i]))),
-                })  # fmt: skip
+                rows.append(FinerRow(
+                    scene=at.name, engine=method.engine, method=method.name, dt=dt, ulps=int(sign), observed=left,
+                    direction=side(motion.q, left, dt),
+                    moved=number_or_none(deviation(motion.q[: count + 1], at.q)),
+                    step=number_or_none(dt * abs(motion.v[count, i])),
+                    half_ulp=0.5 * float(np.spacing(abs(at.q[i]))),
+                ))  # fmt: skip
     return rows
 
 
-def check_finer_steps(result: Result, robot: Robot, finer: list[dict]) -> None:
+def check_finer_steps(result: Result, robot: Robot, finer: list[FinerRow]) -> None:
     """Claim 2: a smaller step reverses the side, and a very small one leaves the robot in place."""
     add_rows(result, finer)
     claims, still, turned, leave = robot.claims, True, 0, True
-    series = list(dict.fromkeys((row["engine"], row["ulps"]) for row in finer))
+    series = list(dict.fromkeys((row.engine, row.ulps) for row in finer))
     for engine, sign in series:
-        rows = [row for row in finer if (row["engine"], row["ulps"]) == (engine, sign)]
-        finest = min(rows, key=lambda row: row["dt_s"])
-        count = round(claims.duration / finest["dt_s"])
-        where = f"{claims.left}, {who(finest)}, torque {sign:+d} ulp"
+        rows = [row for row in finer if (row.engine, row.ulps) == (engine, sign)]
+        finest = min(rows, key=lambda row: row.dt)
+        count = round(claims.duration / finest.dt)
+        where = f"{claims.left}, {finest.who}, torque {sign:+d} ulp"
         quantity = f"movement in {claims.duration:g} s at {count} steps"
-        still &= result.check(where, quantity, finest["moved_rad"], 0.0, "rad", about=About.PREDICTION).passed
-        sides = [row["direction"] for row in rows if row["direction"]]
+        still &= result.check(where, quantity, finest.moved, 0.0, "rad", about=About.PREDICTION).passed
+        sides = [row.direction for row in rows if row.direction]
         turned += any(before != after for before, after in pairwise(sides))
         leave &= bool(sides)
     met = {3: "yes", 2: "in part"}.get(bool(turned) + still + leave, "no")
     result.find(
         "claim_2", reproduced=met, joint=robot.joints[0], series=len(series), turned=turned, still=still, count=count,
-        seconds=claims.duration, step=finest["step_rad"], half_ulp=finest["half_ulp_rad"],
+        seconds=claims.duration, step=finest.step, half_ulp=finest.half_ulp,
     )  # fmt: skip
 
 
 # claim 3
 
 
-def kept(robot: Robot, engines: Mapping[str, Engine], steps: int = RUN_BEYOND) -> dict:
+class KeptRuns(NamedTuple):
+    """Runs of claim 3. limit: of RK4's step, s; fastest: rate of a mode, 1/s; acceleration_at_end: of each engine."""
+
+    rows: list[KeptRow]
+    limit: float
+    fastest: float
+    acceleration_at_end: dict[str, np.ndarray]
+
+
+def kept(robot: Robot, engines: Mapping[str, Engine], steps: int = RUN_BEYOND) -> KeptRuns:
     """RK4 at the posture that is kept, below and beyond its limit, the torque one ulp off; and whether it ends as claimed.
 
     acceleration_at_end: of each engine at the claimed end, under the torque that holds the posture.
@@ -190,30 +200,28 @@ def kept(robot: Robot, engines: Mapping[str, Engine], steps: int = RUN_BEYOND) -
             with np.errstate(over="ignore", invalid="ignore"):
                 motion = dynamics.run(at.q, rest, tau, dt, steps, method.name)
             fast = ~(np.abs(motion.v).max(axis=1) < DIVERGED_RATE)  # no number from there on is motion
-            rows.append({
-                "claim": 3, "scene": at.name, "engine": method.engine, "method": method.name, "dt_s": dt, "torque": ONE_ULP,
-                "observed_s": departure(motion.t, motion.q),
-                "diverged_at_s": float(dt * np.argmax(fast)) if fast.any() else None,
-                "moved_rad": None if fast.any() else number_or_none(deviation(motion.q, at.q)), "run_s": dt * steps,
-            })  # fmt: skip
+            rows.append(KeptRow(
+                scene=at.name, engine=method.engine, method=method.name, dt=dt, torque=ONE_ULP,
+                observed=departure(motion.t, motion.q),
+                diverged_at=float(dt * np.argmax(fast)) if fast.any() else None,
+                moved=None if fast.any() else number_or_none(deviation(motion.q, at.q)), run=dt * steps,
+            ))  # fmt: skip
         pushed[method.engine] = dynamics.acceleration(robot.posture(claims.end), rest, at.tau)
     rate = float(np.abs(at.modes[0]).max())
-    return {"rows": rows, "limit": at.limit("rk4")[1] or 0.0, "fastest": rate, "acceleration_at_end": pushed}
+    return KeptRuns(rows, at.limit("rk4")[1] or 0.0, rate, pushed)
 
 
-def check_kept(result: Result, robot: Robot, runs: dict) -> None:
+def check_kept(result: Result, robot: Robot, runs: KeptRuns) -> None:
     """Claim 3: held beyond the limit of RK4."""
-    claims, rows, limit, stays = robot.claims, runs["rows"], runs["limit"], True
+    claims, rows, limit, stays = robot.claims, runs.rows, runs.limit, True
     add_rows(result, rows)
-    for row in (row for row in rows if row["dt_s"] < limit):
-        where = f"{claims.kept}, {who(row)}, dt = {row['dt_s']:.4g} s, torque {row['torque']}"
-        time = row["run_s"] if row["observed_s"] is None else row["observed_s"]
+    for row in (row for row in rows if row.dt < limit):
+        where = f"{claims.kept}, {row.who}, dt = {row.dt:.4g} s, torque {row.torque}"
+        time = row.run if row.observed is None else row.observed
         what = f"time within {LEFT:g} rad, below the limit"
-        stays &= result.check(
-            where, what, time, row["run_s"], "s", rule="at least", about=About.PREDICTION
-        ).passed
+        stays &= result.check(where, what, time, row.run, "s", rule="at least", about=About.PREDICTION).passed
     ends, leaves_end = (
-        {LABELS[name]: float(np.abs(a).max()) for name, a in runs["acceleration_at_end"].items()},
+        {LABELS[name]: float(np.abs(a).max()) for name, a in runs.acceleration_at_end.items()},
         False,
     )
     for label, size in ends.items():
@@ -222,13 +230,11 @@ def check_kept(result: Result, robot: Robot, runs: dict) -> None:
         leaves_end |= result.check(
             f"{claims.end}, {label}", quantity, size, PUSHED, "rad/s2", **options
         ).passed
-    above = [row for row in rows if row["dt_s"] > limit]
-    moves = bool(above) and all(
-        row["observed_s"] is not None or (row["moved_rad"] or 0.0) > MOVED for row in above
-    )
+    above = [row for row in rows if row.dt > limit]
+    moves = bool(above) and all(row.observed is not None or (row.moved or 0.0) > MOVED for row in above)
     result.find(
         "claim_3", reproduced=("bounded" if leaves_end else "yes") if stays and moves else "no", posture=claims.kept,
-        end=claims.end, noun=robot.noun, limit=limit, rate=runs["fastest"], above=len(above), ends=ends,
-        diverged=sum(row["diverged_at_s"] is not None for row in above),
-        farthest=max((row["moved_rad"] for row in above if row["moved_rad"] is not None), default=None),
+        end=claims.end, noun=robot.noun, limit=limit, rate=runs.fastest, above=len(above), ends=ends,
+        diverged=sum(row.diverged_at is not None for row in above),
+        farthest=max((row.moved for row in above if row.moved is not None), default=None),
     )  # fmt: skip

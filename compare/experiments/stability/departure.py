@@ -9,7 +9,10 @@ from ...core.check import About, Result
 from ...engines import Engine, Method
 from ...judge.run import LEFT, departure
 from ...truth.linear import NEGLIGIBLE, Held
-from .subjects import unit_of_movements, who
+from .rows import DepartureRow, TorqueRow
+from .subjects import unit_of_movements
+
+Departure = DepartureRow | TorqueRow  # with a predicted and an observed time
 
 LONGEST_DEPARTURE = 12.0  # s
 PERTURBATIONS = tuple(10.0**-k for k in (2, 4, 6, 8, 10, 12))  # rad, of the angles at the start
@@ -65,12 +68,13 @@ def curved_by(at: Held) -> float:
     return float(np.abs(curved).max() / (abs(rate) ** 2 * LEFT) / rate.real)
 
 
-def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]) -> list[dict]:
+def departures(
+    dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]
+) -> list[DepartureRow]:
     """Rows for tables/departure.csv: every method that is led and every perturbation at one dt, from one saddle."""
     (rate, *_), vectors = at.modes
     shape, robot = vectors[: at.nv, 0].real / np.abs(vectors[: at.nv, 0]).max(), at.case.robot
-    column = "perturbation_" + unit_of_movements(robot).replace(" ", "_")
-    rows, allowed = [], {"allowed_s": near({"dt_s": dt}) + curved_by(at)} if robot.is_read else {}
+    rows, allowed = [], usually_near(dt) + curved_by(at) if robot.is_read else None
     sizes = [(size, True) for size in PERTURBATIONS] + [(size, False) for size in TORQUE_ERRORS]
     sizes = [(size, is_push) for size, is_push in sizes if size > ABOVE_ROUNDING or not robot.is_read]
     moved = np.array([size * shape * is_push for size, is_push in sizes])
@@ -83,61 +87,62 @@ def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tupl
         expected = predicted(at, method.scheme, dt, moved, residual(method, engines, at, torques))
         steps = round(LONGEST_DEPARTURE / dt)
         if allowed and None not in expected:
-            steps = min(steps, round((max(expected) + 2.0 * allowed["allowed_s"]) / dt))
+            steps = min(steps, round((max(expected) + 2.0 * allowed) / dt))
         with np.errstate(over="ignore", invalid="ignore"):
             dynamics = engines[method.engine].of(at.case)
             motion = dynamics.run(at.moved(moved), np.zeros_like(moved), torques, dt, steps, method.name)
         for (size, is_push), time, path in zip(sizes, expected, motion.q):
-            if allowed and allowed["allowed_s"] >= (time or LONGEST_DEPARTURE):
+            if allowed and allowed >= (time or LONGEST_DEPARTURE):
                 continue  # any departure would be as predicted
-            rows.append({
-                "scene": at.name + ("" if is_push else ", torque off"), "engine": method.engine, "method": method.name,
-                "dt_s": dt, column: size, "predicted_s": time,
-                "observed_s": departure(motion.t, path, at.case.coordinates), **allowed,
-            })  # fmt: skip
+            rows.append(DepartureRow(
+                scene=at.name + ("" if is_push else ", torque off"), engine=method.engine, method=method.name,
+                dt=dt, perturbation=size, unit=unit_of_movements(robot), predicted=time,
+                observed=departure(motion.t, path, at.case.coordinates), allowed=allowed,
+            ))  # fmt: skip
     return rows
 
 
-def check_departures(result: Result, rows: list[dict]) -> None:
+def check_departures(result: Result, rows: list[DepartureRow]) -> None:
     """The table of departures and a check for each."""
     result.tables.setdefault("departure", []).extend(rows)
     for row in rows:
-        size, unit = perturbation(row)
-        check_row(result, f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s, {size:.0e} {unit}", row)
+        size = f"{row.perturbation:.0e} {row.unit}"
+        check_row(result, f"{row.scene}, {row.who}, dt = {row.dt:.4g} s, {size}", row)
 
 
-def perturbation(row: dict) -> tuple[float, str]:
-    column = next(name for name in row if name.startswith("perturbation_"))
-    return row[column], column.removeprefix("perturbation_").replace("_", " ")
-
-
-def late(row: dict) -> float | None:
+def late(row: Departure) -> float | None:
     """By how much a run leaves later than predicted, s: 0 where neither leaves, None where only one of them does."""
-    times = row["observed_s"], row["predicted_s"]
+    times = row.observed, row.predicted
     if None in times:
         return 0.0 if times == (None, None) else None
     return times[0] - times[1]
 
 
-def check_row(result: Result, where: str, row: dict) -> None:
+def check_row(result: Result, where: str, row: Departure) -> None:
     """The check of one departure: as predicted to one step or 0.03 s; where the prediction stays, the run stays too."""
     off = late(row)
-    missing = {"observed_s": "the run stays", "predicted_s": "the prediction stays"}
-    note = " and ".join(text for key, text in missing.items() if row[key] is None)
+    missing = {"the run stays": row.observed, "the prediction stays": row.predicted}
+    note = " and ".join(text for text, time in missing.items() if time is None)
     quantity = "departure, observed - predicted"
     result.check(
         where, quantity, None if off is None else abs(off), near(row), "s", note, about=About.PREDICTION
     )
 
 
-def near(row: dict) -> float:
-    """How near its prediction a departure is to be, s: one step or 0.03 s, if the row does not say it."""
-    return row.get("allowed_s", max(DEPARTURE_TOLERANCE, row["dt_s"]) * (1.0 + 1e-9))
+def near(row: Departure) -> float:
+    """How near its prediction a departure is to be, s: as its row says."""
+    allowed = row.allowed if isinstance(row, DepartureRow) else None
+    return usually_near(row.dt) if allowed is None else allowed
 
 
-def departure_values(rows: list[dict]) -> dict:
+def usually_near(dt: float) -> float:
+    """One step or 0.03 s."""
+    return max(DEPARTURE_TOLERANCE, dt) * (1.0 + 1e-9)
+
+
+def departure_values(rows: list[DepartureRow]) -> dict:
     """How many departures are as predicted, and the largest difference, s."""
-    off = [abs(late(row)) for row in rows if None not in (row["observed_s"], row["predicted_s"])]
+    off = [abs(late(row)) for row in rows if None not in (row.observed, row.predicted)]
     close = sum(late(row) is not None and abs(late(row)) <= near(row) for row in rows)
     return {"count": len(rows), "close": close, "worst": max(off, default=None)}
 

@@ -1,10 +1,11 @@
 """Figures: step limits, also of the first screen; departure; claims."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...core.check import Result
 from ...core.finding import Finding
 from ...engines import COLOURS, LABELS
 from ...judge.run import LEFT, number_or_nan
@@ -12,8 +13,9 @@ from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...robots import Robot
 from ..figures_overview import MOST_ROWS, chart, named_rows
 from .claims import VARIANT
-from .departure import departure_values, perturbation
+from .departure import departure_values
 from .limits import LINEAR_DEVIATION, summary
+from .rows import FinerRow, LimitRow, StabilityResult, TorqueRow
 from .subjects import fraction, unit_of_movements
 
 SCHEME_LOOKS = {  # colour, dash, name
@@ -33,32 +35,36 @@ def look(name: str) -> tuple:
     return SCHEME_LOOKS.get(name, ("black", "-", name.replace("_", " ")))
 
 
-def limits_in(ax: Axes, rows: list[dict], known: dict, most: int | None = None) -> list:
+def limits_in(
+    ax: Axes,
+    rows: Sequence[LimitRow],
+    known: dict,
+    most: int | None = None,
+    file_dt: float | None = None,
+) -> list:
     """The limits of each scheme, predicted (line) and observed (mark); the handles of a legend. known: schemes of methods."""
     of_scheme = {}
     for row in rows:
-        of_scheme.setdefault(known.get((row["engine"], row["method"]), row["method"]), []).append(row)
+        of_scheme.setdefault(known.get((row.engine, row.method), row.method), []).append(row)
     of_scheme = dict(list(of_scheme.items())[:most])
-    steps = ("predicted_dt_s", "observed_dt_s", "file_dt_s")
-    ends = [row[key] for row in rows for key in steps if row.get(key)] or [1e-3, 1.0]
+    steps = [dt for row in rows for dt in (row.predicted_dt, row.observed_dt)]
+    ends = list(filter(None, [*steps, file_dt])) or [1e-3, 1.0]
     low, high = min(ends) / 2, max(ends) * 2
     for place, mine in enumerate(of_scheme.values()):
         for row in mine:
-            is_mujoco, failed = row["engine"] == "mujoco", row["passed"] is False
-            if row["predicted_dt_s"]:
-                ax.vlines(row["predicted_dt_s"], place - 0.38, place + 0.38, color=GREY, linewidth=1.0)
+            is_mujoco, failed = row.engine == "mujoco", row.passed is False
+            if row.predicted_dt:
+                ax.vlines(row.predicted_dt, place - 0.38, place + 0.38, color=GREY, linewidth=1.0)
             mark = "X" if failed else "s" if is_mujoco else "o"
             colour = RED if failed else ORANGE if is_mujoco else BLUE
             shift = 0.17 if is_mujoco else -0.17
-            ax.plot(
-                number_or_nan(row["observed_dt_s"]), place + shift, mark, color=(colour, 0.85), markersize=4.5
-            )
-        if all(row["limit"] != "finite" for row in mine):
-            count = sum(row["limit"] == "never_fails" for row in mine)
+            ax.plot(number_or_nan(row.observed_dt), place + shift, mark, color=(colour, 0.85), markersize=4.5)
+        if all(row.limit != "finite" for row in mine):
+            count = sum(row.limit == "never_fails" for row in mine)
             some = f"no limit at {count} of {len(mine)}" if count else "fails at every step"
             text = "no limit" if count == len(mine) else some
             ax.text(low * 1.15, place, text, va="center", fontsize=8, color=GREY)
-    passed = [all(row["passed"] is not False for row in mine) for mine in of_scheme.values()]
+    passed = [all(row.passed is not False for row in mine) for mine in of_scheme.values()]
     named_rows(ax, [look(name)[2] for name in of_scheme], passed)
     ax.tick_params(axis="y", labelsize=8)
     ax.set(xscale="log", xlim=(low, high))
@@ -74,11 +80,12 @@ def limits_in(ax: Axes, rows: list[dict], known: dict, most: int | None = None) 
     ]
 
 
-def draw_overview(result: Result, robot: Robot, rows: list[dict]) -> tuple[str, Figure, Finding]:
-    """The limits of the first screen, all postures in one."""
+def draw_overview(
+    result: StabilityResult, robot: Robot, rows: Sequence[LimitRow], dt: float | None
+) -> tuple[str, Figure, Finding]:
+    """The limits of the first screen, all postures in one. dt: the file's step, s, of limits with servos."""
     fig, ax = chart()
-    dt = rows[0].get("file_dt_s")  # of limits with servos
-    handles = limits_in(ax, rows, {} if dt else result.curves["schemes"], MOST_ROWS)
+    handles = limits_in(ax, rows, {} if dt else result.schemes, MOST_ROWS, dt)
     if dt:
         ax.axvline(dt, color="black", linestyle=":")
     ax.set_xlabel("largest stable dt, s")
@@ -88,16 +95,18 @@ def draw_overview(result: Result, robot: Robot, rows: list[dict]) -> tuple[str, 
     return "overview_limits", fig, result.finding("overview_caption", **values, **summary(rows))
 
 
-def draw_limits(result: Result, robot: Robot, rows: list[dict]) -> tuple[str, Figure, Finding]:
+def draw_limits(
+    result: StabilityResult, robot: Robot, rows: Sequence[LimitRow]
+) -> tuple[str, Figure, Finding]:
     """The limits scene by scene and damping by damping."""
-    panels = list(dict.fromkeys((row["scene"], row["damping"]) for row in rows))
+    panels = list(dict.fromkeys((row.scene, row.damping) for row in rows))
     columns = min(3, len(panels))
     lines = -(-len(panels) // columns)
     fig = Figure(figsize=(WIDTH, 0.9 + 2.15 * lines), layout="constrained")
     axes = fig.subplots(lines, columns, sharey=True, squeeze=False)
     for ax, (scene, damping) in zip(axes.flat, panels):
-        here = [row for row in rows if (row["scene"], row["damping"]) == (scene, damping)]
-        handles = limits_in(ax, here, result.curves["schemes"])
+        here = [row for row in rows if (row.scene, row.damping) == (scene, damping)]
+        handles = limits_in(ax, here, result.schemes)
         ax.set_title(f"{scene}, damping {damping:g}" if damping else scene)
     for ax in axes.flat[len(panels) :]:
         ax.set_visible(False)
@@ -105,34 +114,31 @@ def draw_limits(result: Result, robot: Robot, rows: list[dict]) -> tuple[str, Fi
     fig.legend(handles=handles, loc="outside upper center", ncols=3)
     values = {"deviation": LINEAR_DEVIATION, "unit": unit_of_movements(robot)}
     values |= {"has_actuators": bool(robot.drive.actuators)}
-    first = [row for row in rows if (row["scene"], row["damping"], row["engine"]) == (*panels[0], "tmt")]
-    finite = [row for row in first if row["predicted_dt_s"]]
-    products = {look(row["method"])[2]: row["predicted_dt_s"] * row["mode_per_s"] for row in finite}
+    first = [row for row in rows if (row.scene, row.damping, row.engine) == (*panels[0], "tmt")]
+    finite = [row for row in first if row.predicted_dt]
+    products = {look(row.method)[2]: row.predicted_dt * row.mode for row in finite}
     caption = result.finding(
         "figure_limits", posture=panels[0][0], products=products, **values, **summary(rows)
     )
     return "stability_limits", fig, caption
 
 
-def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
+def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Finding]:
     """Time to leave a saddle against the size of the perturbation."""
     unit, table = unit_of_movements(robot), result.tables["departure"]
-    saddle = table[0]["scene"]
-    rows = [row for row in table if row["scene"] in (saddle, f"{saddle}, torque off")]
-    steps = sorted({row["dt_s"] for row in rows}, reverse=True)
+    saddle = table[0].scene
+    rows = [row for row in table if row.scene in (saddle, f"{saddle}, torque off")]
+    steps = sorted({row.dt for row in rows}, reverse=True)
     fig = Figure(figsize=(WIDTH, 3.9), layout="constrained")
     axes = fig.subplots(1, len(steps), sharey=True, squeeze=False)[0]
-    methods = list(dict.fromkeys((row["engine"], row["method"]) for row in rows))
+    methods = list(dict.fromkeys((row.engine, row.method) for row in rows))
     for ax, dt in zip(axes, steps):
         for k, (engine, method) in enumerate(methods):
-            mine = [
-                row for row in rows if (row["dt_s"], row["engine"], row["method"]) == (dt, engine, method)
-            ]
-            mine.sort(key=perturbation)
-            sizes = [perturbation(row)[0] for row in mine]
-            observed, predicted = (
-                [number_or_nan(row[key]) for row in mine] for key in ("observed_s", "predicted_s")
-            )
+            mine = [row for row in rows if (row.dt, row.engine, row.method) == (dt, engine, method)]
+            mine.sort(key=lambda row: row.perturbation)
+            sizes = [row.perturbation for row in mine]
+            observed = [number_or_nan(row.observed) for row in mine]
+            predicted = [number_or_nan(row.predicted) for row in mine]
             label = f"{LABELS[engine]}: {look(method)[2] if engine == 'tmt' else method}"
             colour, dash, _ = look(method)
             if engine == "tmt":
@@ -152,15 +158,13 @@ def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     return "stability_departure", fig, result.finding("figure_departure", **values, **departure_values(rows))
 
 
-def draw_claims(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
+def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Finding]:
     """Claims 1 and 2: departure against the push of the residual, and against the number of steps."""
     claims, rows = robot.claims, result.tables["stability_claims"]
-    finer = [row for row in rows if row["claim"] == 2]
+    finer = [row for row in rows if row.claim == 2]
     fig = Figure(figsize=(WIDTH, 3.4), layout="constrained")
     axes = fig.subplots(1, 1 + bool(finer), squeeze=False)[0]
-    draw_torques(
-        axes[0], [row for row in rows if row["claim"] == 1 and row["torque"].startswith(VARIANT)], robot
-    )
+    draw_torques(axes[0], [row for row in rows if row.claim == 1 and row.torque.startswith(VARIANT)], robot)
     if finer:
         draw_finer_steps(axes[1], finer, robot)
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=8)
@@ -168,16 +172,16 @@ def draw_claims(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     return "stability_claims", fig, result.finding("figure_claims", **values, finer=bool(finer))
 
 
-def draw_torques(ax: Axes, rows: list[dict], robot: Robot) -> None:
+def draw_torques(ax: Axes, rows: list[TorqueRow], robot: Robot) -> None:
     """Claim 1: when and to which side the posture is left, over the push of the residual on the unstable mode."""
     symbol = robot.symbol(robot.joints[0])
     for engine, fill in (("tmt", "full"), ("mujoco", "none")):
         for side, mark, word in ((1, "^", "larger"), (-1, "v", "smaller")):
-            mine = [row for row in rows if (row["engine"], row["direction"]) == (engine, side)]
-            pushes, times = ([row[key] for row in mine] for key in ("push_rad_per_s2", "observed_s"))
+            mine = [row for row in rows if (row.engine, row.direction) == (engine, side)]
+            pushes, times = [row.push for row in mine], [row.observed for row in mine]
             looks = {"fillstyle": fill, "markersize": 5, "label": f"{LABELS[engine]}, to {word} {symbol}"}
             ax.plot(np.array(pushes) * 1e14, times, mark, color=COLOURS[engine], **looks)
-    predicted = sorted((row["push_rad_per_s2"] * 1e14, number_or_nan(row["predicted_s"])) for row in rows)
+    predicted = sorted((row.push * 1e14, number_or_nan(row.predicted)) for row in rows)
     ax.plot(*np.array(predicted).reshape(-1, 2).T, color="black", linewidth=0.8, label="predicted")
     ax.axvline(0.0, color="black", linewidth=0.5)
     ax.set(
@@ -187,19 +191,16 @@ def draw_torques(ax: Axes, rows: list[dict], robot: Robot) -> None:
     ax.set_ylabel(f"time until a movement of {LEFT:g} rad, s")
 
 
-def draw_finer_steps(ax: Axes, rows: list[dict], robot: Robot) -> None:
+def draw_finer_steps(ax: Axes, rows: list[FinerRow], robot: Robot) -> None:
     """Claim 2: when and to which side the posture is left against the number of steps, the torque one ulp off."""
     duration = robot.claims.duration
-    for engine, sign in dict.fromkeys((row["engine"], row["ulps"]) for row in rows):
-        mine = [row for row in rows if (row["engine"], row["ulps"]) == (engine, sign)]
-        counts, times = (
-            [duration / row["dt_s"] for row in mine],
-            [number_or_nan(row["observed_s"]) for row in mine],
-        )
+    for engine, sign in dict.fromkeys((row.engine, row.ulps) for row in rows):
+        mine = [row for row in rows if (row.engine, row.ulps) == (engine, sign)]
+        counts, times = [duration / row.dt for row in mine], [number_or_nan(row.observed) for row in mine]
         fill = "full" if engine == "tmt" else "none"
         ax.plot(counts, times, "-" if sign > 0 else "--", color=COLOURS[engine])
         for row, count, time in zip(mine, counts, times):
-            mark = "v" if row["direction"] == -1 else "^"
+            mark = "v" if row.direction == -1 else "^"
             ax.plot(count, time, mark, color=COLOURS[engine], fillstyle=fill, markersize=5)
     ax.set(title=f"claim 2: {robot.claims.left}", xscale="log", xlabel=f"steps in {duration:g} s")
     ax.set_xticks([32, 512, 8192], ["32", "512", "8192"])

@@ -1,6 +1,7 @@
 """Step limits: up to which dt a method keeps a small deviation small, predicted from one step and observed in runs."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ...engines import Engine, Method
 from ...judge.rounding import slope_rounding
 from ...judge.scale import FACTOR
 from ...truth.linear import Held
-from .subjects import who
+from .rows import LimitRow
 
 LINEAR_DEVIATION = 1e-6  # rad, at the start
 GROWTH_STEPS = 2000  # of a run
@@ -33,10 +34,18 @@ KINDS = {"never_fails": "never fails", "always_fails": "fails at every step", "f
 MOST_TOLERANCE = 0.1  # relative: limits of a file's robot that runs show less exactly are not observed
 
 
+class Observed(NamedTuple):
+    """A limit, and what runs show: of which kind it is, None: not observed; how far it may be from the predicted one."""
+
+    row: LimitRow
+    kind: str | None
+    tolerance: float
+
+
 def limit_rows(
     at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...], steps: int = GROWTH_STEPS
-) -> list[dict]:
-    """Rows for tables/stability.csv of one posture, with `seen` and `allowed` for the check; seen is None: not observed."""
+) -> list[Observed]:
+    """The limits of one posture, predicted and observed."""
     rows, fastest, is_read = [], np.abs(at.modes[0]).max(), at.case.robot.is_read
     for method in methods:
         kind, predicted = at.limit(method.scheme)
@@ -52,11 +61,11 @@ def limit_rows(
         seen, observed = None, None
         if not is_read or is_shown(at, tolerance, duration, rate):
             seen, observed = observed_limit(method, engines, at, steps, tried)
-        rows.append({
-            "scene": at.name, "engine": method.engine, "method": method.name, "damping": at.case.scene.damping,
-            "mode_per_s": rate, "predicted_dt_s": predicted, "observed_dt_s": observed, "limit": kind,
-            "criterion": "no mode grows from the second to the last quarter of a run", "seen": seen, "allowed": tolerance,
-        })  # fmt: skip
+        row = LimitRow(
+            scene=at.name, engine=method.engine, method=method.name, damping=at.case.scene.damping, mode=rate,
+            predicted_dt=predicted, observed_dt=observed, limit=kind,
+        )  # fmt: skip
+        rows.append(Observed(row, seen, tolerance))
     return rows
 
 
@@ -169,39 +178,33 @@ def grows(early: np.ndarray, late: np.ndarray) -> bool:
 # checks
 
 
-def check_limits(result: Result, rows: Sequence[dict]) -> None:
-    """The table of limits, and a check for each row; `passed` is None where runs do not show the limit."""
+def check_limits(result: Result, limits: Sequence[Observed]) -> None:
+    """The table of limits, and a check of each that runs show."""
     not_shown = []
-    for row in rows:
-        seen, allowed = row.pop("seen"), row.pop("allowed")
-        where = f"{row['scene']}, {who(row)}, damping {row['damping']:g}"
-        if seen is None:
-            passed = not_shown.append(where)
-        elif row["limit"] == "finite":
-            off, note = apart(row), "" if seen == "finite" else f"observed: {KINDS[seen]}"
-            about = About.PREDICTION
-            one = result.check(where, "limit, observed / predicted - 1", off, allowed, "", note, about=about)
-            passed = one.passed
+    for row, kind, tolerance in limits:
+        where = f"{row.scene}, {row.who}, damping {row.damping:g}"
+        result.rows.append(row)
+        if kind is None:
+            not_shown.append(where)
+        elif row.limit == "finite":
+            quantity, note = "limit, observed / predicted - 1", ""
+            if kind != "finite":
+                note = f"observed: {KINDS[kind]}"
+            check = result.check(where, quantity, row.apart, tolerance, "", note, about=About.PREDICTION)
+            row.passed = check.passed
         else:
-            quantity = f"runs in which it {KINDS[row['limit']]}, as predicted"
-            same = int(seen == row["limit"])
-            passed = result.check(
-                where, quantity, same, 1, "runs", rule="equal", about=About.PREDICTION
-            ).passed
-        result.rows.append(row | {"passed": passed})
-    result.shown = [name for name in (rows[0] if rows else ()) if name != "criterion"]
+            quantity, same = f"runs in which it {KINDS[row.limit]}, as predicted", int(kind == row.limit)
+            check = result.check(where, quantity, same, 1, "runs", rule="equal", about=About.PREDICTION)
+            row.passed = check.passed
+    result.shown = [
+        name for row in result.rows[:1] for name in row.record() if name not in ("criterion", "passed")
+    ]
     if not_shown:
         result.find("not_observed", where=not_shown)
 
 
-def summary(rows: Sequence[dict]) -> dict:
+def summary(rows: Sequence[LimitRow]) -> dict:
     """How many limits are observed and as predicted, and the largest relative difference."""
-    off = [apart(row) for row in rows if apart(row) is not None]
-    wrong = sum(row["passed"] is False for row in rows)
+    off = [row.apart for row in rows if row.apart is not None]
+    wrong = sum(row.passed is False for row in rows)
     return {"limits": len(rows), "known": len(off), "wrong": wrong, "off": max(off, default=0.0)}
-
-
-def apart(row: dict) -> float | None:
-    """How far an observed limit is from the predicted one, relative; None if one of them is missing."""
-    known = row["observed_dt_s"] and row["predicted_dt_s"]
-    return abs(row["observed_dt_s"] / row["predicted_dt_s"] - 1.0) if known else None

@@ -1,6 +1,6 @@
 """The file's own run: everything on, from its own starts, at one step, and at finer ones where it does not come to rest."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 
 import numpy as np
@@ -13,6 +13,7 @@ from ...judge.run import number_or_none
 from ...robots.case import SEED
 from ...robots.file import names_of_keys
 from ..setup import Setup
+from .rows import OwnRunRow
 
 MOST_STARTS = 6  # the first keyframes
 LASTS, LEAST_STEPS, MOST_STEPS = 2.0, 1000, 20_000  # s, and between which numbers of steps it lasts
@@ -24,16 +25,11 @@ PUSH = (
 )
 CALM = 1e-3  # rad/s or m/s, root of the mean square
 FASTER = 10.0  # fold, than at the finer step: what moves on by the step alone
-FULL_MODEL = (
-    "full_model_rms_speed",
-    "full_model_warnings",
-    "full_model_resets",
-    "full_model_calm",
-)  # columns
+OwnRuns = tuple[str, Iterable[OwnRunRow]]  # the quantity of their checks, and the runs
 AT_OWN, AT_REQUESTED = "stable in its own run", "stable in its run"
 
 
-def begin(setup: Setup) -> list:
+def begin(setup: Setup) -> list[OwnRuns]:
     """Start the runs at the file's step, and at a requested one; none without a file's numbers."""
     reading = setup.reading
     if reading is None:
@@ -46,7 +42,7 @@ def begin(setup: Setup) -> list:
     ]
 
 
-def own_run(key: str, dt: float, integrator: str, reading: Reading) -> dict:
+def own_run(key: str, dt: float, integrator: str, reading: Reading) -> OwnRunRow:
     """What the file does from a keyframe (or from qpos0, if the name is empty): a row of own_run.csv.
 
     outcome: calm, it comes to rest; worse, it diverges or moves on, and at a finer step it does not; alike, it moves on there
@@ -68,17 +64,13 @@ def own_run(key: str, dt: float, integrator: str, reading: Reading) -> dict:
         finer = run(finer_dt)
         outcome = "worse" if is_worse(own, finer) else "fails" if own.failed_at else "alike"
     failed = own.failed_at is not None
-    values = (
-        number_or_none(own.speeds[-1]),
-        int(failed),
-        int(failed and on(reading.model, "AUTORESET")),
-        is_calm(own),
-    )
-    return {
-        "start": names_of_keys(reading).get(key, "qpos0"), "dt_s": dt, "integrator": integrator, "outcome": outcome,
-        "failed_at_s": own.failed_at, **dict(zip(FULL_MODEL, values)), "finer_dt_s": finer and finer_dt,
-        "finer_rms_speed": finer and number_or_none(finer.speeds[-1]),
-    }  # fmt: skip
+    return OwnRunRow(
+        start=names_of_keys(reading).get(key, "qpos0"), dt=dt, integrator=integrator, outcome=outcome,
+        failed_at=own.failed_at, full_model_rms_speed=number_or_none(own.speeds[-1]),
+        full_model_warnings=int(failed), full_model_resets=int(failed and on(reading.model, "AUTORESET")),
+        full_model_calm=is_calm(own), finer_dt=finer and finer_dt,
+        finer_rms_speed=finer and number_or_none(finer.speeds[-1]),
+    )  # fmt: skip
 
 
 def is_calm(run: WholeRun) -> bool:
@@ -94,19 +86,18 @@ def is_worse(own: WholeRun, finer: WholeRun) -> bool:
     return not finer.failed_at and not own.speeds[-1] <= max(CALM, FASTER * float(speed))
 
 
-def add(result: Result, work: Sequence) -> None:
+def add(result: Result, work: Sequence[OwnRuns]) -> None:
     """The rows, a check of each, and what is said of the worst start."""
     order = ("worse", "fails", "alike", "calm")
     for quantity, rows in work:
-        rows = sorted(rows, key=lambda row: (order.index(row["outcome"]), row["failed_at_s"] is None))
+        rows = sorted(rows, key=lambda row: (order.index(row.outcome), row.failed_at is None))
         for row in rows:
-            note = f"{1e3 * row['dt_s']:.4g} ms with {row['integrator']}"
-            passed = row["outcome"] in ("alike", "calm")
+            note = f"{1e3 * row.dt:.4g} ms with {row.integrator}"
+            passed = row.outcome in ("alike", "calm")
             result.check(
-                row["start"], quantity, 1 if passed else None, 1, "runs", note, rule="equal", about=About.STEP
+                row.start, quantity, 1 if passed else None, 1, "runs", note, rule="equal", about=About.STEP
             )
         result.tables.setdefault("own_run", []).extend(rows)
-        others = sum(row["outcome"] == rows[0]["outcome"] for row in rows[1:])
-        values = {name: rows[0][name] for name in rows[0] if name not in FULL_MODEL[1:]}
-        values |= {"requested": quantity == AT_REQUESTED, "others": others, "calm": CALM}
-        result.top.append(result.finding("own_run", **values))
+        others = sum(row.outcome == rows[0].outcome for row in rows[1:])
+        values = {"requested": quantity == AT_REQUESTED, "others": others, "calm": CALM}
+        result.top.append(result.finding("own_run", run=rows[0], **values))

@@ -9,7 +9,7 @@ import numpy as np
 
 import tmt
 
-from ...engines import LABELS, Engine, Method, one_of_each_scheme, same_scheme
+from ...engines import Engine, Method, one_of_each_scheme, same_scheme
 from ...robots import Robot
 from ...robots.case import Case
 from ...robots.coordinates import floats
@@ -84,11 +84,6 @@ def coarsest_case(robot: Robot) -> Case:
 def fraction(duration: float, dt: float) -> str:
     """A step that divides a run, as a fraction: 5/64."""
     return f"{duration:g}/{round(duration / dt)}"
-
-
-def who(row: dict) -> str:
-    """The engine and the method of a row."""
-    return f"{LABELS[row['engine']]} {row['method']}"
 
 
 def unit_of_movements(robot: Robot) -> str:

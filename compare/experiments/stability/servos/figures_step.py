@@ -2,11 +2,11 @@
 
 from matplotlib.figure import Figure
 
-from ....core.check import Result
 from ....core.finding import Finding
 from ....core.words import milliseconds
 from ....report.style import BLUE, GREEN, ORANGE, PINK, RED, WIDTH
 from ....robots import Robot
+from ..rows import StabilityResult
 from .response import LASTS
 
 STEP_LOOKS = {  # colour, dash, marker, width: those that coincide are drawn over each other, the wider one below
@@ -18,25 +18,25 @@ STEP_LOOKS = {  # colour, dash, marker, width: those that coincide are drawn ove
 }
 
 
-def draw_step_response(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
+def draw_step_response(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Finding]:
     """Error over step, a line for each integrator, with its largest stable step and the file's own point."""
-    drawn = result.curves["step response"]
-    rows = {row["integrator"]: row for row in drawn["rows"]}
-    dt, integrator = drawn["rows"][0]["file_dt_s"], drawn["rows"][0]["file_integrator"]
+    drawn = result.step_response
+    rows = {row.integrator: row for row in drawn.rows}
+    dt, integrator = drawn.rows[0].file_dt, drawn.rows[0].file_integrator
     fig = Figure(figsize=(WIDTH, 4.2), layout="constrained")
     ax = fig.subplots()
-    for name, line in drawn["lines"].items():
+    for name, line in drawn.lines.items():
         colour, dash, marker, width = STEP_LOOKS[name]
-        limit = rows[name]["predicted_dt_s"]
+        limit = rows[name].predicted_dt
         ends = f"stable up to {milliseconds(limit)}" if limit else "no limit up to 5000 ms"
         ax.loglog(*zip(*line), color=colour, linestyle=dash, linewidth=width, label=f"{name}, {ends}")
         if limit and line and limit <= 1.001 * line[-1][0]:
             ax.plot(*line[-1], marker=marker, color=colour, markersize=7, markeredgecolor="black", zorder=4)
-    if error := rows[integrator]["step_response_error"]:
+    if error := rows[integrator].step_response_error:
         label = f"the file's step: {milliseconds(dt)}, {integrator}"
         ax.plot(dt, error, "*", color="black", markersize=13, zorder=5, label=label)
     ax.set(xlabel="dt, s", ylabel="relative error of the step response")
     ax.axvline(dt, color="black", linewidth=0.6, linestyle=":")
-    fig.legend(loc="outside upper center", ncols=2, title=f"at {drawn['posture']}")
-    caption = result.finding("figure_step_response", "servos", posture=drawn["posture"], seconds=LASTS, dt=dt)
+    fig.legend(loc="outside upper center", ncols=2, title=f"at {drawn.posture}")
+    caption = result.finding("figure_step_response", "servos", posture=drawn.posture, seconds=LASTS, dt=dt)
     return "stability_step_response", fig, caption

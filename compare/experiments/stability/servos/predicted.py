@@ -12,7 +12,7 @@ from ....engines.mujoco.names import INTEGRATORS
 from ....robots import Robot
 from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO, Limit
-from ..own_run import FULL_MODEL
+from ..rows import StepLimitRow
 
 MOST_RESTS, SAME_REST = (
     4,
@@ -116,19 +116,19 @@ def limit_at(at: Posture, integrator: str) -> tuple[Posture, Limit]:
     return at, limit
 
 
-def limit_rows(predictions: Sequence[Prediction], dt: float, integrator: str) -> list[dict]:
+def limit_rows(predictions: Sequence[Prediction], dt: float, integrator: str) -> list[StepLimitRow]:
     """The rows of step_limits.csv before anything is run: one per posture and integrator; dt, integrator: the file's."""
     rows = []
     for prediction in predictions:
         for name in INTEGRATORS:
             limit = prediction.limits.get(name, Limit(prediction.why))
-            rows.append({
-                "posture": prediction.at.name, "base": prediction.at.base_kind, "integrator": name, "limit": limit.limit,
-                "predicted_dt_s": limit.dt and float(limit.dt), "observed_dt_s": None, "file_dt_s": dt,
-                "file_integrator": integrator, "stable_at_file_dt": prediction.is_stable(name, dt),
-                "limiting_joint": limit.joint if limit.limit == "finite" else None, "mode_per_s": limit.rate,
-                "mode_kind": limit.kind or None, "step_response_error": None, **dict.fromkeys(FULL_MODEL),
-            })  # fmt: skip
+            rows.append(StepLimitRow(
+                posture=prediction.at.name, base=prediction.at.base_kind, integrator=name, limit=limit.limit,
+                predicted_dt=limit.dt and float(limit.dt), file_dt=dt, file_integrator=integrator,
+                stable_at_file_dt=prediction.is_stable(name, dt),
+                limiting_joint=limit.joint if limit.limit == "finite" else None,
+                mode=limit.rate, mode_kind=limit.kind or None,
+            ))  # fmt: skip
     return rows
 
 
