@@ -4,9 +4,9 @@ from compare.core.check import Result
 from compare.report.verdict import Section
 
 
-def section(name="mass", *checks, rows=(), **tables):
+def section(name="mass", *checks, rows=(), kind=Result, **tables):
     """A section of plain checks (quantity, value, tolerance, rule, rounding), and what it is about if that is not the models."""
-    result = Result(name, rows=list(rows), tables=tables)
+    result = kind(name, rows=list(rows), tables=tables)
     for quantity, value, tolerance, rule, rounding, *about in checks:
         result.check("zero", quantity, value, tolerance, "kg m2", "", rounding, rule, *about)
     return Section(name, name.capitalize(), "They agree.", "64 eps.", result)

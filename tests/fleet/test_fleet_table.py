@@ -67,8 +67,9 @@ def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
 
 
 def limit(dt, stable, integrator="Euler", kind="finite"):
-    return {"integrator": integrator, "file_integrator": "Euler", "limit": kind, "predicted_dt_s": dt,
-            "stable_at_file_dt": stable}  # fmt: skip
+    return SimpleNamespace(
+        integrator=integrator, file_integrator="Euler", limit=kind, predicted_dt=dt, stable_at_file_dt=stable
+    )
 
 
 @pytest.mark.parametrize("limits, stable, least", [
@@ -82,7 +83,7 @@ def test_the_own_step_is_that_of_the_own_integrator_at_all_postures(limits, stab
     row = row_of(good(), limits=limits)
     assert (row["stable_at_file_dt"], row["limit_s"]) == (stable, least)
     for outcome, is_stable in {"calm": True, "alike": True, "worse": False, "fails": False}.items():
-        row = row_of(good(), limits=limits, runs=[{"outcome": "calm"}, {"outcome": outcome}])
+        row = row_of(good(), limits=limits, runs=[SimpleNamespace(outcome=one) for one in ("calm", outcome)])
         assert row["stable_at_file_dt"] is (is_stable and stable is not False)
 
 

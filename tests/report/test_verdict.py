@@ -14,6 +14,7 @@ from compare.core.text import say
 from compare.engines.mujoco.reading import read
 from compare.experiments import figures_overview, module, stability
 from compare.experiments.speed import first_screen as of_speed
+from compare.experiments.stability.rows import LimitRow, StabilityResult, StepLimitRow
 from compare.report.questions import answers, true_errors
 from compare.report.style import BLUE, ORANGE, RED
 from compare.report.verdict import failures, headline, outcome, passed, standing, verdict
@@ -211,8 +212,8 @@ OFF = {"of": "forearm", "quantity": "com", "component": "x", "stated": 2.0, "com
        "unit": "m"}  # fmt: skip
 SAME = OFF | {"compiled": 2.0, "difference": 0.0}
 APART = {"quantity": "Mbar", "unit": "kg m2", "worst_difference": 2e-16, "difference_over_bar": 0.1}
-STEP = {"scene": "s", "engine": "tmt", "method": "rk4", "damping": 0.0, "limit": "finite", "predicted_dt_s": 0.1,
-        "observed_dt_s": 0.1001, "passed": True}  # fmt: skip
+STEP = LimitRow(scene="s", engine="tmt", method="rk4", damping=0.0, mode=9.0, limit="finite", predicted_dt=0.1,
+                observed_dt=0.1001, passed=True)  # fmt: skip
 PRINTED = {"published": 1.0, "tmt": 1.1, "mujoco": 0.9, "tolerance": 0.11}
 
 
@@ -226,10 +227,11 @@ def headline_of(name, of):
     ("published", [PRINTED | {"mujoco": 0.8}], "0 1", ""),
     ("gravity", [APART, APART | {"quantity": "other", "worst_difference": 1.0, "difference_over_bar": 0.05}], "2e-16 10", "Mbar"),
     ("trajectory", [{"scene": "a", "difference_over_band": 0.04}, {"scene": "a", "difference_over_band": 12.0}], "1 12", ""),
-    ("stability", [STEP, STEP | {"observed_dt_s": 0.0995}], "2 0.5", ""),
+    ("stability", [STEP, replace(STEP, observed_dt=0.0995)], "2 0.5", ""),
 ])  # fmt: skip
 def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, named):
-    of = section(name, GOOD, rows=rows)
+    kind = StabilityResult if name == "stability" else Result
+    of = section(name, GOOD, rows=rows, kind=kind)
     said = headline_of(name, of)
     found = re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]\d+)?", said.replace(" m2", ""))
     assert found == numbers.split() and named in said, said
@@ -286,18 +288,22 @@ def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_n
 
 
 def test_limits_are_counted_and_drawn_where_they_are_predicted_and_observed():
-    row = STEP | {"damping": 0.5}
-    curves = {"centres": ("s",), "schemes": {("tmt", "rk4"): "rk4", ("mujoco", "RK4"): "rk4"}}
-    mujoco = row | {"engine": "mujoco", "method": "RK4", "observed_dt_s": 0.0995, "passed": False}
-    result = Result("stability", rows=[row, mujoco, row | {"scene": "saddle"}], curves=curves)
+    row = replace(STEP, damping=0.5)
+    schemes = {("tmt", "rk4"): "rk4", ("mujoco", "RK4"): "rk4"}
+    mujoco = replace(row, engine="mujoco", method="RK4", observed_dt=0.0995, passed=False)
+    rows = [row, mujoco, replace(row, scene="saddle")]
+    result = StabilityResult("stability", rows=rows, centres=("s",), schemes=schemes)
     counts = {"limits": 2, "known": 2, "wrong": 1, "off": pytest.approx(0.005)}
     assert stability.headline(result).values == counts
     assert {("o", to_hex(BLUE), 0.1001), ("X", to_hex(RED), 0.0995)} <= marks("stability", result)
 
 
 def test_where_the_robot_has_servos_the_limits_with_them_are_drawn():
-    row = {"integrator": "Euler", "limit": "finite", "predicted_dt_s": 0.1, "file_dt_s": 0.002}
-    rows = [row | {"observed_dt_s": dt} for dt in (None, 0.1009, 0.1011)] + [row | {"limit": "saddle"}]
-    result = Result("stability", rows=[STEP], curves={"centres": ("s",)}, tables={"step_limits": rows})
+    row = StepLimitRow(
+        posture="s", base="fixed", integrator="Euler", limit="finite", predicted_dt=0.1, file_dt=0.002,
+        file_integrator="Euler", stable_at_file_dt=True, limiting_joint="j", mode=9.0, mode_kind="real",
+    )  # fmt: skip
+    rows = [replace(row, observed_dt=dt) for dt in (None, 0.1009, 0.1011)] + [replace(row, limit="saddle")]
+    result = StabilityResult("stability", rows=[STEP], centres=("s",), tables={"step_limits": rows})
     robot = replace(ARM, drive=robot_of(read(PATHS["arm7"]), "arm7.xml").drive)
     assert {("s", to_hex(ORANGE), 0.1009), ("X", to_hex(RED), 0.1011)} <= marks("stability", result, robot)

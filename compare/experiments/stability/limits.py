@@ -187,11 +187,9 @@ def check_limits(result: Result, limits: Sequence[Observed]) -> None:
         if kind is None:
             not_shown.append(where)
         elif row.limit == "finite":
-            quantity, note = "limit, observed / predicted - 1", ""
-            if kind != "finite":
-                note = f"observed: {KINDS[kind]}"
-            check = result.check(where, quantity, row.apart, tolerance, "", note, about=About.PREDICTION)
-            row.passed = check.passed
+            note, about = "" if kind == "finite" else f"observed: {KINDS[kind]}", About.PREDICTION
+            what = "limit, observed / predicted - 1"
+            row.passed = result.check(where, what, row.apart, tolerance, "", note, about=about).passed
         else:
             quantity, same = f"runs in which it {KINDS[row.limit]}, as predicted", int(kind == row.limit)
             check = result.check(where, quantity, same, 1, "runs", rule="equal", about=About.PREDICTION)

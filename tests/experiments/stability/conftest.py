@@ -1,8 +1,8 @@
 import pytest
 
-from compare.core.check import Result
+from compare.experiments.stability.rows import StabilityResult
 
 
 @pytest.fixture
 def result():
-    return Result("stability")
+    return StabilityResult("stability")

@@ -6,6 +6,7 @@ import pytest
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments.stability import claims, failure
+from compare.experiments.stability.rows import FinerRow, KeptRow, TorqueRow
 from compare.robots.arm import ARM
 
 RK4 = (Tmt().methods["rk4"], INTEGRATORS["RK4"])
@@ -19,12 +20,11 @@ def torque_rows(times=(4.7, 4.7), moved=0.0, sides=(1, 1), clear=(1, 1), leaving
     for method, time, side, away in zip(RK4, times, sides, clear):
         for k, name in enumerate(NAMES):
             stays = method.engine == "tmt" and leaving <= k < 27
-            rows.append({
-                "scene": "ball catch", "engine": method.engine, "method": method.name, "dt_s": 5 / 64, "torque": name,
-                "push_rad_per_s2": 1e-14 * (away if "ulps" in name else 1), "predicted_s": time,
-                "observed_s": None if stays else time, "direction": None if stays else side,
-                "moved_rad": moved if "own" in name else 1.0,
-            })  # fmt: skip
+            rows.append(TorqueRow(
+                scene="ball catch", engine=method.engine, method=method.name, dt=5 / 64, torque=name,
+                push=1e-14 * (away if "ulps" in name else 1), predicted=time, observed=None if stays else time,
+                direction=None if stays else side, moved=moved if "own" in name else 1.0,
+            ))  # fmt: skip
     return rows
 
 
@@ -50,9 +50,8 @@ def test_the_side_to_which_a_posture_is_left(to, found):
 
 def finer_rows(moved=0.0, directions=(1, -1), times=(5.0, 6.0)):
     return [
-        {"scene": "ball catch", "engine": method.engine, "method": method.name, "dt_s": 5 / count, "ulps": sign,
-         "observed_s": time, "direction": side, "moved_rad": away,
-         "step_rad": 1e-17, "half_ulp_rad": 5e-17}
+        FinerRow(scene="ball catch", engine=method.engine, method=method.name, dt=5 / count, ulps=sign,
+                 observed=time, direction=side, moved=away, step=1e-17, half_ulp=5e-17)
         for method in RK4 for sign in (1, -1)
         for count, time, side, away in ((64, times[0], directions[0], 1.0), (128, times[1], directions[1], 1.0),
                                         (4096, None, None, moved))
@@ -73,16 +72,12 @@ def test_claim_2(result, changed, word, passes):
 
 def kept_runs(observed=None, largest=0.06, acceleration=50.0):
     rows = [
-        {"scene": "bent", "engine": method.engine, "method": method.name, "dt_s": dt, "torque": claims.ONE_ULP,
-         "observed_s": observed if dt < 0.31 else None, "diverged_at_s": None, "moved_rad": away,
-         "run_s": 1000.0}
+        KeptRow(scene="bent", engine=method.engine, method=method.name, dt=dt, torque=claims.ONE_ULP,
+                observed=observed if dt < 0.31 else None, diverged_at=None, moved=away, run=1000.0)
         for method in RK4 for dt, away in ((0.3, 1e-9), (0.35, largest))
     ]  # fmt: skip
     engines = [method.engine for method in RK4]
-    return {
-        "rows": rows, "limit": 0.3108, "fastest": 9.1,
-        "acceleration_at_end": {engine: np.array([0.0, -acceleration, 0.0]) for engine in engines},
-    }  # fmt: skip
+    return claims.KeptRuns(rows, 0.3108, 9.1, dict.fromkeys(engines, np.array([0.0, -acceleration, 0.0])))
 
 
 @pytest.mark.parametrize("changed, word, failing", [
@@ -100,7 +95,6 @@ def test_claim_3(result, changed, word, failing):
     (1.0, 1.0 + 0.999 * 5 / 64, [True]), (1.0, 1.0 + 1.001 * 5 / 64, [False]), (1.0, None, [False]), (None, None, []),
 ])  # fmt: skip
 def test_a_reset_is_caught_within_a_step(result, reset, caught, passes):
-    failure.check_reset(
-        result, FREE, {"resets": int(reset is not None), "first_reset_s": reset, "caught_s": caught}
-    )
+    run = failure.OwnReset(5.0, int(reset is not None), reset, True, 0, caught)
+    failure.check_reset(result, FREE, run)
     assert [check.passed for check in result.checks] == passes

@@ -7,6 +7,7 @@ from models import PATHS
 
 from compare.engines.mujoco import reading
 from compare.experiments.stability import departure, equilibria, limits
+from compare.experiments.stability.rows import DepartureRow, LimitRow
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.truth.linear import held
@@ -25,10 +26,9 @@ def test_amplification_within_the_rounding_of_a_difference_quotient_or_of_a_step
 
 
 def limit_row(predicted=0.1, observed=0.1, kind="finite", seen="finite", **more):
-    return {
-        "scene": "bent", "engine": "tmt", "method": "rk4", "damping": 0.0, "mode_per_s": 9.1, "predicted_dt_s": predicted,
-        "observed_dt_s": observed, "limit": kind, "criterion": "", "seen": seen, "allowed": 1e-3, **more,
-    }  # fmt: skip
+    usual = {"scene": "bent", "engine": "tmt", "method": "rk4", "damping": 0.0, "mode": 9.1, "limit": kind}
+    row = LimitRow(**usual | {"predicted_dt": predicted, "observed_dt": observed} | more)
+    return limits.Observed(row, seen, 1e-3)
 
 
 def check_limits(result, *rows):
@@ -53,7 +53,7 @@ def test_kind_of_limit_is_as_predicted(result, kind, seen, passes):
 
 def test_what_no_run_decides_is_not_checked(result):
     check_limits(result, limit_row(), limit_row(observed=None, seen=None, method="implicit"))
-    assert only(result) and [row["passed"] for row in result.rows] == [True, None]
+    assert only(result) and [row.passed for row in result.rows] == [True, None]
     assert result.notes[0].values["where"] == ["bent, TMT implicit, damping 0"]
 
 
@@ -87,14 +87,14 @@ def test_a_limit_is_not_decided_by_runs_in_which_a_slow_mode_is_lost_in_rounding
 
 
 def departure_row(observed, predicted, **more):
-    return {"scene": "ball catch", "engine": "tmt", "method": "rk4", "dt_s": 0.01, "perturbation_rad": 1e-6,
-            "predicted_s": predicted, "observed_s": observed} | more  # fmt: skip
+    usual = {"scene": "ball catch", "engine": "tmt", "method": "rk4", "dt": 0.01, "perturbation": 1e-6}
+    return DepartureRow(**usual | {"predicted": predicted, "observed": observed} | more)
 
 
 @pytest.mark.parametrize("observed, predicted, more, passes", [
     *((2.0 + off, 2.0, {}, passes) for off, passes in ((0.0299, True), (0.0301, False), (-0.0299, True), (-0.0301, False))),
-    (2.0 + INSIDE * 5 / 64, 2.0, {"dt_s": 5 / 64}, True), (2.0 + OUTSIDE * 5 / 64, 2.0, {"dt_s": 5 / 64}, False),
-    (2.199, 2.0, {"allowed_s": 0.2}, True), (2.201, 2.0, {"allowed_s": 0.2}, False),  # a row may say how near
+    (2.0 + INSIDE * 5 / 64, 2.0, {"dt": 5 / 64}, True), (2.0 + OUTSIDE * 5 / 64, 2.0, {"dt": 5 / 64}, False),
+    (2.199, 2.0, {"allowed": 0.2}, True), (2.201, 2.0, {"allowed": 0.2}, False),  # a row may say how near
     (None, None, {}, True), (1.0, None, {}, False), (None, 1.0, {}, False),
 ])  # fmt: skip
 def test_departure_within_one_step_or_three_hundredths(result, observed, predicted, more, passes):

@@ -51,7 +51,7 @@ def of(source, **more):
     (FREE.format(9.81), "calm"), (FREE.format(0), "alike"),  # it hovers, and falls
 ])  # fmt: skip
 def test_what_moves_on_by_its_step_alone_is_not_stable(source, outcome):
-    assert of(source)["outcome"] == outcome
+    assert of(source).outcome == outcome
 
 
 @pytest.mark.parametrize("own, finer, worse", [
@@ -91,7 +91,7 @@ def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step(quick):
 def test_the_first_six_keyframes_are_run(quick):
     keys = "".join(f'<key name="k{i}" qpos="{i / 10}"/>' for i in range(7))
     rows = quick(hinge('damping="0.05"', key=keys)).tables["own_run"]
-    assert sorted(row["start"] for row in rows) == [f"k{i}" for i in range(own_run.MOST_STARTS)]
+    assert sorted(row.start for row in rows) == [f"k{i}" for i in range(own_run.MOST_STARTS)]
 
 
 @pytest.mark.parametrize("source, why", [
@@ -101,13 +101,13 @@ def test_the_first_six_keyframes_are_run(quick):
 ])  # fmt: skip
 def test_what_is_not_modelled_has_no_limit(quick, source, why):
     result = quick(source)
-    assert {row["limit"] for row in result.tables["step_limits"] if row["posture"] != "middle"} == {why}
+    assert {row.limit for row in result.tables["step_limits"] if row.posture != "middle"} == {why}
 
 
 def test_adhesion_acts_in_contacts_alone_and_hides_no_limit(quick):
     grip = f'{STIFF}<adhesion body="grip" ctrlrange="0 1" gain="2"/>'
     result = quick(hinge(actuator=grip).replace("<body>", '<body name="grip">'))
-    assert "not_judged" not in {row["limit"] for row in result.tables["step_limits"]}
+    assert "not_judged" not in {row.limit for row in result.tables["step_limits"]}
 
 
 def test_a_servo_at_its_range_lets_a_keyframe_rest_beside_it():
@@ -128,7 +128,7 @@ def test_constraints_of_a_sparse_jacobian_and_a_pickled_model():
 def test_a_robot_of_many_speeds_has_its_servo_limits_alone(quick):
     result = quick(hinge(actuator=STIFF))
     assert result.tables.keys() == {"own_run", "step_limits"} and not result.rows
-    aside = [row for row in result.tables["step_limits"] if row["posture"] == "aside"]
-    calm = {row["integrator"]: row["full_model_calm"] for row in aside}
+    aside = [row for row in result.tables["step_limits"] if row.posture == "aside"]
+    calm = {row.integrator: row.full_model_calm for row in aside}
     assert calm == dict.fromkeys(INTEGRATORS) | {"Euler": False}
     assert [finding.kind for finding in result.top] == ["own_run", "step", "large"]

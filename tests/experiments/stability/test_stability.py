@@ -77,7 +77,7 @@ def test_a_cart_with_a_pole_leaves_as_predicted_and_its_column_names_both_units(
     robot, mujoco = read(CART_POLE)
     known = engines_of(mujoco)
     rows = departure.departures(1 / 512, held(robot, "qpos0"), known, (known["mujoco"].methods["RK4"],))
-    assert "perturbation_m_or_rad" in rows[0] and "perturbation_rad" not in rows[0]
+    assert "perturbation_m_or_rad" in rows[0].record() and "unit" not in rows[0].record()
     departure.check_departures(result, rows)
     assert len(result.checks) == 3 and all(check.passed for check in result.checks)
     # methods that solve their stages are not run for a file
@@ -94,24 +94,23 @@ def method(engines):
 def test_predicted_and_observed_limits_agree(engines, method):
     ours = [method("tmt", scheme) for scheme in ("semi_implicit_euler", "implicit_midpoint")]
     rows = limits.limit_rows(BENT, engines, (*ours, method("mujoco", "RK4")))
-    assert (
-        [row["seen"] for row in rows] == [row["limit"] for row in rows] == ["finite", "never_fails", "finite"]
-    )
-    for row in (rows[0], rows[2]):
-        assert row["observed_dt_s"] == pytest.approx(row["predicted_dt_s"], rel=limits.LIMIT_TOLERANCE)
+    kinds = ["finite", "never_fails", "finite"]
+    assert [found.kind for found in rows] == [found.row.limit for found in rows] == kinds
+    for row, *_ in (rows[0], rows[2]):
+        assert row.observed_dt == pytest.approx(row.predicted_dt, rel=limits.LIMIT_TOLERANCE)
     # a forearm of another mass has another one
     heavy = held(dataclasses.replace(ARM, tree=dataclasses.replace(tmt.ARM, mass=(1.9, 1.65))), "bent")
-    assert abs(rows[2]["observed_dt_s"] / heavy.limit("rk4")[1] - 1.0) > 2.0 * limits.LIMIT_TOLERANCE
+    assert abs(rows[2].row.observed_dt / heavy.limit("rk4")[1] - 1.0) > 2.0 * limits.LIMIT_TOLERANCE
     # growth beyond the limit is slow with little damping: 100-fold in 2000 steps comes 6 % later
-    (row,) = limits.limit_rows(held(ARM, "bent", 0.5), engines, (method("tmt", "explicit_euler"),))
-    assert row["seen"] == "finite" and row["observed_dt_s"] == pytest.approx(row["predicted_dt_s"], rel=5e-4)
+    ((row, kind, _),) = limits.limit_rows(held(ARM, "bent", 0.5), engines, (method("tmt", "explicit_euler"),))
+    assert kind == "finite" and row.observed_dt == pytest.approx(row.predicted_dt, rel=5e-4)
 
 
 def test_departure_is_predicted_where_no_other_mode_grows_faster_than_that_of_the_saddle(
     engines, method, result
 ):
     rows = departure.departures(5 / 64, BALL, engines, (method("tmt", "rk4"), method("mujoco", "Euler")))
-    assert len({row["observed_s"] for row in rows}) > 8  # the arm left, at other times from other starts
+    assert len({row.observed for row in rows}) > 8  # the arm left, at other times from other starts
     departure.check_departures(result, rows)
     assert len(result.checks) == len(rows) and all(check.passed for check in result.checks)
     # with steps of 1 s a swing grows 9.5-fold in each, what leaves 8.5-fold
@@ -128,17 +127,17 @@ def test_own_bias_holds_for_ever(engines, method):
 
 def test_the_clear_torques_push_as_much_as_sixteen_ulps(engines):
     """The torques within an ulp span the push of two."""
-    of_tmt = {row["torque"]: row for row in claims.holding_torques(ARM, engines) if row["engine"] == "tmt"}
-    push = {name: row["push_rad_per_s2"] for name, row in of_tmt.items()}
+    of_tmt = {row.torque: row for row in claims.holding_torques(ARM, engines) if row.engine == "tmt"}
+    push = {name: row.push for name, row in of_tmt.items()}
     ulp = np.ptp([size for name, size in push.items() if name.startswith(claims.VARIANT)]) / 2
     assert [push[name] / ulp for name in claims.CLEAR_TORQUES] == pytest.approx([16.0, -16.0], rel=0.1)
 
 
 def test_a_reset_is_caught(engines):
     reset = failure.own_reset(FREE, engines)
-    assert reset["finite"] and reset["resets"] >= 1 and reset["caught_s"] <= reset["first_reset_s"]
+    assert reset.finite and reset.resets >= 1 and reset.caught <= reset.first_reset
     calm = ARM.case("hanging, free", posture="hanging")
-    assert failure.own_reset(calm, engines)["resets"] == 0
+    assert failure.own_reset(calm, engines).resets == 0
 
 
 @pytest.mark.slow
@@ -170,8 +169,8 @@ def test_departures_that_may_differ_by_more_than_they_last_are_not_compared(monk
     found = reading.read(SWING.format(keys=""))
     setup = Setup.quick(robot_of(found, "robot.xml"), engines_of(engine(found)))
     rows = stability.rows(setup).tables["departure"]
-    shortest = min(row["predicted_s"] for row in rows)
-    for curved, left in ((0.99 * shortest - departure.near({"dt_s": rows[0]["dt_s"]}), len(rows)), (1e6, 0)):
+    shortest = min(row.predicted for row in rows)
+    for curved, left in ((0.99 * shortest - departure.usually_near(rows[0].dt), len(rows)), (1e6, 0)):
         monkeypatch.setattr(departure, "curved_by", lambda at, curved=curved: curved)
         result = stability.rows(setup)
         assert len(result.tables.get("departure", ())) == left

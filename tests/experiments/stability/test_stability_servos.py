@@ -7,12 +7,13 @@ import pytest
 from models import PATHS
 from servo_models import FILTERED, FLOATING, FORK, INERTIA, hinge, posture_of
 
-from compare.core.check import AT_OWN_STEP, Result
+from compare.core.check import AT_OWN_STEP
 from compare.engines.mujoco import reading
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
 from compare.experiments.stability import servos
+from compare.experiments.stability.rows import StabilityResult, StepLimitRow
 from compare.experiments.stability.servos import figures_step, observed, predicted, response
 from compare.experiments.stability.servos.findings import verdict
 from compare.experiments.stability.servos.lifting import lifts
@@ -34,22 +35,22 @@ def swing(servo=SERVO, key="", integrator="Euler", com="0 0 -0.5"):
 
 def row(**more):
     """A row of step_limits.csv."""
-    return {
-        "posture": "p", "base": "fixed", "integrator": "Euler", "limit": "finite", "predicted_dt_s": 0.1, "file_dt_s": 0.1,
-        "observed_dt_s": None, "file_integrator": "Euler", "limiting_joint": "joint7", "stable_at_file_dt": None,
-        "step_response_error": None,
-    } | more  # fmt: skip
+    usual = {
+        "posture": "p", "base": "fixed", "integrator": "Euler", "limit": "finite", "predicted_dt": 0.1, "file_dt": 0.1,
+        "file_integrator": "Euler", "limiting_joint": "joint7", "stable_at_file_dt": None, "mode": None, "mode_kind": None,
+    }  # fmt: skip
+    return StepLimitRow(**usual | more)
 
 
-NONE = {"limit": "none", "predicted_dt_s": None}
+NONE = {"limit": "none", "predicted_dt": None}
 
 
 @pytest.mark.parametrize("more, kind, passed", [
-    ({"observed_dt_s": 0.100999}, "finite", [True]), ({"observed_dt_s": 0.10101}, "finite", [False]),
-    ({"observed_dt_s": 0.099001}, "finite", [True]), ({"observed_dt_s": 0.09899}, "finite", [False]),
-    ({}, "none", [False]), ({}, "always", [False]), (NONE, "none", []), (NONE | {"observed_dt_s": 1.0}, "finite", [False]),
+    ({"observed_dt": 0.100999}, "finite", [True]), ({"observed_dt": 0.10101}, "finite", [False]),
+    ({"observed_dt": 0.099001}, "finite", [True]), ({"observed_dt": 0.09899}, "finite", [False]),
+    ({}, "none", [False]), ({}, "always", [False]), (NONE, "none", []), (NONE | {"observed_dt": 1.0}, "finite", [False]),
     # below the shortest step that is tried nothing is compared
-    ({"predicted_dt_s": 0.99e-7}, "always", []), ({"predicted_dt_s": 1.01e-7}, "always", [False]),
+    ({"predicted_dt": 0.99e-7}, "always", []), ({"predicted_dt": 1.01e-7}, "always", [False]),
 ])  # fmt: skip
 def test_an_observed_limit_is_within_a_hundredth(result, more, kind, passed):
     servos.check_observed(result, row(**more), kind)
@@ -63,8 +64,8 @@ def test_the_spectral_radius_near_a_limit(result, apart, passes):
 
 
 @pytest.mark.parametrize("more, passed", [
-    ({}, [True]), ({"file_dt_s": 0.1001}, [False]), ({"integrator": "RK4"}, []), (NONE, [True]),
-    ({"limit": "saddle", "predicted_dt_s": None}, []),
+    ({}, [True]), ({"file_dt": 0.1001}, [False]), ({"integrator": "RK4"}, []), (NONE, [True]),
+    ({"limit": "saddle", "predicted_dt": None}, []),
 ])  # fmt: skip
 def test_a_step_is_stable_up_to_its_limit_where_one_counts(result, more, passed):
     servos.check_step(result, [row(**more)], "stable at its own step")
@@ -170,7 +171,7 @@ def read(source, make=Setup.quick, **more):
 
 
 def done(setup):
-    result = Result("stability")
+    result = StabilityResult("stability")
     servos.add(result, setup, servos.begin(setup))
     return result
 
@@ -183,14 +184,14 @@ def at_qpos0(source=None):
 def test_a_quick_run_has_every_limit_and_observes_the_files_own_integrator_and_euler_at_one_posture():
     result = done(read(swing(SERVO.replace('"4"', '"10"'), UP, "implicitfast")))
     rows = result.tables["step_limits"]
-    places = [(row["posture"], row["base"], row["integrator"]) for row in rows]
+    places = [(row.posture, row.base, row.integrator) for row in rows]
     assert places == [(posture, "fixed", name) for posture in ("up", "qpos0") for name in INTEGRATORS]
-    seen = {(row["posture"], row["integrator"]) for row in rows if row["observed_dt_s"]}
+    seen = {(row.posture, row.integrator) for row in rows if row.observed_dt}
     assert ("up", "Euler") in seen <= {("up", "Euler"), ("up", "implicitfast")}
     euler = rows[0]
-    assert (euler["limit"], euler["limiting_joint"], euler["stable_at_file_dt"]) == ("finite", "swing", True)
-    assert euler["observed_dt_s"] == pytest.approx(euler["predicted_dt_s"], rel=5e-3)
-    assert euler["observed_dt_s"] != euler["predicted_dt_s"] and 0.0 < euler["step_response_error"] < 0.1
+    assert (euler.limit, euler.limiting_joint, euler.stable_at_file_dt) == ("finite", "swing", True)
+    assert euler.observed_dt == pytest.approx(euler.predicted_dt, rel=5e-3)
+    assert euler.observed_dt != euler.predicted_dt and 0.0 < euler.step_response_error < 0.1
     assert all(check.passed for check in result.checks) and result.top[0].values["own"]["stable"]
     assert sum(check.quantity == AT_OWN_STEP for check in result.checks) == 2
 
@@ -200,13 +201,13 @@ def test_a_full_run_observes_every_integrator_and_draws_curves(result):
         setup = read(swing(key=UP), Setup.small, alone=alone)
         work = servos.begin(setup)
         # every integrator at the first posture with a limit; `stability` alone the file's, which is Euler, at the other
-        assert [one.name for one, *_ in work["observed"][0]] == ["up"] * len(INTEGRATORS) + ["qpos0"] * alone
-    drawn, curves = work["curves"]
+        assert [one.name for one, *_ in work.observed[0]] == ["up"] * len(INTEGRATORS) + ["qpos0"] * alone
+    drawn, curves = work.curves
     assert [name for _, name, _ in drawn] == [*INTEGRATORS]
-    work |= {"observed": ([], ()), "curves": (drawn[:1], curves)}  # one curve, and no limit is sought
+    work = work._replace(observed=([], ()), curves=(drawn[:1], curves))  # one curve, and no limit is sought
     servos.add(result, setup, work)
-    row, (curve,) = result.tables["step_limits"][0], result.curves["step response"]["lines"].values()
-    assert curve[0][0] < 0.002 < curve[-1][0] <= row["predicted_dt_s"] < 1.5 * curve[-1][0]
+    row, (curve,) = result.tables["step_limits"][0], result.step_response.lines.values()
+    assert curve[0][0] < 0.002 < curve[-1][0] <= row.predicted_dt < 1.5 * curve[-1][0]
     assert figures_step.draw_step_response(result, None)
 
 
@@ -221,14 +222,14 @@ def test_a_file_that_is_not_stable_at_its_own_step_fails_a_check_and_is_told_wha
 def test_motors_are_neither_stable_nor_not(engines):
     assert servos.begin(Setup.quick(ARM, engines)) is None
     _, one = at_qpos0(swing('<motor name="servo" joint="swing"/>'))
-    assert {row["stable_at_file_dt"] for row in predicted.limit_rows([one], 0.002, "Euler")} == {None}
+    assert {row.stable_at_file_dt for row in predicted.limit_rows([one], 0.002, "Euler")} == {None}
 
 
 def test_a_saddle_has_a_rate_and_neither_a_joint_that_limits_nor_an_answer():
     _, one = at_qpos0(swing(SERVO.replace('"50" kv="4"', '"1"'), com="0 0 0.5"))
     for row in predicted.limit_rows([one], 0.002, "Euler"):
-        assert (row["limit"], row["limiting_joint"], row["stable_at_file_dt"]) == ("saddle", None, None)
-        assert row["mode_per_s"] > 1.0
+        assert (row.limit, row.limiting_joint, row.stable_at_file_dt) == ("saddle", None, None)
+        assert row.mode > 1.0
 
 
 def test_runs_have_the_weight_and_the_cuts_of_the_rest():

@@ -19,7 +19,7 @@ CHECKS = (
     ("trajectory", "check_divergence", 'f"step of divergence, MuJoCo\'s, is {whose}"'),
     ("judge.run", "check_movement", '"movement"'), ("trajectory", "check_level", "quantity"),
     ("energy", "check_order", "name"),
-    ("stability.limits", "check_limits", '"limit, observed / predicted - 1"'),
+    ("stability.limits", "check_limits", "what"),
     ("stability.limits", "check_limits", "quantity"), ("departure", "check_row", "quantity"),
     ("claims", "check_torques", "text"), ("claims", "check_torques", "quantity"),
     ("claims", "check_finer_steps", "quantity"), ("claims", "check_kept", "what"),

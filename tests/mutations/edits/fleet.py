@@ -3,7 +3,7 @@
 from ..edit import Edit
 
 EDITS = (
-    Edit("fleet.table", "own_step", "row['outcome'] in ('calm', 'alike')", "True", "a file is stable whatever its own run does"),
+    Edit("fleet.table", "own_step", "row.outcome in ('calm', 'alike')", "True", "a file is stable whatever its own run does"),
     Edit("fleet.table", "row_of_file", "outcome, reasons = DIFFER, _1", "outcome, reasons = AGREE, _1",
          "a file that differs agrees"),
     Edit("fleet.table", "row_of_file", "outcome, reasons = BROKE, []", "outcome, reasons = AGREE, []", "what broke off agrees"),
@@ -14,7 +14,7 @@ EDITS = (
          "no killed process is tried again"),
     Edit("fleet.table", "own_step", "all(stable)", "any(stable)", "one posture at which the step is stable is enough"),
     Edit("fleet.table", "own_step", "min(limits, default=None)", "max(limits, default=None)", "the largest of the limits"),
-    Edit("fleet.table", "own_step", 'row["integrator"] == row["file_integrator"]', "True", "limits of any integrator"),
+    Edit("fleet.table", "own_step", 'row.integrator == row.file_integrator', "True", "limits of any integrator"),
     Edit("command_line", "request", "'--joints' in words[:-1]", "False", "a first joint of the other sense is an option"),
     Edit("command_line", "process_count", "0 < int(text) <= 1024", "True", "a fleet may have no process"),
     Edit("command_line", "seconds", "1e-6 <= float(text) <= most", "float(text) <= most", "a step may be negative"),

@@ -3,7 +3,7 @@
 from ..edit import Edit
 
 EDITS = (
-    Edit("servos", "limits_in_use", "(apart(row) or 0.0) <= OBSERVED_WITHIN", "True", "each limit with servos is as predicted"),
+    Edit("servos", "limits_in_use", "(row.apart or 0.0) <= OBSERVED_WITHIN", "True", "each limit with servos is as predicted"),
     Edit("step_limits", "Small.braking", "np.diag(self.damping)", "self.D", "kv is implicit under Euler"),
     Edit("step_limits", "Small.braking", "np.where(self.on_path, self.D, 0.0)", "self.D",
          "a tendon's terms across branches are implicit"),
