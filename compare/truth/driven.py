@@ -10,6 +10,7 @@ import tmt
 from tmt.derivation.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 from tmt.methods import by_speed, lone_speeds
 
+from ..robots import Robot
 from ..robots.actuators import Rows
 from ..robots.coordinates import free_joints
 from .rest import carries
@@ -26,7 +27,7 @@ class Posture:
     for the rest starts, by default the posture.
     """
 
-    robot: object  # a robots.Robot
+    robot: Robot
     name: str
     ask: Callable | None = None
     rows: Callable | None = None
