@@ -14,7 +14,7 @@ from compare.core.text import say
 from compare.engines.mujoco.reading import read
 from compare.experiments import figures_overview, module, stability
 from compare.experiments.speed import first_screen as of_speed
-from compare.experiments.stability.rows import LimitRow, StabilityResult, StepLimitRow
+from compare.experiments.stability.tables import LimitRow, StabilityResult, StepLimitRow
 from compare.report.questions import answers, true_errors
 from compare.report.style import BLUE, ORANGE, RED
 from compare.report.verdict import failures, headline, outcome, passed, standing, verdict

@@ -18,8 +18,8 @@ from .equilibria import check_equilibria
 from .failure import OwnReset
 from .limits import Observed
 from .own_run import OwnRuns
-from .rows import DepartureRow, FinerRow, LimitRow, StabilityResult, TorqueRow
 from .subjects import DAMPINGS, SCHEMES, Subjects, coarsest_case, methods_of, subjects_of, unit_of_movements
+from .tables import DepartureRow, FinerRow, LimitRow, StabilityResult, TorqueRow
 
 EXPERIMENT = Experiment(order=100, serves_own=False, options=("--dt", "--integrator"), overview="limits")
 MOST_SPEEDS = 60  # of a file's robot: with more there are no runs without servos

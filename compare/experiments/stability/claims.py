@@ -15,8 +15,8 @@ from ...judge.run import LEFT, departure, deviation, number_or_none
 from ...robots import Robot
 from ...truth.linear import Held, held
 from .departure import check_row, own_torque, predicted, residual, variants
-from .rows import ClaimRow, FinerRow, KeptRow, TorqueRow
 from .subjects import fraction, rk4_of_both
+from .tables import ClaimRow, FinerRow, KeptRow, TorqueRow
 
 CLEAR_ULPS = 16  # of each component: a push that rounding of the bias on the way cannot turn round
 VARIANT, NEAREST = "variant", "nearest to own bias"  # names of torques

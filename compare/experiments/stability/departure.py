@@ -9,8 +9,8 @@ from ...core.check import About, Result
 from ...engines import Engine, Method
 from ...judge.run import LEFT, departure
 from ...truth.linear import NEGLIGIBLE, Held
-from .rows import DepartureRow, TorqueRow
 from .subjects import unit_of_movements
+from .tables import DepartureRow, TorqueRow
 
 Departure = DepartureRow | TorqueRow  # with a predicted and an observed time
 

@@ -15,8 +15,8 @@ from ..figures_overview import MOST_ROWS, chart, named_rows
 from .claims import VARIANT
 from .departure import departure_values
 from .limits import LINEAR_DEVIATION, summary
-from .rows import FinerRow, LimitRow, StabilityResult, TorqueRow
 from .subjects import fraction, unit_of_movements
+from .tables import FinerRow, LimitRow, StabilityResult, TorqueRow
 
 SCHEME_LOOKS = {  # colour, dash, name
     "rk4": (GREEN, "-", "RK4"),

@@ -12,7 +12,7 @@ from ...engines import Engine, Method
 from ...judge.rounding import slope_rounding
 from ...judge.scale import FACTOR
 from ...truth.linear import Held
-from .rows import LimitRow
+from .tables import LimitRow
 
 LINEAR_DEVIATION = 1e-6  # rad, at the start
 GROWTH_STEPS = 2000  # of a run

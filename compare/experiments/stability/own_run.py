@@ -13,7 +13,7 @@ from ...judge.run import number_or_none
 from ...robots.case import SEED
 from ...robots.file import names_of_keys
 from ..setup import Setup
-from .rows import OwnRunRow
+from .tables import OwnRunRow
 
 MOST_STARTS = 6  # the first keyframes
 LASTS, LEAST_STEPS, MOST_STEPS = 2.0, 1000, 20_000  # s, and between which numbers of steps it lasts

@@ -1,6 +1,6 @@
 import pytest
 
-from compare.experiments.stability.rows import StabilityResult
+from compare.experiments.stability.tables import StabilityResult
 
 
 @pytest.fixture

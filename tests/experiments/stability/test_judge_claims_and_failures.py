@@ -6,7 +6,7 @@ import pytest
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments.stability import claims, failure
-from compare.experiments.stability.rows import FinerRow, KeptRow, TorqueRow
+from compare.experiments.stability.tables import FinerRow, KeptRow, TorqueRow
 from compare.robots.arm import ARM
 
 RK4 = (Tmt().methods["rk4"], INTEGRATORS["RK4"])

@@ -7,7 +7,7 @@ from models import PATHS
 
 from compare.engines.mujoco import reading
 from compare.experiments.stability import departure, equilibria, limits
-from compare.experiments.stability.rows import DepartureRow, LimitRow
+from compare.experiments.stability.tables import DepartureRow, LimitRow
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.truth.linear import held

@@ -13,12 +13,12 @@ from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
 from compare.experiments.stability import servos
-from compare.experiments.stability.rows import StabilityResult, StepLimitRow
 from compare.experiments.stability.servos import figures_step, observed, predicted, response
 from compare.experiments.stability.servos.findings import verdict
 from compare.experiments.stability.servos.lifting import lifts
 from compare.experiments.stability.servos.observed import grows_in_runs
 from compare.experiments.stability.servos.predicted import acting_at
+from compare.experiments.stability.tables import StabilityResult, StepLimitRow
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 

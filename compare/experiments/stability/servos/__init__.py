@@ -8,7 +8,7 @@ from ....core.check import AT_OWN_STEP, AT_REQUESTED_STEP, About, Result
 from ....truth.linear import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from ...setup import Setup
-from ..rows import LimitRow, StabilityResult, StepLimitRow, StepResponse
+from ..tables import LimitRow, StabilityResult, StepLimitRow, StepResponse
 from . import findings, lifting, observed, response
 from .observed import OBSERVED_WITHIN
 from .predicted import Prediction, limit_rows, predicted_at, radii_apart

@@ -6,7 +6,7 @@ from ....core.finding import Finding
 from ....core.words import milliseconds
 from ....report.style import BLUE, GREEN, ORANGE, PINK, RED, WIDTH
 from ....robots import Robot
-from ..rows import StabilityResult
+from ..tables import StabilityResult
 from .response import LASTS
 
 STEP_LOOKS = {  # colour, dash, marker, width: those that coincide are drawn over each other, the wider one below

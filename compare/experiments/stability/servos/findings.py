@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ....core.check import Result
 from ....engines.mujoco.names import INTEGRATORS
 from ....truth.step_limits import LIMIT_UP_TO
-from ..rows import StepLimitRow
+from ..tables import StepLimitRow
 from . import response
 from .predicted import COUPLED, KNOWN, Prediction, limit_rows, unmodelled
 

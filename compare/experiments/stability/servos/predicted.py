@@ -12,7 +12,7 @@ from ....engines.mujoco.names import INTEGRATORS
 from ....robots import Robot
 from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO, Limit
-from ..rows import StepLimitRow
+from ..tables import StepLimitRow
 
 MOST_RESTS, SAME_REST = (
     4,
