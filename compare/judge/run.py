@@ -7,12 +7,12 @@ import tmt
 from ..core.check import About, Result
 from ..robots.case import Case, Coordinates, rates_at
 from .entries import Entries
+from .order import ORDER_MARGIN as ORDER_MARGIN
 from .rounding import NARROW
 from .scale import EPS, FACTOR, gravity_scale
 
 LEFT = 0.1  # rad or m: the distance at which a held model has left its posture
 MOVES = 0.1  # rad or m: the least movement of a run without a holding torque that tests anything
-ORDER_MARGIN = 0.15  # of a measured order
 LEAST_JUDGED = (
     0.1  # of a scene that states no minimum: the share of its time for which its runs must be judged
 )

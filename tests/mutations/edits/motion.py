@@ -52,7 +52,7 @@ EDITS = (
          "the bound of the energy x 3"),
     Edit("run", "exchanged", "_1 + tmt.energy(q[0], case.v, tree) - _2",
          "_1 + 3 * tmt.energy(q[0], case.v, tree) - _2", "the energy at the start x 3"),
-    Edit("run", "ORDER_MARGIN", "0.15", "3", "orders may be off by 3"),
+    Edit("order", "ORDER_MARGIN", "0.15", "3", "orders may be off by 3"),
     Edit("run", "MOVES", "0.1", "0.001", "a run that hardly moves is enough"),
     Edit("trajectory", "check_divergence", "width[_1] < NARROW", "False", "the step of divergence is never compared"),
     Edit("trajectory.runs", "tmt_side", "t[::every] < _1", "(t[::every] < _1) & (t[::every] < case.duration / 2)",
