@@ -20,6 +20,7 @@ rounding of those before it and adds its own. Where a system is solved, errors o
 
 from collections.abc import Iterable
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +29,8 @@ import tmt
 from tmt.model.singular import mass_matrices
 
 from .scale import FACTOR, levers, spring_scale
+
+Value = TypeVar("Value")
 
 
 def unit(tree: tmt.Tree, of_hinge: str, of_slide: str, of_both: str = "") -> str:
@@ -44,18 +47,17 @@ class Entries:
         self.tree, self.q = tree, q
         self.qd = np.broadcast_to(qd, (len(q), tree.coordinates.nv))
         from_joints, self.reach = levers(tree, q)
-        by_joint = np.array([tree.moves(b) for b in range(len(tree.mass))])
-        turns = np.array(tree.kind) != "slide"
-        self.count = np.maximum(1, (by_joint & turns).sum(axis=1))  # k, (m,)
-        moved, turns = (
-            np.array([per_speed(tree, joints) for joints in by_joint]),
-            np.array(per_speed(tree, turns)),
-        )
+        if not np.ptp(from_joints, axis=0).any():  # no slide moves a body farther from a hinge
+            from_joints = from_joints[:1]
+        joints_of_bodies = np.array([tree.moves(b) for b in range(len(tree.mass))])
+        is_turn = np.array(tree.kind) != "slide"
+        self.count = np.maximum(1, (joints_of_bodies & is_turn).sum(axis=1))  # k, (m,)
+        joint_of_speed = per_speed(tree, range(len(tree.kind)))
+        moved, turns = joints_of_bodies[:, joint_of_speed], is_turn[joint_of_speed]
         self.slides, self.turns = moved & ~turns, moved & turns  # (m, nv)
-        of_speeds = per_speed(tree, range(len(tree.kind)))
-        arms = from_joints[..., of_speeds] + from_joints.max(initial=0.0) / 8
+        arms = from_joints[..., joint_of_speed] + from_joints.max(initial=0.0) / 8
         arms = arms + self.reach.max(axis=0, initial=0.0)[:, None] / FACTOR
-        self.t = (self.slides + self.turns * arms).reshape(-1, *moved.shape)  # (1 or states, m, nv)
+        self.t = self.slides + self.turns * arms  # (1 or states, m, nv)
         self.mass = self.count * np.array(tree.mass)
         self.inertia = self.count * np.linalg.norm(tree.inertia, 2, axis=(1, 2))
         rates = np.abs(self.qd)
@@ -147,7 +149,7 @@ class Entries:
         return 2.0 * self.residual(force, np.broadcast_to(qdd, force.shape))
 
 
-def per_speed(tree: tmt.Tree, values: Iterable) -> list:
+def per_speed(tree: tmt.Tree, values: Iterable[Value]) -> list[Value]:
     """One value for each speed, (nv,), of one for each joint."""
     joints = tree.coordinates.joints
     return [value for value, joint in zip(values, joints) for _ in range(3 if joint.kind == "ball" else 1)]

@@ -5,7 +5,7 @@ from numpy import ndarray
 
 from tmt import Tree
 from tmt.methods import METHODS
-from tmt.methods.derivatives import FEW_SPEEDS, amplification, has_residual, linear_system
+from tmt.methods.derivatives import amplification, linear_system
 from tmt.methods.stepping import Method, stepped
 
 from .entries import Entries
@@ -21,38 +21,28 @@ LEFT_OUT = 3.2e-8
 
 
 def slope_rounding(
-    stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float
-) -> tuple:
+    stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float
+) -> tuple[ndarray, ndarray, ndarray]:
     """a, |a| and the bound of the rounding error of a, rad/s2; (states, nv) each: A a = force, with the method's matrix A.
 
     The bound is |A^-1| (64 eps R |a| + 64 eps S), entry by entry, because entries have different units. S is the sum of the
     absolute terms of the force; R_ij = sqrt(A_ii A_jj) bounds the terms of A_ij and of its factorization, where A is Mbar.
     Of `discrete` with servos it has the force that MuJoCo leaves out, where the force is as small as that, or nearly so.
     """
-    shape = q.shape[:1]
-    if len(tree.axis) > FEW_SPEEDS and has_residual(stepping):
-        A, right = linear_system(stepping, tree, list(q.T), list(qd.T), tau, dt)
-        a = list(np.linalg.solve(A, right[..., None])[..., 0].T)
-    else:
-        a = stepping.slope(tree, list(q.T), list(qd.T), tau, dt)
-        rows = stepping.matrix(tree, list(q.T), list(qd.T), dt)
-        A = np.array([[np.broadcast_to(entry, shape) for entry in row] for row in rows]).transpose(2, 0, 1)
-    size = np.stack([np.broadcast_to(np.abs(component), shape) for component in a], axis=-1)
+    A, total = linear_system(stepping, tree, list(q.T), list(qd.T), tau, dt)
+    a = np.linalg.solve(A, total[..., None])[..., 0]
     force = motion_scale(tree, q, qd) + Entries(tree, q).force(tau) + np.array(tree.damping) * np.abs(qd)
     if tree.has_gains:
         force = force + gain_scale(tree, q, qd)
     root = np.sqrt(np.abs(np.einsum("sii->si", A)))
     terms = np.maximum(np.abs(A), root[:, :, None] * root[:, None, :])
-    errors = FACTOR * EPS * (np.einsum("sij,sj->si", terms, size) + force)
+    errors = FACTOR * EPS * (np.einsum("sij,sj->si", terms, np.abs(a)) + force)
     if tree.has_gains and stepping == METHODS["discrete"]:
-        whole = np.einsum("sij,sj->si", A, np.stack(np.broadcast_arrays(*a), axis=-1))
-        errors = errors + LEFT_OUT * (np.linalg.norm(whole, axis=1, keepdims=True) < 4.0 * LEFT_OUT)
-    return a, size, np.einsum("sij,sj->si", np.abs(np.linalg.inv(A)), errors)
+        errors = errors + LEFT_OUT * (np.linalg.norm(total, axis=1, keepdims=True) < 4.0 * LEFT_OUT)
+    return a, np.abs(a), np.einsum("sij,sj->si", np.abs(np.linalg.inv(A)), errors)
 
 
-def step_rounding(
-    stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float
-) -> np.ndarray:
+def step_rounding(stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float) -> ndarray:
     """Bound delta, to first order in dt, of the difference that rounding adds in one step, (steps, 2 nv), movements first.
 
     Speeds: dt x the rounding of the slope (maximum over the stages) plus that of the sum qd + dt a. Positions: the rounding of
@@ -61,10 +51,10 @@ def step_rounding(
     """
     stages = []
 
-    def slope(q, qd):
+    def slope(q: list[ndarray], qd: list[ndarray]) -> list[ndarray]:
         a, *bounds = slope_rounding(stepping, tree, np.stack(q, axis=-1), np.stack(qd, axis=-1), tau, dt)
         stages.append(bounds)
-        return a
+        return list(a.T)
 
     stepped(stepping, tree, slope, list(q.T), list(qd.T), dt)
     size, rounding = np.max(stages, axis=0)
@@ -73,7 +63,7 @@ def step_rounding(
     return np.concatenate([angles, rates], axis=1)
 
 
-def of_positions(tree: Tree, q: np.ndarray) -> np.ndarray:
+def of_positions(tree: Tree, q: ndarray) -> ndarray:
     """The sizes of which the sum of a position and its change has 8 eps of rounding, (states, nv)."""
     sizes = np.full((len(q), tree.coordinates.nv), OF_A_BALL / (8 * EPS))
     for joint in tree.coordinates.joints:
@@ -83,36 +73,25 @@ def of_positions(tree: Tree, q: np.ndarray) -> np.ndarray:
 
 
 def band(
-    stepping: Method,
-    tree: Tree,
-    q: ndarray,
-    qd: ndarray,
-    tau: ndarray,
-    dt: float,
-    every=1,
-    most: int | None = None,
-) -> ndarray:
+    stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float, every: int = 1, most: int | None = None
+) -> ndarray:  # fmt: skip
     """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states (steps + 1, nq, nv), (steps / every + 1, 2 nv).
 
     every: steps between two values. Infinite from where the run has diverged or the band is far too wide, and after `most` steps.
     """
-    blocks = (len(q) - 1) // every
-    finite = np.isfinite([*q.T, *qd.T]).all(axis=0)
-    ran = (
-        (int(np.argmin(finite)) - 1) // every if not finite.all() else blocks
-    )  # whole blocks before it diverges
-    ran = ran if most is None else min(ran, most // every)
     size = 2 * qd.shape[1]
-    widths = np.full((blocks + 1, size), np.inf)
+    widths = np.full(((len(q) - 1) // every + 1, size), np.inf)
     widths[0] = 0.0
-    if ran <= 0:
+    steps = finite_states(q, qd) - 1
+    blocks = (steps if most is None else min(steps, most)) // every
+    if blocks <= 0:
         return widths
-    q, qd = q[: ran * every], qd[: ran * every]
-    jacobians = amplification(stepping, tree, q, qd, tau, dt).reshape(ran, every, size, size)
+    q, qd = q[: blocks * every], qd[: blocks * every]
+    jacobians = amplification(stepping, tree, q, qd, tau, dt).reshape(blocks, every, size, size)
     # the bound varies slowly: at fine steps it is computed at some states, and used for those that follow
     stride = max(1, every // SAMPLED)
     delta = step_rounding(stepping, tree, q[::stride], qd[::stride], tau, dt)
-    delta = np.repeat(delta, stride, axis=0).reshape(ran, every, size)
+    delta = np.repeat(delta, stride, axis=0)
 
     # to_end[j, k]: from after step k of block j to the end of the block; all blocks at once
     to_end = np.empty_like(jacobians)
@@ -121,15 +100,21 @@ def band(
         to_end[:, k] = to_end[:, k + 1] @ jacobians[:, k + 1]
     across = to_end[:, 0] @ jacobians[:, 0]
 
-    carried = np.empty((size, ran * every, size))  # carried[:, k]: the rounding of step k, propagated
-    for j in range(ran):
-        done, here = j * every, (j + 1) * every
-        carried[:, :done] = np.tensordot(across[j], carried[:, :done], axes=1)
-        carried[:, done:here] = to_end[j].transpose(1, 0, 2)
-        widths[j + 1] = np.abs(carried[:, :here]).reshape(size, -1) @ delta.reshape(-1, size)[:here].ravel()
+    carried = np.empty((size, blocks * every, size))  # carried[:, k]: the rounding of step k, propagated
+    for j in range(blocks):
+        start, end = j * every, (j + 1) * every
+        carried[:, :start] = np.tensordot(across[j], carried[:, :start], axes=1)
+        carried[:, start:end] = to_end[j].transpose(1, 0, 2)
+        widths[j + 1] = np.abs(carried[:, :end]).reshape(size, -1) @ delta[:end].ravel()
         if not widths[j + 1].max() < 1e6 * NARROW:
             break
     return widths
+
+
+def finite_states(q: ndarray, qd: ndarray) -> int:
+    """The number of states of a run before the first that is not finite."""
+    finite = np.isfinite(np.concatenate([q, qd], axis=1)).all(axis=1)
+    return len(q) if finite.all() else int(np.argmin(finite))
 
 
 def growth(
@@ -148,13 +133,13 @@ def growth(
     stride: steps for all of which the Jacobian of the first is taken; it divides `every`.
     """
     product, scale = np.eye(2 * qd.shape[1]), 0.0
-    finite = np.isfinite([*q.T, *qd.T]).all(axis=0)
     result = np.full((len(q) - 1) // every + 1, np.nan)
     result[0] = 0.0
     jacobians = amplification(stepping, tree, q[:-1:stride], qd[:-1:stride], tau, dt)
-    for k, J in zip(range(stride, len(q), stride), np.linalg.matrix_power(jacobians, stride)):
+    powers = np.linalg.matrix_power(jacobians, stride)
+    for k, J in zip(range(stride, finite_states(q, qd), stride), powers):
         product = J @ product
-        if not (finite[k] and np.isfinite(product).all()):
+        if not np.isfinite(product).all():
             break
         if k % every == 0:
             size = np.linalg.norm(product, 2)

@@ -5,7 +5,10 @@ import numpy as np
 import tmt
 
 from ..core.check import About, Result
-from ..robots.case import Case, Coordinates, rates_at
+from ..core.finding import Finding
+from ..robots import Robot
+from ..robots.case import Case
+from ..robots.coordinates import Coordinates, rates_at
 from .entries import Entries
 from .order import ORDER_MARGIN as ORDER_MARGIN
 from .rounding import NARROW
@@ -14,14 +17,12 @@ from .scale import EPS, FACTOR, gravity_scale
 LEFT = 0.1  # rad or m: the distance at which a held model has left its posture
 MOVES = 0.1  # rad or m: the least movement of a run without a holding torque that tests anything
 LEAST_JUDGED = (
-    0.1  # of a scene that states no minimum: the share of its time for which its runs must be judged
+    0.1  # the share of its time for which the runs of a scene that states no minimum must be judged
 )
 RESTS = 1e-9  # rad or m, and per s: what moves less only rounds
 STILL = 1e-3  # of the largest movement of its unit: a joint that moves less is not what a run tests
-COARSE_STEP, STABLE_TIME = (
-    0.01,
-    0.3,
-)  # s: from this step on, methods other than RK4 may be unstable after this time
+COARSE_STEP = 0.01  # s: from this step on, methods other than RK4 may be unstable after STABLE_TIME
+STABLE_TIME = 0.3  # s
 
 
 def step_in_words(case: Case, steps: int) -> str:
@@ -41,19 +42,21 @@ def widest_judged(case: Case, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     NARROW for movements; and never more than what itself moves in the run q (times, nq), v (times, nv). Where a robot is held,
     nothing has to move. A joint that hardly moves beside others of its unit has the widths of the joint that moves most.
     """
-    nv, scene = case.coordinates.nv, case.scene
+    nv, scene, units = case.coordinates.nv, case.scene, np.array(case.coordinates.units)
     if scene.torque in ("hold", "servos") and not np.any(scene.speed) and not np.any(scene.targets):
         return np.concatenate([np.full(nv, NARROW), np.full(nv, np.inf)])
-    limits, units = [], np.array(case.coordinates.units)
-    for sizes, most in ((moved_from(q, q[0], case.coordinates), NARROW), (np.abs(v), np.inf)):
-        largest = np.nanmax(sizes, axis=0)
-        of_unit = np.array([largest[units == unit].max() for unit in units])
-        widest = np.where(largest >= STILL * of_unit, largest, of_unit)
-        moves = (
-            of_unit > RESTS if largest.max() > RESTS else np.ones(nv, bool)
-        )  # else another unit is what moves
-        limits.append(np.where(moves, np.minimum(widest, most), most))
-    return np.concatenate(limits)
+    moved = moved_from(q, q[0], case.coordinates)
+    return np.concatenate([widths(moved, units, NARROW), widths(np.abs(v), units, np.inf)])
+
+
+def widths(sizes: np.ndarray, units: np.ndarray, most: float) -> np.ndarray:
+    """The same of the movements or the speeds, `sizes` (times, nv), of joints with these units, (nv,)."""
+    largest = np.nanmax(sizes, axis=0)
+    of_unit = np.array([largest[units == unit].max() for unit in units])
+    width = np.minimum(np.where(largest >= STILL * of_unit, largest, of_unit), most)
+    if largest.max() > RESTS:
+        width = np.where(of_unit > RESTS, width, most)  # where another unit is what moves
+    return width
 
 
 def movement_unit(coordinates: Coordinates) -> str:
@@ -135,7 +138,7 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     exchange = exchange + tmt.energy(q[0], case.v, tree) - tmt.potential_energy(q[0], tree)
     if (
         tree.position_gain
-    ):  # servos return energy until they exert no force; the remaining torque is that of a motor
+    ):  # servos return energy until they exert no force; the other torque is that of a motor
         gain = np.array(tree.position_gain)
         pull, give = case.tau - fed_back_at(tree, q[0]), np.linalg.pinv(gain, hermitian=True)
         exchange = exchange + pull @ give @ pull / 2.0
@@ -161,7 +164,7 @@ def number_or_nan(number: float | None) -> float:
     return np.nan if number is None else number
 
 
-def leaves_no_digits(robot: object) -> str | None:
+def leaves_no_digits(robot: Robot) -> Finding | None:
     """Why no run of a file's robot can be compared, if rounding exceeds the judged error within two steps; else None.
 
     A force that moves a joint at the rate r has a rounding error of 64 eps of itself. A step multiplies an error by (r dt)^2
@@ -173,7 +176,4 @@ def leaves_no_digits(robot: object) -> str | None:
     rate, dt = max(rates_at(case.tree, case.q)), case.scene.dt
     if not FACTOR * EPS * (rate * dt) ** 4 > NARROW:
         return None
-    return (
-        f"the fastest rate of the {robot.noun} times the finest step, {rate:.1e} 1/s x {dt:.1e} s = {rate * dt:.1e}, is too "
-        "large: after two steps only rounding error remains"
-    )
+    return Finding("shared", "leaves_no_digits", {"noun": robot.noun, "rate": rate, "dt": dt})

@@ -5,10 +5,8 @@ from ..edit import Edit
 # module, function, quantity: as written in the call of `check`, _1, _2 for what is filled in
 CHECKS = (
     ("parameters", "compare_number", "quantity"), ("parameters", "check_forces", 'f"no forces of {_1}"'),
-    ("published", "check_answer", 'f"{_1}: {item.quantity} - printed"'),
-    ("published", "check_answer", 'f"{_1}: {item.quantity} - exact"'),
-    ("published", "check_answer", "digits"),
-    ("published", "check_answer", 'f"exact: |{item.quantity}_{_1}| - |printed|"'),
+    ("published", "check_answer", "printed_digits"), ("published", "check_answer", "from_exact"),
+    ("published", "check_answer", "every_digit"), ("published", "check_answer", "size"),
     ("mass", "check_symmetry", "what"), ("mass", "check_definiteness", "what"),
     ("accuracy", "check_same_schemes", "quantity"), ("accuracy", "check_smallest_errors", "quantity"),
     ("accuracy", "check_smallest_errors", "\"smallest error of MuJoCo's RK4, compared with tmt's rk4\""),
