@@ -51,7 +51,7 @@ EDITS = (
     Edit("experiment", "say_outcome", "max(used)", "min(used)", "the terminal gives the best check as the worst"),
     # files
     Edit("report.files", "write", "passed(_1)", "True", "results.json says passed whatever fails"),
-    Edit("report.files", "cell", 'return ""', 'return ""\nif isinstance(value, float):\n    return f"{value:.4g}"',
+    Edit("report.files", "csv", "cell(value)", "cell(float(f'{value:.4g}') if isinstance(value, float) else value)",
          "digits of the tables are rounded"),
     Edit("report.text", "markup", "escaped(value) if _1 else value", "value", "a name in a document is markup"),
     Edit("report.text", "escaped", "in_one_line(str(value))", "str(value)", "a name has control characters and lines"),
