@@ -49,7 +49,7 @@ def rows(setup: Setup) -> Result:
 
 
 def energy_rate(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    """Time derivative of the potential and kinetic energy along the motion, exact by dual numbers, W, (states,)."""
+    """Time derivative of the energy along the motion, W, (states,), exact by dual numbers."""
     state = seeded([*q.T, *qd.T], [*tree.coordinates.component_rates(q.T, qd.T), *qdd.T])
     positions, speeds = state[: q.shape[1]], state[q.shape[1] :]
     bodies = method.bodies(tree, positions, speeds)

@@ -1,4 +1,4 @@
-"""What explains a difference in Mbar, h and accelerations: of a file's robot and its reference, or of the user's equations."""
+"""What explains a difference in Mbar, h and accelerations, of a file's robot or of a user's equations."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
@@ -135,7 +135,7 @@ def largest_ratio(difference: np.ndarray, tolerance: np.ndarray) -> float:
 
 
 def rows(setup: Setup) -> DiagnosisResult:
-    """One row for each explanation; a check of each condition, of Mbar and h, and of accelerations, whose note is the cause."""
+    """A row for each explanation; a check of each condition, of Mbar and h, and of accelerations."""
     found = diagnosed(setup)
     result = DiagnosisResult("diagnosis", nearest=found.diagnosis.nearest)
     for condition in found.conditions:
@@ -156,7 +156,7 @@ def rows(setup: Setup) -> DiagnosisResult:
 
 
 def check(result: Result, found: Found, condition: Condition) -> None:
-    """A check that a condition is met; where it is not, its note, and a note of the result, is what is wrong."""
+    """A check that a condition is met; if not, its note, and a note of the result, is what is wrong."""
     name, note = f"{WHOSE_VALUES[found.engine]} {condition.name}", ""
     if not condition.is_met:
         result.notes.append(condition.finding)

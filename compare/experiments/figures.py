@@ -1,4 +1,4 @@
-"""Figures of the experiments at single states: differences and corrections; each is (file name, figure, caption)."""
+"""Figures of the experiments at single states: differences and corrections."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -15,7 +15,7 @@ MOST_DRAWN = 600  # points of a curve: more are not seen
 
 
 def draw_distances(result: AgreementResult, quantities: list[str]) -> tuple[str, Figure, Finding]:
-    """Cumulative distributions of the differences between the engines over random states, and of each from the exact value."""
+    """Cumulative distributions of the DISTANCES of judge.agree over random states."""
     distances = {quantity: result.distances["random states"][quantity] for quantity in quantities}
     columns = 2 if len(quantities) == 4 else min(3, len(quantities))
     lines = -(-len(quantities) // columns)
@@ -48,7 +48,7 @@ def draw_distances(result: AgreementResult, quantities: list[str]) -> tuple[str,
 
 
 def drawn(ascending: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The points of a cumulative distribution, at most MOST_DRAWN: values, and the share of states up to each."""
+    """At most MOST_DRAWN points of a cumulative distribution: values, and the share of states up to each."""
     count = len(ascending)
     points = np.unique(np.linspace(0, count - 1, min(count, MOST_DRAWN)).round().astype(int))
     return np.maximum(ascending[points], ZERO_AT), (points + 1) / count

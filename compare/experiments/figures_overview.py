@@ -54,7 +54,7 @@ def named_rows(ax: Axes, names: Sequence[str], passed: Sequence[bool]) -> None:
 def lines_to(
     ax: Axes, values: Sequence[float], rows: Sequence[float], mark: str, colour: str, **look: Any
 ) -> None:
-    """A mark at each value in its row, with a line to it from the left end of the axis. look: of the marks."""
+    """A mark at each value in its row, and a line to it from the left end of the axis. look: of the marks."""
     shown = np.clip(values, *ax.get_xlim())
     ax.hlines(rows, ax.get_xlim()[0], shown, color=colour, linewidth=1.2)
     ax.plot(shown, rows, mark, color=colour, **{"markersize": 5} | look)
@@ -65,13 +65,13 @@ def beyond_tolerance(ax: Axes, tolerance: float, text: str) -> None:
     ax.axvline(tolerance, color=RED, linewidth=2)
     edge = (0.84, 0.37, 0.0, 0.35)
     ax.axvspan(tolerance, 1e30, facecolor="none", edgecolor=edge, hatch="////", linewidth=0)
-    ax.annotate(f"tolerance {text}", (tolerance, 0.02), (-4, 0), xycoords=("data", "axes fraction"), fontsize=7.5,
-                textcoords="offset points", color=RED, rotation=90, ha="right", va="bottom",
+    ax.annotate(f"tolerance {text}", (tolerance, 0.02), (-4, 0), xycoords=("data", "axes fraction"),
+                textcoords="offset points", color=RED, rotation=90, ha="right", va="bottom", fontsize=7.5,
                 path_effects=OUTLINE)  # fmt: skip
 
 
 def agreements(results: Mapping[str, Result]) -> list[dict[str, Any]]:
-    """The largest DISTANCES of Mbar, h and accelerations over all states, eps, and whether all pass, as far as compared."""
+    """The largest DISTANCES of Mbar, h and accelerations over all states, eps, and whether all pass."""
     quantities = []
     for quantity, name in QUANTITIES.items():
         rows = [row for result in results.values() for row in result.rows if row.quantity == quantity]
@@ -82,7 +82,7 @@ def agreements(results: Mapping[str, Result]) -> list[dict[str, Any]]:
 
 
 def draw_agreement(results: Mapping[str, Result]) -> tuple[str, Figure, Finding]:
-    """M, h and accelerations: the largest difference of the engines, and the distance of each from exact, in eps."""
+    """M, h and accelerations: the largest difference of the engines, and of each from exact, in eps."""
     quantities, label = agreements(results), next(iter(results.values())).label
     passed = [quantity["passed"] for quantity in quantities]
     fig, ax = chart()

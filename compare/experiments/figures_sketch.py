@@ -1,4 +1,4 @@
-"""The sketch of a robot: a stick figure in two postures with the axes of its joints, from the method's own frames."""
+"""The sketch of a robot: a stick figure in two postures with the axes of its joints."""
 
 import matplotlib
 import numpy as np
@@ -57,7 +57,7 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
 
 
 def draw_joints(ax, robot: Robot, arrows: np.ndarray, few: bool) -> None:
-    """Arrows along hinges and, with a dashed line, along slides; circles for balls; of few joints each has its name."""
+    """Arrows along hinges and, with a dashed line, slides; circles for balls; few joints have their names."""
     lines = joint_lines(robot)
     for name, joint in zip(robot.joints, robot.tree.coordinates.joints):
         colour, (origin, axis) = lines[name][0] if few else KIND_COLOURS[joint.kind], arrows[joint.qd.start]

@@ -15,7 +15,7 @@ EXPERIMENT = Experiment(order=50, asks_of_own=("gravity", "bias"), options=("--j
 
 
 def rows(setup: Setup) -> Result:
-    """Torques at named postures and random states; those of gravity and springs together; a user's own gravity and bias."""
+    """Holding torques, those of gravity and springs together, and a user's own gravity beside the bias."""
     tree, units = setup.robot.tree, unit(setup.robot.tree, "N m", "N")
     result, comparisons = compared(setup, "gravity", "holding torque")
     for comparison in comparisons:

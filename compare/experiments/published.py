@@ -125,7 +125,7 @@ def rows_of(item: Printed, computed: Answer, joints: tuple[str, ...]) -> list[Pr
 
 
 def check_answer(result: Result, item: Printed, computed: Answer, joints: tuple[str, ...]) -> None:
-    """Checks of one item against the printed digits, or, where those are rounding, against the exact value."""
+    """Checks of one item: the printed digits, or, where those are rounding, the exact value."""
     printed, where, unit = np.array(item.values), f"({item.item}) {item.posture}", item.unit
     by_label = {"TMT": computed.tmt, "MuJoCo": computed.mujoco, "exact": computed.nearest}
     from_printed = {label: np.abs(values - printed).max() for label, values in by_label.items()}

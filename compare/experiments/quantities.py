@@ -1,4 +1,4 @@
-"""The quantities that both engines give at a state, one row of a table each, and their comparison over samples of states.
+"""The quantities that both engines give at a state, one row each, and their comparison over samples.
 
 The experiments at single states share their figures, headline and first screen too: those of this module.
 """
@@ -77,7 +77,7 @@ QUANTITIES = {
 
 
 class Comparison:
-    """Two engines, and tmt's compiled functions at random states, over a sample: each function is called once."""
+    """Two engines, at random states also tmt's compiled functions: each function is called once."""
 
     def __init__(self, setup: Setup, result: AgreementResult, sample: Sample):
         self.result, self.sample, self.robot = result, sample, setup.robot
@@ -127,7 +127,7 @@ class Comparison:
 
 
 def compared(setup: Setup, experiment: str, *names: str) -> tuple[AgreementResult, list[Comparison]]:
-    """The result of an experiment that compares these quantities at the named postures and at random states."""
+    """The result of an experiment that compares these quantities at named postures and random states."""
     result = AgreementResult(experiment, label=LABELS[setup.robot.compared[0]])
     comparisons = [Comparison(setup, result, sample) for sample in (setup.named, setup.random)]
     for comparison in comparisons:

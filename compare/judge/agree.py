@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 # fields of a row, in eps: the distance of the two engines, and of each from the exact values
 DISTANCES = "difference", "from_exact", "mujoco_from_exact"
 SHOWN = (  # fields of a comparison in a report; its file has all
-    "scene", "quantity", "unit", "states", "largest_difference", "worst_difference", "bar", "difference_over_bar",
-    "from_exact", "mujoco_from_exact",
+    "scene", "quantity", "unit", "states", "largest_difference", "worst_difference", "bar",
+    "difference_over_bar", "from_exact", "mujoco_from_exact",
 )  # fmt: skip
 
 
@@ -27,8 +27,8 @@ SHOWN = (  # fields of a comparison in a report; its file has all
 class Compared:
     """A quantity by two engines at the states of a sample, (states, ...) each.
 
-    scale: a number or (states,), or with as many dimensions as the values for a scale of each entry; the tolerance is
-    64 eps x scale. exact: at the first states.
+    scale: a number or (states,), or with as many dimensions as the values for a scale of each entry; the
+    tolerance is 64 eps x scale. exact: at the first states.
     """
 
     quantity: str
@@ -41,7 +41,7 @@ class Compared:
 
 @dataclass(kw_only=True)
 class AgreementRow(Row):
-    """The comparison of one quantity over the states of a sample; the column of `from_exact` is named after the engine."""
+    """One quantity over the states of a sample; the column of `from_exact` is named after the engine."""
 
     engine: str
     scene: str
@@ -84,7 +84,7 @@ class AgreementResult(Result):
 
 
 def agree(result: AgreementResult, sample: Sample, compared: Compared) -> None:
-    """Add a row and a check: of the differences between two engines over the states, the one closest to its tolerance.
+    """Add a row and a check: the difference between two engines that is closest to its tolerance.
 
     Where exact values are known there is also a check for each engine: of its distance from them.
     """
@@ -159,8 +159,8 @@ def share_of(difference: np.ndarray, scale: np.ndarray) -> np.ndarray:
 def worst_of_each(differences: ArrayLike, scale: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """Of each state the difference with the largest share of its scale, and that scale, (states,) each.
 
-    differences: (states, ...). scale: a number or (states,), or with as many dimensions as the differences; it may have more
-    states.
+    differences: (states, ...). scale: a number or (states,), or with as many dimensions as the differences;
+    it may have more states.
     """
     differences, scale = np.abs(differences), np.asarray(scale, dtype=float)
     states = len(differences)

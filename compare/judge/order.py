@@ -22,10 +22,11 @@ class MeasuredOrder(NamedTuple):
 def measured_order(
     steps: Sequence[float], errors: Sequence[float], least_runs: int = 2
 ) -> MeasuredOrder | None:
-    """The order between the two finest of at least `least_runs` runs; None: there are fewer, or it has not settled.
+    """The order between the two finest of `least_runs` runs or more; None: fewer, or it has not settled.
 
-    steps: s, from coarse to fine. errors: of these runs, without those in which it does not fall with the order. Where three
-    runs or more are required, the order has settled if the last two orders differ by at most ORDER_MARGIN.
+    steps: s, from coarse to fine. errors: of these runs, without those in which it does not fall with the
+    order. Where three runs or more are required, the order has settled if the last two orders differ by at
+    most ORDER_MARGIN.
     """
     if len(steps) < least_runs:
         return None
@@ -39,7 +40,7 @@ def measured_order(
 def check_order(
     result: Result, where: str, nominal: int, measured: float, error: str = "error", note: str = ""
 ) -> None:
-    """The measured order is the method's within ORDER_MARGIN; of order 8 it is at least 7. error: what falls, in words."""
+    """The measured order is the nominal one within ORDER_MARGIN; of order 8 it is at least 7."""
     if least := LEAST_ORDER.get(nominal):
         name = f"measured order, nominal {nominal}"
         result.check(where, name, measured, least, "", rule="at least", about=About.PREDICTION)

@@ -13,8 +13,9 @@ from .scale import EPS, FACTOR, gain_scale, motion_scale
 
 SAMPLED = 16  # states of a block at which the bound of a step is computed
 NARROW = 1e-3  # rad, m: a run is judged while the band of its positions is narrower
-# Rounding of a ball's turn in a step, a product of quaternions scaled to length 1: cosine and sine 1.5 eps, four sums of four
-# products 4 eps, division 0.5 eps: 6 eps of the quaternion, 12 of the turn, 24 for two runs; the difference of the runs 8 eps
+# Rounding of a ball's turn in a step, a product of quaternions scaled to length 1: cosine and sine 1.5 eps,
+# four sums of four products 4 eps, division 0.5 eps: 6 eps of the quaternion, 12 of the turn, 24 for two
+# runs; the difference of the runs 8 eps
 OF_A_BALL = 32 * EPS
 # N m or N: with servos MuJoCo's discrete takes forces for 0 whose sum of squares is below mjMINVAL, 1e-15
 LEFT_OUT = 3.2e-8
@@ -23,11 +24,12 @@ LEFT_OUT = 3.2e-8
 def slope_rounding(
     stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float
 ) -> tuple[ndarray, ndarray, ndarray]:
-    """a, |a| and the bound of the rounding error of a, rad/s2; (states, nv) each: A a = force, with the method's matrix A.
+    """a, |a| and the bound of the rounding error of a, rad/s2, (states, nv) each, where A a = force.
 
-    The bound is |A^-1| (64 eps R |a| + 64 eps S), entry by entry, because entries have different units. S is the sum of the
-    absolute terms of the force; R_ij = sqrt(A_ii A_jj) bounds the terms of A_ij and of its factorization, where A is Mbar.
-    Of `discrete` with servos it has the force that MuJoCo leaves out, where the force is as small as that, or nearly so.
+    The bound is |A^-1| (64 eps R |a| + 64 eps S), entry by entry, because entries have different units. S is
+    the sum of the absolute terms of the force; R_ij = sqrt(A_ii A_jj) bounds the terms of A_ij and of its
+    factorization, where A is Mbar. Of `discrete` with servos it has the force that MuJoCo leaves out, where
+    the force is as small as that, or nearly so.
     """
     A, total = linear_system(stepping, tree, list(q.T), list(qd.T), tau, dt)
     a = np.linalg.solve(A, total[..., None])[..., 0]
@@ -43,11 +45,11 @@ def slope_rounding(
 
 
 def step_rounding(stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float) -> ndarray:
-    """Bound delta, to first order in dt, of the difference that rounding adds in one step, (steps, 2 nv), movements first.
+    """Bound delta of the difference that rounding adds in one step, (steps, 2 nv), movements first.
 
-    Speeds: dt x the rounding of the slope (maximum over the stages) plus that of the sum qd + dt a. Positions: the rounding of
-    the sum q + dt qd plus dt x that of the speeds. The sums have at most 8 roundings in the two runs together; for a ball,
-    OF_A_BALL replaces the rounding of q.
+    To first order in dt. Speeds: dt x the rounding of the slope (maximum over the stages) plus that of the
+    sum qd + dt a. Positions: the rounding of the sum q + dt qd plus dt x that of the speeds. The sums have at
+    most 8 roundings in the two runs together; for a ball, OF_A_BALL replaces the rounding of q.
     """
     stages = []
 
@@ -73,11 +75,13 @@ def of_positions(tree: Tree, q: ndarray) -> ndarray:
 
 
 def band(
-    stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float, every: int = 1, most: int | None = None
+    stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float,
+    every: int = 1, most: int | None = None,
 ) -> ndarray:  # fmt: skip
-    """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states (steps + 1, nq, nv), (steps / every + 1, 2 nv).
+    """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states, (steps / every + 1, 2 nv).
 
-    every: steps between two values. Infinite from where the run has diverged or the band is far too wide, and after `most` steps.
+    every: steps between two values. Infinite from where the run has diverged or the band is far too wide, and
+    after `most` steps.
     """
     size = 2 * qd.shape[1]
     widths = np.full(((len(q) - 1) // every + 1, size), np.inf)
@@ -129,8 +133,8 @@ def growth(
 ) -> ndarray:
     """log10 of the growth of a small difference of the initial state, at every `every` steps.
 
-    The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled to avoid overflow. NaN from where the run has diverged.
-    stride: steps for all of which the Jacobian of the first is taken; it divides `every`.
+    The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled to avoid overflow. NaN from where the run has
+    diverged. stride: steps for all of which the Jacobian of the first is taken; it divides `every`.
     """
     product, scale = np.eye(2 * qd.shape[1]), 0.0
     result = np.full((len(q) - 1) // every + 1, np.nan)

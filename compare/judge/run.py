@@ -31,16 +31,17 @@ def step_in_words(case: Case, steps: int) -> str:
 
 
 def required_time(case: Case, scheme: str, dt: float) -> float:
-    """The shortest time, s, over which a run of a case by a scheme must be judged; 0: the scene states none."""
+    """The shortest time, s, for which a run by a scheme must be judged; 0: the scene states none."""
     judged = case.duration if case.scene.judged is None else case.scene.judged
     return judged if scheme == "rk4" or dt < COARSE_STEP else min(judged, STABLE_TIME)
 
 
 def widest_judged(case: Case, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """The width of the band from which on it judges a movement or a speed no more, (2 nv,) rad or m, then per s.
+    """The width from which on the band judges a movement or a speed no more, (2 nv,) rad or m, then per s.
 
-    NARROW for movements; and never more than what itself moves in the run q (times, nq), v (times, nv). Where a robot is held,
-    nothing has to move. A joint that hardly moves beside others of its unit has the widths of the joint that moves most.
+    NARROW for movements; and never more than what itself moves in the run q (times, nq), v (times, nv). Where
+    a robot is held, nothing has to move. A joint that hardly moves beside others of its unit has the widths
+    of the joint that moves most.
     """
     nv, scene, units = case.coordinates.nv, case.scene, np.array(case.coordinates.units)
     if scene.torque in ("hold", "servos") and not np.any(scene.speed) and not np.any(scene.targets):
@@ -92,9 +93,10 @@ def departure(t: np.ndarray, q: np.ndarray, coordinates: Coordinates | None = No
 
 
 def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> float | None:
-    """The first time at which a run has stopped, is not finite, or has more energy than is possible; None: never.
+    """The first time at which a run is not finite, or has more energy than is possible; None: never.
 
-    Energy minus the work of the constant torque cannot grow. The bound on its gain is the energy that the motion can exchange.
+    Energy minus the work of the constant torque cannot grow. The bound on its gain is the energy that the
+    motion can exchange.
     """
     finite = np.isfinite(np.concatenate([q, qd], axis=1)).all(axis=1)
     q, qd = np.where(finite[:, None], q, case.q), np.where(finite[:, None], qd, 0.0)
@@ -108,8 +110,8 @@ def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> flo
 def work(case: Case, q: np.ndarray) -> np.ndarray:
     """The work of the constant torque and of a controller's position gains along a run, J, (times,).
 
-    At hinges and slides it follows from the movement from the start. A ball's torque is constant in axes that turn with it: its
-    work depends on the path, and is added up from state to state.
+    At hinges and slides it follows from the movement from the start. A ball's torque is constant in axes that
+    turn with it: its work depends on the path, and is added up from state to state.
     """
     if case.tree.position_gain:
         mean = case.tau - (fed_back_at(case.tree, q) + fed_back_at(case.tree, q[0])) / 2.0  # as it is linear
@@ -120,16 +122,17 @@ def work(case: Case, q: np.ndarray) -> np.ndarray:
 
 
 def fed_back_at(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
-    """The torque of a controller's position gains at positions q (..., nq), N m or N, (..., nv), to be subtracted."""
+    """The torque of a controller's position gains at q (..., nq), N m or N, (..., nv), to be subtracted."""
     return q[..., tree.coordinates.first_positions] @ np.array(tree.position_gain).T
 
 
 def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     """The largest energy that the motion of a case can have exchanged up to each state of a run, J, (times,).
 
-    The initial kinetic energy, that of the springs, the whole potential range of the stated robot (twice the sum of m g reach),
-    and what servos store. Slides have no such range: where it is larger, the largest work `done` of the torque plus the weight
-    times the distance along the slides. Rounding may add 64 eps of 1 J for each inertia and stiffness of 1.
+    The initial kinetic energy, that of the springs, the whole potential range of the stated robot (twice the
+    sum of m g reach), and what servos store. Slides have no such range: where it is larger, the largest work
+    `done` of the torque plus the weight times the distance along the slides. Rounding may add 64 eps of 1 J
+    for each inertia and stiffness of 1.
     """
     tree, coordinates = case.tree, case.coordinates
     exchange = 2.0 * gravity_scale(
@@ -165,10 +168,10 @@ def number_or_nan(number: float | None) -> float:
 
 
 def leaves_no_digits(robot: Robot) -> Finding | None:
-    """Why no run of a file's robot can be compared, if rounding exceeds the judged error within two steps; else None.
+    """Why no run of a file's robot can be compared: rounding exceeds the judged error within two steps.
 
-    A force that moves a joint at the rate r has a rounding error of 64 eps of itself. A step multiplies an error by (r dt)^2
-    where that is far above 1: two steps give 64 eps (r dt)^4 of 1 rad or 1 m.
+    A force that moves a joint at the rate r has a rounding error of 64 eps of itself. A step multiplies an
+    error by (r dt)^2 where that is far above 1: two steps give 64 eps (r dt)^4 of 1 rad or 1 m.
     """
     if not (robot.is_read and robot.cases_of_torque):
         return None

@@ -1,7 +1,8 @@
 """Scales of tolerances: from the stated numbers and TMT's own terms, for each state.
 
-A tolerance is 64 x eps x scale. The scale of a quantity is the sum of the absolute values of the terms that are added in it; it
-is never the quantity itself, which may be zero. `entries.py` has the scales of all quantities, entry by entry.
+A tolerance is 64 x eps x scale. The scale of a quantity is the sum of the absolute values of the terms that
+are added in it; it is never the quantity itself, which may be zero. `entries.py` has the scales of all
+quantities, entry by entry.
 """
 
 import numpy as np
@@ -16,10 +17,10 @@ FACTOR = 64
 
 
 def levers(tree: tmt.Tree, q: ArrayLike | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Largest possible distances of each centre of mass, m: from each hinge's axis or ball, and from the world's origin.
+    """Largest possible distances of centres of mass, m: from each hinge's axis or ball, and from the origin.
 
-    Lengths added along the tree, (..., m, joints), 0 for a joint that does not turn the body, and (..., m). q: positions
-    (..., nq), of which the displacements of slides are added; None: none are displaced.
+    Lengths added along the tree, (..., m, joints), 0 for a joint that does not turn the body, and (..., m).
+    q: positions (..., nq), of which the displacements of slides are added; None: none are displaced.
     """
     q = np.array(tree.zero) if q is None else np.asarray(q, float)
     links = np.zeros((*q.shape[:-1], len(tree.kind)))  # of each joint, from the joint before it
@@ -39,13 +40,13 @@ def levers(tree: tmt.Tree, q: ArrayLike | None = None) -> tuple[np.ndarray, np.n
 
 
 def gravity_scale(tree: tmt.Tree, q: ArrayLike | None = None) -> float | np.ndarray:
-    """Sum of m g times the largest distance from the origin, N m or J; with q (..., nq) that of these positions, (...)."""
+    """Sum of m g times the largest distance from the origin, N m or J; at q (..., nq): (...)."""
     sums = np.linalg.norm(tree.gravity) * (levers(tree, q)[1] @ np.array(tree.mass))
     return float(sums) if q is None else sums
 
 
 def motion_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """Convective and Euler terms of each entry of the bias, by their absolute values, N m or N, (states, nv)."""
+    """Convective and Euler terms of each entry of the bias, absolute values, N m or N, (states, nv)."""
     bodies, inertia = method.bodies(tree, list(q.T), list(qd.T)), np.array(tree.inertia)
     T, B, v_conv, w_conv, omega = (
         gather([getattr(body, name) for body in bodies], q.shape[:1])
