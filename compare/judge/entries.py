@@ -44,7 +44,7 @@ class Entries:
         self.tree, self.q = tree, q
         self.qd = np.broadcast_to(qd, (len(q), tree.coordinates.nv))
         from_joints, self.reach = levers(tree, q)
-        if not np.ptp(from_joints, axis=0).any():  # no slide moves a body farther from a hinge
+        if (from_joints == from_joints[:1]).all():  # no slide moves a body farther from a hinge
             from_joints = from_joints[:1]
         joints_of_bodies = np.array([tree.moves(b) for b in range(len(tree.mass))])
         is_turn = np.array(tree.kind) != "slide"
