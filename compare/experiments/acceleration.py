@@ -9,7 +9,6 @@ from tmt.derivation.dual import seeded
 
 from ..core.check import Result
 from ..engines import WHOSE
-from ..judge.agree import agree
 from ..judge.entries import unit
 from . import Experiment
 from .quantities import check_wide, compared, figures, headline, overview
@@ -20,45 +19,39 @@ EXPERIMENT = Experiment(order=60, options=("--joints",), diagnosed=True, overvie
 
 
 def rows(setup: Setup) -> Result:
-    robot, tree, (ours, theirs) = setup.robot, setup.robot.tree, setup.compared().values()
-    whose, torques, damping = WHOSE[robot.compared[0]], unit(tree, "N m", "N"), np.array(tree.damping)
+    robot, tree, damping = setup.robot, setup.robot.tree, np.array(setup.robot.tree.damping)
+    whose, torques = WHOSE[robot.compared[0]], unit(tree, "N m", "N")
     work = "(tau - D qd).qd" if damping.any() else "tau.qd"
     energies = () if robot.own else ("energy", "potential energy")
     result, comparisons = compared(setup, "acceleration", "bias", "qdd", *energies)
     check_wide(result, comparisons)
     for comparison in comparisons:
-        sample, scale, (qdd, engine_qdd, *_) = comparison.sample, comparison.scale, comparison.values("qdd")
+        engine, mujoco, *_ = comparison.engines
+        sample, scale, (qdd, mujoco_qdd, *_) = comparison.sample, comparison.scale, comparison.values("qdd")
         q, qd, tau, drag = sample.q, sample.qd, sample.tau, damping * sample.qd
         closing = scale.closing(scale.force(tau), comparison.acceleration_size())
-        inertia = np.einsum("sij,sj->si", ours.mass_matrix(q), engine_qdd)
+        inertia = np.einsum("sij,sj->si", engine.mass_matrix(q), mujoco_qdd)
         springs = literal.spring_torque(q, tree) if tree.has_springs else 0.0
         back = inertia + comparison.values("bias")[0] + drag + springs
-        agree(result, sample, f"tau from MuJoCo's qdd by {result.label}", torques, back, tau, closing)
-        agree(
-            result,
-            sample,
-            f"tau from {whose} qdd by mj_inverse",
-            torques,
-            tau,
-            theirs.inverse(q, qd, qdd),
-            closing,
-        )
+        comparison.agree(f"tau from MuJoCo's qdd by {result.label}", torques, back, tau, closing)
+        back = mujoco.inverse(q, qd, qdd)
+        comparison.agree(f"tau from {whose} qdd by mj_inverse", torques, tau, back, closing)
         if "energy" in robot.own:  # which may be zero at any position
-            zero, rest = np.array(tree.zero)[None], np.zeros((1, tree.coordinates.nv))
-            above = (engine.energy(q, qd) - engine.energy(zero, rest) for engine in (ours, theirs))
-            agree(result, sample, "energy above the zero position's", "J", *above, scale.energy)
+            zero = np.array(tree.zero)[None], np.zeros((1, tree.coordinates.nv))
+            above, mujoco_above = (of.energy(q, qd) - of.energy(*zero) for of in (engine, mujoco))
+            comparison.agree("energy above the zero position's", "J", above, mujoco_above, scale.energy)
 
         power, size = np.einsum("si,si->s", tau - drag, qd), np.einsum("si,si->s", closing, np.abs(qd))
-        for engine, accelerations in ((whose, qdd), (WHOSE["mujoco"], engine_qdd)):
+        for name, accelerations in ((whose, qdd), (WHOSE["mujoco"], mujoco_qdd)):
             gained = energy_rate(tree, q, qd, accelerations)
-            agree(result, sample, f"dE/dt - {work} at {engine} qdd", "W", gained, power, size)
+            comparison.agree(f"dE/dt - {work} at {name} qdd", "W", gained, power, size)
     return result
 
 
 def energy_rate(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    """Time derivative of the potential and kinetic energy along the motion, exact by dual numbers, W, (states,)."""
+    """Time derivative of the energy along the motion, W, (states,), exact by dual numbers."""
     state = seeded([*q.T, *qd.T], [*tree.coordinates.component_rates(q.T, qd.T), *qdd.T])
-    q, qd = state[: q.shape[1]], state[q.shape[1] :]
-    bodies = method.bodies(tree, q, qd)
-    potential = method.potential(bodies, tree.gravity) + method.spring_energy(tree, q)
-    return (potential + method.kinetic(bodies, qd, tree.armature)).slope
+    positions, speeds = state[: q.shape[1]], state[q.shape[1] :]
+    bodies = method.bodies(tree, positions, speeds)
+    potential = method.potential(bodies, tree.gravity) + method.spring_energy(tree, positions)
+    return (potential + method.kinetic(bodies, speeds, tree.armature)).slope

@@ -1,8 +1,9 @@
-"""What explains a difference in Mbar, h and accelerations: of a file's robot and its reference, or of the user's equations."""
+"""What explains a difference in Mbar, h and accelerations, of a file's robot or of a user's equations."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass, fields
 from functools import lru_cache, partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,29 +12,48 @@ from tmt import literal
 
 from ..core.check import Result
 from ..core.finding import Finding
-from ..core.text import say
+from ..core.rows import Row, column
 from ..diagnosis import STATES_ASKED, Diagnosis, Values, diagnose_stated, packed
 from ..diagnosis.cause import Cause
 from ..diagnosis.consistency import Condition, conditions
 from ..diagnosis.forces import causes_of_forces, force_left_over
 from ..engines.own import QUICK, OwnDynamics
-from ..judge.agree import over
+from ..judge.agree import share_of
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
 from ..robots.states import Sample
 from . import Experiment
 from .setup import Setup
 
+if TYPE_CHECKING:
+    from .quantities import Drawing
+
 EXPERIMENT = Experiment(order=80, needs_file=True, options=("--joints",))
 SECONDS = 8.0  # of a search
 SECONDS_OF_CONDITIONS = 3.0
-CALLS_OF_CONDITIONS, CALLS_FOR_A_JOINT = (
-    30,
-    16,
-)  # of Mbar and h at each state, that the conditions take, about
-CAUSE_COLUMNS = ["rank", "kind", "place", "stated", "explains", "unit", "left_over", "tied"]
+# of Mbar and h at each state, that the conditions take, about: in all, and for each joint
+CALLS_OF_CONDITIONS, CALLS_FOR_A_JOINT = 30, 16
+OF_EQUATIONS = "M and h, largest difference over its tolerance"
 OF_ACCELERATIONS = "accelerations follow from M and h: force left over, over its tolerance"
 WHOSE_VALUES = {"own": "Your", "mujoco": "MuJoCo's"}
+
+
+@dataclass(kw_only=True)
+class CauseRow(Row):
+    rank: int
+    kind: str
+    place: str
+    stated: float | str = column(digits=7)
+    explains: float | str
+    unit: str
+    left_over: float
+    tied: int
+
+
+@dataclass
+class DiagnosisResult(Result):
+    # single changes that leave least: what they leave, a share, and whether it is within the tolerance
+    nearest: tuple[tuple[str, float, bool], ...] = ()
 
 
 class Found(NamedTuple):
@@ -66,109 +86,99 @@ class Found(NamedTuple):
 @lru_cache(maxsize=2)
 def diagnosed(setup: Setup) -> Found:
     """What explains the difference of the engine that is compared with the robot's Tree; computed once."""
-    tree, sample, is_own = setup.robot.tree, setup.random.first(STATES_ASKED), bool(setup.robot.own)
-    name = "own" if is_own else "mujoco"
-    given, (q, qd, tau) = setup.engines[name].of(setup.robot.case()), (sample.q, sample.qd, sample.tau)
-    M, h, qdd = (
-        np.asarray(part) for part in (given.mass_matrix(q), given.bias(q, qd), given.acceleration(q, qd, tau))
-    )
+    tree, sample, engine = setup.robot.tree, setup.random.first(STATES_ASKED), setup.robot.compared[0]
+    engine = "own" if engine == "own" else "mujoco"
+    dynamics, (q, qd, tau) = setup.engines[engine].of(setup.robot.case()), (sample.q, sample.qd, sample.tau)
+    M, h = np.asarray(dynamics.mass_matrix(q)), np.asarray(dynamics.bias(q, qd))
+    qdd = np.asarray(dynamics.acceleration(q, qd, tau))
     values = Values.of(tree, q, qd, M, h)
 
     def bias(qd: np.ndarray) -> np.ndarray:
-        return np.asarray(given.bias(q, qd))
+        return np.asarray(dynamics.bias(q, qd))
 
-    met, too_slow = conditions_of(given, values) if is_own else ([], False)
-    of_speeds = None if is_own and given.equations.seconds > QUICK else bias
-    diagnosis = diagnose_stated(tree, given.equations.joints if is_own else None, values, SECONDS, of_speeds)
-    off = packed(M, h) - packed(literal.mass_matrix(q, tree), literal.bias(q, qd, tree))
+    if isinstance(dynamics, OwnDynamics):
+        broken, too_slow = conditions_of(dynamics, values)
+        joints, is_slow = dynamics.equations.joints, dynamics.equations.seconds > QUICK
+    else:
+        broken, too_slow, joints, is_slow = [], False, None, False
+    diagnosis = diagnose_stated(tree, joints, values, SECONDS, None if is_slow else bias)
+    difference = packed(M, h) - packed(literal.mass_matrix(q, tree), literal.bias(q, qd, tree))
     acting, allowed = force_left_over(tree, q, qd, tau, M, h, qdd)
     of_forces = causes_of_forces(tree, q, qd, tau, h, acting, allowed)
-    ratios = largest_ratio(off, packed(*values.tolerances)), largest_ratio(acting, allowed)
-    return Found(name, len(q), met, too_slow, diagnosis, ratios[0], of_forces, ratios[1])
+    ratio, force_ratio = largest_ratio(difference, packed(*values.tolerances)), largest_ratio(acting, allowed)
+    return Found(engine, len(q), broken, too_slow, diagnosis, ratio, of_forces, force_ratio)
 
 
-def conditions_of(given: OwnDynamics, values: Values) -> tuple[list[Condition], bool]:
+def conditions_of(dynamics: OwnDynamics, values: Values) -> tuple[list[Condition], bool]:
     """The conditions at as many of the states as there is time for, and whether that is none."""
     if not values.are_finite:
         return [], False
     q, qd = values.q, values.qd
-    calls = CALLS_OF_CONDITIONS + CALLS_FOR_A_JOINT * given.coordinates.nv
-    count = given.equations.affordable(calls * len(q), SECONDS_OF_CONDITIONS) // calls
+    calls = CALLS_OF_CONDITIONS + CALLS_FOR_A_JOINT * dynamics.coordinates.nv
+    count = dynamics.equations.affordable(calls * len(q), SECONDS_OF_CONDITIONS) // calls
     if count == 0:
         return [], True
-    found = conditions(given.mass_matrix, given.bias, given.coordinates, q[:count], qd[:count])
-    return [condition for condition in found if np.isfinite(condition.tolerance)], False
+    every = conditions(dynamics.mass_matrix, dynamics.bias, dynamics.coordinates, q[:count], qd[:count])
+    return [condition for condition in every if np.isfinite(condition.tolerance)], False
 
 
-def is_solved(given: OwnDynamics, tree: tmt.Tree, sample: Sample) -> bool:
+def is_solved(dynamics: OwnDynamics, tree: tmt.Tree, sample: Sample) -> bool:
     """Whether a user's accelerations are those of the own Mbar and h at all states of a sample."""
     q, qd, tau = sample.q, sample.qd, sample.tau
-    values = given.mass_matrix(q), given.bias(q, qd), given.acceleration(q, qd, tau)
+    values = dynamics.mass_matrix(q), dynamics.bias(q, qd), dynamics.acceleration(q, qd, tau)
     return largest_ratio(*force_left_over(tree, q, qd, tau, *values)) <= 1.0
 
 
-def largest_ratio(off: np.ndarray, tolerance: np.ndarray) -> float:
+def largest_ratio(difference: np.ndarray, tolerance: np.ndarray) -> float:
     """Of a difference to its tolerance; inf if one is not a number."""
-    return float(over(np.where(np.isfinite(off), np.abs(off), np.inf), tolerance).max())
+    return float(share_of(np.abs(difference), tolerance).max())
 
 
-def rows(setup: Setup) -> Result:
-    """One row for each explanation; a check of each condition, of Mbar and h, and of accelerations, whose note is the cause."""
-    result, found = Result("diagnosis", shown=CAUSE_COLUMNS), diagnosed(setup)
-    scene, whose, diagnosis = f"{found.states} random states", WHOSE_VALUES[found.engine], found.diagnosis
-
-    def check(name, value, tolerance, fails: bool, finding: Finding, **more) -> None:
-        result.check(scene, f"{whose} {name}", value, tolerance, note=say(finding) if fails else "", **more)
-        if fails:
-            result.notes.append(finding)
-
-    for of in found.conditions:
-        check(of.name, of.value, of.tolerance, not of.is_met, of.finding, unit=of.unit, rule=of.rule)
-    is_finite = diagnosis.differs or np.isfinite(found.ratio)
-    for name, ratio, kind, is_known in (
-        ("M and h, largest difference over its tolerance", found.ratio, "of_equations", is_finite),
-        (OF_ACCELERATIONS, found.force_ratio, "of_forces", np.isfinite(found.force_ratio)),
-    ):
-        values = {"found": found} if is_known else {}
-        check(
-            name,
-            ratio,
-            1.0,
-            ratio > 1.0,
-            result.finding(kind if is_known else "no_numbers", **values),
-            unit="",
-        )
-    result.rows = [{name: getattr(cause, name) for name in CAUSE_COLUMNS} for cause in found.causes]
+def rows(setup: Setup) -> DiagnosisResult:
+    """A row for each explanation; a check of each condition, of Mbar and h, and of accelerations."""
+    found = diagnosed(setup)
+    result = DiagnosisResult("diagnosis", nearest=found.diagnosis.nearest)
+    for condition in found.conditions:
+        check(result, found, condition)
+    is_known = found.diagnosis.differs or np.isfinite(found.ratio)
+    finding = result.finding("of_equations", found=found) if is_known else result.finding("no_numbers")
+    check(result, found, Condition(OF_EQUATIONS, found.ratio, 1.0, "", finding))
+    is_known = np.isfinite(found.force_ratio)
+    finding = result.finding("of_forces", found=found) if is_known else result.finding("no_numbers")
+    check(result, found, Condition(OF_ACCELERATIONS, found.force_ratio, 1.0, "", finding))
+    names = [field.name for field in fields(CauseRow)]
+    result.rows = [CauseRow(**{name: getattr(cause, name) for name in names}) for cause in found.causes]
     if found.too_slow:
         result.find("too_slow")
     if not result.notes:
         result.find("nothing")
-    result.curves["nearest"] = diagnosis.nearest
-    result.curves["causes"] = [record(cause, bool(setup.robot.own)) for cause in found.causes]
     return result
 
 
-def record(cause: Cause, is_own: bool = False) -> dict:
-    text = cause.text("option" if is_own else "")
-    return {
-        "rank": cause.rank,
-        "place": cause.place,
-        "stated": cause.stated,
-        "found": cause.explains,
-        "text": text,
-    }
+def check(result: Result, found: Found, condition: Condition) -> None:
+    """A check that a condition is met; if not, its note, and a note of the result, is what is wrong."""
+    name, note = f"{WHOSE_VALUES[found.engine]} {condition.name}", ""
+    if not condition.is_met:
+        result.notes.append(condition.finding)
+        note = condition.text
+    scene, value, least_or_most = f"{found.states} random states", condition.value, condition.tolerance
+    result.check(scene, name, value, least_or_most, condition.unit, note, rule=condition.rule)
 
 
-def headline(result: Result) -> Finding | None:
-    return (
-        result.finding("headline", place=result.rows[0]["place"], more=len(result.rows) - 1)
-        if result.rows
-        else None
-    )
+def record(cause: Cause, is_own: bool = False) -> dict[str, object]:
+    """A cause as reports list it, in words."""
+    values = {"rank": cause.rank, "place": cause.place, "stated": cause.stated, "found": cause.explains}
+    return values | {"text": cause.text("option" if is_own else "")}
 
 
-def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    if result.curves["nearest"]:
+def headline(result: DiagnosisResult) -> Finding | None:
+    if not result.rows:
+        return None
+    return result.finding("headline", place=result.rows[0].place, more=len(result.rows) - 1)
+
+
+def figures(result: DiagnosisResult, robot: Robot) -> Iterator["Drawing"]:
+    if result.nearest:
         from .figures import draw_nearest  # matplotlib is for the process that draws
 
         yield partial(draw_nearest, result)

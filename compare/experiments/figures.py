@@ -1,75 +1,72 @@
-"""Figures of the experiments at single states: differences and corrections; each is (file name, figure, caption)."""
+"""Figures of the experiments at single states: differences and corrections."""
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
-from ..core.check import Result, largest_known
 from ..core.finding import Finding
+from ..judge.agree import AgreementResult
 from ..judge.scale import EPS, FACTOR
-from ..report.style import BLUE, GREEN, GREY, ORANGE, RED, WIDTH, zero_at_the_end
+from ..report.style import GREEN, GREY, RED, WIDTH, zero_at_the_end
+from .diagnosis import DiagnosisResult
+from .figures_overview import LOOKS
 
 ZERO_AT = 1e-3  # eps: where differences of exactly zero are drawn
 MOST_DRAWN = 600  # points of a curve: more are not seen
 
 
-def draw_distances(result: Result, quantities: list[str]) -> tuple[str, Figure, Finding]:
-    """Cumulative distributions of the differences between the engines over random states, and of each from the exact value."""
-    curves, label = result.curves["random states"], result.label
-    styles = [
-        (f"{label} to MuJoCo", "black", "-"),
-        (f"{label} to exact", BLUE, "--"),
-        ("MuJoCo to exact", ORANGE, "-."),
-    ]
-    exact = styles[1][0] in curves[quantities[0]]  # not where exact values take too long
+def draw_distances(result: AgreementResult, quantities: list[str]) -> tuple[str, Figure, Finding]:
+    """Cumulative distributions of the DISTANCES of judge.agree over random states."""
+    distances = {quantity: result.distances["random states"][quantity] for quantity in quantities}
     columns = 2 if len(quantities) == 4 else min(3, len(quantities))
     lines = -(-len(quantities) // columns)
     fig = Figure(figsize=(WIDTH, 0.7 + 2.1 * lines), layout="constrained")
     axes = fig.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
-    for ax, quantity in zip(axes.flat, quantities):
-        for name, colour, dash in styles if exact else styles[:1]:
-            values = np.maximum(curves[quantity][name], ZERO_AT)
-            share = np.arange(1, len(values) + 1) / len(values)
-            shown = np.unique(
-                np.linspace(0, len(values) - 1, min(len(values), MOST_DRAWN)).round().astype(int)
-            )
-            ax.step(values[shown], share[shown], where="post", color=colour, linestyle=dash, label=name)
+    for ax, (quantity, measured) in zip(axes.flat, distances.items()):
+        for distance, ascending in measured.items():
+            text, colour, dash, *_ = LOOKS[distance]
+            look = {"color": colour, "linestyle": dash, "label": text.format(result.label)}
+            ax.step(*drawn(ascending), where="post", **look)
         ax.axvline(FACTOR, color=RED, linewidth=2, label=f"tolerance, {FACTOR} eps")
         ax.set(title=quantity, xscale="log", ylim=(0, 1.02))
     for ax in axes.flat[len(quantities) :]:
         ax.set_visible(False)
-    drawn = [line.get_xdata() for ax in axes.flat for line in ax.lines]
-    zeros = min(values[0] for values in drawn) <= ZERO_AT
+    every = np.concatenate([values for measured in distances.values() for values in measured.values()])
+    zeros = bool((every <= ZERO_AT).any())
     if zeros:
-        largest = max((values[-1] for values in drawn if np.isfinite(values[-1])), default=FACTOR)
-        zero_at_the_end(axes[0, 0].xaxis, ZERO_AT, largest, most=4 + 2 * (columns < 3))
+        farthest = max(np.max(every[np.isfinite(every)], initial=0.0), FACTOR)
+        zero_at_the_end(axes[0, 0].xaxis, ZERO_AT, farthest, most=4 + 2 * (columns < 3))
     for ax in axes[:, 0]:
         ax.set_ylabel("share of states")
     fig.supxlabel("difference, eps × scale of the quantity", fontsize=9)
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    maxima = [(largest_known(curves[quantity][styles[0][0]][-1:]), quantity) for quantity in quantities]
-    worst, of_worst = max(maxima)
-    values = {"label": label, "worst": worst, "of_worst": of_worst, "zero_at": ZERO_AT if zeros else None}
-    caption = result.finding("distances", of="shared", exact=exact, **values)
-    return f"{result.experiment}_distances", fig, caption
+    largest = {quantity: measured["difference"][-1] for quantity, measured in distances.items()}
+    largest = {quantity: np.inf if np.isnan(value) else float(value) for quantity, value in largest.items()}
+    furthest = max(quantities, key=lambda quantity: largest[quantity])
+    told = {"label": result.label, "worst": largest[furthest], "of_worst": furthest}
+    told |= {"exact": "from_exact" in distances[quantities[0]], "zero_at": ZERO_AT if zeros else None}
+    return f"{result.experiment}_distances", fig, result.finding("distances", of="shared", **told)
 
 
-def draw_nearest(result: Result) -> tuple[str, Figure, Finding]:
+def drawn(ascending: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """At most MOST_DRAWN points of a cumulative distribution: values, and the share of states up to each."""
+    count = len(ascending)
+    points = np.unique(np.linspace(0, count - 1, min(count, MOST_DRAWN)).round().astype(int))
+    return np.maximum(ascending[points], ZERO_AT), (points + 1) / count
+
+
+def draw_nearest(result: DiagnosisResult) -> tuple[str, Figure, Finding]:
     """The share of the difference that remains after each of the best single corrections."""
-    names, left, explains = zip(*result.curves["nearest"])
-    left = np.maximum(left, EPS)
+    names, shares, explains = zip(*result.nearest)
+    left = np.maximum(shares, EPS)
     fig = Figure(figsize=(WIDTH, 0.9 + 0.25 * len(names)), layout="constrained")
-    ax = fig.subplots()
-    ax.barh(range(len(names)), left, color=[GREEN if one else GREY for one in explains])
-    ax.set(
-        xscale="log",
-        xlim=(EPS / 3.0, 1.5),
-        xlabel="remaining share of the difference",
-        yticks=range(len(names)),
-    )
-    ax.set_yticklabels(names)
-    ax.invert_yaxis()
+    ax, rows = fig.subplots(), np.arange(len(names))
     looks = ((True, GREEN, "explains the difference down to rounding"), (False, GREY, "does not explain it"))
-    handles = [Patch(color=colour, label=name) for one, colour, name in looks if one in explains]
-    fig.legend(handles=handles, loc="outside upper center", ncols=2)
+    for is_explained, colour, label in looks:
+        shown = np.equal(explains, is_explained)
+        if shown.any():
+            ax.barh(rows[shown], left[shown], color=colour, label=label)
+    ax.set(xscale="log", xlim=(EPS / 3.0, 1.5), xlabel="remaining share of the difference")
+    ax.set_yticks(rows, names)
+    ax.set_ylim(len(names) - 0.5, -0.5)
+    fig.legend(loc="outside upper center", ncols=2)
     return "diagnosis_nearest", fig, result.finding("nearest", names=names[:2], left=left[:2].tolist())

@@ -5,7 +5,6 @@ import numpy as np
 from tmt import literal
 
 from ..core.check import Result
-from ..judge.agree import agree
 from ..judge.entries import unit
 from . import Experiment
 from .quantities import compared, figures, headline
@@ -16,17 +15,17 @@ EXPERIMENT = Experiment(order=50, asks_of_own=("gravity", "bias"), options=("--j
 
 
 def rows(setup: Setup) -> Result:
-    """Torques at named postures and random states; those of gravity and springs together; a user's own gravity and bias."""
-    tree, (ours, theirs) = setup.robot.tree, setup.compared().values()
+    """Holding torques, those of gravity and springs together, and a user's own gravity beside the bias."""
+    tree, units = setup.robot.tree, unit(setup.robot.tree, "N m", "N")
     result, comparisons = compared(setup, "gravity", "holding torque")
-    units = unit(tree, "N m", "N")
     for comparison in comparisons:
+        engine, mujoco, *_ = comparison.engines
         sample, scale, (held, *_) = comparison.sample, comparison.scale, comparison.values("holding torque")
         if "gravity" in setup.robot.own:
-            still = ours.bias(sample.q, np.zeros(tree.coordinates.nv))
-            agree(result, sample, "yours: gravity - bias at rest", units, held, still, scale.weight)
+            still = engine.bias(sample.q, np.zeros(tree.coordinates.nv))
+            comparison.agree("yours: gravity - bias at rest", units, held, still, scale.weight)
         if tree.has_springs:
             held, size = held + literal.spring_torque(sample.q, tree), scale.weight + scale.springs
-            engine_held = theirs.inverse(sample.q, 0.0, 0.0)
-            agree(result, sample, "holding torque, springs too", units, held, engine_held, size)
+            mujoco_held = mujoco.inverse(sample.q, 0.0, 0.0)
+            comparison.agree("holding torque, springs too", units, held, mujoco_held, size)
     return result

@@ -21,7 +21,7 @@ def skipped(robot: Robot) -> Finding | None:
     return None if quantities(robot) else Finding("kinematics", "nothing_given")
 
 
-def claim_values(robot: Robot) -> dict:
+def claim_values(robot: Robot) -> dict[str, list[str]]:
     return {"quantities": quantities(robot)}
 
 

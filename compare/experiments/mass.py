@@ -32,7 +32,7 @@ def check_symmetry(result: Result, M: np.ndarray, scale: np.ndarray) -> None:
 
 
 def check_definiteness(result: Result, label: str, M: np.ndarray) -> None:
-    """The smallest eigenvalue over the largest of Mbar in units of its diagonal, at all states, is more than rounding."""
+    """The smallest eigenvalue of Mbar over the largest, in units of its diagonal, is more than rounding."""
     diagonal = np.einsum("sii->si", M)
     root = np.sqrt(
         np.where((diagonal > 0.0).all(axis=1, keepdims=True), diagonal, 1.0)

@@ -1,32 +1,47 @@
 """Every number that an assignment prints, from TMT, from MuJoCo and exactly."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
+import tmt
+from tmt import literal
 from tmt.exact.values import distance, exact
 
 from ..core.check import Result
 from ..core.finding import Finding
-from ..engines import Dynamics
-from ..judge.scale import EPS, FACTOR, acceleration_scale, gravity_scale, mass_scale
+from ..core.rows import Row, column
+from ..judge.scale import EPS, FACTOR, gravity_scale
 from ..robots import Printed, Robot
 from . import Experiment
 from .setup import Setup
 
 EXPERIMENT = Experiment(order=20, serves_own=False)
+SHOWN = ["item", "quantity", "component", "published", "exact", "tmt", "mujoco", "unit"]
+FUNCTIONS = {"Mbar": "mass_matrix", "qdd": "acceleration", "holding torque": "gravity_balance"}
 
 
-def skipped(robot: Robot) -> Finding | None:
-    return None if robot.printed else Finding("published", "nothing_printed", {"noun": robot.noun})
+@dataclass(kw_only=True)
+class PrintedRow(Row):
+    """One component of a printed answer."""
 
+    item: str
+    posture: str
+    quantity: str
+    component: str
+    unit: str
+    published: float = column(digits=7)
+    exact: float = column(digits=7)
+    tmt: float = column(digits=7)
+    mujoco: float = column(digits=7)
+    tolerance: float
 
-def claim_values(robot: Robot) -> dict:
-    noise = [
-        item.item for item in robot.printed if item.is_rounding and any(item.values)
-    ]  # printed, but truly zero
-    return {"weight": gravity_scale(robot.tree), "rounding": noise}
+    @property
+    def is_met(self) -> bool:
+        """Whether both engines meet the printed number."""
+        return max(abs(self.tmt - self.published), abs(self.mujoco - self.published)) <= self.tolerance
 
 
 class Answer(NamedTuple):
@@ -47,79 +62,97 @@ class Answer(NamedTuple):
         return FACTOR * EPS * self.scale
 
 
-def answer(item: Printed, robot: Robot, dynamics: Mapping[str, Dynamics]) -> Answer:
+def skipped(robot: Robot) -> Finding | None:
+    return None if robot.printed else Finding("published", "nothing_printed", {"noun": robot.noun})
+
+
+def claim_values(robot: Robot) -> dict[str, object]:
+    """The scale of a holding torque, and the items whose printed digits are rounding errors."""
+    noise = [item.item for item in robot.printed if item.is_rounding and any(item.values)]
+    return {"weight": gravity_scale(robot.tree), "rounding": noise}
+
+
+def scales(tree: tmt.Tree, q: np.ndarray) -> dict[str, float]:
+    """The scale of all components of each quantity at q (nq,), by its function; of accelerations at rest."""
+    M, weight = literal.mass_matrix(q, tree), gravity_scale(tree)
+    least, *_, largest = np.linalg.eigvalsh(M)
+    of_accelerations = (largest / least + 1.0) * weight / least
+    return {"mass_matrix": np.abs(M).max(), "acceleration": of_accelerations, "gravity_balance": weight}
+
+
+def answer(item: Printed, robot: Robot, dynamics: Mapping[str, Any]) -> Answer:
     """An item by exact arithmetic, TMT and MuJoCo."""
-    tree, q = robot.tree, robot.posture(item.posture)
+    function, q = FUNCTIONS[item.quantity], robot.posture(item.posture)
     rest, tau = np.zeros((2, len(q)))
     if item.torque != "none":
         held = next(other for other in robot.printed if other.item == item.torque)
         tau = dynamics["tmt"].gravity_balance(robot.posture(held.posture))
-    function, arguments, scale = {
-        "Mbar": ("mass_matrix", (q,), mass_scale(tree, q[None])[0]),
-        "qdd": ("acceleration", (q, rest, tau), acceleration_scale(tree, q[None], gravity_scale(tree))[0]),
-        "holding torque": ("gravity_balance", (q,), gravity_scale(tree)),
-    }[item.quantity]
-    engines = (getattr(dynamics[name], function)(*arguments) for name in ("tmt", "mujoco"))
-    return Answer(getattr(exact(tree, q, rest, tau), function), *engines, scale)
+    arguments = (q, rest, tau) if function == "acceleration" else (q,)
+    of_tmt, of_mujoco = (getattr(dynamics[engine], function)(*arguments) for engine in ("tmt", "mujoco"))
+    values = getattr(exact(robot.tree, q, rest, tau), function)
+    return Answer(values, of_tmt, of_mujoco, scales(robot.tree, q)[function])
 
 
 def rows(setup: Setup) -> Result:
     """One row for each printed component, one check for each item and engine."""
-    result = Result(
-        "published", shown=["item", "quantity", "component", "published", "exact", "tmt", "mujoco", "unit"]
-    )
-    robot, dynamics = setup.robot, setup.compared()
+    result, robot, dynamics = Result("published", shown=SHOWN), setup.robot, setup.compared()
     answers = {item.item: answer(item, robot, dynamics) for item in robot.printed}
     for item in robot.printed:
-        of, printed = answers[item.item], np.array(item.values)
-        check_answer(result, item, of, robot.joints)
-        for index in np.ndindex(printed.shape):
-            component = " ".join(robot.joints[i] for i in index)
-            row = {
-                "item": item.item,
-                "posture": item.posture,
-                "quantity": item.quantity,
-                "component": component,
-            }
-            row |= {
-                "unit": item.unit,
-                "published": printed[index],
-                "exact": of.nearest[index],
-                "tmt": of.tmt[index],
-            }
-            tolerance = of.rounding + (0.0 if item.is_rounding else item.half_digit)
-            result.rows.append(row | {"mujoco": of.mujoco[index], "tolerance": tolerance})
+        check_answer(result, item, answers[item.item], robot.joints)
+        result.rows += rows_of(item, answers[item.item], robot.joints)
     if robot.remarks:
         result.notes += robot.remarks(answers, dynamics)
     return result
 
 
-def check_answer(result: Result, item: Printed, of: Answer, joints: tuple) -> None:
-    """Checks of one item against the printed digits, or, where those are rounding, against the exact value."""
-    printed, where = np.array(item.values), f"({item.item}) {item.posture}"
-    engines = {"TMT": of.tmt, "MuJoCo": of.mujoco, "exact": of.nearest}
-    for label, values in engines.items():
+def rows_of(item: Printed, computed: Answer, joints: tuple[str, ...]) -> list[PrintedRow]:
+    printed = np.array(item.values)
+    return [
+        PrintedRow(
+            item=item.item,
+            posture=item.posture,
+            quantity=item.quantity,
+            component=" ".join(joints[i] for i in index),
+            unit=item.unit,
+            published=float(printed[index]),
+            exact=float(computed.nearest[index]),
+            tmt=float(computed.tmt[index]),
+            mujoco=float(computed.mujoco[index]),
+            tolerance=computed.rounding + (0.0 if item.is_rounding else item.half_digit),
+        )
+        for index in np.ndindex(printed.shape)
+    ]
+
+
+def check_answer(result: Result, item: Printed, computed: Answer, joints: tuple[str, ...]) -> None:
+    """Checks of one item: the printed digits, or, where those are rounding, the exact value."""
+    printed, where, unit = np.array(item.values), f"({item.item}) {item.posture}", item.unit
+    by_label = {"TMT": computed.tmt, "MuJoCo": computed.mujoco, "exact": computed.nearest}
+    from_printed = {label: np.abs(values - printed).max() for label, values in by_label.items()}
+    for label, values in by_label.items():
         if not item.is_rounding:
-            off, tolerance = np.abs(values - printed).max(), item.half_digit + of.rounding
-            result.check(where, f"{label}: {item.quantity} - printed", off, tolerance, item.unit)
-        elif label != "exact":
-            off = distance(values, of.exact).max()
-            result.check(
-                where, f"{label}: {item.quantity} - exact", off, of.rounding, item.unit, rounding=True
+            printed_digits, tolerance = (
+                f"{label}: {item.quantity} - printed",
+                item.half_digit + computed.rounding,
             )
-    for label in [name for name in ("exact", "TMT") if name.lower() in item.to_every_digit]:
-        digits, off = f"{label}: {item.quantity} - printed", np.abs(engines[label] - printed).max()
-        result.check(where, digits, off, item.half_digit, item.unit)
+            result.check(where, printed_digits, from_printed[label], tolerance, unit)
+        elif label != "exact":
+            from_exact, off = f"{label}: {item.quantity} - exact", distance(values, computed.exact).max()
+            result.check(where, from_exact, off, computed.rounding, unit, rounding=True)
+    for label in ("exact", "TMT"):
+        if label.lower() in item.to_every_digit:
+            every_digit = f"{label}: {item.quantity} - printed"
+            result.check(where, every_digit, from_printed[label], item.half_digit, unit)
     for joint in item.sizes:
         k = joints.index(joint)
-        off = abs(abs(of.nearest[k]) - abs(printed[k]))
-        result.check(where, f"exact: |{item.quantity}_{joint}| - |printed|", off, item.half_digit, item.unit)
+        size, off = (
+            f"exact: |{item.quantity}_{joint}| - |printed|",
+            abs(computed.nearest[k]) - abs(printed[k]),
+        )
+        result.check(where, size, abs(off), item.half_digit, unit)
 
 
 def headline(result: Result) -> Finding | None:
     """How many of the printed numbers both engines meet."""
-    met = sum(
-        all(abs(row[name] - row["published"]) <= row["tolerance"] for name in ("tmt", "mujoco"))
-        for row in result.rows
-    )
-    return result.finding("headline", met=met, numbers=len(result.rows)) if result.rows else None
+    met, numbers = sum(row.is_met for row in result.rows), len(result.rows)
+    return result.finding("headline", met=met, numbers=numbers) if numbers else None

@@ -1,13 +1,16 @@
-"""The quantities that both engines give at a state, one row of a table each, and their comparison over samples of states.
+"""The quantities that both engines give at a state, one row each, and their comparison over samples.
 
 The experiments at single states share their figures, headline and first screen too: those of this module.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+import tmt
 
 from ..core.check import Result
 from ..core.finding import Finding
@@ -15,12 +18,19 @@ from ..core.text import say
 from ..engines import LABELS
 from ..engines.mujoco.dynamics import convective_accelerations
 from ..engines.tmt import Compiled
-from ..judge.agree import agree
+from ..judge.agree import AgreementResult, Compared, agree
 from ..judge.entries import Entries, unit
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
 from ..robots.states import MOST_SPEEDS, Sample
 from .setup import Setup
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tmt.exact.many import Pairs
+
+    Drawing = partial[tuple[str, Figure, Finding]]
 
 
 class Quantity(NamedTuple):
@@ -31,6 +41,22 @@ class Quantity(NamedTuple):
     units: tuple[str, ...]  # for hinges and balls, for slides, for one of each; a single one for all
     scale: str  # of judge.entries
     part: int | None = None  # of a function that returns several arrays
+
+    def states(self, sample: Sample) -> list[np.ndarray]:
+        """The arguments of the function at the states of a sample."""
+        return [getattr(sample, argument) for argument in self.arguments]
+
+    def exact(self, sample: Sample) -> "Pairs":
+        return sample.exact(self.function, self.part)
+
+    def unit(self, tree: tmt.Tree) -> str:
+        return self.units[0] if len(self.units) == 1 else unit(tree, *self.units)
+
+    def size(self, scale: Entries, tau: ArrayLike = 0.0, qdd: ArrayLike = 0.0) -> np.ndarray:
+        """The scale of each entry. tau, qdd: of accelerations, from which their scale is taken."""
+        if self.function == "acceleration":
+            return scale.acceleration(scale.force(tau), qdd)
+        return getattr(scale, self.scale)
 
 
 QUANTITIES = {
@@ -51,57 +77,62 @@ QUANTITIES = {
 
 
 class Comparison:
-    """Two engines, and tmt's compiled functions at random states, over a sample: each function is called once."""
+    """Two engines, at random states also tmt's compiled functions: each function is called once."""
 
-    def __init__(self, setup: Setup, sample: Sample):
-        self.sample, self.robot = sample, setup.robot
-        self.engines = list(setup.compared().values())  # MuJoCo is the second
+    def __init__(self, setup: Setup, result: AgreementResult, sample: Sample):
+        self.result, self.sample, self.robot = result, sample, setup.robot
+        self.engines: list[Any] = list(
+            setup.compared().values()
+        )  # Dynamics with more functions; MuJoCo is the second
         is_small = self.robot.coordinates.nv <= MOST_SPEEDS  # code for more takes minutes to compile
         if sample is setup.random and is_small and not self.robot.own:
             self.engines.append(Compiled(self.robot.tree))
         self.scale = Entries(self.robot.tree, sample.q, sample.qd)
-        self.returned = {}
+        self.returned: dict[str, list[Any]] = {}
 
-    def values(self, name: str) -> list:
+    def values(self, name: str) -> list[np.ndarray]:
         """A quantity by each engine, (states, ...)."""
-        function, part = QUANTITIES[name].function, QUANTITIES[name].part
+        quantity = QUANTITIES[name]
+        function, part, states = quantity.function, quantity.part, quantity.states(self.sample)
         if function not in self.returned:
-            states = [getattr(self.sample, argument) for argument in QUANTITIES[name].arguments]
-            returned = self.returned[function] = [
-                getattr(engine, function)(*states) for engine in self.engines
-            ]
+            self.returned[function] = [getattr(engine, function)(*states) for engine in self.engines]
             if function == "convective_terms" and self.robot.coordinates.has_balls:
                 # mj_jacDot of MuJoCo 4.0 leaves out what a ball does to a slide after it in the same body
-                returned[1] = convective_accelerations(self.engines[1], *states)
+                self.returned[function][1] = convective_accelerations(self.engines[1], *states)
         return [values if part is None else values[part] for values in self.returned[function]]
 
     def acceleration_size(self) -> np.ndarray:
         """The accelerations that scales are taken from: a user's own may be NaN."""
-        return self.values("qdd")[bool(self.robot.own)]
+        own, of_mujoco, *_ = self.values("qdd")
+        return of_mujoco if self.robot.own else own
 
     @cached_property
     def acceleration_scale(self) -> np.ndarray:
-        return self.scale.acceleration(self.scale.force(self.sample.tau), self.acceleration_size())
+        return QUANTITIES["qdd"].size(self.scale, self.sample.tau, self.acceleration_size())
 
-    def agree(self, result: Result, *names: str) -> None:
-        """A row and a check for each quantity of two engines, and of MuJoCo and the compiled functions."""
-        for name in names:
-            quantity, (ours, theirs, *compiled) = QUANTITIES[name], self.values(name)
-            size = self.acceleration_scale if name == "qdd" else getattr(self.scale, quantity.scale)
-            units = quantity.units
-            named = units[0] if len(units) == 1 else unit(self.robot.tree, *units)
-            exact = self.sample.exact(quantity.function, quantity.part)
-            agree(result, self.sample, name, named, ours, theirs, size, exact)
-            for values in compiled:
-                agree(result, self.sample, f"{name}, compiled", named, values, theirs, size)
+    def agree(
+        self, name: str, unit: str, values: np.ndarray, mujoco_values: np.ndarray, scale: np.ndarray
+    ) -> None:
+        """A row and a check of values of the two engines, (states, ...)."""
+        agree(self.result, self.sample, Compared(name, unit, values, mujoco_values, scale))
+
+    def compare(self, name: str) -> None:
+        """Rows and checks of a quantity of two engines, and of MuJoCo and the compiled functions."""
+        quantity, (values, mujoco_values, *compiled) = QUANTITIES[name], self.values(name)
+        scale = self.acceleration_scale if name == "qdd" else quantity.size(self.scale)
+        units, exact = quantity.unit(self.robot.tree), quantity.exact(self.sample)
+        agree(self.result, self.sample, Compared(name, units, values, mujoco_values, scale, exact))
+        for of_code in compiled:
+            self.agree(f"{name}, compiled", units, of_code, mujoco_values, scale)
 
 
-def compared(setup: Setup, experiment: str, *names: str) -> tuple[Result, list[Comparison]]:
-    """The result of an experiment that compares these quantities at the named postures and at random states."""
-    result = Result(experiment, label=LABELS[setup.robot.compared[0]])
-    comparisons = [Comparison(setup, sample) for sample in (setup.named, setup.random)]
+def compared(setup: Setup, experiment: str, *names: str) -> tuple[AgreementResult, list[Comparison]]:
+    """The result of an experiment that compares these quantities at named postures and random states."""
+    result = AgreementResult(experiment, label=LABELS[setup.robot.compared[0]])
+    comparisons = [Comparison(setup, result, sample) for sample in (setup.named, setup.random)]
     for comparison in comparisons:
-        comparison.agree(result, *names)
+        for name in names:
+            comparison.compare(name)
         result.notes += comparison.sample.notes
     if len(comparisons[-1].engines) > 2:
         result.find("rows_compiled", of="shared")
@@ -118,37 +149,29 @@ def check_wide(result: Result, comparisons: Sequence[Comparison]) -> None:
     if len(wide):
         worst = wide[np.argmax(least[wide] / largest[wide])]
         joint = comparisons[0].robot.coordinates.speeds[worst]
-        found = {
-            "joint": joint,
-            "tolerance": least[worst],
-            "largest": largest[worst],
-            "others": len(wide) - 1,
-        }
-        result.not_judged("all states", "qdd", say(Finding("shared", "wide", found)))
+        sizes = {"tolerance": least[worst], "largest": largest[worst]}
+        reason = Finding("shared", "wide", {"joint": joint, **sizes, "others": len(wide) - 1})
+        result.not_judged("all states", "qdd", say(reason))
 
 
-def headline(result: Result) -> Finding | None:
+def headline(result: AgreementResult) -> Finding | None:
     """The difference with the largest share of its tolerance; one that is not a number comes first."""
-    rows = [
-        row
-        for row in result.rows
-        if row["worst_difference"] is None or row["difference_over_bar"] is not None
-    ]
-    if not rows:
-        return None
-    top = max(rows, key=lambda row: np.inf if row["worst_difference"] is None else row["difference_over_bar"])
-    values = {"difference": top["worst_difference"], "unit": top["unit"], "share": top["difference_over_bar"]}
-    return Finding("shared", "agreement_headline", {"quantity": top["quantity"], **values})
+    top, largest = None, -1.0
+    for row in result.rows:
+        share = np.inf if row.worst_difference is None else row.difference_over_bar
+        if share is not None and share > largest:
+            top, largest = row, share
+    return Finding("shared", "agreement_headline", {"row": top}) if top else None
 
 
-def figures(result: Result, robot: Robot) -> Iterator[partial]:
+def figures(result: AgreementResult, robot: Robot) -> Iterator["Drawing"]:
     from .figures import draw_distances  # matplotlib is for the process that draws
 
-    drawn = [name for name in QUANTITIES if name in result.curves["random states"]]
+    drawn = [name for name in QUANTITIES if name in result.distances["random states"]]
     yield partial(draw_distances, result, drawn)
 
 
-def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
+def overview(results: Mapping[str, Result], robot: Robot) -> Iterator["Drawing"]:
     """The picture of M, h and accelerations on the first screen, where one of them was compared."""
     from .figures_overview import agreements, draw_agreement
 

@@ -1,103 +1,177 @@
 """The comparison of two engines' values over states: the one closest to its tolerance."""
 
+import math
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.check import Result
+from ..core.check import Check, Result
+from ..core.rows import Column, Row, column
+from ..robots.states import Sample
 from .scale import EPS, FACTOR
 
 if TYPE_CHECKING:
     from tmt.exact.many import Pairs
 
-SHOWN = 8  # columns of a comparison, the first ones; the others are in its file
+# fields of a row, in eps: the distance of the two engines, and of each from the exact values
+DISTANCES = "difference", "from_exact", "mujoco_from_exact"
+SHOWN = (  # fields of a comparison in a report; its file has all
+    "scene", "quantity", "unit", "states", "largest_difference", "worst_difference", "bar",
+    "difference_over_bar", "from_exact", "mujoco_from_exact",
+)  # fmt: skip
 
 
-def agree(
-    result: Result, sample, quantity, unit, values, mujoco_values, scale, exact: "Pairs | None" = None
-) -> None:
-    """Add a row and a check: of the differences between two engines over the states, the one closest to its tolerance.
+@dataclass(frozen=True)
+class Compared:
+    """A quantity by two engines at the states of a sample, (states, ...) each.
 
-    values, mujoco_values: (states, ...). scale: a number or (states,), or with as many dimensions as the values for a
-    scale of each entry; the tolerance is 64 eps x scale. exact: at the first states; one more check for each engine of its
-    distance from them.
+    scale: a number or (states,), or with as many dimensions as the values for a scale of each entry; the
+    tolerance is 64 eps x scale. exact: at the first states.
     """
-    between, exact_states = f"{result.label} to MuJoCo", None if exact is None else len(exact.high)
-    differences = {between: np.abs(np.subtract(values, mujoco_values))}
-    for engine, computed in ((result.label, values), ("MuJoCo", mujoco_values)) if exact_states else ():
-        differences[f"{engine} to exact"] = exact.distance(computed[:exact_states])
-    worst_of_states = {name: worst_of_each(values, scale) for name, values in differences.items()}
-    in_eps = {name: over(d, EPS * s) for name, (d, s) in worst_of_states.items()}
-    difference, scale = worst_of_states[between]
 
-    def check_closest(quantity, difference, scale):
-        """A check of the state that is closest to its tolerance, and its index."""
-        tolerance = FACTOR * EPS * scale
-        (k,) = closest(difference, tolerance)
-        return result.check(
-            sample.name, quantity, difference[k], tolerance[k], unit, sample.describe(k), True
-        ), k
-
-    check, worst = check_closest(quantity, difference, scale)
-    for name in list(worst_of_states)[1:]:
-        check_closest(f"{quantity}, {name}", *worst_of_states[name])
-    row = {
-        "scene": sample.name,
-        "quantity": quantity,
-        "unit": unit,
-        "states": len(sample.q),
-        "largest_difference": float(difference.max()) if np.isfinite(difference).all() else None,
-        "worst_difference": check.value,
-        "bar": check.tolerance,
-        "difference_over_bar": check.over_tolerance,
-        "scale": scale[worst],
-        "difference_eps": in_eps[between].max(),
-        f"{result.label.lower()}_from_exact_eps": in_eps[f"{result.label} to exact"].max()
-        if exact_states
-        else None,
-        "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if exact_states else None,
-        "exact_states": exact_states,
-        "worst_state": check.note,
-    }
-    for name in ("q", "qd", "tau"):
-        row[f"worst_{name}"] = " ".join(repr(float(number)) for number in getattr(sample, name)[worst])
-    result.rows.append(row | {"passed": check.passed})
-    result.curves.setdefault(sample.name, {})[quantity] = {
-        name: np.sort(values) for name, values in in_eps.items()
-    }
-    result.shown = [
-        *list(row)[:SHOWN],
-        *(f"{engine.lower()}_from_exact_eps" for engine in (result.label, "MuJoCo")),
-    ]
+    quantity: str
+    unit: str
+    values: ArrayLike
+    mujoco_values: ArrayLike
+    scale: ArrayLike
+    exact: "Pairs | None" = None
 
 
-def closest(difference: np.ndarray, tolerance: np.ndarray) -> tuple[int, ...]:
+@dataclass(kw_only=True)
+class AgreementRow(Row):
+    """One quantity over the states of a sample; the column of `from_exact` is named after the engine."""
+
+    engine: str
+    scene: str
+    quantity: str
+    unit: str
+    states: int
+    largest_difference: float | None
+    worst_difference: float | None
+    bar: float
+    difference_over_bar: float | None
+    scale: float
+    difference: float | None = column("eps", default=None)
+    from_exact: float | None = column("eps", default=None)
+    mujoco_from_exact: float | None = column("eps", default=None)
+    exact_states: int | None
+    worst_state: str
+    worst_q: str
+    worst_qd: str
+    worst_tau: str
+    passed: bool
+
+    def columns(self) -> dict[str, tuple[str, Column]]:
+        columns = super().columns()
+        del columns["engine"]
+        named_after_engine = {"from_exact_eps": f"{self.engine.lower()}_from_exact_eps"}
+        return {named_after_engine.get(name, name): field for name, field in columns.items()}
+
+    @property
+    def urgency(self) -> tuple[bool, bool, float]:
+        share = self.difference_over_bar
+        return self.passed, True, math.inf if share is None else -share
+
+
+@dataclass
+class AgreementResult(Result):
+    """The result of an experiment that compares two engines at states."""
+
+    # by sample and quantity: the arrays of DISTANCES that are known, ascending
+    distances: dict[str, dict[str, dict[str, np.ndarray]]] = field(default_factory=dict)
+
+
+def agree(result: AgreementResult, sample: Sample, compared: Compared) -> None:
+    """Add a row and a check: the difference between two engines that is closest to its tolerance.
+
+    Where exact values are known there is also a check for each engine: of its distance from them.
+    """
+    quantity, exact = compared.quantity, compared.exact
+    measured = {quantity: worst_of_each(np.subtract(compared.values, compared.mujoco_values), compared.scale)}
+    if exact is not None and len(exact.high):
+        for engine, values in ((result.label, compared.values), ("MuJoCo", compared.mujoco_values)):
+            measured[f"{quantity}, {engine} to exact"] = distance_from_exact(exact, values, compared.scale)
+    checks = [check_closest(result, sample, name, compared.unit, *pair) for name, pair in measured.items()]
+    (check, worst), (difference, scale) = checks[0], measured[quantity]
+    in_eps = [np.sort(over(difference, EPS * scale)) for difference, scale in measured.values()]
+    distances = dict(zip(DISTANCES, in_eps))
+    result.distances.setdefault(sample.name, {})[quantity] = distances
+    row = AgreementRow(
+        engine=result.label,
+        scene=sample.name,
+        quantity=quantity,
+        unit=compared.unit,
+        states=len(sample.q),
+        largest_difference=float(difference.max()) if np.isfinite(difference).all() else None,
+        worst_difference=check.value,
+        bar=check.tolerance,
+        difference_over_bar=check.over_tolerance,
+        scale=float(scale[worst]),
+        exact_states=None if exact is None else len(exact.high),
+        worst_state=check.note,
+        worst_q=in_full(sample.q[worst]),
+        worst_qd=in_full(sample.qd[worst]),
+        worst_tau=in_full(sample.tau[worst]),
+        passed=check.passed,
+        **{name: float(values[-1]) for name, values in distances.items()},
+    )
+    result.rows.append(row)
+    result.shown = [name for name, (field, _) in row.columns().items() if field in SHOWN]
+
+
+def check_closest(
+    result: Result, sample: Sample, quantity: str, unit: str, difference: np.ndarray, scale: np.ndarray
+) -> tuple[Check, int]:
+    """A check of the state that is closest to its tolerance, and its index. difference, scale: (states,)."""
+    tolerance = FACTOR * EPS * scale
+    (k,) = closest(difference, tolerance)
+    note = sample.describe(k)
+    return result.check(sample.name, quantity, difference[k], tolerance[k], unit, note, rounding=True), k
+
+
+def in_full(numbers: np.ndarray) -> str:
+    """Numbers in one cell of a table, with all their digits."""
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+def closest(difference: ArrayLike, tolerance: ArrayLike) -> tuple[int, ...]:
     """Index of the difference with the largest share of its tolerance, which broadcasts to the same shape.
 
     NaN and any difference where the tolerance is 0 come first.
     """
-    difference, tolerance = np.broadcast_arrays(np.abs(difference), tolerance)
-    share = np.where(np.isfinite(difference), over(difference, tolerance), np.inf)
+    share = share_of(*np.broadcast_arrays(np.abs(difference), tolerance))
     return tuple(map(int, np.unravel_index(np.argmax(share), share.shape)))
 
 
-def over(difference: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def over(difference: np.ndarray, scale: ArrayLike) -> np.ndarray:
     """A difference over its scale, of the same shape; 0 / 0 is 0."""
+    scale = np.asarray(scale)
     return np.divide(difference, scale, out=np.where(difference == 0.0, 0.0, np.inf), where=scale > 0.0)
 
 
-def worst_of_each(differences: np.ndarray, scale: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """For each state the difference with the largest share of its scale, and that scale, (states,) each.
+def share_of(difference: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """The share of its scale that a difference takes; inf where it is not a number."""
+    return np.where(np.isfinite(difference), over(difference, scale), np.inf)
 
-    differences: (states, ...). scale: a number or (states,), or with as many dimensions as the differences; it may have more
-    states.
+
+def worst_of_each(differences: ArrayLike, scale: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Of each state the difference with the largest share of its scale, and that scale, (states,) each.
+
+    differences: (states, ...). scale: a number or (states,), or with as many dimensions as the differences;
+    it may have more states.
     """
-    states, scale = len(differences), np.asarray(scale, dtype=float)
+    differences, scale = np.abs(differences), np.asarray(scale, dtype=float)
+    states = len(differences)
     scale = scale[:states] if scale.ndim and len(scale) > 1 else scale
     if scale.ndim == 1:
-        scale = scale.reshape(-1, *[1] * (np.ndim(differences) - 1))
-    differences, scale = (a.reshape(states, -1) for a in np.broadcast_arrays(np.abs(differences), scale))
-    share = np.where(np.isfinite(differences), over(differences, scale), np.inf)
-    entry = np.arange(states), share.argmax(axis=1)
+        scale = scale.reshape(-1, *[1] * (differences.ndim - 1))
+    differences, scale = (a.reshape(states, -1) for a in np.broadcast_arrays(differences, scale))
+    entry = np.arange(states), share_of(differences, scale).argmax(axis=1)
     return differences[entry], scale[entry]
+
+
+def distance_from_exact(exact: "Pairs", values: ArrayLike, scale: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """The distance of an engine's values from the exact ones, of each state that has those."""
+    return worst_of_each(exact.distance(np.asarray(values)[: len(exact.high)]), scale)

@@ -1,24 +1,24 @@
 """Scales of the tolerances of every quantity, one for each entry.
 
-Entries differ in unit (kg and kg m2, N and N m) and size: one number for all would hide errors of small ones. The scale of an
-entry is the sum of the absolute values of the terms that are added in it, each at its maximum. With L_i the largest possible
-distance of the centre of mass of a body from the axis or anchor of joint i at that state:
+Entries differ in unit (kg and kg m2, N and N m) and size: one number for all would hide errors of small ones.
+The scale of an entry is the sum of the absolute values of the terms that are added in it, each at its
+maximum. With L_i the largest possible distance of the centre of mass of a body from the axis or anchor of
+joint i at that state:
 
-    a column of T_b     t_i = L_i + W / 8 + R / 64 of a hinge or ball, 1 of a slide, 0 if the joint does not move the body
+    a column of T_b     t_i = L_i + W / 8 + R / 64 of a hinge or ball, 1 of a slide, 0 if i moves it not
     of B_b              u_i = 1 of a hinge or ball, 0 of a slide
-    speeds              S = sum of |rates| that turn the body, V of those that slide it, w = V + sum of t_i |rates|
+    speeds              S: sum of |rates| that turn the body, V: that slide it, w = V + sum of t_i |rates|
     Mbar_ij             sum of m t_i t_j + |I| u_i u_j, and the armature
     h_i                 sum of t_i m (2 S w + g) + u_i (m V^2 + |I| S^2)
 
-W is the largest of all L_i: MuJoCo adds moments about the centre of mass of the whole tree, where terms of up to m W^2 leave
-m L_i^2, and each is rounded by eps: 64 eps (W / 8)^2. R is the largest distance of the body from the world's origin: its
-position, and so each of its levers, is rounded by eps R.
-Every term of a body is multiplied by k, the number of hinges and balls that turn it, at least 1: each turn passes on the
-rounding of those before it and adds its own. Where a system is solved, errors of eps in Mbar and in the forces are multiplied by
-|Mbar^-1|, entry by entry: a condition number would depend on the units.
+W is the largest of all L_i: MuJoCo adds moments about the centre of mass of the whole tree, where terms of up
+to m W^2 leave m L_i^2, and each is rounded by eps: 64 eps (W / 8)^2. R is the largest distance of the body
+from the world's origin: its position, and so each of its levers, is rounded by eps R. Every term of a body is
+multiplied by k, the number of hinges and balls that turn it, at least 1: each turn passes on the rounding of
+those before it and adds its own. Where a system is solved, errors of eps in Mbar and in the forces are
+multiplied by |Mbar^-1|, entry by entry: a condition number would depend on the units.
 """
 
-from collections.abc import Iterable
 from functools import cached_property
 
 import numpy as np
@@ -31,31 +31,30 @@ from .scale import FACTOR, levers, spring_scale
 
 
 def unit(tree: tmt.Tree, of_hinge: str, of_slide: str, of_both: str = "") -> str:
-    """The units of a quantity's entries for hinges and balls, for slides, and for one of each, as far as the tree has them."""
+    """The units of the entries for hinges and balls, for slides, and one of each, if the tree has them."""
     turns, slides = set(tree.kind) != {"slide"}, "slide" in tree.kind
     units = [of_hinge] * turns + [of_both] * (turns and slides) + [of_slide] * slides
     return " or ".join(filter(None, units))
 
 
 class Entries:
-    """Scales at states q (states, nq), qd (states, nv), each of the shape of its quantity, or of one that broadcasts to it."""
+    """Scales at q (states, nq), qd (states, nv), each of a shape that broadcasts to that of its quantity."""
 
     def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: ArrayLike = 0.0):
         self.tree, self.q = tree, q
         self.qd = np.broadcast_to(qd, (len(q), tree.coordinates.nv))
         from_joints, self.reach = levers(tree, q)
-        by_joint = np.array([tree.moves(b) for b in range(len(tree.mass))])
-        turns = np.array(tree.kind) != "slide"
-        self.count = np.maximum(1, (by_joint & turns).sum(axis=1))  # k, (m,)
-        moved, turns = (
-            np.array([per_speed(tree, joints) for joints in by_joint]),
-            np.array(per_speed(tree, turns)),
-        )
+        if (from_joints == from_joints[:1]).all():  # no slide moves a body farther from a hinge
+            from_joints = from_joints[:1]
+        joints_of_bodies = np.array([tree.moves(b) for b in range(len(tree.mass))])
+        is_turn = np.array(tree.kind) != "slide"
+        self.count = np.maximum(1, (joints_of_bodies & is_turn).sum(axis=1))  # k, (m,)
+        self.of_speed = [i for i, joint in enumerate(tree.coordinates.joints) for _ in tree.axis[joint.qd]]
+        moved, turns = joints_of_bodies[:, self.of_speed], is_turn[self.of_speed]
         self.slides, self.turns = moved & ~turns, moved & turns  # (m, nv)
-        of_speeds = per_speed(tree, range(len(tree.kind)))
-        arms = from_joints[..., of_speeds] + from_joints.max(initial=0.0) / 8
+        arms = from_joints[..., self.of_speed] + from_joints.max(initial=0.0) / 8
         arms = arms + self.reach.max(axis=0, initial=0.0)[:, None] / FACTOR
-        self.t = (self.slides + self.turns * arms).reshape(-1, *moved.shape)  # (1 or states, m, nv)
+        self.t = self.slides + self.turns * arms  # (1 or states, m, nv)
         self.mass = self.count * np.array(tree.mass)
         self.inertia = self.count * np.linalg.norm(tree.inertia, 2, axis=(1, 2))
         rates = np.abs(self.qd)
@@ -105,10 +104,8 @@ class Entries:
     @cached_property
     def potential_energy(self) -> np.ndarray:
         """J, (states,): m g L, and k (|q| + |rest|)^2 / 2."""
-        stiffness = np.array(per_speed(self.tree, self.tree.stiffness))
-        stretched = np.divide(
-            self.springs**2, stiffness, out=np.zeros_like(self.springs), where=stiffness > 0.0
-        )
+        stiffness, zero = np.array(self.tree.stiffness)[self.of_speed], np.zeros_like(self.springs)
+        stretched = np.divide(self.springs**2, stiffness, out=zero, where=stiffness > 0.0)
         return np.linalg.norm(self.tree.gravity) * (self.reach @ self.mass) + stretched.sum(axis=1) / 2.0
 
     @cached_property
@@ -130,7 +127,7 @@ class Entries:
         return self.bias + np.abs(tau) + np.array(self.tree.damping) * np.abs(self.qd) + self.springs
 
     def residual(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
-        """Of Mbar qdd and the forces together; a factorization of Mbar has terms up to sqrt(Mbar_ii Mbar_jj)."""
+        """Of Mbar qdd and the forces; a factorization of Mbar has terms up to sqrt(Mbar_ii Mbar_jj)."""
         root = np.sqrt(np.einsum("sii->si", self.M))
         sizes = self.added + root[:, :, None] * root[:, None, :]
         return np.einsum("sij,sj->si", sizes, np.abs(qdd)) + force
@@ -140,14 +137,9 @@ class Entries:
         return np.einsum("sij,sj->si", self.inverse, self.residual(force, np.broadcast_to(qdd, force.shape)))
 
     def closing(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
-        """Of the force that one engine computes for another's qdd, N m or N, (states, nv): the residual once for each engine.
+        """Of the force that an engine computes for another's qdd, (states, nv): the residual of each.
 
-        The qdd of a backward stable solver solves a system with errors of eps in Mbar and in the forces, whatever cond(Mbar).
+        The qdd of a backward stable solver solves a system with errors of eps in Mbar and in the forces,
+        whatever cond(Mbar).
         """
         return 2.0 * self.residual(force, np.broadcast_to(qdd, force.shape))
-
-
-def per_speed(tree: tmt.Tree, values: Iterable) -> list:
-    """One value for each speed, (nv,), of one for each joint."""
-    joints = tree.coordinates.joints
-    return [value for value, joint in zip(values, joints) for _ in range(3 if joint.kind == "ball" else 1)]

@@ -5,23 +5,24 @@ import numpy as np
 import tmt
 
 from ..core.check import About, Result
-from ..robots.case import Case, Coordinates, rates_at
+from ..core.finding import Finding
+from ..robots import Robot
+from ..robots.case import Case
+from ..robots.coordinates import Coordinates, rates_at
 from .entries import Entries
+from .order import ORDER_MARGIN as ORDER_MARGIN
 from .rounding import NARROW
 from .scale import EPS, FACTOR, gravity_scale
 
 LEFT = 0.1  # rad or m: the distance at which a held model has left its posture
 MOVES = 0.1  # rad or m: the least movement of a run without a holding torque that tests anything
-ORDER_MARGIN = 0.15  # of a measured order
 LEAST_JUDGED = (
-    0.1  # of a scene that states no minimum: the share of its time for which its runs must be judged
+    0.1  # the share of its time for which the runs of a scene that states no minimum must be judged
 )
 RESTS = 1e-9  # rad or m, and per s: what moves less only rounds
 STILL = 1e-3  # of the largest movement of its unit: a joint that moves less is not what a run tests
-COARSE_STEP, STABLE_TIME = (
-    0.01,
-    0.3,
-)  # s: from this step on, methods other than RK4 may be unstable after this time
+COARSE_STEP = 0.01  # s: from this step on, methods other than RK4 may be unstable after STABLE_TIME
+STABLE_TIME = 0.3  # s
 
 
 def step_in_words(case: Case, steps: int) -> str:
@@ -30,30 +31,33 @@ def step_in_words(case: Case, steps: int) -> str:
 
 
 def required_time(case: Case, scheme: str, dt: float) -> float:
-    """The shortest time, s, over which a run of a case by a scheme must be judged; 0: the scene states none."""
+    """The shortest time, s, for which a run by a scheme must be judged; 0: the scene states none."""
     judged = case.duration if case.scene.judged is None else case.scene.judged
     return judged if scheme == "rk4" or dt < COARSE_STEP else min(judged, STABLE_TIME)
 
 
 def widest_judged(case: Case, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """The width of the band from which on it judges a movement or a speed no more, (2 nv,) rad or m, then per s.
+    """The width from which on the band judges a movement or a speed no more, (2 nv,) rad or m, then per s.
 
-    NARROW for movements; and never more than what itself moves in the run q (times, nq), v (times, nv). Where a robot is held,
-    nothing has to move. A joint that hardly moves beside others of its unit has the widths of the joint that moves most.
+    NARROW for movements; and never more than what itself moves in the run q (times, nq), v (times, nv). Where
+    a robot is held, nothing has to move. A joint that hardly moves beside others of its unit has the widths
+    of the joint that moves most.
     """
-    nv, scene = case.coordinates.nv, case.scene
+    nv, scene, units = case.coordinates.nv, case.scene, np.array(case.coordinates.units)
     if scene.torque in ("hold", "servos") and not np.any(scene.speed) and not np.any(scene.targets):
         return np.concatenate([np.full(nv, NARROW), np.full(nv, np.inf)])
-    limits, units = [], np.array(case.coordinates.units)
-    for sizes, most in ((moved_from(q, q[0], case.coordinates), NARROW), (np.abs(v), np.inf)):
-        largest = np.nanmax(sizes, axis=0)
-        of_unit = np.array([largest[units == unit].max() for unit in units])
-        widest = np.where(largest >= STILL * of_unit, largest, of_unit)
-        moves = (
-            of_unit > RESTS if largest.max() > RESTS else np.ones(nv, bool)
-        )  # else another unit is what moves
-        limits.append(np.where(moves, np.minimum(widest, most), most))
-    return np.concatenate(limits)
+    moved = moved_from(q, q[0], case.coordinates)
+    return np.concatenate([widths(moved, units, NARROW), widths(np.abs(v), units, np.inf)])
+
+
+def widths(sizes: np.ndarray, units: np.ndarray, most: float) -> np.ndarray:
+    """The same of the movements or the speeds, `sizes` (times, nv), of joints with these units, (nv,)."""
+    largest = np.nanmax(sizes, axis=0)
+    of_unit = np.array([largest[units == unit].max() for unit in units])
+    width = np.minimum(np.where(largest >= STILL * of_unit, largest, of_unit), most)
+    if largest.max() > RESTS:
+        width = np.where(of_unit > RESTS, width, most)  # where another unit is what moves
+    return width
 
 
 def movement_unit(coordinates: Coordinates) -> str:
@@ -89,9 +93,10 @@ def departure(t: np.ndarray, q: np.ndarray, coordinates: Coordinates | None = No
 
 
 def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> float | None:
-    """The first time at which a run has stopped, is not finite, or has more energy than is possible; None: never.
+    """The first time at which a run is not finite, or has more energy than is possible; None: never.
 
-    Energy minus the work of the constant torque cannot grow. The bound on its gain is the energy that the motion can exchange.
+    Energy minus the work of the constant torque cannot grow. The bound on its gain is the energy that the
+    motion can exchange.
     """
     finite = np.isfinite(np.concatenate([q, qd], axis=1)).all(axis=1)
     q, qd = np.where(finite[:, None], q, case.q), np.where(finite[:, None], qd, 0.0)
@@ -105,8 +110,8 @@ def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> flo
 def work(case: Case, q: np.ndarray) -> np.ndarray:
     """The work of the constant torque and of a controller's position gains along a run, J, (times,).
 
-    At hinges and slides it follows from the movement from the start. A ball's torque is constant in axes that turn with it: its
-    work depends on the path, and is added up from state to state.
+    At hinges and slides it follows from the movement from the start. A ball's torque is constant in axes that
+    turn with it: its work depends on the path, and is added up from state to state.
     """
     if case.tree.position_gain:
         mean = case.tau - (fed_back_at(case.tree, q) + fed_back_at(case.tree, q[0])) / 2.0  # as it is linear
@@ -117,16 +122,17 @@ def work(case: Case, q: np.ndarray) -> np.ndarray:
 
 
 def fed_back_at(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
-    """The torque of a controller's position gains at positions q (..., nq), N m or N, (..., nv), to be subtracted."""
+    """The torque of a controller's position gains at q (..., nq), N m or N, (..., nv), to be subtracted."""
     return q[..., tree.coordinates.first_positions] @ np.array(tree.position_gain).T
 
 
 def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     """The largest energy that the motion of a case can have exchanged up to each state of a run, J, (times,).
 
-    The initial kinetic energy, that of the springs, the whole potential range of the stated robot (twice the sum of m g reach),
-    and what servos store. Slides have no such range: where it is larger, the largest work `done` of the torque plus the weight
-    times the distance along the slides. Rounding may add 64 eps of 1 J for each inertia and stiffness of 1.
+    The initial kinetic energy, that of the springs, the whole potential range of the stated robot (twice the
+    sum of m g reach), and what servos store. Slides have no such range: where it is larger, the largest work
+    `done` of the torque plus the weight times the distance along the slides. Rounding may add 64 eps of 1 J
+    for each inertia and stiffness of 1.
     """
     tree, coordinates = case.tree, case.coordinates
     exchange = 2.0 * gravity_scale(
@@ -135,7 +141,7 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     exchange = exchange + tmt.energy(q[0], case.v, tree) - tmt.potential_energy(q[0], tree)
     if (
         tree.position_gain
-    ):  # servos return energy until they exert no force; the remaining torque is that of a motor
+    ):  # servos return energy until they exert no force; the other torque is that of a motor
         gain = np.array(tree.position_gain)
         pull, give = case.tau - fed_back_at(tree, q[0]), np.linalg.pinv(gain, hermitian=True)
         exchange = exchange + pull @ give @ pull / 2.0
@@ -161,11 +167,11 @@ def number_or_nan(number: float | None) -> float:
     return np.nan if number is None else number
 
 
-def leaves_no_digits(robot: object) -> str | None:
-    """Why no run of a file's robot can be compared, if rounding exceeds the judged error within two steps; else None.
+def leaves_no_digits(robot: Robot) -> Finding | None:
+    """Why no run of a file's robot can be compared: rounding exceeds the judged error within two steps.
 
-    A force that moves a joint at the rate r has a rounding error of 64 eps of itself. A step multiplies an error by (r dt)^2
-    where that is far above 1: two steps give 64 eps (r dt)^4 of 1 rad or 1 m.
+    A force that moves a joint at the rate r has a rounding error of 64 eps of itself. A step multiplies an
+    error by (r dt)^2 where that is far above 1: two steps give 64 eps (r dt)^4 of 1 rad or 1 m.
     """
     if not (robot.is_read and robot.cases_of_torque):
         return None
@@ -173,7 +179,4 @@ def leaves_no_digits(robot: object) -> str | None:
     rate, dt = max(rates_at(case.tree, case.q)), case.scene.dt
     if not FACTOR * EPS * (rate * dt) ** 4 > NARROW:
         return None
-    return (
-        f"the fastest rate of the {robot.noun} times the finest step, {rate:.1e} 1/s x {dt:.1e} s = {rate * dt:.1e}, is too "
-        "large: after two steps only rounding error remains"
-    )
+    return Finding("shared", "leaves_no_digits", {"noun": robot.noun, "rate": rate, "dt": dt})

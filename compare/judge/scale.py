@@ -1,14 +1,14 @@
 """Scales of tolerances: from the stated numbers and TMT's own terms, for each state.
 
-A tolerance is 64 x eps x scale. The scale of a quantity is the sum of the absolute values of the terms that are added in it,
-times the condition number of Mbar where a linear system is solved; it is never the quantity itself, which may be zero.
+A tolerance is 64 x eps x scale. The scale of a quantity is the sum of the absolute values of the terms that
+are added in it; it is never the quantity itself, which may be zero. `entries.py` has the scales of all
+quantities, entry by entry.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import tmt
-from tmt import literal
 from tmt.derivation import method
 from tmt.literal import gather
 
@@ -17,82 +17,62 @@ FACTOR = 64
 
 
 def levers(tree: tmt.Tree, q: ArrayLike | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Largest possible distances of each centre of mass, m: from each hinge's axis or ball, and from the world's origin.
+    """Largest possible distances of centres of mass, m: from each hinge's axis or ball, and from the origin.
 
-    Lengths added along the tree, (..., m, joints), 0 for a joint that does not turn the body, and (..., m). q: positions
-    (..., nq), of which the displacements of slides are added; None: none are displaced. The first have no leading shape where
-    no slide comes after a hinge.
+    Lengths added along the tree, (..., m, joints), 0 for a joint that does not turn the body, and (..., m).
+    q: positions (..., nq), of which the displacements of slides are added; None: none are displaced.
     """
     q = np.array(tree.zero) if q is None else np.asarray(q, float)
-    lengths = []  # of each joint, from the joint before it
+    links = np.zeros((*q.shape[:-1], len(tree.kind)))  # of each joint, from the joint before it
     for i, joint in enumerate(tree.coordinates.joints):
         moved = np.abs(q[..., joint.q.start] - tree.reference[i]) if joint.kind == "slide" else 0.0
-        lengths.append(np.linalg.norm(tree.offset[i]) + moved)
-    from_joints = [[0.0] * len(lengths) for _ in tree.mass]
+        links[..., i] = np.linalg.norm(tree.offset[i]) + moved
+    from_joints = np.zeros((*q.shape[:-1], len(tree.mass), len(tree.kind)))
     from_origin = np.zeros((*q.shape[:-1], len(tree.mass)))
-    for b, (joint, com) in enumerate(zip(tree.body_joint, tree.com)):
-        distance = np.linalg.norm(com)
-        while joint >= 0:
-            if tree.kind[joint] != "slide":
-                from_joints[b][joint] = distance
-            distance = distance + lengths[joint]
-            joint = tree.parent[joint]
-        from_origin[..., b] = distance
-    shape = np.broadcast_shapes(*(np.shape(distance) for row in from_joints for distance in row))
-    columns = [[np.broadcast_to(distance, shape) for distance in row] for row in from_joints]
-    return np.moveaxis(np.array(columns), (0, 1), (-2, -1)), from_origin
+    for b, (i, com) in enumerate(zip(tree.body_joint, tree.com)):
+        from_origin[..., b] = np.linalg.norm(com)
+        while i >= 0:
+            if tree.kind[i] != "slide":
+                from_joints[..., b, i] = from_origin[..., b]
+            from_origin[..., b] += links[..., i]
+            i = tree.parent[i]
+    return from_joints, from_origin
 
 
 def gravity_scale(tree: tmt.Tree, q: ArrayLike | None = None) -> float | np.ndarray:
-    """Sum of m g times the largest distance from the origin, N m or J; with q (..., nq) that of these positions, (...)."""
+    """Sum of m g times the largest distance from the origin, N m or J; at q (..., nq): (...)."""
     sums = np.linalg.norm(tree.gravity) * (levers(tree, q)[1] @ np.array(tree.mass))
     return float(sums) if q is None else sums
 
 
 def motion_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """Convective and Euler terms of each entry of the bias, by their absolute values, N m or N, (states, nv)."""
-    parts, shape = method.bodies(tree, list(q.T), list(qd.T)), q.shape[:1]
-    T, B = (gather((zip(*columns) for columns in both), shape) for both in zip(*((b.T, b.B) for b in parts)))
-    vectors = zip(*((b.v_conv, b.w_conv, b.omega) for b in parts))
-    v_conv, w_conv, omega = (gather(map(list, of_bodies), shape) for of_bodies in vectors)
-    inertia = np.array(tree.inertia)
+    """Convective and Euler terms of each entry of the bias, absolute values, N m or N, (states, nv)."""
+    bodies, inertia = method.bodies(tree, list(q.T), list(qd.T)), np.array(tree.inertia)
+    T, B, v_conv, w_conv, omega = (
+        gather([getattr(body, name) for body in bodies], q.shape[:1])
+        for name in ("T", "B", "v_conv", "w_conv", "omega")
+    )
     moments = np.abs(np.einsum("bij,sbj->sbi", inertia, w_conv))
     moments += np.abs(np.cross(omega, np.einsum("bij,sbj->sbi", inertia, omega)))
-    newton = np.einsum("sbci,b,sbc->si", np.abs(T), tree.mass, np.abs(v_conv))
-    euler = np.einsum("sbci,sbc->si", np.abs(B), moments)
+    newton = np.einsum("sbic,b,sbc->si", np.abs(T), tree.mass, np.abs(v_conv))
+    euler = np.einsum("sbic,sbc->si", np.abs(B), moments)
     return newton + euler
-
-
-def mass_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
-    """Largest entry of Mbar, kg m2, (states,)."""
-    return np.abs(literal.mass_matrix(q, tree)).max(axis=(1, 2))
-
-
-def acceleration_scale(
-    tree: tmt.Tree, q: np.ndarray, force: ArrayLike, size: ArrayLike | None = None
-) -> np.ndarray:
-    """|Mbar^-1| (|Mbar| |qdd| + force), rad/s2, (states,): the effect of errors of eps in Mbar and in the force on qdd.
-
-    force: scale of the forces, N m, (states,). size: |qdd|; None: its bound |Mbar^-1| force, for which the scale is
-    (cond(Mbar) + 1) |Mbar^-1| force. Norms of Mbar are its eigenvalues.
-    """
-    eigenvalues = np.linalg.eigvalsh(literal.mass_matrix(q, tree))
-    size = force / eigenvalues[:, 0] if size is None else size
-    return (eigenvalues[:, -1] * size + force) / eigenvalues[:, 0]
 
 
 def gain_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """|P| |q| + |S| |qd| of a controller's gains, N m or N, (..., nv)."""
-    positions = np.abs(q)[..., tree.coordinates.first_positions]
-    gains = zip((tree.position_gain, tree.speed_gain), (positions, np.abs(qd)))
-    return sum((values @ np.abs(gain).T for gain, values in gains if gain), np.zeros(np.shape(qd)))
+    scale, positions = np.zeros(np.shape(qd)), np.abs(q)[..., tree.coordinates.first_positions]
+    for gain, values in ((tree.position_gain, positions), (tree.speed_gain, np.abs(qd))):
+        if gain:
+            scale += values @ np.abs(gain).T
+    return scale
 
 
 def spring_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     """k (|q| + |rest|) of the springs, N m or N, (..., nv); for a ball, which turns by pi at most, k pi."""
     scale = np.zeros((*q.shape[:-1], tree.coordinates.nv))
     for k, joint in zip(tree.stiffness, tree.coordinates.joints):
-        scale[..., joint.qd] = k * (
-            np.pi if joint.kind == "ball" else np.abs(q[..., joint.q]) + np.abs(tree.rest[joint.q.start])
-        )
+        is_ball = joint.kind == "ball"
+        stretch = np.pi if is_ball else np.abs(q[..., joint.q]) + np.abs(tree.rest[joint.q.start])
+        scale[..., joint.qd] = k * stretch
     return scale

@@ -135,19 +135,16 @@ def test_the_printed_digits_of_f2_and_f3_are_met_to_half_a_unit_of_the_last(off,
 
 def test_each_column_is_whose_it_says_and_f4_is_asked_under_the_torque_of_c():
     of_moon = published.rows(setup_of(MOON)).rows
-    moon = {(row["item"], row["component"]): row for row in of_moon}
-    ours, least = (
-        tmt.gravity_balance(np.zeros(3)),
-        np.linalg.eigvalsh(tmt.mass_matrix(ARM.posture("hanging"))),
-    )
+    moon = {(row.item, row.component): row for row in of_moon}
+    ours, M = tmt.gravity_balance(np.zeros(3)), tmt.mass_matrix(ARM.posture("hanging"))
+    least, *_, largest = np.linalg.eigvalsh(M)
     theirs = parse(MOON, tmt.ARM).of(ARM.case()).gravity_balance(np.zeros(3))
-    assert [moon["c", name]["tmt"] for name in ARM.joints] == list(ours)
-    assert [moon["c", name]["mujoco"] for name in ARM.joints] == list(theirs)
+    assert [moon["c", name].tmt for name in ARM.joints] == list(ours)
+    assert [moon["c", name].mujoco for name in ARM.joints] == list(theirs)
     of_alpha = moon["c", "alpha"]
-    assert of_alpha["exact"] == pytest.approx(-2.20725) and of_alpha["tolerance"] == pytest.approx(
-        0.5e-4, rel=1e-6
-    )
+    assert of_alpha.exact == pytest.approx(-2.20725) and of_alpha.tolerance == pytest.approx(0.5e-4, rel=1e-6)
     for name in ("tmt", "exact"):
-        assert max(abs(float(row[name])) for row in of_moon if row["item"] == "f4") < 1e-12
-    allowed = 64 * EPS * (least[-1] / least[0] + 1.0) / least[0] * 9.4176
-    assert moon["f2", "alpha"]["tolerance"] == pytest.approx(allowed, rel=1e-9)
+        assert max(abs(float(getattr(row, name))) for row in of_moon if row.item == "f4") < 1e-12
+    allowed = 64 * EPS * (largest / least + 1.0) / least * 9.4176
+    assert moon["f2", "alpha"].tolerance == pytest.approx(allowed, rel=1e-9)
+    assert published.scales(ARM.tree, ARM.posture("hanging"))["mass_matrix"] == np.abs(M).max()

@@ -5,10 +5,10 @@ import pytest
 from edited import CART, STONE, setup_between
 from models import random_tree
 
-from compare.core.check import Result
 from compare.core.text import say
 from compare.experiments import acceleration, figures_sketch, gravity, kinematics, mass
 from compare.experiments import figures as draw
+from compare.judge.agree import AgreementResult
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 
@@ -89,10 +89,10 @@ def test_an_error_of_a_number_fails_the_checks_that_depend_on_it(text, old, new,
 
 
 def test_the_caption_of_distances_says_who_is_how_far_from_what():
-    curves = {"TMT to MuJoCo": [1.0, 5.0], "TMT to exact": [1.5, 2.0], "MuJoCo to exact": [2.5, 3.0]}
-    of_bias = {name: np.array([0.5, 0.7]) for name in curves}
-    of_mass = {name: np.array(values) for name, values in curves.items()}
-    result = Result("mass", curves={"random states": {"Mbar": of_mass, "bias": of_bias}})
+    of_mass = {"difference": [1.0, 5.0], "from_exact": [1.5, 2.0], "mujoco_from_exact": [2.5, 3.0]}
+    of_bias = dict.fromkeys(of_mass, np.array([0.5, 0.7]))
+    of_mass = {name: np.array(values) for name, values in of_mass.items()}
+    result = AgreementResult("mass", distances={"random states": {"Mbar": of_mass, "bias": of_bias}})
     *_, caption = draw.draw_distances(result, ["Mbar", "bias"])
     expected = {"worst": 5.0, "of_worst": "Mbar", "exact": True}
     assert caption.kind == "distances" and {name: caption.values[name] for name in expected} == expected

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from compare.core.check import Result
-from compare.judge.agree import agree, closest, worst_of_each
+from compare.judge.agree import AgreementResult, Compared, agree, closest, worst_of_each
 from compare.robots.arm import ARM
 from compare.robots.states import Sample
 from tmt.exact.many import Pairs
@@ -20,9 +20,9 @@ def sample(states=4, exact=2):
 
 def agreed(ours, theirs, scale, exact=None):
     """The checks and the row of one quantity, (states, ...)."""
-    result, of = Result("mass"), sample(len(ours), exact=0 if exact is None else 2)
+    result, states = AgreementResult("mass"), sample(len(ours), exact=0 if exact is None else 2)
     exact = np.zeros((0, 1)) if exact is None else np.array(exact)[:, None]
-    agree(result, of, "Mbar", "kg m2", np.array(ours), np.array(theirs), scale, Pairs(exact, 0.0 * exact))
+    agree(result, states, Compared("Mbar", "kg m2", ours, theirs, scale, Pairs(exact, 0.0 * exact)))
     return result.checks, result.rows[0]
 
 
@@ -62,15 +62,15 @@ def test_a_difference_is_allowed_64_eps_of_its_own_states_scale(eps, passes, sig
     theirs, scale = np.zeros((4, 1)), np.array([4.0, 1.0, 2.0, 8.0])
     theirs[place] = sign * eps * EPS * scale[place]
     (check,), row = agreed(np.zeros((4, 1)), theirs, scale)
-    assert check.passed is row["passed"] is passes
+    assert check.passed is row.passed is passes
     assert (check.value, check.tolerance, check.rule) == (
         abs(theirs[place, 0]),
         64 * EPS * scale[place],
         "at most",
     )
-    assert (row["difference_over_bar"], row["bar"], row["scale"]) == (eps / 64, check.tolerance, scale[place])
+    assert (row.difference_over_bar, row.bar, row.scale) == (eps / 64, check.tolerance, scale[place])
     for name, values in (("worst_q", sample().q), ("worst_qd", sample().qd), ("worst_tau", sample().tau)):
-        assert row[name] == " ".join(map(repr, values[place].tolist()))
+        assert getattr(row, name) == " ".join(map(repr, values[place].tolist()))
 
 
 @pytest.mark.parametrize("eps, passes", [(63, True), (65, False)])
@@ -81,20 +81,15 @@ def test_each_entry_has_its_own_tolerance_if_the_scale_has(eps, passes, entry):
     scale[entry], theirs[entry] = 1e-3, eps * EPS * 1e-3
     (check,), row = agreed(np.zeros((3, 2, 2)), theirs, scale)
     assert check.passed is passes and check.value == theirs[entry] and check.tolerance == 64 * EPS * 1e-3
-    assert (row["scale"], row["difference_eps"]) == (1e-3, eps)
-    assert row["largest_difference"] == max(theirs[entry], 50 * EPS)
+    assert (row.scale, row.difference) == (1e-3, eps)
+    assert row.largest_difference == max(theirs[entry], 50 * EPS)
 
 
 @pytest.mark.parametrize("bad", [np.nan, -np.inf])
 @pytest.mark.parametrize("scale", [1.0, np.ones((3, 1))], ids=["one scale", "a scale of each entry"])
 def test_a_value_that_is_no_number_fails_wherever_it_is(bad, scale):
     (check,), row = agreed([[0.0], [0.0], [bad]], [[0.0], [1e-20], [0.0]], scale)
-    assert (
-        not check.passed
-        and check.value is None
-        and row["largest_difference"] is None
-        and row["passed"] is False
-    )
+    assert not check.passed and check.value is None and row.largest_difference is None and row.passed is False
 
 
 @pytest.mark.parametrize("eps, passes", [(63, True), (65, False)])
@@ -108,12 +103,15 @@ def test_the_distance_of_each_engine_from_the_exact_value_is_checked(eps, passes
         by_name[f"Mbar, {engine} to exact"].passed is passes
         and by_name[f"Mbar, {other} to exact"].value == 0.0
     )
-    assert (row[f"{engine.lower()}_from_exact_eps"], row[f"{other.lower()}_from_exact_eps"]) == (eps, 0.0)
+    assert (
+        row.record()[f"{engine.lower()}_from_exact_eps"],
+        row.record()[f"{other.lower()}_from_exact_eps"],
+    ) == (eps, 0.0)
     in_order = agreed([[1.0], [5.0]], [[1.0], [5.0]], 1.0, exact=[1.0, 5.0])[0]
     assert all(check.value == 0.0 for check in in_order)
     checks, row = agreed(off, right, 1.0)  # without an exact state nothing is compared with one
     assert [check.quantity for check in checks] == ["Mbar"]
-    assert row["tmt_from_exact_eps"] is None and row["exact_states"] == 0
+    assert row.from_exact is None and row.exact_states == 0
 
 
 @pytest.mark.parametrize("difference, tolerance, place", [

@@ -7,7 +7,6 @@ import pytest
 
 import tmt
 from compare.judge import entries, scale
-from tmt import literal
 
 MOMENTS = ((0.02, 0.03, 0.04), (0.001, 0.002, 0.002), (0.01, 0.01, 0.02))
 TREE = tmt.Tree(  # a slide, on it a hinge, on that a ball; and a hinge of its own beside them
@@ -141,14 +140,3 @@ def test_what_moves_is_the_sum_of_its_absolute_terms():
             moment = np.abs(inertia @ w[b]) + np.abs(np.cross(omega, inertia @ omega))
             terms += np.abs(T[b]).T @ (tmt.ARM.mass[b] * np.abs(v[b])) + np.abs(B[b]).T @ moment
         assert sizes == pytest.approx(terms, rel=1e-12)
-
-
-def test_the_scales_of_mass_and_acceleration():
-    M = literal.mass_matrix(ANGLES)
-    assert np.array_equal(scale.mass_scale(tmt.ARM, ANGLES), [abs(m).max() for m in M])
-    norm, inverse = (np.array([np.linalg.norm(m, 2) for m in of]) for of in (M, np.linalg.inv(M)))
-    force = np.linspace(1.0, 20.0, 20)
-    assert np.allclose(
-        scale.acceleration_scale(tmt.ARM, ANGLES, force), (inverse * norm + 1.0) * inverse * force
-    )
-    assert np.allclose(scale.acceleration_scale(tmt.ARM, ANGLES, force, 2.0), inverse * (norm * 2.0 + force))

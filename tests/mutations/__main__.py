@@ -15,11 +15,9 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import closing, suppress
-from functools import partial
 from importlib.util import cache_from_source
 from itertools import pairwise
 from pathlib import Path
-from queue import SimpleQueue
 from tempfile import TemporaryDirectory
 
 import psutil
@@ -34,16 +32,10 @@ BLIND = (
     "test_structure.py",
     "test_interrupt.py",
 )  # they see any edit, or no edit of a judge
-SLICES = (
-    0,
-    4,
-    16,
-    1000,
-)  # the files of tests run in parts, the nearest first: most edits are caught by the first
-PATIENCE = (
-    90.0,
-    20.0,
-)  # s that a part may take, and for each of its files: then an edit counts as an endless run
+# the files of tests run in parts, the nearest first: most edits are caught by the first
+SLICES = 0, 4, 16, 1000
+# s that a part may take, and for each of its files: then an edit counts as an endless run
+PATIENCE, PATIENCE_WITH_FILE = 90.0, 20.0
 STATUS = """exit status: 0 no edit survives; 1 some do; 2 an edit does not apply to the sources, or a test that caught one fails
 without it too"""
 
@@ -51,9 +43,8 @@ without it too"""
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; the exit status."""
     parser = argparse.ArgumentParser("python -m tests.mutations", description=__doc__, epilog=STATUS)
-    parser.add_argument(
-        "words", nargs="*", metavar="WORD", help="only edits that have one of these in their name"
-    )
+    words = "only edits that have one of these in their name"
+    parser.add_argument("words", nargs="*", metavar="WORD", help=words)
     parser.add_argument("--list", action="store_true", help="list the edits, run nothing")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="runs side by side (%(default)s)")
     options = parser.parse_args(arguments)
@@ -72,10 +63,8 @@ def main(arguments: list[str] | None = None) -> int:
         copies = [copied(Path(folder, str(number))) for number in range(options.jobs)]
         with closing(outcomes(places, copies)) as tried:
             for edit, seconds, caught in tried:
-                print(
-                    f"{seconds:5.1f} s  {edit.name}: {f'caught by {caught}' if caught else 'SURVIVED'}",
-                    flush=True,
-                )
+                outcome = f"caught by {caught}" if caught else "SURVIVED"
+                print(f"{seconds:5.1f} s  {edit.name}: {outcome}", flush=True)
                 if caught.startswith("tests"):
                     caught_by.add(caught.split("[")[0])
                 if not caught:
@@ -94,19 +83,17 @@ def copied(folder: Path) -> Path:
 
 def outcomes(places: dict[Edit, Place], copies: list[Path]) -> Iterator[tuple[Edit, float, str]]:
     """Each edit as it ends: its seconds, and which test caught it; empty if it survived."""
-    idle = SimpleQueue()
-    for copy in copies:
-        idle.put(copy)
+    idle = list(copies)
 
     def tried(edit: Edit, place: Place) -> tuple[Edit, float, str]:
-        copy, started = idle.get(), time.perf_counter()
+        copy, started = idle.pop(), time.perf_counter()
         name = place.path.relative_to(PROJECT)
         files = nearest(edit, name)
         write(copy / name, place.after)
         parts = [files[start:end] for start, end in pairwise(SLICES) if files[start:end]]
-        caught = next(filter(None, map(partial(first_failed, copy), parts)), "")
+        caught = next(filter(None, (first_failed(copy, part) for part in parts)), "")
         write(copy / name, place.before)
-        idle.put(copy)
+        idle.append(copy)
         return edit, time.perf_counter() - started, caught
 
     with ThreadPoolExecutor(len(copies)) as pool:
@@ -115,7 +102,7 @@ def outcomes(places: dict[Edit, Place], copies: list[Path]) -> Iterator[tuple[Ed
             yield from (done.result() for done in as_completed(under_way))
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
-            while not all(one.done() for one in under_way):  # interrupted
+            while not all(future.done() for future in under_way):  # interrupted
                 end_children(os.getpid())
                 time.sleep(0.05)
 
@@ -131,7 +118,7 @@ def first_failed(copy: Path, tests: list[str]) -> str:
     command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-rfE", *tests]
     own = {"PYTHONPATH": copy, "TMT_CACHE": copy.parent / "store", "TMPDIR": copy.parent, "COLUMNS": "200"}
     own["PYTHONDONTWRITEBYTECODE"] = ""  # or each run would compile all sources again
-    limit, log = PATIENCE[0] + PATIENCE[1] * len(tests), copy.with_suffix(".log")
+    limit, log = PATIENCE + PATIENCE_WITH_FILE * len(tests), copy.with_suffix(".log")
     with log.open("w") as output:
         streams = {"stdin": subprocess.DEVNULL, "stdout": output, "stderr": output}
         process = subprocess.Popen(command, cwd=copy, env=os.environ | own, start_new_session=True, **streams)
@@ -177,8 +164,7 @@ def nearest(edit: Edit, name: Path) -> list[str]:
 
 
 def difference(place: Place) -> str:
-    texts = (text.splitlines() for text in (place.before, place.after))
-    name = place.path.relative_to(PROJECT)
+    texts, name = (place.before.splitlines(), place.after.splitlines()), place.path.relative_to(PROJECT)
     return "\n".join(difflib.unified_diff(*texts, f"a/{name}", f"b/{name}", n=1, lineterm=""))
 
 

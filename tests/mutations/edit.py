@@ -3,7 +3,6 @@
 import ast
 import copy
 import re
-import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -12,7 +11,7 @@ from typing import NamedTuple
 
 PACKAGES = ("compare", "tmt")
 DEFINITIONS = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
-NOT_COMPARED = ("ctx", "kind", "type_comment")
+Holes = dict[str, ast.AST | list[ast.AST]]  # what they stand for
 
 
 @dataclass(frozen=True)
@@ -21,7 +20,7 @@ class Edit:
 
     module: a file by the end of its dotted name, "verdict" or "trajectory.rows", or the name of a folder of files;
     where: a function, Class.method, function.inner function, or a name that is assigned in the module or a class.
-    old: an expression, a keyword argument (name=value) or a statement; new: what replaces it (statements: any number).
+    old: an expression, a keyword argument (name=value) or a statement; new: what replaces it.
     In both _1, _2 stand for any expression (on a line of its own: statement), *_1 at the end of a call for all other arguments.
     nth: which one, from 1, if there are several. breaks: what the edited program does.
     """
@@ -43,15 +42,30 @@ class DoesNotApply(ValueError):
 
 
 class Place(NamedTuple):
-    """Where an edit applies: the file, and its text without and with the edit."""
+    """Where an edit applies: a node of a file, and what stands in its place."""
 
     path: Path
-    before: str
-    after: str
+    old: ast.AST
+    new: ast.AST
+
+    @property
+    def before(self) -> str:
+        return text_of(self.path)
+
+    @property
+    def after(self) -> str:
+        """The text with the edit; the definition around it is in the layout of `ast`."""
+        statement = next(part for part in parsed(self.path).body if self.old in ast.walk(part))
+        start = min(part.lineno for part in (statement, *getattr(statement, "decorator_list", ())))
+        lines = self.before.splitlines(keepends=True)
+        edited = copy.deepcopy(
+            statement, {id(self.old): self.new}
+        )  # what is copied already is taken as it is
+        return "".join([*lines[: start - 1], ast.unparse(edited), "\n", *lines[statement.end_lineno :]])
 
 
 def applied(project: Path, edit: Edit) -> Place:
-    """The file that the edit changes, with its text before and after."""
+    """Where the edit applies in the sources of a project."""
     paths, module = sources(project), f".{edit.module}."
     named = [path for path, name in paths.items() if module in name and scopes(path, edit.where)]
     holding = named or [path for path in paths if scopes(path, edit.where)]  # moved to another file
@@ -62,25 +76,15 @@ def applied(project: Path, edit: Edit) -> Place:
         (path, *hit) for path in holding for scope in scopes(path, edit.where) for hit in matches(scope, old)
     ]
     if not 1 <= (edit.nth or 1) <= len(hits) or (edit.nth is None and len(hits) > 1):
-        raise DoesNotApply(
-            f"{edit.name}: {len(hits)} times {edit.old} in {edit.where}; one is expected, or nth"
-        )
+        what = f"{len(hits)} times {edit.old} in {edit.where}"
+        raise DoesNotApply(f"{edit.name}: {what}; one is expected, or nth")
     path, node, holes = hits[(edit.nth or 1) - 1]
-    before = text_of(path)
-    lines = before.encode().splitlines(keepends=True)
-    places = (node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset)
-    start, end = (sum(map(len, lines[: line - 1])) + column for line, column in places)
-    new = ast.unparse(Filled(holes).visit(ast.parse(textwrap.dedent(edit.new).strip())))
-    if isinstance(node, ast.stmt):
-        new = textwrap.indent(new, " " * node.col_offset).lstrip()
-    elif isinstance(node, ast.expr) and not isinstance(node, ast.Starred):
-        new = f"({new})"
-    after = (before.encode()[:start] + new.encode() + before.encode()[end:]).decode()
-    try:
-        ast.parse(after)
-    except SyntaxError:
-        raise DoesNotApply(f"{edit.name}: {edit.old} cannot be replaced") from None
-    return Place(path, before, after)
+    new = filled(read(edit.new), holes)
+    if isinstance(node, ast.keyword):
+        new = as_keyword(new)
+    elif isinstance(node, ast.stmt) and isinstance(new, ast.expr):
+        new = ast.Expr(new)
+    return Place(path, node, new)
 
 
 @cache
@@ -90,18 +94,20 @@ def sources(project: Path) -> dict[Path, str]:
     return {path: f".{'.'.join(path.relative_to(project).with_suffix('').parts)}." for path in paths}
 
 
-parsed = cache(ast.parse)
-
-
 @cache
 def text_of(path: Path) -> str:
     return path.read_text(encoding="utf-8")
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(text_of(path))
+
+
+@cache
 def scopes(path: Path, where: str) -> list[ast.AST]:
     """The nodes of this qualified name: definitions, or statements that assign it."""
-    text = text_of(path)
-    nodes = [parsed(text)] if where.split(".")[0] in text else []
+    nodes: list[ast.AST] = [parsed(path)]
     for name in where.split("."):
         nodes = [inner for node in nodes for inner in named_inside(node, name)]
     return nodes
@@ -113,39 +119,38 @@ def named_inside(node: ast.AST, name: str) -> Iterator[ast.AST]:
         if isinstance(child, DEFINITIONS):
             if child.name == name:
                 yield child
-        elif isinstance(child, ast.Assign | ast.AnnAssign) and assigns(child, name):
-            yield child
+        elif isinstance(child, ast.Assign | ast.AnnAssign):
+            targets = child.targets if isinstance(child, ast.Assign) else [child.target]
+            assigned = [getattr(part, "id", None) for target in targets for part in ast.walk(target)]
+            if name in assigned:
+                yield child
         else:
             yield from named_inside(child, name)
 
 
-def assigns(statement: ast.Assign | ast.AnnAssign, name: str) -> bool:
-    targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
-    return any(getattr(node, "id", None) == name for target in targets for node in ast.walk(target))
-
-
 def read(text: str) -> ast.AST:
     """The statement or the expression that the text is."""
-    (statement,) = ast.parse(textwrap.dedent(text).strip()).body
+    (statement,) = ast.parse(text).body
     return statement.value if isinstance(statement, ast.Expr) else statement
 
 
-def matches(node: ast.AST, pattern: ast.AST) -> Iterator[tuple[ast.AST, dict]]:
+def as_keyword(node: ast.AST) -> ast.AST:
+    """The argument name=value of an assignment; anything else as it is."""
+    if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+        return ast.keyword(arg=node.targets[0].id, value=node.value)
+    return node
+
+
+def matches(node: ast.AST, pattern: ast.AST) -> Iterator[tuple[ast.AST, Holes]]:
     """Every node in a function or statement that matches a pattern, in the order of the source, with what the holes stand for."""
-    holes, wanted = {}, pattern
-    if (
-        isinstance(node, ast.keyword)
-        and isinstance(pattern, ast.Assign)
-        and isinstance(pattern.targets[0], ast.Name)
-    ):
-        wanted = ast.keyword(arg=pattern.targets[0].id, value=pattern.value)
-    if fits(wanted, node, holes):
+    holes: Holes = {}
+    if fits(as_keyword(pattern) if isinstance(node, ast.keyword) else pattern, node, holes):
         yield node, holes
     for child in ast.iter_child_nodes(node):
         yield from matches(child, pattern)
 
 
-def fits(pattern: object, node: object, holes: dict) -> bool:
+def fits(pattern: object, node: object, holes: Holes) -> bool:
     """Whether a node is what the pattern says; fills the holes."""
     if (hole := hole_of(pattern)) and isinstance(node, ast.AST):
         return ast.dump(holes.setdefault(hole, node)) == ast.dump(node)
@@ -158,7 +163,7 @@ def fits(pattern: object, node: object, holes: dict) -> bool:
     if type(pattern) is not type(node):
         return False
     if isinstance(pattern, ast.AST):
-        fields = [name for name in pattern._fields if name not in NOT_COMPARED]
+        fields = [name for name in pattern._fields if name != "ctx"]
         return all(fits(getattr(pattern, name), getattr(node, name), holes) for name in fields)
     return pattern == node
 
@@ -174,22 +179,15 @@ def rest_of(call: ast.Call) -> str | None:
     return hole_of(call.args[-1].value) if call.args and isinstance(call.args[-1], ast.Starred) else None
 
 
-class Filled(ast.NodeTransformer):
-    """The new expression with what the holes stand for."""
-
-    def __init__(self, holes: dict):
-        self.holes = holes
-
-    def visit_Name(self, node):
-        return copy.deepcopy(self.holes.get(node.id, node))
-
-    def visit_Expr(self, node):
-        value = self.visit(node.value)
-        return value if isinstance(value, ast.stmt) else ast.Expr(value)
-
-    def visit_Call(self, node):
-        if rest := rest_of(node):
-            others = copy.deepcopy(self.holes[rest])
-            node.args[-1:] = [one for one in others if not isinstance(one, ast.keyword)]
-            node.keywords += [one for one in others if isinstance(one, ast.keyword)]
-        return self.generic_visit(node)
+def filled(new: ast.AST, holes: Holes) -> ast.AST:
+    """The new expression or statement with what the holes stand for."""
+    copies = {}  # of nodes, by their id: what deepcopy takes for their copies
+    for node in ast.walk(new):
+        hole = hole_of(node)
+        if hole in holes and isinstance(node, ast.stmt) == isinstance(holes[hole], ast.stmt):
+            copies[id(node)] = holes[hole]
+        if isinstance(node, ast.Call) and (rest := rest_of(node)):
+            keywords = [argument for argument in holes[rest] if isinstance(argument, ast.keyword)]
+            node.args[-1:] = [argument for argument in holes[rest] if argument not in keywords]
+            node.keywords += keywords
+    return copy.deepcopy(new, copies)

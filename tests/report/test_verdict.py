@@ -13,8 +13,10 @@ from compare.core.check import About, Result
 from compare.core.text import say
 from compare.engines.mujoco.reading import read
 from compare.experiments import figures_overview, module, stability
+from compare.experiments.published import PrintedRow
 from compare.experiments.speed import first_screen as of_speed
 from compare.experiments.stability.tables import LimitRow, StabilityResult, StepLimitRow
+from compare.judge.agree import AgreementRow
 from compare.report.questions import answers, true_errors
 from compare.report.style import BLUE, ORANGE, RED
 from compare.report.verdict import failures, headline, outcome, passed, standing, verdict
@@ -211,10 +213,14 @@ def test_errors_are_those_of_the_coarsest_steps():
 OFF = {"of": "forearm", "quantity": "com", "component": "x", "stated": 2.0, "compiled": 2.5, "difference": 0.5,
        "unit": "m"}  # fmt: skip
 SAME = OFF | {"compiled": 2.0, "difference": 0.0}
-APART = {"quantity": "Mbar", "unit": "kg m2", "worst_difference": 2e-16, "difference_over_bar": 0.1}
 STEP = LimitRow(scene="s", engine="tmt", method="rk4", damping=0.0, mode=9.0, limit="finite", predicted_dt=0.1,
                 observed_dt=0.1001, passed=True)  # fmt: skip
-PRINTED = {"published": 1.0, "tmt": 1.1, "mujoco": 0.9, "tolerance": 0.11}
+PRINTED = PrintedRow(item="c", posture="zero", quantity="qdd", component="alpha", unit="rad/s2", published=1.0, exact=1.0,
+                     tmt=1.1, mujoco=0.9, tolerance=0.11)  # fmt: skip
+AGREED = AgreementRow(engine="TMT", scene="zero", quantity="Mbar", unit="kg m2", states=1, largest_difference=2e-16,
+                      worst_difference=2e-16, bar=2e-15, difference_over_bar=0.1, scale=1.0, difference=2.0, from_exact=1.0,
+                      mujoco_from_exact=4.0, exact_states=1, worst_state="", worst_q="", worst_qd="", worst_tau="",
+                      passed=True)  # fmt: skip
 
 
 def headline_of(name, of):
@@ -224,8 +230,8 @@ def headline_of(name, of):
 
 @pytest.mark.parametrize("name, rows, numbers, named", [
     ("parameters", [SAME, OFF], "1 2", "all as stated"),
-    ("published", [PRINTED | {"mujoco": 0.8}], "0 1", ""),
-    ("gravity", [APART, APART | {"quantity": "other", "worst_difference": 1.0, "difference_over_bar": 0.05}], "2e-16 10", "Mbar"),
+    ("published", [replace(PRINTED, mujoco=0.8)], "0 1", ""),
+    ("gravity", [AGREED, replace(AGREED, quantity="other", worst_difference=1.0, difference_over_bar=0.05)], "2e-16 10", "Mbar"),
     ("trajectory", [{"scene": "a", "difference_over_band": 0.04}, {"scene": "a", "difference_over_band": 12.0}], "1 12", ""),
     ("stability", [STEP, replace(STEP, observed_dt=0.0995)], "2 0.5", ""),
 ])  # fmt: skip
@@ -238,9 +244,6 @@ def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, 
 
 
 # the pictures
-
-OF_BIAS = {"quantity": "Mbar", "difference_eps": 2.0, "tmt_from_exact_eps": 1.0, "mujoco_from_exact_eps": 4.0,
-           "passed": True}  # fmt: skip
 
 
 def timed(engine, method, seconds, error, **more):
@@ -258,16 +261,26 @@ def marks(experiment, result, robot=ARM):
 
 
 def test_the_agreement_is_the_largest_of_all_rows_of_a_quantity_and_its_picture_says_whose_distance_is_whose():
-    near, far = {"mujoco_from_exact_eps": None}, {"difference_eps": 7.0, "tmt_from_exact_eps": None}
-    rows = [OF_BIAS | near, OF_BIAS | near | far, OF_BIAS | {"quantity": "other", "difference_eps": 9.0}]
+    near = replace(AGREED, mujoco_from_exact=None)
+    rows = [
+        near,
+        replace(near, difference=7.0, from_exact=None),
+        replace(AGREED, quantity="other", difference=9.0),
+    ]
     (found,) = figures_overview.agreements({"mass": Result("mass", rows=rows)})
-    assert found | {"name": ""} == {"name": "", "apart": 7.0, "ours": 1.0, "theirs": None, "passed": True}
+    assert found == {
+        "name": "mass matrix M",
+        "difference": 7.0,
+        "from_exact": 1.0,
+        "mujoco_from_exact": None,
+        "passed": True,
+    }
     _, _, caption = figures_overview.draw_agreement({"mass": Result("mass", rows=rows)})
     assert "Maximum difference: 7 eps" in say(caption)
-    rows.append(OF_BIAS | {"difference_eps": float("nan"), "passed": False})
+    rows.append(replace(AGREED, difference=float("nan"), passed=False))
     (found,) = figures_overview.agreements({"mass": Result("mass", rows=rows)})
-    assert found["apart"] == float("inf") and not found["passed"]
-    drawn = marks("mass", Result("mass", rows=[OF_BIAS]))
+    assert found["difference"] == float("inf") and not found["passed"]
+    drawn = marks("mass", Result("mass", rows=[AGREED]))
     assert drawn == {("D", to_hex("black"), 2.0), ("o", to_hex(BLUE), 1.0), ("s", to_hex(ORANGE), 4.0)}
 
 

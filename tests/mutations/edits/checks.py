@@ -5,10 +5,8 @@ from ..edit import Edit
 # module, function, quantity: as written in the call of `check`, _1, _2 for what is filled in
 CHECKS = (
     ("parameters", "compare_number", "quantity"), ("parameters", "check_forces", 'f"no forces of {_1}"'),
-    ("published", "check_answer", 'f"{_1}: {item.quantity} - printed"'),
-    ("published", "check_answer", 'f"{_1}: {item.quantity} - exact"'),
-    ("published", "check_answer", "digits"),
-    ("published", "check_answer", 'f"exact: |{item.quantity}_{_1}| - |printed|"'),
+    ("published", "check_answer", "printed_digits"), ("published", "check_answer", "from_exact"),
+    ("published", "check_answer", "every_digit"), ("published", "check_answer", "size"),
     ("mass", "check_symmetry", "what"), ("mass", "check_definiteness", "what"),
     ("accuracy", "check_same_schemes", "quantity"), ("accuracy", "check_smallest_errors", "quantity"),
     ("accuracy", "check_smallest_errors", "\"smallest error of MuJoCo's RK4, compared with tmt's rk4\""),
@@ -39,13 +37,13 @@ EDITS = (
         for module, where, quantity in CHECKS
     ),
     *(
-        Edit(module, where, f"agree(result, _3, {quantity}, _4, _5, _6, *_7)",
-             f"agree(result, _3, {quantity}, _4, _6, _6, *_7)", f"{quantity} is compared with itself")
+        Edit(module, where, f"comparison.agree({quantity}, _3, _4, _5, _6)",
+             f"comparison.agree({quantity}, _3, _5, _5, _6)", f"{quantity} is compared with itself")
         for module, where, quantity in AGREEMENTS
     ),
     *(
-        Edit("quantities", "Comparison.agree", "agree(_1, _2, _3, _5, ours, theirs, *_4)",
-             f"agree(_1, _2, _3, _5, ours, ours if name == {quantity!r} else theirs, *_4)",
+        Edit("quantities", "Comparison.compare", "Compared(_1, _2, values, mujoco_values, *_3)",
+             f"Compared(_1, _2, values, values if name == {quantity!r} else mujoco_values, *_3)",
              f"{quantity} is compared with itself")
         for quantity in ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv", "Mbar", "holding torque", "bias", "qdd", "energy")
     ),

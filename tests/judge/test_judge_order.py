@@ -1,0 +1,60 @@
+"""The order of a method from errors of several steps, and its check."""
+
+import math
+
+import pytest
+from judged import BOTH
+
+from compare.core.check import Result
+from compare.judge.order import ORDER_MARGIN, check_order, measured_order
+
+STEPS = (0.4, 0.2, 0.1, 0.05)
+
+
+def errors(*orders: float) -> list[float]:
+    """Errors that fall by these orders from step to step."""
+    values = [1.0]
+    for order in orders:
+        values.append(values[-1] / 2.0**order)
+    return values
+
+
+def test_the_two_finest_steps_give_the_order():
+    order, coarse, fine = measured_order(STEPS, errors(1.0, 2.0, 4.0))
+    assert order == pytest.approx(4.0) and (coarse, fine) == STEPS[-2:]
+
+
+@pytest.mark.parametrize(("off", "settled"), [(0.999, True), (1.001, False)])
+def test_an_order_has_settled_if_the_last_two_differ_by_the_margin(off, settled):
+    falling = errors(4.0, 4.0 + off * ORDER_MARGIN)
+    assert (measured_order(STEPS[:3], falling, 3) is not None) == settled
+    assert measured_order(STEPS[:3], falling, 2)
+
+
+def test_fewer_runs_than_are_needed_give_no_order():
+    assert measured_order(STEPS[:1], [1.0]) is None
+    assert measured_order(STEPS[:3], errors(4.0, 4.0), 4) is None
+
+
+@pytest.mark.parametrize("error", [math.nan, 0.0])
+def test_an_error_that_is_no_number_or_zero_fails(error):
+    order, *_ = measured_order(STEPS[:2], [1.0, error])
+    result = Result("test")
+    check_order(result, "pendulum", 4, order)
+    assert result.checks[0].failed
+
+
+@BOTH
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_measured_order_is_that_of_the_method(share, passes, side):
+    result = Result("test")
+    check_order(result, "pendulum", 4, 4.0 + side * share * ORDER_MARGIN, "error of the swing", "4.15")
+    assert result.checks[0].passed == passes
+    assert result.checks[0].quantity == "deviation from order 4: error of the swing"
+
+
+@pytest.mark.parametrize(("order", "passes"), [(7.01, True), (6.99, False), (9.5, True)])
+def test_of_order_8_only_a_least_order_is_known(order, passes):
+    result = Result("test")
+    check_order(result, "pendulum", 8, order)
+    assert result.checks[0].passed == passes
