@@ -6,6 +6,7 @@ import pandas as pd
 
 from ..core.check import Result
 from ..core.finding import Finding
+from ..core.rows import Row
 from ..core.text import say
 from .verdict import Section
 
@@ -42,9 +43,8 @@ def largest(
     if experiment not in results:
         return about | {"state": "absent"}
     where = where or {"quantity": quantity}
-    rows = [
-        row for row in results[experiment].rows if all(row.get(key) == value for key, value in where.items())
-    ]
+    rows = [row.record() if isinstance(row, Row) else row for row in results[experiment].rows]
+    rows = [row for row in rows if all(row.get(key) == value for key, value in where.items())]
     if not rows or any(row["largest_difference"] is None for row in rows):
         return about | {"state": "diverged" if rows else "empty"}
     top = max(rows, key=lambda row: row["largest_difference"])
@@ -61,6 +61,6 @@ def printed(result: Result, item: str) -> dict:
 
 def true_errors(result: Result) -> tuple[dict, int | None]:
     """Errors of both engines against the true motion with the coarsest steps of each scene, and their number if it is one."""
-    errors, runs = result.curves.get("errors") or {}, result.curves.get("runs", {})
-    counts = {min(steps for name, _, steps in runs if name == scene) for scene in errors}
+    errors = getattr(result, "errors", {})
+    counts = {min(run.steps for run in result.runs if run.case.name == scene) for scene in errors}
     return errors, min(counts) if len(counts) == 1 else None

@@ -4,7 +4,6 @@ A second run with another form of the equations and another order gives the accu
 stiff robot, the reference is a run in doubles of order 8, whose accuracy is known from halving its steps.
 """
 
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -37,20 +36,12 @@ class Reference(NamedTuple):
     coordinates: Coordinates
     why: str | None = None  # the reason for a run in doubles
 
-    def error(self, q: np.ndarray, joints: Sequence[int]) -> np.ndarray:
-        """The largest error at each time of the positions q (65, ...) of these joints of the robot, rad or m, (65,)."""
-        whole = self.coordinates
-        part = Coordinates(*(tuple(names[i] for i in joints) for names in (whole.names, whole.all_kinds)))
-        places = [whole.places.joints[i].q for i in joints]
-        columns = [k for place in places for k in range(place.start, place.stop)]
-        high, low = self.high[:, columns], self.low[:, columns]
-        beyond = np.stack(np.broadcast_arrays(*part.places.tangent([*high.T], [*low.T])), axis=-1)
-        return np.abs(part.difference(q, high) - beyond).max(axis=1)
-
-
-def references(cases: Sequence[Case]) -> dict[str, Reference]:
-    """Each case's reference by its name."""
-    return {case.name: reference(case) for case in cases}
+    def error(self, q: np.ndarray) -> np.ndarray:
+        """The largest error of the positions q (65, nq) at each time, rad or m, (65,)."""
+        nq, places = self.coordinates.nq, self.coordinates.places
+        high, low = self.high[:, :nq], self.low[:, :nq]
+        beyond = np.stack(np.broadcast_arrays(*places.tangent([*high.T], [*low.T])), axis=-1)
+        return np.abs(self.coordinates.difference(q, high) - beyond).max(axis=1)
 
 
 def reference(case: Case) -> Reference:
