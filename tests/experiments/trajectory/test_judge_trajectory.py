@@ -78,7 +78,7 @@ def level(difference, bar):
     """The check and the row of differences (states, 2 nv)."""
     result, times = TrajectoryResult("trajectory"), np.arange(len(difference)) / 2
     row = runs.TrajectoryRow(scene="", engine_integrator="", twin="", dt=0.1, judged_until=1.0, required=1.0)
-    deviation = Deviation(LIFT_AND_HEAD, times, np.array(difference), bar)
+    deviation = Deviation(LIFT_AND_HEAD, times, np.array(difference), np.full(np.shape(difference), bar))
     runs.check_level(result, "x", row, deviation)
     return result.checks[0], result.rows[0]
 
