@@ -6,9 +6,8 @@ import pandas as pd
 
 from ..core.check import Result
 from ..core.finding import Finding
-from ..core.rows import Row
 from ..core.text import say
-from .verdict import Section
+from .verdict import Section, as_records
 
 
 def answers(sections: Sequence[Section], robot) -> pd.DataFrame:
@@ -43,8 +42,11 @@ def largest(
     if experiment not in results:
         return about | {"state": "absent"}
     where = where or {"quantity": quantity}
-    rows = [row.record() if isinstance(row, Row) else row for row in results[experiment].rows]
-    rows = [row for row in rows if all(row.get(key) == value for key, value in where.items())]
+    rows = [
+        row
+        for row in as_records(results[experiment].rows)
+        if all(row.get(key) == value for key, value in where.items())
+    ]
     if not rows or any(row["largest_difference"] is None for row in rows):
         return about | {"state": "diverged" if rows else "empty"}
     top = max(rows, key=lambda row: row["largest_difference"])
@@ -54,7 +56,7 @@ def largest(
 
 def printed(result: Result, item: str) -> dict:
     """A printed item, with the numbers of both engines; its unit is None where there is no result."""
-    rows = [row for row in result.rows if row["item"] == item]
+    rows = [row for row in as_records(result.rows) if row["item"] == item]
     values = {name: [row[name] for row in rows] for name in ("published", "tmt", "mujoco")}
     return {"item": item, "unit": rows[0]["unit"] if rows else None, **values}
 

@@ -39,7 +39,8 @@ class Section:
 
 
 def as_records(rows: list) -> list[dict]:
-    return [row.record() for row in rows] if isinstance(rows, list) and isinstance(rows[0], Row) else rows
+    is_typed = isinstance(rows, list) and rows and isinstance(rows[0], Row)
+    return [row.record() for row in rows] if is_typed else rows
 
 
 class Report(NamedTuple):

@@ -71,18 +71,26 @@ def check_same_schemes(result: SpeedResult, scene: SceneRuns) -> None:
 
 def check_smallest_errors(result: SpeedResult, scene: SceneRuns) -> None:
     """Where errors stop falling they are of the size of rounding; MuJoCo's RK4 is as exact as tmt's with the same steps."""
-    name, rounding = scene.case.name, FACTOR * scene.floor
-    errors: dict[str, dict[float, float]] = {}  # by method and step
-    for engine, method in (("mujoco", "RK4"), ("tmt", "rk4"), ("tmt", "dopri8")):
-        runs = [run for run in scene.runs if (run.method.engine, run.method.name) == (engine, method)]
-        of_method = errors[method] = {run.dt: run.row.largest_error for run in runs}
-        least = min(of_method.values(), default=np.inf)
-        if np.isfinite(least) and [*of_method.values()].index(least) < len(of_method) - 1:
-            quantity = f"smallest error of {engine}'s {method}, where smaller steps gain nothing"
-            result.check(name, quantity, least, rounding, result.unit, rounding=True)
-    theirs, finest = min(errors["RK4"].values(), default=np.inf), min(errors["RK4"], default=np.inf)
-    ours = min((error for dt, error in errors["rk4"].items() if dt >= finest), default=np.inf)
-    if np.isfinite([theirs, ours]).any() and errors["rk4"]:
-        tolerance = rounding + (2.0 * ours if np.isfinite(ours) else 0.0)
+    rounding = FACTOR * scene.floor
+    rk4 = check_stopped(result, scene, "mujoco", "RK4", rounding)
+    ours = check_stopped(result, scene, "tmt", "rk4", rounding)
+    check_stopped(result, scene, "tmt", "dopri8", rounding)
+    least, finest = min(rk4.values(), default=np.inf), min(rk4, default=np.inf)
+    least_of_ours = min((error for dt, error in ours.items() if dt >= finest), default=np.inf)
+    if np.isfinite([least, least_of_ours]).any() and ours:
+        tolerance = rounding + (2.0 * least_of_ours if np.isfinite(least_of_ours) else 0.0)
         quantity = "smallest error of MuJoCo's RK4, compared with tmt's rk4"
-        result.check(name, quantity, theirs, tolerance, result.unit)
+        result.check(scene.case.name, quantity, least, tolerance, result.unit)
+
+
+def check_stopped(
+    result: SpeedResult, scene: SceneRuns, engine: str, method: str, rounding: float
+) -> dict[float, float]:
+    """A check of the smallest error of a method if finer steps gain nothing; its errors by the step, from coarse to fine."""
+    runs = [run for run in scene.runs if (run.method.engine, run.method.name) == (engine, method)]
+    errors = {run.dt: run.row.largest_error for run in runs}
+    least = min(errors.values(), default=np.inf)
+    if np.isfinite(least) and least != [*errors.values()][-1]:
+        quantity = f"smallest error of {engine}'s {method}, where smaller steps gain nothing"
+        result.check(scene.case.name, quantity, least, rounding, result.unit, rounding=True)
+    return errors
