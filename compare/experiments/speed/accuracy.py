@@ -90,7 +90,7 @@ def check_stopped(
     runs = [run for run in scene.runs if (run.method.engine, run.method.name) == (engine, method)]
     errors = {run.dt: run.row.largest_error for run in runs}
     least = min(errors.values(), default=np.inf)
-    if np.isfinite(least) and least != [*errors.values()][-1]:
+    if np.isfinite(least) and [*errors.values()].index(least) < len(errors) - 1:
         quantity = f"smallest error of {engine}'s {method}, where smaller steps gain nothing"
         result.check(scene.case.name, quantity, least, rounding, result.unit, rounding=True)
     return errors

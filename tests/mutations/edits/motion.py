@@ -73,7 +73,7 @@ EDITS = (
     Edit("sub_blocks", "check_blocks", "FACTOR * EPS * scale", "100 * FACTOR * EPS * scale", "tolerance x 100"),
     Edit("smallest", "ZERO", "mpmath.mpf(10) ** _1", "mpmath.mpf(10)", "an acceleration below 10 rad/s2 is zero"),
     Edit("exact_motion", "check_falling", "values[:clear]", "values[-clear:]", "the order is measured among rounding"),
-    Edit("exact_motion", "check_falling", "if found:\n _1", "pass", "no order is measured"),
+    Edit("exact_motion", "check_falling", "measured_order(*_1)", "None", "no order is measured"),
     Edit("pendulum", "swing", "ellipj(frequency * t + _1, k * k)[0]", "np.sin(frequency * t)",
          "a sine as the exact swing"),
     Edit("sub_blocks", "sub_block_differences", "of_tmt - of_mujoco", "of_tmt - of_tmt", "TMT is compared with itself"),
