@@ -31,18 +31,18 @@ class TrajectoryRow(Row):
     engine_integrator: str
     twin: str
     dt: float = column("s", digits=5)
-    level: str = ""
-    largest_difference: float | None = None
-    unit: str = "rad"
-    worst_difference: float | None = None
-    band: float | None = None
-    worst_unit: str = ""
-    difference_over_band: float | None = None
-    worst_place: str = ""
+    level: str
+    largest_difference: float | None
+    unit: str
+    worst_difference: float | None
+    band: float
+    worst_unit: str
+    difference_over_band: float | None
+    worst_place: str
     judged_until: float = column("s")
     required: float = column("s")
-    diverged_at: float | None = column("s", default=None)
-    twin_diverged_at: float | None = column("s", default=None)
+    diverged_at: float | None = column("s")
+    twin_diverged_at: float | None = column("s")
 
     @property
     def urgency(self) -> tuple[bool, bool, float]:
@@ -64,20 +64,18 @@ class Path(NamedTuple):
         return cls(motion.q, motion.v, ended, rules.departure(motion.t, motion.q, case.coordinates))
 
 
-class Ours(NamedTuple):
-    """One case with one scheme and step by TMT, or by a user's own equations."""
+@dataclass(frozen=True)
+class Run:
+    """One case by one scheme and step in both engines."""
 
     case: Case
     scheme: str
     steps: int
     t: np.ndarray  # (steps + 1,) s
-    path: Path
-    width: np.ndarray  # (recorded, 2 nv): the band of rounding, of movements first
-    widest: np.ndarray  # (2 nv,): the width of the band from which on it judges no more
-    at: np.ndarray  # (states,) s: recorded times from which a single step is compared
-    states: list[np.ndarray]  # q and v at these times
-    stepped: list[np.ndarray]  # q and v one step later
-    step_tolerance: np.ndarray  # (states, 2 nv)
+    paths: dict[str, Path]  # by engine, MuJoCo last
+    band: np.ndarray  # (recorded,) of rounding, rad or m
+    integrator: str = ""  # of MuJoCo
+    judged_until: float = 0.0  # s
 
     @property
     def dt(self) -> float:
@@ -88,25 +86,37 @@ class Ours(NamedTuple):
         """The number of steps from one recorded state to the next."""
         return self.steps // recorded(self.case)
 
+    @property
+    def ends(self) -> list[float | None]:
+        """When the run of each engine has diverged, s."""
+        return [path.ended for path in self.paths.values()]
 
-@dataclass(kw_only=True)
-class Run:
-    """One case by one scheme and step in both engines."""
+    @property
+    def where(self) -> str:
+        """The place of its checks."""
+        return f"{self.case.name}, {self.integrator}, {rules.step_in_words(self.case, self.steps)}"
 
-    case: Case
-    scheme: str
-    integrator: str  # of MuJoCo
-    steps: int
-    t: np.ndarray  # (steps + 1,) s
-    every: int  # steps from one recorded state to the next
-    paths: dict[str, Path]  # by engine, MuJoCo last
-    band: np.ndarray  # (recorded,) of rounding, rad or m
-    judged_until: float  # s
+    @property
+    def required(self) -> float:
+        """The shortest time for which it must be judged, s; 0: the scene states none."""
+        return rules.required_time(self.case, self.scheme, self.dt)
 
     def until_diverged(self, engine: str, values: np.ndarray) -> np.ndarray:
         """Values of the run of an engine, (times, n), NaN from where it has diverged."""
         ended = self.paths[engine].ended
         return values if ended is None else np.where((self.t < ended)[:, None], values, np.nan)
+
+
+class Ours(NamedTuple):
+    """The side of TMT, or of a user's own equations: its run, and what MuJoCo's is compared with."""
+
+    run: Run
+    width: np.ndarray  # (recorded, 2 nv): the band of rounding, of movements first
+    widest: np.ndarray  # (2 nv,): the width of the band from which on it judges no more
+    at: np.ndarray  # (states,) s: recorded times from which a single step is compared
+    states: list[np.ndarray]  # q and v at these times
+    stepped: list[np.ndarray]  # q and v one step later
+    step_tolerance: np.ndarray  # (states, 2 nv)
 
 
 @dataclass
@@ -159,19 +169,23 @@ def run_of_ours(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Ours
     stepping, tree, tau = METHODS[scheme], case.tree, case.tau
     dt, every = case.duration / steps, steps // recorded(case)
     motion = dynamics.run(*case.start, tau, dt, steps, scheme)
-    t, q, v = motion.t, motion.q, motion.v
     path = Path.of(case, motion)
-    width = band(stepping, tree, q, v, tau, dt, every, steps_afforded(case))
-    alive = t[::every] < (np.inf if path.ended is None else path.ended)
-    states, times = [values[::every][alive] for values in (q, v)], t[::every][alive]
+    width = band(stepping, tree, path.q, path.v, tau, dt, every, steps_afforded(case))
+    alive = motion.t[::every] < ends_first([path.ended])
+    states, times = [values[::every][alive] for values in (path.q, path.v)], motion.t[::every][alive]
     stepped = one_step(dynamics, states, tau, dt, scheme)
     # the bound of a step's rounding is of first order in dt, and too small where a joint turns by more than half a turn
     turning = [i for i, unit in enumerate(case.coordinates.units) if unit == "rad"]
     rates = np.maximum(*(np.abs(speeds[:, turning]) for speeds in (states[1], stepped[1])))
     single = dt * rates.max(axis=1, initial=0.0) <= np.pi
     states, stepped = ([values[single] for values in pair] for pair in (states, stepped))
-    tolerance, widest = step_rounding(stepping, tree, *states, tau, dt), rules.widest_judged(case, q, v)
-    return Ours(case, scheme, steps, t, path, width, widest, times[single], states, stepped, tolerance)
+    tolerance, widest = (
+        step_rounding(stepping, tree, *states, tau, dt),
+        rules.widest_judged(case, path.q, path.v),
+    )
+    narrowest = width[:, : case.coordinates.nv].max(axis=1)
+    run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, narrowest)
+    return Ours(run, width, widest, times[single], states, stepped, tolerance)
 
 
 def one_step(
@@ -182,57 +196,55 @@ def one_step(
     return [motion.q[:, 1], motion.v[:, 1]]
 
 
-def compare_run(result: Result, mine: Ours, dynamics: Dynamics, method: Method) -> Run:
+def compare_run(result: Result, ours: Ours, dynamics: Dynamics, method: Method) -> Run:
     """One side and an integrator of MuJoCo with the same scheme, from the same start with the same step."""
-    case, dt, every, coordinates = mine.case, mine.dt, mine.every, mine.case.coordinates
-    theirs = Path.of(case, dynamics.run(*case.start, case.tau, dt, mine.steps, method.name))
-    ends, times = (mine.path.ended, theirs.ended), mine.t[::every]
-    count = judged(times, mine.width < mine.widest, ends)
-    run = Run(
-        case=case, scheme=method.scheme, integrator=method.name, steps=mine.steps, t=mine.t, every=every,
-        paths=dict(zip(case.robot.compared, (mine.path, theirs))), band=mine.width[:, : coordinates.nv].max(axis=1),
-        judged_until=float(times[count - 1]),
-    )  # fmt: skip
-    where = f"{case.name}, {method.name}, {rules.step_in_words(case, mine.steps)}"
-    required = rules.required_time(case, method.scheme, dt)
-    row = TrajectoryRow(
-        scene=case.name, engine_integrator=method.name, twin=method.scheme, dt=dt, unit=rules.movement_unit(coordinates),
-        judged_until=run.judged_until, required=required, diverged_at=theirs.ended, twin_diverged_at=mine.path.ended,
-    )  # fmt: skip
-    if len(mine.at):
-        stepped = one_step(dynamics, mine.states, case.tau, dt, method.name)
-        off = differences(coordinates, mine.stepped, stepped)
-        check_level(
-            result,
-            where,
-            replace(row, level="one step"),
-            Deviation(coordinates, mine.at, off, mine.step_tolerance),
-        )
-        if (mine.step_tolerance.min(axis=0) >= mine.widest).any():
-            result.not_judged(where, "one step", say(result.finding("wide_step")))
-    ours, other = ([path.q[::every][:count], path.v[::every][:count]] for path in (mine.path, theirs))
-    deviation = Deviation(
-        coordinates, times[:count], differences(coordinates, ours, other), mine.width[:count]
+    case, (run, width, widest, at, states, stepped, step_tolerance) = ours.run.case, ours
+    mine, coordinates, times = run.paths[case.robot.compared[0]], case.coordinates, run.t[:: run.every]
+    theirs = Path.of(case, dynamics.run(*case.start, case.tau, run.dt, run.steps, method.name))
+    run = replace(run, integrator=method.name, paths=run.paths | {"mujoco": theirs})
+    count = judged(times, width < widest, run.ends)
+    run = replace(run, judged_until=float(times[count - 1]))
+    if len(at):
+        apart = differences(coordinates, stepped, one_step(dynamics, states, case.tau, run.dt, method.name))
+        check_level(result, run, "one step", Deviation(coordinates, at, apart, step_tolerance))
+        if (step_tolerance.min(axis=0) >= widest).any():
+            result.not_judged(run.where, "one step", say(result.finding("wide_step")))
+    recorded_states = (
+        [path.q[:: run.every][:count], path.v[:: run.every][:count]] for path in (mine, theirs)
     )
-    check_level(result, where, replace(row, level="open loop"), deviation)
-    check_end(result, where, run, required)
+    apart = differences(coordinates, *recorded_states)
+    check_level(result, run, "open loop", Deviation(coordinates, times[:count], apart, width[:count]))
+    check_end(result, run)
     return run
 
 
-def check_end(result: Result, where: str, run: Run, required: float) -> None:
+def check_level(result: Result, run: Run, level: str, deviation: Deviation) -> None:
+    """A row and a check: the component and the recorded state that come closest to their tolerance."""
+    check = check_closest(result, run.where, f"{level}, {result.label} to MuJoCo", deviation)
+    movements = deviation.difference[:, : deviation.coordinates.nv]
+    twin_diverged_at, diverged_at = run.ends
+    result.rows.append(TrajectoryRow(
+        scene=run.case.name, engine_integrator=run.integrator, twin=run.scheme, dt=run.dt, level=level,
+        largest_difference=None if check.value is None else movements.max(), unit=rules.movement_unit(run.case.coordinates),
+        worst_difference=check.value, band=check.tolerance, worst_unit=check.unit, worst_place=check.note,
+        difference_over_band=check.over_tolerance, judged_until=run.judged_until, required=run.required,
+        diverged_at=diverged_at, twin_diverged_at=twin_diverged_at,
+    ))  # fmt: skip
+
+
+def check_end(result: Result, run: Run) -> None:
     """How long a run is judged, whether both runs diverge alike, and whether it moves."""
-    case, ends = run.case, [path.ended for path in run.paths.values()]
-    alive = run.t[:: run.every][run.t[:: run.every] < ends_first(ends)][-1]
-    check_time_judged(result, where, case, run.judged_until, required, alive)
-    is_known = check_divergence(result, where, ends, case.duration / run.steps, run.steps, run.band)
-    if not (alive or is_known or required):
-        result.not_judged(where, "open loop", say(result.finding("diverges_at_once")))
+    case, end = run.case, ends_first(run.ends)
+    times = run.t[:: run.every]
+    alive = times[times < end][-1]
+    check_time_judged(result, run, alive)
+    is_known = check_divergence(result, run)
+    if not (alive or is_known or run.required):
+        result.not_judged(run.where, "open loop", say(result.finding("diverges_at_once")))
     if case.is_free and "own" not in case.scene.tags:
-        before = run.t < ends_first(ends)
-        moved = min(
-            rules.deviation_alive(path.q[before], case.q, case.coordinates) for path in run.paths.values()
-        )
-        rules.check_movement(result, where, moved, rules.movement_unit(case.coordinates))
+        alive_paths = [path.q[run.t < end] for path in run.paths.values()]
+        moved = min(rules.deviation_alive(q, case.q, case.coordinates) for q in alive_paths)
+        rules.check_movement(result, run.where, moved, rules.movement_unit(case.coordinates))
 
 
 def ends_first(ends: Sequence[float | None]) -> float:
@@ -249,50 +261,32 @@ def judged(times: np.ndarray, narrow: np.ndarray, ends: Sequence[float | None]) 
     return max(1, int(np.argmin(np.append(narrow.all(axis=1) & alive, False))))
 
 
-def check_time_judged(
-    result: Result, where: str, case: Case, until: float, required: float, alive: float
-) -> None:
+def check_time_judged(result: Result, run: Run, alive: float) -> None:
     """A run is judged for the time that its scene states, or for a tenth of it while it is alive; else it is not judged.
 
-    until: when it is no more judged; alive: the last recorded time before one of both runs diverges, s.
+    alive: the last recorded time before one of both runs diverges, s.
     """
-    least = required or min(rules.LEAST_JUDGED * case.duration, alive)
+    until, least = run.judged_until, run.required or min(rules.LEAST_JUDGED * run.case.duration, alive)
     if until < least:
         reason = say(result.finding("wide", until=until, least=least))
-        result.not_judged(where, "time judged", reason, "s")
-    elif required:
-        result.check(where, "time judged", until, required, "s", rule="at least", about=About.PREDICTION)
+        result.not_judged(run.where, "time judged", reason, "s")
+    elif run.required:
+        result.check(run.where, "time judged", until, least, "s", rule="at least", about=About.PREDICTION)
 
 
-def check_divergence(
-    result: Result, where: str, ends: Sequence[float | None], dt: float, steps: int, width: np.ndarray
-) -> bool:
-    """Both diverge at the same step, if one does and the band (recorded,) is narrow at the first recorded state after that.
+def check_divergence(result: Result, run: Run) -> bool:
+    """Both diverge at the same step, if one does and the band is narrow at the first recorded state after that.
 
-    Returned: whether that is compared. ends: of MuJoCo's partner and of MuJoCo, s.
+    Returned: whether that is compared.
     """
-    end = ends_first(ends)
+    end, steps, dt = ends_first(run.ends), run.steps, run.dt
     if end == np.inf:
         return False
-    every = steps // (len(width) - 1)
-    is_narrow = bool(width[-(-round(end / dt) // every)] < NARROW)
+    is_narrow = bool(run.band[-(-round(end / dt) // run.every)] < NARROW)
     if is_narrow:
-        ours, theirs = (steps + 1 if at is None else round(at / dt) for at in ends)
+        ours, theirs = (steps + 1 if at is None else round(at / dt) for at in run.ends)
         whose = "TMT's" if result.label == "TMT" else result.label
         note = f"{steps + 1}: never" if steps + 1 in (ours, theirs) else ""
-        result.check(where, f"step of divergence, MuJoCo's, is {whose}", theirs, ours, "", note, rule="equal")
+        what = f"step of divergence, MuJoCo's, is {whose}"
+        result.check(run.where, what, theirs, ours, "", note, rule="equal")
     return is_narrow
-
-
-def check_level(result: Result, where: str, row: TrajectoryRow, deviation: Deviation) -> None:
-    """A check of the component and the recorded state that come closest to their tolerance, and the row, filled in."""
-    check = check_closest(result, where, f"{row.level}, {result.label} to MuJoCo", deviation)
-    if check.value is not None:
-        row.largest_difference = float(deviation.difference[:, : deviation.coordinates.nv].max())
-    row.worst_difference, row.band, row.difference_over_band = (
-        check.value,
-        check.tolerance,
-        check.over_tolerance,
-    )
-    row.worst_unit, row.worst_place = check.unit, check.note
-    result.rows.append(row)

@@ -1,6 +1,6 @@
 """The rules of runs and of the drift of energy, just inside and just outside; errors and departures."""
 
-import dataclasses
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,8 +25,8 @@ NARROW, AT_ONCE = np.full(11, 0.999e-3), np.array([0.0, 1e-9, *[np.inf] * 9])
 
 def verdicts(check, *arguments) -> dict:
     """Whether each check that is made passes, by the name of its quantity."""
-    result = Result("trajectory")
-    check(result, "x", *arguments)
+    result = TrajectoryResult("trajectory")
+    check(result, *arguments)
     return {check.quantity: check.passed for check in result.checks}
 
 
@@ -68,8 +68,8 @@ def test_a_band_judges_nothing_that_moves_less():
     (0.0, 0.0, 0.0, True),
 ])  # fmt: skip
 def test_a_run_that_is_judged_too_short_is_not_judged(required, until, alive, judged):
-    result, case = Result("trajectory"), SimpleNamespace(duration=5.0)
-    runs.check_time_judged(result, "x", case, until, required, alive)
+    result, run = TrajectoryResult("trajectory"), run_of(FREE.changed(judged=required), until=until)
+    runs.check_time_judged(result, run, alive)
     assert [check.passed for check in result.checks] == [judged] * (required > 0.0 or not judged)
     assert all(check.judged == judged for check in result.checks)
 
@@ -77,9 +77,8 @@ def test_a_run_that_is_judged_too_short_is_not_judged(required, until, alive, ju
 def level(difference, bar):
     """The check and the row of differences (states, 2 nv)."""
     result, times = TrajectoryResult("trajectory"), np.arange(len(difference)) / 2
-    row = runs.TrajectoryRow(scene="", engine_integrator="", twin="", dt=0.1, judged_until=1.0, required=1.0)
     deviation = Deviation(LIFT_AND_HEAD, times, np.array(difference), np.full(np.shape(difference), bar))
-    runs.check_level(result, "x", row, deviation)
+    runs.check_level(result, run_of(FREE), "open loop", deviation)
     return result.checks[0], result.rows[0]
 
 
@@ -113,12 +112,15 @@ def test_what_a_scene_asks_for_depends_on_the_scheme_and_the_step():
     (0.12, 0.13, AT_ONCE, []),  # the band opens before the next recorded state
 ])  # fmt: skip
 def test_both_diverge_at_the_same_step_while_the_band_is_narrow(ours, theirs, width, found):
-    assert [*verdicts(runs.check_divergence, (ours, theirs), 0.01, 100, width).values()] == found
+    """In a second with 100 steps, of which each tenth is recorded."""
+    case = FREE.changed(duration=1.0, dt=0.1)
+    run = replace(run_of(case, ended=(ours, theirs), steps=100), band=width)
+    assert [*verdicts(runs.check_divergence, run).values()] == found
 
 
 @pytest.mark.parametrize("moved, passes", [(0.1001, True), (0.0999, False), (np.nan, False)])
 def test_a_free_run_moves_by_a_tenth_of_a_radian(moved, passes):
-    assert verdicts(check_movement, moved) == {"movement": passes}
+    assert verdicts(check_movement, "x", moved) == {"movement": passes}
 
 
 # energy, errors, departures
@@ -128,7 +130,7 @@ def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_
     q = tmt.simulate(*FREE.start, FREE.tau, 5 / 64, 64, "rk4", FREE.tree).q
     others = [run_of(HELD, 9.0, 9.0, scheme="implicit"), run_of(HELD, 9.0, 9.0, steps=128)]
     free, held = run_of(FREE), run_of(HELD, 0.25, np.nan)
-    free.paths = {"tmt": Path(q, q), "mujoco": Path(q + 100.0, q)}
+    free = replace(free, paths={"tmt": Path(q, q), "mujoco": Path(q + 100.0, q)})
     result = TrajectoryResult("trajectory", runs=[*others, free, held])
     true_motion.find_errors(result, ARM, {FREE.name: reference(FREE)})
     assert list(result.errors) == [HELD.name, FREE.name] and result.errors[HELD.name] == (0.25, None)
@@ -169,7 +171,7 @@ def with_gravity(gravity) -> dict:
 def test_drift_is_measured_where_nothing_takes_energy_and_an_engine_that_does_not_drift_is_seen(engines):
     """Without gravity MuJoCo's arm stays where it is let go, and TMT's falls."""
     scenes = tuple(CASES[name].scene for name in ("bent, free", "bent, damped", "bent, held"))
-    robot = dataclasses.replace(ARM, scenes=scenes)
+    robot = replace(ARM, scenes=scenes)
     result = energy.measure_energy(robot, engines | with_gravity("0 0 0"), {1: (32, 64), 4: (32, 64)})
     drifts = {(row.integrator, row.engine): row.drift for row in result.tables["energy"]}
     assert {row.scene for row in result.tables["energy"]} == {"bent, free"} and len(drifts) == 6

@@ -1,6 +1,7 @@
 """A scene followed by both engines: each level by its own bound, what is kept, and in figures whose number stands where."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ def side(case) -> runs.Ours:
 def judged_with(mujoco, mine) -> dict:
     """The checks of a run whose TMT side may be edited, by quantity."""
     result = TrajectoryResult("trajectory")
-    runs.compare_run(result, mine, mujoco.of(mine.case), METHODS["RK4"])
+    runs.compare_run(result, mine, mujoco.of(mine.run.case), METHODS["RK4"])
     return {check.quantity: check for check in result.checks}
 
 
@@ -41,7 +42,7 @@ def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco):
     checks = judged_with(mujoco, damped)
     used = checks[name].over_tolerance
     assert all(check.passed for check in checks.values()) and 1e-5 < used < 1.0
-    assert checks[name].tolerance in getattr(damped, field) and np.array_equal(damped.at, damped.t)
+    assert checks[name].tolerance in getattr(damped, field) and np.array_equal(damped.at, damped.run.t)
     for more, passes in ((1.01, True), (0.99, False)):
         tight = judged_with(mujoco, damped._replace(**{field: more * used * getattr(damped, field)}))
         assert {quantity for quantity, check in tight.items() if not check.passed} == (
@@ -51,10 +52,12 @@ def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco):
 
 def test_an_open_loop_is_judged_up_to_its_last_state(mujoco):
     damped = side(DAMPED)
-    q, name = damped.path.q.copy(), "open loop, TMT to MuJoCo"
+    path, name = damped.run.paths["tmt"], "open loop, TMT to MuJoCo"
     for share, passes in ((0.9, True), (1.1, False)):
-        q[-1] = damped.path.q[-1] + share * damped.width[-1, :3]
-        assert judged_with(mujoco, damped._replace(path=damped.path._replace(q=q)))[name].passed is passes
+        q = path.q.copy()
+        q[-1] += share * damped.width[-1, :3]
+        edited = damped._replace(run=replace(damped.run, paths={"tmt": path._replace(q=q)}))
+        assert judged_with(mujoco, edited)[name].passed is passes
 
 
 def test_a_step_whose_bound_is_wider_than_what_moves_is_not_judged(mujoco):
@@ -69,10 +72,11 @@ def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
     """Half a turn in 1/64 s is 201 rad/s."""
     case = DAMPED.changed(speed=(np.degrees(rate), 0.0, 0.0), duration=1.0, dt=1 / 64, judged=0.0)
     mine = side(case)
-    alive, v = mine.t < (np.inf if mine.path.ended is None else mine.path.ended), np.abs(mine.path.v)
+    path = mine.run.paths["tmt"]
+    alive, v = mine.run.t < (np.inf if path.ended is None else path.ended), np.abs(path.v)
     following = np.append(v[1:].max(axis=1), 0.0)  # within each step: at its end
     slow = np.maximum(v.max(axis=1), following)[alive] / 64 <= np.pi
-    assert np.array_equal(mine.at, mine.t[alive][slow]) and slow[0] == (rate < 201.1)
+    assert np.array_equal(mine.at, mine.run.t[alive][slow]) and slow[0] == (rate < 201.1)
     assert ("one step, TMT to MuJoCo" in judged_with(mujoco, mine)) == slow.any()
 
 
@@ -108,8 +112,9 @@ def test_what_is_kept_of_a_run_is_whose_it_says():
     mine, result = side(HELD), TrajectoryResult("trajectory")
     run = runs.compare_run(result, mine, moon.of(HELD), METHODS["RK4"])
     motion = moon.of(HELD).run(*HELD.start, HELD.tau, 5 / 64, 64, "RK4")
-    theirs, ended = run.paths["mujoco"], diverged_at(HELD, motion.t, motion.q, motion.v)
-    assert run.paths["tmt"] is mine.path and (mine.path.ended, mine.path.left) == (None, None)
+    (ours, theirs), ended = run.paths.values(), diverged_at(HELD, motion.t, motion.q, motion.v)
+    assert [*run.paths] == ["tmt", "mujoco"] and ours is mine.run.paths["tmt"]
+    assert (ours.ended, ours.left) == (None, None)
     assert np.array_equal(theirs.q, motion.q, equal_nan=True) and np.array_equal(
         theirs.v, motion.v, equal_nan=True
     )
@@ -130,7 +135,8 @@ def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the
 
 
 def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
-    found = [run_of(HELD, 0.1, 0.2, 2.5, (None, 4.0), scheme) for scheme in ("rk4", "implicit", "discrete")]
+    schemes = "rk4", "implicit", "discrete"
+    found = [run_of(HELD, 0.1, 0.2, (None, 4.0), scheme=scheme, until=2.5) for scheme in schemes]
     result = TrajectoryResult("trajectory", runs=found, errors={HELD.name: (0.1, 0.2)})
     caption = figures_runs.draw_held(result, HELD, 2)[2].values
     engines = [{"label": "TMT", "left": None, "error": 0.1}, {"label": "MuJoCo", "left": 4.0, "error": 0.2}]
@@ -139,9 +145,8 @@ def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
         pytest.approx(0.05),
     )
 
-    row = runs.TrajectoryRow(scene=HELD.name, engine_integrator="RK4", twin="rk4", dt=5 / 64, level="open loop",
-                             judged_until=2.5, required=2.5)  # fmt: skip
-    result.rows = [replace(row, difference_over_band=used) for used in (0.25, None, 0.125)]
+    about = {"scene": HELD.name, "level": "open loop"}
+    result.rows = [SimpleNamespace(**about, difference_over_band=used) for used in (0.25, None, 0.125)]
     _, fig, caption = figures_runs.draw_run(result, HELD)
     assert caption.values["errors"] == {"TMT": 0.1, "MuJoCo": 0.2} and caption.values["share"] == 0.25
     assert {at for _, at in caption.values["judged"]} == {2.5}

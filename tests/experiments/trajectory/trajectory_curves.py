@@ -9,13 +9,15 @@ CASES = {case.name: case for case in ARM.cases}
 FREE, HELD, DAMPED = (CASES[name] for name in ("bent, free", "ball catch, held", "bent, damped"))
 
 
-def run_of(case, ours=0.0, theirs=0.0, until=5.0, left=(None, None), scheme="rk4", steps=64) -> Run:
+def run_of(
+    case, ours=0.0, theirs=0.0, left=(None, None), ended=(None, None), scheme="rk4", steps=64, until=5.0
+) -> Run:
     """A run of 64 steps by RK4 whose angles end so far from where they started, or one that is said to be another."""
     ramp = np.linspace(0.0, 1.0, 65)[:, None] * np.ones(len(case.joints))
-    mine, other = (
-        Path(case.q + ours * ramp, 10.0 + ours * ramp),
-        Path(case.q + theirs * ramp, 20.0 + theirs * ramp),
-    )
-    paths = {"tmt": mine._replace(left=left[0]), "mujoco": other._replace(left=left[1])}
-    about = {"case": case, "scheme": scheme, "integrator": "RK4", "steps": steps, "every": 1, "paths": paths}
-    return Run(**about, t=np.linspace(0.0, 5.0, 65), band=np.full(65, 1e-9), judged_until=until)
+    paths = {
+        engine: Path(case.q + end * ramp, speed + end * ramp, *of_engine)
+        for engine, end, speed, of_engine in zip(
+            ("tmt", "mujoco"), (ours, theirs), (10.0, 20.0), zip(ended, left)
+        )
+    }
+    return Run(case, scheme, steps, np.linspace(0.0, 5.0, 65), paths, np.full(65, 1e-9), "RK4", until)

@@ -14,7 +14,7 @@ CHECKS = (
     ("accuracy", "check_stopped", "quantity"), ("accuracy", "check_smallest_errors", "quantity"),
     ("needs", "check_smaller", '"time judged"'), ("reduction", "add_not_lockable", "quantity"),
     ("sub_blocks", "check_blocks", "name"), ("trajectory", "check_time_judged", '"time judged"'),
-    ("trajectory", "check_divergence", 'f"step of divergence, MuJoCo\'s, is {whose}"'),
+    ("trajectory", "check_divergence", "what"),
     ("judge.run", "check_movement", '"movement"'), ("followed", "check_closest", "quantity"),
     ("energy", "check_order", "name"),
     ("stability.limits", "check_limits", '"limit, observed / predicted - 1"'),
