@@ -77,9 +77,7 @@ class ReadRow(Row):
 
 @dataclass
 class EnginesResult(Result):
-    mended: dict[str, list[str]] = field(
-        default_factory=dict
-    )  # by engine: the numbers that this program has set
+    mended: dict[str, list[str]] = field(default_factory=dict)  # the numbers of each engine that are set here
 
 
 def skipped(robot: Robot) -> Finding | None:
@@ -146,10 +144,11 @@ def compare_numbers(
         stated = reading["stated"][number]
         tolerance = FACTOR * record.eps * size_of(reading["stated"], number)
         if number in OF_BODIES:
-            most, what = np.abs(values - stated).max(initial=0.0), f"{number} {AS_READ}"
-            result.check(
-                record.label, what, most, tolerance, UNITS[number], rounding=True, about=About.ENGINE
+            most, check = (
+                np.abs(values - stated).max(initial=0.0),
+                partial(result.check, rounding=True, about=About.ENGINE),
             )
+            check(record.label, f"{number} {AS_READ}", most, tolerance, UNITS[number])
         if number not in reading["mended"] or (number == "inertia" and "moments" in reading["mended"]):
             continue
         is_set = bool(reading["mended"][number])
@@ -213,9 +212,8 @@ def compare_quantity(
     numbers = {of: [repr(float(x)) for x in getattr(sample, of)[worst[0]]] for of in ("q", "qd", "tau")}
     note = "; ".join(f"{of} = ({', '.join(numbers[of])})" for of in quantity.arguments)
     units, what = unit(sample.tree, *quantity.units), f"{name} to exact"
-    check = result.check(
-        record.label, what, difference[worst], tolerance[worst], units, note, True, about=About.ENGINE
-    )
+    pair = difference[worst], tolerance[worst]
+    check = result.check(record.label, what, *pair, units, note, True, about=About.ENGINE)
     row = EngineRow(record.label, record.precision, name, units, len(sample.q), check.value, check.tolerance)
     row.difference_over_bar, row.passed = check.over_tolerance, check.passed
     row.difference_eps = float(over(difference, eps * size).max())

@@ -43,9 +43,8 @@ def begin(setup: Setup) -> Work:
     trees = [case.tree for case in cases]
     # different trees come first: their code compiles in parallel
     different_first = sorted(cases, key=lambda case: trees[: cases.index(case)].count(case.tree))
-    return Work(
-        cases, setup.map(partial(scene_runs, engines=setup.engines, size=setup.size), different_first)
-    )
+    measure = partial(scene_runs, engines=setup.engines, size=setup.size)
+    return Work(cases, setup.map(measure, different_first))
 
 
 def rows(setup: Setup, work: Work | None = None) -> SpeedResult:
@@ -72,11 +71,9 @@ def judged(setup: Setup, scenes: Sequence[SceneRuns]) -> SpeedResult:
     result.floors = {scene.case.name: scene.floor for scene in scenes}
     result.regular, result.unit = regular.name, movement_unit(setup.robot.coordinates)
     result.servos_off = setup.robot.drive.feeds_back and not regular.controller
-    if (
-        setup.size == "full"
-    ):  # where servos act a fast mode decays first, and an order shows only with short steps
-        falling, engines = [scene for scene in scenes if not scene.case.controller], tuple(setup.engines)
-    else:  # with coarse steps errors are regular in one scene only, and other engines have too few settings
+    # where servos act a fast mode decays first, and an order shows only with short steps
+    falling, engines = [scene for scene in scenes if not scene.case.controller], tuple(setup.engines)
+    if setup.size != "full":  # errors are regular in one scene only, and other engines have too few settings
         falling, engines = [scene for scene in scenes if scene.case.name == regular.name], IN_QUICK_RUNS
     result.tables["speed_orders"] = accuracy.check_orders(result, falling, engines)
     for scene in scenes:

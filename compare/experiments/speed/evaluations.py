@@ -57,9 +57,7 @@ def loops(setup: Setup) -> tuple[list[Loop], list[EvaluationRow]]:
     first, few = [values[0] for values in states], [values[:FEW] for values in states]
     ready, absent = at_one_state(tree, *first) + at_many_states(tree, *few), []
     if missing := MinimalCalls.unavailable():
-        absent.append(
-            EvaluationRow(FORWARD, "MuJoCo, mj_forward", states=None, threads=None, why_not=missing)
-        )
+        absent.append(EvaluationRow(FORWARD, "MuJoCo, mj_forward", None, None, why_not=missing))
     else:
         minimal = MinimalCalls(setup.engines["mujoco"].of(setup.robot.case()))
         of_mujoco = minimal.loops(*first).items()
@@ -94,18 +92,15 @@ def at_many_states(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarra
     out = np.ones((count, compiled.size))
     columns = [np.ascontiguousarray(values.T) for values in (q, qd, tau, out)]
     paths = [np.stack([part, part], axis=1) for part in (q, qd)]
-    row, operations = EvaluationRow, compiled.operations
+    each = EvaluationRow(FORWARD, ONE_BY_ONE, count, operations=compiled.operations)
+    lanes = EvaluationRow(FORWARD, SIDE_BY_SIDE, count, operations=compiled.operations)
+    called = EvaluationRow(FORWARD, CALLED, count, cores())
+    step = EvaluationRow(RK4_STEP, SIDE_BY_SIDE, count, cores())
     return [
-        Loop(
-            row(FORWARD, ONE_BY_ONE, count, operations=operations),
-            repeated(lambda: compiled.each(q, qd, tau, out)),
-        ),
-        Loop(
-            row(FORWARD, SIDE_BY_SIDE, count, operations=operations),
-            repeated(lambda: compiled.lanes(*columns)),
-        ),
-        Loop(row(FORWARD, CALLED, count, cores()), repeated(lambda: tmt.acceleration(q, qd, tau, tree))),
-        Loop(row(RK4_STEP, SIDE_BY_SIDE, count, cores()), repeated(lambda: run(*paths, tau, 1e-3))),
+        Loop(each, repeated(lambda: compiled.each(q, qd, tau, out))),
+        Loop(lanes, repeated(lambda: compiled.lanes(*columns))),
+        Loop(called, repeated(lambda: tmt.acceleration(q, qd, tau, tree))),
+        Loop(step, repeated(lambda: run(*paths, tau, 1e-3))),
     ]
 
 

@@ -26,9 +26,7 @@ from .settings import MOST_SECONDS, coarsest_steps, estimated, methods, settings
 
 NEAR_ROUNDING = 30  # a smaller multiple of the error of rounding counts as rounding
 GROWTH_STEPS = 16  # of the run whose growth is computed, between two recorded times
-EACH_STEP = (
-    12  # nv up to which the growth takes the Jacobian of every step; above, that of one in GROWTH_STEPS
-)
+EACH_STEP = 12  # nv up to which the growth takes the Jacobian of every step, not of one in GROWTH_STEPS
 TimedCall = tuple[Callable[[], object], float]  # a run takes this many times as long as the call
 FIRST_STEPS = 512  # a longer run of MuJoCo is timed over its first steps only
 
@@ -93,9 +91,7 @@ class SceneRuns:
 
 @dataclass
 class SpeedResult(Result):
-    floors: dict[str, float] = field(
-        default_factory=dict
-    )  # by scene: the error that rounding leaves, rad or m
+    floors: dict[str, float] = field(default_factory=dict)  # by scene, see SceneRuns
     regular: str = ""  # the scene in which errors are regular
     unit: str = "rad"
     servos_off: bool = False  # whether the robot has servos, which do not act in the regular scene
@@ -151,23 +147,16 @@ def gained_nothing(error: float, work: int, best: float, last: int, floor: float
 def measured(scene: SceneRuns, engine: Engine, method: Method, setting: Setting) -> Run:
     """One run; a reference in doubles resolves no error below the floor of the scene: smaller ones are set to it."""
     case, reference = scene.case, scene.reference
-    followed = follow(engine.of(case), case, method, setting, reference)
-    motion = followed.motion
-    least = scene.floor if reference.why else 0.0
+    motion, seconds, errors, early = follow(engine.of(case), case, method, setting, reference)
+    least, unit = scene.floor if reference.why else 0.0, movement_unit(case.robot.coordinates)
     dt = setting.duration / setting.steps if setting.steps else None
-    row = SpeedRow(case.name, method.engine, method.name, dt, setting.tolerance, motion.steps, motion.steps)
-    row.evaluations, row.seconds, row.unit = (
-        motion.evaluations,
-        followed.seconds,
-        movement_unit(case.robot.coordinates),
-    )
+    row = SpeedRow(case.name, method.engine, method.name, dt, setting.tolerance, motion.steps, unit=unit)
+    row.timed_steps, row.evaluations, row.seconds = motion.steps, motion.evaluations, seconds
     row.diverged = diverged_at(case, reference.t, motion.q, motion.v) is not None
     if not row.diverged:
-        row.error, row.worst_error = (
-            max(float(e), least) for e in (followed.error[-1], followed.error.max())
-        )
+        row.error, row.worst_error = max(float(errors[-1]), least), max(float(errors.max()), least)
         row.energy_error = float(np.abs(tmt.energy(motion.q, motion.v, case.tree) - scene.energy).max())
-    return Run(method, setting, max(followed.early, least), row)
+    return Run(method, setting, max(early, least), row)
 
 
 def floor(case: Case, dynamics: Dynamics) -> float:
@@ -184,9 +173,8 @@ def floor(case: Case, dynamics: Dynamics) -> float:
             stride = 1 if case.coordinates.nv <= EACH_STEP else GROWTH_STEPS
             grown = growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_STEPS, stride)
             return float(EPS * 10.0 ** grown.max() * max(1.0, np.abs(motion.q).max()))
-    raise ValueError(
-        f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; expected a shorter scene"
-    )
+    reached = f"scene {case.name!r}: RK4 with {steps} steps does not reach its end"
+    raise ValueError(f"{reached}; expected a shorter scene")
 
 
 def prepared(case: Case, runs: Sequence[Run], engines: Mapping[str, Engine]) -> list[TimedCall]:

@@ -20,6 +20,7 @@ from ...engines import LABELS
 from ...report.style import BLUE, ORANGE
 from .runs import TrajectoryResult
 
+Pen, Links = ImageDraw.ImageDraw, Sequence[tuple[int, int]]
 PIXELS, TOP, BOTTOM = (640, 420), 78, 34  # pixels; and the margins for text above and below
 ROOM = PIXELS[0] - 36, PIXELS[1] - TOP - BOTTOM - 36
 MIDDLE = PIXELS[0] / 2, (PIXELS[1] + TOP - BOTTOM) / 2
@@ -70,12 +71,10 @@ def one_picture(scene: Pictures, k: int, still: Image.Image, paths: Sequence[np.
             draw_sticks(pen, path[k], scene.links, which, scene.few_sticks)
     lost = [LABELS[name] for name, path in scene.points.items() if not np.isfinite(path[k]).all()]
     apart = say_of_picture("apart", lost=lost, apart=scene.apart[k], unit=scene.unit)
-    left = [
-        (time, LABELS[name]) for name, time in scene.left.items() if time is not None and time <= scene.t[k]
-    ]
+    left = {LABELS[name]: time for name, time in scene.left.items() if time and time <= scene.t[k]}
     write(pen, (PIXELS[0] - 16, PIXELS[1] - 28), f"t = {scene.t[k]:.2f} s", 17, "ra")
     write(pen, (16, PIXELS[1] - 28), apart, 17)
-    write(pen, (PIXELS[0] - 16, 68), say_of_picture("left", left=sorted(left)), 14, "ra")
+    write(pen, (PIXELS[0] - 16, 68), say_of_picture("left", left=left), 14, "ra")
     return image.reduce(FINE)
 
 
@@ -83,13 +82,7 @@ def say_of_picture(kind: str, **values: Any) -> str:
     return say(Finding("trajectory", f"picture_{kind}", values))
 
 
-def draw_sticks(
-    pen: ImageDraw.ImageDraw,
-    points: np.ndarray,
-    links: Sequence[tuple[int, int]],
-    which: int,
-    few: bool = True,
-) -> None:
+def draw_sticks(pen: Pen, points: np.ndarray, links: Links, which: int, few: bool = True) -> None:
     """The sticks of an engine: of the first (0) wide with discs, else narrow with rings. points: (n, 2)."""
     colour = (BLUE, ORANGE)[which]
     places = [tuple(FINE * point) for point in points]
@@ -118,9 +111,7 @@ def text_of_scene(scene: Pictures, label: str, base: np.ndarray) -> Image.Image:
     return image
 
 
-def write(
-    pen: ImageDraw.ImageDraw, place: tuple[float, float], text: str, size: int, anchor: str = "la"
-) -> None:
+def write(pen: Pen, place: tuple[float, float], text: str, size: int, anchor: str = "la") -> None:
     pen.text((FINE * place[0], FINE * place[1]), text, fill=BLACK, font=font(FINE * size), anchor=anchor)
 
 

@@ -41,9 +41,8 @@ def scenes_of(result: TrajectoryResult, robot: Robot) -> list[SceneRuns]:
         left = tuple(path.left for path in run.paths.values()) if run else ()
         passed = not any(scene_of(where, [*names]) == case.name for where in failing)
         share = largest_known([row.difference_over_band for row in rows])
-        scenes.append(
-            SceneRuns(case.name, share, min(until), max(until), case.duration, diverged, left, passed)
-        )
+        runs_of = SceneRuns(case.name, share, min(until), max(until), case.duration, diverged, left, passed)
+        scenes.append(runs_of)
     return scenes
 
 

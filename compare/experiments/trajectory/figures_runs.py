@@ -22,9 +22,9 @@ from .true_motion import difference_while_judged
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
 LEGEND_COLUMNS = 4  # of a legend; with names longer than LONG three
 LONG = 14  # letters of a joint's name
+MARKS: dict[str, Any] = {"marker": "o", "linestyle": "none", "mfc": "white", "markersize": 2.8, "mew": 0.9}
 NOT_JUDGED: dict[str, Any] = {"color": (GREY, 0.2), "linewidth": 0}
 MOST_LINES = len(LINES)  # of joints in a panel
-LEVEL = 1e-6  # of a position: a smaller change is not seen in a panel
 
 
 def draw_held(result: TrajectoryResult, case: Case, number: int) -> tuple[str, Figure, Finding]:
@@ -33,30 +33,17 @@ def draw_held(result: TrajectoryResult, case: Case, number: int) -> tuple[str, F
     fig = Figure(figsize=(WIDTH, 3.3), layout="constrained")
     ax = fig.subplots()
     over_time(ax, run, [np.degrees(run.until_diverged(engine, path.q)) for engine, path in run.paths.items()])
-    for (engine, path), dash in zip(run.paths.items(), ("--", ":")):
+    engines = []
+    for (engine, path), error, dash in zip(run.paths.items(), result.errors[case.name], ("--", ":")):
+        engines.append({"label": LABELS[engine], "left": path.left, "error": error})
         if path.left is not None:
-            ax.axvline(
-                path.left,
-                color="black",
-                linestyle=dash,
-                label=f"{LABELS[engine]} leaves at {path.left:.2f} s",
-            )
+            label = f"{LABELS[engine]} leaves at {path.left:.2f} s"
+            ax.axvline(path.left, color="black", linestyle=dash, label=label)
     ax.set(xlabel="time, s", ylabel="hinge angle, deg", xlim=(0, run.t[-1]))
     fig.legend(loc="outside upper center", ncols=LEGEND_COLUMNS + 1)
-    errors = zip(run.paths.items(), result.errors[case.name])
-    engines = [
-        {"label": LABELS[engine], "left": path.left, "error": error} for (engine, path), error in errors
-    ]
-    values = {
-        "number": number,
-        "scene": case.name,
-        "end": float(run.t[-1]),
-        "steps": run.steps,
-        "limit": LEFT,
-    }
-    apart = difference_while_judged(run)
-    caption = result.finding("figure_held", **values, engines=engines, judged=run.judged_until, apart=apart)
-    return f"assignment_figure_{number}", fig, caption
+    values: dict[str, Any] = {"scene": case.name, "end": float(run.t[-1]), "steps": run.steps, "limit": LEFT}
+    values |= {"engines": engines, "judged": run.judged_until, "apart": difference_while_judged(run)}
+    return f"assignment_figure_{number}", fig, result.finding("figure_held", number=number, **values)
 
 
 def runs_of(result: TrajectoryResult, case: Case) -> list[Run]:
@@ -71,13 +58,14 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
     shown, unit = differing_most(case, runs), movement_unit(case.coordinates)
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
     axes = fig.subplots(3, len(runs), sharex=True, sharey="row", squeeze=False)
+    step = step_in_words(case, steps)
     for (positions, speeds, below), run in zip(axes.T, runs):
-        paths = run.paths.items()
-        places = [run.until_diverged(engine, drawable(case, path.q)) for engine, path in paths]
-        over_time(positions, run, places, shown, 64 // len(runs))
-        rates = [run.until_diverged(engine, path.v) for engine, path in paths]
-        over_time(speeds, run, rates, shown, 64 // len(runs))
-        step = step_in_words(case, steps)
+        for ax, name in ((positions, "q"), (speeds, "v")):
+            paths = {engine: getattr(path, name) for engine, path in run.paths.items()}
+            values = [
+                run.until_diverged(engine, drawable(case, name, path)) for engine, path in paths.items()
+            ]
+            over_time(ax, run, values, shown, 64 // len(runs))
         positions.set_title(f"{run.integrator}, {step}" if len(runs) < 4 else f"{run.integrator}\n{step}")
         draw_difference(below, run, result.label)
     values = np.concatenate([line.get_ydata() for ax in axes[2] for line in ax.lines])
@@ -86,8 +74,8 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
         zero_at_the_end(axes[2, 0].yaxis, DRAWN_ZERO, values.max(), most=6)
     turns = unit == "rad" and not case.coordinates.has_balls
     place, speed = ("angle", "rate") if turns else ("position", "speed")
-    label_axis(axes[0, 0], place, unit)
-    label_axis(axes[1, 0], speed, " or ".join(f"{part}/s" for part in unit.split(" or ")))
+    axes[0, 0].set_ylabel(f"{place}, {unit}")
+    axes[1, 0].set_ylabel(f"{speed}, {unit.replace(' or', '/s or')}/s")
     axes[2, 0].set_ylabel(f"{place}: difference, {unit}" if unit == "rad" else f"difference, {unit}")
     fig.align_ylabels(axes[:, 0])
     add_legend(fig, axes, any(len(case.coordinates.speeds[i]) > LONG for i in shown))
@@ -111,14 +99,12 @@ def draw_difference(ax: Axes, run: Run, label: str) -> None:
 
 def add_legend(fig: Figure, axes: np.ndarray, long: bool) -> None:
     """The legend of a run above its panels. long: it has long names."""
-    handles, labels = (
-        a + b for a, b in zip(*(ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0])))
-    )
+    handles = [handle for ax in (axes[0, 0], axes[2, 0]) for handle in ax.get_legend_handles_labels()[0]]
     if any(ax.patches for ax in axes[2]):
-        handles, labels = [*handles, Patch(**NOT_JUDGED)], [*labels, "not judged"]
+        handles.append(Patch(label="not judged", **NOT_JUDGED))
     columns, high = LEGEND_COLUMNS - long, axes[0, 0].get_title().count("\n")
     lines = -(-len(handles) // columns)
-    fig.legend(handles, labels, loc="upper center", ncols=columns)
+    fig.legend(handles=handles, loc="upper center", ncols=columns)
     top = (94.5 - 3 * lines - 2.4 * high) / 100
     fig.subplots_adjust(left=0.105, right=0.985, bottom=0.075, top=top, hspace=0.12, wspace=0.08)
 
@@ -126,63 +112,53 @@ def add_legend(fig: Figure, axes: np.ndarray, long: bool) -> None:
 def run_caption(result: TrajectoryResult, case: Case, runs: Sequence[Run], shown: int) -> Finding:
     """The engines' difference in a scene, until when it is judged, and their errors. shown: the number of positions."""
     rows = [row for row in result.rows if row.scene == case.name and row.level == "open loop"]
-    share = largest_known([row.difference_over_band for row in rows])
-    judged, errors = [(run.integrator, run.judged_until) for run in runs], result.errors.get(case.name)
-    values = {"scene": scene_begins(case.name, case.robot), "judged": judged, "share": share, "shown": shown}
+    errors, coordinates = result.errors.get(case.name), case.coordinates
+    values: dict[str, Any] = {
+        "scene": scene_begins(case.name, case.robot),
+        "unit": movement_unit(coordinates),
+    }
+    values |= {"shown": shown, "positions": coordinates.nv, "balls": coordinates.has_balls}
     values["errors"] = errors and dict(zip((result.label, "MuJoCo"), errors))
-    unit, balls = movement_unit(case.coordinates), case.coordinates.has_balls
-    return result.finding("figure_run", **values, unit=unit, positions=case.coordinates.nv, balls=balls)
+    values["share"] = largest_known([row.difference_over_band for row in rows])
+    judged = [(run.integrator, run.judged_until) for run in runs]
+    return result.finding("figure_run", judged=judged, **values)
 
 
 def over_time(
-    ax: Axes,
-    run: Run,
-    values: Sequence[np.ndarray],
-    shown: Sequence[int] | None = None,
-    marks_at_most: int = 64,
+    ax: Axes, run: Run, values: Sequence[np.ndarray], shown: Sequence[int] = (), marks_at_most: int = 64
 ) -> None:
     """Positions or speeds of both engines, (times, nv), against time: lines, and marks for MuJoCo.
 
-    shown: the numbers of those that are drawn, None: all.
+    shown: the numbers of those that are drawn, (): all.
     """
     every = slice(None, None, max(1, len(run.t) // marks_at_most))
-    marks = {"marker": "o", "linestyle": "none", "mfc": "white", "markersize": 2.8, "markeredgewidth": 0.9}
     robot, names, (ours, theirs) = run.case.robot, run.case.coordinates.speeds, values
     all_names = robot.coordinates.speeds
     few = len(all_names) <= MOST_LINES  # then a joint looks the same in every figure
-    for k, i in enumerate(range(len(names)) if shown is None else shown):
+    for k, i in enumerate(shown or range(len(names))):
         colour, dash = LINES[all_names.index(names[i]) if few else k]
         label = f"{robot.symbol(names[i])}, {LABELS[robot.compared[0]]}"
         ax.plot(run.t, ours[:, i], linestyle=dash, color=colour, label=label)
-        ax.plot(run.t[every], theirs[every, i], color=colour, clip_on=False, **marks)
-    ax.plot([], [], color="black", label="MuJoCo", **marks)
+        ax.plot(run.t[every], theirs[every, i], color=colour, clip_on=False, **MARKS)
+    ax.plot([], [], color="black", label="MuJoCo", **MARKS)
 
 
-def label_axis(ax: Axes, name: str, unit: str) -> None:
-    """Name a vertical axis, with the power of ten by which its numbers are multiplied."""
-    low, high = ax.get_ylim()
-    largest = max(abs(low), abs(high))
-    if high - low < LEVEL * largest:  # a position that does not change: its numbers would all be alike
-        ax.set_ylim((low + high) / 2 - 0.05 * largest, (low + high) / 2 + 0.05 * largest)
-    power = int(np.floor(np.log10(largest)))
-    factor = 1.0 if -2 <= power <= 3 else 10.0**power
-    ax.yaxis.set_major_formatter(lambda value, _: f"{value / factor:g}".replace("-", "\N{MINUS SIGN}"))
-    ax.set_ylabel(f"{name}, {unit}" if factor == 1.0 else f"{name}, {factor:.0e} {unit}")
+def drawable(case: Case, name: str, values: np.ndarray) -> np.ndarray:
+    """What is drawn of positions "q" or speeds "v", (times, nv).
 
-
-def drawable(case: Case, q: np.ndarray) -> np.ndarray:
-    """Positions as they are drawn, (times, nv): of a ball the movement from the start, NaN where it passes half a turn."""
+    Of a ball's position the movement from the start, NaN where it passes half a turn.
+    """
     coordinates = case.coordinates
-    if not coordinates.has_balls:
-        return q
-    values = coordinates.difference(q, q[0])
+    if name == "v" or not coordinates.has_balls:
+        return values
+    movements = coordinates.difference(values, values[0])
     for joint in coordinates.places.joints:
-        if joint.kind != "ball":
-            values[:, joint.qd] = q[:, joint.q]
-            continue
-        jumps = np.linalg.norm(np.diff(values[:, joint.qd], axis=0), axis=1) > np.pi
-        values[1:, joint.qd][jumps] = np.nan
-    return values
+        if joint.kind == "ball":
+            turned = movements[:, joint.qd]
+            turned[1:][np.linalg.norm(np.diff(turned, axis=0), axis=1) > np.pi] = np.nan
+        else:
+            movements[:, joint.qd] = values[:, joint.q]
+    return movements
 
 
 def differing_most(case: Case, runs: Sequence[Run]) -> list[int]:

@@ -179,12 +179,12 @@ def run_of_ours(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Ours
     rates = np.maximum(*(np.abs(speeds[:, turning]) for speeds in (states[1], stepped[1])))
     single = dt * rates.max(axis=1, initial=0.0) <= np.pi
     states, stepped = ([values[single] for values in pair] for pair in (states, stepped))
-    tolerance, widest = (
-        step_rounding(stepping, tree, *states, tau, dt),
+    of_positions = width[:, : case.coordinates.nv].max(axis=1)
+    run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, of_positions)
+    widest, tolerance = (
         rules.widest_judged(case, path.q, path.v),
+        step_rounding(stepping, tree, *states, tau, dt),
     )
-    narrowest = width[:, : case.coordinates.nv].max(axis=1)
-    run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, narrowest)
     return Ours(run, width, widest, times[single], states, stepped, tolerance)
 
 

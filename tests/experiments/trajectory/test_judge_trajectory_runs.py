@@ -168,7 +168,7 @@ def test_a_ball_is_drawn_by_its_turn_from_the_start():
     case = robot_of(reading.read(random_tree(2, joints=5)), "kinds.xml").case("c")
     turns = np.array([0.0, 0.1, 1.75, 1.85])
     q = case.coordinates.move(case.q, turns[:, None] * np.ones(case.coordinates.nv))
-    values = figures_runs.drawable(case, q)
+    values = figures_runs.drawable(case, "q", q)
     for joint in case.coordinates.places.joints:
         if joint.kind == "ball":
             assert values[:3, joint.qd] == pytest.approx(turns[:3, None] * np.ones(3))
