@@ -49,6 +49,4 @@ def setup_between(text: str, edited: str | None = None, states: int = 30, exact_
 
 def untimed_speed(setup: Setup) -> Result:
     """What speed judges in its regular scene, without times."""
-    regular = settings.regular_of(setup.robot)
-    name, *parts = runs.scene(regular, setup.engines, setup.size)
-    return speed.judged(setup, [regular], *({name: part} for part in parts))
+    return speed.judged(setup, [runs.scene_runs(settings.regular_of(setup.robot), setup.engines, setup.size)])

@@ -63,7 +63,9 @@ def test_imports_keep_their_directions():
             said = f"{dotted(path)} imports {name}"
             is_style = path.stem.startswith("figures") and name == "compare.report.style"
             assert part(name) in allowed or is_style or name == "compare.core.text", said
-            shared = tuple(f"compare.experiments.{name}" for name in ("figures", "quantities", "setup"))
+            shared = tuple(
+                f"compare.experiments.{name}" for name in ("figures", "followed", "quantities", "setup")
+            )
             is_free = name.startswith(shared) or name.split(".")[:3] == own
             assert is_free or not name.startswith("compare.experiments."), said
         assert "tmt" not in libraries(path) or "tmt" in allowed, path

@@ -63,6 +63,6 @@ def printed(result: Result, item: str) -> dict:
 
 def true_errors(result: Result) -> tuple[dict, int | None]:
     """Errors of both engines against the true motion with the coarsest steps of each scene, and their number if it is one."""
-    errors, runs = result.curves.get("errors") or {}, result.curves.get("runs", {})
-    counts = {min(steps for name, _, steps in runs if name == scene) for scene in errors}
+    errors = getattr(result, "errors", {})
+    counts = {min(run.steps for run in result.runs if run.case.name == scene) for scene in errors}
     return errors, min(counts) if len(counts) == 1 else None

@@ -14,17 +14,15 @@ def pendulum(tree: tmt.Tree) -> tuple[float, float]:
     """
     axis, gravity = np.array(tree.axis[0]), np.array(tree.gravity)
     inertia, moment = tree.armature[0], np.zeros(3)
-    for hinge, mass, com, tensor in zip(
-        tree.body_joint, tree.mass, np.array(tree.com), np.array(tree.inertia)
-    ):
+    bodies = zip(tree.body_joint, tree.mass, np.array(tree.com), np.array(tree.inertia))
+    for hinge, mass, com, tensor in bodies:
         if hinge == 0:
             inertia += axis @ tensor @ axis + mass * np.sum(np.cross(axis, com) ** 2)
             moment += mass * com
     across, pull = (v - axis * (axis @ v) for v in (moment, gravity))
     hanging = np.arctan2(axis @ np.cross(across, pull), across @ pull)
-    return float(hanging + tree.reference[0]), float(
-        np.sqrt(np.linalg.norm(across) * np.linalg.norm(pull) / inertia)
-    )
+    frequency = np.sqrt(np.linalg.norm(across) * np.linalg.norm(pull) / inertia)
+    return float(hanging + tree.reference[0]), float(frequency)
 
 
 def swing(t: np.ndarray, q: float, qd: float, hanging: float, frequency: float) -> np.ndarray:

@@ -4,7 +4,6 @@ A second run with another form of the equations and another order gives the accu
 stiff robot, the reference is a run in doubles of order 8, whose accuracy is known from halving its steps.
 """
 
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -14,15 +13,16 @@ import tmt
 from tmt.exact.motion import TooManySteps, truth
 from tmt.methods import METHODS
 
-from ..robots.case import Case, Coordinates, rates_at
+from ..core.finding import Finding
+from ..robots import Robot
+from ..robots.case import Case
+from ..robots.coordinates import Coordinates, rates_at
 from .steps import growth_of
 
 RECORDS = 64  # states of a run, without its start
 LOST = 1e-30  # error of a run in pairs relative to the growth of a small difference, about
-DOUBLES, MOST_DOUBLINGS = (
-    "dopri8",
-    5,
-)  # the method of a run in doubles; how often its number of steps is doubled
+DOUBLES = "dopri8"  # the method of a run in doubles
+MOST_DOUBLINGS = 5  # of the number of its steps
 DIVERGES = 1.05  # growth in a step that overflows in the thousands of steps of a run
 
 
@@ -37,34 +37,25 @@ class Reference(NamedTuple):
     coordinates: Coordinates
     why: str | None = None  # the reason for a run in doubles
 
-    def error(self, q: np.ndarray, joints: Sequence[int]) -> np.ndarray:
-        """The largest error at each time of the positions q (65, ...) of these joints of the robot, rad or m, (65,)."""
-        whole = self.coordinates
-        part = Coordinates(*(tuple(names[i] for i in joints) for names in (whole.names, whole.all_kinds)))
-        places = [whole.places.joints[i].q for i in joints]
-        columns = [k for place in places for k in range(place.start, place.stop)]
-        high, low = self.high[:, columns], self.low[:, columns]
-        beyond = np.stack(np.broadcast_arrays(*part.places.tangent([*high.T], [*low.T])), axis=-1)
-        return np.abs(part.difference(q, high) - beyond).max(axis=1)
-
-
-def references(cases: Sequence[Case]) -> dict[str, Reference]:
-    """Each case's reference by its name."""
-    return {case.name: reference(case) for case in cases}
+    def error(self, q: np.ndarray) -> np.ndarray:
+        """The largest error of the positions q (65, nq) at each time, rad or m, (65,)."""
+        nq, places = self.coordinates.nq, self.coordinates.places
+        high, low = self.high[:, :nq], self.low[:, :nq]
+        beyond = np.stack(np.broadcast_arrays(*places.tangent([*high.T], [*low.T])), axis=-1)
+        return np.abs(self.coordinates.difference(q, high) - beyond).max(axis=1)
 
 
 def reference(case: Case) -> Reference:
     """The reference of one case at 65 equal times; ValueError if no run reaches the end of the scene."""
     count = RECORDS if case.controller else first_steps(case)  # as the coarsest runs of `speed`
-    start = (tuple(values.tolist()) for values in (*case.start, case.tau))
+    q, v, tau = (tuple(values.tolist()) for values in (*case.start, case.tau))
     try:
-        path, apart = in_pairs(case.tree, *start, case.duration / count, count, count // RECORDS)
+        path, apart = in_pairs(case.tree, q, v, tau, case.duration / count, count, count // RECORDS)
     except TooManySteps as error:
         return in_doubles(case)._replace(why=str(error))
     except ValueError as error:
-        raise ValueError(
-            f"scene {case.name!r}: {error}; expected a slower start or a shorter scene"
-        ) from error
+        reason = f"scene {case.name!r}: {error}; expected a slower start or a shorter scene"
+        raise ValueError(reason) from error
     return Reference(times(case), path.high, path.low, apart, path.steps, case.coordinates)
 
 
@@ -86,39 +77,29 @@ def in_doubles(case: Case) -> Reference:
 
     ValueError if no run reaches the end of the scene.
     """
-    count, runs = first_steps(case), []
-    before = after = None
+    count, before, runs = first_steps(case), None, []
     for _ in range(MOST_DOUBLINGS + 1):
-        after = tmt.simulate(*case.start, case.tau, case.duration / count, count, DOUBLES, case.tree)
-        every = count // RECORDS
-        after = after.q[::every], after.qd[::every]
-        if before is not None:
-            apart = case.coordinates.difference(after[0], before[0]), after[1] - before[1]
-            runs.append((np.abs(np.concatenate(apart, axis=1)).max(), after, count))
+        motion = tmt.simulate(*case.start, case.tau, case.duration / count, count, DOUBLES, case.tree)
+        q, qd = motion.q[:: count // RECORDS], motion.qd[:: count // RECORDS]
+        if before:
+            apart = case.coordinates.difference(q, before[0]), qd - before[1]
+            runs.append((np.abs(np.concatenate(apart, axis=1)).max(), np.concatenate([q, qd], axis=1), count))
             if len(runs) > 1 and np.isfinite(runs[-2][0]) and not runs[-1][0] < runs[-2][0] / 2.0:
                 break
-        before, count = after, 2 * count
-    apart, path, count = min(runs, key=lambda run: np.nan_to_num(run[0], nan=np.inf))
+        before, count = (q, qd), 2 * count
+    apart, high, steps = min(runs, key=lambda run: np.nan_to_num(run[0], nan=np.inf))
     if not np.isfinite(apart):
-        raise ValueError(
-            f"scene {case.name!r}: runs with up to {runs[-1][2]} steps of {DOUBLES} diverge; expected a slower start or a "
-            "shorter scene"
-        )
-    high = np.concatenate(path, axis=1)
-    return Reference(times(case), high, np.zeros_like(high), float(apart), count, case.coordinates)
+        tried = f"scene {case.name!r}: runs with up to {runs[-1][2]} steps of {DOUBLES} diverge"
+        raise ValueError(f"{tried}; expected a slower start or a shorter scene")
+    return Reference(times(case), high, np.zeros_like(high), float(apart), steps, case.coordinates)
 
 
-def has_no_reference(robot: object) -> str | None:
+def has_no_reference(robot: Robot) -> Finding | None:
     """Why a file's robot has no reference, as its fastest mode diverges even with the finest steps; or None."""
     for case in robot.cases_of_torque if robot.is_read else ():
-        count = first_steps(case) << MOST_DOUBLINGS
+        dt = case.duration / (first_steps(case) << MOST_DOUBLINGS)
         decay, swing = rates_at(case.tree, case.q)
-        grown = np.abs(
-            growth_of(METHODS[DOUBLES], np.array([-decay, 1j * swing]) * case.duration / count)
-        ).max()
-        if not grown <= DIVERGES:
-            return (
-                f"the {robot.noun}'s fastest rate, {max(decay, swing):.1e} per second, is too fast for the reference's finest "
-                f"step, {case.duration / count:.1e} s"
-            )
+        growth = np.abs(growth_of(METHODS[DOUBLES], np.array([-decay, 1j * swing]) * dt)).max()
+        if not growth <= DIVERGES:
+            return Finding("speed", "no_reference", {"noun": robot.noun, "rate": max(decay, swing), "dt": dt})
     return None

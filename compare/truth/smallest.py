@@ -8,6 +8,7 @@ at a random state, by its acceleration in 50 digits of the robot's doubles: an a
 import dataclasses
 from collections.abc import Sequence
 from functools import lru_cache
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import mpmath
@@ -23,44 +24,42 @@ from ..robots.case import SEED, Case
 
 # an acceleration in 50 digits that counts as 0, relative to the largest one at that state, which is taken as at least 1
 ZERO = mpmath.mpf(10) ** (10 - DIGITS)
+Numbers = list[mpmath.mpf]
 
 
 class Needed(NamedTuple):
     """Which free joints of a case stay, and why each of the others is needed."""
 
-    stays: tuple
-    moves: dict  # name: why
+    stays: tuple[str, ...]
+    moves: dict[str, str]  # name: why
 
 
 def needed(case: Case) -> Needed:
     """Which joints of the case its motion needs."""
     names, coordinates = case.joints, case.coordinates
     joints = dict(zip(names, coordinates.places.joints))
-    units = {name: coordinates.units[joint.qd.start] for name, joint in joints.items()}
-    moves = {
-        name: f"{name} has a speed at the start" for name, joint in joints.items() if any(case.v[joint.qd])
-    }
+    moves = {name: f"{name} has a speed at the start" for name in names if any(case.v[joints[name].qd])}
     while still := tuple(name for name in names if name not in moves):
         rng = np.random.default_rng(SEED)
         (q,), qd = coordinates.random(rng, 1), rng.uniform(-10.0, 10.0, coordinates.nv)
-        largest = {name: max(map(abs, a)) for name, a in exact_accelerations(case, still, q, qd).items()}
         when = "at the start" if len(still) == len(names) else "when the others move"
-        for name, a in largest.items():
-            if a > 0.0:
-                moves[name] = f"{name} accelerates by {float(a):.2g} {units[name]}/s2 {when}"
-        if not any(largest.values()):
+        for name, accelerations in exact_accelerations(case, still, q, qd).items():
+            largest, unit = max(map(abs, accelerations)), coordinates.units[joints[name].qd.start]
+            if largest > 0.0:
+                moves[name] = f"{name} accelerates by {float(largest):.2g} {unit}/s2 {when}"
+        if not moves.keys() & {*still}:
             break
     return Needed(still, moves)
 
 
 def forces(
-    case: Case, tree, still: Sequence[str], start: Sequence, q: Sequence, qd: Sequence
-) -> tuple[list, list]:
+    case: Case, tree: SimpleNamespace, still: Sequence[str], start: Numbers, q: Numbers, qd: Numbers
+) -> tuple[Numbers, Numbers]:
     """Mbar qdd (nv,) and the position: joints in `still` at their start and at rest, the others at q, qd; in mpmath's numbers.
 
     A holding torque is the model's own bias (and springs) at the start in these numbers, not its rounded value.
     """
-    q, qd, joints = list(q), list(qd), dict(zip(case.joints, tree.coordinates.joints))
+    q, qd, joints = [*q], [*qd], dict(zip(case.joints, tree.coordinates.joints))
     for name in still:
         joint = joints[name]
         q[joint.q], qd[joint.qd] = start[joint.q], [mpmath.mpf(0)] * len(qd[joint.qd])
@@ -75,32 +74,32 @@ def forces(
     return [t - d * v - hi - spring for t, d, v, hi, spring in zip(tau, tree.damping, qd, h, springs)], q
 
 
-def exact_accelerations(case: Case, still: Sequence[str], q: np.ndarray, qd: np.ndarray) -> dict:
+def exact_accelerations(
+    case: Case, still: Sequence[str], of_q: np.ndarray, of_qd: np.ndarray
+) -> dict[str, tuple[mpmath.mpf, ...]]:
     """The accelerations of the joints in `still` with 50 digits, rad/s2 or m/s2: tuples by name; 0 where they vanish."""
     with mpmath.workdps(DIGITS):
         tree = exact_tree(case.tree, mpmath.mpf)
-        start, q, qd = ([mpmath.mpf(float(v)) for v in values] for values in (case.q, q, qd))
+        start, q, qd = ([mpmath.mpf(float(v)) for v in values] for values in (case.q, of_q, of_qd))
         for joint in tree.coordinates.balls:
             for turns in (start, q):
                 length = mpmath.sqrt(sum(part * part for part in turns[joint.q]))
                 turns[joint.q] = [part / length for part in turns[joint.q]]
         values, q = forces(case, tree, still, start, q, qd)
         if max(map(abs, values)) > ZERO:
-            still_tree = dataclasses.replace(case.tree, damping=np.zeros(len(qd)))
+            still_tree = dataclasses.replace(case.tree, damping=(0.0,) * len(qd))
             values = solve(exact_mass_matrix(still_tree, tuple(q)), values)
         zero = ZERO * max(1, *map(abs, values))
+        values = [a if abs(a) > zero else mpmath.mpf(0) for a in values]
         joints = dict(zip(case.joints, case.tree.coordinates.joints))
-        return {
-            name: tuple(a if abs(a) > zero else mpmath.mpf(0) for a in values[joints[name].qd])
-            for name in still
-        }
+        return {name: tuple(values[joints[name].qd]) for name in still}
 
 
 @lru_cache(maxsize=8)
-def exact_mass_matrix(tree: tmt.Tree, q: tuple) -> list:
+def exact_mass_matrix(tree: tmt.Tree, q: tuple[mpmath.mpf, ...]) -> list[Numbers]:
     """Mbar at a position in mpmath's current digits; cached, as the scenes of a robot share positions."""
-    tree = exact_tree(tree, mpmath.mpf)
-    return method.mass_matrix(method.bodies(tree, q), tree.armature)
+    exact = exact_tree(tree, mpmath.mpf)
+    return method.mass_matrix(method.bodies(exact, q), exact.armature)
 
 
 def reduced(case: Case, need: Needed | None = None) -> Case | None:

@@ -18,7 +18,7 @@ from compare.core.check import About, Result
 from compare.engines import EngineRecord, Method
 from compare.engines.outside.model import numbers_of, size_of, together
 from compare.engines.tmt import TmtDynamics
-from compare.experiments.engines import compare_numbers, compare_quantities, integrators
+from compare.experiments.engines import EnginesResult, compare_numbers, compare_quantities, integrators
 from compare.judge.entries import Entries
 from compare.judge.scale import FACTOR
 from compare.robots.arm import ARM
@@ -183,7 +183,7 @@ def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, p
     """A float32 engine is allowed what its own eps allows, and no more."""
     for share, fails in ((0.9, False), (1.1, True)):
         result, record = Result("engines"), RECORDS[precision]
-        compare_quantities(result, setup_of(), "Other", Other(quantity, share, record.eps), record)
+        compare_quantities(result, setup_of(), record, Other(quantity, share, record.eps))
         assert [check.quantity for check in result.checks if not check.passed] == [f"{name} to exact"] * fails
         assert all(check.about is About.ENGINE for check in result.checks)
         assert [note.kind for note in result.notes] == ["cause"] * fails
@@ -191,7 +191,7 @@ def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, p
 
 def test_an_engine_without_a_function_is_not_judged_by_it():
     result = Result("engines")
-    compare_quantities(result, setup_of(), "Other", Other("none"), RECORDS["float64"])
+    compare_quantities(result, setup_of(), RECORDS["float64"], Other("none"))
     assert [check.quantity for check in result.checks] == ["Mbar to exact", "qdd to exact"]
 
 
@@ -200,17 +200,17 @@ def test_a_number_as_read_just_inside_and_just_outside(number):
     """Masses and moments are checked; a number that an engine drops or sets otherwise is a finding."""
     stated = numbers_of(ARM.tree)
     for off, differs in ((60.0, False), (70.0, True)):
-        result, read = Result("engines"), {name: values.copy() for name, values in stated.items()}
+        result, read = EnginesResult("engines"), {name: values.copy() for name, values in stated.items()}
         result.tables["engines_read"] = []
         size = size_of(stated, number) or 1.0
         read[number][..., -1] += (
             off * RECORDS["float64"].eps * size * (1.0 if stated[number].any() else differs)
         )
         reading = {"read": read, "stated": stated, "mended": {number: True} if differs else {}}
-        compare_numbers(result, ARM, "Other", reading, RECORDS["float64"])
+        compare_numbers(result, ARM, RECORDS["float64"], reading)
         failed = [f"{number} as read"] * (differs and number in ("mass", "moments"))
         assert [check.quantity for check in result.checks if not check.passed] == failed
-        assert [row["number"] for row in result.tables["engines_read"][:1]] == [number] * differs
+        assert [row.number for row in result.tables["engines_read"][:1]] == [number] * differs
 
 
 ASKED = """import numpy as np
@@ -256,14 +256,12 @@ def test_bodies_that_move_as_one():
 def test_an_order_is_taken_from_regular_errors_above_the_floor(order):
     steps = [0.1 / 2**k for k in range(4)]
     errors = [2e-2 / 2 ** (order * k) for k in range(4)]
-    assert integrators.measured_order(steps, errors, 2.2e-16) == pytest.approx(order)
-    assert integrators.measured_order(steps[:3], errors[:3], 2.2e-16) is None  # two orders have not settled
-    assert integrators.measured_order(steps, [*errors[:3], 1e-14], 2.2e-16) is None  # rounding
-    assert integrators.measured_order(steps, errors, 1e-2) is None
+    assert integrators.order_of(steps, errors, 2.2e-16).order == pytest.approx(order)
+    assert integrators.order_of(steps[:3], errors[:3], 2.2e-16) is None  # two orders have not settled
+    assert integrators.order_of(steps, [*errors[:3], 1e-14], 2.2e-16) is None  # rounding
+    assert integrators.order_of(steps, errors, 1e-2) is None
     finer = [2.0**-k for k in range(7, 14)]
-    assert (
-        integrators.measured_order(finer, [2e-16 / dt for dt in finer], 2.2e-16) is None
-    )  # an eps of each step
+    assert integrators.order_of(finer, [2e-16 / dt for dt in finer], 2.2e-16) is None  # an eps of each step
 
 
 def test_a_step_is_compared_with_the_same_scheme():

@@ -16,13 +16,14 @@ from PIL import Image
 from sections import section
 
 from compare.core.check import About
+from compare.core.pictures import Pictures
 from compare.core.text import environment
-from compare.experiments.trajectory.motion import Drawn
+from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.report import images, motion, style
 from compare.robots.arm import ARM
 
 
-def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None) -> Drawn:
+def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None) -> Pictures:
     """A scene in which the points of the first engine go round, those of MuJoCo beside them; or any way that rng chooses."""
     turn = np.linspace(0.0, 1.0, pictures)[:, None] * 3.0 + np.arange(points)
     path = np.stack([np.cos(turn), np.sin(turn)], axis=-1) * np.arange(1, points + 1)[None, :, None]
@@ -33,14 +34,14 @@ def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None)
             np.where((t >= ended).reshape(-1, *[1] * (v.ndim - 1)), np.nan, v) for v in (ways[1], off)
         )
     links = [(k, k + 1) for k in range(points - 1)]
-    return Drawn(scene, "RK4, dt = 5/128 s", t, dict(zip(("tmt", "mujoco"), ways)), links, off, "rad",
-                 {"tmt": None, "mujoco": ended}, dict.fromkeys(("tmt", "mujoco")), "What is seen.", True)  # fmt: skip
+    paths, left = dict(zip(("tmt", "mujoco"), ways)), dict.fromkeys(("tmt", "mujoco"))
+    return Pictures(scene, "RK4, dt = 5/128 s", t, paths, links, off, "rad", left, "What is seen.", True)
 
 
 def page_of(*scenes, label="TMT") -> str:
     of = section("trajectory")
-    of.result.curves, of.result.label = {"drawn": list(scenes)}, label
-    return motion.motion_in_html([section("mass"), of], ARM)
+    of.result = TrajectoryResult("trajectory", pictures=list(scenes), label=label)
+    return motion.motion_in_html([section("mass"), of], ARM.noun)
 
 
 def data_of(text) -> dict:
@@ -61,9 +62,10 @@ def test_it_opens_on_the_scene_that_differs():
     drift = "drift", 2.0, 1.0, "at most", False, About.PREDICTION
     of = section("trajectory", ("open loop", 2.0, 1.0, "at most", True), drift)
     scenes = zip(of.result.checks, ("let go", "held"))
-    of.result.checks = [replace(check, scene=f"{scene}, RK4") for check, scene in scenes]
-    of.result.curves = {"drawn": [drawn("held"), drawn("let"), drawn("let go")]}
-    names = [scene["name"] for scene in data_of(motion.motion_in_html([of], ARM))["scenes"]]
+    checks = [replace(check, scene=f"{scene}, RK4") for check, scene in scenes]
+    pictures = [drawn("held"), drawn("let"), drawn("let go")]
+    of.result = TrajectoryResult("trajectory", checks=checks, pictures=pictures)
+    names = [scene["name"] for scene in data_of(motion.motion_in_html([of], ARM.noun))["scenes"]]
     assert names == ["let go", "held", "let"]
 
 

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from matplotlib.colors import to_hex
@@ -14,8 +15,10 @@ from compare.core.text import say
 from compare.engines.mujoco.reading import read
 from compare.experiments import figures_overview, module, stability
 from compare.experiments.published import PrintedRow
-from compare.experiments.speed import first_screen as of_speed
+from compare.experiments.speed import advice
+from compare.experiments.speed.runs import SpeedResult, SpeedRow
 from compare.experiments.stability.tables import LimitRow, StabilityResult, StepLimitRow
+from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.agree import AgreementRow
 from compare.report.questions import answers, true_errors
 from compare.report.style import BLUE, ORANGE, RED
@@ -201,10 +204,11 @@ def test_the_largest_difference_is_the_answer_unless_a_run_diverged(rows, number
 
 
 def test_errors_are_those_of_the_coarsest_steps():
-    runs = {("a", "rk4", 128): {}, ("a", "rk4", 64): {}, ("b", "rk4", 64): {}, ("c", "rk4", 32): {}}
-    result = Result("trajectory", curves={"runs": runs, "errors": {"a": (1.0, 2.0), "b": (3.0, None)}})
-    assert true_errors(result) == (result.curves["errors"], 64)
-    result.curves["errors"]["c"] = (5.0, 6.0)
+    counts = ("a", 128), ("a", 64), ("b", 64), ("c", 32)
+    runs = [SimpleNamespace(case=SimpleNamespace(name=name), steps=steps) for name, steps in counts]
+    result = TrajectoryResult("trajectory", runs=runs, errors={"a": (1.0, 2.0), "b": (3.0, None)})
+    assert true_errors(result) == (result.errors, 64)
+    result.errors["c"] = (5.0, 6.0)
     assert true_errors(result)[1] is None  # they are not the same in all scenes
 
 
@@ -232,7 +236,7 @@ def headline_of(name, of):
     ("parameters", [SAME, OFF], "1 2", "all as stated"),
     ("published", [replace(PRINTED, mujoco=0.8)], "0 1", ""),
     ("gravity", [AGREED, replace(AGREED, quantity="other", worst_difference=1.0, difference_over_bar=0.05)], "2e-16 10", "Mbar"),
-    ("trajectory", [{"scene": "a", "difference_over_band": 0.04}, {"scene": "a", "difference_over_band": 12.0}], "1 12", ""),
+    ("trajectory", [SimpleNamespace(scene="a", difference_over_band=share) for share in (0.04, 12.0)], "1 12", ""),
     ("stability", [STEP, replace(STEP, observed_dt=0.0995)], "2 0.5", ""),
 ])  # fmt: skip
 def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, named):
@@ -247,8 +251,7 @@ def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, 
 
 
 def timed(engine, method, seconds, error, **more):
-    return {"scene": "s", "engine": engine, "method": method, "seconds": seconds, "worst_error_rad": error, "why_not": None,
-            "diverged": False} | more  # fmt: skip
+    return SpeedRow("s", engine, method, seconds=seconds, worst_error=error, **{"diverged": False} | more)
 
 
 def marks(experiment, result, robot=ARM):
@@ -290,13 +293,12 @@ def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_n
         timed("tmt", "dopri8", 5e-3, 1e-9), timed("mujoco", "RK4", 1e-2, 1.1e-6), timed("tmt", "rk4", 1e-9, None, diverged=True),
         timed("tmt", "rk4", 1e-9, 2.0), timed("heyoka", "Taylor", None, None, why_not="absent"),
     ]  # fmt: skip
-    result = Result("speed", rows=rows, curves={"regular": "s", "unit": "rad"})
-    assert of_speed.best_rows(result) == {"tmt": [rows[0], rows[2], rows[3]], "mujoco": [rows[4]]}
-    assert of_speed.within_target(rows[4:5]) is None  # just outside of the error asked for
-    rows.append(timed("mujoco", "RK4", 3e-3, 1e-6, dt_s=0.00244140625, steps=2048.0))
+    result = SpeedResult("speed", rows=rows, regular="s")
+    assert advice.best_rows(result) == {"tmt": [rows[0], rows[2], rows[3]], "mujoco": [rows[4]]}
+    assert advice.within_target(rows[4:5]) is None  # just outside of the error asked for
+    rows.append(timed("mujoco", "RK4", 3e-3, 1e-6, dt=0.00244140625, steps=2048))
     rows.append(timed("scipy", "DOP853", 4.5e-3, 1e-7))  # which is not the cheapest beside MuJoCo
-    best = of_speed.cheapest(of_speed.best_rows(result))
-    assert best == [{name: row.get(name) for name in of_speed.SETTING} for row in (rows[-2], rows[2])]
+    assert advice.cheapest_of_fronts(advice.best_rows(result)) == [rows[-2], rows[2]]
     assert {("o", to_hex(BLUE), 1e-6), ("s", to_hex(ORANGE), 1e-6)} <= marks("speed", result)
 
 

@@ -1,15 +1,18 @@
 """Other engines that read the robot's file: what each has read, its equations at random states, and its integrators."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from ...core.check import ENDS, About, Result
 from ...core.finding import Finding
+from ...core.rows import Row, column
 from ...core.words import some_of
 from ...diagnosis import Values, diagnose_stated
-from ...engines import LABELS, RECORDS, Engine, EngineRecord
+from ...engines import LABELS, RECORDS, EngineRecord
 from ...engines.outside import Outside, OutsideDynamics
 from ...engines.outside.model import EngineError, TooLong, Unread, size_of
 from ...judge.agree import closest, over
@@ -34,182 +37,201 @@ SHOWN = ["engine", "quantity", "unit", "states", "worst_difference", "bar", "dif
          "mujoco_eps"]  # fmt: skip
 
 
+@dataclass
+class EngineRow(Row):
+    """A quantity of an engine compared with exact values."""
+
+    engine: str
+    precision: str
+    quantity: str
+    unit: str
+    states: int
+    worst_difference: float | None
+    bar: float
+    difference_over_bar: float | None = None
+    difference_eps: float = np.inf  # the largest distance from the exact value
+    mujoco_eps: float = np.inf
+    worst_q: str = ""
+    worst_qd: str = ""
+    worst_tau: str = ""
+    passed: bool = False
+
+    @property
+    def urgency(self) -> tuple[bool, bool, float]:
+        return self.passed, True, -(self.difference_over_bar or 0.0)
+
+
+@dataclass
+class ReadRow(Row):
+    """A number that an engine has read differently, or why it cannot read the file."""
+
+    engine: str
+    number: str | None = column(optional=True)
+    of: str | None = column(optional=True)
+    read: float | None = column(optional=True)
+    compared: float | None = column(optional=True)
+    unit: str | None = column(optional=True)
+    set_by_this_program: bool | None = column(optional=True)
+    why_not: str | None = None
+
+
+@dataclass
+class EnginesResult(Result):
+    mended: dict[str, list[str]] = field(default_factory=dict)  # the numbers of each engine that are set here
+
+
 def skipped(robot: Robot) -> Finding | None:
     engines = [Outside(name) for name, record in RECORDS.items() if record.reads_file]
     if any(not engine.unavailable() for engine in engines):
         return None
-    return Finding(
-        "engines", "none_installed", {"extras": [RECORDS[engine.name].extra for engine in engines]}
-    )
+    return Finding("engines", "none_installed", {"extras": [engine.record.extra for engine in engines]})
 
 
-def rows(setup: Setup) -> Result:
+def rows(setup: Setup) -> EnginesResult:
     """For each installed engine: what it has read, M, h and accelerations compared with exact values, its integrators."""
-    result = Result("engines", shown=SHOWN, curves={"mended": {}})
-    result.tables["engines_read"], result.tables["engines_methods"] = [], []
-    absent = {}
-    for engine in setup.engines.values():
-        if not isinstance(engine, Outside):
-            continue
-        if reason := engine.unavailable():
-            absent[LABELS[engine.name]] = reason
-            continue
+    result = EnginesResult("engines", shown=SHOWN, tables={"engines_read": [], "engines_methods": []})
+    absent: dict[str, list[str]] = {}
+    for engine in [engine for engine in setup.engines.values() if isinstance(engine, Outside)]:
         label = LABELS[engine.name]
         try:
-            compare_engine(result, setup, engine, label)
+            if reason := engine.unavailable():
+                absent.setdefault(reason, []).append(label)
+            else:
+                compare_engine(result, setup, engine)
         except Unread as error:
-            result.tables["engines_read"].append({"engine": label, "why_not": str(error)})
+            result.tables["engines_read"].append(ReadRow(label, why_not=str(error)))
             result.find("unread", engine=label, reason=str(error).rstrip("."))
         except TooLong as error:
             result.find("left_out", what=label, reason=str(error))
         except EngineError as error:
             result.check(label, ENDS, None, 0.0, "", str(error), rule="equal", about=About.ENGINE)
-    for reason in dict.fromkeys(absent.values()):
-        result.find(
-            "absent", engines=[label for label, why in absent.items() if why == reason], reason=reason
-        )
+    for reason, labels in absent.items():
+        result.find("absent", engines=labels, reason=reason)
     if result.rows:
         integrators.follow_known(result, setup)
-        names, largest = list(dict.fromkeys(row["engine"] for row in result.rows)), {}
-        for name in names:
-            largest[name] = max(row["difference_eps"] for row in result.rows if row["engine"] == name)
-        differing = list(dict.fromkeys(row["engine"] for row in result.rows if not row["passed"]))
-        failed = {check.scene for check in result.checks if check.quantity.endswith(AS_READ) and check.failed}
-        values = {
-            "engines": names,
-            "differing": differing,
-            "misread": [name for name in names if name in failed],
-        }
-        values |= {"largest": largest, "mended": result.curves["mended"]}
-        result.headline = result.finding("headline", **values)
-        result.top.append(result.finding("answer", **values))
+        add_answer(result)
     return result
 
 
-def compare_engine(result: Result, setup: Setup, engine: Engine, label: str) -> None:
-    record = RECORDS[engine.name]
-    setup.progress(f"engines: {label}{' compiles' * record.compiles}")
-    case = setup.robot.case()
-    dynamics = engine.of(case)
-    compare_numbers(result, setup.robot, label, dynamics.reading, record)
-    compare_quantities(result, setup, label, dynamics, record)
+def add_answer(result: EnginesResult) -> None:
+    """Which engines differ, which have read other numbers, and the largest distance of each from the exact values."""
+    largest: dict[str, float] = {}
+    for row in result.rows:
+        largest[row.engine] = max(row.difference_eps, largest.get(row.engine, 0.0))
+    differing = dict.fromkeys(row.engine for row in result.rows if not row.passed)
+    failed = {check.scene for check in result.checks if check.quantity.endswith(AS_READ) and check.failed}
+    misread = [label for label in largest if label in failed]
+    values: dict[str, Any] = {"engines": [*largest], "differing": [*differing], "misread": misread}
+    values |= {"largest": largest, "mended": result.mended}
+    result.headline = result.finding("headline", **values)
+    result.top.append(result.finding("answer", **values))
+
+
+def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None:
+    setup.progress(f"engines: {engine.record.label}{' compiles' * engine.record.compiles}")
+    dynamics = engine.of(setup.robot.case())
+    compare_numbers(result, setup.robot, engine.record, dynamics.reading)
+    compare_quantities(result, setup, engine.record, dynamics)
     if all(dynamics.reading["mended"].values()):
         integrators.compare_methods(result, setup, engine)
 
 
-def compare_numbers(result: Result, robot: Robot, label: str, reading: dict, record: EngineRecord) -> None:
+def compare_numbers(
+    result: EnginesResult, robot: Robot, record: EngineRecord, reading: Mapping[str, Mapping[str, Any]]
+) -> None:
     """A row for each number that the engine has read differently, and a check of the masses and moments of inertia."""
     for number, values in reading["read"].items():
         stated = reading["stated"][number]
         tolerance = FACTOR * record.eps * size_of(reading["stated"], number)
         if number in OF_BODIES:
-            most = np.abs(values - stated).max(initial=0.0)
-            result.check(
-                label,
-                f"{number} {AS_READ}",
-                most,
-                tolerance,
-                UNITS[number],
-                rounding=True,
-                about=About.ENGINE,
+            most, check = (
+                np.abs(values - stated).max(initial=0.0),
+                partial(result.check, rounding=True, about=About.ENGINE),
             )
+            check(record.label, f"{number} {AS_READ}", most, tolerance, UNITS[number])
         if number not in reading["mended"] or (number == "inertia" and "moments" in reading["mended"]):
             continue
-        names = named_after(robot, number)
-        rows = [
-            {"engine": label, "number": number, "of": name, "read": float(a), "compared": float(b), "unit": UNITS[number],
-             "set_by_this_program": bool(reading["mended"][number]), "why_not": None}
-            for name, a, b in zip(names, np.ravel(values), np.ravel(stated))
-            if not abs(a - b) <= tolerance
-        ]  # fmt: skip
-        result.tables["engines_read"] += rows
-        result.find(
-            "read_differently", engine=label, rows=rows, number=number, mended=bool(reading["mended"][number])
-        )
-        if reading["mended"][number]:
-            result.curves.setdefault("mended", {}).setdefault(label, []).append(number)
+        is_set = bool(reading["mended"][number])
+        differing = [
+            ReadRow(record.label, number, name, float(read), float(compared), UNITS[number], is_set)
+            for name, read, compared in zip(named_after(robot, number), np.ravel(values), np.ravel(stated))
+            if not abs(read - compared) <= tolerance
+        ]
+        result.tables["engines_read"] += differing
+        result.find("read_differently", engine=record.label, rows=differing, number=number, mended=is_set)
+        if is_set:
+            result.mended.setdefault(record.label, []).append(number)
 
 
 def named_after(robot: Robot, number: str) -> list[str]:
     """What each entry of a number belongs to."""
     if number == "gravity":
         return list("xyz")
-    joints, tree = robot.joints, robot.tree
-    if number in ENTRIES:
-        names = [
-            some_of([body for body, at in zip(tree.body_names, tree.body_joint) if at == k]) or joints[k]
-            for k in range(len(joints))
-        ]
-        return [name for name in names for _ in range(ENTRIES[number])]
-    return list(robot.coordinates.speeds)
+    tree, names = robot.tree, []
+    if number not in ENTRIES:
+        return list(robot.coordinates.speeds)
+    for k, joint in enumerate(robot.joints):
+        bodies = [body for body, of_joint in zip(tree.body_names, tree.body_joint) if of_joint == k]
+        names += [some_of(bodies) or joint] * ENTRIES[number]
+    return names
 
 
 def compare_quantities(
-    result: Result, setup: Setup, label: str, dynamics: OutsideDynamics, record: EngineRecord
+    result: EnginesResult, setup: Setup, record: EngineRecord, dynamics: OutsideDynamics
 ) -> None:
     """Rows and checks: M, h and accelerations at the states that have exact values, in eps of the engine's precision."""
-    sample, eps = asked_at(setup, record.precision), record.eps
-    scale, mujoco = Entries(sample.tree, sample.q, sample.qd), setup.engines["mujoco"].of(setup.robot.case())
-    found = {}
+    sample, mujoco = asked_at(setup, record.precision), setup.engines["mujoco"].of(setup.robot.case())
+    computed = {}
     for name in COMPARED:
-        quantity = QUANTITIES[name]
-        if not dynamics.has(quantity.function):
-            result.find("no_function", engine=label, quantity=name)
+        function = QUANTITIES[name].function
+        if not dynamics.has(function):
+            result.find("no_function", engine=record.label, quantity=name)
             continue
-        states, exact = (
-            [getattr(sample, argument) for argument in quantity.arguments],
-            sample.exact(quantity.function),
-        )
-        values = found[name] = getattr(dynamics, quantity.function)(*states)
-        size = getattr(scale, quantity.scale)
-        if name == "qdd":
-            size = size(scale.force(sample.tau), exact.high)
-        size = np.broadcast_to(size, values.shape)
-        difference, tolerance = exact.distance(values), FACTOR * eps * size
-        worst = closest(difference, tolerance)
-        units = unit(sample.tree, *quantity.units)
-        in_full = {
-            of: ", ".join(repr(float(x)) for x in getattr(sample, of)[worst[0]]) for of in quantity.arguments
-        }
-        note = "; ".join(f"{of} = ({numbers})" for of, numbers in in_full.items())
-        check = result.check(
-            label,
-            f"{name} to exact",
-            difference[worst],
-            tolerance[worst],
-            units,
-            note,
-            True,
-            about=About.ENGINE,
-        )
-        theirs = exact.distance(getattr(mujoco, quantity.function)(*states))
-        row = {"engine": label, "precision": record.precision, "quantity": name, "unit": units, "states": len(sample.q),
-               "worst_difference": check.value, "bar": check.tolerance, "difference_over_bar": check.over_tolerance,
-               "difference_eps": float(over(difference, eps * size).max()),
-               "mujoco_eps": float(over(theirs, EPS * size).max())}  # fmt: skip
-        for of in ("q", "qd", "tau"):
-            row[f"worst_{of}"] = " ".join(repr(float(x)) for x in getattr(sample, of)[worst[0]])
-        result.rows.append(row | {"passed": check.passed})
-    if (
-        not all(row["passed"] for row in result.rows if row["engine"] == label)
-        and {"Mbar", "bias"} <= found.keys()
-    ):
-        values = Values.of(sample.tree, sample.q, sample.qd, found["Mbar"], found["bias"], FACTOR * eps)
-        result.find(
-            "cause", engine=label, text=diagnose_stated(sample.tree, None, values, SECONDS).sentence()
-        )
+        states = [getattr(sample, argument) for argument in QUANTITIES[name].arguments]
+        computed[name] = getattr(dynamics, function)(*states)
+        compare_quantity(result, sample, record, name, computed[name], getattr(mujoco, function)(*states))
+    differs = any(row.engine == record.label and not row.passed for row in result.rows)
+    if differs and {"Mbar", "bias"} <= computed.keys():
+        tree, tolerance = sample.tree, FACTOR * record.eps
+        values = Values.of(tree, sample.q, sample.qd, computed["Mbar"], computed["bias"], tolerance)
+        text = diagnose_stated(tree, None, values, SECONDS).sentence()
+        result.find("cause", engine=record.label, text=text)
+
+
+def compare_quantity(
+    result: Result, sample: Sample, record: EngineRecord, name: str, values: np.ndarray, by_mujoco: np.ndarray
+) -> None:
+    """A check of the entry that is closest to its tolerance, and a row."""
+    quantity, scale, eps = QUANTITIES[name], Entries(sample.tree, sample.q, sample.qd), record.eps
+    exact, size = sample.exact(quantity.function), getattr(scale, quantity.scale)
+    if name == "qdd":
+        size = size(scale.force(sample.tau), exact.high)
+    size = np.broadcast_to(size, values.shape)
+    difference, tolerance = exact.distance(values), FACTOR * eps * size
+    worst = closest(difference, tolerance)
+    numbers = {of: [repr(float(x)) for x in getattr(sample, of)[worst[0]]] for of in ("q", "qd", "tau")}
+    note = "; ".join(f"{of} = ({', '.join(numbers[of])})" for of in quantity.arguments)
+    units, what = unit(sample.tree, *quantity.units), f"{name} to exact"
+    pair = difference[worst], tolerance[worst]
+    check = result.check(record.label, what, *pair, units, note, True, about=About.ENGINE)
+    row = EngineRow(record.label, record.precision, name, units, len(sample.q), check.value, check.tolerance)
+    row.difference_over_bar, row.passed = check.over_tolerance, check.passed
+    row.difference_eps = float(over(difference, eps * size).max())
+    row.mujoco_eps = float(over(exact.distance(by_mujoco), EPS * size).max())
+    row.worst_q, row.worst_qd, row.worst_tau = (" ".join(of_state) for of_state in numbers.values())
+    result.rows.append(row)
 
 
 def asked_at(setup: Setup, precision: str) -> Sample:
     """The random states that have exact values, and the Tree, with numbers that this precision has."""
-    whole, tree = setup.random, setup.robot.tree
-    states = [values[: whole.exact_states] for values in (whole.q, whole.qd, whole.tau)]
+    sample = setup.random
+    states = [values[: sample.exact_states] for values in (sample.q, sample.qd, sample.tau)]
     if precision == "float32":
         states = [values.astype(np.float32).astype(float) for values in states]
-    return Sample(tree, whole.name, *states, whole.exact_states)
+    return Sample(setup.robot.tree, sample.name, *states, sample.exact_states)
 
 
-def figures(result: Result, robot: Robot) -> Iterator[partial]:
+def figures(result: EnginesResult, robot: Robot) -> Iterator[partial[Any]]:
     from . import figures_engines  # matplotlib is for the process that draws
 
     if result.rows:

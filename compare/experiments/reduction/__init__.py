@@ -1,12 +1,13 @@
 """What each scene needs of the model: the joints that can be locked without changing its motion."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
+from typing import Any, NamedTuple
 
 from tmt.exact.values import DIGITS
 
-from ...core.check import About, Result
+from ...core.check import About
 from ...core.finding import Finding
 from ...engines.mujoco import ModelError
 from ...judge.rounding import NARROW
@@ -15,8 +16,9 @@ from ...judge.scale import FACTOR
 from ...robots import Robot
 from .. import Experiment
 from ..setup import Setup, nothing
-from .exact_motion import compare_swing, pendulums
-from .needs import joint_word, of_case
+from .exact_motion import compare_swing, is_pendulum
+from .needs import compare_case, joint_word
+from .records import Need, ReductionResult
 from .sub_blocks import compare_blocks
 from .times import largest_gain, time_models
 
@@ -24,63 +26,68 @@ EXPERIMENT = Experiment(order=110, serves_own=False, options=("--scenes",), time
 NO_GAIN = 1.05  # a smaller speedup is within the accuracy of the times
 
 
-def claim_values(robot: Robot) -> dict:
+class Work(NamedTuple):
+    untimed: Iterable[ReductionResult]  # one
+
+
+def claim_values(robot: Robot) -> dict[str, str | float]:
     words = {"joint": joint_word(robot.coordinates), "unit": movement_unit(robot.coordinates)}
     return words | {"digits": DIGITS, "eps": FACTOR, "narrow": NARROW}
 
 
-def begin(setup: Setup) -> Iterator:
+def begin(setup: Setup) -> Work:
     """Start everything that is not timed, in parallel with other work."""
     alone = replace(setup, map=map, quiet=nothing, progress=nothing, reading=None)
-    return setup.map(untimed, [alone])
+    return Work(setup.map(untimed, [alone]))
 
 
-def rows(setup: Setup, work: Iterator | None = None) -> Result:
+def rows(setup: Setup, work: Work | None = None) -> ReductionResult:
     """Sub-blocks with joints locked; what each case needs, its runs and times; exact solutions."""
-    ((result, models),) = begin(setup) if work is None else work
-    if models is not None:
+    (result,) = (begin(setup) if work is None else work).untimed
+    if result.models is not None:
         setup.quiet()
-        time_models(result, models, setup, rounds=setup.of(64, 16, 2))
+        time_models(result, setup, rounds=setup.of(64, 16, 2))
         best = largest_gain(result.rows, setup.robot.coordinates.nv)
-        if best and best["speedup"] >= NO_GAIN:
-            values = {"speedup": best["speedup"], "joints": best["hinges"].split(), "scene": best["scene"]}
-            result.headline = result.finding("headline", **values)
+        if best and best.speedup >= NO_GAIN:
+            joints = best.hinges.split()
+            result.headline = result.finding(
+                "headline", speedup=best.speedup, joints=joints, scene=best.scene
+            )
     result.top += answers(result, setup.robot)
     return result
 
 
-def answers(result: Result, robot: Robot) -> list[Finding]:
+def answers(result: ReductionResult, robot: Robot) -> list[Finding]:
     """What scenes need, a finding for those that need the same; what can be locked comes last."""
-    groups = {}
-    for scene, need in result.curves["needs"].items():
-        joints = {kind: tuple(names) for kind, names in need.items()}
-        groups.setdefault(tuple(joints.values()), joints | {"scenes": []})["scenes"].append(scene)
-    for group in groups.values():
-        apart = [value for (scene, _), value in result.curves["apart"].items() if scene in group["scenes"]]
-        group |= {"apart": max(apart, default=None), "unit": movement_unit(robot.coordinates)}
-    found = [
-        result.finding("answer", joint=joint_word(robot.coordinates), **group) for group in groups.values()
-    ]
-    return sorted(found, key=lambda one: bool(one.values["needed"] and one.values["stays"]))
+    groups: dict[Need, list[str]] = {}
+    for scene, need in result.needs.items():
+        groups.setdefault(need, []).append(scene)
+    about = {"joint": joint_word(robot.coordinates), "unit": movement_unit(robot.coordinates)}
+    found = []
+    for need, scenes in sorted(groups.items(), key=lambda group: bool(group[0].needed and group[0].stays)):
+        apart = max((value for (scene, _), value in result.apart.items() if scene in scenes), default=None)
+        found.append(result.finding("answer", scenes=scenes, apart=apart, **need._asdict(), **about))
+    return found
 
 
-def untimed(setup: Setup) -> tuple[Result, list[tuple] | None]:
-    """The parts of `rows` that are not timed, and the models to be timed; None: no joint can be locked."""
-    result, robot = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}}), setup.robot
+def untimed(setup: Setup) -> ReductionResult:
+    """The parts of `rows` that are not timed, and the models to be timed."""
+    result, robot = ReductionResult("reduction"), setup.robot
     if driven := [case.name for case in robot.cases if case.controller]:
         result.find("driven", scenes=driven)
     try:
         compare_blocks(result, setup, setup.of(10, 1 if robot.is_read else 3, 1))
-        models = [model for case in robot.cases_of_torque for model in of_case(result, case, setup)]
-        for case in pendulums(robot.cases_of_torque):
-            compare_swing(result, setup, case)
+        models = [model for case in robot.cases_of_torque for model in compare_case(result, case, setup)]
+        for case in robot.cases_of_torque:
+            if is_pendulum(case):
+                compare_swing(result, setup, case)
+        result.models = models
     except ModelError as error:
         add_not_lockable(result, robot, error)
-        return result, None
-    return result, models
+    return result
 
 
-def add_not_lockable(result: Result, robot: Robot, error: ModelError) -> None:
+def add_not_lockable(result: ReductionResult, robot: Robot, error: ModelError) -> None:
     """A finding for a robot from a file; a failed check for a stated one, whose joints can be locked."""
     if robot.is_read:
         result.top.append(result.finding("not_lockable", error=str(error)))
@@ -89,11 +96,11 @@ def add_not_lockable(result: Result, robot: Robot, error: ModelError) -> None:
         result.check("every subset", quantity, 0, 1, "models", str(error), rule="equal", about=About.PROGRAM)
 
 
-def figures(result: Result, robot: Robot) -> Iterator[partial]:
+def figures(result: ReductionResult, robot: Robot) -> Iterator[partial[Any]]:
     from . import figures_reduction  # matplotlib is for the process that draws
 
-    needs = result.curves["needs"].values() if result.rows else ()  # empty if no joint can be locked
-    if any(need["stays"] or need["locked"] or need["undecided"] for need in needs):
+    needs = result.needs.values() if result.rows else ()  # empty if no joint can be locked
+    if any(need.stays or need.locked or need.undecided for need in needs):
         yield partial(figures_reduction.draw_needs, result, robot)
-    for scene in result.curves["swings"]:
+    for scene in result.swings:
         yield partial(figures_reduction.draw_swing, result, scene)

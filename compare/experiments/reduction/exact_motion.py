@@ -1,15 +1,17 @@
 """Both engines compared with an exact motion: the swing of a single free hinge, a physical pendulum."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core.check import About, Result
+from ...core.check import Result
 from ...engines import LABELS
-from ...judge.run import MOVES, ORDER_MARGIN
+from ...judge.order import check_order, measured_order
+from ...judge.run import MOVES
 from ...robots.case import Case
 from ...truth.pendulum import pendulum, swing
 from ..setup import Setup
+from .records import ReductionResult, Swing
 from .times import rk4_of
 
 SWING_STEPS = (4, 8, 16, 32, 64, 128)  # multiples of the case's own steps
@@ -17,60 +19,45 @@ IN_TABLE = 16  # the one of these whose error is in the table
 ROUNDED = 1e-11  # rad: smaller errors contain rounding
 
 
-def pendulums(cases: Sequence[Case]) -> list[Case]:
-    """The cases in which one hinge is free and only gravity acts."""
-    return [
-        case
-        for case in cases
-        if (
-            len(case.joints) == 1
-            and case.coordinates.all_kinds == ("hinge",)
-            and case.is_free
-            and case.scene.gravity
-        )
-        and not (any(case.tree.damping) or case.tree.has_springs)
-    ]
+def is_pendulum(case: Case) -> bool:
+    """Whether one hinge is free and only gravity acts."""
+    is_hinge = case.coordinates.all_kinds == ("hinge",)
+    is_forced = any(case.tree.damping) or case.tree.has_springs
+    return is_hinge and case.is_free and case.scene.gravity and not is_forced
 
 
-def compare_swing(result: Result, setup: Setup, case: Case) -> None:
+def compare_swing(result: ReductionResult, setup: Setup, case: Case) -> None:
     """Errors of RK4 against the elliptic function fall at its order; not where the hinge turns over or hardly moves."""
     (q,), (v,), t = *case.start, np.linspace(0.0, case.duration, SWING_STEPS[0] * case.steps + 1)
     hanging, frequency = pendulum(case.tree)
     exact = swing(t, q, v, hanging, frequency) if frequency else np.full_like(t, np.nan)
     if not np.ptp(exact) >= MOVES:  # NaN where it turns over
         return
-    errors = {}
+    dt, errors = case.duration / case.steps / np.array(SWING_STEPS), {}
     for engine, dynamics in setup.compared(case).items():
-        method = rk4_of(setup.engines, engine).name
-        for finer in SWING_STEPS:
-            steps = finer * case.steps
-            path = dynamics.run(*case.start, case.tau, case.duration / steps, steps, method).q
-            error = float(np.abs(path[:: finer // SWING_STEPS[0], 0] - exact).max())
-            errors.setdefault(engine, []).append(error)
-            if finer == IN_TABLE:
-                result.curves["apart"][case.name, engine] = error
-    orders = check_falling(result, case.name, errors, setup.engines["mujoco"].methods["RK4"].order)
-    dt = case.duration / case.steps / np.array(SWING_STEPS)
-    result.curves["swings"][case.name] = {"dt": dt, "errors": errors, "orders": orders}
+        method, errors[engine] = rk4_of(setup.engines, engine).name, []
+        for finer, step in zip(SWING_STEPS, dt):
+            path = dynamics.run(*case.start, case.tau, step, finer * case.steps, method).q
+            errors[engine].append(float(np.abs(path[:: finer // SWING_STEPS[0], 0] - exact).max()))
+        result.apart[case.name, engine] = errors[engine][SWING_STEPS.index(IN_TABLE)]
+    orders = check_falling(result, case.name, dt, errors, setup.engines["mujoco"].methods["RK4"].order)
+    result.swings[case.name] = Swing(dt, errors, orders)
 
 
 def check_falling(
-    result: Result, scene: str, errors: dict[str, Sequence[float]], order: int
+    result: Result, scene: str, dt: Sequence[float], errors: Mapping[str, Sequence[float]], order: int
 ) -> dict[str, float]:
-    """Errors fall at the method's order; the measured orders. errors: {engine: rad, each step half the last}.
+    """Errors, rad, fall at the method's order; the measured orders of the engines.
 
     Measured between the last two errors above 1e-11 rad; with fewer than two there is no check.
     """
     orders = {}
     for engine, values in errors.items():
-        clear = np.argmin(
-            [*(not value <= ROUNDED for value in values), False]
-        )  # above rounding, from the first on
-        if clear < 2:
-            continue
-        with np.errstate(divide="ignore", invalid="ignore"):
-            orders[engine] = float(np.log2(np.divide(values[clear - 2], values[clear - 1])))
-        name = f"deviation from order {order}: error from the elliptic function"
-        off = abs(orders[engine] - order)
-        result.check(f"{scene}, RK4, {LABELS[engine]}", name, off, ORDER_MARGIN, "", about=About.PREDICTION)
+        is_rounded = [value <= ROUNDED for value in values]
+        clear = [*is_rounded, True].index(True)  # the errors above rounding, from the first on
+        found = measured_order(dt[:clear], values[:clear])
+        if found:
+            orders[engine] = found.order
+            where = f"{scene}, RK4, {LABELS[engine]}"
+            check_order(result, where, order, found.order, "error from the elliptic function")
     return orders

@@ -1,28 +1,36 @@
 """Figures of reduction: the joints that each scene needs and the time of a step; exact swings."""
 
+from typing import Any
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ...core.check import Result
+from ...core.finding import Finding
 from ...core.words import capital
 from ...engines import COLOURS, LABELS, MARKS
 from ...report.style import BLUE, GREY, ORANGE, WIDTH, file_name
 from ...robots import Robot
+from .records import Need, ReductionResult
 
-KINDS_OF_JOINT = {
+KINDS_OF_JOINT: dict[str, dict[str, Any]] = {
     "needed": {"marker": "o", "color": BLUE},
     "never moves": {"marker": "o", "color": BLUE, "mfc": "none"},
     "declared locked": {"marker": "x", "color": GREY},
     "not decided": {"marker": "d", "color": ORANGE, "mfc": "none"},
 }
 HEIGHTS = {"tmt": -0.15, "mujoco": 0.15}  # of an engine's times in the line of a scene
-ABOVE = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "handletextpad": 0.2, "columnspacing": 1.0}
+ABOVE: dict[str, Any] = {
+    "loc": "lower center",
+    "bbox_to_anchor": (0.5, 1.0),
+    "handletextpad": 0.2,
+    "columnspacing": 1.0,
+}
 
 
-def draw_needs(result: Result, robot: Robot) -> tuple:
+def draw_needs(result: ReductionResult, robot: Robot) -> tuple[str, Figure, Finding]:
     """The joints that each scene needs, and the time of a step of the whole and of the smallest model."""
-    scenes, joints = result.curves["needs"], robot.joints
+    scenes, joints = result.needs, robot.joints
     many = len(joints) > 8
     fig = Figure(figsize=(WIDTH, 1.5 + 0.36 * len(scenes)), layout="constrained")
     left, right = fig.subplots(1, 2, sharey=True, width_ratios=(min(len(joints), 8), 7.2))
@@ -52,34 +60,34 @@ def draw_needs(result: Result, robot: Robot) -> tuple:
     return "reduction_needs", fig, result.finding("needs", robot=robot.name)
 
 
-def look_of(engine: str) -> dict:
+def look_of(engine: str) -> dict[str, Any]:
     return {"marker": MARKS[engine], "color": COLOURS[engine]}
 
 
-def kind_of_joint(joint: str, need: dict) -> str:
-    if joint in need["locked"]:
+def kind_of_joint(joint: str, need: Need) -> str:
+    if joint in need.locked:
         return "declared locked"
-    if joint in need["undecided"]:
+    if joint in need.undecided:
         return "not decided"
-    return "never moves" if joint in need["stays"] else "needed"
+    return "never moves" if joint in need.stays else "needed"
 
 
-def mark_times(ax: Axes, result: Result, scene: str, y: float) -> None:
+def mark_times(ax: Axes, result: ReductionResult, scene: str, y: float) -> None:
     """The time of a step of each engine in a scene, of the whole and of the smallest model."""
     for engine, offset in HEIGHTS.items():
-        rows = [row for row in result.rows if (row["scene"], row["engine"]) == (scene, engine)]
-        whole, *smaller = [row["ns_per_step"] for row in rows]
+        times = [row.ns_per_step for row in result.rows if (row.scene, row.engine) == (scene, engine)]
+        whole, smallest = times[0], times[-1]
         ax.plot(whole, y + offset, mfc="none", **look_of(engine))
-        if smaller and smaller[0]:
-            ax.plot([smaller[0], whole], [y + offset] * 2, color=COLOURS[engine], linewidth=1)
-            ax.plot(smaller[0], y + offset, markersize=3.5, **look_of(engine))
-            speedup = f"×{whole / smaller[0]:.2f}"
-            ax.text(smaller[0] / 1.15, y + offset, speedup, ha="right", va="center", fontsize=8)
+        if len(times) > 1 and smallest:
+            ax.plot([smallest, whole], [y + offset] * 2, color=COLOURS[engine], linewidth=1)
+            ax.plot(smallest, y + offset, markersize=3.5, **look_of(engine))
+            speedup = f"×{whole / smallest:.2f}"
+            ax.text(smallest / 1.15, y + offset, speedup, ha="right", va="center", fontsize=8)
 
 
-def draw_swing(result: Result, scene: str) -> tuple:
+def draw_swing(result: ReductionResult, scene: str) -> tuple[str, Figure, Finding]:
     """Error of a swing of one hinge against the elliptic function, over the step."""
-    dt, errors, orders = (result.curves["swings"][scene][key] for key in ("dt", "errors", "orders"))
+    dt, errors, orders = result.swings[scene]
     fig = Figure(figsize=(WIDTH, 3.0), layout="constrained")
     ax = fig.subplots()
     for engine, values in errors.items():

@@ -6,13 +6,13 @@ from functools import lru_cache
 import tmt
 from tmt.compiled import evaluator
 
-from ...core.check import Result
 from ...core.timing import fastest
-from ...core.units import renamed
 from ...engines import Engine, Method, Setting, same_scheme
 from ...judge.run import movement_unit
+from ...robots import Robot
 from ...robots.case import Case
 from ..setup import Setup
+from .records import ReductionResult, ReductionRow
 
 TIMED_STEPS = {
     "tmt": 1024,
@@ -31,46 +31,34 @@ def rk4_of(engines: Mapping[str, Engine], engine: str) -> Method:
     return same_scheme(engines, engines["mujoco"].methods["RK4"], engine)
 
 
-def time_models(result: Result, models: Sequence[tuple], setup: Setup, rounds: int) -> None:
+def time_models(result: ReductionResult, setup: Setup, rounds: int) -> None:
     """The rows: all models of all cases, timed in turn, relative to the whole model of the same case."""
     calls = {}
-    for name, case in models:
+    for scene, case in result.models or ():
         for engine, dynamics in setup.compared(case).items() if case else ():
             steps = TIMED_STEPS[engine]
             setting = Setting(case.duration / case.steps / finer(case) * steps, steps)
             call, _ = dynamics.prepare(*case.start, case.tau, setting, rk4_of(setup.engines, engine).name)
-            calls[name, case.joints, engine] = call
-    rows = time_rows(models, setup.robot.joints, fastest(calls, rounds), result.curves["apart"])
-    result.rows += renamed(rows, movement_unit(setup.robot.coordinates))
+            calls[scene, case.joints, engine] = call
+    add_rows(result, setup.robot, fastest(calls, rounds))
 
 
-def time_rows(
-    models: Sequence[tuple],
-    every: Sequence[str],
-    seconds: Mapping[tuple, float],
-    apart: Mapping[tuple, float],
-) -> list[dict]:
-    """The rows of models, (a case's name, Case or None). every: all joints; seconds: of a run by (name, joints, engine)."""
-    rows = []
-    for name, case in models:
+def add_rows(
+    result: ReductionResult, robot: Robot, seconds: Mapping[tuple[str, tuple[str, ...], str], float]
+) -> None:
+    """The rows of all models. seconds: of a run, by scene, joints and engine."""
+    for scene, case in result.models or ():
         joints = case.joints if case else ()
         for engine, steps in TIMED_STEPS.items():
-            time = seconds.get((name, joints, engine))
-            count = operations(case.tree) if case else 0
-            rows.append(
-                {
-                    "scene": name,
-                    "hinges": " ".join(joints) or "none",
-                    "engine": engine,
-                    "nv": case.coordinates.nv if case else 0,
-                    "operations": count if engine == "tmt" else None,
-                    "ns_per_step": 1e9 * time / steps if time else None,
-                    "speedup": seconds[name, every, engine] / time if time else None,
-                    "max_difference_rad": None if joints == every else apart.get((name, engine)),
-                    "integrator": "RK4",
-                }
-            )
-    return rows
+            time = seconds.get((scene, joints, engine))
+            result.rows.append(ReductionRow(
+                scene=scene, hinges=" ".join(joints) or "none", engine=engine, nv=case.coordinates.nv if case else 0,
+                operations=(operations(case.tree) if case else 0) if engine == "tmt" else None,
+                ns_per_step=1e9 * time / steps if time else None,
+                speedup=seconds[scene, robot.joints, engine] / time if time else None,
+                max_difference=None if joints == robot.joints else result.apart.get((scene, engine)),
+                unit=movement_unit(robot.coordinates),
+            ))  # fmt: skip
 
 
 @lru_cache
@@ -79,7 +67,7 @@ def operations(tree: tmt.Tree) -> int | None:
     return evaluator(tree, "acceleration").operations if len(tree.axis) <= MOST_TRACED else None
 
 
-def largest_gain(rows: Sequence[dict], nv: int) -> dict | None:
+def largest_gain(rows: Sequence[ReductionRow], nv: int) -> ReductionRow | None:
     """The row of the largest speedup among models with fewer speeds than nv; None if there is none."""
-    smaller = [row for row in rows if row["speedup"] and row["nv"] < nv]
-    return max(smaller, key=lambda row: row["speedup"], default=None)
+    smaller = [row for row in rows if row.speedup and row.nv < nv]
+    return max(smaller, key=lambda row: row.speedup or 0.0, default=None)

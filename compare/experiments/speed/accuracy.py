@@ -1,131 +1,96 @@
 """Checks of the errors of the runs: the order of each method, MuJoCo against the same scheme in tmt, rounding."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
-from ...core.check import About, Result
-from ...engines import Method
-from ...judge.run import ORDER_MARGIN
+from ...core.rows import Row, column
+from ...judge.order import LEAST_ORDER, MeasuredOrder, check_order, measured_order
 from ...judge.scale import FACTOR
+from ..followed import REGULAR
+from .runs import NEAR_ROUNDING, Run, SceneRuns, SpeedResult
 
-Floors = Mapping[str, float]  # {scene: error that rounding leaves, rad}
-
-NEAR_ROUNDING = 30  # a smaller multiple of the error of rounding counts as rounding
-SMALL_ERROR = (
-    0.1  # rad: rounding changes a smaller error by no more than the growth of a small difference predicts
-)
-EARLY = 1.0  # s: until then chaos has not grown, and errors fall regularly
-REGULAR, CLEAR = (
-    3e-2,
-    2e-12,
-)  # rad: an error up to EARLY between these falls with its order, far above rounding
-LEAST_ORDER = {8: 7.0}  # a bound only: with order 8 rounding comes before the measured order settles
+SMALL_ERROR = 0.1  # rad: a smaller error is changed by rounding by no more than a small difference grows
+CLEAR = 2e-12  # rad: an error up to EARLY above this is far above rounding
 
 
-def check_orders(result: Result, scenes: Sequence[str], methods: Sequence[Method]) -> list[dict]:
-    """Rows and checks: the stated and the measured order of each method of fixed step.
+@dataclass
+class OrderRow(Row):
+    """The measured order of a method in a scene."""
 
-    For a robot from a file only an order that has settled is checked.
-    """
-    table, of_file = [], result.curves.get("of_file")
+    scene: str
+    engine: str
+    method: str
+    order: int
+    measured_order: float
+    from_dt: float = column("s", digits=5)
+    to_dt: float = column("s", digits=5)
+
+
+def check_orders(
+    result: SpeedResult, scenes: Sequence[SceneRuns], engines: Collection[str]
+) -> list[OrderRow]:
+    """Rows and checks: the stated and the measured order of each method of fixed step of these engines."""
+    rows = []
     for scene in scenes:
-        # the error of rounding, or of a reference in doubles, differs from robot to robot
-        clear = max(CLEAR, NEAR_ROUNDING * result.curves["floors"][scene]) if of_file else CLEAR
-        for method in methods:
-            runs = rows_of_method(result.rows, scene, method.engine, method.name)
-            regular = [row for row in runs if clear < row["early"] < REGULAR]
-            settled = not of_file or method.order in LEAST_ORDER or has_settled(regular)
-            if len(regular) < 2 or not settled:
-                continue
-            coarse, fine = regular[-2:]  # theory applies best to the finest
-            order = order_between(coarse, fine)
-            check_order(result, f"{scene}, {method.engine} {method.name}", method.order, order)
-            row = {"scene": scene, "engine": method.engine, "method": method.name, "order": method.order}
-            table.append(
-                row | {"measured_order": order, "from_dt_s": coarse["dt_s"], "to_dt_s": fine["dt_s"]}
-            )
-    return table
+        for method, runs in groupby(scene.runs, key=lambda run: run.method):
+            found = order_in(scene, list(runs)) if method.order and method.engine in engines else None
+            if found:
+                where, note = f"{scene.case.name}, {method.engine} {method.name}", f"{found.order:.2f}"
+                check_order(result, where, method.order, found.order, note=note)
+                rows.append(OrderRow(scene.case.name, method.engine, method.name, method.order, *found))
+    return rows
 
 
-def order_between(coarse: dict, fine: dict) -> float:
-    """The order by which the error falls from one row to a finer one."""
-    return float(np.log(coarse["early"] / fine["early"]) / np.log(coarse["dt_s"] / fine["dt_s"]))
+def order_in(scene: SceneRuns, runs: Sequence[Run]) -> MeasuredOrder | None:
+    """The order that the runs of a method show where their errors are regular; of a robot from a file one that has settled."""
+    clear, least_runs = CLEAR, 2
+    if scene.case.robot.is_read:  # the error of rounding, or of the reference, differs from robot to robot
+        clear, least_runs = max(CLEAR, NEAR_ROUNDING * scene.floor), 3
+    regular = [run for run in runs if clear < run.early < REGULAR]
+    least_runs = 2 if runs[0].method.order in LEAST_ORDER else least_runs
+    return measured_order([run.dt for run in regular], [run.early for run in regular], least_runs)
 
 
-def has_settled(rows: Sequence[dict]) -> bool:
-    """Whether the last two measured orders of these rows, from coarse to fine, differ by at most ORDER_MARGIN."""
-    return len(rows) > 2 and abs(order_between(*rows[-3:-1]) - order_between(*rows[-2:])) <= ORDER_MARGIN
-
-
-def check_order(result: Result, where: str, order: int, measured: float) -> None:
-    """The measured order is the method's; of order 8 it is at least 7."""
-    if least := LEAST_ORDER.get(order):
-        result.check(
-            where,
-            f"measured order, nominal {order}",
-            measured,
-            least,
-            "",
-            rule="at least",
-            about=About.PREDICTION,
-        )
-    else:
-        name, note = f"deviation from order {order}: error", f"{measured:.2f}"
-        result.check(where, name, abs(measured - order), ORDER_MARGIN, "", note, about=About.PREDICTION)
-
-
-def check_same_schemes(
-    result: Result, floors: Floors, schemes: Mapping[str, Mapping[str, str]], unit: str = "rad"
-) -> None:
+def check_same_schemes(result: SpeedResult, scene: SceneRuns) -> None:
     """MuJoCo's integrators and the same schemes in tmt make the same error, except for rounding.
 
-    Checked where at least one of the errors is below 0.1 rad; a diverged run has the error inf.
-    schemes: for each scene {integrator of MuJoCo: method of tmt}.
+    Checked where at least one of the errors is below 0.1 rad.
     """
-    by_place = {(row["scene"], row["engine"], row["method"], row["dt_s"]): row for row in result.rows}
-    for (scene, engine, method, dt), row in by_place.items():
-        scheme = schemes[scene].get(method) if engine == "mujoco" and scene in floors else None
-        ours = by_place.get((scene, "tmt", scheme, dt)) if scheme else None
-        if ours and min(error(row), error(ours)) < SMALL_ERROR:
-            difference = abs(error(row) - error(ours))
-            where = f"{scene}, {method}, dt = {dt:.3g} s"
-            quantity = f"the same error as tmt's {ours['method']}"
-            result.check(where, quantity, difference, FACTOR * floors[scene], unit, rounding=True)
+    by_tmt = {(run.method.name, run.row.dt): run.row for run in scene.runs if run.method.engine == "tmt"}
+    for run in scene.runs:
+        theirs, ours = run.row, by_tmt.get((run.method.scheme, run.row.dt))
+        if theirs.engine == "mujoco" and ours and min(theirs.largest_error, ours.largest_error) < SMALL_ERROR:
+            difference = abs(theirs.largest_error - ours.largest_error)
+            where = f"{scene.case.name}, {theirs.method}, dt = {run.dt:.3g} s"
+            quantity = f"the same error as tmt's {ours.method}"
+            result.check(where, quantity, difference, FACTOR * scene.floor, result.unit, rounding=True)
 
 
-def check_smallest_errors(result: Result, floors: Floors, unit: str = "rad") -> None:
+def check_smallest_errors(result: SpeedResult, scene: SceneRuns) -> None:
     """Where errors stop falling they are of the size of rounding; MuJoCo's RK4 is as exact as tmt's with the same steps."""
-    for scene, left in floors.items():
-        by_method = {}
-        for engine, method in (("mujoco", "RK4"), ("tmt", "rk4"), ("tmt", "dopri8")):
-            runs = rows_of_method(result.rows, scene, engine, method)
-            by_method[method] = {row["dt_s"]: error(row) for row in runs}
-            errors = list(by_method[method].values())
-            least = min(errors, default=np.inf)
-            if np.isfinite(least) and errors.index(least) < len(errors) - 1:
-                quantity = f"smallest error of {engine}'s {method}, where smaller steps gain nothing"
-                result.check(scene, quantity, least, FACTOR * left, unit, rounding=True)
-        theirs = min(by_method["RK4"].values(), default=np.inf)
-        finest = min(by_method["RK4"], default=np.inf)
-        ours = min((error for dt, error in by_method["rk4"].items() if dt >= finest), default=np.inf)
-        if np.isfinite([theirs, ours]).any() and by_method["rk4"]:
-            tolerance = FACTOR * left + (2.0 * ours if np.isfinite(ours) else 0.0)
-            result.check(
-                scene, "smallest error of MuJoCo's RK4, compared with tmt's rk4", theirs, tolerance, unit
-            )
+    rounding = FACTOR * scene.floor
+    rk4 = check_stopped(result, scene, "mujoco", "RK4", rounding)
+    ours = check_stopped(result, scene, "tmt", "rk4", rounding)
+    check_stopped(result, scene, "tmt", "dopri8", rounding)
+    least, finest = min(rk4.values(), default=np.inf), min(rk4, default=np.inf)
+    least_of_ours = min((error for dt, error in ours.items() if dt >= finest), default=np.inf)
+    if np.isfinite([least, least_of_ours]).any() and ours:
+        tolerance = rounding + (2.0 * least_of_ours if np.isfinite(least_of_ours) else 0.0)
+        quantity = "smallest error of MuJoCo's RK4, compared with tmt's rk4"
+        result.check(scene.case.name, quantity, least, tolerance, result.unit)
 
 
-def gained_nothing(error: float, work: int, best: float, last: int, left: float) -> bool:
-    """Whether a run that cost more than the last one is not more exact, when the best error is already near rounding."""
-    return best < NEAR_ROUNDING * left and work > 1.2 * last and not error < 0.7 * best
-
-
-def error(row: dict) -> float:
-    """The worst error of a run, rad; inf if it diverged."""
-    return np.inf if row["diverged"] else row["worst_error_rad"]
-
-
-def rows_of_method(rows: list[dict], scene: str, engine: str, method: str) -> list[dict]:
-    """The rows of a method in a scene, from coarse to fine."""
-    return [row for row in rows if (row["scene"], row["engine"], row["method"]) == (scene, engine, method)]
+def check_stopped(
+    result: SpeedResult, scene: SceneRuns, engine: str, method: str, rounding: float
+) -> dict[float, float]:
+    """A check of the smallest error of a method if finer steps gain nothing; its errors by the step, from coarse to fine."""
+    runs = [run for run in scene.runs if (run.method.engine, run.method.name) == (engine, method)]
+    errors = {run.dt: run.row.largest_error for run in runs}
+    least = min(errors.values(), default=np.inf)
+    if np.isfinite(least) and [*errors.values()].index(least) < len(errors) - 1:
+        quantity = f"smallest error of {engine}'s {method}, where smaller steps gain nothing"
+        result.check(scene.case.name, quantity, least, rounding, result.unit, rounding=True)
+    return errors

@@ -1,52 +1,55 @@
 """Figures of speed: error against time, of each scene and on the first screen."""
 
+from collections.abc import Sequence
 from itertools import cycle
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from ...core.check import Result
 from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
 from ...report.style import GREY, WIDTH, file_name
 from ..figures_overview import chart
-from .first_screen import TARGET, best_rows, cheapest, error, front, target, within_target
+from .advice import TARGET, best_rows, cheapest_of_fronts, front, target, within_target
+from .runs import SpeedResult, SpeedRow
 
 METHOD_MARKERS = "osD^v<>PX*hp"  # of the methods of an engine, whose colour they have
 COARSE_END, FINE_END = 3.0, 3e-16  # rad: ends of the axis of errors
 
 
-def draw_times(result: Result, scene: str, beginning: str = "") -> tuple:
+def draw_times(result: SpeedResult, scene: str, beginning: str = "") -> tuple[str, Figure, Finding]:
     """Worst error against time of one scene, a curve for each method, the Pareto front marked."""
     fig = Figure(figsize=(WIDTH, 5.6), layout="constrained")
-    ax, unit = fig.subplots(), result.curves.get("unit", "rad")
-    ran = [row for row in result.rows if row["scene"] == scene and row["why_not"] is None]
-    good = [row for row in ran if not row["diverged"] and error(row) <= COARSE_END]
-    markers = {}
-    for engine, method in dict.fromkeys((row["engine"], row["method"]) for row in good):
-        errors, times = drawn([row for row in good if (row["engine"], row["method"]) == (engine, method)])
+    ax, unit = fig.subplots(), result.unit
+    ran = [row for row in result.rows if row.scene == scene and row.why_not is None]
+    good = [row for row in ran if row.largest_error <= COARSE_END]
+    curves: dict[tuple[str, str], list[SpeedRow]] = {}
+    for row in good:
+        curves.setdefault((row.engine, row.method), []).append(row)
+    markers: dict[str, cycle[str]] = {}
+    for (engine, method), rows in curves.items():
         marker = next(markers.setdefault(engine, cycle(METHOD_MARKERS)))
         look = {"color": COLOURS.get(engine, GREY), "marker": marker, "markersize": 4.5, "linewidth": 1.0}
-        ax.plot(errors, times, label=f"{LABELS.get(engine, engine)} {method}", **look)
+        ax.plot(*drawn(rows), label=f"{LABELS.get(engine, engine)} {method}", **look)
     ax.plot(*drawn(front(good)), "ko", markersize=9, markerfacecolor="none", label="Pareto front")
     looks = {"color": GREY, "linestyle": ":", "label": "rounding, or accuracy of the reference"}
-    ax.axvline(result.curves["floors"][scene], **looks)
+    ax.axvline(result.floors[scene], **looks)
     ax.set(xscale="log", yscale="log", xlim=(2.0 * COARSE_END, FINE_END / 30), ylabel="time of the run, ms")
     ax.set(xlabel=f"maximum error, {unit} (decreasing)", xticks=[10.0**k for k in range(0, -17, -2)])
     ax.minorticks_off()
     fig.legend(loc="outside right upper", fontsize=7, handlelength=1.6)
-    values = {"diverged": sum(row["diverged"] for row in ran), "missing": len(ran) - len(good)}
+    values = {"diverged": sum(bool(row.diverged) for row in ran), "missing": len(ran) - len(good)}
     caption = result.finding("times", begins=beginning or scene, unit=unit, end=COARSE_END, **values)
     return file_name("speed", scene), fig, caption
 
 
-def drawn(rows: list[dict]) -> tuple[np.ndarray, list[float]]:
+def drawn(rows: Sequence[SpeedRow]) -> tuple[np.ndarray, list[float]]:
     """Errors, at least FINE_END, and times in ms."""
-    return np.maximum([error(row) for row in rows], FINE_END), [1e3 * row["seconds"] for row in rows]
+    return np.maximum([row.largest_error for row in rows], FINE_END), [1e3 * row.time for row in rows]
 
 
-def draw_overview(result: Result) -> tuple[str, Figure, Finding]:
+def draw_overview(result: SpeedResult) -> tuple[str, Figure, Finding]:
     """Time against error: the best settings of each engine in one scene, the cheapest within the target in a circle."""
     fig, ax = chart()
     fronts = best_rows(result)
@@ -54,23 +57,22 @@ def draw_overview(result: Result) -> tuple[str, Figure, Finding]:
         colour, (errors, times) = COLOURS.get(engine, GREY), drawn(rows)
         look = {"marker": MARKS.get(engine, "v"), "markersize": 3.5, "linewidth": 1.2, "color": colour}
         ax.plot(errors, times, label=LABELS.get(engine, engine), **look)
-        if best := within_target(rows):
-            time = 1e3 * best["seconds"]
-            at = errors[times.index(time)]
-            ax.plot(at, time, "o", markersize=9, markerfacecolor="none", markeredgecolor="black")
-            if engine in ("mujoco", "tmt"):
-                above, fine = engine == "mujoco", at < np.sqrt(errors[0] * errors[-1])
-                text = f"{best['method']} {float(f'{time:.2g}'):g} ms"
-                ax.annotate(text, (at, time), (0, 8 if above else -11), fontsize=8, color=colour,
-                            textcoords="offset points", ha="right" if above else "center" if fine else "left",
-                            va="bottom" if above else "top",
-                            path_effects=[withStroke(linewidth=3, foreground="white")])  # fmt: skip
+        best = within_target(rows)
+        if best:
+            (error,), (time,) = drawn([best])
+            ax.plot(error, time, "o", markersize=9, markerfacecolor="none", markeredgecolor="black")
+        if best and engine in ("mujoco", "tmt"):
+            above, fine = engine == "mujoco", error < np.sqrt(errors[0] * errors[-1])
+            text = f"{best.method} {float(f'{time:.2g}'):g} ms"
+            ax.annotate(text, (error, time), (0, 8 if above else -11), fontsize=8, color=colour,
+                        textcoords="offset points", ha="right" if above else "center" if fine else "left",
+                        va="bottom" if above else "top",
+                        path_effects=[withStroke(linewidth=3, foreground="white")])  # fmt: skip
     numbers = target(result)
     ax.axvline(TARGET, color=GREY, linestyle=":", linewidth=1.2)
-    ax.set(
-        xscale="log", yscale="log", xlabel=f"maximum error, {numbers['unit']} (decreasing)", ylabel="time, ms"
-    )
+    ax.set(xscale="log", yscale="log", xlabel=f"maximum error, {result.unit} (decreasing)", ylabel="time, ms")
     ax.invert_xaxis()
     ax.margins(0.06, 0.12)
     fig.legend(loc="outside upper center", ncols=4, fontsize=8, handletextpad=0.4, columnspacing=1.0)
-    return "overview_times", fig, result.finding("overview_caption", settings=cheapest(fronts), **numbers)
+    settings = cheapest_of_fronts(fronts)
+    return "overview_times", fig, result.finding("overview_caption", settings=settings, **numbers)

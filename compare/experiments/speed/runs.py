@@ -1,8 +1,10 @@
 """The runs of each scene by each method and setting: their errors, their times, and the error that rounding leaves."""
 
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,93 +12,151 @@ import tmt
 from tmt.methods import METHODS
 
 from ...core import timing
-from ...engines import GRID, RECORDS, Dynamics, Engine, Method, Setting
+from ...core.check import Result
+from ...core.rows import MOVEMENT, MovementRow, column
+from ...engines import GRID, IN_QUICK_RUNS, RECORDS, Dynamics, Engine, Method, Setting
 from ...engines.outside.model import EngineError
 from ...judge.rounding import growth
-from ...judge.run import diverged_at
+from ...judge.run import diverged_at, movement_unit
 from ...judge.scale import EPS
 from ...robots.case import Case
-from ...truth.reference import Reference, references
-from ..setup import Setup
-from . import accuracy
+from ...truth.reference import Reference, reference
+from ..followed import follow
 from .settings import MOST_SECONDS, coarsest_steps, estimated, methods, settings_of
 
+NEAR_ROUNDING = 30  # a smaller multiple of the error of rounding counts as rounding
 GROWTH_STEPS = 16  # of the run whose growth is computed, between two recorded times
-EACH_STEP = (
-    12  # nv up to which the growth takes the Jacobian of every step; above, that of one in GROWTH_STEPS
-)
+EACH_STEP = 12  # nv up to which the growth takes the Jacobian of every step, not of one in GROWTH_STEPS
+TimedCall = tuple[Callable[[], object], float]  # a run takes this many times as long as the call
 FIRST_STEPS = 512  # a longer run of MuJoCo is timed over its first steps only
 
 
-def measured(setup: Setup, cases: Sequence[Case]) -> tuple[Sequence[Case], Iterator[tuple]]:
-    """The scenes, and `scene` of each. Different trees come first: their code compiles in parallel."""
-    trees = [case.tree for case in cases]
-    different_first = sorted(cases, key=lambda case: trees[: cases.index(case)].count(case.tree))
-    return cases, setup.map(partial(scene, engines=setup.engines, size=setup.size), different_first)
+@dataclass
+class SpeedRow(MovementRow):
+    """One run of a method in a scene, or why there is none."""
+
+    scene: str
+    engine: str
+    method: str
+    dt: float | None = column("s", digits=5, default=None)
+    tolerance: float | None = None
+    steps: int | None = None
+    timed_steps: int | None = None
+    evaluations: int | None = None
+    seconds: float | None = None
+    error: float | None = column(MOVEMENT, default=None)  # at the end
+    worst_error: float | None = column(MOVEMENT, default=None)
+    energy_error: float | None = column("J", default=None)
+    diverged: bool | None = None
+    why_not: str | None = None
+
+    @property
+    def time(self) -> float:
+        """The time of the run, s; infinite where it was not timed."""
+        return math.inf if self.seconds is None else self.seconds
+
+    @property
+    def largest_error(self) -> float:
+        """The worst error of the run, rad or m; infinite if it diverged."""
+        return math.inf if self.worst_error is None else self.worst_error
 
 
-def scene(case: Case, engines: Mapping[str, Engine], size: str) -> tuple:
-    """Name, reference, error of rounding, rad, and rows of a scene, without times, by compiled methods."""
-    reference = references([case])[case.name]
-    left = max(floor(case, engines["tmt"].of(case)), reference.apart)
-    return case.name, reference, left, rows_of_scene(case, engines, reference, left, size, "compiled")
+class Run(NamedTuple):
+    method: Method
+    setting: Setting
+    early: float  # rad or m: the largest error of the first second
+    row: SpeedRow
+
+    @property
+    def dt(self) -> float:
+        """The step, s; not a number for a method that chooses its own."""
+        return math.nan if self.row.dt is None else self.row.dt
 
 
-def rows_of_scene(
-    case: Case, engines: Mapping[str, Engine], reference: Reference, left: float, size: str, which: str
-) -> list[dict]:
-    """The rows of a scene, with times of what is called; left: the error that rounding or the reference leaves in it, rad."""
-    rows, nq = [], case.coordinates.nq
-    energy = tmt.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
-    for method in methods(engines, size, which, case.robot, case):
-        best, last, of_precision = np.inf, 0, RECORDS[method.engine].eps / EPS
-        for setting in settings_of(method, case, size):
+@dataclass
+class SceneRuns:
+    """The runs of one scene."""
+
+    case: Case
+    reference: Reference
+    floor: float  # rad or m: the error that rounding, or the reference, leaves
+    runs: list[Run] = field(default_factory=list)
+
+    @cached_property
+    def energy(self) -> np.ndarray:
+        """The energy of the reference, J, (65,)."""
+        nq = self.case.coordinates.nq
+        return tmt.energy(self.reference.high[:, :nq], self.reference.high[:, nq:], self.case.tree)
+
+
+@dataclass
+class SpeedResult(Result):
+    floors: dict[str, float] = field(default_factory=dict)  # by scene, see SceneRuns
+    regular: str = ""  # the scene in which errors are regular
+    unit: str = "rad"
+    servos_off: bool = False  # whether the robot has servos, which do not act in the regular scene
+
+
+def scene_runs(case: Case, engines: Mapping[str, Engine], size: str) -> SceneRuns:
+    """The runs of a scene by compiled methods, which are not yet timed."""
+    known = reference(case)
+    scene = SceneRuns(case, known, max(floor(case, engines["tmt"].of(case)), known.apart))
+    scene.runs, _ = runs_of(scene, engines, size, compiled=True)
+    for run in scene.runs:
+        run.row.seconds = None
+    return scene
+
+
+def runs_of(
+    scene: SceneRuns, engines: Mapping[str, Engine], size: str, compiled: bool
+) -> tuple[list[Run], list[SpeedRow]]:
+    """The runs by methods whose loop over the steps is compiled, or by the others; and a row for each method that fails."""
+    runs: list[Run] = []
+    failed = []
+    for method in methods(engines, size, scene.case):
+        if (method.engine in IN_QUICK_RUNS) == compiled:
             try:
-                rows.append(row_of_run(case, engines, method, setting, reference, energy, left))
-            except EngineError as failed:
-                about = {"scene": case.name, "engine": method.engine, "method": method.name}
-                rows.append(about | {"why_not": str(failed)})
-                break
-            error, work = (
-                accuracy.error(rows[-1]),
-                rows[-1]["evaluations"] or rows[-1]["steps"] or 2 * last + 1,
-            )
+                runs.extend(series(scene, engines[method.engine], method, size))  # up to the one that fails
+            except EngineError as error:
+                failed.append(SpeedRow(scene.case.name, method.engine, method.name, why_not=str(error)))
+    return runs, failed
+
+
+def series(scene: SceneRuns, engine: Engine, method: Method, size: str) -> Iterator[Run]:
+    """The runs of a method from coarse to fine, until one takes too long or gains nothing."""
+    record, case = RECORDS[method.engine], scene.case
+    best, last = math.inf, 0
+    for setting in settings_of(method, case, size):
+        run = measured(scene, engine, method, setting)
+        yield run
+        error, work = run.row.largest_error, run.row.evaluations or run.row.steps or 2 * last + 1
+        if record.reads_file:
+            too_long = run.row.time > MOST_SECONDS[size]
+        else:
             too_long = method.adaptive and work * estimated(method, case.tree) > MOST_SECONDS[size] / 2
-            if RECORDS[method.engine].reads_file:
-                too_long = rows[-1]["seconds"] > MOST_SECONDS[size]
-            if too_long or accuracy.gained_nothing(error, work, best, last, left * of_precision):
-                break
-            best, last = min(best, error), work
-    return rows if which == "called" else [row | {"seconds": None} for row in rows]
+        if too_long or gained_nothing(error, work, best, last, scene.floor * record.eps / EPS):
+            return
+        best, last = min(best, error), work
 
 
-def row_of_run(
-    case: Case, engines: Mapping, method: Method, setting: Setting, reference: Reference, energy, left=0.0
-) -> dict:
-    """The row of one run.
+def gained_nothing(error: float, work: int, best: float, last: int, floor: float) -> bool:
+    """Whether a run that cost more than the last one is not more exact, when the best error is already near rounding."""
+    return best < NEAR_ROUNDING * floor and work > 1.2 * last and not error < 0.7 * best
 
-    energy: of the reference, J, (times,); left: the least error that a reference in doubles resolves, rad; smaller ones are
-    set to it.
-    """
-    run, read = engines[method.engine].of(case).prepare(*case.start, case.tau, setting, method.name)
-    with np.errstate(all="ignore"):
-        begin = time.perf_counter()
-        outcome = run()
-        seconds = time.perf_counter() - begin
-        motion = read(outcome)
-        seconds = seconds if motion.seconds is None else motion.seconds
-        ended = diverged_at(case, reference.t, motion.q, motion.v) is not None
-        error = reference.error(motion.q, range(len(case.joints)))
-        error = np.maximum(error, left) if reference.why else error
-        off = 0.0 if ended else np.abs(tmt.energy(motion.q, motion.v, case.tree) - energy).max()
-    return {
-        "scene": case.name, "engine": method.engine, "method": method.name,
-        "dt_s": setting.duration / setting.steps if setting.steps else None, "tolerance": setting.tolerance,
-        "steps": motion.steps, "evaluations": motion.evaluations, "seconds": seconds, "timed_steps": motion.steps,
-        "error_rad": None if ended else float(error[-1]), "worst_error_rad": None if ended else float(error.max()),
-        "energy_error_J": None if ended else float(off), "diverged": ended,
-        "early": float(error[reference.t <= accuracy.EARLY].max()), "run": (case, method, setting),
-    }  # fmt: skip
+
+def measured(scene: SceneRuns, engine: Engine, method: Method, setting: Setting) -> Run:
+    """One run; a reference in doubles resolves no error below the floor of the scene: smaller ones are set to it."""
+    case, reference = scene.case, scene.reference
+    motion, seconds, errors, early = follow(engine.of(case), case, method, setting, reference)
+    least, unit = scene.floor if reference.why else 0.0, movement_unit(case.robot.coordinates)
+    dt = setting.duration / setting.steps if setting.steps else None
+    row = SpeedRow(case.name, method.engine, method.name, dt, setting.tolerance, motion.steps, unit=unit)
+    row.timed_steps, row.evaluations, row.seconds = motion.steps, motion.evaluations, seconds
+    row.diverged = diverged_at(case, reference.t, motion.q, motion.v) is not None
+    if not row.diverged:
+        row.error, row.worst_error = max(float(errors[-1]), least), max(float(errors.max()), least)
+        row.energy_error = float(np.abs(tmt.energy(motion.q, motion.v, case.tree) - scene.energy).max())
+    return Run(method, setting, max(early, least), row)
 
 
 def floor(case: Case, dynamics: Dynamics) -> float:
@@ -104,11 +164,8 @@ def floor(case: Case, dynamics: Dynamics) -> float:
 
     dynamics: tmt's, run by RK4 with 1024 steps or as many as the scene needs; ValueError if the run diverges.
     """
-    first = (
-        GROWTH_STEPS
-        * GRID
-        * max(1, round(case.duration / 5.0), -(-coarsest_steps(case) // (GROWTH_STEPS * GRID)))
-    )
+    recorded = GROWTH_STEPS * GRID
+    first = recorded * max(1, round(case.duration / 5.0), -(-coarsest_steps(case) // recorded))
     for steps in (first, 4 * first, 16 * first):
         dt = case.duration / steps
         motion = dynamics.run(*case.start, case.tau, dt, steps, "rk4")
@@ -116,26 +173,25 @@ def floor(case: Case, dynamics: Dynamics) -> float:
             stride = 1 if case.coordinates.nv <= EACH_STEP else GROWTH_STEPS
             grown = growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_STEPS, stride)
             return float(EPS * 10.0 ** grown.max() * max(1.0, np.abs(motion.q).max()))
-    raise ValueError(
-        f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; expected a shorter scene"
-    )
+    reached = f"scene {case.name!r}: RK4 with {steps} steps does not reach its end"
+    raise ValueError(f"{reached}; expected a shorter scene")
 
 
-def prepared(rows: list[dict], setup: Setup) -> list[tuple]:
-    """(call, factor) of the rows of one scene: a run takes factor times as long as the call."""
-    runs = []
-    for case, method, setting in (row["run"] for row in rows):
-        part = setting
-        if method.engine == "mujoco" and setting.steps > FIRST_STEPS:  # each of its steps costs the same
-            part = Setting(setting.duration * FIRST_STEPS / setting.steps, FIRST_STEPS)
-        run, _ = setup.engines[method.engine].of(case).prepare(*case.start, case.tau, part, method.name)
-        runs.append((run, setting.duration / part.duration))
-    return runs
+def prepared(case: Case, runs: Sequence[Run], engines: Mapping[str, Engine]) -> list[TimedCall]:
+    """The calls by which runs are timed, and for each how many times as long the run takes."""
+    calls = []
+    for method, setting, *_ in runs:
+        part, steps = setting, setting.steps or 0
+        if method.engine == "mujoco" and steps > FIRST_STEPS:  # each of its steps costs the same
+            part = Setting(setting.duration * FIRST_STEPS / steps, FIRST_STEPS)
+        call, _ = engines[method.engine].of(case).prepare(*case.start, case.tau, part, method.name)
+        calls.append((call, setting.duration / part.duration))
+    return calls
 
 
-def take_times(rows: Sequence[dict], runs: Sequence[tuple], setup: Setup) -> None:
-    """Set the seconds of the rows of one scene to the least of their times; runs: see `prepared`, timed in turns."""
-    times = timing.in_turns([run for run, _ in runs], rounds=5)
-    for row, (_, factor), of_row in zip(rows, runs, times):
-        row["seconds"] = factor * min(of_row)
-        row["timed_steps"] = row["steps"] and round(row["steps"] / factor)
+def take_times(runs: Sequence[Run], calls: Sequence[TimedCall]) -> None:
+    """Set the seconds of runs to the least of their times; their calls are timed in turns."""
+    times = timing.in_turns([call for call, _ in calls], rounds=5)
+    for run, (_, factor), seconds in zip(runs, calls, times):
+        run.row.seconds = factor * min(seconds)
+        run.row.timed_steps = run.row.steps and round(run.row.steps / factor)

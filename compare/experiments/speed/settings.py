@@ -29,12 +29,16 @@ SLOWEST_RUN = 0.6  # s, estimated: a method whose coarsest run takes longer is l
 
 def scenes_of(robot: Robot) -> list[Case]:
     """The scenes with the tag `speed`, and a user's own except held postures of a file's robot, which do not move."""
-    return [
-        case
-        for case in robot.cases
-        if "speed" in case.scene.tags
-        or (case.scene.tags == ("own",) and not (robot.is_read and case.is_held))
-    ]
+    return [case for case in robot.cases if "speed" in case.scene.tags or (is_own(case) and not rests(case))]
+
+
+def is_own(case: Case) -> bool:
+    """Whether a scene is the user's own."""
+    return case.scene.tags == ("own",)
+
+
+def rests(case: Case) -> bool:
+    return case.robot.is_read and case.is_held
 
 
 def regular_of(robot: Robot) -> Case:
@@ -47,45 +51,28 @@ def followed(robot: Robot, size: str) -> list[Case]:
     """The scenes of a run of this size: quick: the regular one and a user's own; small: the first and the regular one."""
     cases, regular = scenes_of(robot), regular_of(robot).name
     if size == "quick":
-        return [case for case in cases if case.name == regular or case.scene.tags == ("own",)]
+        return [case for case in cases if case.name == regular or is_own(case)]
     return [case for k, case in enumerate(cases) if size == "full" or k == 0 or case.name == regular]
 
 
-def methods(
-    engines: Mapping[str, Engine],
-    size: str,
-    which: str = "all",
-    robot: Robot | None = None,
-    case: Case | None = None,
-) -> list[Method]:
-    """The methods of the available engines, which = "all".
-
-    "compiled": those whose loop over the steps is compiled; "called": the others, which take long and are
-    followed only once.
-    case: one in which the robot's actuators may act, which changes the schemes of some methods.
-    """
-    excluded = left_out(engines, size, robot)
-    compiled = {name: name in IN_QUICK_RUNS for name in engines}
-    return [
-        method
-        for name, engine in engines.items()
-        if (compiled[name] or size != "quick")
-        and which in ("all", "compiled" if compiled[name] else "called")
-        for method in (methods_in(engine, case) if case else engine.methods).values()
-        if (name, method.name) not in excluded
-    ]
+def methods(engines: Mapping[str, Engine], size: str, case: Case) -> list[Method]:
+    """The methods by which a case is followed. Where the robot's actuators act, some have other schemes."""
+    excluded = left_out(engines, size, case.robot)
+    asked = [engine for name, engine in engines.items() if size != "quick" or name in IN_QUICK_RUNS]
+    every = [method for engine in asked for method in methods_in(engine, case).values()]
+    return [method for method in every if (method.engine, method.name) not in excluded]
 
 
-def left_out(engines: Mapping[str, Engine], size: str, robot: Robot | None) -> dict[tuple[str, str], str]:
+def left_out(engines: Mapping[str, Engine], size: str, robot: Robot) -> dict[tuple[str, str], str]:
     """{(engine, method): reason} of methods that are not run: the engine is unavailable, or takes too long for this robot."""
     reasons = {}
     for engine in engines.values():
         if size == "quick" and engine.name not in IN_QUICK_RUNS:
             continue
         too_long = getattr(engine, "too_long", lambda tree: None)
-        of_engine = engine.unavailable() or (robot and too_long(robot.tree))
+        of_engine = engine.unavailable() or too_long(robot.tree)
         for method in engine.methods.values():
-            if reason := of_engine or (robot and too_slow(method, robot, size)):
+            if reason := of_engine or too_slow(method, robot, size):
                 reasons[engine.name, method.name] = reason
     return reasons
 
@@ -98,12 +85,8 @@ def too_slow(method: Method, robot: Robot, size: str) -> str | None:
     seconds = coarsest_steps(case) * estimated(method, case.tree)
     if seconds > SLOWEST_RUN:
         return f"with {n} speeds its coarsest run would take about {seconds:.1g} s"
-    if (
-        size == "quick"
-        and n > QUICK_SPEEDS
-        and method.engine == "tmt"
-        and method_named(method.name).solves_stages
-    ):
+    is_large = size == "quick" and n > QUICK_SPEEDS
+    if is_large and method.engine == "tmt" and method_named(method.name).solves_stages:
         return f"with {n} speeds its code takes too long to compile for a quick run"
     return None
 
@@ -130,8 +113,8 @@ def settings_of(method: Method, case: Case, size: str = "full") -> tuple[Setting
         settings = tuple(Setting(case.duration, tolerance=10.0**-k) for k in range(first, last + 1))
     else:
         settings = halvings(method, case, size)
-    few = FEW_SETTINGS if method.engine in IN_QUICK_RUNS else dict.fromkeys(FEW_SETTINGS, FEW_OTHERS)
-    return settings[: few.get(size)]
+    few = FEW_SETTINGS.get(size)
+    return settings[: FEW_OTHERS if few and method.engine not in IN_QUICK_RUNS else few]
 
 
 def halvings(method: Method, case: Case, size: str = "full") -> tuple[Setting, ...]:
@@ -143,9 +126,8 @@ def halvings(method: Method, case: Case, size: str = "full") -> tuple[Setting, .
     if case.robot.is_read:
         affordable = int(MOST_SECONDS[size] / estimated(method, case.tree))
         finest = max(min(finest, affordable), count << (LEAST_SETTINGS[size] - 1))
-    return tuple(
-        Setting(case.duration, steps=count << k) for k in range(max(1, (finest // count).bit_length()))
-    )
+    halved = max(1, (finest // count).bit_length())
+    return tuple(Setting(case.duration, steps=count << k) for k in range(halved))
 
 
 def coarsest_steps(case: Case) -> int:

@@ -1,14 +1,17 @@
 """Energy along free runs: its drift falls with the step at the order of the method."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from tmt import literal
 
 from ...core.check import About, Result
+from ...core.rows import Row, column
 from ...engines import LABELS, Dynamics, Engine, compared, one_of_each_scheme, same_scheme
-from ...judge.run import ORDER_MARGIN, number_or_none
+from ...judge.order import ORDER_MARGIN, measured_order
+from ...judge.run import number_or_none
 from ...judge.scale import EPS, FACTOR, gravity_scale
 from ...robots import Robot
 from ...robots.case import Case
@@ -19,34 +22,44 @@ FEW_STEPS = STEPS | {1: (1024, 2048)}
 ROUNDED = 10 * FACTOR * EPS  # of the terms of the energy: a smaller drift may be rounding
 
 
-def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, tuple]) -> Result:
+@dataclass
+class EnergyRow(Row):
+    """The drift of the energy in a free run of a second."""
+
+    scene: str
+    integrator: str
+    dt: float = column("s", digits=5)
+    engine: str = ""
+    drift: float | None = column("J", default=None)
+    order: float | None = None
+
+
+def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, Sequence[int]]) -> Result:
     """The drift of the energy along free, undamped runs of a second. steps: two counts by the order, one twice the other."""
     result = Result("trajectory")
     rows = result.tables["energy"] = []
-    for case in robot.cases:
-        # in a scene of a user's own the order may not show in a second
-        if not case.is_free or any(case.tree.damping) or "own" in case.scene.tags:
-            continue
+    # in a scene of a user's own the order may not show in a second
+    free = [case for case in robot.cases if case.is_free and "own" not in case.scene.tags]
+    for case in [case for case in free if not any(case.tree.damping)]:
         for method in one_of_each_scheme(engines["mujoco"]):
             counts, drifts = steps[method.order], {}
             for engine, dynamics in compared(engines, case).items():
                 name = method.name if engine == method.engine else same_scheme(engines, method, engine).name
                 drifts[engine] = [largest_drift(case, dynamics, name, count) for count in counts]
             orders = check_order(result, case, f"{case.name}, {method.name}", method.order, drifts)
-            about = {"scene": case.name, "integrator": method.name, "dt_s": DURATION / counts[-1]}
             for engine, (_, drift) in drifts.items():
-                rows.append(
-                    about | {"engine": engine, "drift_J": number_or_none(drift), "order": orders.get(engine)}
-                )
+                row = EnergyRow(case.name, method.name, DURATION / counts[-1], engine, number_or_none(drift))
+                row.order = orders.get(engine)
+                rows.append(row)
     return result
 
 
 def largest_drift(case: Case, dynamics: Dynamics, method: str, count: int) -> float:
     """The largest change of the energy in a second, J; NaN if the run has diverged."""
-    _, q, v, *_ = dynamics.run(*case.start, case.tau, DURATION / count, count, method)
-    if not (np.isfinite(q).all() and np.isfinite(v).all()):
+    motion = dynamics.run(*case.start, case.tau, DURATION / count, count, method)
+    if not np.isfinite(motion.states).all():
         return np.nan
-    energy = literal.energy(q, v, case.tree)
+    energy = literal.energy(motion.q, motion.v, case.tree)
     return float(np.abs(energy - energy[0]).max())
 
 
@@ -69,11 +82,11 @@ def check_order(
     """
     if all(finer <= rounding(case) for _, finer in drifts.values()):
         return {}
-    orders = {}  # None: a run has diverged, or does not drift
-    for engine, (coarser, finer) in drifts.items():
-        orders[engine] = float(np.log2(coarser / finer)) if coarser > 0.0 and finer > 0.0 else None
-        of_engine, name = f"{where}, {LABELS[engine]}, {DURATION:g} s", "order of the drift of energy"
-        result.check(
-            of_engine, name, orders[engine], order - ORDER_MARGIN, "", rule="at least", about=About.PREDICTION
-        )
+    orders: dict[str, float | None] = {}  # None: a run has diverged, or does not drift
+    least, name = order - ORDER_MARGIN, "order of the drift of energy"
+    for engine, of_engine in drifts.items():
+        found = measured_order((2.0, 1.0), of_engine)
+        measured = orders[engine] = number_or_none(found and found.order)
+        place = f"{where}, {LABELS[engine]}, {DURATION:g} s"
+        result.check(place, name, measured, least, "", rule="at least", about=About.PREDICTION)
     return orders

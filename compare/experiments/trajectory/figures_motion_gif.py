@@ -7,18 +7,20 @@ discs, MuJoCo's narrow with rings.
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from ...core.check import Result
 from ...core.finding import Finding
-from ...core.words import capital
+from ...core.pictures import Pictures
+from ...core.text import say
 from ...engines import LABELS
 from ...report.style import BLUE, ORANGE
-from .motion import Drawn
+from .runs import TrajectoryResult
 
+Pen, Links = ImageDraw.ImageDraw, Sequence[tuple[int, int]]
 PIXELS, TOP, BOTTOM = (640, 420), 78, 34  # pixels; and the margins for text above and below
 ROOM = PIXELS[0] - 36, PIXELS[1] - TOP - BOTTOM - 36
 MIDDLE = PIXELS[0] / 2, (PIXELS[1] + TOP - BOTTOM) / 2
@@ -27,7 +29,6 @@ SHADES = 16  # colours of the GIF
 BLACK = "#1a1a1a"
 CENTISECONDS, PAUSE = 4, 120  # of a picture, and of the last one of a scene
 NAMES_AT = 16, 150  # pixels from the left: the engines' names
-MOST_WIDE = 6  # sticks that are drawn wide
 
 
 class Animation:
@@ -35,12 +36,13 @@ class Animation:
 
     suffix = ".gif"
 
-    def __init__(self, scenes: Sequence[Drawn], label: str):
+    def __init__(self, scenes: Sequence[Pictures], label: str):
         self.scenes, self.label = scenes, label
 
     def savefig(self, path: Path) -> None:
         """Write the GIF, which is played again and again."""
-        pictures, times = [], []
+        pictures: list[Image.Image] = []
+        times: list[int] = []
         for scene in self.scenes:
             paths = scene.placed(ROOM, MIDDLE)
             still = text_of_scene(scene, self.label, paths[0][0, 0])
@@ -51,47 +53,38 @@ class Animation:
         first.save(path, save_all=True, append_images=others, duration=times, loop=0, optimize=False)
 
 
-def draw_motion(result: Result) -> tuple[str, Animation, Finding]:
+def draw_motion(result: TrajectoryResult) -> tuple[str, Animation, Finding]:
     """The first two scenes that are drawn in motion, of which one is held and one let go."""
-    scenes = result.curves["drawn"][:2]
+    scenes = result.pictures[:2]
     engines = [LABELS[name] for name in scenes[0].points]
     seen = [{"name": scene.scene, "run": scene.run, "seen": scene.seen.values} for scene in scenes]
-    return (
-        "motion",
-        Animation(scenes, result.label),
-        result.finding("figure_motion", engines=engines, scenes=seen),
-    )
+    caption = result.finding("figure_motion", engines=engines, scenes=seen)
+    return "motion", Animation(scenes, result.label), caption
 
 
-def one_picture(scene: Drawn, k: int, still: Image.Image, paths: Sequence[np.ndarray]) -> Image.Image:
+def one_picture(scene: Pictures, k: int, still: Image.Image, paths: Sequence[np.ndarray]) -> Image.Image:
     """The k-th picture of a scene; still: the text in all of them; paths: of each engine, in pixels."""
     image = still.copy()
     pen = ImageDraw.Draw(image)
     for which, path in enumerate(paths):
         if np.isfinite(path[k]).all():
-            draw_sticks(pen, path[k], scene.links, which)
-    time, apart, gone = words_of_picture(scene, k)
-    write(pen, (PIXELS[0] - 16, PIXELS[1] - 28), time, 17, "ra")
+            draw_sticks(pen, path[k], scene.links, which, scene.few_sticks)
+    lost = [LABELS[name] for name, path in scene.points.items() if not np.isfinite(path[k]).all()]
+    apart = say_of_picture("apart", lost=lost, apart=scene.apart[k], unit=scene.unit)
+    left = {LABELS[name]: time for name, time in scene.left.items() if time and time <= scene.t[k]}
+    write(pen, (PIXELS[0] - 16, PIXELS[1] - 28), f"t = {scene.t[k]:.2f} s", 17, "ra")
     write(pen, (16, PIXELS[1] - 28), apart, 17)
-    write(pen, (PIXELS[0] - 16, 68), gone, 14, "ra")
+    write(pen, (PIXELS[0] - 16, 68), say_of_picture("left", left=left), 14, "ra")
     return image.reduce(FINE)
 
 
-def words_of_picture(scene: Drawn, k: int) -> tuple[str, str, str]:
-    """The text of the k-th picture: its time; the engines' difference, or which has diverged; which has left by then."""
-    lost = [name for name, path in scene.points.items() if not np.isfinite(path[k]).all()]
-    apart = "; ".join(f"{capital(LABELS[name])} has diverged" for name in lost)
-    left = [
-        (time, LABELS[name]) for name, time in scene.left.items() if time is not None and time <= scene.t[k]
-    ]
-    gone = "; ".join(f"{capital(name)} has left at {time:.2f} s" for time, name in sorted(left))
-    apart = apart or f"largest difference of a joint: {scene.apart[k]:.2g} {scene.unit}"
-    return f"t = {scene.t[k]:.2f} s", apart, gone
+def say_of_picture(kind: str, **values: Any) -> str:
+    return say(Finding("trajectory", f"picture_{kind}", values))
 
 
-def draw_sticks(pen: ImageDraw.ImageDraw, points: np.ndarray, links: Sequence[tuple], which: int) -> None:
+def draw_sticks(pen: Pen, points: np.ndarray, links: Links, which: int, few: bool = True) -> None:
     """The sticks of an engine: of the first (0) wide with discs, else narrow with rings. points: (n, 2)."""
-    few, colour = len(links) <= MOST_WIDE, (BLUE, ORANGE)[which]
+    colour = (BLUE, ORANGE)[which]
     places = [tuple(FINE * point) for point in points]
     width = FINE * ((14 if few else 8), (4 if few else 3))[which]
     disc = FINE * ((7 if few else 4), (6 if few else 3))[which]
@@ -103,12 +96,13 @@ def draw_sticks(pen: ImageDraw.ImageDraw, points: np.ndarray, links: Sequence[tu
             pen.circle(place, disc - 3 * FINE / 2, fill="white")
 
 
-def text_of_scene(scene: Drawn, label: str, base: np.ndarray) -> Image.Image:
+def text_of_scene(scene: Pictures, label: str, base: np.ndarray) -> Image.Image:
     """What is in all pictures of a scene: its name, run, the engines, a frame where the robot is fixed."""
     image = Image.new("RGB", (FINE * PIXELS[0], FINE * PIXELS[1]), "white")
     pen = ImageDraw.Draw(image)
     write(pen, (16, 10), scene.scene, 20)
-    write(pen, (PIXELS[0] - 16, 50), f"{scene.run}{slower(scene)}", 14, "ra")
+    run = say_of_picture("run", run=scene.run, slower=scene.slower(CENTISECONDS / 100.0))
+    write(pen, (PIXELS[0] - 16, 50), run, 14, "ra")
     for which, (x, name) in enumerate(zip(NAMES_AT, (label, LABELS["mujoco"]))):
         draw_sticks(pen, np.array([[x + 4, 62], [x + 36, 62]]), [(0, 1)], which)
         write(pen, (x + 48, 62), name, 16, "lm")
@@ -117,16 +111,8 @@ def text_of_scene(scene: Drawn, label: str, base: np.ndarray) -> Image.Image:
     return image
 
 
-def write(pen: ImageDraw.ImageDraw, place: tuple, text: str, size: int, anchor: str = "la") -> None:
+def write(pen: Pen, place: tuple[float, float], text: str, size: int, anchor: str = "la") -> None:
     pen.text((FINE * place[0], FINE * place[1]), text, fill=BLACK, font=font(FINE * size), anchor=anchor)
-
-
-def slower(scene: Drawn) -> str:
-    """By what factor a scene is shown slower, in words; nothing where that is hardly seen."""
-    times = CENTISECONDS / 100.0 / float(scene.t[1] - scene.t[0])
-    if 0.9 < times < 1.1:
-        return ""
-    return f", shown {times:.2g} times slower" if times > 1.0 else f", shown {1.0 / times:.2g} times faster"
 
 
 @cache

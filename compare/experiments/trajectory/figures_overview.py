@@ -4,48 +4,51 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from ...core.check import About, Result, largest_known
+from ...core.check import About, largest_known
 from ...core.finding import Finding
 from ...core.words import scene_of
 from ...report.style import BLUE, GREY, ORANGE, RED
 from ...robots import Robot
 from ..figures_overview import MOST_ROWS, beyond_tolerance, chart, named_rows
+from .runs import TrajectoryResult
 
 LEAST_SHARE, MOST_SHARE = 1e-4, 1e3  # of a band
 
 
-class SceneRun(NamedTuple):
+class SceneRuns(NamedTuple):
     """One scene: the runs of all integrators and steps together."""
 
     name: str
     share: float | None  # the largest difference over its band of rounding; None: no number
-    judged: tuple[float, float]  # s, the shortest and the longest time to which a run is judged
+    shortest: float  # s, for which each run is judged
+    longest: float  # s, for which some run is judged
     duration: float  # s
     diverged: float | None  # s, the earliest time at which a run of MuJoCo diverges
     left: tuple[float | None, ...]  # s, when each engine leaves a held posture; (): not held
     passed: bool
 
 
-def scene_runs(result: Result, robot: Robot) -> list[SceneRun]:
-    names = {row["scene"] for row in result.rows}
+def scenes_of(result: TrajectoryResult, robot: Robot) -> list[SceneRuns]:
+    names = {row.scene for row in result.rows}
     failing = [check.scene for check in result.checks if check.failed and check.about == About.MODELS]
+    runs = {(run.case.name, run.scheme, run.steps): run for run in result.runs}
     scenes = []
     for case in (case for case in robot.cases if case.name in names):
-        rows = [row for row in result.rows if row["scene"] == case.name]
-        until = [row["judged_until_s"] for row in rows]
-        diverged = [row["diverged_at_s"] for row in rows if row["diverged_at_s"] is not None]
-        curve = result.curves["runs"].get((case.name, "rk4", case.steps))
-        left = tuple(curve["left"].values()) if curve and case.is_held else ()
+        rows = [row for row in result.rows if row.scene == case.name]
+        until = [row.judged_until for row in rows]
+        diverged = min((row.diverged_at for row in rows if row.diverged_at is not None), default=None)
+        run = runs.get((case.name, "rk4", case.steps)) if case.is_held else None
+        left = tuple(path.left for path in run.paths.values()) if run else ()
         passed = not any(scene_of(where, [*names]) == case.name for where in failing)
-        share = largest_known([row["difference_over_band"] for row in rows])
-        judged, first = (min(until), max(until)), min(diverged, default=None)
-        scenes.append(SceneRun(case.name, share, judged, case.duration, first, left, passed))
+        share = largest_known([row.difference_over_band for row in rows])
+        runs_of = SceneRuns(case.name, share, min(until), max(until), case.duration, diverged, left, passed)
+        scenes.append(runs_of)
     return scenes
 
 
-def draw_scenes(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
+def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Finding]:
     """Scene by scene: the difference over its band at the left; at the right how long it is judged, and what ends it."""
-    scenes = scene_runs(result, robot)
+    scenes = scenes_of(result, robot)
     wrong_first = sorted(scenes, key=lambda scene: scene.passed)[:MOST_ROWS]
     shown = [scene for scene in scenes if scene in wrong_first]
     fig, (left, right) = chart(2, sharey=True, width_ratios=(1.15, 1))
@@ -58,8 +61,8 @@ def draw_scenes(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
             left.hlines(place, LEAST_SHARE, at, color=colour, linewidth=1.2)
             left.plot(at, place, "D" if scene.passed else "X", color=colour, markersize=4.5)
         right.barh(place, scene.duration, height=0.5, color=(GREY, 0.2))
-        right.barh(place, scene.judged[1], height=0.5, color=(BLUE, 0.4))
-        right.barh(place, scene.judged[0], height=0.5, color=BLUE)
+        right.barh(place, scene.longest, height=0.5, color=(BLUE, 0.4))
+        right.barh(place, scene.shortest, height=0.5, color=BLUE)
         ends = {"diverges": ("X", RED, scene.diverged)}
         for name, mark, colour, time in zip((result.label, "MuJoCo"), "os", ("white", ORANGE), scene.left):
             ends[f"{name} leaves"] = mark, colour, time
@@ -82,7 +85,7 @@ def draw_scenes(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     fig.legend(handles=[*handles, *marks.values()], loc="outside upper center", **look)
     share = largest_known([scene.share for scene in scenes])
     failing = [scene.name for scene in scenes if not scene.passed]
-    times = [time for scene in scenes for time in scene.judged]
+    shortest, longest = min(scene.shortest for scene in scenes), max(scene.longest for scene in scenes)
     values = {"label": result.label, "share": share, "scenes": len(scenes), "failing": failing}
-    caption = result.finding("overview_caption", **values, shortest=min(times), longest=max(times))
+    caption = result.finding("overview_caption", **values, shortest=shortest, longest=longest)
     return "overview_scenes", fig, caption

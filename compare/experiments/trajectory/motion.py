@@ -1,86 +1,59 @@
 """The motion as it is drawn: stick figures of both engines, about 128 for each scene."""
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 
 from ...core.finding import Finding
+from ...core.pictures import Pictures
 from ...engines import LABELS
 from ...judge.run import LEFT, movement_unit, step_in_words
 from ...robots import Robot
 from ...robots.case import Case
 from ...robots.stick import as_seen, stick_figure
+from .runs import Path, Run
 from .true_motion import SCHEMES_OF_RK4
 
 FRAMES = 128  # of a scene, about, without its start
 
 
-class Drawn(NamedTuple):
-    scene: str
-    run: str  # method and step
-    t: np.ndarray  # (frames,) s
-    points: (
-        dict  # of each engine (frames, points, 2): to the right and up, m; NaN from where it has diverged on
-    )
-    links: list  # pairs of points that a stick joins
-    apart: (
-        np.ndarray
-    )  # (frames,): the largest difference of the engines in any joint; NaN if one has diverged
-    unit: str  # of that
-    ended: dict  # of each engine: time of divergence, s, or None
-    left: dict  # of each engine: time when a held robot left its posture, s, or None
-    seen: Finding  # departures, the largest difference, divergence
-    fixed: bool  # whether the first point does not move, as the first joint only turns
-
-    def placed(self, room: Sequence[float], middle: Sequence[float]) -> list[np.ndarray]:
-        """The points of each engine in a drawing, whose y goes down: all in a room, (2,), about a middle, (2,)."""
-        points = np.concatenate([path.reshape(-1, 2) for path in self.points.values()])
-        points = points[np.isfinite(points).all(axis=1)]
-        low, high = points.min(axis=0), points.max(axis=0)
-        scale = (np.array(room) / np.maximum(high - low, 1e-3)).min()
-        return [middle + scale * (path - (low + high) / 2) * [1.0, -1.0] for path in self.points.values()]
-
-
-def drawn_motion(case: Case, runs: Mapping[tuple, dict]) -> Drawn | None:
+def pictures_of(case: Case, runs: Sequence[Run]) -> Pictures | None:
     """The motion of a case by RK4; None if there is no such run.
 
     A held scene is drawn with its own step, as the departure depends on the step; others with the finest one.
     """
-    keys = [key for key in runs if key[0] == case.name and key[1] in SCHEMES_OF_RK4]
-    if not keys:
+    by_steps = {run.steps: run for run in runs if run.case.name == case.name and run.scheme in SCHEMES_OF_RK4}
+    if not by_steps:
         return None
-    key = (min if case.is_held else max)(keys, key=lambda key: key[2])
-    curve, steps, unit = runs[key], key[2], movement_unit(case.coordinates)
-    left = curve["left"] if case.is_held else dict.fromkeys(case.robot.compared)
-    positions, points, links = {}, {}, []
-    for name in case.robot.compared:
-        times, q = frames(case, curve["t"], *curve[name], curve["ended"][name])
+    run, unit = by_steps[(min if case.is_held else max)(by_steps)], movement_unit(case.coordinates)
+    positions, points, links = [], {}, []
+    for engine, path in run.paths.items():
+        times, q = frames(case, run.t, path)
         alive = np.isfinite(q).all(axis=1)
         whole = case.whole_positions(np.where(alive[:, None], q, case.q))
         of_robot, links = stick_figure(case.robot, whole, crosses=True)
-        points[name] = np.where(alive[:, None, None], as_seen(of_robot), np.nan)
-        positions[name] = q
-    apart = np.abs(case.coordinates.difference(*positions.values())).max(axis=1)
+        points[engine] = np.where(alive[:, None, None], as_seen(of_robot), np.nan)
+        positions.append(q)
+    apart = np.abs(case.coordinates.difference(*positions)).max(axis=1)
+    left = {engine: path.left if case.is_held else None for engine, path in run.paths.items()}
+    ended = {engine: path.ended for engine, path in run.paths.items() if path.ended is not None}
     seen = Finding("trajectory", "seen", {
         "noun": case.robot.noun, "unit": unit, "limit": LEFT, "held": case.is_held, "end": case.duration,
         "leaves": [{"label": LABELS[name], "left": time} for name, time in left.items()] if any(left.values()) else [],
         "apart": float(np.nanmax(apart)) if np.isfinite(apart).any() else None,
-        "diverged": [{"label": LABELS[name], "time": end} for name, end in curve["ended"].items() if end is not None],
+        "diverged": [{"label": LABELS[name], "time": end} for name, end in ended.items()],
     })  # fmt: skip
-    run, fixed = f"{curve['integrator']}, {step_in_words(case, steps)}", case.robot.tree.kind[0] != "slide"
-    return Drawn(case.name, run, times, points, links, apart, unit, curve["ended"], left, seen, fixed)
+    label, fixed = f"{run.integrator}, {step_in_words(case, run.steps)}", case.robot.tree.kind[0] != "slide"
+    return Pictures(case.name, label, times, points, links, apart, unit, left, seen, fixed)
 
 
-def frames(
-    case: Case, t: np.ndarray, q: np.ndarray, v: np.ndarray, ended: float | None
-) -> tuple[np.ndarray, np.ndarray]:
+def frames(case: Case, t: np.ndarray, path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Times and positions of the pictures of a run, (frames,) and (frames, nq), NaN from where it has diverged.
 
     A run of few steps is interpolated between them, unless a joint is a ball.
     """
-    alive = (t < (np.inf if ended is None else ended)) & np.isfinite(q).all(axis=1)
-    q = np.where(alive[:, None], q, np.nan)
+    alive = (t < (np.inf if path.ended is None else path.ended)) & np.isfinite(path.q).all(axis=1)
+    q, v = np.where(alive[:, None], path.q, np.nan), path.v
     parts, every = max(1, FRAMES // (len(t) - 1)), -(-(len(t) - 1) // FRAMES)
     if parts == 1 or case.coordinates.has_balls:
         return t[::every], q[::every]
@@ -93,13 +66,13 @@ def frames(
     return times, np.where((times <= t[alive][-1])[:, None], between, np.nan)
 
 
-def in_order(drawn: Sequence[Drawn], robot: Robot) -> list[Drawn]:
+def in_order(drawn: Sequence[Pictures], robot: Robot) -> list[Pictures]:
     """Scenes in the order of the page: a held one, if possible with a departure; a free one, if possible from there; the rest."""
     cases = {case.name: case for case in robot.cases}
-    held = [each for each in drawn if cases[each.scene].is_held]
-    first = sorted(held, key=lambda each: not any(each.left.values()))[:1]
-    postures = [cases[each.scene].scene.posture for each in first]
-    free = [each for each in drawn if cases[each.scene].is_free]
-    first += sorted(free, key=lambda each: cases[each.scene].scene.posture not in postures)[:1]
-    names = [each.scene for each in first]
-    return first + [each for each in drawn if each.scene not in names]
+    held = [scene for scene in drawn if cases[scene.scene].is_held]
+    free = [scene for scene in drawn if cases[scene.scene].is_free]
+    first = sorted(held, key=lambda scene: not any(scene.left.values()))[:1]
+    postures = [cases[scene.scene].scene.posture for scene in first]
+    first += sorted(free, key=lambda scene: cases[scene.scene].scene.posture not in postures)[:1]
+    names = [scene.scene for scene in first]
+    return first + [scene for scene in drawn if scene.scene not in names]

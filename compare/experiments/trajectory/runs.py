@@ -1,6 +1,7 @@
 """One scene by every scheme and step: a method of tmt and the integrators of MuJoCo with the same scheme."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -8,32 +9,122 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...core.check import About, Result
+from ...core.pictures import Pictures
+from ...core.rows import Row, column
 from ...core.text import say
-from ...engines import LABELS, Dynamics, Engine, Method, compared, methods_in
-from ...judge import run
-from ...judge.agree import closest
+from ...engines import LABELS, Dynamics, Engine, Method, Motion, compared, methods_in
+from ...judge import run as rules
 from ...judge.rounding import NARROW, band, step_rounding
-from ...judge.run import departure
-from ...robots.case import Case, Coordinates
+from ...robots.case import Case
+from ..followed import Deviation, check_closest, differences
 
 STEPS_AT_MOST = 8192  # of a run that is finer than the scene's own
 MOST_ENTRIES = 2_700_000  # of all Jacobians of a run, which take the time
 RECORDED = 64  # states of a run that are compared: one for each of the scene's own steps, or fewer
 
 
-class TmtSide(NamedTuple):
-    """One case with one scheme and step by TMT, or by a user's own equations, recorded at the scene's own steps."""
+@dataclass(kw_only=True)
+class TrajectoryRow(Row):
+    """The largest difference of the engines in single steps, or in an open loop."""
 
-    t: np.ndarray  # (steps + 1,) s
+    scene: str
+    engine_integrator: str
+    twin: str
+    dt: float = column("s", digits=5)
+    level: str
+    largest_difference: float | None
+    unit: str
+    worst_difference: float | None
+    band: float
+    worst_unit: str
+    difference_over_band: float | None
+    worst_place: str
+    judged_until: float = column("s")
+    required: float = column("s")
+    diverged_at: float | None = column("s")
+    twin_diverged_at: float | None = column("s")
+
+    @property
+    def urgency(self) -> tuple[bool, bool, float]:
+        share = self.difference_over_band
+        return True, True, np.inf if share is None else -share
+
+
+class Path(NamedTuple):
+    """The run of one engine at each of its steps."""
+
     q: np.ndarray  # (steps + 1, nq) rad
     v: np.ndarray  # (steps + 1, nv)
+    ended: float | None = None  # s: when it diverged
+    left: float | None = None  # s: when it left its start
+
+    @classmethod
+    def of(cls, case: Case, motion: Motion) -> "Path":
+        ended = rules.diverged_at(case, motion.t, motion.q, motion.v)
+        return cls(motion.q, motion.v, ended, rules.departure(motion.t, motion.q, case.coordinates))
+
+
+@dataclass(frozen=True)
+class Run:
+    """One case by one scheme and step in both engines."""
+
+    case: Case
+    scheme: str
+    steps: int
+    t: np.ndarray  # (steps + 1,) s
+    paths: dict[str, Path]  # by engine, MuJoCo last
+    band: np.ndarray  # (recorded,) of rounding, rad or m
+    integrator: str = ""  # of MuJoCo
+    judged_until: float = 0.0  # s
+
+    @property
+    def dt(self) -> float:
+        return self.case.duration / self.steps
+
+    @property
+    def every(self) -> int:
+        """The number of steps from one recorded state to the next."""
+        return self.steps // recorded(self.case)
+
+    @property
+    def ends(self) -> list[float | None]:
+        """When the run of each engine has diverged, s."""
+        return [path.ended for path in self.paths.values()]
+
+    @property
+    def where(self) -> str:
+        """The place of its checks."""
+        return f"{self.case.name}, {self.integrator}, {rules.step_in_words(self.case, self.steps)}"
+
+    @property
+    def required(self) -> float:
+        """The shortest time for which it must be judged, s; 0: the scene states none."""
+        return rules.required_time(self.case, self.scheme, self.dt)
+
+    def until_diverged(self, engine: str, values: np.ndarray) -> np.ndarray:
+        """Values of the run of an engine, (times, n), NaN from where it has diverged."""
+        ended = self.paths[engine].ended
+        return values if ended is None else np.where((self.t < ended)[:, None], values, np.nan)
+
+
+class Ours(NamedTuple):
+    """The side of TMT, or of a user's own equations: its run, and what MuJoCo's is compared with."""
+
+    run: Run
     width: np.ndarray  # (recorded, 2 nv): the band of rounding, of movements first
     widest: np.ndarray  # (2 nv,): the width of the band from which on it judges no more
-    ended: float | None  # s: when it diverged
     at: np.ndarray  # (states,) s: recorded times from which a single step is compared
-    states: list  # q and v at these times
-    stepped: list  # q and v one step later
+    states: list[np.ndarray]  # q and v at these times
+    stepped: list[np.ndarray]  # q and v one step later
     step_tolerance: np.ndarray  # (states, 2 nv)
+
+
+@dataclass
+class TrajectoryResult(Result):
+    runs: list[Run] = field(default_factory=list)
+    # of each scene whose true motion is known: the largest error of both engines, rad or m
+    errors: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
+    pictures: list[Pictures] = field(default_factory=list)
 
 
 def steps_afforded(case: Case) -> int:
@@ -55,114 +146,113 @@ def recorded(case: Case) -> int:
     return count
 
 
-def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int]) -> Result:
+def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int]) -> TrajectoryResult:
     """One case with every scheme that both engines have and every step size, in multiples of the scene's own steps."""
     ours, theirs = case.robot.compared
-    result, dynamics = Result("trajectory", label=LABELS[ours]), compared(engines, case)
+    result, dynamics = TrajectoryResult("trajectory", label=LABELS[ours]), compared(engines, case)
     available = {method.scheme for method in methods_in(engines[ours], case).values()}
-    schemes = {}
+    schemes: dict[str, list[Method]] = {}
     for method in methods_in(engines[theirs], case).values():
         if method.scheme in available:
             schemes.setdefault(method.scheme, []).append(method)
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for steps in step_counts(case, finer):
             for scheme, methods in schemes.items():
-                mine = tmt_side(case, dynamics[ours], steps, scheme)
-                compare_runs(result, case, dynamics[theirs], steps, methods, mine)
+                mine = run_of_ours(case, dynamics[ours], steps, scheme)
+                runs = [compare_run(result, mine, dynamics[theirs], method) for method in methods]
+                result.runs.append(runs[0])
     return result
 
 
-def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide:
+def run_of_ours(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Ours:
     """TMT's side of a case, or a user's: the run, its band, and single steps from its recorded states."""
     stepping, tree, tau = METHODS[scheme], case.tree, case.tau
     dt, every = case.duration / steps, steps // recorded(case)
-    t, q, v, *_ = dynamics.run(*case.start, tau, dt, steps, scheme)
-    ended = run.diverged_at(case, t, q, v)
-    width = band(stepping, tree, q, v, tau, dt, every, steps_afforded(case))
-    alive = t[::every] < (np.inf if ended is None else ended)
-    states, times = [path[::every][alive] for path in (q, v)], t[::every][alive]
+    motion = dynamics.run(*case.start, tau, dt, steps, scheme)
+    path = Path.of(case, motion)
+    width = band(stepping, tree, path.q, path.v, tau, dt, every, steps_afforded(case))
+    alive = motion.t[::every] < ends_first([path.ended])
+    states, times = [values[::every][alive] for values in (path.q, path.v)], motion.t[::every][alive]
     stepped = one_step(dynamics, states, tau, dt, scheme)
     # the bound of a step's rounding is of first order in dt, and too small where a joint turns by more than half a turn
     turning = [i for i, unit in enumerate(case.coordinates.units) if unit == "rad"]
     rates = np.maximum(*(np.abs(speeds[:, turning]) for speeds in (states[1], stepped[1])))
     single = dt * rates.max(axis=1, initial=0.0) <= np.pi
-    states, stepped = ([part[single] for part in pair] for pair in (states, stepped))
-    tolerance = step_rounding(stepping, tree, *states, tau, dt)
-    widest = run.widest_judged(case, q, v)
-    return TmtSide(t, q, v, width, widest, ended, times[single], states, stepped, tolerance)
+    states, stepped = ([values[single] for values in pair] for pair in (states, stepped))
+    of_positions = width[:, : case.coordinates.nv].max(axis=1)
+    run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, of_positions)
+    widest, tolerance = (
+        rules.widest_judged(case, path.q, path.v),
+        step_rounding(stepping, tree, *states, tau, dt),
+    )
+    return Ours(run, width, widest, times[single], states, stepped, tolerance)
 
 
 def one_step(
     dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str
-) -> list:
+) -> list[np.ndarray]:
     """q and v one step after each of the states."""
     motion = dynamics.run(*states, tau, dt, 1, method)
     return [motion.q[:, 1], motion.v[:, 1]]
 
 
-def compare_runs(
-    result: Result, case: Case, dynamics: Dynamics, steps: int, methods: Sequence[Method], mine: TmtSide
-) -> None:
-    """One side and the integrators of MuJoCo with the same scheme, from the same start with the same step."""
-    tau, dt, every, coordinates = case.tau, case.duration / steps, steps // recorded(case), case.coordinates
-    t, times, name, unit = mine.t, mine.t[::every], case.robot.compared[0], run.movement_unit(coordinates)
-    width = mine.width[:, : coordinates.nv].max(axis=1)
-    for method in methods:
-        _, *theirs = dynamics.run(*case.start, tau, dt, steps, method.name)[:3]
-        ends = {name: mine.ended, "mujoco": run.diverged_at(case, t, *theirs)}
-        count = judged(times, mine.width < mine.widest, ends)
-        where = f"{case.name}, {method.name}, {run.step_in_words(case, steps)}"
-        until, required = float(times[count - 1]), run.required_time(case, method.scheme, dt)
-        about = {"scene": case.name, "engine_integrator": method.name, "twin": method.scheme, "dt_s": dt}
-        ending = {"judged_until_s": until, "required_s": required}
-        ending |= {"diverged_at_s": ends["mujoco"], "twin_diverged_at_s": ends[name]}
-        paths = [[path[::every][:count] for path in side] for side in ((mine.q, mine.v), theirs)]
-        levels = [("open loop", *paths, mine.width[:count], times[:count])]
-        if len(mine.at):
-            stepped = one_step(dynamics, mine.states, tau, dt, method.name)
-            levels.insert(0, ("one step", mine.stepped, stepped, mine.step_tolerance, mine.at))
-        for level, ours, other, tolerance, at in levels:
-            movement = coordinates.difference(ours[0], other[0])
-            difference = np.concatenate([movement, ours[1] - other[1]], axis=-1)
-            check_level(
-                result, where, about | {"level": level}, coordinates, difference, tolerance, at, ending
-            )
-        if len(mine.at) and (mine.step_tolerance.min(axis=0) >= mine.widest).any():
-            result.not_judged(where, "one step", say(result.finding("wide_step")))
-        alive = times[times < ends_first(ends)][-1]
-        check_time_judged(result, where, case, until, required, alive)
-        is_known = check_divergence(result, where, ends, dt, steps, width)
-        if not (alive or is_known or required):
-            result.not_judged(where, "open loop", say(result.finding("diverges_at_once")))
-        if case.is_free and "own" not in case.scene.tags:
-            before = t < ends_first(ends)
-            moved = min(run.deviation_alive(q[before], case.q, coordinates) for q in (mine.q, theirs[0]))
-            run.check_movement(result, where, moved, unit)
-        result.curves.setdefault(
-            (case.name, method.scheme, steps),
-            {
-                "integrator": method.name,
-                "t": t,
-                "every": every,
-                name: [mine.q, mine.v],
-                "mujoco": theirs,
-                "band": width,
-                "judged_until_s": until,
-                "ended": ends,
-                "left": {
-                    name: departure(t, mine.q, coordinates),
-                    "mujoco": departure(t, theirs[0], coordinates),
-                },
-            },
-        )
+def compare_run(result: Result, ours: Ours, dynamics: Dynamics, method: Method) -> Run:
+    """One side and an integrator of MuJoCo with the same scheme, from the same start with the same step."""
+    case, (run, width, widest, at, states, stepped, step_tolerance) = ours.run.case, ours
+    mine, coordinates, times = run.paths[case.robot.compared[0]], case.coordinates, run.t[:: run.every]
+    theirs = Path.of(case, dynamics.run(*case.start, case.tau, run.dt, run.steps, method.name))
+    run = replace(run, integrator=method.name, paths=run.paths | {"mujoco": theirs})
+    count = judged(times, width < widest, run.ends)
+    run = replace(run, judged_until=float(times[count - 1]))
+    if len(at):
+        apart = differences(coordinates, stepped, one_step(dynamics, states, case.tau, run.dt, method.name))
+        check_level(result, run, "one step", Deviation(coordinates, at, apart, step_tolerance))
+        if (step_tolerance.min(axis=0) >= widest).any():
+            result.not_judged(run.where, "one step", say(result.finding("wide_step")))
+    recorded_states = (
+        [path.q[:: run.every][:count], path.v[:: run.every][:count]] for path in (mine, theirs)
+    )
+    apart = differences(coordinates, *recorded_states)
+    check_level(result, run, "open loop", Deviation(coordinates, times[:count], apart, width[:count]))
+    check_end(result, run)
+    return run
 
 
-def ends_first(ends: Mapping[str, float | None]) -> float:
+def check_level(result: Result, run: Run, level: str, deviation: Deviation) -> None:
+    """A row and a check: the component and the recorded state that come closest to their tolerance."""
+    check = check_closest(result, run.where, f"{level}, {result.label} to MuJoCo", deviation)
+    movements = deviation.difference[:, : deviation.coordinates.nv]
+    twin_diverged_at, diverged_at = run.ends
+    result.rows.append(TrajectoryRow(
+        scene=run.case.name, engine_integrator=run.integrator, twin=run.scheme, dt=run.dt, level=level,
+        largest_difference=None if check.value is None else movements.max(), unit=rules.movement_unit(run.case.coordinates),
+        worst_difference=check.value, band=check.tolerance, worst_unit=check.unit, worst_place=check.note,
+        difference_over_band=check.over_tolerance, judged_until=run.judged_until, required=run.required,
+        diverged_at=diverged_at, twin_diverged_at=twin_diverged_at,
+    ))  # fmt: skip
+
+
+def check_end(result: Result, run: Run) -> None:
+    """How long a run is judged, whether both runs diverge alike, and whether it moves."""
+    case, end = run.case, ends_first(run.ends)
+    times = run.t[:: run.every]
+    alive = times[times < end][-1]
+    check_time_judged(result, run, alive)
+    is_known = check_divergence(result, run)
+    if not (alive or is_known or run.required):
+        result.not_judged(run.where, "open loop", say(result.finding("diverges_at_once")))
+    if case.is_free and "own" not in case.scene.tags:
+        alive_paths = [path.q[run.t < end] for path in run.paths.values()]
+        moved = min(rules.deviation_alive(q, case.q, case.coordinates) for q in alive_paths)
+        rules.check_movement(result, run.where, moved, rules.movement_unit(case.coordinates))
+
+
+def ends_first(ends: Sequence[float | None]) -> float:
     """When the first of the runs has diverged, s; inf: none has."""
-    return min((end for end in ends.values() if end is not None), default=np.inf)
+    return min((end for end in ends if end is not None), default=np.inf)
 
 
-def judged(times: np.ndarray, narrow: np.ndarray, ends: Mapping[str, float | None]) -> int:
+def judged(times: np.ndarray, narrow: np.ndarray, ends: Sequence[float | None]) -> int:
     """The number of recorded states that are judged: those before the band is wide or a run has diverged, and the start.
 
     narrow: whether the band still judges each movement and speed, (recorded, 2 nv).
@@ -171,65 +261,32 @@ def judged(times: np.ndarray, narrow: np.ndarray, ends: Mapping[str, float | Non
     return max(1, int(np.argmin(np.append(narrow.all(axis=1) & alive, False))))
 
 
-def check_time_judged(
-    result: Result, where: str, case: Case, until: float, required: float, alive: float
-) -> None:
+def check_time_judged(result: Result, run: Run, alive: float) -> None:
     """A run is judged for the time that its scene states, or for a tenth of it while it is alive; else it is not judged.
 
-    until: when it is no more judged; alive: the last recorded time before one of both runs diverges, s.
+    alive: the last recorded time before one of both runs diverges, s.
     """
-    least = required or min(run.LEAST_JUDGED * case.duration, alive)
+    until, least = run.judged_until, run.required or min(rules.LEAST_JUDGED * run.case.duration, alive)
     if until < least:
         reason = say(result.finding("wide", until=until, least=least))
-        result.not_judged(where, "time judged", reason, "s")
-    elif required:
-        result.check(where, "time judged", until, required, "s", rule="at least", about=About.PREDICTION)
+        result.not_judged(run.where, "time judged", reason, "s")
+    elif run.required:
+        result.check(run.where, "time judged", until, least, "s", rule="at least", about=About.PREDICTION)
 
 
-def check_divergence(
-    result: Result, where: str, ends: Mapping[str, float | None], dt: float, steps: int, width: np.ndarray
-) -> bool:
-    """Both diverge at the same step, if one does and the band (recorded,) is narrow at the first recorded state after that.
+def check_divergence(result: Result, run: Run) -> bool:
+    """Both diverge at the same step, if one does and the band is narrow at the first recorded state after that.
 
     Returned: whether that is compared.
-
-    ends: of MuJoCo's partner and of MuJoCo, s.
     """
-    end = ends_first(ends)
+    end, steps, dt = ends_first(run.ends), run.steps, run.dt
     if end == np.inf:
         return False
-    every = steps // (len(width) - 1)
-    is_narrow = bool(width[-(-round(end / dt) // every)] < NARROW)
+    is_narrow = bool(run.band[-(-round(end / dt) // run.every)] < NARROW)
     if is_narrow:
-        ours, theirs = (steps + 1 if at is None else round(at / dt) for at in ends.values())
+        ours, theirs = (steps + 1 if at is None else round(at / dt) for at in run.ends)
         whose = "TMT's" if result.label == "TMT" else result.label
         note = f"{steps + 1}: never" if steps + 1 in (ours, theirs) else ""
-        result.check(where, f"step of divergence, MuJoCo's, is {whose}", theirs, ours, "", note, rule="equal")
+        what = f"step of divergence, MuJoCo's, is {whose}"
+        result.check(run.where, what, theirs, ours, "", note, rule="equal")
     return is_narrow
-
-
-def check_level(
-    result: Result, where: str, about: dict, coordinates: Coordinates, difference, tolerance, times, ending
-) -> None:
-    """A row and a check: the component and recorded state that come closest to their tolerance.
-
-    about, ending: the first and the last columns of the row; difference: (states, 2 nv) rad and rad/s; tolerance: broadcast to
-    it; times: of the states, s.
-    """
-    n, difference = coordinates.nv, np.abs(difference)
-    tolerance = np.broadcast_to(tolerance, difference.shape)
-    k, i = closest(difference, tolerance)
-    unit = coordinates.units[i % n] + ("", "/s")[i // n]
-    place = f"{coordinates.speeds[i % n]} at t = {times[k]:.3f} s"
-    quantity = f"{about['level']}, {result.label} to MuJoCo"
-    check = result.check(where, quantity, difference[k, i], tolerance[k, i], unit, place, True)
-    found = {
-        "largest_difference": None if check.value is None else difference[:, :n].max(),
-        "unit": run.movement_unit(coordinates),
-        "worst_difference": check.value,
-        "band": check.tolerance,
-        "worst_unit": unit,
-        "difference_over_band": check.over_tolerance,
-        "worst_place": place,
-    }
-    result.rows.append(about | found | ending)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from edited import XML
 
-from compare.core.check import Result
 from compare.engines.mujoco import parse
+from compare.experiments.followed import Deviation
 from compare.experiments.reduction import exact_motion, needs, sub_blocks, times
+from compare.experiments.reduction.records import Model, ReductionResult
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
 from compare.judge.scale import EPS
@@ -16,7 +17,7 @@ from compare.robots.case import Coordinates
 
 def verdicts(check, *arguments):
     """Whether each check that is made passes, by the name of its quantity."""
-    result = Result("reduction", curves={"apart": {}}, tables={"reduction_subsets": []})
+    result = ReductionResult("reduction", tables={"reduction_subsets": []})
     check(result, *arguments)
     return {check.quantity: check.passed for check in result.checks}
 
@@ -25,9 +26,8 @@ def verdicts(check, *arguments):
 def test_sub_blocks_agree_within_64_eps(apart, passes):
     scale = np.array([2.0, 1e-3, 5.0])
     off = np.array([0.0, apart * EPS * 1e-3, 0.0])  # in the state with the small scale
-    found = verdicts(
-        sub_blocks.check_blocks, ("beta",), "Mbar", "reduced, TMT to MuJoCo", off, scale, "kg m2"
-    )
+    names = "Mbar", "reduced, TMT to MuJoCo", "kg m2"
+    found = verdicts(sub_blocks.check_blocks, ("beta",), names, off, scale)
     assert found == {"Mbar, reduced, TMT to MuJoCo": passes}
 
 
@@ -41,9 +41,8 @@ def test_the_smallest_model_is_judged_while_the_band_is_narrow(apart, width, req
     t = np.arange(6.0)
     off, band = np.zeros((6, 4)), np.full((6, 4), 1e-9)
     off[4, 1], band[4, 1] = apart, width
-    found = verdicts(
-        needs.check_smaller, "zero, free", Coordinates(("alpha", "gamma")), t, off, band, required
-    )
+    deviation = Deviation(Coordinates(("alpha", "gamma")), t, off, band)
+    found = verdicts(needs.check_smaller, "zero, free", deviation, required)
     assert found == {"smallest model to whole": within, "time judged": long_enough}
 
 
@@ -64,15 +63,16 @@ FALLING = {
 
 @pytest.mark.parametrize("errors, passed", FALLING.values(), ids=FALLING)
 def test_errors_fall_at_the_order_of_the_method(errors, passed):
-    found = verdicts(exact_motion.check_falling, "swing", {"tmt": errors}, 4)
+    dt = [0.1 / 2**k for k in range(len(errors))]
+    found = verdicts(exact_motion.check_falling, "swing", dt, {"tmt": errors}, 4)
     assert list(found.values()) == passed
 
 
-def swings(engines, **scene) -> Result:
+def swings(engines, **scene) -> ReductionResult:
     """Of one scene, or of all the arm's."""
-    result = Result("reduction", curves={"apart": {}, "swings": {}})
+    result = ReductionResult("reduction")
     cases = [ARM.case("mine", locked=("alpha", "beta"), **scene)] if scene else ARM.cases
-    for case in exact_motion.pendulums(cases):
+    for case in filter(exact_motion.is_pendulum, cases):
         exact_motion.compare_swing(result, Setup.small(ARM, engines), case)
     return result
 
@@ -95,7 +95,7 @@ def test_both_engines_meet_the_elliptic_function_and_a_heavier_arm_does_not():
 ])  # fmt: skip
 def test_a_pendulum_that_shows_nothing_is_left_out(engines, scene):
     result = swings(engines, **scene)
-    assert result.checks == [] and result.curves["swings"] == {}
+    assert result.checks == [] and result.swings == {}
 
 
 # whose number stands where
@@ -104,28 +104,26 @@ def test_a_pendulum_that_shows_nothing_is_left_out(engines, scene):
 def test_the_table_has_the_times_of_each_engine_and_the_largest_gain():
     """Of a scene with a smaller model and of one that needs no run."""
     cases, seconds = {case.name: case for case in ARM.cases}, {}
-    free, held, planar = (
-        cases["zero, free"],
-        cases["bent, held"],
-        cases["elbow swing"],
-    )  # stands for the smaller model
+    free, held = cases["zero, free"], cases["bent, held"]
+    planar = cases["elbow swing"]  # stands for the smaller model
     for engine, steps, whole, small in (("tmt", 1024, 300e-9, 100e-9), ("mujoco", 128, 6000e-9, 4000e-9)):
         for case, of, taken in ((free, free, whole), (held, held, whole), (free, planar, small)):
             seconds[case.name, of.joints, engine] = steps * taken
-    models = [(free.name, free), (free.name, planar), (held.name, held), (held.name, None)]
-    table = times.time_rows(models, ARM.joints, seconds, {(free.name, "tmt"): 1e-12})
-    rows = {(r["scene"], r["nv"], r["engine"]): r for r in table}
+    models = [
+        Model(free.name, free),
+        Model(free.name, planar),
+        Model(held.name, held),
+        Model(held.name, None),
+    ]
+    result = ReductionResult("reduction", models=models, apart={(free.name, "tmt"): 1e-12})
+    times.add_rows(result, ARM, seconds)
+    rows = {(row.scene, row.nv, row.engine): row for row in result.rows}
     for engine, whole, small in (("tmt", 300.0, 100.0), ("mujoco", 6000.0, 4000.0)):
         of_whole, of_small = rows[free.name, 3, engine], rows[free.name, 1, engine]
-        assert (of_whole["ns_per_step"], of_whole["speedup"]) == pytest.approx((whole, 1.0))
-        assert (of_small["ns_per_step"], of_small["speedup"]) == pytest.approx((small, whole / small))
-        assert rows[held.name, 0, engine]["ns_per_step"] is None
-    assert [rows[free.name, nv, "tmt"]["max_difference_rad"] for nv in (1, 3)] == [1e-12, None]
+        assert (of_whole.ns_per_step, of_whole.speedup) == pytest.approx((whole, 1.0))
+        assert (of_small.ns_per_step, of_small.speedup) == pytest.approx((small, whole / small))
+        assert rows[held.name, 0, engine].ns_per_step is None
+    assert [rows[free.name, nv, "tmt"].max_difference for nv in (1, 3)] == [1e-12, None]
 
-    best = times.largest_gain(table, 3)
-    assert (best["engine"], best["scene"], best["nv"], best["speedup"]) == (
-        "tmt",
-        "zero, free",
-        1,
-        pytest.approx(3.0),
-    )
+    best = times.largest_gain(result.rows, 3)
+    assert (best.engine, best.scene, best.nv, best.speedup) == ("tmt", "zero, free", 1, pytest.approx(3.0))

@@ -13,6 +13,7 @@ from compare.core.text import say
 from compare.engines.mujoco import Mujoco, engine, read
 from compare.experiments import reduction
 from compare.experiments.reduction import needs, sub_blocks, times
+from compare.experiments.reduction.records import ReductionResult
 from compare.experiments.setup import Setup, engines
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
@@ -31,11 +32,11 @@ def failed(result) -> list[str]:
 
 def test_a_small_run_takes_every_path_and_every_figure_has_numbers(small):
     result = small("reduction")
-    rows = {(r["scene"], r["hinges"], r["engine"]): r for r in result.rows}
+    rows = {(row.scene, row.hinges, row.engine): row for row in result.rows}
     assert {scene for scene, *_ in rows} == {scene.name for scene in ARM.scenes}
     planar, whole = (rows["zero, free", hinges, "tmt"] for hinges in ("alpha gamma", "alpha beta gamma"))
-    assert 0 < planar["operations"] < whole["operations"] and planar["ns_per_step"] > 0
-    assert rows["bent, held", "none", "mujoco"]["ns_per_step"] is None
+    assert 0 < planar.operations < whole.operations and planar.ns_per_step > 0
+    assert rows["bent, held", "none", "mujoco"].ns_per_step is None
     drawn = {name: caption for name, _, caption in (figure() for figure in reduction.figures(result, ARM))}
     assert list(drawn) == ["reduction_needs", "reduction_elbow_swing"]
     assert not any("nan" in say(caption) for caption in drawn.values())
@@ -43,16 +44,16 @@ def test_a_small_run_takes_every_path_and_every_figure_has_numbers(small):
 
 def test_a_model_whose_joints_cannot_be_locked_fails():
     tendon = '<tendon><fixed><joint joint="alpha" coef="1"/><joint joint="gamma" coef="1"/></fixed></tendon></mujoco>'
-    (check,) = reduction.untimed(setup_of(XML.replace("</mujoco>", tendon)))[0].checks
+    (check,) = reduction.untimed(setup_of(XML.replace("</mujoco>", tendon))).checks
     assert check.quantity == "models whose hinges can be locked" and not check.passed
 
 
 def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_done_again(setup, monkeypatch):
     log = []
     for name, said in (("untimed", "computed"), ("time_models", "timed")):
-        given = Result("reduction", curves={"needs": {}}), []
+        result = ReductionResult("reduction", models=[])
         monkeypatch.setattr(
-            reduction, name, lambda *_, said=said, given=given, **__: log.append(said) or given
+            reduction, name, lambda *_, said=said, result=result, **__: log.append(said) or result
         )
     setup = dataclasses.replace(setup, quiet=lambda: log.append("quiet"))
     reduction.rows(setup, reduction.begin(setup))
@@ -116,7 +117,7 @@ def test_of_many_joints_some_are_locked_each_alone():
 def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
     body = '<body><joint axis="0 1 0"/><geom size="0.1 0.2 0.3" type="box" pos="0.1 0.2 1"/></body>'
     aligned = f'<body><freejoint align="true"/><geom size="0.1" pos="0.05 0 0"/>{body}</body>'
-    result, _ = reduction.untimed(of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"))
+    result = reduction.untimed(of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"))
     assert [note.kind for note in result.top] == ["not_lockable"] and failed(result) == []
 
 
@@ -124,12 +125,10 @@ def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
 
 
 def test_the_planar_arm_moves_as_the_whole_one(engines):
-    case, setup, result = ARM.cases[0], Setup.small(ARM, engines), Result("reduction", curves={"apart": {}})
+    case, setup, result = ARM.cases[0], Setup.small(ARM, engines), ReductionResult("reduction")
     smaller = reduced(case)
-    assert (
-        smaller.joints == ("alpha", "gamma")
-        and times.operations(tmt.ARM) > 2 * times.operations(smaller.tree) > 0
-    )
+    assert smaller.joints == ("alpha", "gamma")
+    assert times.operations(tmt.ARM) > 2 * times.operations(smaller.tree) > 0
     needs.compare_smaller(result, case, smaller, setup)
     assert len(result.checks) == 6 and failed(result) == []
     # a planar arm that starts elsewhere is another motion
@@ -144,7 +143,7 @@ def test_each_engine_is_compared_with_its_own_smaller_model(engines):
 
     wrong, case = engines["mujoco"], ARM.cases[0]
     wrong = Braked(wrong.model, wrong.joints, wrong.bodies, wrong.source)
-    result = Result("reduction", curves={"apart": {}})
+    result = ReductionResult("reduction")
     needs.compare_smaller(result, case, reduced(case), Setup.small(ARM, {**engines, "mujoco": wrong}))
     assert [check.scene.split(", ")[2] for check in result.checks if not check.passed] == ["MuJoCo"]
 
@@ -153,8 +152,8 @@ def test_of_a_users_own_scene_nothing_is_expected_but_agreement(engines):
     """A motion that is small is no failure."""
     more = {"duration": 0.5, "dt": 1 / 64, "judged": 0.0, "tags": ("own",)}
     case = ARM.case("own", posture="hanging", speed=(0, 1e-3, 0), **more)
-    result = Result("reduction", curves={"needs": {}, "apart": {}})
-    (_, whole), *smaller = needs.of_case(result, case, Setup.small(ARM, engines))
+    result = ReductionResult("reduction")
+    (_, whole), *smaller = needs.compare_case(result, case, Setup.small(ARM, engines))
     assert failed(result) == [] and "movement" not in {check.quantity for check in result.checks}
     assert whole.joints == ARM.joints and smaller == []
 
@@ -162,10 +161,8 @@ def test_of_a_users_own_scene_nothing_is_expected_but_agreement(engines):
 def test_a_held_posture_with_springs_needs_nothing():
     held = next(case for case in of_file(PATHS["gripper"]).robot.cases if case.is_held)
     assert held.tree.has_springs and needed(held).stays == held.joints
-    rigid = held.changed(
-        torque=tuple(tmt.gravity_balance(held.posture, held.whole))
-    )  # without what the springs need
-    assert needed(rigid).stays == ()
+    gravity_alone = tuple(tmt.gravity_balance(held.posture, held.whole))  # without what the springs need
+    assert needed(held.changed(torque=gravity_alone)).stays == ()
 
 
 FALLS = """<mujoco><worldbody><body name="base"><freejoint name="base"/><geom type="box" size="0.1 0.1 0.05" mass="2"/>
@@ -183,9 +180,8 @@ def test_a_robot_that_falls_does_not_bend_and_the_answer_says_it_last():
 
 def test_what_takes_too_long_to_decide_is_neither_needed_nor_locked(monkeypatch):
     monkeypatch.setattr(needs, "SECONDS_OF_STATE", 0.0)
-    case, result = ARM.cases[0], Result("reduction", curves={"needs": {}, "apart": {}})
-    needs.of_case(result, case, None)
+    case, result = ARM.cases[0], ReductionResult("reduction")
+    needs.compare_case(result, case, None)
     (answer,) = reduction.answers(result, ARM)
-    assert (
-        answer.values["undecided"] == ARM.joints and answer.values["needed"] == answer.values["stays"] == ()
-    )
+    assert answer.values["undecided"] == ARM.joints
+    assert answer.values["needed"] == answer.values["stays"] == ()

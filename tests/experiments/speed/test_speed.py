@@ -36,9 +36,9 @@ FREE, STEP = settings.scenes_of(GRIPPER)
 
 
 @pytest.fixture(scope="module")
-def known_reference():
-    """The arm's run with many digits, in pairs of doubles."""
-    return reference.reference(BENT)
+def of_bent():
+    """The arm's scene with its reference in pairs of doubles, without runs."""
+    return runs.SceneRuns(BENT, reference.reference(BENT), 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -68,24 +68,16 @@ def test_scenes_are_those_with_the_tag_and_a_users_own():
 
 
 def test_methods_are_those_of_the_engines_that_are_there(engines):
-    full, quick = (settings.methods(engines, size) for size in ("full", "quick"))
+    full, quick, small = (settings.methods(engines, size, BENT) for size in ("full", "quick", "small"))
     there = [engine for engine in engines.values() if engine.unavailable() is None]
-    assert (
-        full == settings.methods(engines, "small") == [m for engine in there for m in engine.methods.values()]
-    )
+    assert full == small == [method for engine in there for method in engine.methods.values()]
     assert quick == [m for m in full if m.engine in ("mujoco", "tmt")] and len(quick) < len(full)
-    split = [
-        settings.methods(engines, size, which)
-        for size in ("full", "quick")
-        for which in ("compiled", "called")
-    ]
-    assert split == [quick, [m for m in full if m not in quick], quick, []]
 
 
 def test_a_step_response_is_followed_from_coarse_steps_on_by_the_schemes_that_it_has(of_gripper):
     stiff = robot_in("arm7").cases[-1]
     assert settings.coarsest_steps(stiff) == 64 < stiff.steps and settings.coarsest_steps(FREE) == FREE.steps
-    of_both = (settings.methods(of_gripper, "full", "all", GRIPPER, case) for case in (STEP, FREE))
+    of_both = (settings.methods(of_gripper, "full", case) for case in (STEP, FREE))
     of_step, of_free = ({(m.engine, m.name): m.scheme for m in methods} for methods in of_both)
     schemes = [of["mujoco", "implicitfast"] for of in (of_step, of_free)]
     assert schemes == ["implicitfast", "semi_implicit_euler"]
@@ -95,9 +87,8 @@ def test_a_step_response_is_followed_from_coarse_steps_on_by_the_schemes_that_it
 def test_what_takes_too_long_is_left_out(engines):
     assert Heyoka().too_long(HUMANOID.tree) and Heyoka().too_long(ARM.tree) is None
     slow = settings.left_out(engines, "full", HUMANOID)
-    assert slow and not {
-        (m.engine, m.name) for m in settings.methods(engines, "full", "all", HUMANOID)
-    } & set(slow)
+    taken = {(m.engine, m.name) for m in settings.methods(engines, "full", HUMANOID.cases[0])}
+    assert slow and not taken & set(slow)
     implicit, arm7 = ("tmt", "implicit_midpoint"), robot_in("arm7")
     assert [implicit in settings.left_out(engines, size, arm7) for size in ("quick", "full")] == [True, False]
 
@@ -115,20 +106,20 @@ def test_steps_are_halved_from_the_scenes_own_to_the_finest(engine, name, finest
     assert [s.tolerance for s in adaptive] == [1e-2, 1e-3, 1e-4]
 
 
-def test_every_method_follows_the_scene(engines, known_reference):
+def test_every_method_follows_the_scene(engines, of_bent):
     """Each method with a fine setting is near the reference, and costs evaluations; one that diverges has no error."""
-    for method in settings.methods(engines, "full"):
+    for method in settings.methods(engines, "full", BENT):
         if RECORDS[method.engine].reads_file:  # see test_outside
             continue
         steps = None if method.adaptive else 2**13 if method.order == 1 else 1024
         setting = Setting(5.0, steps, 1e-5 if method.adaptive else None)
-        row = runs.row_of_run(BENT, engines, method, setting, known_reference, 0.0)
+        row = runs.measured(of_bent, engines[method.engine], method, setting).row
         tolerance = {1: 0.6, 2: 0.03, None: 1e-3}.get(method.order, 1e-4)
-        assert 0.0 < row["error_rad"] <= row["worst_error_rad"] < tolerance and not row["diverged"], method
-        assert row["energy_error_J"] > 0.0 and row["dt_s"] == (5.0 / steps if steps else None)
+        assert 0.0 < row.error <= row.worst_error < tolerance and not row.diverged, method
+        assert row.energy_error > 0.0 and row.dt == (5.0 / steps if steps else None)
     method = engines["tmt"].methods["explicit_euler"]
-    row = runs.row_of_run(BENT, engines, method, Setting(5.0, 64), known_reference, 0.0)
-    assert row["diverged"] and row["error_rad"] is row["worst_error_rad"] is row["energy_error_J"] is None
+    row = runs.measured(of_bent, engines["tmt"], method, Setting(5.0, 64)).row
+    assert row.diverged and row.error is row.worst_error is row.energy_error is None
 
 
 def test_rounding_leaves_eps_times_the_growth(engines, of_gripper):
@@ -144,33 +135,32 @@ def test_rounding_leaves_eps_times_the_growth(engines, of_gripper):
     assert np.abs(growth(*given) - growth(*given, stride=given[-1])).max() < 0.1
 
 
-def test_beyond_the_digits_of_the_reference_nothing_is_judged(
-    engines, of_gripper, known_reference, monkeypatch
-):
-    truth, method = reference.in_doubles(FREE)._replace(why="too stiff"), of_gripper["tmt"].methods["dopri8"]
-    row = runs.row_of_run(FREE, of_gripper, method, settings.halvings(method, FREE)[1], truth, 0.0, 1e-11)
-    assert row["worst_error_rad"] == row["error_rad"] == 1e-11 and not row["diverged"]
-    known = known_reference._replace(apart=1e-6)
+def test_beyond_the_digits_of_the_reference_nothing_is_judged(engines, of_gripper, of_bent, monkeypatch):
+    known, method = reference.in_doubles(FREE)._replace(why="too stiff"), of_gripper["tmt"].methods["dopri8"]
+    scene, setting = runs.SceneRuns(FREE, known, 1e-11), settings.halvings(method, FREE)[1]
+    row = runs.measured(scene, of_gripper["tmt"], method, setting).row
+    assert row.worst_error == row.error == 1e-11 and not row.diverged
     monkeypatch.setattr(runs, "methods", lambda *_: [])
-    monkeypatch.setattr(runs, "references", lambda cases: {case.name: known for case in cases})
-    assert runs.scene(BENT, engines, "small") == (BENT.name, known, 1e-6, [])
+    monkeypatch.setattr(runs, "reference", lambda case: of_bent.reference._replace(apart=1e-6))
+    assert runs.scene_runs(BENT, engines, "small").floor == 1e-6
 
 
 @pytest.mark.slow
 def test_a_small_run_takes_every_path(engines, small):
     result = small("speed")
-    table = pd.DataFrame(result.rows)
+    table = pd.DataFrame([row.record() for row in result.rows])
     ran = table[table.why_not.isna()]
-    assert list(table.columns) == speed.COLUMNS and (ran.seconds > 0.0).all()
-    assert {*zip(ran.engine, ran.method)} == {(m.engine, m.name) for m in settings.methods(engines, "full")}
+    assert (ran.seconds > 0.0).all()
+    assert {*zip(ran.engine, ran.method)} == {
+        (m.engine, m.name) for m in settings.methods(engines, "full", BENT)
+    }
     diverged = ran[ran.diverged.astype(bool)]
     assert len(diverged) and diverged[["error_rad", "worst_error_rad", "energy_error_J"]].isna().all(
         axis=None
     )
-    costs = pd.DataFrame(result.tables["evaluations"])
-    timed = costs[costs.why_not.isna()]
-    assert {"forward_dynamics", "rk4_step"} == set(timed.quantity)
-    assert (timed.ns_per_state > 0.0).all() and costs[costs.why_not.notna()].ns_per_state.isna().all()
+    costs = result.tables["evaluations"]
+    assert {"forward_dynamics", "rk4_step"} == {row.quantity for row in costs if row.why_not is None}
+    assert all((row.ns_per_state or 0.0) > 0.0 for row in costs if row.why_not is None)
     coarse = (
         ran[(ran.steps == 64) & ran.method.isin(("rk4", "RK4"))]
         .set_index(["scene", "engine"])
@@ -183,7 +173,7 @@ def test_a_small_run_takes_every_path(engines, small):
 def test_a_run_without_timings_has_the_checks_only_and_sees_a_wrong_model(engines):
     result = untimed_speed(Setup.small(ARM, engines))
     assert len(result.checks) > 10 and all(check.passed for check in result.checks)
-    assert all(row["seconds"] is None for row in result.rows) and list(speed.figures(result, ARM)) == []
+    assert all(row.seconds is None for row in result.rows) and list(speed.figures(result, ARM)) == []
     checks = untimed_speed(setup_of(XML.replace('mass="1.5"', 'mass="1.50001"'))).checks
     failed = {check.quantity for check in checks if not check.passed}
     assert {
@@ -195,12 +185,12 @@ def test_a_run_without_timings_has_the_checks_only_and_sees_a_wrong_model(engine
 def test_a_reference_in_doubles_measures_turns_and_no_quaternions():
     case = settings.regular_of(robot_of(read(PATHS["free_body"]), "free_body.xml"))
     known = reference.in_doubles(case)
-    assert known.error(-known.high[:, 3:7], [3]).max() < 1e-15  # -q is the same turn
+    position = known.high[:, :7] * [1, 1, 1, -1, -1, -1, -1]  # -q is the same turn
+    assert known.error(position).max() < 1e-15
     turned = case.coordinates.move(known.high[:, :7], [0.0, 0.0, 0.0, 0.0, 1e-3, 0.0])
-    assert known.error(turned[:, 3:], [3]) == pytest.approx(1e-3)
-    assert known.error(turned, range(4)) == pytest.approx(1e-3)
+    assert known.error(turned) == pytest.approx(1e-3)
 
 
 def test_whether_servos_are_off_is_known(engines, of_gripper):
     setups = Setup.quick(GRIPPER, of_gripper), Setup.quick(ARM, engines)
-    assert [untimed_speed(setup).curves["servos_off"] for setup in setups] == [True, False]
+    assert [untimed_speed(setup).servos_off for setup in setups] == [True, False]

@@ -1,6 +1,6 @@
 """The rules of runs and of the drift of energy, just inside and just outside; errors and departures."""
 
-import dataclasses
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +10,9 @@ from trajectory_curves import CASES, FREE, HELD, run_of
 import tmt
 from compare.core.check import Result
 from compare.engines.mujoco import parse
+from compare.experiments.followed import Deviation
 from compare.experiments.trajectory import energy, runs, true_motion
+from compare.experiments.trajectory.runs import Path, TrajectoryResult
 from compare.judge.run import check_movement, required_time, widest_judged
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
@@ -23,18 +25,18 @@ NARROW, AT_ONCE = np.full(11, 0.999e-3), np.array([0.0, 1e-9, *[np.inf] * 9])
 
 def verdicts(check, *arguments) -> dict:
     """Whether each check that is made passes, by the name of its quantity."""
-    result = Result("trajectory")
-    check(result, "x", *arguments)
+    result = TrajectoryResult("trajectory")
+    check(result, *arguments)
     return {check.quantity: check.passed for check in result.checks}
 
 
 def test_a_run_is_judged_while_its_band_is_narrow_and_nothing_has_diverged():
-    times, never = np.arange(5.0), {"tmt": None, "mujoco": None}
+    times, never = np.arange(5.0), (None, None)
     narrow = np.ones((5, 2), bool)
     wide = narrow & np.array([[True], [True], [False], [True], [True]])
     assert runs.judged(times, narrow, never) == 5
     assert runs.judged(times, wide, never) == runs.judged(times, narrow & wide[:, :1], never) == 2
-    assert runs.judged(times, narrow, {"tmt": 2.5, "mujoco": 4.0}) == 3
+    assert runs.judged(times, narrow, (2.5, 4.0)) == 3
     assert runs.judged(times, ~narrow, never) == 1
 
 
@@ -66,16 +68,17 @@ def test_a_band_judges_nothing_that_moves_less():
     (0.0, 0.0, 0.0, True),
 ])  # fmt: skip
 def test_a_run_that_is_judged_too_short_is_not_judged(required, until, alive, judged):
-    result, case = Result("trajectory"), SimpleNamespace(duration=5.0)
-    runs.check_time_judged(result, "x", case, until, required, alive)
+    result, run = TrajectoryResult("trajectory"), run_of(FREE.changed(judged=required), until=until)
+    runs.check_time_judged(result, run, alive)
     assert [check.passed for check in result.checks] == [judged] * (required > 0.0 or not judged)
     assert all(check.judged == judged for check in result.checks)
 
 
 def level(difference, bar):
     """The check and the row of differences (states, 2 nv)."""
-    result, times = Result("trajectory"), np.arange(len(difference)) / 2
-    runs.check_level(result, "x", {"level": "open loop"}, LIFT_AND_HEAD, np.array(difference), bar, times, {})
+    result, times = TrajectoryResult("trajectory"), np.arange(len(difference)) / 2
+    deviation = Deviation(LIFT_AND_HEAD, times, np.array(difference), np.full(np.shape(difference), bar))
+    runs.check_level(result, run_of(FREE), "open loop", deviation)
     return result.checks[0], result.rows[0]
 
 
@@ -87,18 +90,15 @@ def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(
     differences = np.zeros((3, 8))
     differences[1, place] = off
     check, row = level(differences, bar)
-    assert check.passed is (off in (0.999, 0.0)) and row["worst_difference"] == check.value
+    assert check.passed is (off in (0.999, 0.0)) and row.worst_difference == check.value
     if bar:
-        assert (
-            (check.unit, row["worst_unit"]) == (unit, unit)
-            and check.note.startswith(name)
-            and "0.500" in check.note
-        )
+        assert (check.unit, row.worst_unit, row.worst_place) == (unit, unit, check.note)
+        assert check.note.startswith(name) and "0.500" in check.note
 
 
 def test_a_row_has_the_largest_movement_beside_the_worst_component():
     _, row = level([[0.2, 0, 0, 0.7, 3.0, 0, 0, 0], [0.1, 0, 0, 0.4, 0, 0, 0, 0.9]], 1.0)
-    assert (row["largest_difference"], row["worst_difference"], row["unit"]) == (0.7, 3.0, "rad or m")
+    assert (row.largest_difference, row.worst_difference) == (0.7, 3.0)
 
 
 def test_what_a_scene_asks_for_depends_on_the_scheme_and_the_step():
@@ -112,37 +112,38 @@ def test_what_a_scene_asks_for_depends_on_the_scheme_and_the_step():
     (0.12, 0.13, AT_ONCE, []),  # the band opens before the next recorded state
 ])  # fmt: skip
 def test_both_diverge_at_the_same_step_while_the_band_is_narrow(ours, theirs, width, found):
-    ends = {"tmt": ours, "mujoco": theirs}
-    assert [*verdicts(runs.check_divergence, ends, 0.01, 100, width).values()] == found
+    """In a second with 100 steps, of which each tenth is recorded."""
+    case = FREE.changed(duration=1.0, dt=0.1)
+    run = replace(run_of(case, ended=(ours, theirs), steps=100), band=width)
+    assert [*verdicts(runs.check_divergence, run).values()] == found
 
 
 @pytest.mark.parametrize("moved, passes", [(0.1001, True), (0.0999, False), (np.nan, False)])
 def test_a_free_run_moves_by_a_tenth_of_a_radian(moved, passes):
-    assert verdicts(check_movement, moved) == {"movement": passes}
+    assert verdicts(check_movement, "x", moved) == {"movement": passes}
 
 
 # energy, errors, departures
 
 
 def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_one_that_from_many_digits():
-    path = tmt.simulate(*FREE.start, FREE.tau, 5 / 64, 64, "rk4", FREE.tree).q
-    runs = {(HELD.name, *of): run_of(HELD, 9.0, 9.0) for of in (("implicit", 64), ("rk4", 128))}
-    runs |= {(HELD.name, "rk4", 64): run_of(HELD, 0.25, np.nan)}
-    runs |= {(FREE.name, "rk4", 64): run_of(FREE) | {"tmt": [path], "mujoco": [path + 100.0]}}
-    result = Result("trajectory", curves={"runs": runs})
+    q = tmt.simulate(*FREE.start, FREE.tau, 5 / 64, 64, "rk4", FREE.tree).q
+    others = [run_of(HELD, 9.0, 9.0, scheme="implicit"), run_of(HELD, 9.0, 9.0, steps=128)]
+    free, held = run_of(FREE), run_of(HELD, 0.25, np.nan)
+    free = replace(free, paths={"tmt": Path(q, q), "mujoco": Path(q + 100.0, q)})
+    result = TrajectoryResult("trajectory", runs=[*others, free, held])
     true_motion.find_errors(result, ARM, {FREE.name: reference(FREE)})
-    assert list(result.curves["errors"]) == [HELD.name, FREE.name]
-    assert result.curves["errors"][HELD.name] == (0.25, None)
+    assert list(result.errors) == [HELD.name, FREE.name] and result.errors[HELD.name] == (0.25, None)
     assert [scene["far"] for scene in result.notes[0].values["scenes"]] == [False, False]
-    ours, theirs = result.curves["errors"][FREE.name]
+    ours, theirs = result.errors[FREE.name]
     assert ours == pytest.approx(0.27, rel=0.03) and theirs > 90.0
 
 
 @pytest.mark.parametrize("error, far", [(0.49, False), (0.51, True), (None, False)])
 def test_an_error_of_more_than_a_hundred_times_the_difference_is_far(error, far):
     assert true_motion.is_far((0.1, error), 0.005) is far
-    curve = run_of(HELD, 0.25, 0.26, until=2.5)
-    assert true_motion.difference_while_judged(curve, HELD) == pytest.approx(0.005)
+    run = run_of(HELD, 0.25, 0.26, until=2.5)
+    assert true_motion.difference_while_judged(run) == pytest.approx(0.005)
 
 
 @BY_ENGINE
@@ -170,24 +171,23 @@ def with_gravity(gravity) -> dict:
 def test_drift_is_measured_where_nothing_takes_energy_and_an_engine_that_does_not_drift_is_seen(engines):
     """Without gravity MuJoCo's arm stays where it is let go, and TMT's falls."""
     scenes = tuple(CASES[name].scene for name in ("bent, free", "bent, damped", "bent, held"))
-    robot = dataclasses.replace(ARM, scenes=scenes)
+    robot = replace(ARM, scenes=scenes)
     result = energy.measure_energy(robot, engines | with_gravity("0 0 0"), {1: (32, 64), 4: (32, 64)})
-    drifts = {(row["integrator"], row["engine"]): row["drift_J"] for row in result.tables["energy"]}
-    assert {row["scene"] for row in result.tables["energy"]} == {"bent, free"} and len(drifts) == 6
+    drifts = {(row.integrator, row.engine): row.drift for row in result.tables["energy"]}
+    assert {row.scene for row in result.tables["energy"]} == {"bent, free"} and len(drifts) == 6
     assert drifts["RK4", "mujoco"] == 0.0 < drifts["RK4", "tmt"]
     assert not any(check.passed for check in result.checks if ", MuJoCo" in check.scene)
 
 
 def test_a_torque_that_does_not_hold_is_not_rounding(engines):
-    left, farthest = {"tmt": None, "mujoco": 0.1}, {"tmt": 0.0, "mujoco": 2.0}
-    others = {}, with_gravity("0 0 -1.62")
-    earth, moon = (true_motion.departures(HELD, engines | other, left, farthest) for other in others)
+    run, others = run_of(HELD, 0.0, 2.0, left=(None, 0.1)), ({}, with_gravity("0 0 -1.62"))
+    earth, moon = (true_motion.departures(run, engines | other) for other in others)
     pushes = [[engine["push"] for engine in of["engines"]] for of in (earth, moon)]
     assert max(pushes[0]) <= earth["allowed"] < 1e-11
     q, left_over = HELD.q, 1.0 - 1.62 / 9.81
     falls = np.abs(np.linalg.solve(tmt.mass_matrix(q), left_over * tmt.gravity_balance(q)))
     assert pushes[1][0] <= moon["allowed"] and np.isclose(pushes[1][1], falls, rtol=1e-9).any()
-    assert [[engine["holds"] for engine in of["engines"]] for of in (earth, moon)] == [
-        [True, True],
-        [True, False],
-    ]
+    holds = [[engine["holds"] for engine in of["engines"]] for of in (earth, moon)]
+    assert holds == [[True, True], [True, False]]
+    said = [(engine["left"], engine["farthest"]) for engine in earth["engines"]]
+    assert said == [(None, 0.0), (0.1, pytest.approx(2.0))]

@@ -1,18 +1,21 @@
 """A scene followed by both engines: each level by its own bound, what is kept, and in figures whose number stands where."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from edited import MOON, XML
 from models import chain, random_tree
-from trajectory_curves import CASES, DAMPED, FREE, HELD, run_of
+from trajectory_curves import DAMPED, FREE, HELD, run_of
 
 import tmt
-from compare.core.check import Result
 from compare.engines.mujoco import parse, reading
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
 from compare.experiments import trajectory
 from compare.experiments.trajectory import figures_runs, runs
+from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.run import diverged_at
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
@@ -20,15 +23,15 @@ from compare.robots.file import robot_of
 LEVELS = {f"{level}, TMT to MuJoCo" for level in ("one step", "open loop")}
 
 
-def side(case) -> runs.TmtSide:
+def side(case) -> runs.Ours:
     """TMT's side of a case by RK4 with its own steps."""
-    return runs.tmt_side(case, Tmt().of(case), case.steps, "rk4")
+    return runs.run_of_ours(case, Tmt().of(case), case.steps, "rk4")
 
 
-def judged_with(mujoco, mine, case=DAMPED, result=None) -> dict:
+def judged_with(mujoco, mine) -> dict:
     """The checks of a run whose TMT side may be edited, by quantity."""
-    result = result or Result("trajectory")
-    runs.compare_runs(result, case, mujoco.of(case), case.steps, [METHODS["RK4"]], mine)
+    result = TrajectoryResult("trajectory")
+    runs.compare_run(result, mine, mujoco.of(mine.run.case), METHODS["RK4"])
     return {check.quantity: check for check in result.checks}
 
 
@@ -39,7 +42,7 @@ def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco):
     checks = judged_with(mujoco, damped)
     used = checks[name].over_tolerance
     assert all(check.passed for check in checks.values()) and 1e-5 < used < 1.0
-    assert checks[name].tolerance in getattr(damped, field) and np.array_equal(damped.at, damped.t)
+    assert checks[name].tolerance in getattr(damped, field) and np.array_equal(damped.at, damped.run.t)
     for more, passes in ((1.01, True), (0.99, False)):
         tight = judged_with(mujoco, damped._replace(**{field: more * used * getattr(damped, field)}))
         assert {quantity for quantity, check in tight.items() if not check.passed} == (
@@ -49,10 +52,12 @@ def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco):
 
 def test_an_open_loop_is_judged_up_to_its_last_state(mujoco):
     damped = side(DAMPED)
-    q, name = damped.q.copy(), "open loop, TMT to MuJoCo"
+    path, name = damped.run.paths["tmt"], "open loop, TMT to MuJoCo"
     for share, passes in ((0.9, True), (1.1, False)):
-        q[-1] = damped.q[-1] + share * damped.width[-1, :3]
-        assert judged_with(mujoco, damped._replace(q=q))[name].passed is passes
+        q = path.q.copy()
+        q[-1] += share * damped.width[-1, :3]
+        edited = damped._replace(run=replace(damped.run, paths={"tmt": path._replace(q=q)}))
+        assert judged_with(mujoco, edited)[name].passed is passes
 
 
 def test_a_step_whose_bound_is_wider_than_what_moves_is_not_judged(mujoco):
@@ -67,11 +72,12 @@ def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
     """Half a turn in 1/64 s is 201 rad/s."""
     case = DAMPED.changed(speed=(np.degrees(rate), 0.0, 0.0), duration=1.0, dt=1 / 64, judged=0.0)
     mine = side(case)
-    alive = mine.t < (np.inf if mine.ended is None else mine.ended)
-    following = np.append(np.abs(mine.v[1:]).max(axis=1), 0.0)  # within each step: at its end
-    slow = np.maximum(np.abs(mine.v).max(axis=1), following)[alive] / 64 <= np.pi
-    assert np.array_equal(mine.at, mine.t[alive][slow]) and slow[0] == (rate < 201.1)
-    assert ("one step, TMT to MuJoCo" in judged_with(mujoco, mine, case)) == slow.any()
+    path = mine.run.paths["tmt"]
+    alive, v = mine.run.t < (np.inf if path.ended is None else path.ended), np.abs(path.v)
+    following = np.append(v[1:].max(axis=1), 0.0)  # within each step: at its end
+    slow = np.maximum(v.max(axis=1), following)[alive] / 64 <= np.pi
+    assert np.array_equal(mine.at, mine.run.t[alive][slow]) and slow[0] == (rate < 201.1)
+    assert ("one step, TMT to MuJoCo" in judged_with(mujoco, mine)) == slow.any()
 
 
 def test_a_step_that_ends_faster_than_half_a_turn_is_not_compared_alone(mujoco):
@@ -79,41 +85,41 @@ def test_a_step_that_ends_faster_than_half_a_turn_is_not_compared_alone(mujoco):
     far = FREE.changed(duration=20.0, dt=10.0, judged=0.0, tags=("own",))
     mine = side(far)
     assert 0.0 not in mine.at and 0.0 in side(FREE).at
-    assert [name for name, check in judged_with(mujoco, mine, far).items() if not check.judged] == [
-        "open loop"
-    ]
+    assert [name for name, check in judged_with(mujoco, mine).items() if not check.judged] == ["open loop"]
 
 
 @pytest.mark.parametrize("judged, passes", [(3.04, True), (3.05, False)])
 def test_the_time_that_is_judged_is_at_least_what_the_scene_asks_for(judged, passes, mujoco):
     case = HELD.changed(judged=judged)
-    checks = judged_with(mujoco, side(case), case)
+    checks = judged_with(mujoco, side(case))
     of_time = checks["time judged"]
     assert (of_time.value, of_time.passed, of_time.judged) == (3.046875 if passes else None, passes, passes)
 
 
 def test_of_a_users_own_scene_nothing_is_expected_but_agreement(mujoco):
     case = DAMPED.changed(judged=0.0, damping=0.0, tags=("own",))
-    assert judged_with(mujoco, side(case), case).keys() == LEVELS
-    assert judged_with(mujoco, side(FREE), FREE).keys() == LEVELS | {"time judged", "movement"}
+    assert judged_with(mujoco, side(case)).keys() == LEVELS
+    assert judged_with(mujoco, side(FREE)).keys() == LEVELS | {"time judged", "movement"}
 
 
 def test_a_free_run_of_which_one_side_stays_tests_nothing():
     still = parse(XML.replace("0 0 -9.81", "0 0 0"), tmt.ARM)
-    assert judged_with(still, side(FREE), FREE)["movement"].value == 0.0
+    assert judged_with(still, side(FREE))["movement"].value == 0.0
 
 
 def test_what_is_kept_of_a_run_is_whose_it_says():
     moon = parse(MOON, tmt.ARM)
-    mine, result = side(HELD), Result("trajectory")
-    judged_with(moon, mine, HELD, result)
-    (kept,) = result.curves.values()
-    t, *theirs = moon.of(HELD).run(*HELD.start, HELD.tau, 5 / 64, 64, "RK4")[:3]
-    assert all(np.array_equal(a, b) for a, b in zip(kept["tmt"], (mine.q, mine.v)))
-    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(kept["mujoco"], theirs))
-    assert kept["left"] == {"tmt": None, "mujoco": 5 / 64} and kept["ended"]["tmt"] is None
-    assert kept["ended"]["mujoco"] == diverged_at(HELD, t, *theirs)
-    assert {row["diverged_at_s"] for row in result.rows} == {kept["ended"]["mujoco"]}
+    mine, result = side(HELD), TrajectoryResult("trajectory")
+    run = runs.compare_run(result, mine, moon.of(HELD), METHODS["RK4"])
+    motion = moon.of(HELD).run(*HELD.start, HELD.tau, 5 / 64, 64, "RK4")
+    (ours, theirs), ended = run.paths.values(), diverged_at(HELD, motion.t, motion.q, motion.v)
+    assert [*run.paths] == ["tmt", "mujoco"] and ours is mine.run.paths["tmt"]
+    assert (ours.ended, ours.left) == (None, None)
+    assert np.array_equal(theirs.q, motion.q, equal_nan=True) and np.array_equal(
+        theirs.v, motion.v, equal_nan=True
+    )
+    assert (theirs.ended, theirs.left) == (ended, 5 / 64)
+    assert {row.diverged_at for row in result.rows} == {ended}
 
 
 def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the_scene_itself_has():
@@ -121,27 +127,17 @@ def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the
     long = robot_of(reading.read(chain(40)), "chain.xml")
     case = long.case("c", duration=1.0, dt=1 / 512)
     coarse, fine = FREE, FREE.changed(dt=5 / 8193)
-    assert runs.step_counts(coarse, (1, 16, 128)) == [64, 1024, 8192] and runs.step_counts(fine, (1, 2)) == [
-        8193
-    ]
+    assert runs.step_counts(coarse, (1, 16, 128)) == [64, 1024, 8192]
+    assert runs.step_counts(fine, (1, 2)) == [8193]
     assert runs.steps_afforded(case) == 2_700_000 // 6400 and runs.step_counts(case, (1, 2)) == [512]
-    assert [runs.recorded(FREE.changed(duration=n / 64, dt=1 / 64)) for n in (5, 65, 130, 512)] == [
-        5,
-        65,
-        65,
-        64,
-    ]
-
-
-def result_of(curve, **curves) -> Result:
-    """With this curve of the held scene, for each scheme."""
-    runs = {(HELD.name, scheme, 64): curve for scheme in ("rk4", "implicit", "semi_implicit_euler")}
-    return Result("trajectory", curves={"runs": runs, "errors": {HELD.name: (0.1, 0.2)}} | curves)
+    counts = [runs.recorded(FREE.changed(duration=n / 64, dt=1 / 64)) for n in (5, 65, 130, 512)]
+    assert counts == [5, 65, 65, 64]
 
 
 def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
-    curve = run_of(HELD, 0.1, 0.2, until=2.5, left=(None, 4.0))
-    result = result_of(curve)
+    schemes = "rk4", "implicit", "discrete"
+    found = [run_of(HELD, 0.1, 0.2, (None, 4.0), scheme=scheme, until=2.5) for scheme in schemes]
+    result = TrajectoryResult("trajectory", runs=found, errors={HELD.name: (0.1, 0.2)})
     caption = figures_runs.draw_held(result, HELD, 2)[2].values
     engines = [{"label": "TMT", "left": None, "error": 0.1}, {"label": "MuJoCo", "left": 4.0, "error": 0.2}]
     assert caption["engines"] == engines and (caption["judged"], caption["apart"]) == (
@@ -149,20 +145,20 @@ def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
         pytest.approx(0.05),
     )
 
-    about = {"scene": HELD.name, "level": "open loop", "engine_integrator": "RK4", "dt_s": 5 / 64}
-    ends = ((None, 0.25), (0.0, None), (None, 0.125))
-    result.rows = [about | {"diverged_at_s": at, "difference_over_band": used} for at, used in ends]
+    about = {"scene": HELD.name, "level": "open loop"}
+    result.rows = [SimpleNamespace(**about, difference_over_band=used) for used in (0.25, None, 0.125)]
     _, fig, caption = figures_runs.draw_run(result, HELD)
     assert caption.values["errors"] == {"TMT": 0.1, "MuJoCo": 0.2} and caption.values["share"] == 0.25
     assert {at for _, at in caption.values["judged"]} == {2.5}
-    for ax, k in ((fig.axes[0], 0), (fig.axes[3], 1)):  # angles and rates of the first scheme
-        assert np.array_equal(ax.lines[0].get_ydata(), curve["tmt"][k][:, 0])
-        assert np.array_equal(ax.lines[1].get_ydata(), curve["mujoco"][k][::3, 0])
+    paths = found[0].paths
+    for ax, name in ((fig.axes[0], "q"), (fig.axes[3], "v")):  # angles and rates of the first scheme
+        ours, theirs = (getattr(paths[engine], name)[:, 0] for engine in ("tmt", "mujoco"))
+        assert np.array_equal(ax.lines[0].get_ydata(), ours)
+        assert np.array_equal(ax.lines[1].get_ydata(), theirs[::3])
 
 
 def test_which_figures_there_are_follows_what_was_run():
-    runs = {(case.name, "rk4", 64): run_of(case) for case in (CASES["bent, free"], HELD)}
-    result = result_of(None, runs=runs, drawn=[])
+    result = TrajectoryResult("trajectory", runs=[run_of(FREE), run_of(HELD)], errors={HELD.name: (0.1, 0.2)})
     names = ["assignment_figure_2", "trajectory_ball_catch_held", "trajectory_bent_free"]
     assert sorted(call()[0] for call in trajectory.figures(result, ARM)) == names
 
@@ -172,12 +168,10 @@ def test_a_ball_is_drawn_by_its_turn_from_the_start():
     case = robot_of(reading.read(random_tree(2, joints=5)), "kinds.xml").case("c")
     turns = np.array([0.0, 0.1, 1.75, 1.85])
     q = case.coordinates.move(case.q, turns[:, None] * np.ones(case.coordinates.nv))
-    values = figures_runs.drawable(case, q)
+    values = figures_runs.drawable(case, "q", q)
     for joint in case.coordinates.places.joints:
         if joint.kind == "ball":
-            assert (
-                values[:3, joint.qd] == pytest.approx(turns[:3, None] * np.ones(3))
-                and np.isnan(values[3, joint.qd]).all()
-            )
+            assert values[:3, joint.qd] == pytest.approx(turns[:3, None] * np.ones(3))
+            assert np.isnan(values[3, joint.qd]).all()
         else:
             assert values[:, joint.qd] == pytest.approx(q[:, joint.q])

@@ -6,24 +6,22 @@ from models import PATHS, chain
 from PIL import Image
 from trajectory_curves import CASES
 
-from compare.core.check import Result
 from compare.engines.mujoco import reading
 from compare.experiments.trajectory import figures_motion_gif as gif
 from compare.experiments.trajectory import motion
-from compare.experiments.trajectory.runs import follow
+from compare.experiments.trajectory.runs import Path, TrajectoryResult, follow
 from compare.robots.arm import landmarks
 from compare.robots.file import robot_of
 from compare.robots.stick import as_seen, stick_figure
 
 CATCH = CASES["ball catch, free"]  # in which a method of order 1 diverges
 BLUE, ORANGE = (0, 114, 178), (230, 159, 0)
-METHOD = {"tmt": "rk4", "mujoco": "RK4"}
 
 
 @pytest.fixture(scope="module")
 def runs(engines):
     """Of a scene by its own steps and finer ones."""
-    return follow(CATCH, engines, (1, 4)).curves
+    return follow(CATCH, engines, (1, 4)).runs
 
 
 def seen(path) -> np.ndarray:
@@ -32,27 +30,34 @@ def seen(path) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def drawn(runs):
-    return motion.drawn_motion(CATCH, runs)
+    return motion.pictures_of(CATCH, runs)
+
+
+def by_rk4(runs, steps):
+    return next(run for run in runs if (run.scheme, run.steps) == ("rk4", steps))
 
 
 def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_of_it(drawn, runs):
-    curve = runs[CATCH.name, "rk4", 256]
-    np.testing.assert_array_equal(drawn.t, curve["t"][::2])
-    for name in METHOD:
-        np.testing.assert_allclose(drawn.points[name], seen(curve[name][0][::2]), atol=1e-15)
-    np.testing.assert_array_equal(drawn.apart, np.abs(curve["tmt"][0] - curve["mujoco"][0]).max(axis=1)[::2])
+    run = by_rk4(runs, 256)
+    np.testing.assert_array_equal(drawn.t, run.t[::2])
+    for name, path in run.paths.items():
+        np.testing.assert_allclose(drawn.points[name], seen(path.q[::2]), atol=1e-15)
+    apart = np.abs(run.paths["tmt"].q - run.paths["mujoco"].q).max(axis=1)
+    np.testing.assert_array_equal(drawn.apart, apart[::2])
 
 
 def test_between_steps_a_run_is_interpolated_until_it_has_diverged(runs):
-    coarse = runs[CATCH.name, "rk4", 64]
+    coarse = by_rk4(runs, 64)
+    path = coarse.paths["tmt"]
     for ended, last in ((None, 5.0), (2.5, 2.5 - 5 / 64), (5 / 64, 0.0)):
-        times, q = motion.frames(CATCH, coarse["t"], *coarse["tmt"], ended)
+        times, q = motion.frames(CATCH, coarse.t, path._replace(ended=ended))
         np.testing.assert_allclose(times, np.linspace(0.0, 5.0, 129))
         assert (np.isfinite(q).all(axis=1) == (times <= last)).all()
         alive = times[::2] <= last
-        np.testing.assert_allclose(q[::2][alive], coarse["tmt"][0][alive])
+        np.testing.assert_allclose(q[::2][alive], path.q[alive])
     t = np.linspace(0.0, 5.0, 65)  # a cubic is itself
-    times, q = motion.frames(CATCH, t, t[:, None] ** [1, 2, 3], [1, 2, 3] * t[:, None] ** [0, 1, 2], None)
+    cubic = Path(t[:, None] ** [1, 2, 3], [1, 2, 3] * t[:, None] ** [0, 1, 2])
+    times, q = motion.frames(CATCH, t, cubic)
     np.testing.assert_allclose(q, times[:, None] ** [1, 2, 3], atol=1e-12)
 
 
@@ -82,7 +87,7 @@ def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(drawn, tmp_
     )
     points = {"tmt": np.stack([left] * 3), "mujoco": np.stack([right, left, np.nan * right])}
     scene = drawn._replace(t=drawn.t[:3], apart=drawn.apart[:3], points=points)
-    name, figure, _ = gif.draw_motion(Result("trajectory", curves={"drawn": [scene]}))
+    name, figure, _ = gif.draw_motion(TrajectoryResult("trajectory", pictures=[scene]))
     figure.savefig(tmp_path / f"{name}{figure.suffix}")
     found = []
     with Image.open(tmp_path / "motion.gif") as image:

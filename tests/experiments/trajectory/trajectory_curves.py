@@ -1,19 +1,23 @@
-"""The scenes by name, and curves of runs whose numbers a test chooses. Used by all tests of this folder."""
+"""The scenes by name, and runs whose numbers a test chooses. Used by all tests of this folder."""
 
 import numpy as np
 
+from compare.experiments.trajectory.runs import Path, Run
 from compare.robots.arm import ARM
 
 CASES = {case.name: case for case in ARM.cases}
 FREE, HELD, DAMPED = (CASES[name] for name in ("bent, free", "ball catch, held", "bent, damped"))
 
 
-def run_of(case, ours=0.0, theirs=0.0, until=5.0, left=(None, None)) -> dict:
-    """The curves of a run of 64 steps whose angles end so far from where they started."""
-    t = np.linspace(0.0, 5.0, 65)
+def run_of(
+    case, ours=0.0, theirs=0.0, left=(None, None), ended=(None, None), scheme="rk4", steps=64, until=5.0
+) -> Run:
+    """A run of 64 steps by RK4 whose angles end so far from where they started, or one that is said to be another."""
     ramp = np.linspace(0.0, 1.0, 65)[:, None] * np.ones(len(case.joints))
-    return {
-        "integrator": "RK4", "t": t, "every": 1, "tmt": [case.q + ours * ramp, 10.0 + ours * ramp],
-        "mujoco": [case.q + theirs * ramp, 20.0 + theirs * ramp], "band": np.full(65, 1e-9),
-        "judged_until_s": until, "ended": {"tmt": None, "mujoco": None}, "left": dict(zip(("tmt", "mujoco"), left)),
-    }  # fmt: skip
+    paths = {
+        engine: Path(case.q + end * ramp, speed + end * ramp, *of_engine)
+        for engine, end, speed, of_engine in zip(
+            ("tmt", "mujoco"), (ours, theirs), (10.0, 20.0), zip(ended, left)
+        )
+    }
+    return Run(case, scheme, steps, np.linspace(0.0, 5.0, 65), paths, np.full(65, 1e-9), "RK4", until)

@@ -1,0 +1,74 @@
+"""Runs of a method along a scene, timed and measured against the reference of the scene; the difference of two runs."""
+
+import time
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.check import Check, Result
+from ..engines import Dynamics, Method, Motion, Setting
+from ..judge.agree import closest
+from ..robots.case import Case, Coordinates
+from ..truth.reference import Reference
+
+States = Sequence[np.ndarray]  # q and v
+EARLY = 1.0  # s: until then chaos has not grown, and errors fall regularly
+REGULAR = 3e-2  # rad: a smaller error up to EARLY falls with the order of the method
+
+
+class Followed(NamedTuple):
+    """A run at the start and at 64 equal times."""
+
+    motion: Motion
+    seconds: float  # the least of its times
+    error: np.ndarray  # (65,) rad or m: the largest of all joints
+    early: float  # rad or m: the largest error up to EARLY
+
+
+def follow(
+    dynamics: Dynamics,
+    case: Case,
+    method: Method,
+    setting: Setting,
+    reference: Reference,
+    repeat: float = 0.0,
+) -> Followed:
+    """The run of a method with a setting; it is timed up to 5 times, as long as these take less than `repeat` s together."""
+    run, read = dynamics.prepare(*case.start, case.tau, setting, method.name)
+    times: list[float] = []
+    with np.errstate(all="ignore"):  # in a run that diverges
+        while not times or (len(times) < 5 and sum(times) < repeat):
+            begin = time.perf_counter()
+            outcome = run()
+            seconds = time.perf_counter() - begin
+            motion = read(outcome)
+            times.append(seconds if motion.seconds is None else motion.seconds)
+        error = reference.error(motion.q)
+    return Followed(motion, min(times), error, float(error[reference.t <= EARLY].max()))
+
+
+class Deviation(NamedTuple):
+    """The difference of two runs at some times, movements first and then speeds, and how large it may be."""
+
+    coordinates: Coordinates
+    times: np.ndarray  # (times,) s
+    difference: np.ndarray  # (times, 2 nv) rad or m, then per s
+    tolerance: np.ndarray  # (times, 2 nv)
+
+
+def differences(coordinates: Coordinates, states: States, others: States) -> np.ndarray:
+    """The absolute differences of two runs, each q (times, nq) and v (times, nv), movements first: (times, 2 nv)."""
+    movements = coordinates.difference(states[0], others[0])
+    return np.abs(np.concatenate([movements, states[1] - others[1]], axis=-1))
+
+
+def check_closest(result: Result, where: str, quantity: str, deviation: Deviation) -> Check:
+    """A check of the component and the time that come closest to their tolerance, which its note names."""
+    coordinates, times, difference, tolerance = deviation
+    k, i = closest(difference, tolerance)
+    unit, joint = coordinates.units[i % coordinates.nv], coordinates.speeds[i % coordinates.nv]
+    if i >= coordinates.nv:
+        unit = f"{unit}/s"
+    place = f"{joint} at t = {times[k]:.3f} s"
+    return result.check(where, quantity, difference[k, i], tolerance[k, i], unit, place, True)

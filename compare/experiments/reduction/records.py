@@ -1,0 +1,79 @@
+"""What reduction finds: rows of its tables, what each scene needs, and swings that are known exactly."""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.check import Result
+from ...core.rows import MOVEMENT, MovementRow, Row, column
+from ...robots.case import Case
+
+
+@dataclass(kw_only=True)
+class ReductionRow(MovementRow):
+    """The time of an RK4 step of a model in an engine."""
+
+    scene: str
+    hinges: str = column(names=True)
+    engine: str
+    nv: int
+    operations: int | None
+    ns_per_step: float | None
+    speedup: float | None  # relative to the whole model
+    max_difference: float | None = column(MOVEMENT)  # from the whole model
+    integrator: str = "RK4"
+
+
+@dataclass
+class NeedRow(Row):
+    scene: str
+    joint: str
+    why_needed: str
+
+
+@dataclass(kw_only=True)
+class SubsetRow(Row):
+    """Blocks of Mbar or of the bias with joints locked."""
+
+    locked: str = column(names=True)
+    quantity: str
+    parties: str
+    states: int
+    largest_difference: float | None
+    unit: str
+    difference_over_bar: float | None
+
+    @property
+    def urgency(self) -> tuple[bool, bool, float]:
+        share = self.difference_over_bar
+        return True, True, math.inf if share is None else -share
+
+
+class Need(NamedTuple):
+    """The joints of a scene."""
+
+    needed: tuple[str, ...]
+    locked: tuple[str, ...]  # as the scene says
+    stays: tuple[str, ...]  # those that can be locked
+    undecided: tuple[str, ...]
+
+
+class Swing(NamedTuple):
+    dt: np.ndarray  # s
+    errors: dict[str, list[float]]  # of each engine, rad
+    orders: dict[str, float]
+
+
+class Model(NamedTuple):
+    scene: str
+    case: Case | None  # None: nothing moves
+
+
+@dataclass
+class ReductionResult(Result):
+    models: list[Model] | None = None  # that are timed; None: no joint can be locked
+    needs: dict[str, Need] = field(default_factory=dict)  # by scene
+    apart: dict[tuple[str, str], float] = field(default_factory=dict)  # by scene and engine, rad or m
+    swings: dict[str, Swing] = field(default_factory=dict)  # by scene
