@@ -5,7 +5,7 @@ from numpy import ndarray
 
 from tmt import Tree
 from tmt.methods import METHODS
-from tmt.methods.derivatives import FEW_SPEEDS, amplification, has_residual, linear_system
+from tmt.methods.derivatives import Differentiated, amplification
 from tmt.methods.stepping import Method, stepped
 
 from .entries import Entries
@@ -30,13 +30,9 @@ def slope_rounding(
     Of `discrete` with servos it has the force that MuJoCo leaves out, where the force is as small as that, or nearly so.
     """
     shape = q.shape[:1]
-    if len(tree.axis) > FEW_SPEEDS and has_residual(stepping):
-        A, right = linear_system(stepping, tree, list(q.T), list(qd.T), tau, dt)
-        a = list(np.linalg.solve(A, right[..., None])[..., 0].T)
-    else:
-        a = stepping.slope(tree, list(q.T), list(qd.T), tau, dt)
-        rows = stepping.matrix(tree, list(q.T), list(qd.T), dt)
-        A = np.array([[np.broadcast_to(entry, shape) for entry in row] for row in rows]).transpose(2, 0, 1)
+    dynamics = Differentiated()
+    a = stepping.slope(tree, list(q.T), list(qd.T), tau, dt, dynamics)
+    A, _ = dynamics.system
     size = np.stack([np.broadcast_to(np.abs(component), shape) for component in a], axis=-1)
     force = motion_scale(tree, q, qd) + Entries(tree, q).force(tau) + np.array(tree.damping) * np.abs(qd)
     if tree.has_gains:

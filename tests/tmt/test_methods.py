@@ -157,9 +157,11 @@ def test_which_gains_are_implicit(name, speed, position):
     matrix = tmt.mass_matrix(q, FORK) + dt * (np.diag(FORK.damping) + bias + speed) + dt**2 * (k + position)
     force = tau - P @ q - S @ qd - tmt.bias(q, qd, FORK) - FORK.damping * qd - tmt.spring_torque(q, FORK)
     force -= dt * (k + position) @ qd
-    found = derivatives.linear_system(stepping, DRIVEN, list(q[:, None]), list(qd[:, None]), list(tau), dt)
-    assert np.allclose(found[0][0], matrix, atol=1e-13) and np.allclose(found[1][0], force, atol=1e-13)
-    assert np.allclose(stepping.matrix(DRIVEN, list(q), list(qd), dt), matrix, atol=1e-13)
+    dynamics = derivatives.Differentiated()
+    (a,) = np.array(stepping.slope(DRIVEN, list(q[:, None]), list(qd[:, None]), list(tau), dt, dynamics)).T
+    assert np.allclose(dynamics.system[0][0], matrix, atol=1e-13)
+    assert np.allclose(dynamics.system[1][0], force, atol=1e-13)
+    assert np.allclose(a, np.linalg.solve(matrix, force), atol=1e-11)
     slope = stepping.slope(DRIVEN, list(q), list(qd), list(tau), dt)
     assert np.allclose(slope, np.linalg.solve(matrix, force), atol=1e-11)
 
