@@ -1,12 +1,13 @@
 """What one evaluation of the dynamics costs: MuJoCo's calls, and the ways of tmt."""
 
+import ctypes
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 import tmt
-from tmt.compiled import evaluator, runner
+from tmt.compiled import evaluator, runner_of
 from tmt.compiled.cores import cores
 
 from ...core import timing
@@ -64,34 +65,67 @@ def repeated(call: Callable[[], object]) -> Callable[[int], None]:
 def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> dict[tuple, Callable]:
     """Loops of tmt at one state."""
     q, qd, tau = state
+    out = np.empty(len(qd))
     tmt.prepare(tree)
-    run, chain = runner(tree, "rk4"), evaluator(tree, "acceleration").chain
+    run, chain = runner_of(tree, "rk4").follow, chained(tree)
     most = min(MOST_CALLS, MOST_NUMBERS // len(tree.axis))
     paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
     paths[0][0, 0], paths[1][0, 0] = q, qd
 
     def steps(count):
-        run(*(path[:, : min(count, most) + 1].copy() for path in paths), tau[None], 1e-4)
+        run(*(path[:, : min(count, most) + 1].copy() for path in paths), tau[None], 1e-4, 0.0, 1)
 
     return {
         (FORWARD, CALLED, 1, 1): repeated(lambda: tmt.acceleration(q, qd, tau, tree)),
-        (FORWARD, WAITING, 1, 1): lambda count: chain(q, qd, tau, count),
+        (FORWARD, WAITING, 1, 1): lambda count: chain(
+            *(part.ctypes.data for part in (q, qd, tau, out)), count
+        ),
         (RK4_STEP, EACH, 1, 1): steps,
     }
+
+
+CHAIN = """
+define void @chain(ptr %q, ptr %qd, ptr %tau, ptr %out, i64 %count) {
+entry:
+  br label %body
+body:
+  %i = phi i64 [0, %entry], [%next, %body]
+  %last = phi i64 [0, %entry], [%wrong, %body]
+  %q.i = getelementptr double, ptr %q, i64 %last
+  %qd.i = getelementptr double, ptr %qd, i64 %last
+  %tau.i = getelementptr double, ptr %tau, i64 %last
+  %wrong = call i64 @one(ptr %q.i, ptr %qd.i, ptr %tau.i, ptr %out)
+  %next = add i64 %i, 1
+  %more = icmp slt i64 %next, %count
+  br i1 %more, label %body, label %done
+done:
+  ret void
+}
+"""
+
+
+def chained(tree: tmt.Tree) -> Callable[..., None]:
+    """chain(q, qd, tau, out, count): the accelerations at one state again and again, where each call waits for the last.
+
+    It reads the state from the address that is given plus `wrong` of the last call, which is 0 but known only at its end.
+    """
+    from tmt.compiled import entries, machine  # loads the compiler
+
+    library = machine.Library(entries.source(tree, "acceleration", 1) + CHAIN)
+    return library.function("chain", None, *[ctypes.c_void_p] * 4, ctypes.c_int64)
 
 
 def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray]) -> dict[tuple, Callable]:
     """Loops of tmt over many states, (N, nq and nv)."""
     q, qd, tau = (np.ascontiguousarray(a) for a in states)
-    count, run, compiled = len(qd), runner(tree, "rk4"), evaluator(tree, "acceleration")
-    out = np.ones((count, compiled.size))
-    wide = [np.ascontiguousarray(a.T) for a in (q, qd, tau, out)]
+    count, run, compiled = len(qd), runner_of(tree, "rk4").follow, evaluator(tree, "acceleration")
+    out = np.empty((count, compiled.size))
     paths = [np.stack([part, part], axis=1) for part in (q, qd)]
     return {
-        (FORWARD, EACH, count, 1): repeated(lambda: compiled.each(q, qd, tau, out)),
-        (FORWARD, IN_LANES, count, 1): repeated(lambda: compiled.lanes(*wide)),
+        (FORWARD, EACH, count, 1): repeated(lambda: compiled.fill(False, out, q, qd, tau)),
+        (FORWARD, IN_LANES, count, 1): repeated(lambda: compiled.fill(True, out, q, qd, tau)),
         (FORWARD, CALLED, count, cores()): repeated(lambda: tmt.acceleration(q, qd, tau, tree)),
-        (RK4_STEP, IN_LANES, count, cores()): repeated(lambda: run(*paths, tau, 1e-3)),
+        (RK4_STEP, IN_LANES, count, cores()): repeated(lambda: run(*paths, tau, 1e-3, 0.0, 1)),
     }
 
 

@@ -17,7 +17,8 @@ from compare.experiments.trajectory.runs import follow
 from compare.judge.scale import EPS
 from compare.robots.case import Case, Scene
 from compare.robots.file import robot_of
-from tmt.compiled import Library, store
+from tmt.compiled import store
+from tmt.compiled.machine import Library
 from tmt.compiled.runner import known as compiled_runs
 from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler, semi_implicit
 
