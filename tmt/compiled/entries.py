@@ -51,7 +51,7 @@ class Entries:
             square = sum((x * x for x in p[1:]), p[0] * p[0])
             for within in (square.compare("ge", SHORTEST), square.compare("le", LONGEST)):
                 right = right.bits("and", within)
-        return right.bits("xor", True)
+        return right.negated()
 
     def one(self) -> Code:
         """One state."""

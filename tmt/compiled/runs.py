@@ -175,7 +175,7 @@ class Step:
                     linear.put_directions(given, inputs + unknown, unknown, loop.index, width)
                     with code.when(is_linear):
                         code.call("linear_residual", given, found)
-                    with code.when(is_linear.bits("xor", True)):
+                    with code.when(is_linear.negated()):
                         code.call("residual", given, found)
                     with code.loop(each) as rows:
                         change = found.load((rows.index + unknown) * width, wide(DOUBLE, width))
@@ -193,11 +193,11 @@ class Step:
                         # not a number stays so
                         largest.set(value.compare("le", so_far).choose(so_far, value))
                 close = most.get().compare("le", CLOSE * (1.0 + size.get()))
-                close = close.bits("and", is_linear.bits("xor", True))
+                close = close.bits("and", is_linear.negated())
                 with code.when(close):
                     why.set(0)
                 iteration.leave(close)
-                iteration.leave(size.get().compare("lt", float("inf")).bits("xor", True))
+                iteration.leave(size.get().compare("lt", float("inf")).negated())
             with code.when(why.get().compare("eq", 0)):
                 for k in code.each(nq + n):
                     last.store(state.load(k), k)
@@ -266,9 +266,9 @@ def run(step: Step, advance: Callable) -> Code:
                         with code.when(ends.lane(l)):
                             info.store(why.lane(l), (runs.index + l) * 3)
                             info.store(records.index * code["every"] + steps.index, (runs.index + l) * 3 + 1)
-                    alive.set(alive.get().bits("and", ends.bits("xor", True)))
-                steps.leave(linear.any_of(alive.get(), width).bits("xor", True))
-            records.leave(linear.any_of(alive.get(), width).bits("xor", True))
+                    alive.set(alive.get().bits("and", ends.negated()))
+                steps.leave(linear.any_of(alive.get(), width).negated())
+            records.leave(linear.any_of(alive.get(), width).negated())
             for l in range(width):
                 for name, size, first in paths:
                     place = ((runs.index + l) * code["records"] + records.index + 1) * size
