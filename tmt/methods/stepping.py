@@ -78,15 +78,8 @@ def stepped(stepping: Method, tree: Tree, slope: Slope, q: Values, qd: Values, d
 
 
 OVERFLOW, TURNED, NEWTON, SMALL = 1, 2, 3, 4  # why a run ends; 0: it does not
-FIELDS = {
-    "adaptive": bool,
-    "solves_stages": bool,
-    "damps_implicitly": bool,
-    "lanes": bool,
-    "order": int,
-    "stages": int,
-}
-ACCEPTED = {bool: "True or False", int: "a whole number of at least 1"}
+FLAGS, COUNTS = ("adaptive", "solves_stages", "damps_implicitly", "lanes"), ("order", "stages")
+FIELDS = dict.fromkeys(FLAGS, "True or False") | dict.fromkeys(COUNTS, "a whole number of at least 1")
 ACTS = ("slope", "step")
 NEEDS = {"adaptive": ("attempt",), "solves_stages": ("stage_states", "finish")}
 EXPECTED = "a hashable method with a slope and a step is expected"
@@ -115,10 +108,11 @@ def _completed(stepping: object) -> Method:
     if not all(callable(getattr(stepping, act, None)) for act in ACTS):
         raise ValueError(EXPECTED)
     complete = stepping if isinstance(stepping, Method) else Completed(stepping)
-    for name, kind in FIELDS.items():
+    for name, accepted in FIELDS.items():
         value: Any = getattr(complete, name)
-        if type(value) is not kind or (kind is int and value < 1):
-            raise ValueError(f"its {name} is {shown(value)}, where {ACCEPTED[kind]} is expected")
+        is_right = isinstance(value, bool) if name in FLAGS else type(value) is int and value >= 1
+        if not is_right:
+            raise ValueError(f"its {name} is {shown(value)}, where {accepted} is expected")
     for name, parts in NEEDS.items():
         if lacking := [part for part in parts if getattr(complete, name) and not hasattr(complete, part)]:
             raise ValueError(f"its {name} is {getattr(complete, name)}, but it has no {lacking[0]}")
