@@ -6,7 +6,7 @@ given; whatever is, the literal form says.
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy import ndarray
@@ -31,21 +31,24 @@ def answered(quantity: str, model: Tree, *given: ArrayLike) -> Any:
 
     given: q, or q and qd, or q, qd and tau, as that function takes them.
     """
-    if answers := known.get(id(model)) or (answers_of(model) if isinstance(model, Tree) else None):
-        found = answers.of_one(quantity, given)
-        if found is None:
-            found = answers.of_any(quantity, given)
-        if found is not None:
-            return found
+    answers = known.get(id(model))
+    if answers is None and isinstance(model, Tree):
+        answers = answers_of(model)
+    result = answers.by_machine_code(quantity, given) if answers else None
+    if result is not None:
+        return result
     return getattr(literal, quantity)(*given, model)
 
 
 def answers_of(model: Tree) -> "Answers":
     """What is compiled of a model; of the prepared ones and the last others."""
-    others = [key for key, answers in list(known.items()) if not answers.ready]
-    for key in others if len(others) >= MOST else ():
-        known.pop(key, None)
-    return known.setdefault(id(model), Answers(model))
+    answers = known.get(id(model))
+    if answers is None:
+        others = [key for key, answers in list(known.items()) if not answers.prepared]
+        for key in others if len(others) >= MOST else ():
+            known.pop(key, None)
+        answers = known.setdefault(id(model), Answers(model))
+    return answers
 
 
 def prepare(model: Tree = ARM, *quantities: str) -> None:
@@ -76,64 +79,57 @@ def prepare(model: Tree = ARM, *quantities: str) -> None:
     if unknown := [name for name in quantities if not isinstance(name, str) or name not in QUANTITIES]:
         raise ValueError(f"{shown(unknown[0])} is no quantity; known are {', '.join(QUANTITIES)}")
     for quantity in quantities or QUANTITIES:
-        (known.get(id(model)) or answers_of(model)).get(quantity)
+        answers = answers_of(model)
+        answers.prepared[quantity] = answers.evaluators[quantity].one_state
 
 
 class Answers:
-    """The compiled quantities of a model, and those that are prepared."""
+    """What machine code answers of a model: large calls, and all of the quantities that are prepared."""
 
     def __init__(self, tree: Tree):
         self.tree = tree  # held, so that no other has its id
-        self.compiled = {name: Evaluator(tree, name) for name in QUANTITIES}
-        self.ready: dict[str, Callable[..., Any]] = {}  # of one state, those that are prepared
+        self.evaluators = {name: Evaluator(tree, name) for name in QUANTITIES}
+        self.prepared: dict[str, Callable[..., int]] = {}  # of one state, compiled or loaded by now
         self.shapes = [(tree.coordinates.nq,), (tree.coordinates.nv,), (tree.coordinates.nv,)]
         self.may_be_singular = not tree.never_singular
 
-    def get(self, quantity: str) -> None:
-        """Have machine code answer all calls."""
-        if quantity not in self.ready:
-            self.ready[quantity] = self.compiled[quantity].single()
-
-    def of_one(self, quantity: str, given: tuple[Any, ...]) -> Any:
-        """The quantity of one state that is given in plain arrays; None where nothing is compiled, or something is wrong."""
-        evaluate = self.ready.get(quantity)
-        if evaluate is None or (self.may_be_singular and quantity == "acceleration"):
-            return None
-        for array, shape in zip(given, self.shapes):
-            if type(array) is not ndarray or array.shape != shape or array.dtype is not DOUBLE:
-                return None
-        return evaluate(*given)
-
-    def of_any(self, quantity: str, given: tuple[Any, ...]) -> Any:
-        """The quantity of states of any batch shape; None where the literal form is to answer."""
+    def by_machine_code(self, quantity: str, given: tuple[ArrayLike, ...]) -> Any:
+        """The quantity of states; None where NumPy is to answer: of few states, and where something is wrong."""
+        evaluator, is_prepared = self.evaluators[quantity], quantity in self.prepared
+        may_be_singular = self.may_be_singular and quantity == "acceleration"
+        if is_prepared and not may_be_singular and self.is_state(given):
+            return evaluator.of_one(*given)
         with np.errstate(
             all="ignore"
         ):  # of numbers beyond the largest double, which the literal form refuses
-            found = [x if type(x) is ndarray and x.dtype is DOUBLE else real_numbers(x) for x in given]
-        arrays = [
-            x for x, shape in zip(found, self.shapes) if x is not None and x.ndim and x.shape[-1:] == shape
-        ]
-        if len(arrays) < len(given):
+            numbers = [x if type(x) is ndarray and x.dtype is DOUBLE else real_numbers(x) for x in given]
+        arrays = [x for x in numbers if x is not None]
+        if [array.shape[-1:] for array in arrays] != self.shapes[: len(given)]:
             return None
         try:
             batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
         except ValueError:
             return None
-        count, own = math.prod(batch), self.compiled[quantity]
-        if not count or (count <= SMALL and quantity not in self.ready):
+        count = math.prod(batch)
+        if count == 0 or (count <= SMALL and not is_prepared):
             return None
-        if quantity == "acceleration" and self.may_be_singular and self.is_singular(arrays[0]):
+        if may_be_singular and self.is_singular(arrays[0]):
             return None
-        if not batch:
-            return own.of_one(*arrays)
         try:
-            return own.of_any(*arrays)
+            return evaluator.of_any(*arrays) if batch else evaluator.of_one(*arrays)
         except MemoryError:
             return None
+
+    def is_state(self, given: tuple[ArrayLike, ...]) -> TypeGuard[tuple[ndarray, ...]]:
+        """Whether one state is given, in arrays of doubles: then nothing else has to be looked at."""
+        for array, shape in zip(given, self.shapes):  # no generator, which takes as long as the rest
+            if type(array) is not ndarray or array.shape != shape or array.dtype is not DOUBLE:
+                return False
+        return True
 
     def is_singular(self, q: ndarray) -> bool:
         """Whether Mbar may be singular at a position among these, or cannot be told here."""
         q = q.reshape(-1, q.shape[-1])
-        M = self.compiled["mass_matrix"].of_rows(np.ascontiguousarray(q))
+        M = self.evaluators["mass_matrix"].of_rows(np.ascontiguousarray(q))
         n = len(self.tree.axis)
         return M is None or bool(singular.first(self.tree, q, M.reshape(-1, n, n)))

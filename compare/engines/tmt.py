@@ -7,7 +7,7 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.compiled import prepared
+from tmt.compiled import runner_of
 from tmt.derivation.quantities import QUANTITIES
 from tmt.methods import method_named
 from tmt.model.singular import mass_matrices
@@ -90,18 +90,19 @@ class TmtDynamics:
         every, dt = setting.every, setting.duration / setting.steps
         paths = [np.full((1, setting.steps + 1, len(start)), np.nan) for start in (q, v)]
         paths[0][0, 0], paths[1][0, 0] = q, v
-        run, outcome = prepared(
-            self.tree, method, *paths, np.array(tau, float)[None], dt, setting.tolerance or 0.0
-        )
+        runner, info = runner_of(self.tree, method), np.zeros((1, 3), np.int64)
+        torque, tolerance = np.array(tau, float)[None], setting.tolerance or 0.0
+        arrays = *paths, torque, info
+        call = runner.call(1, arrays, dt, tolerance)
         t = np.linspace(0.0, setting.duration, GRID + 1)
 
         def read(_):
-            codes, evaluations = outcome()
-            (ended,) = reasons(self.tree, *paths, codes, dt, setting.tolerance or 0.0)
+            codes, evaluations = runner.outcome(*paths, info)
+            (ended,) = reasons(self.tree, *paths, codes, dt, tolerance)
             taken = evaluations // stepping.stages if stepping.adaptive else setting.steps
             return Motion(t, *(path[0, ::every].copy() for path in paths), evaluations, ended, taken)
 
-        return run, read
+        return lambda _=arrays: call(), read  # the arrays live as long as it
 
 
 class Compiled:

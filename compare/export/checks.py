@@ -133,7 +133,7 @@ def times(compared: Compared, program: Program | None, quantities: Sequence[str]
         calls[name, "c"] = program.call(name, *arrays)[0]
         compiled = evaluator(tree, name)
         out = np.empty((states, compiled.size))
-        calls[name, "tmt"] = lambda compiled=compiled, out=out: compiled.each(*arrays, out)
+        calls[name, "tmt"] = lambda compiled=compiled, out=out: compiled.fill(False, out, *arrays)
     if not MinimalCalls.unavailable():
         loops = MinimalCalls(compared.mujoco.of(compared.robot.case())).loops(*(x[0] for x in arrays))
         forward = loops["MuJoCo, mj_forward"][1]

@@ -5,7 +5,7 @@ from numpy import ndarray
 
 from tmt import Tree
 from tmt.methods import METHODS
-from tmt.methods.derivatives import amplification, linear_system
+from tmt.methods.derivatives import Differentiated, amplification
 from tmt.methods.stepping import Method, stepped
 
 from .entries import Entries
@@ -31,8 +31,10 @@ def slope_rounding(
     factorization, where A is Mbar. Of `discrete` with servos it has the force that MuJoCo leaves out, where
     the force is as small as that, or nearly so.
     """
-    A, total = linear_system(stepping, tree, list(q.T), list(qd.T), tau, dt)
-    a = np.linalg.solve(A, total[..., None])[..., 0]
+    dynamics = Differentiated()
+    slope = stepping.slope(tree, list(q.T), list(qd.T), tau, dt, dynamics)
+    a = np.stack([np.broadcast_to(component, q.shape[:1]) for component in slope], axis=-1)
+    A, total = dynamics.system
     force = motion_scale(tree, q, qd) + Entries(tree, q).force(tau) + np.array(tree.damping) * np.abs(qd)
     if tree.has_gains:
         force = force + gain_scale(tree, q, qd)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tmt.methods import RungeKutta, SemiImplicitEuler, amplification, by_speed
+from tmt.methods import RungeKutta, SemiImplicitEuler, amplification
 from tmt.methods.implicit import ImplicitRungeKutta
 
 
@@ -20,11 +20,7 @@ def linear_step(at, stepping, dt: np.ndarray) -> np.ndarray:
         return amplification(stepping, at.tree, at.q, np.zeros(n), at.tau, dt)
     # at rest the bias has no derivative by the speeds: an implicit bias makes no difference
     unit = np.eye(2 * n)
-    stiff = np.diag(by_speed(at.tree, at.tree.stiffness)) * stepping.implicit_springs
-    damped = np.diag(at.tree.damping)
-    if at.tree.has_gains:
-        position_gain, speed_gain = stepping.gains_held(at.tree)
-        stiff, damped = stiff + (position_gain or 0.0), damped + (speed_gain or 0.0)
+    stiff, damped = map(np.array, stepping.held(at.tree))
     matrix = at.mass_matrix + each * damped + each**2 * stiff
     force = at.mass_matrix @ at.matrix[n:] - each * np.hstack([0.0 * stiff, stiff])
     speeds = unit[n:] + each * np.linalg.solve(matrix, force)

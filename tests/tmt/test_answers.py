@@ -4,6 +4,7 @@ import dataclasses
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from inspect import signature
 
 import numpy as np
@@ -17,6 +18,7 @@ from tmt.derivation.quantities import QUANTITIES
 from tmt.exact.values import FIELDS, distance, exact
 
 EPS = np.finfo(float).eps
+evaluator = import_module("tmt.compiled.evaluator")  # the package has the function of that name
 SMALL = small_tree()
 
 
@@ -80,7 +82,7 @@ def test_a_call_gives_the_same_bits_whatever_was_asked_before(rng):
     for mass in range(1, answers.MOST + 2):  # of other models the last ones are held
         tmt.mass_matrix(np.zeros(3), dataclasses.replace(tmt.ARM, mass=(mass, 1.5)))
     assert bits(tmt.acceleration, *parts) == prepared
-    assert sum(not one.ready for one in answers.known.values()) <= answers.MOST
+    assert sum(not one.prepared for one in answers.known.values()) <= answers.MOST
 
 
 def test_threads_change_no_bit(monkeypatch, rng):
@@ -91,9 +93,9 @@ def test_threads_change_no_bit(monkeypatch, rng):
     def refuse(*_):
         raise RuntimeError("cannot schedule new futures")
 
-    monkeypatch.setattr(cores, "cores", lambda: 3)
+    monkeypatch.setattr(evaluator, "cores", lambda: 3)
     monkeypatch.setattr(cores, "ThreadPoolExecutor", lambda n: used.append(n) or ThreadPoolExecutor(n))
-    monkeypatch.setattr(cores, "SHARED", 1)
+    monkeypatch.setattr(evaluator, "SHARED", 1)
     assert np.array_equal(tmt.acceleration(*states, tree), alone) and used == [3]
     monkeypatch.setattr(ThreadPoolExecutor, "submit", refuse)
     assert np.array_equal(tmt.acceleration(*states, tree), alone) and used == [3, 3]
@@ -170,10 +172,10 @@ def test_numbers_beyond_the_largest_double():
 def test_who_cannot_wait_has_it_prepared(monkeypatch):
     tree = tmt.ARM.lock({"alpha": 0.0, "beta": 0.5})
     tmt.prepare(tree, "bias")
-    assert set(answers.answers_of(tree).ready) == {"bias"}
+    assert set(answers.answers_of(tree).prepared) == {"bias"}
     with pytest.raises(ValueError, match="'weight'"):
         tmt.prepare(tree, "weight")
-    assert tmt.prepare(tree) is None and set(answers.answers_of(tree).ready) == set(QUANTITIES)
+    assert tmt.prepare(tree) is None and set(answers.answers_of(tree).prepared) == set(QUANTITIES)
     monkeypatch.setattr(literal, "acceleration", None)
     assert np.isfinite(tmt.acceleration(Z[:1], Z[:1], Z[:1], tree)).all()
 

@@ -1,18 +1,16 @@
 """Compiled runs: the steps of the methods, several side by side and in threads with the bits of each alone."""
 
 from concurrent.futures import ThreadPoolExecutor
-from importlib import import_module
 
 import numpy as np
 import pytest
 from trees import random_states, small_tree
 
 import tmt
-from tmt.compiled import forms, prepared, runner, runs, straight
-from tmt.compiled.runner import Runner, known
+from tmt.compiled import forms, runner, runs, straight
+from tmt.compiled.runner import Runner, known, runner_of
 from tmt.methods import METHODS, one_step
 
-MODULE = import_module("tmt.compiled.runner")  # the package has the function of that name
 SMALL = small_tree()
 
 
@@ -78,10 +76,10 @@ def test_several_cores_give_the_bits_of_one(monkeypatch):
     q, qd, tau = starts(75)
     qd[40] = 1e200
     for name in ("rk4", "implicit_midpoint"):
-        monkeypatch.setattr(MODULE, "cores", lambda: 1)
+        monkeypatch.setattr(runner, "cores", lambda: 1)
         one = tmt.simulate(q, qd, tau, 0.02, 6, name, SMALL)
-        monkeypatch.setattr(MODULE, "cores", lambda: 3)
-        monkeypatch.setattr(MODULE, "SPREAD", 0)
+        monkeypatch.setattr(runner, "cores", lambda: 3)
+        monkeypatch.setattr(runner, "SPREAD", 0)
         three = tmt.simulate(q, qd, tau, 0.02, 6, name, SMALL)
         assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, three))
         assert (
@@ -90,7 +88,7 @@ def test_several_cores_give_the_bits_of_one(monkeypatch):
 
 
 def test_threads_ask_at_once_for_what_is_not_compiled(folder, monkeypatch):
-    monkeypatch.setattr(MODULE, "MOST", 1)  # of trees and methods the last ones are held
+    monkeypatch.setattr(runner, "MOST", 1)  # of trees and methods the last ones are held
     tree = tmt.ARM.lock({"alpha": 0.1, "gamma": 0.25})
     q = np.random.default_rng(0).uniform(-1, 1, (9, 1))
     with ThreadPoolExecutor(4) as pool:
@@ -103,18 +101,16 @@ def test_threads_ask_at_once_for_what_is_not_compiled(folder, monkeypatch):
     assert np.array_equal(found[0][1:], found[1]) and len(known) == 1
 
 
-def test_a_runner_and_a_prepared_run_fill_paths():
+def test_a_call_that_is_made_once_fills_its_paths_each_time():
     q, qd, tau = starts(2)
     qd[1] = 1e200
     wanted = tmt.simulate(q, qd, tau, 0.1, 6, "dopri8_adaptive", SMALL, tolerance=1e-6)
-    paths, ended = paths_from(q, qd, 2), np.full((2, 2), -1)
-    count = runner(SMALL, "dopri8_adaptive")(*paths, tau, 0.1, 1e-6, ended, 3)
-    assert count == wanted.evaluations and np.array_equal(paths[0], wanted.q[:, ::3], equal_nan=True)
-    assert ended[0].tolist() == [0, 0] and ended[1, 0] > 0
-    paths = paths_from(q, qd, 6)
-    run, outcome = prepared(SMALL, "dopri8_adaptive", *paths, tau, 0.1, 1e-6)
+    arrays = *paths_from(q, qd, 6), tau, np.zeros((2, 3), np.int64)
+    compiled = runner_of(SMALL, "dopri8_adaptive")
+    call = compiled.call(1, arrays, 0.1, 1e-6)
     for _ in range(2):
-        run()
-        assert outcome()[1] == wanted.evaluations and np.array_equal(outcome()[0][:, 0], ended[:, 0])
-        assert all(np.array_equal(*pair, equal_nan=True) for pair in zip(paths, wanted[1:]))
-        paths[0][:, 1:] = np.nan
+        call()
+        codes, evaluations = compiled.outcome(*arrays[:2], arrays[3])
+        assert evaluations == wanted.evaluations and codes[0].tolist() == [0, 0] and codes[1, 0] > 0
+        assert all(np.array_equal(*pair, equal_nan=True) for pair in zip(arrays, wanted[1:]))
+        arrays[0][:, 1:] = np.nan

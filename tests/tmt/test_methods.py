@@ -9,7 +9,7 @@ from scipy.integrate import DOP853
 from trees import random_state, random_states, small_tree, tree_of_kinds
 
 import tmt
-from tmt.compiled import runner
+from tmt.compiled import runner_of
 from tmt.derivation import method
 from tmt.exact.motion import trajectory
 from tmt.methods import METHODS, amplification, derivatives, dop853, one_step
@@ -105,7 +105,7 @@ def test_every_evaluation_of_an_implicit_method_is_counted():
         state = stepping.step(slope, *state, 0.1)
     path = np.full((2, 1, 5, 3), np.nan)
     path[:, 0, 0] = BENT, [1.0, 2.0, 3.0]
-    evaluations = runner(tmt.ARM, "implicit_midpoint")(*path, np.zeros((1, 3)), 0.1)
+    _, evaluations = runner_of(tmt.ARM, "implicit_midpoint").follow(*path, np.zeros((1, 3)), 0.1, 0.0, 1)
     assert np.allclose(path[:, 0, -1], state, rtol=0, atol=1e-12)
     # over any scalar the stages are found once more; compiled code counts the linear equations that it starts from
     assert evaluations == counted
@@ -157,9 +157,11 @@ def test_which_gains_are_implicit(name, speed, position):
     matrix = tmt.mass_matrix(q, FORK) + dt * (np.diag(FORK.damping) + bias + speed) + dt**2 * (k + position)
     force = tau - P @ q - S @ qd - tmt.bias(q, qd, FORK) - FORK.damping * qd - tmt.spring_torque(q, FORK)
     force -= dt * (k + position) @ qd
-    found = derivatives.linear_system(stepping, DRIVEN, list(q[:, None]), list(qd[:, None]), list(tau), dt)
-    assert np.allclose(found[0][0], matrix, atol=1e-13) and np.allclose(found[1][0], force, atol=1e-13)
-    assert np.allclose(stepping.matrix(DRIVEN, list(q), list(qd), dt), matrix, atol=1e-13)
+    dynamics = derivatives.Differentiated()
+    (a,) = np.array(stepping.slope(DRIVEN, list(q[:, None]), list(qd[:, None]), list(tau), dt, dynamics)).T
+    assert np.allclose(dynamics.system[0][0], matrix, atol=1e-13)
+    assert np.allclose(dynamics.system[1][0], force, atol=1e-13)
+    assert np.allclose(a, np.linalg.solve(matrix, force), atol=1e-11)
     slope = stepping.slope(DRIVEN, list(q), list(qd), list(tau), dt)
     assert np.allclose(slope, np.linalg.solve(matrix, force), atol=1e-11)
 

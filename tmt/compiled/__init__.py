@@ -1,18 +1,7 @@
-"""Machine code for a tree: `evaluator` of its quantities, `runner` of its motions, `prepared` for one that is timed.
-
-`Library`: of any LLVM text.
-"""
+"""Machine code for a tree: `evaluator` of its quantities, `runner_of` for its motions."""
 
 from . import sources  # noqa: F401 - which notes what is imported now
 from .evaluator import Evaluator, evaluator
-from .runner import prepared, runner
+from .runner import runner_of
 
-__all__ = ["Evaluator", "Library", "evaluator", "prepared", "runner"]
-
-
-def __getattr__(name: str):
-    if name != "Library":
-        raise AttributeError(name)
-    from .machine import Library  # here, so that `import tmt` need not wait for llvmlite
-
-    return Library
+__all__ = ["Evaluator", "evaluator", "runner_of"]

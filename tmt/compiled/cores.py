@@ -4,29 +4,27 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from typing import TypeVar
 
-SHARED = 5_000  # states times speeds from which several cores share them
-TOGETHER = 32  # states that are not parted
+Result = TypeVar("Result")
 
 
 def cores() -> int:
-    """Of the machine, those that this process may use."""
+    """How many cores of the machine this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def side_by_side(work: Callable, count: int, speeds: int) -> list:
-    """work(slice) of parts of many states, in threads where each has enough to do."""
-    threads = max(1, min(cores(), count * speeds // SHARED))
-    ends = [count * k // threads // TOGETHER * TOGETHER for k in range(threads)] + [count]
+def in_threads(
+    work: Callable[[slice], Result], count: int, parts: int, block: int, threads: int
+) -> list[Result]:
+    """work(slice) of parts of so many states, which are cut at multiples of a block; in this number of threads."""
+    ends = [count * k // parts // block * block for k in range(parts)] + [count]
     slices = [slice(*pair) for pair in pairwise(ends)]
-    return [work(slices[0])] if threads == 1 else in_threads(work, [(part,) for part in slices], threads)
-
-
-def in_threads(work: Callable, parts: list[tuple], threads: int) -> list:
-    """work(*part) of all parts, in this number of threads; one after the other where none can be started any more."""
+    if min(threads, parts) == 1:
+        return [work(part) for part in slices]
     with ThreadPoolExecutor(threads) as pool:
         try:
-            found = [pool.submit(work, *part) for part in parts]
-        except RuntimeError:  # the interpreter ends, or there are too many
-            found = None
-    return [work(*part) for part in parts] if found is None else [one.result() for one in found]
+            futures = [pool.submit(work, part) for part in slices]
+        except RuntimeError:  # the interpreter ends, or there are too many: one after the other
+            return [work(part) for part in slices]
+    return [future.result() for future in futures]

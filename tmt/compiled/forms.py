@@ -4,14 +4,17 @@ Up to some ten joints in a row, and for trees of short branches, those are the s
 beyond, those in the axes of the world (articulated.py), whose number grows with the number of joints.
 """
 
-from collections.abc import Callable
 from functools import lru_cache, partial
 
 from tmt.derivation import articulated, composite
 from tmt.derivation.dual import seeded
+from tmt.derivation.method import reduced_force
 from tmt.derivation.quantities import QUANTITIES, State
-from tmt.methods.stepping import Completed, Method
+from tmt.methods.dynamics import Dynamics, Implicit, Rows, Terms, Values, minus, plus
+from tmt.methods.stepping import Method
+from tmt.model.tree import Tree
 from tmt.model.values import shown
+from tmt.scalar import Scalar
 
 from .straight import Traced, trace
 from .trace import Expression
@@ -22,88 +25,102 @@ FEW, MANY = (
 )  # speeds: up to FEW the composite form alone is traced, from MANY on the articulated one alone
 DENSE = 10  # speeds from which solving linear systems and the derivatives of the bias are loops and no longer straight lines
 DYNAMICS = ("mass_matrix", "bias", "gravity_balance", "acceleration")
+TERMS = "mass_matrix_and_bias"
 
 
-class Terms:
+class Traceable(Dynamics):
     """Mbar and h of a tree for its traced functions, in the form with fewer operations.
 
     Of more than a few speeds the derivatives of h by the speeds and the solution of linear systems are functions that are called.
+    by_bodies: accelerations are those of articulated bodies, where all that a method takes implicitly acts at single joints: then
+    it counts as armature.
     """
 
-    def __init__(self, tree):
-        self.n = len(tree.axis)
-        self.form = (
-            articulated.mass_matrix_and_bias
-            if is_shorter_articulated(tree)
-            else composite.mass_matrix_and_bias
-        )
-        if self.n > DENSE:
-            self.bias_rates, self.solve_any = self.called_rates, self.called_solution
+    def __init__(self, tree: Tree, by_bodies: bool = False):
+        form = articulated if is_shorter_articulated(tree) else composite
+        super().__init__(form.mass_matrix_and_bias)
+        self.n, self.by_bodies, self.has_used_bodies = len(tree.axis), by_bodies, False
 
-    def __call__(self, tree, q, qd):
-        return self.form(tree, q, qd)
+    def acceleration(
+        self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
+    ) -> Values:
+        if not self.by_bodies or (implicit and not acts_at_single_joints(implicit)):
+            return super().acceleration(tree, q, qd, tau, implicit)
+        self.has_used_bodies = True
+        force, armature = reduced_force(tree, [0.0] * self.n, q, qd, tau), list(tree.armature)
+        if implicit:
+            force = minus(force, implicit.pull)
+            armature = plus(armature, [row[i] for i, row in enumerate(implicit.matrix)])
+        return articulated.acceleration(tree, q, qd, force, armature)
 
-    def called_rates(self, tree, q, qd) -> list:
-        """dh/dqd by the function of that name."""
-        found = q[0].tape.call("bias_rates", [*q, *qd], self.n * self.n)
-        return [found[self.n * i : self.n * (i + 1)] for i in range(self.n)]
+    def bias_rates(self, tree: Tree, q: Values, qd: Values) -> Rows:
+        if self.n <= DENSE:
+            return super().bias_rates(tree, q, qd)
+        rates = q[0].tape.call("bias_rates", [*q, *qd], self.n * self.n)
+        return [rates[self.n * i : self.n * (i + 1)] for i in range(self.n)]
 
-    def called_solution(self, matrix, right) -> list:
-        tape = next(x.tape for x in (*right, matrix[0][0]) if hasattr(x, "tape"))
+    def solve_any(self, matrix: Rows, right: Values) -> Values:
+        if self.n <= DENSE:
+            return super().solve_any(matrix, right)
+        tape = next(x.tape for x in (*right, matrix[0][0]) if isinstance(x, Expression))
         return tape.call("solution", [*(x for row in matrix for x in row), *right], self.n)
 
 
+def acts_at_single_joints(implicit: Implicit) -> bool:
+    """Whether what a method takes implicitly is diagonal."""
+    across = [x for i, row in enumerate(implicit.matrix) for j, x in enumerate(row) if i != j]
+    return not implicit.bias_rows and all(isinstance(x, float) and x == 0.0 for x in across)
+
+
 @lru_cache(maxsize=64)
-def is_shorter_articulated(tree) -> bool:
+def is_shorter_articulated(tree: Tree) -> bool:
     """Whether Mbar and h have fewer operations in the articulated form."""
     n = len(tree.axis)
     if n <= FEW or n >= MANY:
         return n >= MANY
     forms = articulated.mass_matrix_and_bias, composite.mass_matrix_and_bias
-    inner, outer = (len(of_terms(tree, terms).nodes) for terms in forms)
+    inner, outer = (len(of_terms(tree, Dynamics(terms)).nodes) for terms in forms)
     return inner < outer
 
 
-def of_terms(tree, terms) -> Traced:
+def of_terms(tree: Tree, dynamics: Dynamics) -> Traced:
     """The upper triangle of Mbar, row by row, and h as a function of (q, qd, tau)."""
     n = len(tree.axis)
 
-    def both(q, qd, tau):
-        M, h = terms(tree, q, qd)
+    def both(q: Values, qd: Values, tau: Values) -> Values:
+        M, h = dynamics(tree, q, qd)
         return [*(M[i][j] for i in range(n) for j in range(i, n)), *h]
 
     return trace("quantity", (tree.coordinates.nq, n, n), both)
 
 
-def quantity(tree, name: str, terms: Callable | None = None) -> Traced:
+def quantity(tree: Tree, name: str, terms: Terms | None = None) -> Traced:
     """A quantity as a function of (q, qd, tau), flat; or "mass_matrix_and_bias", see `of_terms`.
 
     terms: another form of Mbar and h; ValueError if they are not what a function of tmt's would return.
     """
-    terms = partial(checked_terms, terms) if terms else Terms(tree)
-    if name == "mass_matrix_and_bias":
-        return of_terms(tree, terms)
-    if name == "acceleration" and isinstance(terms, Terms):
+    dynamics = Dynamics(partial(checked_terms, terms)) if terms else Traceable(tree)
+    if name == TERMS:
+        return of_terms(tree, dynamics)
+    if name == "acceleration" and not terms:
         return slope(tree, Method(), "quantity", with_step=False)
 
-    def function(q, qd, tau):
+    def function(q: Values, qd: Values, tau: Values) -> Values:
         state = State(tree, q, qd if "qd" in QUANTITIES[name].takes else None, tau)
         if name in DYNAMICS:
-            state.mass_matrix, state.bias = terms(tree, q, state.qd)
+            state.mass_matrix, state.bias = dynamics(tree, q, state.qd)
         return flat(state.bias if name == "gravity_balance" else QUANTITIES[name].of(state))
 
     return trace("quantity", (tree.coordinates.nq, len(tree.axis), len(tree.axis)), function)
 
 
-def checked_terms(terms, tree, q, qd) -> tuple[list, list]:
+def checked_terms(terms: Terms, tree: Tree, q: Values, qd: Values) -> tuple[Rows, Values]:
     """Mbar and h as a user's function gives them."""
     n = len(tree.axis)
     try:
         M, h = terms(tree, q, qd)
         M, h = [[row[j] for j in range(n)] for row in (M[i] for i in range(n))], [h[i] for i in range(n)]
-        if wrong := [
-            x for x in (*h, *(x for row in M for x in row)) if not isinstance(x, int | float | Expression)
-        ]:
+        if wrong := [x for x in flat([h, M]) if not isinstance(x, int | float | Expression)]:
             raise TypeError(f"{shown(wrong[0])} is no scalar")
         return M, h
     except Exception as error:
@@ -112,58 +129,46 @@ def checked_terms(terms, tree, q, qd) -> tuple[list, list]:
         raise ValueError(f"terms(tree, q, qd) does not return {wanted}: {why}") from error
 
 
-def flat(nested) -> list:
+def flat(nested: Scalar) -> Values:
+    """The scalars of nested lists or tuples, in a row."""
     return [x for part in nested for x in flat(part)] if isinstance(nested, (list, tuple)) else [nested]
 
 
-def slope(tree, stepping: Method, name: str = "slope", with_step: bool = True) -> Traced:
+def slope(tree: Tree, stepping: Method, name: str = "slope", with_step: bool = True) -> Traced:
     """The slope of a method as a function of (q, qd, tau) and, with_step, dt."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
-    def in_terms(q, qd, tau, dt=(0.0,)):
-        return stepping.slope(tree, q, qd, tau, dt[0], Terms(tree))
+    def traced(dynamics: Traceable) -> Traced:
+        def function(q: Values, qd: Values, tau: Values, dt: Values = [0.0]) -> Values:  # noqa: B006
+            return stepping.slope(tree, q, qd, tau, dt[0], dynamics)
 
-    def in_bodies(q, qd, tau, dt=(0.0,)):
-        return stepping.articulated(tree, q, qd, tau, dt[0])
+        return trace(name, (nq, n, n, *[1] * with_step), function)
 
-    forms = [in_terms]
-    if is_articulated(stepping, tree):
-        forms = [in_terms] * (n < MANY) + [in_bodies] * (n > FEW)
-    traced = (trace(name, (nq, n, n, *[1] * with_step), form) for form in forms)
-    return min(traced, key=lambda one: one.length)
-
-
-def is_articulated(stepping: Method, tree) -> bool:
-    """Whether the slope of a method can be had from articulated bodies; not if it is another since."""
-    if isinstance(stepping, Completed):
-        return False
-    kind = next(
-        (kind for kind in type(stepping).__mro__ if {"slope", "articulated"} & vars(kind).keys()), None
-    )
-    return kind is not None and "articulated" in vars(kind) and stepping.articulates(tree)
+    by_bodies = Traceable(tree, by_bodies=n > FEW)
+    first = traced(by_bodies)
+    if n >= MANY or not by_bodies.has_used_bodies:
+        return first
+    return min(traced(Traceable(tree)), first, key=lambda function: function.length)
 
 
-def directional(tree, stepping: Method) -> Traced:
+def directional(tree: Tree, stepping: Method) -> Traced:
     """The slope and its derivative: (q, qd, tau, dt, dq, dqd) -> (qdd, dqdd); dq (nq) is a change of the numbers in q."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
-    def both(q, qd, tau, dt, dq, dqd):
+    def both(q: Values, qd: Values, tau: Values, dt: Values, dq: Values, dqd: Values) -> Values:
         x = seeded([*q, *qd], [*dq, *dqd])
-        if is_articulated(stepping, tree) and n > FEW:
-            found = stepping.articulated(tree, x[:nq], x[nq:], tau, dt[0])
-        else:
-            found = stepping.slope(tree, x[:nq], x[nq:], tau, dt[0], Terms(tree))
-        parts = [x[0].parts(value) for value in found]
+        slopes = stepping.slope(tree, x[:nq], x[nq:], tau, dt[0], Traceable(tree, by_bodies=n > FEW))
+        parts = [x[0].parts(value) for value in slopes]
         return [*(value for value, _ in parts), *(slope for _, slope in parts)]
 
     return trace("directional", (nq, n, n, 1, nq, n), both)
 
 
-def bias_rate(tree) -> Traced:
+def bias_rate(tree: Tree) -> Traced:
     """The derivative of h along a change of the speeds: (q, qd, dqd) -> dh."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
-    def function(q, qd, dqd):
+    def function(q: Values, qd: Values, dqd: Values) -> Values:
         rates = seeded(qd, dqd)
         return [rates[0].parts(x)[1] for x in articulated.bias(tree, q, rates)]
 

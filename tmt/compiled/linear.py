@@ -12,7 +12,7 @@ def solve() -> Code:
     matrix: n rows of `stride` numbers, of which the first n belong to it; it is written over.
     """
     given = {"matrix": POINTER, "stride": INDEX, "right": POINTER, "n": INDEX}
-    code = Code("solve", given, attributes="noinline", own=True)
+    code = Code("solve", given, attributes="noinline")
     matrix, stride, right, n = (code[name] for name in code.arguments)
     with code.loop(n) as outer:
         k = outer.index
@@ -39,7 +39,7 @@ def solve() -> Code:
 
 def solution(n: int) -> Code:
     """solution(in, out): of n rows of n numbers and the right-hand side."""
-    code = Code("solution", {"in": POINTER, "out": POINTER}, attributes="noinline", own=True)
+    code = Code("solution", {"in": POINTER, "out": POINTER}, attributes="noinline")
     matrix = code.reserve(DOUBLE, n * n)
     with code.loop(n * n) as loop:
         matrix.store(code["in"].load(loop.index), loop.index)
@@ -53,7 +53,7 @@ def solution(n: int) -> Code:
 
 def bias_rates(nq: int, n: int, width: int) -> Code:
     """bias_rates(in, out): dh/dqd (n, n) from (q, qd), by `bias_rate`, several directions at a time."""
-    code = Code("bias_rates", {"in": POINTER, "out": POINTER}, attributes="noinline", own=True)
+    code = Code("bias_rates", {"in": POINTER, "out": POINTER}, attributes="noinline")
     state = code.reserve(wide(DOUBLE, width), nq + 2 * n)
     found = code.reserve(wide(DOUBLE, width), n)
     for k in range(nq + n):
@@ -73,8 +73,7 @@ def put_directions(state: Value, at: int, n: int, first: Value, width: int) -> N
     code = state.code
     lanes = first.everywhere(width)
     if width > 1:
-        numbers = Value(code, lanes.kind, "<" + ", ".join(f"i64 {l}" for l in range(width)) + ">")
-        lanes = lanes + numbers
+        lanes = lanes + Value(code, lanes.kind, f"<{', '.join(f'i64 {l}' for l in range(width))}>")
     kind = wide(DOUBLE, width)
     with code.loop(n) as loop:
         chosen = lanes.compare("eq", loop.index.everywhere(width))

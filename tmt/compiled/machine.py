@@ -1,8 +1,10 @@
 """Machine code from LLVM's text, by llvmlite: for this processor, optimised, and as functions that ctypes can call."""
 
 import ctypes
+from collections.abc import Callable
 from functools import lru_cache
 from threading import Lock
+from typing import Any
 
 import llvmlite
 import llvmlite.binding as llvm
@@ -63,11 +65,13 @@ class Library:
             self.engine.add_object_file(llvm.ObjectFileRef.from_data(code))
             self.engine.finalize_object()
 
-    def function(self, name: str, result, *arguments, keeps_lock: bool = False):
-        """A function of that name as ctypes calls it; keeps_lock: Python's other threads wait meanwhile."""
+    def function(
+        self, name: str, result: Any, *arguments: Any, keeps_lock: bool = False
+    ) -> Callable[..., Any]:
+        """A function of that name as ctypes calls it, of ctypes' types; keeps_lock: Python's other threads wait meanwhile."""
         address = self.engine.get_function_address(name)
         if not address:
             raise KeyError(name)
-        made = (ctypes.PYFUNCTYPE if keeps_lock else ctypes.CFUNCTYPE)(result, *arguments)(address)
-        made.library = self  # the code lives as long as it
-        return made
+        function = (ctypes.PYFUNCTYPE if keeps_lock else ctypes.CFUNCTYPE)(result, *arguments)(address)
+        setattr(function, "library", self)  # noqa: B010 - the code lives as long as it, of which ctypes' type knows nothing
+        return function

@@ -6,22 +6,29 @@ it did not, after how many steps, and how often the dynamics were evaluated. Wha
 """
 
 from collections.abc import Callable
+from typing import Any
 
+from tmt.derivation.dual import seeded
+from tmt.methods.dynamics import Values, minus, plus
 from tmt.methods.implicit import CLOSE, ITERATIONS
-from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED, Method
+from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED, Joints
 from tmt.model.coordinates import FLAT
+from tmt.model.tree import Tree
 
 from . import forms, linear
 from .ir import DOUBLE, FLAG, INDEX, POINTER, Code, Value, Variable, module, wide
 from .sine import LIMIT
 from .straight import Traced, functions, trace
 
+Advance = Callable[
+    [Code, Value, Value, Value, Variable], Value
+]  # (code, state, new state, dt, evaluations): why it ends
 INLINED = 1_500  # nodes of the slopes of a step that are put in the place of their calls
 # of an adaptive method, in units of dt and of the step before
 SHORTEST_STEP, GROWTH, SHRINKING, SAFETY = 1e-9, 6.0, 0.333, 0.9
 
 
-def source(tree, stepping: Method, width: int) -> str:
+def source(tree: Tree, stepping: Any, width: int) -> str:
     """The module that follows runs of a tree, `width` side by side."""
     step = Step(tree, stepping, width)
     if stepping.solves_stages:
@@ -36,21 +43,24 @@ def source(tree, stepping: Method, width: int) -> str:
 class Step:
     """The functions of one step, and the lines that call them."""
 
-    def __init__(self, tree, stepping: Method, width: int):
+    def __init__(
+        self, tree: Tree, stepping: Any, width: int
+    ):  # stepping: a Method, with what NEEDS says of its kind
         self.tree, self.stepping, self.width = tree, stepping, width
         self.nq, self.n = tree.coordinates.nq, tree.coordinates.nv
-        self.joints = tree.coordinates if tree.coordinates.balls else FLAT
-        self.functions = []
+        self.joints: Joints = tree.coordinates if tree.coordinates.balls else FLAT
+        self.functions: list[Code] = []
+        self.wanted: Variable  # of an adaptive method: the step that its tolerance wants
 
     def add(self, traced: Traced, width: int, inline: bool = False) -> str:
         """The functions of a traced one and of what it calls; its name."""
         self.functions += functions(traced, width, inline)
         operations = [traced.tape.nodes[i] for i in traced.nodes]
         called = {arguments[0] for kind, arguments in operations if kind == "call"}
-        known = {code.name for code in self.functions}
-        if "solution" in called and "solution" not in known:
+        missing = called - {code.name for code in self.functions}
+        if "solution" in missing:
             self.functions += [linear.solve(), linear.solution(self.n)]
-        if "bias_rates" in called and "bias_rates" not in known:
+        if "bias_rates" in missing:
             self.functions += functions(forms.bias_rate(self.tree), linear.WIDTH)
             self.functions.append(linear.bias_rates(self.nq, self.n, linear.WIDTH))
         return traced.name
@@ -58,40 +68,41 @@ class Step:
     def add_step(self, name: str) -> int:
         """The slope, and the step or attempt that asks it; how many results that has."""
         nq, n, stepping = self.nq, self.n, self.stepping
+        joints = [] if self.joints is FLAT else [self.joints]
         slope = forms.slope(self.tree, stepping)
         self.add(slope, self.width, inline=len(slope.nodes) * stepping.stages <= INLINED)
 
-        def function(q, qd, tau, dt):
-            def asked(q, qd):
+        def function(q: Values, qd: Values, tau: Values, dt: Values) -> Values:
+            def called_slope(q: Values, qd: Values) -> Values:
                 return q[0].tape.call("slope", [*q, *qd, *tau, *dt], n)
 
-            joints = [self.joints] if self.joints is not FLAT else []
-            return forms.flat(list(getattr(stepping, name)(asked, q, qd, dt[0], *joints)))
+            return forms.flat(list(getattr(stepping, name)(called_slope, q, qd, dt[0], *joints)))
 
         traced = trace(name, (nq, n, n, 1), function)
         self.add(traced, self.width, inline=True)
         return len(traced.outputs)
 
-    def explicit(self) -> Callable:
+    def explicit(self) -> Advance:
         """A step of a method that solves nothing."""
         self.add_step("step")
 
-        def advance(code, state, new, dt, evaluations):
+        def advance(code: Code, state: Value, new: Value, dt: Value, evaluations: Variable) -> Value:
             code.call("step", state, new)
             return unsound(code, self.tree, new, self.width)
 
         return advance
 
-    def adaptive(self) -> Callable:
+    def adaptive(self) -> Advance:
         """As many steps as the tolerance wants between two times."""
         nq, n, order = self.nq, self.n, self.stepping.order
         count = self.add_step("attempt")
-        scales = []  # of each component of an error: the number of the state in whose units it is; None: an angle of a turn
+        # of each component of an error: the number of the state in whose units it is; None: an angle of a turn
+        scales: list[int | None] = []
         for joint in self.tree.coordinates.joints:
-            scales += [None if joint.kind == "ball" else joint.q.start] * (joint.qd.stop - joint.qd.start)
+            scales += [None] * 3 if joint.kind == "ball" else [joint.q.start]
         scales += range(nq, nq + n)
 
-        def advance(code, state, new, dt, evaluations):
+        def advance(code: Code, state: Value, new: Value, dt: Value, evaluations: Variable) -> Value:
             wanted, left, why = self.wanted, Variable(code, DOUBLE, dt), Variable(code, INDEX, 0)
             found = code.reserve(DOUBLE, count)
             with code.loop(2**62) as loop:
@@ -102,18 +113,9 @@ class Step:
                 state.store(h, nq + 2 * n)
                 code.call("attempt", state, found)
                 evaluations.set(evaluations.get() + self.stepping.stages)
-                sums = []
-                for first in (nq + n, nq + 3 * n):
-                    total = None
-                    for k, scale in enumerate(scales):
-                        size = code.number(2.0)
-                        if scale is not None:
-                            a, b = state.load(scale).function("fabs"), found.load(scale).function("fabs")
-                            size = 1.0 + b.compare("gt", a).choose(b, a)
-                        one = found.load(first + k) / (code["tolerance"] * size)
-                        total = one * one if total is None else total + one * one
-                    sums.append(total)
-                e5, e3 = sums
+                e5, e3 = (
+                    squares(state, found, first, scales, code["tolerance"]) for first in (nq + n, nq + 3 * n)
+                )
                 root = (2.0 * n * (e5 + 0.01 * e3)).function("sqrt")
                 error = e5.compare("gt", 0.0).choose(e5 / root, 0.0)
                 accepted = error.compare("lt", 1.0)
@@ -121,12 +123,11 @@ class Step:
                     for k in code.each(nq + n):
                         state.store(found.load(k), k)
                     left.set(pieces.compare("gt", 1.0).choose(left.get() - h, 0.0))
-                factor = SAFETY * code.intrinsic("pow", error, code.number(-1.0 / order))
+                factor = SAFETY * code.intrinsic(
+                    "pow", error, code.number(-1.0 / order)
+                )  # of no error infinite
                 factor = factor.compare("gt", SHRINKING).choose(factor, SHRINKING)
                 factor = factor.compare("lt", GROWTH).choose(factor, GROWTH)
-                factor = error.compare("gt", 0.0).choose(
-                    factor, error.compare("eq", 0.0).choose(code.number(GROWTH), SHRINKING)
-                )
                 wanted.set(h * factor)
                 off = unsound(code, self.tree, state, 1)
                 short = h.compare("gt", dt * SHORTEST_STEP).choose(code.number(0, INDEX), SMALL)
@@ -138,7 +139,7 @@ class Step:
 
         return advance
 
-    def solving(self) -> Callable:
+    def solving(self) -> Advance:
         """A step whose stages solve an equation, by Newton's method with the exact Jacobian, several columns at a time."""
         nq, n, stepping, width = self.nq, self.n, self.stepping, linear.WIDTH
         unknown = n * stepping.stages
@@ -147,14 +148,15 @@ class Step:
         self.add(directional, width, inline=len(directional.nodes) * stepping.stages <= INLINED)
         for made_linear in (False, True):
             self.add(residual(self.tree, stepping, self.joints, made_linear), width, inline=not made_linear)
-        self.functions.append(linear.solve()) if "solve" not in {c.name for c in self.functions} else None
+        if "solve" not in {code.name for code in self.functions}:
+            self.functions.append(linear.solve())
 
-        def finish(q, qd, dt, a):
+        def finish(q: Values, qd: Values, dt: Values, a: Values) -> Values:
             return forms.flat(list(stepping.finish(q, qd, dt[0], a, self.joints)))
 
         self.add(trace("finish", (nq, n, 1, unknown), finish), 1, inline=True)
 
-        def advance(code, state, new, dt, evaluations):
+        def advance(code: Code, state: Value, new: Value, dt: Value, evaluations: Variable) -> Value:
             inputs = nq + 2 * n + 1
             given = code.reserve(wide(DOUBLE, width), inputs + 2 * unknown)
             found = code.reserve(wide(DOUBLE, width), 2 * unknown)
@@ -175,7 +177,7 @@ class Step:
                     linear.put_directions(given, inputs + unknown, unknown, loop.index, width)
                     with code.when(is_linear):
                         code.call("linear_residual", given, found)
-                    with code.when(is_linear.bits("xor", True)):
+                    with code.when(is_linear.negated()):
                         code.call("residual", given, found)
                     with code.loop(each) as rows:
                         change = found.load((rows.index + unknown) * width, wide(DOUBLE, width))
@@ -193,11 +195,11 @@ class Step:
                         # not a number stays so
                         largest.set(value.compare("le", so_far).choose(so_far, value))
                 close = most.get().compare("le", CLOSE * (1.0 + size.get()))
-                close = close.bits("and", is_linear.bits("xor", True))
+                close = close.bits("and", is_linear.negated())
                 with code.when(close):
                     why.set(0)
                 iteration.leave(close)
-                iteration.leave(size.get().compare("lt", float("inf")).bits("xor", True))
+                iteration.leave(size.get().compare("lt", float("inf")).negated())
             with code.when(why.get().compare("eq", 0)):
                 for k in code.each(nq + n):
                     last.store(state.load(k), k)
@@ -209,34 +211,46 @@ class Step:
         return advance
 
 
-def residual(tree, stepping, joints, linear: bool) -> Traced:
+def squares(state: Value, found: Value, first: int, scales: list[int | None], tolerance: Value) -> Value:
+    """The sum of the squares of an estimate of the error, from number `first` on, in units of tolerance (1 + |value|)."""
+    total = state.code.number(0.0)
+    for k, scale in enumerate(scales):
+        unit: Value | float = 2.0
+        if scale is not None:
+            before, after = state.load(scale).function("fabs"), found.load(scale).function("fabs")
+            unit = 1.0 + after.compare("gt", before).choose(after, before)
+        share = found.load(first + k) / (tolerance * unit)
+        total = total + share * share
+    return total
+
+
+def residual(tree: Tree, stepping: Any, joints: Joints, linear: bool) -> Traced:
     """What accelerations a of the stages leave of their equations, and its derivative along da: (q, qd, tau, dt, a, da).
 
     linear: of the equations made linear at (q, qd).
     """
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
-    def function(q, qd, tau, dt, a, da):
-        a = forms.seeded(a, da)
-        values, slopes = [], []
-        for i, state in enumerate(stepping.stage_states(q, qd, dt[0], a, joints)):
-            values_of, slopes_of = zip(*(a[0].parts(x) for part in state for x in part))
-            at = [*q, *qd] if linear else values_of
-            found = q[0].tape.call("directional", [*at, *tau, *dt, *slopes_of], 2 * n)
+    def function(q: Values, qd: Values, tau: Values, dt: Values, a: Values, da: Values) -> Values:
+        unknown, call = seeded(a, da), q[0].tape.call
+        values: Values = []
+        slopes: Values = []
+        for state in stepping.stage_states(q, qd, dt[0], unknown, joints):
+            x, dx = map(list, zip(*(unknown[0].parts(number) for part in state for number in part)))
+            start = [*q, *qd]
+            qdd = call("directional", [*(start if linear else x), *tau, *dt, *dx], 2 * n)
+            slopes += qdd[n:]
             if linear:
-                off = [new - old for old, new in zip(at, values_of)]
-                change = q[0].tape.call("directional", [*at, *tau, *dt, *off], 2 * n)
-                found = [*(value + more for value, more in zip(change, change[n:])), *found[n:]]
-            for k in range(n):
-                values.append(found[k] - a[i * n + k].value)
-                slopes.append(found[n + k] - da[i * n + k])
-        return [*values, *slopes]
+                moved = call("directional", [*start, *tau, *dt, *minus(x, start)], 2 * n)
+                qdd = plus(moved, moved[n:])
+            values += qdd[:n]
+        return [*minus(values, a), *minus(slopes, da)]
 
     sizes = nq, n, n, 1, n * stepping.stages, n * stepping.stages
     return trace("linear_residual" if linear else "residual", sizes, function)
 
 
-def run(step: Step, advance: Callable) -> Code:
+def run(step: Step, advance: Advance) -> Code:
     """The loops over runs, records and steps."""
     names = {"q": POINTER, "qd": POINTER, "tau": POINTER, "dt": DOUBLE, "tolerance": DOUBLE, "info": POINTER}
     code = Code("run", names | dict.fromkeys(("every", "records", "runs"), INDEX))
@@ -246,15 +260,15 @@ def run(step: Step, advance: Callable) -> Code:
     paths, info = (("q", nq, 0), ("qd", n, nq)), code["info"]
     state.store(code["dt"].everywhere(width), (nq + 2 * n) * width)
     with code.loop(code["runs"], width) as runs:
+        rows = [runs.index + lane for lane in range(width)]
         alive, evaluations = Variable(code, flags, True), Variable(code, INDEX, 0)
         step.wanted = Variable(code, DOUBLE, code["dt"] / 8.0)
-        for l in range(width):
-            run = runs.index + l
+        for lane, run in enumerate(rows):
             for name, size, first in paths:
                 for k in code.each(size):
-                    state.store(code[name].load(run * code["records"] * size + k), (k + first) * width + l)
+                    state.store(code[name].load(run * code["records"] * size + k), (k + first) * width + lane)
             for k in code.each(n):
-                state.store(code["tau"].load(run * n + k), (k + nq + n) * width + l)
+                state.store(code["tau"].load(run * n + k), (k + nq + n) * width + lane)
         with code.loop(code["records"] - 1) as records:
             with code.loop(code["every"]) as steps:
                 why = advance(code, state, new, code["dt"], evaluations)
@@ -262,25 +276,25 @@ def run(step: Step, advance: Callable) -> Code:
                     state.store(new.load(k * width, kind), k * width)
                 ends = why.compare("ne", 0).bits("and", alive.get())
                 with code.when(linear.any_of(ends, width)):
-                    for l in range(width):
-                        with code.when(ends.lane(l)):
-                            info.store(why.lane(l), (runs.index + l) * 3)
-                            info.store(records.index * code["every"] + steps.index, (runs.index + l) * 3 + 1)
-                    alive.set(alive.get().bits("and", ends.bits("xor", True)))
-                steps.leave(linear.any_of(alive.get(), width).bits("xor", True))
-            records.leave(linear.any_of(alive.get(), width).bits("xor", True))
-            for l in range(width):
+                    for lane, run in enumerate(rows):
+                        with code.when(ends.lane(lane)):
+                            info.store(why.lane(lane), run * 3)
+                            info.store(records.index * code["every"] + steps.index, run * 3 + 1)
+                    alive.set(alive.get().bits("and", ends.negated()))
+                steps.leave(linear.any_of(alive.get(), width).negated())
+            records.leave(linear.any_of(alive.get(), width).negated())
+            for lane, run in enumerate(rows):
                 for name, size, first in paths:
-                    place = ((runs.index + l) * code["records"] + records.index + 1) * size
+                    place = (run * code["records"] + records.index + 1) * size
                     for k in code.each(size):
-                        code[name].store(state.load((k + first) * width + l), place + k)
+                        code[name].store(state.load((k + first) * width + lane), place + k)
         if width == 1:
             info.store(evaluations.get(), runs.index * 3 + 2)
     code.give_back()
     return code
 
 
-def unsound(code: Code, tree, state: Value, width: int) -> Value:
+def unsound(code: Code, tree: Tree, state: Value, width: int) -> Value:
     """Why a state cannot be gone on from; 0: it can."""
     kind, whole = wide(DOUBLE, width), wide(INDEX, width)
     hinges = [joint.q.start for joint in tree.coordinates.joints if joint.kind == "hinge"]

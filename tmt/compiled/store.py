@@ -25,47 +25,47 @@ from .sources import own_sources
 
 DIGEST = 32  # bytes of a SHA-256, before the object code
 ABANDONED = 3600.0  # s: a file takes milliseconds to write, but the clocks of a shared disk differ
-complaints = []  # about the folder, of this process
+complaints: list[OSError] = []  # about the folder, of this process
 
 
 class NotOwn(OSError):
     """What lies there can be written by others, or belongs to somebody else."""
 
 
-def library(source: Callable[[], str], *what) -> Library:
+def library(
+    source: Callable[[], str], *what: Tree | Method | Callable[..., object] | str | int | None
+) -> Library:
     """The compiled module of a source, from the folder if it lies there; what: all that the source follows from, with tmt itself.
 
     Of what is the user's own (a class of trees, a method, a function), or of changed sources, nothing is kept: it may be another.
     """
     words = [own_sources(), versions(), *map(word_of, what)]
-    if None in words:
+    known = [word for word in words if word is not None]
+    if len(known) < len(words):
         return Library(source())
-    name = hashlib.sha256("\n".join(words).encode()).hexdigest()[:32]
+    name = hashlib.sha256("\n".join(known).encode()).hexdigest()[:32]
     try:
-        folder = own_folder()
-        found = read(folder / f"{name}.o")
+        path = own_folder() / f"{name}.o"
+        code = read(path)
     except NotOwn as error:
         complain(error)
         return Library(source())
     except Exception:  # whatever is wrong with the folder or the file
         return Library(source())
-    if found is not None:
-        return Library(code=found)
-    code = object_code(source())
-    with suppress(OSError):
-        clear(folder)
-        write_aside(folder / f"{name}.o", hashlib.sha256(code).digest() + code)
+    if code is None:
+        code = object_code(source())
+        with suppress(OSError):
+            clear(path.parent)
+            write_aside(path, hashlib.sha256(code).digest() + code)
     return Library(code=code)
 
 
-def word_of(value) -> str | None:
+def word_of(value: object) -> str | None:
     """What stands for a value in the name of a file; None if it may mean something else another time."""
     if isinstance(value, (str, int)) or value is None:
         return repr(value)
-    if type(value) is Tree:
-        return repr([getattr(value, field.name) for field in fields(Tree)])
-    own = type(value).__module__.split(".")[0] == __name__.split(".")[0]
-    if own and isinstance(value, Method) and is_dataclass(value):
+    is_of_tmt = type(value).__module__.split(".")[0] == __name__.split(".")[0]
+    if is_of_tmt and isinstance(value, Tree | Method) and is_dataclass(value):
         return f"{type(value).__qualname__}({[getattr(value, field.name) for field in fields(value)]!r})"
     return None
 
@@ -81,13 +81,13 @@ def read(path: Path) -> bytes | None:
     return code if digest == hashlib.sha256(code).digest() else None
 
 
-def complain(error) -> None:
+def complain(error: OSError) -> None:
     """Say once in a process why the folder is not used; on stderr, unless logging is set up otherwise."""
     if not complaints:
         complaints.append(error)
+        advice = "remove it, or set TMT_CACHE to a folder of your own"
         logging.getLogger("tmt").warning(
-            "%s: nothing there is run, code is compiled in memory; remove it, or set TMT_CACHE to a folder of your own",
-            error,
+            "%s: nothing there is run, code is compiled in memory; %s", error, advice
         )
 
 
@@ -98,9 +98,9 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tmt"
 
 
-def own_folder(folder: Path | None = None) -> Path:
-    """The cache folder (or another), its links resolved, made if it is not there; NotOwn unless it is the user's own."""
-    folder = Path(os.path.realpath(folder or cache_folder()))
+def own_folder() -> Path:
+    """The cache folder, its links resolved, made if it is not there; NotOwn unless it is the user's own."""
+    folder = Path(os.path.realpath(cache_folder()))
     for path in (*reversed(folder.parents), folder):
         if not path.exists():
             path.mkdir(mode=0o700, exist_ok=True)
@@ -109,7 +109,7 @@ def own_folder(folder: Path | None = None) -> Path:
     return folder
 
 
-def check_own(path, on_the_way=False) -> None:
+def check_own(path: Path, on_the_way: bool = False) -> None:
     """Raise NotOwn if a file or folder belongs to somebody else or others can write to it.
 
     on_the_way: a parent folder; it may be root's, and in it others may make entries of their own (as in /tmp).
@@ -126,7 +126,7 @@ def check_own(path, on_the_way=False) -> None:
         raise NotOwn(f"{path} can be written by others (mode {stat.S_IMODE(about.st_mode):04o})")
 
 
-def private(path, group) -> bool:
+def private(path: Path, group: int) -> bool:
     """Whether the group of a path is the user's own, without other members, as many systems make one for each user.
 
     Where there are further access rights the group's bits stand for those.
@@ -135,14 +135,14 @@ def private(path, group) -> bool:
     import pwd
 
     try:
-        user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(group)
+        user, about = pwd.getpwuid(os.geteuid()), grp.getgrgid(group)
         further = "system.posix_acl_access" in os.listxattr(path)
     except (KeyError, OSError, AttributeError):  # no such user or group; not known here
         return False
-    return group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name} and not further
+    return about.gr_name == user.pw_name and set(about.gr_mem) <= {user.pw_name} and not further
 
 
-def write_aside(path, content) -> None:
+def write_aside(path: Path, content: bytes) -> None:
     """Write a file aside and move it, so that a process that reads meanwhile sees all of it or nothing."""
     with tempfile.NamedTemporaryFile("wb", dir=path.parent, suffix=".new", delete=False) as file:
         aside = Path(file.name)
@@ -155,7 +155,7 @@ def write_aside(path, content) -> None:
             raise
 
 
-def clear(folder) -> None:
+def clear(folder: Path) -> None:
     """Remove what writers that were killed have left."""
     for file in folder.glob("*.new"):
         with suppress(OSError):

@@ -5,17 +5,27 @@ all of them together. A product that goes into one sum alone is rounded with it,
 twice as many lines in one function, so long tapes are cut; what one part hands to a later one stands in an array.
 """
 
-from collections.abc import Callable, Iterable
+import operator
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
+
+from tmt.scalar import Scalar
 
 from .ir import DOUBLE, POINTER, Code, Value, wide
 from .sine import sincos
-from .trace import Tape
+from .trace import LEAVES, Expression, Tape
 
 LONGEST = 1_000  # nodes of one function
 OF_ONE = ("solution", "bias_rates")  # functions of linear.py, which take one state
-OPERATIONS = {"+": "add", "-": "sub", "*": "mul", "/": "sdiv"}
+OPERATIONS = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "neg": operator.neg,
+}
 
 
 @dataclass(frozen=True)
@@ -24,8 +34,8 @@ class Traced:
 
     name: str
     tape: Tape
-    inputs: list  # Expressions
-    outputs: list  # Expressions or numbers
+    inputs: list[Expression]
+    outputs: list[Scalar]  # Expressions or numbers
 
     @cached_property
     def nodes(self) -> list[int]:
@@ -34,23 +44,18 @@ class Traced:
     @property
     def length(self) -> float:
         """How many operations it has, those of a linear system that it has solved among them."""
-        solved = (
-            arguments for kind, arguments in map(self.tape.nodes.__getitem__, self.nodes) if kind == "call"
-        )
-        return len(self.nodes) + sum(len(arguments) ** 1.5 / 3 for arguments in solved)
+        calls = [self.tape.operands(i) for i in self.nodes if self.tape.nodes[i][0] == "call"]
+        return len(self.nodes) + sum((1 + len(arguments)) ** 1.5 / 3 for arguments in calls)
 
     @property
     def operations(self) -> int:
         """+ - * / and changes of sign; a sine, a cosine, a root count as one each."""
-        kinds = (self.tape.nodes[i] for i in self.nodes)
-        return sum(
-            kind not in ("input", "number", "call", "sincos", "item")
-            or (kind == "item" and self.tape.nodes[arguments[0]][0] == "sincos")
-            for kind, arguments in kinds
-        )
+        nodes = self.tape.nodes
+        of_calls = [i for i in self.nodes if nodes[i][0] == "item" and nodes[nodes[i][1][0]][0] == "call"]
+        return sum(nodes[i][0] not in (*LEAVES, "call", "sincos") for i in self.nodes) - len(of_calls)
 
 
-def trace(name: str, sizes: Iterable[int], function: Callable) -> Traced:
+def trace(name: str, sizes: Iterable[int], function: Callable[..., Sequence[Scalar]]) -> Traced:
     """function(*lists), each list of one of these sizes, which returns a list."""
     tape, count = Tape(), 0
     lists = []
@@ -58,7 +63,14 @@ def trace(name: str, sizes: Iterable[int], function: Callable) -> Traced:
         lists.append(tape.inputs(*range(count, count + size)))
         count += size
     outputs = function(*lists)
-    return Traced(name, tape, [x for part in lists for x in part], outputs)
+    return Traced(name, tape, [x for part in lists for x in part], list(outputs))
+
+
+class Handed(NamedTuple):
+    """Where the parts of a long function hand values to later ones."""
+
+    array: Value
+    places: dict[int, int]  # of nodes
 
 
 def functions(traced: Traced, width: int, inline: bool = False) -> list[Code]:
@@ -66,27 +78,23 @@ def functions(traced: Traced, width: int, inline: bool = False) -> list[Code]:
     steps = Steps(traced)
     if len(steps.order) <= LONGEST:
         code = entry(traced.name, "alwaysinline" if inline else "noinline")
-        values = {}
-        steps.write(code, steps.order, values, width, code["in"], code["out"], None)
-        code.give_back()
+        steps.write(code, steps.order, width, None)
         return [code]
     cuts = [steps.order[k : k + LONGEST] for k in range(0, len(steps.order), LONGEST)]
     places, size = steps.handed_on(cuts)
     main, result = entry(traced.name, "noinline"), []
     handed = main.reserve(wide(DOUBLE, width), size)
     for k, cut in enumerate(cuts):
-        part = entry(f"{traced.name}.{k}", "noinline", handed=True)
-        steps.write(part, cut, {}, width, part["in"], part["out"], (part["handed"], places))
-        part.give_back()
+        part = entry(f"{traced.name}.{k}", "noinline", "handed")
+        steps.write(part, cut, width, Handed(part["handed"], places))
         main.call(part.name, main["in"], main["out"], handed)
         result.append(part)
     main.give_back()
     return [*result, main]
 
 
-def entry(name: str, attributes: str, handed: bool = False) -> Code:
-    arguments = ["in", "out", *["handed"] * handed]
-    return Code(name, dict.fromkeys(arguments, POINTER), attributes=attributes, own=True)
+def entry(name: str, attributes: str, *more: str) -> Code:
+    return Code(name, dict.fromkeys(("in", "out", *more), POINTER), attributes=attributes)
 
 
 class Steps:
@@ -94,106 +102,103 @@ class Steps:
 
     def __init__(self, traced: Traced):
         tape, nodes = traced.tape, traced.nodes
-        self.tape, outputs = tape, [tape.lift(x) for x in traced.outputs]
-        self.fused, self.outputs = tape.fused(nodes, outputs), {}
-        taken = set(self.fused.values())
+        outputs = [tape.lift(x) for x in traced.outputs]
+        self.tape, self.fused = tape, tape.fused(nodes, outputs)
+        self.outputs: dict[int, list[int]] = {}  # the places of a node among the results
         for k, x in enumerate(outputs):
             self.outputs.setdefault(x.i, []).append(k)
         self.input = {x.i: k for k, x in enumerate(traced.inputs)}
-        self.items = {}  # of a node with several results, which of them are needed
-        self.order = []
+        self.items: dict[int, list[int]] = {}  # of a node with several results, which of them are needed
         for i in nodes:
-            kind, arguments = tape.nodes[i]
-            if kind == "item":
-                self.items.setdefault(arguments[0], []).append(i)
-            elif kind not in ("input", "number") and i not in taken:
-                self.order.append(i)
+            if tape.nodes[i][0] == "item":
+                self.items.setdefault(tape.nodes[i][1][0], []).append(i)
+        left_out = {*self.fused.values(), *(i for i in nodes if tape.nodes[i][0] in (*LEAVES, "item"))}
+        self.order = [i for i in nodes if i not in left_out]
 
     def takes(self, i: int) -> list[int]:
         """The values that a step takes."""
         arguments = self.tape.operands(i)
         if i in self.fused:
             product = self.fused[i]
-            arguments = [*(a for a in arguments if a != product), *self.tape.operands(product)]
+            arguments = *(a for a in arguments if a != product), *self.tape.operands(product)
         return [a for a in arguments if self.tape.nodes[a][0] != "number"]
 
-    def handed_on(self, cuts) -> tuple[dict[int, int], int]:
+    def handed_on(self, cuts: list[list[int]]) -> tuple[dict[int, int], int]:
         """The place of each value that a part hands to a later one, and how many places there are."""
-        part_of, last = {}, {}
+        made: list[list[int]] = [[] for _ in cuts]  # by each part
+        last: dict[int, int] = {}  # the part that takes a value last
         for k, cut in enumerate(cuts):
             for i in cut:
-                part_of |= dict.fromkeys(self.items.get(i, [i]), k)
-                last |= dict.fromkeys((a for a in self.takes(i) if a not in self.input), k)
-        leaving = [[] for _ in cuts]
-        free, places, size = [], {}, 0
-        for k in range(len(cuts)):
-            for i in (i for i, made in part_of.items() if made == k and last.get(i, k) > k):
-                if free:
-                    places[i] = free.pop()
-                else:
-                    places[i], size = size, size + 1
-                leaving[last[i]].append(places[i])
+                made[k] += self.items.get(i, [i])
+                last |= {a: k for a in self.takes(i) if a not in self.input}
+        leaving: list[list[int]] = [[] for _ in cuts]
+        free: list[int] = []
+        places: dict[int, int] = {}
+        size = 0
+        for k, values in enumerate(made):
+            for i in values:
+                if last.get(i, k) > k:
+                    places[i] = free.pop() if free else size
+                    size = max(size, places[i] + 1)
+                    leaving[last[i]].append(places[i])
             free += leaving[k]
         return places, max(size, 1)
 
-    def write(self, code, order, values, width, given, out, handed) -> None:
-        """The lines of some of the steps; values: what is known, by node."""
-        tape, kind = self.tape, wide(DOUBLE, width)
+    def write(self, code: Code, order: list[int], width: int, handed: Handed | None) -> None:
+        """The lines of some of the steps, of which those that hand values on and take them are given an array for it."""
+        tape, kind, out = self.tape, wide(DOUBLE, width), code["out"]
+        values: dict[int, Value] = {}
 
-        def value(i) -> Value:
+        def value(i: int) -> Value:
             if i not in values:
                 name, arguments = tape.nodes[i]
                 if name == "number":
                     values[i] = code.number(float(arguments[0]), kind)
                 elif i in self.input:
-                    values[i] = given.load(self.input[i] * width, kind)
-                else:
-                    array, places = handed
-                    values[i] = array.load(places[i] * width, kind)
+                    values[i] = code["in"].load(self.input[i] * width, kind)
+                elif handed:
+                    values[i] = handed.array.load(handed.places[i] * width, kind)
             return values[i]
 
         for i in order:
-            name, arguments = tape.nodes[i]
-            made = {}
-            if name == "sincos":
-                both = sincos(value(arguments[0]))
-                made = {item: both[tape.nodes[item][1][1]] for item in self.items[i]}
-            elif name == "call":
-                results = called(
-                    code, arguments[0], [value(a) for a in arguments[1:]], self.count_of(i), width
-                )
-                made = {item: results.load(tape.nodes[item][1][1] * width, kind) for item in self.items[i]}
-            elif i in self.fused:
-                product = self.fused[i]
-                x, y = map(value, tape.nodes[product][1])
-                (other,) = (a for a in arguments if a != product)
-                if name == "-" and arguments[0] != product:
-                    x = -x
-                plus = value(other) if name == "+" or arguments[0] != product else -value(other)
-                made[i] = x.fma(y, plus)
-            elif name == "neg":
-                made[i] = -value(arguments[0])
-            elif name == "sqrt":
-                made[i] = value(arguments[0]).function("sqrt")
-            elif name == "arctan":
-                made[i] = code.library("atan", value(arguments[0]))
-            else:
-                made[i] = value(arguments[0]).two(OPERATIONS[name], *map(value, arguments))
+            made = self.results(code, i, value, width)
             values |= made
-            for one, x in made.items():
-                for k in self.outputs.get(one, ()):
+            for node, x in made.items():
+                for k in self.outputs.get(node, ()):
                     out.store(x, k * width)
-                if handed and one in handed[1]:
-                    handed[0].store(x, handed[1][one] * width)
-        if order is self.order or order[-1] == self.order[-1]:  # inputs and numbers that are results too
-            for i, places in self.outputs.items():
-                if tape.nodes[i][0] in ("input", "number"):
-                    for k in places:
-                        out.store(value(i), k * width)
+                if handed and node in handed.places:
+                    handed.array.store(x, handed.places[node] * width)
+        if order[-1:] == self.order[-1:]:  # inputs and numbers that are results too
+            for i in [i for i in self.outputs if tape.nodes[i][0] in LEAVES]:
+                for k in self.outputs[i]:
+                    out.store(value(i), k * width)
+        code.give_back()
 
-    def count_of(self, call: int) -> int:
-        """How many results a call has, as far as they are needed."""
-        return 1 + max(self.tape.nodes[item][1][1] for item in self.items[call])
+    def results(self, code: Code, i: int, value: Callable[[int], Value], width: int) -> dict[int, Value]:
+        """The values that a step makes, by node; value: of a node before it."""
+        nodes = self.tape.nodes
+        name, arguments = nodes[i]
+        if name == "sincos":
+            both = sincos(value(arguments[0]))
+            return {item: both[nodes[item][1][1]] for item in self.items[i]}
+        if name == "call":
+            numbers = {item: nodes[item][1][1] for item in self.items[i]}
+            place = called(
+                code, arguments[0], [value(a) for a in arguments[1:]], 1 + max(numbers.values()), width
+            )
+            return {item: place.load(k * width, wide(DOUBLE, width)) for item, k in numbers.items()}
+        if i in self.fused:
+            product = self.fused[i]
+            x, y = map(value, nodes[product][1])
+            (other,) = (a for a in arguments if a != product)
+            if name == "-" and arguments[0] != product:
+                return {i: (-x).fma(y, value(other))}
+            return {i: x.fma(y, value(other) if name == "+" else -value(other))}
+        if name == "sqrt":
+            return {i: value(arguments[0]).function("sqrt")}
+        if name == "arctan":
+            return {i: code.library("atan", value(arguments[0]))}
+        return {i: OPERATIONS[name](*map(value, arguments))}
 
 
 def called(code: Code, name: str, values: list[Value], count: int, width: int) -> Value:
@@ -205,11 +210,11 @@ def called(code: Code, name: str, values: list[Value], count: int, width: int) -
     if width == 1 or name not in OF_ONE:
         code.call(name, given, out)
         return out
-    one, found = code.reserve(DOUBLE, len(values)), code.reserve(DOUBLE, count)
+    given_one, out_one = code.reserve(DOUBLE, len(values)), code.reserve(DOUBLE, count)
     with code.loop(width) as lane:
         with code.loop(len(values)) as loop:
-            one.store(given.load(loop.index * width + lane.index), loop.index)
-        code.call(name, one, found)
+            given_one.store(given.load(loop.index * width + lane.index), loop.index)
+        code.call(name, given_one, out_one)
         with code.loop(count) as loop:
-            out.store(found.load(loop.index), loop.index * width + lane.index)
+            out.store(out_one.load(loop.index), loop.index * width + lane.index)
     return out

@@ -8,22 +8,26 @@ What remains is the arithmetic of this one model.
 import math
 import operator
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from numbers import Real
+from typing import Any
 
 from tmt.derivation.vectors import arctan, cos, sin, sqrt
+from tmt.scalar import Scalar
 
-FOLD = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": operator.truediv,
-    "neg": operator.neg,
-    "sin": lambda x: math.sin(x) if isinstance(x, float) else sin(x),
-    "cos": lambda x: math.cos(x) if isinstance(x, float) else cos(x),
-    "sqrt": lambda x: math.sqrt(x) if isinstance(x, float) else sqrt(x),
-    "arctan": lambda x: math.atan(x) if isinstance(x, float) else arctan(x),
-}
+
+def folded(
+    of_float: Callable[[float], float], function: Callable[[Scalar], Scalar]
+) -> Callable[[Scalar], Scalar]:
+    """A function of a number, of a float by the C library."""
+    return lambda x: of_float(x) if isinstance(x, float) else function(x)
+
+
+FOLD: dict[str, Callable[..., Scalar]] = {
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "neg": operator.neg,
+    "sin": folded(math.sin, sin), "cos": folded(math.cos, cos), "sqrt": folded(math.sqrt, sqrt),
+    "arctan": folded(math.atan, arctan),
+}  # fmt: skip
 FUNCTIONS = ("sqrt", "arctan")
 LEAVES = ("input", "number")
 
@@ -34,34 +38,35 @@ class Tape:
     number: the type of the model's numbers: float, or an exact one that can be made from a float.
     """
 
-    def __init__(self, number: Callable = float):
+    def __init__(self, number: Callable[[Scalar], Scalar] = float):
         self.number_type = number
-        self.nodes = []  # (operation, arguments): arguments are indices, but a number or a name for a leaf
-        self.index = {}
+        # (operation, arguments): arguments are indices, but a number or a name for a leaf
+        self.nodes: list[tuple[str, tuple[Any, ...]]] = []
+        self.index: dict[tuple[str, tuple[Any, ...]], int] = {}
 
-    def node(self, operation, *arguments) -> "Expression":
+    def node(self, operation: str, *arguments: Any) -> "Expression":
         key = (operation, arguments)
         if key not in self.index:
             self.index[key] = len(self.nodes)
             self.nodes.append(key)
         return Expression(self, self.index[key])
 
-    def inputs(self, *names) -> list["Expression"]:
+    def inputs(self, *names: int | str) -> list["Expression"]:
         return [self.node("input", name) for name in names]
 
-    def call(self, function, arguments, count) -> list["Expression"]:
+    def call(self, function: str, arguments: Iterable[Scalar], count: int) -> list["Expression"]:
         """The `count` results of a function of that name, which compiled code calls."""
         call = self.node("call", function, *(self.lift(a).i for a in arguments))
         return [self.node("item", call.i, k) for k in range(count)]
 
-    def lift(self, value) -> "Expression":
+    def lift(self, value: Scalar) -> "Expression":
         if isinstance(value, Expression):
             return value
         return self.node("number", self.number_type(value))
 
     # one rule for each way in which an operation can become simpler
 
-    def add(self, a, b):
+    def add(self, a: "Expression", b: "Expression") -> "Expression":
         if 0.0 in (a.number, b.number):
             return a if b.number == 0.0 else b
         if b.negated is not None:
@@ -72,7 +77,7 @@ class Tape:
             return self.multiply(self.lift(2.0), a)
         return self.merged("+", a, b) or self.node("+", *sorted((a.i, b.i)))
 
-    def subtract(self, a, b):
+    def subtract(self, a: "Expression", b: "Expression") -> "Expression":
         if a.i == b.i:
             return self.lift(0.0)
         if b.number == 0.0:
@@ -85,7 +90,7 @@ class Tape:
             return self.negative(self.add(a.negated, b))
         return self.node("-", a.i, b.i)
 
-    def multiply(self, a, b):
+    def multiply(self, a: "Expression", b: "Expression") -> "Expression":
         if 0.0 in (a.number, b.number):
             return self.lift(0.0)
         if 1.0 in (a.number, b.number):
@@ -97,7 +102,7 @@ class Tape:
                 return self.negative(self.multiply(self.lift(-one.number), other))
         return self.merged("*", a, b) or self.node("*", *sorted((a.i, b.i)))
 
-    def divide(self, a, b):
+    def divide(self, a: "Expression", b: "Expression") -> "Expression":
         if b.number == 1.0 or a.number == 0.0:
             return a
         if a.negated is not None:
@@ -106,12 +111,12 @@ class Tape:
             return self.negative(self.divide(a, b.negated))
         return self.node("/", a.i, b.i)
 
-    def negative(self, a):
+    def negative(self, a: "Expression") -> "Expression":
         if a.number is not None:
             return self.lift(-a.number)
         return self.node("neg", a.i) if a.negated is None else a.negated
 
-    def merged(self, operation, a, b):
+    def merged(self, operation: str, a: "Expression", b: "Expression") -> "Expression | None":
         """c1 o (c2 o x) as (c1 o c2) o x for numbers c1, c2: else None."""
         for one, other in ((a, b), (b, a)):
             if one.number is not None and self.nodes[other.i][0] == operation:
@@ -121,20 +126,27 @@ class Tape:
                     return self.apply(operation, self.apply(operation, one, inner[0]), inner[1])
         return None
 
-    def apply(self, operation, *values) -> "Expression":
+    def apply(self, operation: str, *operands: Scalar) -> "Expression":
         """The expression for one operation, simplified."""
-        values = [self.lift(v) for v in values]
-        numbers = [v.number for v in values]
+        values = [self.lift(operand) for operand in operands]
+        numbers = [value.number for value in values]
         if None not in numbers:
             return self.lift(FOLD[operation](*numbers))
         if operation in ("sin", "cos"):
             return self.node("item", self.node("sincos", values[0].i).i, ("sin", "cos").index(operation))
         if operation in FUNCTIONS:
             return self.node(operation, values[0].i)
-        rule = {"+": self.add, "-": self.subtract, "*": self.multiply, "/": self.divide, "neg": self.negative}
-        return rule[operation](*values)
+        rules: dict[str, Callable[..., Expression]]
+        rules = {
+            "+": self.add,
+            "-": self.subtract,
+            "*": self.multiply,
+            "/": self.divide,
+            "neg": self.negative,
+        }
+        return rules[operation](*values)
 
-    def fused(self, order, outputs) -> dict[int, int]:
+    def fused(self, order: list[int], outputs: list["Expression"]) -> dict[int, int]:
         """For each sum or difference that takes one up, a product that is used nowhere else."""
         uses = Counter(o.i for o in outputs)
         for i in order:
@@ -148,9 +160,10 @@ class Tape:
                     chosen[i] = products[-1]  # the later one: the other is ready earlier
         return chosen
 
-    def needed(self, outputs) -> list[int]:
+    def needed(self, outputs: list["Expression"]) -> list[int]:
         """The nodes on which the outputs depend, in order."""
-        needed, open_ = set(), [o.i for o in outputs]
+        needed: set[int] = set()
+        open_ = [o.i for o in outputs]
         while open_:
             i = open_.pop()
             if i not in needed:
@@ -158,11 +171,14 @@ class Tape:
                 open_ += self.operands(i)
         return sorted(needed)
 
-    def operands(self, i) -> tuple:
+    def operands(self, i: int) -> tuple[int, ...]:
+        """The nodes that a node is computed from."""
         operation, arguments = self.nodes[i]
         if operation in LEAVES:
             return ()
-        return arguments[1:] if operation == "call" else arguments[:1] if operation == "item" else arguments
+        if operation == "call":
+            return arguments[1:]
+        return arguments[:1] if operation == "item" else arguments
 
 
 class Expression:
@@ -171,59 +187,57 @@ class Expression:
     __slots__ = ("i", "tape")
     __array_ufunc__ = None
 
-    def __init__(self, tape, i):
+    def __init__(self, tape: Tape, i: int):
         self.tape, self.i = tape, i
 
     @property
-    def number(self):
+    def number(self) -> Scalar | None:
         """The value, if it is known without running: else None."""
         operation, arguments = self.tape.nodes[self.i]
         return arguments[0] if operation == "number" else None
 
     @property
-    def negated(self):
+    def negated(self) -> "Expression | None":
         """x, if this is -x: else None."""
         operation, arguments = self.tape.nodes[self.i]
         return Expression(self.tape, arguments[0]) if operation == "neg" else None
 
     @property
-    def name(self):
+    def name(self) -> str:
         """The name of an input."""
         return self.tape.nodes[self.i][1][0]
 
-    def apply(self, operation, *values):
+    def apply(self, operation: str, *values: Scalar) -> Scalar:
         """The expression for an operation; NotImplemented if another kind of scalar takes part, which then decides."""
         if all(isinstance(value, (Expression, Real)) for value in values):
             return self.tape.apply(operation, *values)
         return NotImplemented
 
-    def __neg__(self):
+    def __neg__(self) -> Scalar:
         return self.apply("neg", self)
 
-    def __add__(self, other):
+    def __add__(self, other: Scalar) -> Scalar:
         return self.apply("+", self, other)
 
     __radd__ = __add__
 
-    def __mul__(self, other):
+    def __mul__(self, other: Scalar) -> Scalar:
         return self.apply("*", self, other)
 
     __rmul__ = __mul__
 
-    def __sub__(self, other):
+    def __sub__(self, other: Scalar) -> Scalar:
         return self.apply("-", self, other)
 
-    def __rsub__(self, other):
+    def __rsub__(self, other: Scalar) -> Scalar:
         return self.apply("-", other, self)
 
-    def __truediv__(self, other):
+    def __truediv__(self, other: Scalar) -> Scalar:
         return self.apply("/", self, other)
 
-    def __rtruediv__(self, other):
+    def __rtruediv__(self, other: Scalar) -> Scalar:
         return self.apply("/", other, self)
 
 
-sin.register(Expression, lambda angle: angle.tape.apply("sin", angle))
-cos.register(Expression, lambda angle: angle.tape.apply("cos", angle))
-sqrt.register(Expression, lambda value: value.tape.apply("sqrt", value))
-arctan.register(Expression, lambda value: value.tape.apply("arctan", value))
+for name, function in (("sin", sin), ("cos", cos), ("sqrt", sqrt), ("arctan", arctan)):
+    function.register(Expression, lambda x, name=name: x.tape.apply(name, x))

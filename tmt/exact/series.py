@@ -18,6 +18,7 @@ from .pairs import add, divide, joined, multiply, root, sincos, two_sum
 
 ADD, SUBTRACT, NEGATIVE, SCALE, SLOPE, MULTIPLY, ROOT, DIVIDE, SINE, COSINE, RATE = range(11)
 BESIDE = 2  # products of a sum of products side by side
+BACKWARD = list(reversed(range(BESIDE)))
 
 
 def expand(code: np.ndarray, high: np.ndarray, low: np.ndarray) -> None:
@@ -53,7 +54,7 @@ def source() -> str:
 
 def sincos_of_pair() -> Code:
     """sincos(out, high, low): four doubles."""
-    code = Code("sincos", {"out": POINTER, "high": DOUBLE, "low": DOUBLE}, attributes="noinline", own=True)
+    code = Code("sincos", {"out": POINTER, "high": DOUBLE, "low": DOUBLE}, attributes="noinline")
     for k, x in enumerate(sincos(code["high"], code["low"])):
         code["out"].store(x, k)
     code.give_back()
@@ -78,7 +79,13 @@ def convolution(code: Code, a: Value, b: Value, first: Value, last: Value) -> tu
     whole = count / BESIDE * BESIDE
     with code.loop(whole, BESIDE) as loop:
         at = first + loop.index
-        take(a + at, b - at - (BESIDE - 1), totals, errors, lambda place, at: place.load(at, kind).backward())
+        take(
+            a + at,
+            b - at - (BESIDE - 1),
+            totals,
+            errors,
+            lambda place, at: place.load(at, kind).shuffled(BACKWARD),
+        )
     total, error = Variable(code, DOUBLE, totals.get().lane(0)), Variable(code, DOUBLE, errors.get().lane(0))
     for l in range(1, BESIDE):
         sum_, rounded = two_sum(total.get(), totals.get().lane(l))
@@ -130,7 +137,7 @@ def expansion() -> Code:
             put(*divide(ah, al, times + 1.0, code.number(0.0)), at=r + k + 1)
         with code.when(when(MULTIPLY)):
             put(*convolution(code, a, b + k, code.number(0, INDEX), k))
-        later = at_first.bits("xor", True)
+        later = at_first.negated()
         is_root = when(ROOT)
         with code.when(when(DIVIDE).bits("or", is_root.bits("and", later))):
             # c_0 and the other factors of c_j, j > 0; of a root c itself

@@ -4,31 +4,27 @@ The same lines integrate floats, dual numbers (their exact Jacobian), mpmath num
 code, see tmt.compiled). METHODS may be given further ones, and objects of a user's own that have a `slope` and a `step`.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from tmt.derivation.method import mass_matrix_and_bias, reduced_force
 from tmt.methods import dop853
 from tmt.methods.derivatives import amplification as amplification
 from tmt.methods.derivatives import one_step as one_step
+from tmt.methods.dynamics import Values
 from tmt.methods.implicit import ImplicitRungeKutta
 from tmt.methods.semi_implicit import SemiImplicitEuler as SemiImplicitEuler
 from tmt.methods.semi_implicit import by_speed as by_speed
 from tmt.methods.semi_implicit import lone_speeds as lone_speeds
-from tmt.methods.stepping import (
-    Method,
-    advance,
-    checked_sums,
-    checked_tableau,
-    completed,
-    increments,
-    left_over,
-)
+from tmt.methods.stepping import Joints, Method, Slope, State, advance, completed, increments
+from tmt.methods.tableau import Numbers, Tableau
 from tmt.model.coordinates import FLAT
 from tmt.model.values import shown
+from tmt.scalar import Scalar
+
+Slopes = tuple[list[Values], list[Values]]  # of all stages: rates of the movement, and accelerations
 
 
 @dataclass(frozen=True)
-class RungeKutta(Method):
+class RungeKutta(Tableau):
     """An explicit Runge-Kutta method, given by its Butcher tableau.
 
     Applied to (q, qd) as one first-order system, like MuJoCo's RK4; to balls as Munthe-Kaas does, who keeps the order: what is
@@ -36,45 +32,28 @@ class RungeKutta(Method):
     sum to c, or b does not sum to 1.
     """
 
-    order: int = field()  # it must be given, though Method has a default
-    A: tuple  # row i: the weights of stages 0 .. i-1 in stage i
-    b: tuple  # the weights of the stages in the step
-    c: tuple  # the time of each stage in units of dt
     # balls turn by the weighted mean of their speeds, as MuJoCo's RK4 up to 3.17: then of order 2
     mean_speed: bool = False
 
-    def __post_init__(self):
-        checked_tableau(self, "A")
-        if not len(self.A) == len(self.b) == len(self.c):
-            raise ValueError("A, b and c must have one entry for each stage")
-        for i, row in enumerate(self.A):
-            if len(row) != i:
-                raise ValueError(f"row {i} of A has {len(row)} entries; an explicit method has {i}")
-        checked_sums(self)
+    def check_row(self, i: int, row: Numbers) -> None:
+        if len(row) != i:
+            raise ValueError(f"row {i} of A has {len(row)} entries; an explicit method has {i}")
 
-    def matrix(self, tree, q, qd, dt, terms=mass_matrix_and_bias):
-        """The matrix of the linear system for the slope: Mbar."""
-        return terms(tree, q, [0.0] * len(tree.axis))[0]
-
-    def residual(self, tree, a, q, qd, tau, dt, terms=mass_matrix_and_bias):
-        """Mbar a - Qbar (nv,): zero where a is the slope, and linear in a."""
-        M, h = terms(tree, q, qd)
-        return left_over(M, a, reduced_force(tree, h, q, qd, tau))
-
-    def step(self, slope, q, qd, dt, joints=FLAT):
+    def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
         """The state (q, qd) one dt later, from `slope(q, qd)` at each stage."""
         return self.combined(self.stage_slopes(slope, q, qd, dt, joints), q, qd, dt, joints)
 
-    def stage_slopes(self, slope, q, qd, dt, joints):
+    def stage_slopes(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints) -> Slopes:
         """The rates and the accelerations of all stages; the rates are those of the movement from q, see coordinates.py."""
-        rates, changes = [], []
+        rates: list[Values] = []
+        changes: list[Values] = []
         for row in self.A:
             u, qd_i = increments(dt, row, rates, len(qd)), advance(qd, dt, row, changes)
             rates.append(qd_i if self.mean_speed else joints.rates(u, qd_i))
             changes.append(slope(joints.move(q, u), qd_i))
         return rates, changes
 
-    def combined(self, slopes, q, qd, dt, joints):
+    def combined(self, slopes: Slopes, q: Values, qd: Values, dt: Scalar, joints: Joints) -> State:
         """The state one dt later, from the rates and accelerations of all stages."""
         rates, changes = slopes
         return joints.move(q, increments(dt, self.b, rates, len(qd))), advance(qd, dt, self.b, changes)
@@ -88,20 +67,24 @@ class AdaptiveRungeKutta(RungeKutta):
     the estimates e5 and e3 combine to e5^2 / sqrt(e5^2 + 0.01 e3^2) (Hairer, Norsett, Wanner, section II.10).
     """
 
-    errors: tuple = ()  # weights of the stages in the two estimates, of the movement and of the speeds
+    errors: tuple[
+        Numbers, ...
+    ] = ()  # weights of the stages in the two estimates, of the movement and of the speeds
 
     adaptive = True
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
-        checked_tableau(self, "errors")
+        self.make_plain("errors")
         if len(self.errors) != 2 or any(len(row) != len(self.b) for row in self.errors):
             raise ValueError("errors must be two rows of one weight for each stage")
 
-    def attempt(self, slope, q, qd, dt, joints=FLAT):
+    def attempt(
+        self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT
+    ) -> tuple[Values, ...]:
         """A step, and the two estimates of its error, each for the movement and qd."""
         slopes = self.stage_slopes(slope, q, qd, dt, joints)
-        estimates = [[*advance([0.0] * len(qd), dt, e, part)] for e in self.errors for part in slopes]
+        estimates = [increments(dt, weights, part, len(qd)) for weights in self.errors for part in slopes]
         return *self.combined(slopes, q, qd, dt, joints), *estimates
 
 

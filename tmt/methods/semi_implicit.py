@@ -1,13 +1,18 @@
 """The semi-implicit Euler method: what MuJoCo calls Euler, implicitfast, implicit and discrete."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar
 
-from tmt.derivation import articulated
-from tmt.derivation.method import bias_rates, mass_matrix_and_bias, reduced_force
-from tmt.derivation.vectors import solve_any
-from tmt.methods.stepping import Method, advance, increments, left_over
+from tmt.methods.dynamics import LITERAL, Implicit, Terms, Values, dynamics_of
+from tmt.methods.stepping import Joints, Method, Slope, State, advance, increments
 from tmt.model.coordinates import FLAT
+from tmt.model.tree import Tree
+from tmt.scalar import Scalar
+
+T = TypeVar("T")
+Gains = Sequence[Sequence[float]]
 
 
 @dataclass(frozen=True)
@@ -30,118 +35,65 @@ class SemiImplicitEuler(Method):
 
     damps_implicitly = True
 
-    def gains_held(self, tree) -> tuple:
+    def gains_held(self, tree: Tree) -> tuple[Gains, Gains]:
         """The implicit entries of a controller's gains, of position and of speed: (nv, nv) each, () where there are none."""
         if self.implicit_springs:
-            return tree.position_gain, tree.speed_gain
+            return (tree.position_gain, tree.speed_gain)
         if not (self.implicit_gains and tree.speed_gain):
             return (), ()
-        both = zip(tree.speed_gain, on_one_path(tree))
-        return (), tuple(tuple(gain if one else 0.0 for gain, one in zip(*rows)) for rows in both)
+        connected = zip(tree.speed_gain, on_one_path(tree))
+        return (), tuple([gain if is_on else 0.0 for gain, is_on in zip(*rows)] for rows in connected)
 
-    def matrix(self, tree, q, qd, dt, terms=mass_matrix_and_bias):
-        """The matrix of the linear system for the slope: Mbar + dt D [+ dt dh/dqd] [+ dt S] [+ dt^2 k + dt^2 P]."""
-        n = len(qd)
-        matrix = terms(tree, q, [0.0] * n)[0]
-        held = [dt * d for d in tree.damping]
-        if self.implicit_springs and tree.has_springs:
-            held = [x + dt * dt * k for x, k in zip(held, by_speed(tree, tree.stiffness))]
-        matrix = [[matrix[i][j] + (held[i] if i == j else 0.0) for j in range(n)] for i in range(n)]
-        lone = lone_speeds(tree) if self.lone_bodies else set()
-        if self.implicit_bias or lone:
-            rates = bias_rates(tree, q, qd, terms)
-            own = range(n) if self.implicit_bias else lone
-            added = [[dt * rate if i in own else 0.0 for rate in row] for i, row in enumerate(rates)]
-            matrix = [[x + y for x, y in zip(*rows)] for rows in zip(matrix, added)]
-        for gain, power in zip(self.gains_held(tree), (2, 1)):
-            if gain:
-                share = dt * dt if power == 2 else dt
-                matrix = [[x + share * g if g else x for x, g in zip(*rows)] for rows in zip(matrix, gain)]
-        return matrix
-
-    def residual(self, tree, a, q, qd, tau, dt, terms=mass_matrix_and_bias):
-        """What a leaves of the linear system above, (nv,): zero where it is the slope, and linear in a.
-
-        dh/dqd a is (h(qd + a) - h(qd - a)) / 2, as h is quadratic in the speeds.
-        """
-        M, h = terms(tree, q, qd)
-        force = reduced_force(tree, h, q, qd, tau)
-        held = [dt * d for d in tree.damping]
-        if self.implicit_springs and tree.has_springs:
-            stiffness = by_speed(tree, tree.stiffness)
-            force = [f - dt * k * v for f, k, v in zip(force, stiffness, qd)]
-            held = [x + dt * dt * k for x, k in zip(held, stiffness)]
-        left = [x + d * y for x, d, y in zip(left_over(M, a, force), held, a)]
-        position_gain, speed_gain = self.gains_held(tree)
-        if position_gain:
-            moved = [dt * (v + dt * y) for v, y in zip(qd, a)]
-            left = [x + weighted(row, moved) for x, row in zip(left, position_gain)]
-        if speed_gain:
-            left = [x + weighted(row, [dt * y for y in a]) for x, row in zip(left, speed_gain)]
-        if (
-            own := set(range(len(qd)))
-            if self.implicit_bias
-            else lone_speeds(tree)
-            if self.lone_bodies
-            else ()
-        ):
-            ahead, behind = (terms(tree, q, [v + sign * x for v, x in zip(qd, a)])[1] for sign in (1.0, -1.0))
-            left = [x + 0.5 * dt * (ahead[i] - behind[i]) if i in own else x for i, x in enumerate(left)]
-        return left
-
-    def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):
-        """a from the linear system above."""
-        force = reduced_force(tree, terms(tree, q, qd)[1], q, qd, tau)
-        if self.implicit_springs and tree.has_springs:
-            force = [f - dt * k * v for f, k, v in zip(force, by_speed(tree, tree.stiffness), qd)]
-        if position_gain := self.gains_held(tree)[0]:
-            force = [f - weighted(row, [dt * v for v in qd]) for f, row in zip(force, position_gain)]
-        solution = getattr(terms, "solve_any", solve_any)
-        return solution(self.matrix(tree, q, qd, dt, terms), force)
-
-    def articulates(self, tree) -> bool:
-        """Whether all that is implicit acts at single joints alone: then it counts as armature."""
-        across = any(
-            g
-            for gain in self.gains_held(tree)
-            for i, row in enumerate(gain)
-            for j, g in enumerate(row)
-            if i != j
+    def held(self, tree: Tree) -> tuple[Gains, Gains]:
+        """All that acts implicitly, as stiffness and as damping, (nv, nv) each."""
+        n = len(tree.axis)
+        stiffness = (
+            by_speed(tree, tree.stiffness) if self.implicit_springs and tree.has_springs else [0.0] * n
         )
-        return not (self.implicit_bias or (self.lone_bodies and lone_speeds(tree)) or across)
+        position_gain, speed_gain = self.gains_held(tree)
+        return with_diagonal(position_gain, stiffness), with_diagonal(speed_gain, tree.damping)
 
-    def articulated(self, tree, q, qd, tau, dt):
-        """The slope with dt D + dt^2 k and the gains' dt S + dt^2 P as armature, and dt k and dt P as damping."""
-        force, stiffness = reduced_force(tree, [0.0] * len(qd), q, qd, tau), by_speed(tree, tree.stiffness)
-        held, (position_gain, speed_gain) = [0.0] * len(qd), self.gains_held(tree)
-        if self.implicit_springs:
-            held = [k + (position_gain[i][i] if position_gain else 0.0) for i, k in enumerate(stiffness)]
-        force = [f - dt * k * v if k else f for f, k, v in zip(force, held, qd)]
-        armature = [
-            rotor + dt * (d + (speed_gain[i][i] if speed_gain else 0.0) + dt * k)
-            for i, (rotor, d, k) in enumerate(zip(tree.armature, tree.damping, held))
-        ]
-        return articulated.acceleration(tree, q, qd, force, armature)
+    def implicit(self, tree: Tree, qd: Values, dt: Scalar) -> Implicit:
+        """What the linear system above has beside Mbar and Qbar."""
+        (stiff, damped), powers, moved = self.held(tree), (dt, dt * dt), [dt * v for v in qd]
+        matrix = [[weighted(entry, powers) for entry in zip(*rows)] for rows in zip(damped, stiff)]
+        pull = [weighted(row, moved) for row in stiff]
+        alone = lone_speeds(tree) if self.lone_bodies else frozenset()
+        return Implicit(matrix, pull, dt, frozenset(range(len(qd))) if self.implicit_bias else alone)
 
-    def step(self, slope, q, qd, dt, joints=FLAT):
+    def slope(
+        self, tree: Tree, q: Values, qd: Values, tau: Values, dt: Scalar, terms: Terms = LITERAL
+    ) -> Values:
+        """a from the linear system above."""
+        return dynamics_of(terms).acceleration(tree, q, qd, tau, self.implicit(tree, qd, dt))
+
+    def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
         """The state (q, qd) one dt later."""
         qd = advance(qd, dt, (1.0,), [slope(q, qd)])
         return joints.move(q, increments(dt, (1.0,), [qd], len(qd))), qd
 
 
-def by_speed(tree, of_joints) -> list:
+def with_diagonal(gains: Gains, diagonal: Sequence[float]) -> Gains:
+    """A matrix of gains, if there are any, with these numbers added on its diagonal."""
+    rows = gains or [[0.0] * len(diagonal) for _ in diagonal]
+    return [
+        [x + d if i == j else x for j, x in enumerate(row)] for i, (row, d) in enumerate(zip(rows, diagonal))
+    ]
+
+
+def by_speed(tree: Tree, of_joints: Iterable[T]) -> list[T]:
     """For each speed the value of its joint."""
     pairs = zip(of_joints, tree.coordinates.joints)
     return [value for value, joint in pairs for _ in range(joint.qd.start, joint.qd.stop)]
 
 
-def weighted(row, values):
+def weighted(row: Sequence[float], values: Sequence[Scalar]) -> Scalar:
     """The sum of the entries of a row times values; 0.0 where all are zero."""
     return sum((g * x for g, x in zip(row, values) if g), 0.0)
 
 
 @lru_cache(maxsize=64)
-def on_one_path(tree) -> list:
+def on_one_path(tree: Tree) -> list[list[bool]]:
     """Whether the joints of two speeds lie on one path to the world, (nv, nv)."""
     before = [{i} for i in range(len(tree.parent))]
     for i, parent in enumerate(tree.parent):
@@ -151,15 +103,14 @@ def on_one_path(tree) -> list:
 
 
 @lru_cache(maxsize=64)
-def lone_speeds(tree) -> set:
+def lone_speeds(tree: Tree) -> frozenset[int]:
     """The speeds of free bodies that stand alone: three slides and a ball from the world, and nothing on them."""
-    lone = set()
-    for i, kind in enumerate(tree.kind):
+    lone: set[int] = set()
+    for i in range(3, len(tree.kind)):
         chain = [i - 3, i - 2, i - 1, i]
-        free = kind == "ball" and i >= 3 and [tree.kind[j] for j in chain] == ["slide"] * 3 + ["ball"]
-        alone = (
-            i not in tree.parent and tree.body_joint.count(i) == 1 and not {*chain[:3]} & {*tree.body_joint}
-        )
-        if free and alone and [tree.parent[j] for j in chain] == [-1, *chain[:3]]:
-            lone |= set(range(tree.coordinates.joints[i - 3].qd.start, tree.coordinates.joints[i].qd.stop))
-    return lone
+        is_free = [tree.kind[j] for j in chain] == ["slide", "slide", "slide", "ball"]
+        from_world = [tree.parent[j] for j in chain] == [-1, *chain[:3]]
+        carries_one_body = i not in tree.parent and [b for b in tree.body_joint if b in chain] == [i]
+        if is_free and from_world and carries_one_body:
+            lone.update(range(tree.coordinates.joints[i - 3].qd.start, tree.coordinates.joints[i].qd.stop))
+    return frozenset(lone)

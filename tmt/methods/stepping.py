@@ -3,14 +3,19 @@
 The rest of tmt asks these fields and never a type. An object that is not made from Method gets the defaults, see `completed`.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
+from typing import Any
 
-import numpy as np
+from tmt.methods.dynamics import LITERAL, Terms, Values, dynamics_of
+from tmt.model.coordinates import FLAT, Coordinates, Flat
+from tmt.model.tree import Tree
+from tmt.model.values import shown
+from tmt.scalar import Scalar
 
-from tmt.derivation import articulated
-from tmt.derivation.method import acceleration, mass_matrix_and_bias, reduced_force
-from tmt.model.values import real_numbers, shown
+Slope = Callable[[Values, Values], Values]
+State = tuple[Values, Values]
+Joints = Coordinates | Flat
 
 
 class Method:
@@ -21,7 +26,7 @@ class Method:
     with balls it is given their coordinates too (see coordinates.py), `step(slope, q, qd, dt, joints)`: q is longer than qd.
     """
 
-    order = 1  # the error of a run falls with dt to this power
+    order: int = 1  # the error of a run falls with dt to this power
     adaptive = (
         False  # chooses its own steps, takes a tolerance and has an `attempt`, as AdaptiveRungeKutta does
     )
@@ -42,60 +47,54 @@ class Method:
             raise ValueError(
                 "it solves its stages and does not say how many they are; a field stages is expected"
             )
-        asked = []
+        positions = []
 
-        def slope(q, qd):
-            asked.append(q)
+        def slope(q: Values, qd: Values) -> Values:
+            positions.append(q)
             return [0.0]
 
         try:
             self.step(slope, [0.0], [0.0], 1.0)
         except Exception as error:  # a step of the user's own
-            raise ValueError(
-                f"its stages cannot be counted, as its step of one hinge fails: {shown(error)}"
-            ) from error
-        return len(asked)
+            why = f"its stages cannot be counted, as its step of one hinge fails: {shown(error)}"
+            raise ValueError(why) from error
+        return len(positions)
 
-    def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):
-        """qdd from Mbar qdd = tau - D qd - h; terms: the function that gives Mbar and h."""
-        return acceleration(tree, q, qd, tau, terms)
+    def slope(
+        self, tree: Tree, q: Values, qd: Values, tau: Values, dt: Scalar, terms: Terms = LITERAL
+    ) -> Values:
+        """qdd from Mbar qdd = tau - D qd - h; terms: Dynamics, or a function that gives Mbar and h."""
+        return dynamics_of(terms).acceleration(tree, q, qd, tau)
 
-    def articulates(self, tree) -> bool:
-        """Whether `articulated` is the slope for a tree."""
-        return True
-
-    def articulated(self, tree, q, qd, tau, dt):
-        """The slope by articulated bodies, with fewer operations for large trees; not asked where `slope` is another since."""
-        return articulated.acceleration(tree, q, qd, reduced_force(tree, [0.0] * len(qd), q, qd, tau))
+    def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
+        """The state (q, qd) one dt later, from `slope(q, qd)`."""
+        raise NotImplementedError
 
 
-def stepped(stepping, tree, slope, q, qd, dt) -> tuple[list, list]:
+def stepped(stepping: Method, tree: Tree, slope: Slope, q: Values, qd: Values, dt: Scalar) -> State:
     """The state (q, qd) of a tree one dt later by a method that asks `slope(q, qd)`."""
     joints = tree.coordinates
     return stepping.step(slope, q, qd, dt, joints) if joints.balls else stepping.step(slope, q, qd, dt)
 
 
 OVERFLOW, TURNED, NEWTON, SMALL = 1, 2, 3, 4  # why a run ends; 0: it does not
-FIELDS = dict.fromkeys(("adaptive", "solves_stages", "damps_implicitly", "lanes"), bool) | {
-    "order": int,
-    "stages": int,
-}
-EXPECTED = "a hashable method with a slope and a step is expected"
+FLAGS, COUNTS = ("adaptive", "solves_stages", "damps_implicitly", "lanes"), ("order", "stages")
+FIELDS = dict.fromkeys(FLAGS, "True or False") | dict.fromkeys(COUNTS, "a whole number of at least 1")
+ACTS = ("slope", "step")
 NEEDS = {"adaptive": ("attempt",), "solves_stages": ("stage_states", "finish")}
+EXPECTED = "a hashable method with a slope and a step is expected"
 
 
-@dataclass(frozen=True)
 class Completed(Method):
     """An object that is not made from Method, with the defaults of Method for the fields that it lacks."""
 
-    own: object
+    def __init__(self, stepping: object):  # of a user's own class
+        for name in (*ACTS, *FIELDS, *NEEDS["adaptive"], *NEEDS["solves_stages"]):
+            if hasattr(stepping, name):
+                setattr(self, name, getattr(stepping, name))
 
-    def __post_init__(self):
-        names = {"slope", "step", *FIELDS, *(part for parts in NEEDS.values() for part in parts)}
-        vars(self).update({name: getattr(self.own, name) for name in names if hasattr(self.own, name)})
 
-
-def completed(stepping) -> Method:
+def completed(stepping: object) -> Method:
     """The object as a method with all fields of Method; ValueError if it is no method, or says what cannot be."""
     try:
         hash(stepping)
@@ -105,63 +104,30 @@ def completed(stepping) -> Method:
 
 
 @lru_cache(maxsize=64)
-def _completed(stepping):
-    if not all(callable(getattr(stepping, act, None)) for act in ("slope", "step")):
+def _completed(stepping: object) -> Method:
+    if not all(callable(getattr(stepping, act, None)) for act in ACTS):
         raise ValueError(EXPECTED)
-    if not all(hasattr(stepping, name) for name in FIELDS):
-        stepping = Completed(stepping)
-    for name, kind in FIELDS.items():
-        value = getattr(stepping, name)
-        if type(value) is not kind or (kind is int and value < 1):
-            accepted = {bool: "True or False", int: "a whole number of at least 1"}[kind]
+    complete = stepping if isinstance(stepping, Method) else Completed(stepping)
+    for name, accepted in FIELDS.items():
+        value: Any = getattr(complete, name)
+        is_right = isinstance(value, bool) if name in FLAGS else type(value) is int and value >= 1
+        if not is_right:
             raise ValueError(f"its {name} is {shown(value)}, where {accepted} is expected")
     for name, parts in NEEDS.items():
-        if lacking := [part for part in parts if getattr(stepping, name) and not hasattr(stepping, part)]:
-            raise ValueError(f"its {name} is {getattr(stepping, name)}, but it has no {lacking[0]}")
-    return stepping
+        if lacking := [part for part in parts if getattr(complete, name) and not hasattr(complete, part)]:
+            raise ValueError(f"its {name} is {getattr(complete, name)}, but it has no {lacking[0]}")
+    return complete
 
 
-def checked_tableau(method, *rows) -> None:
-    """Make order, b, c and these rows of a tableau plain numbers: a method is a value, and a key of what is compiled for it."""
-    order = method.order
-    if not isinstance(order, int) or isinstance(order, bool) or not 1 <= order <= 100:
-        raise ValueError(f"order of the method is {shown(order)}; a whole number from 1 to 100 is expected")
-    for name in ("b", "c", *rows):
-        given = getattr(method, name)
-        try:
-            parts = [real_numbers(part) for part in (given if name in rows else [given])]
-        except TypeError:  # one number where rows are expected
-            parts = [None]
-        if any(part is None or part.ndim != 1 or not np.isfinite(part).all() for part in parts):
-            wanted = "rows of numbers" if name in rows else "numbers"
-            raise ValueError(f"{name} of the method is {shown(given)}; {wanted} are expected")
-        parts = tuple(tuple(part.tolist()) for part in parts)
-        object.__setattr__(method, name, parts if name in rows else parts[0])
-
-
-def checked_sums(method) -> None:
-    """Raise ValueError unless every row of A sums to c and b to 1."""
-    for i, (row, c) in enumerate(zip(method.A, method.c)):
-        if abs(sum(row) - c) > 1e-14:
-            raise ValueError(f"row {i} of A sums to {sum(row)}, not to c = {c}")
-    if abs(sum(method.b) - 1.0) > 1e-14:
-        raise ValueError(f"b sums to {sum(method.b)}, not to 1")
-
-
-def increments(dt, weights, slopes, n) -> list:
+def increments(dt: Scalar, weights: Sequence[float], slopes: Sequence[Values], n: int) -> Values:
     """dt * sum of weights * slopes, (n,); 0.0 where there are none."""
     return advance([0.0] * n, dt, weights, slopes)
 
 
-def advance(start, dt, weights, slopes):
+def advance(start: Values, dt: Scalar, weights: Sequence[float], slopes: Sequence[Values]) -> Values:
     """start + dt * sum of weights * slopes, component by component."""
     result = []
     for k, value in enumerate(start):
         terms = [slope[k] if w == 1.0 else w * slope[k] for w, slope in zip(weights, slopes) if w != 0.0]
         result.append(value + dt * sum(terms[1:], terms[0]) if terms else value)
     return result
-
-
-def left_over(M, a, force) -> list:
-    """M a - force."""
-    return [sum((m * x for m, x in zip(row, a)), f * -1.0) for row, f in zip(M, force)]

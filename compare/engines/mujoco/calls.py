@@ -11,7 +11,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from tmt.compiled import Library
+from tmt.compiled.machine import Library
 
 from .dynamics import MujocoDynamics
 from .names import bit

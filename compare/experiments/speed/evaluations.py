@@ -1,5 +1,6 @@
 """What one evaluation of the dynamics costs: MuJoCo's calls, and the ways of tmt."""
 
+import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -8,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import tmt
-from tmt.compiled import evaluator, runner
+from tmt.compiled import evaluator, runner_of
 from tmt.compiled.cores import cores
 
 from ...core import timing
@@ -70,37 +71,38 @@ def loops(setup: Setup) -> tuple[list[Loop], list[EvaluationRow]]:
 def at_one_state(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> list[Loop]:
     """The ways of tmt at one state, (nq,) and (nv,)."""
     tmt.prepare(tree)
-    run, compiled = runner(tree, "rk4"), evaluator(tree, "acceleration")
+    run, compiled = runner_of(tree, "rk4").follow, evaluator(tree, "acceleration")
+    chain, out = chained(tree), np.empty(len(qd))
+    addresses = [values.ctypes.data for values in (q, qd, tau, out)]
     most = min(MOST_CALLS, MOST_NUMBERS // len(tree.axis))
     paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
     paths[0][0, 0], paths[1][0, 0] = q, qd
 
     def steps(count: int) -> None:
-        run(*(path[:, : min(count, most) + 1].copy() for path in paths), tau[None], 1e-4)
+        run(*(path[:, : min(count, most) + 1].copy() for path in paths), tau[None], 1e-4, 0.0, 1)
 
     waiting = EvaluationRow(FORWARD, "compiled, each waits for the last", operations=compiled.operations)
     return [
         Loop(EvaluationRow(FORWARD, CALLED), repeated(lambda: tmt.acceleration(q, qd, tau, tree))),
-        Loop(waiting, lambda count: compiled.chain(q, qd, tau, count)),
+        Loop(waiting, lambda count: chain(*addresses, count)),
         Loop(EvaluationRow(RK4_STEP, ONE_BY_ONE), steps),
     ]
 
 
 def at_many_states(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> list[Loop]:
     """The ways of tmt over many states, (N, nq) and (N, nv)."""
-    count, run, compiled = len(qd), runner(tree, "rk4"), evaluator(tree, "acceleration")
-    out = np.ones((count, compiled.size))
-    columns = [np.ascontiguousarray(values.T) for values in (q, qd, tau, out)]
+    count, run, compiled = len(qd), runner_of(tree, "rk4").follow, evaluator(tree, "acceleration")
+    out = np.empty((count, compiled.size))
     paths = [np.stack([part, part], axis=1) for part in (q, qd)]
     each = EvaluationRow(FORWARD, ONE_BY_ONE, count, operations=compiled.operations)
     lanes = EvaluationRow(FORWARD, SIDE_BY_SIDE, count, operations=compiled.operations)
     called = EvaluationRow(FORWARD, CALLED, count, cores())
     step = EvaluationRow(RK4_STEP, SIDE_BY_SIDE, count, cores())
     return [
-        Loop(each, repeated(lambda: compiled.each(q, qd, tau, out))),
-        Loop(lanes, repeated(lambda: compiled.lanes(*columns))),
+        Loop(each, repeated(lambda: compiled.fill(False, out, q, qd, tau))),
+        Loop(lanes, repeated(lambda: compiled.fill(True, out, q, qd, tau))),
         Loop(called, repeated(lambda: tmt.acceleration(q, qd, tau, tree))),
-        Loop(step, repeated(lambda: run(*paths, tau, 1e-3))),
+        Loop(step, repeated(lambda: run(*paths, tau, 1e-3, 0.0, 1))),
     ]
 
 
@@ -127,3 +129,34 @@ def repetitions(run: Callable[[int], object]) -> int:
     run(1)
     (times,) = timing.in_turns([partial(run, 4)], 5)
     return min(max(1, int(1e-3 / (min(times) / 4))), MOST_CALLS)
+
+
+CHAIN = """
+define void @chain(ptr %q, ptr %qd, ptr %tau, ptr %out, i64 %count) {
+entry:
+  br label %body
+body:
+  %i = phi i64 [0, %entry], [%next, %body]
+  %last = phi i64 [0, %entry], [%wrong, %body]
+  %q.i = getelementptr double, ptr %q, i64 %last
+  %qd.i = getelementptr double, ptr %qd, i64 %last
+  %tau.i = getelementptr double, ptr %tau, i64 %last
+  %wrong = call i64 @one(ptr %q.i, ptr %qd.i, ptr %tau.i, ptr %out)
+  %next = add i64 %i, 1
+  %more = icmp slt i64 %next, %count
+  br i1 %more, label %body, label %done
+done:
+  ret void
+}
+"""
+
+
+def chained(tree: tmt.Tree) -> Callable[..., None]:
+    """chain(q, qd, tau, out, count): the accelerations at one state again and again, where each call waits for the last.
+
+    It reads the state from the address that is given plus `wrong` of the last call, which is 0 but known only at its end.
+    """
+    from tmt.compiled import entries, machine  # loads the compiler
+
+    library = machine.Library(entries.source(tree, "acceleration", 1) + CHAIN)
+    return library.function("chain", None, *[ctypes.c_void_p] * 4, ctypes.c_int64)

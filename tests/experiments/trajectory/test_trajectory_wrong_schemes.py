@@ -17,7 +17,8 @@ from compare.experiments.trajectory.runs import follow
 from compare.judge.scale import EPS
 from compare.robots.case import Case, Scene
 from compare.robots.file import robot_of
-from tmt.compiled import Library, store
+from tmt.compiled import store
+from tmt.compiled.machine import Library
 from tmt.compiled.runner import known as compiled_runs
 from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler, semi_implicit
 
@@ -40,8 +41,8 @@ def failing(case, engines, *integrators) -> set:
 class ExplicitDamping(SemiImplicitEuler):
     """A wrong scheme."""
 
-    def matrix(self, tree, *arguments):
-        return SemiImplicitEuler.matrix(self, dataclasses.replace(tree, damping=(0.0, 0.0, 0.0)), *arguments)
+    def held(self, tree):
+        return SemiImplicitEuler.held(self, dataclasses.replace(tree, damping=(0.0, 0.0, 0.0)))
 
 
 RK4 = {"order": 4, "A": METHODS["rk4"].A, "b": METHODS["rk4"].b, "c": METHODS["rk4"].c}

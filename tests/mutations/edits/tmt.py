@@ -31,9 +31,9 @@ EDITS = (
     Edit("runs", "unsound", "angles.compare('lt', LIMIT)", "angles.compare('lt', float('inf'))", "turns have no limit"),
     Edit("semi_implicit", "SemiImplicitEuler.gains_held", "(tree.position_gain, tree.speed_gain)",
          "(tree.speed_gain, tree.position_gain)", "gains of positions act on speeds"),
-    Edit("answers", "Answers.of_one", "self.may_be_singular", "False", "compiled code answers where Mbar is singular"),
-    Edit("answers", "answers_of", "not answers.ready", "True", "a prepared model is forgotten"),
+    Edit("answers", "Answers.__init__", "not tree.never_singular", "False", "compiled code answers where Mbar is singular"),
+    Edit("answers", "answers_of", "not answers.prepared", "True", "a prepared model is forgotten"),
     Edit("compiled.sources", "own_sources", "stamps(IMPORTED) == IMPORTED", "True", "changed sources keep their name"),
-    Edit("compiled.runner", "Runner.checked", "positive('dt', dt, 'a step in s')", "float(dt)", "a step may be negative"),
-    Edit("answers", "Answers.of_any", "count <= SMALL", "True", "machine code never answers unasked"),
+    Edit("simulation", "simulate", "given.positive('dt', dt, 'a step in s')", "float(dt)", "a step may be negative"),
+    Edit("answers", "Answers.by_machine_code", "count <= SMALL", "True", "machine code never answers unasked"),
 )  # fmt: skip
