@@ -40,6 +40,8 @@ code is kept on disk, see compiled/store.py. Without MuJoCo, `pip install numpy 
 enough.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np

@@ -12,7 +12,7 @@ from tmt.compiled import forms
 from tmt.compiled.straight import Traced
 from tmt.derivation.quantities import QUANTITIES
 from tmt.model.arguments import checked_model
-from tmt.model.tree import Tree
+from tmt.model.tree import Tree, stated
 from tmt.model.values import shown
 
 from . import c, latex, matlab, page, python, symbols
@@ -127,7 +127,7 @@ def conventions(model: Tree) -> list[str]:
 
 def digest(model: Tree) -> str:
     """The first digits of a hash of a Tree's names and numbers."""
-    return hashlib.sha256(repr(model).encode()).hexdigest()[:16]
+    return hashlib.sha256(stated(model).encode()).hexdigest()[:16]
 
 
 def function_of(model: Tree, quantity: str) -> Function:

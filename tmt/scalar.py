@@ -1,0 +1,5 @@
+"""Any number type over which the method is written."""
+
+from typing import Any
+
+Scalar = Any
