@@ -19,7 +19,7 @@ from typing import NamedTuple
 from tmt.scalar import Scalar
 
 from .composite import Distribution, rounded_once, turning
-from .mechanism import AnyTree, placed
+from .mechanism import AnyTree, turn_in_parent
 from .method import reduced_force
 from .vectors import IDENTITY, ZERO, Matrix, Scalars, Vector, outer
 
@@ -75,8 +75,8 @@ class Carried(NamedTuple):
     M: Symmetric
 
     def plus(self, other: "Carried") -> "Carried":
-        J, H, M = self.J.plus(other.J), self.H + other.H, self.M.plus(other.M)
-        return Carried(self.n + other.n, self.f + other.f, J, H, M)
+        n, f, J = self.n + other.n, self.f + other.f, self.J.plus(other.J)
+        return Carried(n, f, J, self.H + other.H, self.M.plus(other.M))
 
 
 class Rigid(NamedTuple):
@@ -89,8 +89,8 @@ class Rigid(NamedTuple):
     m: Scalar
 
     def plus(self, other: "Rigid") -> "Rigid":
-        J, s, m = self.J.plus(other.J), self.s + other.s, self.m + other.m
-        return Rigid(self.n + other.n, self.f + other.f, J, s, m)
+        n, f, J = self.n + other.n, self.f + other.f, self.J.plus(other.J)
+        return Rigid(n, f, J, self.s + other.s, self.m + other.m)
 
     @property
     def carried(self) -> Carried:
@@ -123,8 +123,9 @@ def acceleration(
             inverse = 1.0 / (direction.power(y, x) + armature[k])
             u = (force[k] - direction.power(body.n, body.f)) * inverse
             shares[k] = Share(y * inverse, x * inverse, u)
-            J, M = body.J.less_outer(shares[k].moment, y), body.M.less_outer(shares[k].force, x)
-            body = Carried(body.n + y * u, body.f + x * u, J, body.H - outer(shares[k].moment, x), M)
+            n, f, J = body.n + y * u, body.f + x * u, body.J.less_outer(shares[k].moment, y)
+            H, M = body.H - outer(shares[k].moment, x), body.M.less_outer(shares[k].force, x)
+            body = Carried(n, f, J, H, M)
         if tree.parent[i] >= 0:
             bodies[tree.parent[i]] = bodies[tree.parent[i]].plus(body)
     result: list[Scalar] = []
@@ -205,7 +206,7 @@ def outward(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[Frame], list[R
             a = p.a + p.omega.cross(axis) * (2.0 * qd[joint.qd.start])  # Coriolis
             frame = Frame(p.turn, r, p.omega, p.omegad, a, [Direction(ZERO, axis)])
         else:
-            turn = p.turn @ placed(tree, i, q)[1]
+            turn = p.turn @ turn_in_parent(tree, i, q)
             carrier = turn if joint.kind == "ball" else p.turn
             axes = [carrier @ axis for axis in axes]
             spin = sum((axis * rate for axis, rate in zip(axes, qd[joint.qd])), ZERO)

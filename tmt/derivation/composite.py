@@ -21,7 +21,7 @@ import mpmath
 
 from tmt.scalar import Scalar
 
-from .mechanism import AnyTree, placed
+from .mechanism import AnyTree, origin_in_parent, turn_in_parent
 from .vectors import ZERO, Matrix, Scalars, Vector, outer, total_vector
 
 
@@ -176,7 +176,7 @@ def mass_matrix_and_bias(
     """
     n, joints = len(tree.axis), tree.coordinates.joints
     axes = [Vector(*axis) for axis in tree.axis]
-    placements = [placed(tree, i, q) for i in range(len(joints))]
+    placements = [(origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)) for i in range(len(joints))]
     # fractions take their time; other numbers than floats may be rounded to other digits from call to call
     parts = rounded_once if number is float and isinstance(tree, Hashable) else rounded_once.__wrapped__
     own, uneven, even = map(list, parts(tree, number))

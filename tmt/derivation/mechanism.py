@@ -70,13 +70,20 @@ class Mechanism(Generic[Number]):
 AnyTree = Mechanism[Scalar]
 
 
-def placed(tree: AnyTree, i: int, q: Scalars) -> tuple[Vector, Matrix]:
-    """Origin and turn of joint i's frame in its parent's, at the position q of the tree (nq,)."""
+def origin_in_parent(tree: AnyTree, i: int, q: Scalars) -> Vector:
+    """Origin of joint i's frame in its parent's, at the position q of the tree (nq,)."""
     joint, offset = tree.coordinates.joints[i], Vector(*tree.offset[i])
+    if joint.kind != "slide":
+        return offset
+    return offset + Vector(*tree.axis[joint.qd.start]) * (q[joint.q.start] - tree.reference[i])
+
+
+def turn_in_parent(tree: AnyTree, i: int, q: Scalars) -> Matrix:
+    """Turn of joint i's frame in its parent's, which takes components in it to those in the parent's."""
+    joint = tree.coordinates.joints[i]
+    if joint.kind == "slide":
+        return IDENTITY
     if joint.kind == "ball":
         axes = Matrix(tree.axis[joint.qd])
-        return offset, axes.transposed @ turn_of(q[joint.q]) @ axes
-    axis, from_reference = tree.axis[joint.qd.start], q[joint.q.start] - tree.reference[i]
-    if joint.kind == "slide":
-        return offset + Vector(*axis) * from_reference, IDENTITY
-    return offset, rotation(axis, from_reference)
+        return axes.transposed @ turn_of(q[joint.q]) @ axes
+    return rotation(tree.axis[joint.qd.start], q[joint.q.start] - tree.reference[i])

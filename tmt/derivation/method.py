@@ -25,7 +25,7 @@ from typing import NamedTuple
 from tmt.scalar import Scalar
 
 from .dual import jacobian
-from .mechanism import AnyTree, placed
+from .mechanism import AnyTree, origin_in_parent, turn_in_parent
 from .vectors import IDENTITY, ZERO, Matrix, Scalars, Vector, solve, total, total_vector
 
 Terms = Callable[[AnyTree, Scalars, Scalars], tuple[list[list[Scalar]], list[Scalar]]]  # Mbar and h
@@ -71,8 +71,7 @@ def joint_frames(tree: AnyTree, q: Scalars, qd: Scalars | None = None) -> list[F
     frames: list[Frame] = []
     for i, joint in enumerate(tree.coordinates.joints):
         parent = frames[tree.parent[i]] if tree.parent[i] >= 0 else WORLD
-        origin_in_parent, turn_in_parent = placed(tree, i, q)
-        origin, origin_conv = carried(parent, origin_in_parent)
+        origin, origin_conv = carried(parent, origin_in_parent(tree, i, q))
         axes = [Vector(*axis) for axis in tree.axis[joint.qd]]
         if joint.kind == "slide":
             axis = parent.turn @ axes[0]
@@ -80,7 +79,7 @@ def joint_frames(tree: AnyTree, q: Scalars, qd: Scalars | None = None) -> list[F
             moved = parent._replace(origin=origin, axes=[axis], slides=True, origin_conv=origin_conv)
             frames.append(moved)
             continue
-        turn = parent.turn @ turn_in_parent
+        turn = parent.turn @ turn_in_parent(tree, i, q)
         carrier = turn if joint.kind == "ball" else parent.turn  # the axes of a ball turn with it
         axes = [carrier @ axis for axis in axes]
         spin = total_vector(axis * rate for axis, rate in zip(axes, qd[joint.qd]))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from tmt.derivation.mechanism import placed
+from tmt.derivation.mechanism import origin_in_parent, turn_in_parent
 from tmt.derivation.vectors import IDENTITY, ZERO, Matrix, Vector
 
 from .values import numbers_of, shown
@@ -127,7 +127,9 @@ def _fixed(tree: Tree, i: int, q: Sequence[float]) -> tuple[Vector, Matrix]:
     """Origin and turn of joint i's frame in its parent's: at the reference it rounds nothing."""
     joint = tree.coordinates.joints[i]
     off = any(q[joint.q][1:]) if joint.kind == "ball" else q[joint.q.start] != tree.reference[i]
-    return placed(tree, i, q) if off else (Vector(*tree.offset[i]), IDENTITY)
+    if not off:
+        return Vector(*tree.offset[i]), IDENTITY
+    return origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)
 
 
 def _position(kind: str, value: Any) -> tuple[float, ...]:
