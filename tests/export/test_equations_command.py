@@ -56,7 +56,7 @@ class Altered(Program):
     def __init__(self, tree, quantity, share, eps=2.0**-52):
         self.tree, self.quantity, self.share, self.eps = tree, quantity, share, eps
 
-    def values(self, quantity, *states):
+    def values(self, quantity, states):
         found = getattr(tmt, quantity)(*states[: len(QUANTITIES[quantity].takes)], model=self.tree)
         found = [part.copy() for part in found] if isinstance(found, tuple) else [found.copy()]
         if quantity == self.quantity:
@@ -81,9 +81,9 @@ def test_states_are_spread_within_the_ranges_and_those_of_floats_are_floats():
     seen = []
 
     class Seen(Altered):
-        def values(self, quantity, *states):
+        def values(self, quantity, states):
             seen.append(states)
-            return super().values(quantity, *states)
+            return super().values(quantity, states)
 
     compared = compared_with("model", str(PATHS["arm7"]))
     for single in (False, True):
@@ -126,9 +126,9 @@ def test_arrays_of_matlab_are_stored_by_rows(tmp_path):
 def test_single_precision_is_written_and_checked_at_all_states(tmp_path, monkeypatch):
     asked = []
 
-    def values(self, quantity, q, qd, tau):
-        asked.append((len(q), self.single))
-        return of_c(self, quantity, q, qd, tau)
+    def values(self, quantity, states):
+        asked.append((len(states[0]), self.single))
+        return of_c(self, quantity, states)
 
     of_c = PROGRAMS["c"].values
     monkeypatch.setattr(PROGRAMS["c"], "values", values)

@@ -65,10 +65,10 @@ def test_brackets_keep_the_order_of_operations():
                 a * (b + c) - d * (a - c), -2.0 * a - -3.0 / b, 1.0 / (a - b)]  # fmt: skip
 
     traced, values = straight.trace("f", (4,), function), [1.3, -0.7, 2.1, 0.9]
-    for syntax in (Syntax(), Syntax(number=lambda x: f"({x!r})")):
-        writer, names = Writer(traced, list("abcd"), syntax), dict(zip("abcd", values))
-        for assignment in writer.assignments:
-            names[assignment.name] = eval(assignment.expression, {}, names)
+    for number in (repr, lambda x: f"({x!r})"):
+        syntax, names = Syntax("", "{name} = {value}", "", number=number), dict(zip("abcd", values))
+        writer = Writer(traced, list("abcd"), syntax)
+        exec("\n".join(writer.assignments), {}, names)
         assert np.allclose([eval(text, {}, names) for text in writer.results], function(values), rtol=1e-14)
 
 

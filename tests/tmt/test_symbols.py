@@ -58,9 +58,12 @@ def assert_right(symbols, tree, rng, states=100):
     scale = Entries(tree, q, qd)
     for name in symbols.entries:
         state = (q, qd)[: 2 if name == "bias" else 1]
-        matrix, variables = symbols.pair(name)
+        variables = symbols.q + symbols.qd if name == "bias" else symbols.q
         columns = [*q.T, *qd.T][: len(variables)]
-        values = sympy.lambdify(variables, list(matrix), "numpy", cse=True)(*columns)
+        numbers = {symbol: row.value for symbol, row in symbols.parameters.items()}
+        values = sympy.lambdify(variables, list(symbols.entries[name].subs(numbers)), "numpy", cse=True)(
+            *columns
+        )
         expected = getattr(tmt, name)(*state, tree)
         found = np.stack([np.broadcast_to(value, states) for value in values], axis=-1).reshape(
             expected.shape
