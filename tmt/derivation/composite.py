@@ -243,13 +243,10 @@ def turning(omega: Vector, omegad: Vector) -> Matrix:
     u, v, w = omegad
     xx, yy, zz = x * x, y * y, z * z
     xy, xz, yz = x * y, x * z, y * z
-    return Matrix(
-        [
-            [(yy + zz) * -1.0, xy - w, xz + v],
-            [xy + w, (xx + zz) * -1.0, yz - u],
-            [xz - v, yz + u, (xx + yy) * -1.0],
-        ]
-    )
+    first = (yy + zz) * -1.0, xy - w, xz + v
+    second = xy + w, (xx + zz) * -1.0, yz - u
+    third = xz - v, yz + u, (xx + yy) * -1.0
+    return Matrix([first, second, third])
 
 
 def vee(matrix: Matrix) -> Vector:

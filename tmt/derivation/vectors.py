@@ -131,13 +131,10 @@ def rotation(axis: Iterable[Scalar], angle: Scalar) -> Matrix:
     """
     x, y, z = axis
     s, c = sin(angle), cos(angle)
-    return Matrix(
-        [
-            [x * x + c * (1 - x * x), x * y - c * (x * y) - s * z, x * z - c * (x * z) + s * y],
-            [x * y - c * (x * y) + s * z, y * y + c * (1 - y * y), y * z - c * (y * z) - s * x],
-            [x * z - c * (x * z) - s * y, y * z - c * (y * z) + s * x, z * z + c * (1 - z * z)],
-        ]
-    )
+    first = x * x + c * (1 - x * x), x * y - c * (x * y) - s * z, x * z - c * (x * z) + s * y
+    second = x * y - c * (x * y) + s * z, y * y + c * (1 - y * y), y * z - c * (y * z) - s * x
+    third = x * z - c * (x * z) - s * y, y * z - c * (y * z) + s * x, z * z + c * (1 - z * z)
+    return Matrix([first, second, third])
 
 
 def turn_of(quaternion: Iterable[Scalar]) -> Matrix:
@@ -147,13 +144,10 @@ def turn_of(quaternion: Iterable[Scalar]) -> Matrix:
     a, b, c = x * scale, y * scale, z * scale
     xx, yy, zz, xy, xz, yz = x * a, y * b, z * c, x * b, x * c, y * c
     wx, wy, wz = w * a, w * b, w * c
-    return Matrix(
-        [
-            [1.0 - (yy + zz), xy - wz, xz + wy],
-            [xy + wz, 1.0 - (xx + zz), yz - wx],
-            [xz - wy, yz + wx, 1.0 - (xx + yy)],
-        ]
-    )
+    first = 1.0 - (yy + zz), xy - wz, xz + wy
+    second = xy + wz, 1.0 - (xx + zz), yz - wx
+    third = xz - wy, yz + wx, 1.0 - (xx + yy)
+    return Matrix([first, second, third])
 
 
 def solve(matrix: Sequence[Scalars], right: Scalars) -> list[Scalar]:

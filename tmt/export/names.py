@@ -130,6 +130,10 @@ class Names:
         return symbol
 
     @property
+    def masses(self) -> set[Expression]:
+        return {symbol for symbol, parameter in self.parameters.items() if parameter.unit == "kg"}
+
+    @property
     def is_exact(self) -> bool:
         """Whether all numbers that have no names are integers."""
         return self.named and all(x in (-1, 0, 1) for axis in self.axes for x in axis)

@@ -31,7 +31,7 @@ def page(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     for section in sections(symbolic):
         equations.append(f"<h2>{html.escape(section.heading)}</h2>")
         if section.fits:
-            rows = "".join(f"<mtr>{''.join(map(matrix_cell, row))}</mtr>" for row in section.rows)
+            rows = "".join(map(matrix_row, section.rows))
             matrix = f"<mi>{section.letter}</mi><mo>=</mo><mo>(</mo><mtable>{rows}</mtable><mo>)</mo>"
             equations.append(f"<p><math>{matrix}</math></p>")
         else:
@@ -57,8 +57,8 @@ def table(rows: Sequence[Sequence[str]]) -> str:
     return f"<table>{''.join(lines)}</table>"
 
 
-def matrix_cell(formula: Formula) -> str:
-    return f"<mtd>{mathml(formula)}</mtd>"
+def matrix_row(entries: Sequence[Formula]) -> str:
+    return f"<mtr>{''.join(f'<mtd>{mathml(formula)}</mtd>' for formula in entries)}</mtr>"
 
 
 def mathml(formula: Formula) -> str:

@@ -7,10 +7,12 @@ from functools import reduce
 
 from tmt.scalar import Scalar
 
+from .names import Names
 from .trigonometry import NOISE, Expression, Polynomial, Ring
 
 FEW_TERMS, FEW_FACTORED = 40, 6  # of a polynomial of which every form is tried, of one that is factored
 
+Parallel = Mapping[int, tuple[int, int]]
 Term = tuple[Expression, dict[Expression, Expression]]  # of a sum: a number, {factor: power}
 Harmonics = dict[tuple[bool, tuple[int, ...]], Scalar]  # {(is_sine, k): number}, of sums of k_i times angle i
 
@@ -18,20 +20,12 @@ Harmonics = dict[tuple[bool, tuple[int, ...]], Scalar]  # {(is_sine, k): number}
 class Forms:
     """Expressions of polynomials of a Ring.
 
-    symbols: those of the ring. masses, speeds: those of them that are taken out of sums; others are where all terms have them.
-    angles: SymPy expressions. parallel: {i: (j, sign)} where hinge i turns on hinge j about sign times its axis.
+    Masses and speeds are taken out of sums, other symbols where all terms have them. angles: SymPy expressions.
+    parallel: {i: (j, sign)} where hinge i turns on hinge j about sign times its axis.
     """
 
-    def __init__(
-        self,
-        ring: Ring,
-        symbols: Sequence[Expression],
-        masses: Collection[Expression],
-        speeds: Collection[Expression],
-        angles: Sequence[Expression],
-        parallel: Mapping[int, tuple[int, int]],
-    ):
-        self.ring, self.symbols, self.masses, self.speeds = ring, symbols, set(masses), set(speeds)
+    def __init__(self, ring: Ring, names: Names, angles: Sequence[Expression], parallel: Parallel):
+        self.ring, self.symbols, self.masses, self.speeds = ring, ring.symbols, names.masses, set(names.qd)
         self.angles, self.parallel, self.sums = angles, parallel, list(angles)
         for i, (j, sign) in parallel.items():
             self.sums[i] = angles[i] + sign * self.sums[j]

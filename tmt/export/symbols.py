@@ -82,11 +82,9 @@ def derived(names: Names, quantities: Sequence[str], deadline: float, note: str)
     from_reference = [symbol - number(value) for symbol, value in zip(names.q, tree.reference)]
     parallel = {hinges.index(i): (hinges.index(j), sign) for i, (j, sign) in parallel_hinges(tree).items()}
     symbols = sorted(names.parameters, key=str)
-    masses = [symbol for symbol in symbols if names.parameters[symbol].unit == "kg"]
     angles = [from_reference[i] for i in hinges]
-    symbols = [*symbols, *places.values(), *names.qd]
-    ring = Ring(symbols, len(angles), names.is_exact, deadline)
-    forms = Forms(ring, symbols, masses, names.qd, angles, parallel)
+    ring = Ring([*symbols, *places.values(), *names.qd], len(angles), names.is_exact, deadline)
+    forms = Forms(ring, names, angles, parallel)
     variables = [
         ring.scalar(places[i]) if i in places else ring.angle(hinges.index(i)) for i in range(len(tree.kind))
     ]
@@ -158,18 +156,6 @@ def parallel_hinges(tree: Tree) -> dict[int, tuple[int, int]]:
     return found
 
 
-PYTHON = """{comment}
-import sympy
-from sympy import cos, sin
-
-q = {q} = sympy.symbols({q_names!r}, seq=True)
-qd = {qd} = sympy.symbols({qd_names!r}, seq=True)
-joint_names = {joint_names!r}
-{parameters}
-{matrices}
-"""
-
-
 def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     """Python text with SymPy: symbols, `parameters` {symbol: value}, matrices M, h and G, and mass_matrix, bias and gravity.
 
@@ -182,25 +168,25 @@ def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
         def _print_Float(self, expression: Expression) -> str:
             return repr(float(expression))
 
-    printed, lines, matrices = Printer().doprint, [], []
+    printed = Printer().doprint
+    q, qd = (list(map(str, symbols)) for symbols in (symbolic.q, symbolic.qd))
+    lines = [
+        *(f"# {line}" for line in head_lines),
+        "import sympy",
+        "from sympy import cos, sin",
+        "",
+        f"q = {', '.join(q)}, = sympy.symbols({' '.join(q)!r}, seq=True)",
+        f"qd = {', '.join(qd)}, = sympy.symbols({' '.join(qd)!r}, seq=True)",
+        f"joint_names = {list(symbolic.joint_names)!r}",
+    ]
     for symbol, row in symbolic.parameters.items():
         lines.append(f"{symbol} = sympy.Symbol({str(symbol)!r})  # {row.meaning}, {row.unit}")
     values = ", ".join(f"{symbol}: {row.value!r}" for symbol, row in symbolic.parameters.items())
     lines.append(f"parameters = {{{values}}}")
     for name, matrix in symbolic.entries.items():
         letter, title = TITLES[name]
-        rows = "".join(f"    [{', '.join(map(printed, row))}],\n" for row in matrix.tolist())
-        pair = f"({letter}.subs(parameters), {'[*q, *qd]' if name == 'bias' else '[*q]'})"
-        matrices += [f"# {title}", f"{letter} = sympy.Matrix([\n{rows}])"]
-        matrices.append(f"{name.removesuffix('_balance')} = {pair}")
-    q, qd = (list(map(str, symbols)) for symbols in (symbolic.q, symbolic.qd))
-    return PYTHON.format(
-        comment="\n".join(f"# {line}" for line in head_lines),
-        q=f"{', '.join(q)},",
-        qd=f"{', '.join(qd)},",
-        q_names=" ".join(q),
-        qd_names=" ".join(qd),
-        joint_names=list(symbolic.joint_names),
-        parameters="\n".join(lines),
-        matrices="\n".join(matrices),
-    )
+        rows = [f"    [{', '.join(map(printed, row))}]," for row in matrix.tolist()]
+        lines += [f"# {title}", f"{letter} = sympy.Matrix([", *rows, "])"]
+        variables = "[*q, *qd]" if name == "bias" else "[*q]"
+        lines.append(f"{name.removesuffix('_balance')} = ({letter}.subs(parameters), {variables})")
+    return "\n".join(lines) + "\n"

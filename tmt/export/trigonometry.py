@@ -35,7 +35,7 @@ class Ring:
         functions = [Dummy() for _ in range(2 * n)]  # sines, then cosines
         self.ring = PolyRing([*symbols, *functions], domain, "lex")
         self.functions = PolyRing(functions, domain, "lex")
-        self.exact, self.deadline = exact, deadline
+        self.symbols, self.exact, self.deadline = symbols, exact, deadline
         self.places = [(i, n + i) for i in range(n)]  # of sine and cosine in self.functions
         self.pairs = [(len(symbols) + s, len(symbols) + c) for s, c in self.places]  # and in self.ring
 
