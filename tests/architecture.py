@@ -13,10 +13,8 @@ FILES = sorted((ROOT / "compare").rglob("*.py"))
 OF_TMT = sorted((ROOT / "tmt").rglob("*.py"))
 PAGE = ROOT / "ARCHITECTURE.md"
 DIAGRAM = re.compile(r"(?<=```mermaid\n).*?(?=```)", re.DOTALL)
-SHARED = {
-    "compare.core.text",
-    "compare.report.style",
-}  # for all: words from templates, the style of figures
+# for all: words from templates, the style of figures, the name of any number type
+SHARED = {"compare.core.text", "compare.report.style", "tmt.scalar"}
 
 
 def dotted(path) -> str:

@@ -3,6 +3,7 @@
 import dataclasses
 import doctest
 import inspect
+import pydoc
 import re
 
 import numpy as np
@@ -12,18 +13,25 @@ import compare
 import tmt
 from compare.agreement import Difference
 
-PUBLIC = [getattr(tmt, name) for name in tmt.__all__ if inspect.isroutine(getattr(tmt, name))]
-PUBLIC += [tmt.Tree, tmt.Tree.lock, tmt.Motion, compare.assert_agrees, compare.differences, Difference]
+FUNCTIONS = [getattr(tmt, name) for name in tmt.__all__ if inspect.isroutine(getattr(tmt, name))]
+OTHERS = [tmt.Tree, tmt.Tree.lock, tmt.Motion, compare.assert_agrees, compare.differences, Difference]
 
 
-@pytest.mark.parametrize("public", PUBLIC, ids=lambda public: public.__qualname__)
+@pytest.mark.parametrize("public", [*FUNCTIONS, *OTHERS], ids=lambda public: public.__qualname__)
 def test_examples_are_right_and_every_argument_is_described(public):
     names = {"compare": compare, "tmt": tmt, "np": np, "dataclasses": dataclasses}
     (found,) = doctest.DocTestFinder(recurse=False).find(public, public.__qualname__, globs=names)
     assert doctest.DocTestRunner().run(found).failed == 0 and (found.examples or public is Difference)
-    fields = {*getattr(public, "_fields", ()), *inspect.get_annotations(public)}
-    arguments = fields if inspect.isclass(public) else {*inspect.signature(public).parameters} - {"self"}
+    arguments = {*inspect.signature(public).parameters} - {"self"}
     section = re.search(r"^ *(?:Parameters|Attributes)\n +-+\n((?:.+\n)+)", public.__doc__, re.MULTILINE)[1]
     lines = inspect.cleandoc("\n" + section).splitlines()
     described = [line.split(" : ")[0] for line in lines if not line.startswith(" ")]
     assert {name.strip("* ") for names in described for name in names.split(",")} == arguments
+
+
+@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda function: function.__name__)
+def test_help_begins_with_three_lines_of_signature_and_what_the_function_does(function):
+    signature = f"{function.__name__}{inspect.signature(function)}"
+    assert len(signature) <= 3 * 110
+    shown = " ".join(pydoc.plain(pydoc.render_doc(function)).split())
+    assert f"{signature} {inspect.getdoc(function).splitlines()[0]}" in shown

@@ -21,7 +21,7 @@ DIRECTIONS = {
 }  # fmt: skip
 # the modules, or beginnings of their names, that may import a library
 LIBRARIES = {
-    "mujoco": ("compare.engines.mujoco", "compare.engines.mjx", "compare.export.checks"),
+    "mujoco": ("compare.engines.mujoco", "compare.engines.mjx"),
     "mujoco_warp": ("compare.engines.warp",), "warp": ("compare.engines.newton", "compare.engines.warp"),
     "jax": ("compare.engines.mjx",), "heyoka": ("compare.engines.heyoka",),
     "dartpy": ("compare.engines.dart",), "pybullet": ("compare.engines.pybullet",),

@@ -29,9 +29,9 @@ def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free"), most=
         body_joint.append(before)
         inertias.append(possible_tensor(rng))
     n, nv = len(parent), len(axis)
-    rest = [
-        x for name in kind for x in (unit_quaternion(rng) if name == "ball" else [rng.uniform(-0.5, 0.5)])
-    ]
+    rest = []
+    for name in kind:
+        rest += list(unit_quaternion(rng)) if name == "ball" else [rng.uniform(-0.5, 0.5)]
     return Tree(
         joint_names=[f"{name}{i}" for i, name in enumerate(kind)], parent=parent, offset=offset, axis=axis,
         damping=rng.uniform(0.0, 0.5, nv), **random_bodies(rng, body_joint, inertias), kind=kind, rest=rest,
@@ -76,13 +76,8 @@ def random_bodies(rng, body_joint, inertias) -> dict:
     """What a Tree says of bodies on these joints, and gravity."""
     count = len(body_joint)
     mass, com = rng.uniform(0.5, 2.0, count), rng.uniform(-0.3, 0.3, (count, 3))
-    bodies = {
-        "body_names": [f"body{b}" for b in range(count)],
-        "body_joint": body_joint,
-        "mass": mass,
-        "com": com,
-    }
-    return bodies | {"inertia": inertias, "gravity": rng.normal(size=3) * 5.0}
+    numbers = {"mass": mass, "com": com, "inertia": inertias, "gravity": rng.normal(size=3) * 5.0}
+    return numbers | {"body_names": [f"body{b}" for b in range(count)], "body_joint": body_joint}
 
 
 def unit_quaternion(rng) -> np.ndarray:

@@ -40,6 +40,8 @@ code is kept on disk, see compiled/store.py. Without MuJoCo, `pip install numpy 
 enough.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np
@@ -70,10 +72,6 @@ def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
         Joint positions.
     model : Tree, default ARM
 
-    Returns
-    -------
-    (..., m, 3), m
-
     Examples
     --------
     >>> print(tmt.com_positions([0.0, 0.0, 0.0]) + 0.0)  # the upper arm hangs, the forearm points ahead
@@ -93,10 +91,6 @@ def angular_velocities(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.nda
     q, qd : (..., nq) and (..., nv), rad and rad/s
         Joint positions and speeds.
     model : Tree, default ARM
-
-    Returns
-    -------
-    (..., m, 3), rad/s
 
     Examples
     --------
@@ -166,10 +160,6 @@ def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
         Joint positions.
     model : Tree, default ARM
 
-    Returns
-    -------
-    (..., nv, nv), kg m2
-
     Examples
     --------
     >>> print(tmt.mass_matrix([0.0, 0.0, 0.0])[2, 2].round(9))  # of the elbow: 0.019 + 1.5 kg (0.15 m)^2
@@ -188,10 +178,6 @@ def bias(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     q, qd : (..., nq) and (..., nv), rad and rad/s
         Joint positions and speeds.
     model : Tree, default ARM
-
-    Returns
-    -------
-    (..., nv), N m
 
     Examples
     --------
@@ -212,10 +198,6 @@ def gravity_balance(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
         Joint positions.
     model : Tree, default ARM
 
-    Returns
-    -------
-    (..., nv), N m
-
     Examples
     --------
     >>> print(tmt.gravity_balance([0.0, 0.0, np.pi / 2]).round(9) + 0.0)  # the arm hangs
@@ -234,10 +216,6 @@ def spring_torque(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     q : (..., nq), rad
         Joint positions.
     model : Tree, default ARM
-
-    Returns
-    -------
-    (..., nv), N m
 
     Examples
     --------
@@ -259,10 +237,6 @@ def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM)
         Joint positions, speeds and torques.
     model : Tree, default ARM
 
-    Returns
-    -------
-    (..., nv), rad/s2
-
     Examples
     --------
     >>> q, rest = np.array([0.5, 0.3, 1.0]), np.zeros(3)
@@ -280,10 +254,6 @@ def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     q : (..., nq), rad
         Joint positions.
     model : Tree, default ARM
-
-    Returns
-    -------
-    (...), J
 
     Examples
     --------
@@ -303,10 +273,6 @@ def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     q, qd : (..., nq) and (..., nv), rad and rad/s
         Joint positions and speeds.
     model : Tree, default ARM
-
-    Returns
-    -------
-    (...), J
 
     Examples
     --------
@@ -342,10 +308,6 @@ def equations(
         float in C.
     head : sequence of str
         Lines that begin the comment at its head.
-
-    Returns
-    -------
-    str
 
     Raises
     ------

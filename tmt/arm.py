@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from tmt.derivation.method import joint_frames
 from tmt.derivation.vectors import Vector
-from tmt.model.tree import Rows, Tree
+from tmt.model.tree import Tree
 
 G = 9.81  # m/s2, along -z
 D = 0.3  # m, upper arm, shoulder to elbow
@@ -18,13 +18,8 @@ M1 = 1.9  # kg, upper arm
 M2 = 1.5  # kg, forearm and hand
 COM1 = 0.15  # m, shoulder to CoM of the upper arm: d/2
 COM2 = 0.15  # m, elbow to CoM of the forearm: 0.4 e, written out because 0.4 * 0.375 rounds to another double
-I1 = (0.015, 0.014, 0.002)  # kg m2, about the CoM, principal axes = body axes
-I2 = (0.001, 0.019, 0.019)  # kg m2
-
-
-def _diagonal(moments: tuple[float, float, float]) -> Rows:
-    x, y, z = moments
-    return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
+I1 = (0.015, 0.0, 0.0), (0.0, 0.014, 0.0), (0.0, 0.0, 0.002)  # kg m2, about the CoM, in body axes
+I2 = (0.001, 0.0, 0.0), (0.0, 0.019, 0.0), (0.0, 0.0, 0.019)  # kg m2
 
 
 ARM = Tree(
@@ -37,13 +32,13 @@ ARM = Tree(
     body_joint=(1, 2),
     mass=(M1, M2),
     com=((0.0, 0.0, -COM1), (COM2, 0.0, 0.0)),
-    inertia=(_diagonal(I1), _diagonal(I2)),
+    inertia=(I1, I2),
     gravity=(0.0, 0.0, -G),
 )
 
 
 def points(q: Sequence[float]) -> list[Vector]:
-    """Shoulder, elbow and finger tips in the world, three Vectors in m, at hinge angles q (3 scalars, rad)."""
+    """Shoulder, elbow and finger tips in the world, three Vectors in m, at joint angles q (3 scalars, rad)."""
     frames = joint_frames(ARM, q)
     elbow, turn = frames[2].origin, frames[2].turn
     return [frames[0].origin, elbow, elbow + turn @ Vector(E, 0.0, 0.0)]

@@ -1,5 +1,7 @@
 """Motion by a method of integration, and why it ended where it did."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from functools import partial
@@ -50,7 +52,7 @@ class Motion(_Path):
 
     def __new__(
         cls, t: np.ndarray, q: np.ndarray, qd: np.ndarray, ended: str | np.ndarray | None, evaluations: int
-    ) -> "Motion":
+    ) -> Motion:
         motion = super().__new__(cls, t, q, qd)
         motion.ended, motion.evaluations = ended, evaluations
         return motion

@@ -1,18 +1,18 @@
 """The values of exported equations at random states, compared with MuJoCo and with exact values; and what an evaluation costs."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tmt.compiled import evaluator
-from tmt.exact.many import exact_of_many
+from tmt.exact.many import Pairs, exact_of_many
 
 from ..core import timing
-from ..engines import Dynamics
 from ..engines.mujoco.calls import MinimalCalls
 from ..engines.mujoco.dynamics import convective_accelerations
-from ..experiments.quantities import QUANTITIES
+from ..experiments.quantities import QUANTITIES, Quantity
 from ..judge.agree import closest
 from ..judge.entries import Entries, unit
 from ..judge.scale import FACTOR
@@ -20,7 +20,7 @@ from ..robots import Robot
 from ..robots import states as samples
 from ..robots.case import SEED
 from ..run.reference import Compared
-from .programs import CProgram, NotRun, Program, WrongProgram
+from .programs import Array, CProgram, NotRun, Program, States, WrongProgram
 
 ROUNDS = 20  # of timing
 
@@ -45,104 +45,100 @@ class Outcome(NamedTuple):
     rows: tuple[Row, ...] = ()
     not_run: str = ""  # why it was not run
     wrong: str = ""  # why it cannot run
-    of: str = ""  # the file that was run, where there are others with the same expressions
+    file: str = ""  # that was run, where there are others with the same expressions
 
     @property
     def passed(self) -> bool:
         return bool(self.rows) and all(row.passed for row in self.rows)
 
 
+class Judge:
+    """What the values of a program at states are compared with."""
+
+    def __init__(self, compared: Compared, states: States, eps: float):
+        self.tree, self.states, self.factor = compared.robot.tree, states, FACTOR * eps
+        self.mujoco = compared.mujoco.of(compared.robot.case())
+        self.scales = Entries(self.tree, *states[:2])
+
+    def rows(self, program: Program, name: str) -> list[Row]:
+        """A row for each array of a quantity."""
+        values, exact = program.values(name, self.states), exact_of_many(self.tree, name, *self.states)
+        rows = []
+        for symbol, quantity in QUANTITIES.items():
+            if quantity.function == name:
+                largest = self.largest(quantity, values[quantity.part or 0], exact.part(quantity.part))
+                units = quantity.units
+                shown = units[0] if len(units) == 1 else unit(self.tree, *units)
+                row_name = name if quantity.part is None else symbol
+                rows.append(Row(row_name, shown, program.operations(name), *largest))
+        if not rows:
+            raise WrongProgram(f"{name} has no counterpart in compare.experiments.quantities")
+        return rows
+
+    def largest(self, quantity: Quantity, values: Array, exact: Pairs) -> tuple[float, ...]:
+        """The largest difference from MuJoCo and its share of the tolerance, and those of that from the exact value."""
+        arguments = self.states[: len(quantity.arguments)]
+        if quantity.function == "convective_terms" and self.tree.coordinates.balls:
+            theirs = convective_accelerations(self.mujoco, *arguments)
+        else:
+            theirs = getattr(self.mujoco, quantity.function)(*arguments)
+        from_mujoco = values - (theirs if quantity.part is None else theirs[quantity.part])
+        scale = getattr(self.scales, quantity.scale)
+        if quantity.function == "acceleration":
+            scale = scale(self.scales.force(self.states[2]), exact.high)
+        tolerance = np.broadcast_to(self.factor * np.asarray(scale), exact.high.shape)
+        return *worst_of(from_mujoco, tolerance), *worst_of(exact.distance(values), tolerance)
+
+
 def checked(
-    compared: Compared, make: Callable[[], Program], quantities: Sequence[str], states: int, single: bool
+    compared: Compared, make: Callable[[], Program], quantities: Sequence[str], count: int, single: bool
 ) -> tuple[Outcome, Program | None]:
     """Run a program at random states; a float32 program is asked at states that float32 has."""
-    q, qd, tau = (
-        x.astype(np.float32).astype(float) if single else x for x in random_states(compared.robot, states)
-    )
-    eps = float(np.finfo(np.float32 if single else float).eps)
-    theirs, scales, rows = compared.mujoco.of(compared.robot.case()), Entries(compared.robot.tree, q, qd), []
+    kind, states = np.float32 if single else np.float64, random_states(compared.robot, count)
+    judge = Judge(compared, [x.astype(kind).astype(float) for x in states], float(np.finfo(kind).eps))
     try:
         program = make()
-        for name in dict.fromkeys(quantities):
-            own = program.values(name, q, qd, tau)
-            count = program.operations(name)
-            new = rows_of(compared.robot.tree, name, count, own, theirs, scales, (q, qd, tau), FACTOR * eps)
-            if not new:
-                raise WrongProgram(f"{name} has no counterpart in compare.experiments.quantities")
-            rows += new
+        rows = [row for name in dict.fromkeys(quantities) for row in judge.rows(program, name)]
     except NotRun as error:
         return Outcome(not_run=str(error)), None
     except WrongProgram as error:
         return Outcome(wrong=str(error)), None
-    return Outcome(tuple(rows), of=program.of), program
+    return Outcome(tuple(rows), file=program.file), program
 
 
-def random_states(robot: Robot, count: int) -> list[np.ndarray]:
+def random_states(robot: Robot, count: int) -> list[Array]:
     """q (count, nq) within the ranges of the joints, qd and tau (count, nv)."""
     rng, most = np.random.default_rng(SEED), samples.largest_speeds_and_torques(robot)[:, None]
     q = robot.coordinates.random(rng, count, robot.ranges)
     return [np.ascontiguousarray(q), *rng.uniform(-most, most, (2, count, robot.coordinates.nv))]
 
 
-def rows_of(
-    tree,
-    name: str,
-    operations: int,
-    own: list,
-    theirs: Dynamics,
-    scales: Entries,
-    states: tuple,
-    factor: float,
-) -> list[Row]:
-    """A row for each array of a quantity."""
-    exact, rows = exact_of_many(tree, name, *states), []
-    for symbol, of in QUANTITIES.items():
-        if of.function != name:
-            continue
-        taken, part = states[: len(of.arguments)], of.part
-        if name == "convective_terms" and tree.coordinates.balls:
-            values = convective_accelerations(theirs, *taken)
-        else:
-            values = getattr(theirs, name)(*taken)
-        right = exact.part(part)
-        scale = getattr(scales, of.scale)
-        if name == "acceleration":
-            scale = scale(scales.force(states[2]), right.high)
-        tolerance = np.broadcast_to(factor * np.asarray(scale), right.high.shape)
-        mine = np.asarray(own[part or 0], dtype=float)
-        from_mujoco, from_exact = mine - (values if part is None else values[part]), right.distance(mine)
-        units = of.units[0] if len(of.units) == 1 else unit(tree, *of.units)
-        worst = [worst_of(difference, tolerance) for difference in (from_mujoco, from_exact)]
-        rows.append(Row(symbol if part is not None else name, units, operations, *worst[0], *worst[1]))
-    return rows
-
-
-def worst_of(difference: np.ndarray, tolerance: np.ndarray) -> tuple[float, float]:
+def worst_of(difference: Array, tolerance: Array) -> tuple[float, float]:
     """The difference with the largest share of its tolerance, and that share; inf where it is not a number."""
     at = closest(difference, tolerance)
     value, most = abs(float(difference[at])), float(tolerance[at])
-    return value, value / most if most and np.isfinite(value) else 0.0 if value == 0.0 else np.inf
+    if value == 0.0:
+        return value, 0.0
+    return value, value / most if most and np.isfinite(value) else np.inf
 
 
-def times(compared: Compared, program: Program | None, quantities: Sequence[str], states: int) -> list[dict]:
-    """ns of one evaluation by C code, by tmt's compiled code, one state after the other, and by mj_forward; {}: not C."""
+def times(
+    compared: Compared, program: Program | None, quantities: Sequence[str], count: int
+) -> list[dict[str, Any]]:
+    """ns of one evaluation by C code, by tmt's compiled code, one state after the other, and by mj_forward; []: not C."""
     if not isinstance(program, CProgram):
         return []
-    arrays, tree, calls = random_states(compared.robot, states), compared.robot.tree, {}
-    for name in dict.fromkeys(quantities):
-        calls[name, "c"] = program.call(name, *arrays)[0]
-        compiled = evaluator(tree, name)
-        out = np.empty((states, compiled.size))
-        calls[name, "tmt"] = lambda compiled=compiled, out=out: compiled.fill(False, out, *arrays)
+    names, (q, qd, tau) = list(dict.fromkeys(quantities)), random_states(compared.robot, count)
+    calls: dict[object, Callable[..., Any]] = {}
+    for name in names:
+        calls[name, "c"], _ = program.call(name, (q, qd, tau))
+        compiled = evaluator(compared.robot.tree, name)
+        calls[name, "tmt"] = partial(compiled.fill, False, np.empty((count, compiled.size)), q, qd, tau)
     if not MinimalCalls.unavailable():
-        loops = MinimalCalls(compared.mujoco.of(compared.robot.case())).loops(*(x[0] for x in arrays))
-        forward = loops["MuJoCo, mj_forward"][1]
-        calls["", "mujoco"] = lambda: forward(states)
+        loops = MinimalCalls(compared.mujoco.of(compared.robot.case())).loops(q[0], qd[0], tau[0])
+        calls["mujoco"] = partial(loops["MuJoCo, mj_forward"][1], count)
     for call in calls.values():
         call()  # its code is compiled, or loaded, on the first call
-    seconds = timing.fastest(calls, ROUNDS)
-    ns = {key: 1e9 * value / states for key, value in seconds.items()}
-    return [
-        {"quantity": name, "c": ns[name, "c"], "tmt": ns[name, "tmt"], "mujoco": ns.get(("", "mujoco"))}
-        for name in dict.fromkeys(quantities)
-    ]
+    ns = {key: 1e9 * seconds / count for key, seconds in timing.fastest(calls, ROUNDS).items()}
+    forward = ns.get("mujoco")
+    return [{"quantity": x, "c": ns[x, "c"], "tmt": ns[x, "tmt"], "mujoco": forward} for x in names]

@@ -42,22 +42,22 @@ OPTIONS = {
 
 def equations_status(arguments: Sequence[str], command: str) -> int:
     """Run the command; the exit status. SystemExit for help and wrong arguments. Refused: it cannot be carried out."""
-    made = command_parser(EQUATIONS, "--out DIR", "export", OPTIONS)
-    options, unknown = made.parse_known_args(arguments)
+    parser = command_parser(EQUATIONS, "--out DIR", "export", OPTIONS)
+    options, unknown = parser.parse_known_args(arguments)
     if options.help:
-        made.print_help()
+        parser.print_help()
         raise SystemExit(0)
     if unknown and unknown[0].startswith("-"):
-        made.refuse_option(unknown[0], [*OPTIONS, "--help"])
+        parser.refuse_option(unknown[0], [*OPTIONS, "--help"])
     if unknown:
-        made.error(f"unexpected argument {unknown[0]!r}")
+        parser.error(f"unexpected argument {unknown[0]!r}")
     if options.to not in FILES:
         near = expected(options.to, dict(zip(FILES, FILES)), ", ".join(FILES))
-        made.error(f"--to: {options.to!r} is not a language; {near}")
+        parser.error(f"--to: {options.to!r} is not a language; {near}")
     if not options.out:
-        made.error("expected a new folder: --out DIR")
+        parser.error("expected a new folder: --out DIR")
     if Path(options.out).exists():
-        made.error(f"--out: {options.out} exists; expected the name of a new folder")
+        parser.error(f"--out: {options.out} exists; expected the name of a new folder")
     return write_equations(options, command)
 
 
@@ -80,8 +80,8 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
 
     def written(*head: str) -> dict[str, str]:
         try:
-            of_tree = partial(tmt.equations, robot.tree, name=name, single=options.float, head=head)
-            return {f"{name}{ending}": of_tree(to, quantities) for ending, to in FILES[options.to].items()}
+            text = partial(tmt.equations, robot.tree, name=name, single=options.float, head=head)
+            return {f"{name}{ending}": text(to, quantities) for ending, to in FILES[options.to].items()}
         except ValueError as error:
             raise Refused(error) from None
 
@@ -93,32 +93,29 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
         for file, text in texts.items():
             Path(folder, file).write_text(text, encoding="utf-8")
         terminal.show(f"runs what was written, at {STATES} states")
-        make = partial(
-            programs.PROGRAMS[options.to], Path(folder), name, robot.tree, quantities, options.float
-        )
+        program_of = programs.PROGRAMS[options.to]
+        make = partial(program_of, Path(folder), name, robot.tree, quantities, options.float)
         outcome, program = checks.checked(compared, make, quantities, STATES, options.float)
         times = checks.times(compared, program, quantities, STATES)
-    of = {
+    facts = {
         "outcome": outcome, "name": in_one_line(robot.name), "states": STATES, "features": robot.features,
         "command": in_one_line(command),
         "sha256": hashlib.sha256(Path(robot.mjcf).read_bytes()).hexdigest()[:16],
         "mujoco": installed("mujoco"),
     }  # fmt: skip
-    texts = written(*block("export", "head", **of).splitlines())
-    out = Path(options.out)
+    texts = written(*block("export", "head", **facts).splitlines())
+    paths = [Path(options.out, file) for file in texts]
     try:
-        out.mkdir(parents=True)
-        for file, text in texts.items():
-            (out / file).write_text(text, encoding="utf-8")
+        Path(options.out).mkdir(parents=True)
+        for path, text in zip(paths, texts.values()):
+            path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise Refused(f"cannot write to {out}: {error.strerror}") from None
+        raise Refused(f"cannot write to {options.out}: {error.strerror}") from None
     for line in block("export", "table", outcome=outcome, times=times).splitlines():
         terminal.say(line)
     style = "bold green" if outcome.passed else "bold" if outcome.not_run else "bold red"
     terminal.say(block("export", "verdict", outcome=outcome, states=STATES), style)
-    terminal.say(
-        f"Files: {', '.join(str(out / file) for file in texts)} ({time.perf_counter() - started:.1f} s)"
-    )
+    terminal.say(block("export", "files", paths=paths, seconds=time.perf_counter() - started))
     return 0 if outcome.passed or outcome.not_run else 1
 
 

@@ -6,11 +6,14 @@ import runpy
 import shlex
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import prod
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import tmt
 from tmt.compiled import evaluator
@@ -21,6 +24,10 @@ from ..robots import Robot
 
 STATE = ("q", "qd", "tau")
 MOST_SECONDS = 900.0  # of a compiler, or of a run in another language
+FLAGS = ("-std=c99", "-O2", "-Wall", "-fPIC", "-shared")
+
+Array = NDArray[np.floating[Any]]
+States = Sequence[Array]  # q (states, nq), qd and tau (states, nv)
 
 
 class NotRun(RuntimeError):
@@ -31,37 +38,30 @@ class WrongProgram(RuntimeError):
     """The text does not compile or does not run; the message is the first line that says why."""
 
 
+@dataclass
 class Program:
     """The files of a folder, for a Tree; `values` runs a function of them."""
 
-    of = ""  # the file that is run, where there are others with the same expressions
+    folder: Path
+    name: str
+    tree: tmt.Tree
+    quantities: Sequence[str]
+    single: bool
+    file = ""  # that is run, where there are others with the same expressions
 
-    def __init__(self, folder: Path, name: str, tree: tmt.Tree, quantities: Sequence[str], single: bool):
-        self.folder, self.name, self.tree, self.quantities, self.single = (
-            folder,
-            name,
-            tree,
-            quantities,
-            single,
-        )
+    def __post_init__(self) -> None:
         self.start()
 
     def start(self) -> None:
         """Compile or load the text."""
 
-    def values(self, quantity: str, q, qd, tau) -> list[np.ndarray]:
+    def values(self, quantity: str, states: States) -> list[Array]:
         """The results of a function at states, (states, ...) each: one, or one for each part of the quantity."""
         raise NotImplementedError
-
-    def takes(self, quantity: str, *states: np.ndarray) -> list[np.ndarray]:
-        return list(states[: len(QUANTITIES[quantity].takes)])
 
     def operations(self, quantity: str) -> int:
         """+ - * / of an evaluation; a sine, a cosine, a root count as one each."""
         return evaluator(self.tree, quantity).operations
-
-    def parts(self, quantity: str) -> int:
-        return max(1, len(QUANTITIES[quantity].parts))
 
     def run(self, *command: str) -> str:
         """The output of a command in the folder."""
@@ -81,120 +81,123 @@ class Program:
         return done.stdout
 
 
+def taken(quantity: str, states: States) -> list[Array]:
+    """Those of q, qd and tau that a quantity takes."""
+    return list(states[: len(QUANTITIES[quantity].takes)])
+
+
+def parts(quantity: str) -> int:
+    """How many arrays a quantity has."""
+    return len(QUANTITIES[quantity].parts) or 1
+
+
 class CProgram(Program):
     """Compiled with -O2, called for many states by a loop in C."""
 
-    def start(self):
-        compiler = (
-            shlex.split(os.environ.get("CC", "")) or list(filter(shutil.which, ("gcc", "cc", "clang")))[:1]
-        )
+    def start(self) -> None:
+        compiler = shlex.split(os.environ.get("CC", ""))
+        compiler = compiler or [name for name in ("gcc", "cc", "clang") if shutil.which(name)][:1]
         if not compiler or not shutil.which(compiler[0]):
             raise NotRun(f"no C compiler was found ({' '.join(compiler) or 'gcc, cc, clang'})")
-        driver = [f'#include "{self.name}.h"', *map(self.loop, self.quantities)]
-        Path(self.folder, "_states.c").write_text("\n".join(driver) + "\n", encoding="utf-8")
-        Path(self.folder, "_none.c").write_text("#include <math.h>\nint none;\n", encoding="utf-8")
-        flags = ["-std=c99", "-O2", "-Wall", "-fPIC", "-shared"]
         try:
-            self.run(*compiler, *flags, "_none.c", "-o", "_none.so", "-lm")
-            ctypes.CDLL(str(self.folder / "_none.so"))
+            self.compiled(compiler, "none", "#include <math.h>\nint none;")
         except (WrongProgram, OSError) as error:  # of the compiler or the folder, not of the equations
             raise NotRun(f"a C library cannot be made or loaded: {error}") from None
+        loops = "\n".join([f'#include "{self.name}.h"', *map(self.loop, self.quantities)])
         # the header before the source: the declarations must be those of the functions
-        files = ["-include", f"{self.name}.h", f"{self.name}.c", "_states.c"]
-        self.run(*compiler, *flags, *files, "-o", "_states.so", "-lm")
-        self.library = ctypes.CDLL(str(self.folder / "_states.so"))
+        self.library = self.compiled(
+            compiler, "states", loops, "-include", f"{self.name}.h", f"{self.name}.c"
+        )
+
+    def compiled(self, compiler: Sequence[str], name: str, text: str, *more: str) -> ctypes.CDLL:
+        """The library of a text and of more files."""
+        (self.folder / f"_{name}.c").write_text(f"{text}\n", encoding="utf-8")
+        self.run(*compiler, *FLAGS, *more, f"_{name}.c", "-o", f"_{name}.so", "-lm")
+        return ctypes.CDLL(str(self.folder / f"_{name}.so"))
 
     def loop(self, quantity: str) -> str:
         """A function for many states."""
-        kind, of = "float" if self.single else "double", QUANTITIES[quantity]
-        sizes = dict(zip(STATE, self.sizes))
+        kind, coordinates = "float" if self.single else "double", self.tree.coordinates
+        sizes = {"q": coordinates.nq, "qd": coordinates.nv, "tau": coordinates.nv}
         size = prod(shape_of(quantity, self.tree))
-        own = size // self.parts(quantity)
-        taken = [f"{x} + {sizes[x]} * i" for x in of.takes]
-        taken += [f"out + {size} * i + {own * k}" for k in range(self.parts(quantity))]
+        given = [f"{x} + {sizes[x]} * i" for x in QUANTITIES[quantity].takes]
+        given += [f"out + {size} * i + {size // parts(quantity) * k}" for k in range(parts(quantity))]
         arguments = ", ".join(f"const {kind} *{x}" for x in STATE)
-        call = f"{self.name}_{quantity}({', '.join(taken)});"
+        call = f"{self.name}_{quantity}({', '.join(given)});"
         return f"void states_{quantity}({arguments}, {kind} *out, long n) {{ for (long i = 0; i < n; i++) {call} }}"
 
-    @property
-    def sizes(self) -> tuple[int, int, int]:
-        return self.tree.coordinates.nq, self.tree.coordinates.nv, self.tree.coordinates.nv
-
-    def call(self, quantity: str, q, qd, tau):
+    def call(self, quantity: str, states: States) -> tuple[Callable[[], None], Array]:
         """A call without arguments that evaluates all states, and its output (states, size)."""
         kind = np.float32 if self.single else float
-        arrays = [np.ascontiguousarray(x, dtype=kind) for x in (q, qd, tau)]
-        out = np.empty((len(q), prod(shape_of(quantity, self.tree))), dtype=kind)
+        count = len(states[0])
+        arrays = [np.ascontiguousarray(x, dtype=kind) for x in states]
+        arrays.append(np.empty((count, prod(shape_of(quantity, self.tree))), dtype=kind))
         function = self.library[f"states_{quantity}"]
-        places = [ctypes.c_void_p(x.ctypes.data) for x in (*arrays, out)]
-        count = ctypes.c_long(len(q))
 
-        def call(_=(*arrays, out)):  # they live as long as the call
-            function(*places, count)
+        def call() -> None:
+            function(*(ctypes.c_void_p(x.ctypes.data) for x in arrays), ctypes.c_long(count))
 
-        return call, out
+        return call, arrays[-1]
 
-    def values(self, quantity, q, qd, tau):
-        call, out = self.call(quantity, q, qd, tau)
+    def values(self, quantity: str, states: States) -> list[Array]:
+        call, out = self.call(quantity, states)
         call()
-        found = out.astype(float).reshape(len(q), *shape_of(quantity, self.tree))
-        return [found[:, k] for k in range(self.parts(quantity))] if self.parts(quantity) > 1 else [found]
+        values = out.astype(float).reshape(len(out), *shape_of(quantity, self.tree))
+        return [values[:, k] for k in range(parts(quantity))] if QUANTITIES[quantity].parts else [values]
 
 
 class PythonProgram(Program):
     """A module, called with all states at once."""
 
-    def start(self):
+    def start(self) -> None:
         self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
 
-    def values(self, quantity, q, qd, tau):
-        found = self.functions[quantity](*self.takes(quantity, q, qd, tau))
-        return list(found) if self.parts(quantity) > 1 else [found]
+    def values(self, quantity: str, states: States) -> list[Array]:
+        values = self.functions[quantity](*taken(quantity, states))
+        return list(values) if QUANTITIES[quantity].parts else [values]
 
 
 class SymbolicProgram(Program):
     """The matrices of SymPy, as functions of states."""
 
-    def start(self):
-        self.of = f"{self.name}.py"
-        self.found = runpy.run_path(str(self.folder / self.of))
+    def start(self) -> None:
+        self.file = f"{self.name}.py"
+        self.matrices = runpy.run_path(str(self.folder / self.file))
         robot = Robot("", Path(), self.tree, {}, ())
-        self.functions = functions_of(self.found, robot.coordinates, ())
+        self.functions = functions_of(self.matrices, robot.coordinates, ())
 
-    def operations(self, quantity):
+    def operations(self, quantity: str) -> int:
         import sympy
 
-        matrix, _ = self.found[quantity.removesuffix("_balance")]
+        matrix, _ = self.matrices[quantity.removesuffix("_balance")]
         return int(sum(sympy.count_ops(entry) for entry in matrix))
 
-    def values(self, quantity, q, qd, tau):
+    def values(self, quantity: str, states: States) -> list[Array]:
         function = self.functions[quantity.removesuffix("_balance")]
-        return [np.array([function(*state) for state in zip(*self.takes(quantity, q, qd, tau))], dtype=float)]
+        return [np.array([function(*state) for state in zip(*taken(quantity, states))], dtype=float)]
 
 
 class MatlabProgram(Program):
     """Run by Octave; states and values go through files of doubles."""
 
-    def start(self):
-        self.octave = next(filter(shutil.which, ("octave-cli", "octave")), None)
-        if self.octave is None:
+    def start(self) -> None:
+        found = [name for name in ("octave-cli", "octave") if shutil.which(name)]
+        if not found:
             raise NotRun("Octave was not found")
+        self.octave = found[0]
 
-    def values(self, quantity, q, qd, tau):
-        takes, parts = QUANTITIES[quantity].takes, self.parts(quantity)
-        lines = []
-        for x, values in zip(takes, (q, qd, tau)):
+    def values(self, quantity: str, states: States) -> list[Array]:
+        takes, results, lines = QUANTITIES[quantity].takes, [f"r{k}" for k in range(parts(quantity))], ["1;"]
+        for x, values in zip(takes, states):
             np.ascontiguousarray(values).tofile(self.folder / f"{x}.bin")
-            lines.append(
-                f"f = fopen('{x}.bin'); {x} = fread(f, [{values.shape[1]}, Inf], 'double'); fclose(f);"
-            )
-        results = [f"r{k}" for k in range(parts)]
+            read = f"fread(f, [{values.shape[1]}, Inf], 'double')"
+            lines.append(f"f = fopen('{x}.bin'); {x} = {read}; fclose(f);")
         lines.append(f"[{', '.join(results)}] = {self.name}('{quantity}', {', '.join(takes)});")
         lines += [f"f = fopen('{r}.bin', 'w'); fwrite(f, {r}, 'double'); fclose(f);" for r in results]
-        (self.folder / "_states.m").write_text("\n".join(["1;", *lines]) + "\n", encoding="utf-8")
+        (self.folder / "_states.m").write_text("\n".join(lines) + "\n", encoding="utf-8")
         self.run(self.octave, "--norc", "--quiet", "_states.m")
-        shape = shape_of(quantity, self.tree)[parts > 1 :]
-        arrays = [np.fromfile(self.folder / f"{r}.bin").reshape((*shape, len(q)), order="F") for r in results]
+        shape = *shape_of(quantity, self.tree)[parts(quantity) > 1 :], len(states[0])
+        arrays = [np.fromfile(self.folder / f"{r}.bin").reshape(shape, order="F") for r in results]
         return [np.moveaxis(array, -1, 0) for array in arrays]
 
 

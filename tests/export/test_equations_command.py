@@ -20,16 +20,12 @@ from compare.run.reference import compared_with
 from tmt.derivation.quantities import QUANTITIES
 
 HAS_C, HAS_OCTAVE = (bool(shutil.which(name)) for name in ("gcc", "octave-cli"))
+NEEDS = {"c": HAS_C, "matlab": HAS_OCTAVE, "python": True, "latex": True}
 COUNT = 20
 
 
-@pytest.mark.parametrize(
-    "language",
-    ["c", "python", pytest.param("matlab", marks=pytest.mark.skipif(not HAS_OCTAVE, reason="no Octave"))],
-)
+@pytest.mark.parametrize("language", [name for name in ("c", "python", "matlab") if NEEDS[name]])
 def test_the_arm_in_a_language(language, tmp_path, capsys):
-    if language == "c" and not HAS_C:
-        pytest.skip("no C compiler")
     out = tmp_path / "new" / "folder"
     assert main(["equations", "--to", language, "--out", str(out)]) == 0
     shown = capsys.readouterr().out
@@ -50,13 +46,18 @@ def test_what_is_exported_to_python_can_be_checked_as_a_users_equations(tmp_path
     compare.assert_agrees(str(PATHS["mixed"]), **functions)
 
 
+def outcome_of(make, *quantities, compared=None, single=False):
+    """What is said of a program; compared: with the arm, where it is None."""
+    return checks.checked(compared or compared_with(None, None), make, quantities, COUNT, single)[0]
+
+
 class Altered(Program):
     """tmt's own values, of which one entry of the last state is off by a multiple of its tolerance."""
 
     def __init__(self, tree, quantity, share, eps=2.0**-52):
         self.tree, self.quantity, self.share, self.eps = tree, quantity, share, eps
 
-    def values(self, quantity, *states):
+    def values(self, quantity, states):
         found = getattr(tmt, quantity)(*states[: len(QUANTITIES[quantity].takes)], model=self.tree)
         found = [part.copy() for part in found] if isinstance(found, tuple) else [found.copy()]
         if quantity == self.quantity:
@@ -71,9 +72,8 @@ class Altered(Program):
 @pytest.mark.parametrize(("share", "passes"), [(0.7, True), (1.3, False), (np.nan, False)])
 @pytest.mark.parametrize("single", [False, True])
 def test_a_difference_is_judged_by_the_tolerance_of_its_entry(quantity, share, passes, single):
-    compared = compared_with(None, None)
-    make = partial(Altered, compared.robot.tree, quantity, share, 2.0 ** (-23 if single else -52))
-    outcome, _ = checks.checked(compared, make, [quantity, "gravity_balance"], COUNT, single)
+    make = partial(Altered, tmt.ARM, quantity, share, 2.0 ** (-23 if single else -52))
+    outcome = outcome_of(make, quantity, "gravity_balance", single=single)
     assert [row.passed for row in outcome.rows] == [passes, True] and outcome.passed is passes
 
 
@@ -81,24 +81,22 @@ def test_states_are_spread_within_the_ranges_and_those_of_floats_are_floats():
     seen = []
 
     class Seen(Altered):
-        def values(self, quantity, *states):
+        def values(self, quantity, states):
             seen.append(states)
-            return super().values(quantity, *states)
+            return super().values(quantity, states)
 
     compared = compared_with("model", str(PATHS["arm7"]))
     for single in (False, True):
-        checks.checked(compared, partial(Seen, compared.robot.tree, "", 0.0), ["acceleration"], COUNT, single)
+        outcome_of(
+            partial(Seen, compared.robot.tree, "", 0.0), "acceleration", compared=compared, single=single
+        )
     for states, kind in zip(seen, (np.float64, np.float32)):
         for x in states:
             assert x.shape == (COUNT, 7) and (np.ptp(x, axis=0) > 0.5 * np.abs(x).max(axis=0)).all()
             assert (x == x.astype(kind)).all()
     assert any((x != x.astype(np.float32)).any() for x in seen[0])
-    assert all(
-        (low <= q).all() and (q <= high).all() for q, (low, high) in zip(seen[0][0].T, compared.robot.ranges)
-    )
-
-
-NEEDS = {"c": HAS_C, "matlab": HAS_OCTAVE, "python": True, "latex": True}
+    low, high = np.transpose(compared.robot.ranges)
+    assert (low <= seen[0][0]).all() and (seen[0][0] <= high).all()
 
 
 @pytest.mark.parametrize("language", [name for name, is_there in NEEDS.items() if is_there])
@@ -108,27 +106,27 @@ def test_what_is_judged_is_what_was_written(language, tmp_path):
     for ending, kind in FILES[language].items():
         text = tmt.equations(tmt.ARM, kind, quantities, name="arm")
         (tmp_path / f"arm{ending}").write_text(text.replace("9.81", "9.8100001"), encoding="utf-8")
-    make = partial(PROGRAMS[language], tmp_path, "arm", tmt.ARM, quantities, False)
-    outcome, _ = checks.checked(compared_with(None, None), make, quantities, COUNT, False)
+    outcome = outcome_of(
+        partial(PROGRAMS[language], tmp_path, "arm", tmt.ARM, quantities, False), *quantities
+    )
     assert [row.passed for row in outcome.rows] == [True, False] and outcome.rows[0].operations > 10
 
 
 @pytest.mark.skipif(not HAS_OCTAVE, reason="no Octave")
 def test_arrays_of_matlab_are_stored_by_rows(tmp_path):
-    (tmp_path / "arm.m").write_text(
-        tmt.equations(tmt.ARM, "matlab", ["jacobians"], name="arm"), encoding="utf-8"
-    )
+    text = tmt.equations(tmt.ARM, "matlab", ["jacobians"], name="arm")
+    (tmp_path / "arm.m").write_text(text, encoding="utf-8")
     make = partial(PROGRAMS["matlab"], tmp_path, "arm", tmt.ARM, ["jacobians"], False)
-    assert checks.checked(compared_with(None, None), make, ["jacobians"], COUNT, False)[0].passed
+    assert outcome_of(make, "jacobians").passed
 
 
 @pytest.mark.skipif(not HAS_C, reason="no C compiler")
 def test_single_precision_is_written_and_checked_at_all_states(tmp_path, monkeypatch):
     asked = []
 
-    def values(self, quantity, q, qd, tau):
-        asked.append((len(q), self.single))
-        return of_c(self, quantity, q, qd, tau)
+    def values(self, quantity, states):
+        asked.append((len(states[0]), self.single))
+        return of_c(self, quantity, states)
 
     of_c = PROGRAMS["c"].values
     monkeypatch.setattr(PROGRAMS["c"], "values", values)
@@ -140,9 +138,7 @@ def test_single_precision_is_written_and_checked_at_all_states(tmp_path, monkeyp
 @pytest.mark.parametrize("name", QUANTITIES)
 def test_each_quantity_has_a_counterpart_in_mujoco(name):
     compared = compared_with("model", str(PATHS["mixed"]))
-    outcome, _ = checks.checked(
-        compared, partial(Altered, compared.robot.tree, "", 0.0), [name], COUNT, False
-    )
+    outcome = outcome_of(partial(Altered, compared.robot.tree, "", 0.0), name, compared=compared)
     assert outcome.passed and len(outcome.rows) == max(1, len(QUANTITIES[name].parts))
 
 
@@ -181,12 +177,10 @@ def test_without_a_compiler_the_files_are_not_checked(tmp_path, monkeypatch):
 
 @pytest.mark.skipif(not HAS_C, reason="no C compiler")
 def test_a_text_that_does_not_compile_has_failed(tmp_path):
-    from compare.export.programs import CProgram
-
     (tmp_path / "arm.h").write_text("void arm_bias(const double q[3], const double qd[3], double out[3]);")
     (tmp_path / "arm.c").write_text("void arm_bias(const float q[3], const double qd[3], double out[3]) {}")
     with pytest.raises(WrongProgram, match="arm_bias"):
-        CProgram(tmp_path, "arm", tmt.ARM, ["bias"], False)
+        PROGRAMS["c"](tmp_path, "arm", tmt.ARM, ["bias"], False)
 
 
 @pytest.mark.parametrize(("words", "why"), [
@@ -223,13 +217,9 @@ def test_the_name_of_a_file_becomes_an_identifier(stem, name):
 @pytest.mark.parametrize("from_mujoco", [True, False])
 def test_values_are_compared_with_mujoco_and_with_the_exact_value(from_mujoco, tmp_path):
     heavy = tmp_path / "heavy.xml"
-    heavy.write_text(text_of_arm().replace('mass="1.5"', 'mass="1.6"'), encoding="utf-8")
+    text = ARM.mjcf.read_text(encoding="utf-8")
+    heavy.write_text(text.replace('mass="1.5"', 'mass="1.6"'), encoding="utf-8")
     compared = compared_with("arm", str(heavy))  # the stated numbers, and MuJoCo with another mass
     tree = compared.robot.tree if from_mujoco else compared_with("model", str(heavy)).robot.tree
-    outcome, _ = checks.checked(compared, partial(Altered, tree, "", 0.0), ["mass_matrix"], COUNT, False)
-    (row,) = outcome.rows
+    (row,) = outcome_of(partial(Altered, tree, "", 0.0), "mass_matrix", compared=compared).rows
     assert not row.passed and (row.of_mujoco > 1.0, row.of_exact > 1.0) == (from_mujoco, not from_mujoco)
-
-
-def text_of_arm():
-    return ARM.mjcf.read_text(encoding="utf-8")

@@ -13,8 +13,8 @@ from compare.judge.rounding import LEFT_OUT, OF_A_BALL, band, growth, slope_roun
 from compare.judge.scale import gain_scale
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
+from tmt.derivation.coordinates import coordinates_of
 from tmt.methods import METHODS, amplification
-from tmt.model.coordinates import coordinates_of
 
 EPS = 2.0**-52
 EULER = METHODS["semi_implicit_euler"]

@@ -78,9 +78,8 @@ def test_jacobians_and_convective_terms_are_derivatives_of_what_moves(drawn):
     tree, q, qd, *_ = drawn
 
     def turns(q):
-        return np.array(
-            [[list(row) for row in method.joint_frames(tree, list(q))[h].turn] for h in tree.body_joint]
-        )
+        frames = method.joint_frames(tree, list(q))
+        return np.array([[list(row) for row in frames[joint].turn] for joint in tree.body_joint])
 
     T, B = tmt.jacobians(q, tree)
     assert_close(T, by_each(tree, lambda q: tmt.com_positions(q, tree), q))
@@ -103,9 +102,8 @@ def test_composite_and_articulated_bodies_give_the_numbers_of_the_literal_sums(d
             assert_close(np.array(found), expected, digits=1e-12)
     assert_close(np.array(articulated.bias(tree, q, qd)), h, digits=1e-12)
     qdd = np.array(articulated.forward_dynamics(tree, q, qd, tau))
-    assert_close(
-        M @ qdd, method.reduced_force(tree, h, q, qd, tau), np.abs(M).max() * np.abs(qdd).max(), 1e-12
-    )
+    force = method.reduced_force(tree, h, q, qd, tau)
+    assert_close(M @ qdd, force, np.abs(M).max() * np.abs(qdd).max(), 1e-12)
 
 
 @few
@@ -124,13 +122,13 @@ def test_a_locked_tree_is_the_sub_block_of_the_whole(drawn, data):
     tree, q, qd, *_ = drawn
     joints = tree.coordinates.joints
     locked = data.draw(st.sets(st.integers(0, len(joints) - 1), max_size=len(joints) - 1))
-    held = {
-        tree.joint_names[i]: q[joints[i].q] if tree.kind[i] == "ball" else float(q[joints[i].q][0])
-        for i in locked
-    }
+    held = {}
+    for i in locked:
+        position = q[joints[i].q]
+        held[tree.joint_names[i]] = position if tree.kind[i] == "ball" else float(position[0])
     free = [joint for i, joint in enumerate(joints) if i not in locked]
     at = [k for joint in free for k in range(joint.q.start, joint.q.stop)]
-    by = [k for joint in free for k in range(joint.qd.start, joint.qd.stop)]
+    by = [k for joint in free for k in joint.speeds]
     qd[[k for k in range(len(qd)) if k not in by]] = 0.0
     smaller, state = tree.lock(held), (q[at], qd[by])
     assert smaller.joint_names == tuple(name for i, name in enumerate(tree.joint_names) if i not in locked)
@@ -152,7 +150,7 @@ def test_the_distance_from_many_digits_is_that_of_all_digits():
 
 DIGITS = 150
 TINY = mpmath.mpf(10) ** -35  # errors: of order TINY^2, and 10^-DIGITS / TINY^2
-NUMBERS = (
+NUMBERS = [
     "offset",
     "axis",
     "mass",
@@ -163,7 +161,7 @@ NUMBERS = (
     "stiffness",
     "rest",
     "reference",
-)
+]
 mp = np.vectorize(mpmath.mpf, otypes=[object])
 IDENTITY = mp(np.eye(3))
 
@@ -196,9 +194,8 @@ class Lagrange:
 
         n = self.tangents(q)
         energies = [self.kinetic(q, one) for one in n]
-        M = np.array(
-            [[self.kinetic(q, a + b) - x - y for b, y in zip(n, energies)] for a, x in zip(n, energies)]
-        )
+        tangents = list(zip(n, energies))
+        M = np.array([[self.kinetic(q, a + b) - x - y for b, y in tangents] for a, x in tangents])
 
         def momentum(moved, one):
             now = u @ self.tangents(q + moved)
@@ -219,11 +216,8 @@ class Lagrange:
             J = np.trace(inertia) / 2 * IDENTITY - inertia
             T += mass * (xd @ xd) / 2 + np.sum((Rd @ J) * Rd) / 2
         for joint in self.joints:  # of a ball omega = 2 |pd|
-            T += (
-                self.armature[joint.qd.start]
-                * (qd[joint.q] @ qd[joint.q])
-                * (2 if joint.kind == "ball" else mpmath.mpf(1) / 2)
-            )
+            share = 2 if joint.kind == "ball" else mpmath.mpf(1) / 2
+            T += self.armature[joint.qd.start] * (qd[joint.q] @ qd[joint.q]) * share
         return T
 
     def potential(self, q):
@@ -262,10 +256,10 @@ class Lagrange:
         """N', (nv, nq): qd = N u."""
         N = mp(np.zeros((len(q), len(self.axis))))
         for joint in self.joints:
-            w, x, y, z = q[joint.q] / 2 if joint.kind == "ball" else 4 * [mpmath.mpf(1)]
-            N[joint.q, joint.qd] = (
-                [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]] if joint.kind == "ball" else w
-            )
+            N[joint.q, joint.qd] = mpmath.mpf(1)
+            if joint.kind == "ball":
+                w, x, y, z = q[joint.q] / 2
+                N[joint.q, joint.qd] = [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]]
         return N.T
 
 

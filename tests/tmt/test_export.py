@@ -32,6 +32,12 @@ def module(tree, *quantities):
     return found
 
 
+def compile_in(folder, arguments):
+    """Without any warning."""
+    command = ["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", *arguments.split()]
+    subprocess.run(command, cwd=folder, check=True)
+
+
 def near(values, expected):
     return all(np.allclose(a, b, rtol=1e-11, atol=1e-12) for a, b in zip(values, expected, strict=True))
 
@@ -65,10 +71,10 @@ def test_brackets_keep_the_order_of_operations():
                 a * (b + c) - d * (a - c), -2.0 * a - -3.0 / b, 1.0 / (a - b)]  # fmt: skip
 
     traced, values = straight.trace("f", (4,), function), [1.3, -0.7, 2.1, 0.9]
-    for syntax in (Syntax(), Syntax(number=lambda x: f"({x!r})")):
-        writer, names = Writer(traced, list("abcd"), syntax), dict(zip("abcd", values))
-        for assignment in writer.assignments:
-            names[assignment.name] = eval(assignment.expression, {}, names)
+    for number in (repr, lambda x: f"({x!r})"):
+        syntax, names = Syntax("", "{name} = {value}", "", number=number), dict(zip("abcd", values))
+        writer = Writer(traced, list("abcd"), syntax)
+        exec("\n".join(writer.assignments), {}, names)
         assert np.allclose([eval(text, {}, names) for text in writer.results], function(values), rtol=1e-14)
 
 
@@ -85,28 +91,15 @@ def test_c_compiles_without_a_warning_and_gives_the_same_values(single, tmp_path
     names = ["mass_matrix", "acceleration", "energy"]
     (tmp_path / "robot.c").write_text(tmt.equations(tree, "c", names, single=single))
     (tmp_path / "robot.h").write_text(tmt.equations(tree, "c header", names, single=single))
-    flags = [
-        "-std=c99",
-        "-O1",
-        "-Wall",
-        "-Wextra",
-        "-pedantic",
-        "-Werror",
-        "-fPIC",
-        "-shared",
-        "-include",
-        "robot.h",
-    ]
-    subprocess.run(["gcc", *flags, "robot.c", "-o", "robot.so", "-lm"], cwd=tmp_path, check=True)
+    compile_in(tmp_path, "-O1 -pedantic -fPIC -shared -include robot.h robot.c -o robot.so -lm")
     library, kind = ctypes.CDLL(str(tmp_path / "robot.so")), np.float32 if single else np.float64
     for name in names:
         states = [x[0].astype(kind) for x in states_of(tree)[: len(QUANTITIES[name].takes)]]
         expected = np.asarray(getattr(tmt, name)(*(x.astype(float) for x in states), model=tree))
         out = np.empty(max(1, expected.size), dtype=kind)
         library[f"robot_{name}"](*(ctypes.c_void_p(x.ctypes.data) for x in (*states, out)))
-        assert np.allclose(
-            out, expected.ravel(), rtol=2e-3 if single else 1e-11, atol=1e-4 if single else 1e-12
-        )
+        rtol, atol = (2e-3, 1e-4) if single else (1e-11, 1e-12)
+        assert np.allclose(out, expected.ravel(), rtol=rtol, atol=atol)
 
 
 NAMES = ('*/ int run; /*"""', "x??/", "'''end\\", "`<img src=x onerror=run()>`` 100 %ä")
@@ -128,20 +121,8 @@ def test_names_that_are_pieces_of_programs_stay_in_comments_and_texts(tmp_path):
         if language in ("python", "sympy"):
             compile(text, language, "exec")
     if HAS_C:
-        command = [
-            "gcc",
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            "-x",
-            "c",
-            "-include",
-            "c header",
-            "-c",
-            "c",
-        ]
-        subprocess.run(command, cwd=tmp_path, check=True)
+        (tmp_path / "header").write_text((tmp_path / "c header").read_text())
+        compile_in(tmp_path, "-x c -include header -c c")
 
 
 @pytest.mark.parametrize(("given", "why"), [

@@ -8,6 +8,7 @@ from trees import random_tree, wrist
 
 import tmt
 from tmt.arm import points
+from tmt.model.tree import stated
 
 
 def test_arm_lies_as_the_assignment_says():
@@ -71,11 +72,8 @@ def test_a_state_of_a_ball_is_refused_by_its_name():
 @pytest.mark.parametrize("size", [5e-324, 1.7e308])
 def test_an_axis_of_any_length_is_a_direction(size):
     tree = dataclasses.replace(tmt.ARM, axis=((0, 1, 0), (size, size, 0), (0, 0, -size)))
-    assert np.allclose(tree.axis[1], (0.5**0.5, 0.5**0.5, 0.0), rtol=0, atol=2e-16) and tree.axis[2] == (
-        0.0,
-        0.0,
-        -1.0,
-    )
+    assert np.allclose(tree.axis[1], (0.5**0.5, 0.5**0.5, 0.0), rtol=0, atol=2e-16)
+    assert tree.axis[2] == (0.0, 0.0, -1.0)
 
 
 def chain(axes, com=(0.3, 0.1, 0.2), inertia=None, offsets=None):
@@ -122,24 +120,21 @@ def test_a_hinge_locked_at_zero_rounds_nothing():
     planar, arm = tmt.ARM.lock({"beta": 0.0}), tmt.ARM
     assert (planar.offset, planar.axis) == (arm.offset[::2], arm.axis[::2])
     assert (planar.parent, planar.body_joint) == ((-1, 0), (0, 1))
-    assert (planar.com, planar.inertia, planar.mass) == (arm.com, arm.inertia, arm.mass) and arm.lock(
-        {}
-    ) == arm
+    assert (planar.com, planar.inertia, planar.mass) == (arm.com, arm.inertia, arm.mass)
+    assert arm.lock({}) == arm
 
 
 @pytest.mark.parametrize(
-    "angles, word",
-    [({"wrist": 0.0}, "'wrist'"), (dict.fromkeys(tmt.ARM.joint_names, 0.0), "one must be free")],
+    "joints, word", [(["wrist"], "no joint 'wrist'"), (tmt.ARM.joint_names, "at least one must be free")]
 )
-def test_what_cannot_be_locked(angles, word):
+def test_what_cannot_be_locked(joints, word):
     with pytest.raises(ValueError, match=word):
-        tmt.ARM.lock(angles)
+        tmt.ARM.lock(dict.fromkeys(joints, 0.0))
 
 
 def test_former_names_of_fields_are_accepted_and_deprecated():
-    values = {
-        ("hinge_names" if name == "joint_names" else name): value for name, value in vars(tmt.ARM).items()
-    }
+    values = dict(vars(tmt.ARM))
+    values["hinge_names"] = values.pop("joint_names")
     with pytest.warns(DeprecationWarning, match="joint_names"):
         assert tmt.Tree(**values) == tmt.ARM
     with pytest.warns(DeprecationWarning, match="body_joint"):
@@ -147,3 +142,11 @@ def test_former_names_of_fields_are_accepted_and_deprecated():
     with pytest.warns(DeprecationWarning):
         renamed = dataclasses.replace(tmt.ARM, hinge_names=("a", "b", "c"))
     assert renamed.joint_names == ("a", "b", "c")
+
+
+def test_a_tree_is_shown_in_one_short_line_and_stated_by_all_its_numbers(rng):
+    assert repr(tmt.ARM) == "Tree(3 joints: alpha, beta, gamma; 2 bodies)"
+    assert repr(chain([X], inertia=np.eye(3))) == "Tree(1 joint: h0; 1 body)"
+    large = repr(random_tree(rng, bodies=20))
+    assert large.endswith(", ...; 20 bodies)") and len(large) < 100
+    assert stated(tmt.ARM) != stated(dataclasses.replace(tmt.ARM, mass=(1.9, 1.5 + 1e-15)))

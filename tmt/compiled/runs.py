@@ -8,11 +8,11 @@ it did not, after how many steps, and how often the dynamics were evaluated. Wha
 from collections.abc import Callable
 from typing import Any
 
+from tmt.derivation.coordinates import FLAT
 from tmt.derivation.dual import seeded
 from tmt.methods.dynamics import Values, minus, plus
 from tmt.methods.implicit import CLOSE, ITERATIONS
 from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED, Joints
-from tmt.model.coordinates import FLAT
 from tmt.model.tree import Tree
 
 from . import forms, linear

@@ -16,9 +16,12 @@ The number of operations of the accelerations grows with n, that of Mbar with n 
 
 from typing import NamedTuple
 
-from .composite import outer, rounded_once, turning
+from tmt.scalar import Scalar
+
+from .composite import Distribution, rounded_once, turning
+from .mechanism import AnyTree, turn_in_parent
 from .method import reduced_force
-from .vectors import IDENTITY, ZERO, Matrix, Vector, rotation, turn_of
+from .vectors import IDENTITY, ZERO, Matrix, Scalars, Vector, outer
 
 
 class Symmetric(NamedTuple):
@@ -27,17 +30,28 @@ class Symmetric(NamedTuple):
     diagonal: Vector
     off: Vector  # yz, xz, xy
 
-    def times(self, v) -> Vector:
+    def times(self, v: Vector) -> Vector:
         (xx, yy, zz), (yz, xz, xy) = self
         return Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ v
 
-    def plus(self, other) -> "Symmetric":
+    def plus(self, other: "Symmetric") -> "Symmetric":
         return Symmetric(self.diagonal + other.diagonal, self.off + other.off)
 
-    def less_outer(self, a, b) -> "Symmetric":
+    def less_outer(self, a: Vector, b: Vector) -> "Symmetric":
         """The matrix less a b', a along b."""
         off = Vector(a.y * b.z, a.x * b.z, a.x * b.y)
         return Symmetric(self.diagonal - Vector(a.x * b.x, a.y * b.y, a.z * b.z), self.off - off)
+
+
+class Direction(NamedTuple):
+    """The motion for a unit speed."""
+
+    axis: Vector
+    shift: Vector  # velocity of the point at O
+
+    def power(self, moment: Vector, force: Vector) -> Scalar:
+        """That of a moment and a force about O."""
+        return self.axis.dot(moment) + self.shift.dot(force)
 
 
 class Frame(NamedTuple):
@@ -48,7 +62,7 @@ class Frame(NamedTuple):
     omega: Vector
     omegad: Vector
     a: Vector  # of its point at O
-    directions: list  # of its speeds: (axis, velocity of the point at O)
+    directions: list[Direction]  # of its speeds
 
 
 class Carried(NamedTuple):
@@ -60,10 +74,9 @@ class Carried(NamedTuple):
     H: Matrix
     M: Symmetric
 
-    def plus(self, other) -> "Carried":
-        return Carried(
-            self.n + other.n, self.f + other.f, self.J.plus(other.J), self.H + other.H, self.M.plus(other.M)
-        )
+    def plus(self, other: "Carried") -> "Carried":
+        n, f, J = self.n + other.n, self.f + other.f, self.J.plus(other.J)
+        return Carried(n, f, J, self.H + other.H, self.M.plus(other.M))
 
 
 class Rigid(NamedTuple):
@@ -73,12 +86,11 @@ class Rigid(NamedTuple):
     f: Vector
     J: Symmetric
     s: Vector
-    m: object
+    m: Scalar
 
-    def plus(self, other) -> "Rigid":
-        return Rigid(
-            self.n + other.n, self.f + other.f, self.J.plus(other.J), self.s + other.s, self.m + other.m
-        )
+    def plus(self, other: "Rigid") -> "Rigid":
+        n, f, J = self.n + other.n, self.f + other.f, self.J.plus(other.J)
+        return Rigid(n, f, J, self.s + other.s, self.m + other.m)
 
     @property
     def carried(self) -> Carried:
@@ -87,81 +99,85 @@ class Rigid(NamedTuple):
         return Carried(self.n, self.f, self.J, H, Symmetric(Vector(m, m, m), ZERO))
 
 
-def acceleration(tree, q, qd, force, armature=()) -> list:
+class Share(NamedTuple):
+    """How a speed gives way: U / D by moment and force, and u / D."""
+
+    moment: Vector
+    force: Vector
+    u: Scalar
+
+
+def acceleration(
+    tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armature: Scalars = ()
+) -> list[Scalar]:
     """qdd (nv,) from Mbar qdd = force - h; force: all but the bias (nv,); armature: in place of the tree's."""
     frames, rigid = outward(tree, q, qd)
     armature = armature or tree.armature
     joints, bodies = tree.coordinates.joints, [body.carried for body in rigid]
-    shares = [None] * len(qd)  # of each speed: U / D and u / D
+    shares: dict[int, Share] = {}
     for i in reversed(range(len(joints))):
-        body, by = bodies[i], range(*joints[i].qd.indices(len(qd)))
-        for k in reversed(by):
-            axis, shift = frames[i].directions[k - by.start]
-            y = body.J.times(axis) + body.H @ shift
-            x = body.M.times(shift) + body.H.transposed @ axis
-            inverse = 1.0 / (axis.dot(y) + shift.dot(x) + armature[k])
-            u = (force[k] - (axis.dot(body.n) + shift.dot(body.f))) * inverse
-            y_share, x_share = y * inverse, x * inverse
-            shares[k] = y_share, x_share, u
-            body = Carried(
-                body.n + y * u,
-                body.f + x * u,
-                body.J.less_outer(y_share, y),
-                body.H - outer(y_share, x),
-                body.M.less_outer(x_share, x),
-            )
+        body = bodies[i]
+        for k, direction in reversed(list(zip(joints[i].speeds, frames[i].directions))):
+            y = body.J.times(direction.axis) + body.H @ direction.shift
+            x = body.M.times(direction.shift) + body.H.transposed @ direction.axis
+            inverse = 1.0 / (direction.power(y, x) + armature[k])
+            u = (force[k] - direction.power(body.n, body.f)) * inverse
+            shares[k] = Share(y * inverse, x * inverse, u)
+            n, f, J = body.n + y * u, body.f + x * u, body.J.less_outer(shares[k].moment, y)
+            H, M = body.H - outer(shares[k].moment, x), body.M.less_outer(shares[k].force, x)
+            body = Carried(n, f, J, H, M)
         if tree.parent[i] >= 0:
             bodies[tree.parent[i]] = bodies[tree.parent[i]].plus(body)
-    result, moved = [None] * len(qd), []
+    result: list[Scalar] = []
+    motions: list[tuple[Vector, Vector]] = []  # angular acceleration, and that of the point at O
     for i, joint in enumerate(joints):
-        turn, shift = moved[tree.parent[i]] if tree.parent[i] >= 0 else (ZERO, ZERO)
-        for k, (axis, along) in zip(range(*joint.qd.indices(len(qd))), frames[i].directions):
-            y, x, u = shares[k]
-            result[k] = u - (y.dot(turn) + x.dot(shift))
-            turn, shift = turn + axis * result[k], shift + along * result[k]
-        moved.append((turn, shift))
+        turn, shift = motions[tree.parent[i]] if tree.parent[i] >= 0 else (ZERO, ZERO)
+        for k, direction in zip(joint.speeds, frames[i].directions):
+            share = shares[k]
+            qdd = share.u - (share.moment.dot(turn) + share.force.dot(shift))
+            turn, shift = turn + direction.axis * qdd, shift + direction.shift * qdd
+            result.append(qdd)
+        motions.append((turn, shift))
     return result
 
 
-def forward_dynamics(tree, q, qd, tau) -> list:
+def forward_dynamics(tree: AnyTree, q: Scalars, qd: Scalars, tau: Scalars) -> list[Scalar]:
     """qdd (nv,) from Mbar qdd = tau - D qd - k (q - rest) - P q - S qd - h."""
     return acceleration(tree, q, qd, reduced_force(tree, [0.0] * len(qd), q, qd, tau))
 
 
-def mass_matrix_and_bias(tree, q, qd) -> tuple[list, list]:
+def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[list[Scalar]], list[Scalar]]:
     """Mbar (nv rows of nv, kg m2) and h (nv, N m), as in method.py."""
     frames, rigid = carried(tree, q, qd)
     n, joints = len(qd), tree.coordinates.joints
-    M = [[0.0] * n for _ in range(n)]
+    M: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
     for i, body in enumerate(rigid):
-        by = range(*joints[i].qd.indices(n))
-        for k in by:
-            axis, shift = frames[i].directions[k - by.start]
+        for k, (axis, shift) in zip(joints[i].speeds, frames[i].directions):
             moment = body.J.times(axis) + body.s.cross(shift)
             push = axis.cross(body.s) + shift * body.m
-            inward, before = i, range(by.start, k + 1)
+            inward = i
             while inward >= 0:
-                for other in before:
-                    axis, shift = frames[inward].directions[other - joints[inward].qd.start]
-                    M[k][other] = M[other][k] = axis.dot(moment) + shift.dot(push)
+                for other, direction in zip(joints[inward].speeds, frames[inward].directions):
+                    if other <= k:
+                        M[k][other] = M[other][k] = direction.power(moment, push)
                 inward = tree.parent[inward]
-                before = range(*joints[inward].qd.indices(n)) if inward >= 0 else ()
-            M[k][k] = M[k][k] + tree.armature[k] if tree.armature[k] else M[k][k]
+            if tree.armature[k]:
+                M[k][k] = M[k][k] + tree.armature[k]
     return M, along(frames, rigid)
 
 
-def bias(tree, q, qd) -> list:
+def bias(tree: AnyTree, q: Scalars, qd: Scalars) -> list[Scalar]:
     """h (nv, N m) alone."""
     return along(*carried(tree, q, qd))
 
 
-def along(frames, rigid) -> list:
+def along(frames: list[Frame], rigid: list[Rigid]) -> list[Scalar]:
     """h: moment and force of what is carried along each speed's direction."""
-    along = [(direction, body) for frame, body in zip(frames, rigid) for direction in frame.directions]
-    return [axis.dot(body.n) + shift.dot(body.f) for (axis, shift), body in along]
+    directions = [(direction, body) for frame, body in zip(frames, rigid) for direction in frame.directions]
+    return [direction.power(body.n, body.f) for direction, body in directions]
 
 
-def carried(tree, q, qd) -> tuple[list[Frame], list[Rigid]]:
+def carried(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[Frame], list[Rigid]]:
     """The frames of all joints, and all that each carries."""
     frames, rigid = outward(tree, q, qd)
     for i in reversed(range(len(rigid))):
@@ -170,19 +186,17 @@ def carried(tree, q, qd) -> tuple[list[Frame], list[Rigid]]:
     return frames, rigid
 
 
-def outward(tree, q, qd) -> tuple[list[Frame], list[Rigid]]:
+def outward(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[Frame], list[Rigid]]:
     """The frames of all joints, and what each carries itself."""
-    own = rounded_once(tree, float)[0]
-    frames, rigid, only_slides = [], [], {-1: True}
+    distributions = rounded_once(tree, float)[0]
+    frames: list[Frame] = []
+    rigid: list[Rigid] = []
+    world = Frame(IDENTITY, ZERO, ZERO, ZERO, Vector(*tree.gravity) * -1.0, [])
+    only_slides = {-1: True}
     for i, joint in enumerate(tree.coordinates.joints):
-        parent = tree.parent[i]
-        p = (
-            frames[parent]
-            if parent >= 0
-            else Frame(IDENTITY, ZERO, ZERO, ZERO, Vector(*tree.gravity) * -1.0, [])
-        )
+        p = frames[tree.parent[i]] if tree.parent[i] >= 0 else world
         # what only slides carry: the point O of all that hangs on it moves with it
-        still = only_slides[parent]
+        still = only_slides[tree.parent[i]]
         only_slides[i] = still and joint.kind == "slide"
         r = ZERO if still else p.r + p.turn @ Vector(*tree.offset[i])
         axes = [Vector(*axis) for axis in tree.axis[joint.qd]]
@@ -190,27 +204,22 @@ def outward(tree, q, qd) -> tuple[list[Frame], list[Rigid]]:
             axis = p.turn @ axes[0]
             r = r if still else r + axis * (q[joint.q.start] - tree.reference[i])
             a = p.a + p.omega.cross(axis) * (2.0 * qd[joint.qd.start])  # Coriolis
-            frame = Frame(p.turn, r, p.omega, p.omegad, a, [(ZERO, axis)])
+            frame = Frame(p.turn, r, p.omega, p.omegad, a, [Direction(ZERO, axis)])
         else:
-            if joint.kind == "ball":
-                to_own = Matrix(axes)
-                turn = p.turn @ (to_own.transposed @ turn_of(q[joint.q]) @ to_own)
-            else:
-                turn = p.turn @ rotation(tree.axis[joint.qd.start], q[joint.q.start] - tree.reference[i])
-            axes = [(turn if joint.kind == "ball" else p.turn) @ axis for axis in axes]
-            spin = ZERO
-            for axis, rate in zip(axes, qd[joint.qd]):
-                spin = spin + axis * rate
+            turn = p.turn @ turn_in_parent(tree, i, q)
+            carrier = turn if joint.kind == "ball" else p.turn
+            axes = [carrier @ axis for axis in axes]
+            spin = sum((axis * rate for axis, rate in zip(axes, qd[joint.qd])), ZERO)
             omega, omegad = p.omega + spin, p.omegad + p.omega.cross(spin)
             # the acceleration is handed on where the joint is
             a = p.a + turning(p.omega, p.omegad) @ r - turning(omega, omegad) @ r
-            frame = Frame(turn, r, omega, omegad, a, [(axis, r.cross(axis)) for axis in axes])
+            frame = Frame(turn, r, omega, omegad, a, [Direction(axis, r.cross(axis)) for axis in axes])
         frames.append(frame)
-        rigid.append(about_point(own[i], frame))
+        rigid.append(about_point(distributions[i], frame))
     return frames, rigid
 
 
-def about_point(own, frame) -> Rigid:
+def about_point(own: Distribution, frame: Frame) -> Rigid:
     """What a joint carries itself, about O."""
     m, r, omega, omegad, a = own.mass, frame.r, frame.omega, frame.omegad, frame.a
     turned = frame.turn @ own.moment

@@ -12,34 +12,38 @@ omegad = axis_i (of a slide a = axis_i), all else 0, and the distribution of the
 assignment's part e in another order.
 """
 
+from collections.abc import Callable, Hashable
 from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
 
 import mpmath
 
-from tmt.derivation.vectors import IDENTITY, ZERO, Matrix, Vector, rotation, total_vector, turn_of
+from tmt.scalar import Scalar
+
+from .mechanism import AnyTree, origin_in_parent, turn_in_parent
+from .vectors import ZERO, Matrix, Scalars, Vector, outer, total_vector
 
 
 class Distribution(NamedTuple):
     """Mass about the origin of a frame, in its axes."""
 
-    mass: object  # kg
+    mass: Scalar  # kg
     moment: Vector  # kg m
     second: Matrix  # kg m2, symmetric
 
-    def plus(self, other) -> "Distribution":
+    def plus(self, other: "Distribution") -> "Distribution":
         return Distribution(self.mass + other.mass, self.moment + other.moment, self.second + other.second)
 
-    def less(self, other) -> "Distribution":
+    def less(self, other: "Distribution") -> "Distribution":
         return Distribution(self.mass - other.mass, self.moment - other.moment, self.second - other.second)
 
-    def moved(self, by) -> "Distribution":
+    def moved(self, by: Vector) -> "Distribution":
         """The distribution about another origin, from which the old one is at `by` (m)."""
         moment = self.moment + self.mass * by
         return Distribution(self.mass, moment, self.second + outer(by, self.moment) + outer(moment, by))
 
-    def turned(self, turn) -> "Distribution":
+    def turned(self, turn: Matrix) -> "Distribution":
         """The distribution in other axes; `turn` takes components to them."""
         return Distribution(self.mass, turn @ self.moment, turn @ self.second @ turn.transposed)
 
@@ -49,36 +53,42 @@ class Distribution(NamedTuple):
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = self.second
         return Matrix([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])
 
-    def on_line(self, axis) -> "Distribution":
+    def at_unit_acceleration(self, kind: str, axis: Vector) -> tuple[Vector, Vector]:
+        """Force and moment about the origin where a joint of this kind accelerates by 1 along or about its axis."""
+        if kind == "slide":
+            return self.mass * axis, self.moment.cross(axis)
+        return axis.cross(self.moment), self.inertia @ axis
+
+    def on_line(self, axis: Vector) -> "Distribution":
         """Its part on a line through the origin: a hinge about that line cannot tell to which side it belongs."""
         along = self.moment.dot(axis)
         return Distribution(self.mass, axis * along, outer(axis, axis * axis.dot(self.second @ axis)))
 
-    def even_about(self, axis) -> "Distribution":
+    def even_about(self, axis: Vector) -> "Distribution":
         """A part u (1 - axis axis') of the second moment, which turning about the axis leaves as it is."""
         across = min((Vector(1, 0, 0), Vector(0, 1, 0), Vector(0, 0, 1)), key=lambda e: abs(e.dot(axis)))
         across = across - axis * axis.dot(across)
         u = across.dot(self.second @ across) / across.dot(across)
-        return Distribution(
-            0, Vector(0, 0, 0), Matrix([[u, 0, 0], [0, u, 0], [0, 0, u]]) - outer(axis, axis * u)
-        )
+        second = Matrix([[u, 0, 0], [0, u, 0], [0, 0, u]]) - outer(axis, axis * u)
+        return Distribution(0, NOTHING.moment, second)
 
-    def rounded(self, number) -> "Distribution":
+    def rounded(self, number: Callable[..., Scalar]) -> "Distribution":
         """The distribution in another type of number, each rounded once; zeros stay plain."""
 
-        def one(x):
+        def one(x: Scalar) -> Scalar:
             x = Fraction(x)
-            return (
-                (x.numerator / x.denominator if number is float else number(x.numerator) / x.denominator)
-                if x
-                else 0.0
-            )
+            if not x:
+                return 0.0
+            return float(x) if number is float else number(x.numerator) / x.denominator
 
-        vectors = [Vector(*map(one, v)) for v in (self.moment, *self.second)]
-        return Distribution(one(self.mass), vectors[0], Matrix(vectors[1:]))
+        moment, *second = [Vector(*map(one, v)) for v in (self.moment, *self.second)]
+        return Distribution(one(self.mass), moment, Matrix(second))
 
 
-def fraction(x) -> Fraction:
+NOTHING = Distribution(0, Vector(0, 0, 0), Matrix([[0] * 3] * 3))
+
+
+def fraction(x: Scalar) -> Fraction:
     """A double, or a number of mpmath's, exactly."""
     if not isinstance(x, mpmath.mpf):
         return Fraction(x)
@@ -86,15 +96,24 @@ def fraction(x) -> Fraction:
     return (-1) ** sign * int(digits) * Fraction(2) ** int(power)
 
 
-NOTHING = Distribution(0, Vector(0, 0, 0), Matrix([[0] * 3] * 3))
+def exact_vector(components: Scalars) -> Vector:
+    return Vector(*map(fraction, components))
 
 
-def outer(a, b) -> Matrix:
-    """a b'."""
-    return Matrix([b * component for component in a])
+def distribution_of(tree: AnyTree, body: int) -> Distribution:
+    """The distribution of a body about the origin of its joint's frame, in exact fractions: ten numbers."""
+    inertia = Matrix(map(exact_vector, tree.inertia[body]))
+    (xx, *_), (_, yy, _), (*_, zz) = inertia
+    half = (xx + yy + zz) / 2
+    twice = inertia + inertia.transposed
+    second = Matrix([[half, 0, 0], [0, half, 0], [0, 0, half]]) - Matrix(
+        [row * Fraction(1, 2) for row in twice]
+    )
+    about_com = Distribution(fraction(tree.mass[body]), NOTHING.moment, second)
+    return about_com.moved(exact_vector(tree.com[body]))
 
 
-def carried_by_joint(tree) -> list[Distribution]:
+def carried_by_joint(tree: AnyTree) -> list[Distribution]:
     """The distribution that each joint carries itself, in exact fractions, as far inward as it can be handed.
 
     What lies on a hinge's axis (its mass, first moment and second moment along it) acts the same if it belongs to the
@@ -102,141 +121,135 @@ def carried_by_joint(tree) -> list[Distribution]:
     numbers of the outer bodies become zeros, and what reaches the world drops out.
     """
     joints = tree.coordinates.joints
-    axes = [Vector(*map(fraction, tree.axis[joint.qd.start])) for joint in joints]
-    offsets = [Vector(*map(fraction, v)) for v in tree.offset]
-    own = [NOTHING] * len(axes)
-    for b, joint in enumerate(tree.body_joint):
-        if joint >= 0:
-            mass, com = fraction(tree.mass[b]), Vector(*map(fraction, tree.com[b]))
-            inertia = [[fraction(x) for x in row] for row in tree.inertia[b]]
-            half = sum(inertia[i][i] for i in range(3)) / 2
-            second = [
-                [(half if i == j else 0) - (inertia[i][j] + inertia[j][i]) / 2 for j in range(3)]
-                for i in range(3)
-            ]
-            own[joint] = own[joint].plus(Distribution(mass, Vector(0, 0, 0), Matrix(second)).moved(com))
-    for i in reversed(range(len(axes))):
-        none = Vector(0, 0, 0)
-        if tree.kind[i] == "hinge":
-            handed = own[i].on_line(axes[i])
-        elif tree.kind[i] == "ball":
-            handed = Distribution(own[i].mass, none, NOTHING.second)
+    own = [NOTHING] * len(joints)
+    for body, i in enumerate(tree.body_joint):
+        if i >= 0:
+            own[i] = own[i].plus(distribution_of(tree, body))
+    for i in reversed(range(len(joints))):
+        if joints[i].kind == "hinge":
+            handed = own[i].on_line(exact_vector(tree.axis[joints[i].qd.start]))
+        elif joints[i].kind == "ball":
+            handed = NOTHING._replace(mass=own[i].mass)
         else:
-            handed = Distribution(0, none, own[i].second)
+            handed = NOTHING._replace(second=own[i].second)
         own[i] = own[i].less(handed)
         if tree.parent[i] >= 0:
-            own[tree.parent[i]] = own[tree.parent[i]].plus(handed.moved(offsets[i]))
+            own[tree.parent[i]] = own[tree.parent[i]].plus(handed.moved(exact_vector(tree.offset[i])))
     return own
 
 
-def mass_matrix_and_bias(tree, q, qd, number=float) -> tuple[list, list]:
+class Motion(NamedTuple):
+    """A frame's motion at qdd = 0, in its own axes."""
+
+    a: Vector  # of its origin
+    omega: Vector
+    omegad: Vector
+    P: Matrix
+
+
+def motions(tree: AnyTree, placements: list[tuple[Vector, Matrix]], qd: Scalars) -> list[Motion]:
+    """The motions of the joints' frames, walked outward; placements: origin and turn of each in its parent's."""
+    result: list[Motion] = []
+    for i, (joint, (offset, turn)) in enumerate(zip(tree.coordinates.joints, placements)):
+        a, omega, omegad = Vector(*tree.gravity) * -1.0, ZERO, ZERO
+        if tree.parent[i] >= 0:
+            parent, to_child = result[tree.parent[i]], turn.transposed
+            a = parent.a + parent.P @ offset
+            omega, omegad = to_child @ parent.omega, to_child @ parent.omegad
+        axes = zip(tree.axis[joint.qd], qd[joint.qd])
+        moving = total_vector(Vector(*axis) * rate for axis, rate in axes)
+        if joint.kind == "slide":
+            a = a + omega.cross(moving * 2.0)
+        else:
+            a, omegad, omega = turn.transposed @ a, omegad + omega.cross(moving), omega + moving
+        result.append(Motion(a, omega, omegad, turning(omega, omegad)))
+    return result
+
+
+def mass_matrix_and_bias(
+    tree: AnyTree, q: Scalars, qd: Scalars, number: Callable[..., Scalar] = float
+) -> tuple[list[list[Scalar]], list[Scalar]]:
     """Mbar (nv rows of nv, kg m2) and h (nv, N m), as in method.py; over any scalar.
 
     q (nq), qd (nv): sequences of scalars, rad and rad/s. number: the type of the model's numbers, float or mpmath.mpf; each
     is the exact value, rounded once.
     """
     n, joints = len(tree.axis), tree.coordinates.joints
-    axes = [Vector(*v) for v in tree.axis]
-    offsets, turns = zip(*(placed(tree, i, q) for i in range(len(joints))))
+    axes = [Vector(*axis) for axis in tree.axis]
+    placements = [(origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)) for i in range(len(joints))]
     # fractions take their time; other numbers than floats may be rounded to other digits from call to call
-    parts = rounded_once if number is float and tree.__hash__ else rounded_once.__wrapped__
+    parts = rounded_once if number is float and isinstance(tree, Hashable) else rounded_once.__wrapped__
     own, uneven, even = map(list, parts(tree, number))
 
-    # outward: each frame's motion at qdd = 0, in its own axes
-    motions = []
-    for i, joint in enumerate(joints):
-        to_child = turns[i].transposed
-        if tree.parent[i] >= 0:
-            a, omega, omegad, P = motions[tree.parent[i]]
-            a, omega, omegad = a + P @ offsets[i], to_child @ omega, to_child @ omegad
-        else:
-            a, omega, omegad = Vector(*tree.gravity) * -1.0, ZERO, ZERO
-        moving = total_vector(axis * rate for axis, rate in zip(axes[joint.qd], qd[joint.qd]))
-        if joint.kind == "slide":
-            motions.append((a + omega.cross(moving * 2.0), omega, omegad, turning(omega, omegad)))
-            continue
-        a, omegad, omega = to_child @ a, omegad + omega.cross(moving), omega + moving
-        motions.append((a, omega, omegad, turning(omega, omegad)))
+    def component(k: int, kind: str, force: Vector, moment: Vector) -> Scalar:
+        """That of a force and a moment along or about the axis of a speed."""
+        return axes[k].dot(force if kind == "slide" else moment)
 
     # inward: force and moment on all that a joint carries, and its mass; what is even about a hinge is not turned
-    h, M = [None] * n, [[0.0] * n for _ in range(n)]
-    forces, moments = [ZERO] * len(joints), [ZERO] * len(joints)
+    h: list[Scalar] = [0.0] * n
+    M: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
+    forces, moments, moving = [ZERO] * len(joints), [ZERO] * len(joints), motions(tree, placements, qd)
     for i in reversed(range(len(joints))):
-        a, _, _, P = motions[i]
+        kind, parent, a, P = joints[i].kind, tree.parent[i], moving[i].a, moving[i].P
         forces[i] = forces[i] + own[i].mass * a + P @ own[i].moment
         moments[i] = moments[i] + vee(P @ own[i].second) + own[i].moment.cross(a)
-        carried, parent = uneven[i].plus(even[i]), tree.parent[i]
-        for k in range(*joints[i].qd.indices(n)):
-            slides = tree.kind[i] == "slide"
-            h[k] = axes[k].dot(forces[i] if slides else moments[i])
-            if slides:
-                force, moment = carried.mass * axes[k], carried.moment.cross(axes[k])
-            else:
-                force, moment = axes[k].cross(carried.moment), carried.inertia @ axes[k]
-            M[k][k] = axes[k].dot(force if slides else moment)
-            M[k][k] = M[k][k] + tree.armature[k] if tree.armature[k] else M[k][k]
+        carried = uneven[i].plus(even[i])
+        for k in joints[i].speeds:
+            h[k] = component(k, kind, forces[i], moments[i])
+            force, moment = carried.at_unit_acceleration(kind, axes[k])
+            M[k][k] = component(k, kind, force, moment)
+            if tree.armature[k]:
+                M[k][k] = M[k][k] + tree.armature[k]
             for other in range(joints[i].qd.start, k):  # of the same ball
                 M[k][other] = M[other][k] = axes[other].dot(moment)
             j = i
             while tree.parent[j] >= 0:
-                force, moment = handed_down(turns[j], offsets[j], force, moment)
+                force, moment = handed_down(*placements[j], force, moment)
                 j = tree.parent[j]
-                for other in range(*joints[j].qd.indices(n)):
-                    M[k][other] = M[other][k] = axes[other].dot(force if tree.kind[j] == "slide" else moment)
+                for other in joints[j].speeds:
+                    M[k][other] = M[other][k] = component(other, joints[j].kind, force, moment)
         if parent >= 0:
-            force, moment = handed_down(turns[i], offsets[i], forces[i], moments[i])
+            offset, turn = placements[i]
+            force, moment = handed_down(offset, turn, forces[i], moments[i])
             forces[parent], moments[parent] = forces[parent] + force, moments[parent] + moment
-            uneven[parent] = uneven[parent].plus(uneven[i].turned(turns[i]).plus(even[i]).moved(offsets[i]))
+            uneven[parent] = uneven[parent].plus(uneven[i].turned(turn).plus(even[i]).moved(offset))
     return M, h
 
 
 @lru_cache(maxsize=64)
-def rounded_once(tree, number) -> tuple[list, list, list]:
+def rounded_once(
+    tree: AnyTree, number: Callable[..., Scalar]
+) -> tuple[list[Distribution], list[Distribution], list[Distribution]]:
     """What each joint carries itself, and the part of it that is not even about a hinge, and the part that is."""
     exact = carried_by_joint(tree)
-    even = [
-        d.even_about(Vector(*map(fraction, tree.axis[joint.qd.start]))) if joint.kind == "hinge" else NOTHING
-        for d, joint in zip(exact, tree.coordinates.joints)
-    ]
-    uneven = [d.less(e) for d, e in zip(exact, even)]
-    return tuple([d.rounded(number) for d in ds] for ds in (exact, uneven, even))
+    even = [NOTHING] * len(exact)
+    for i, joint in enumerate(tree.coordinates.joints):
+        if joint.kind == "hinge":
+            even[i] = exact[i].even_about(exact_vector(tree.axis[joint.qd.start]))
+    uneven = [all_of_it.less(part) for all_of_it, part in zip(exact, even)]
+    own, uneven, even = ([part.rounded(number) for part in parts] for parts in (exact, uneven, even))
+    return own, uneven, even
 
 
-def placed(tree, i, q) -> tuple[Vector, Matrix]:
-    """Origin and turn of joint i's frame in its parent's."""
-    joint = tree.coordinates.joints[i]
-    offset = Vector(*tree.offset[i])
-    if joint.kind == "ball":
-        frame = Matrix(tree.axis[joint.qd])
-        return offset, frame.transposed @ turn_of(q[joint.q]) @ frame
-    off = q[joint.q.start] - tree.reference[i]
-    if joint.kind == "slide":
-        return offset + Vector(*tree.axis[joint.qd.start]) * off, IDENTITY
-    return offset, rotation(tree.axis[joint.qd.start], off)
-
-
-def handed_down(turn, offset, force, moment):
+def handed_down(offset: Vector, turn: Matrix, force: Vector, moment: Vector) -> tuple[Vector, Vector]:
     """Force and moment about the origin of the parent's frame, in its axes."""
     force = turn @ force
     return force, turn @ moment + offset.cross(force)
 
 
-def turning(omega, omegad) -> Matrix:
+def turning(omega: Vector, omegad: Vector) -> Matrix:
     """P = [omegad]x + [omega]x[omega]x."""
     x, y, z = omega
     u, v, w = omegad
     xx, yy, zz = x * x, y * y, z * z
     xy, xz, yz = x * y, x * z, y * z
-    return Matrix(
-        [
-            [(yy + zz) * -1.0, xy - w, xz + v],
-            [xy + w, (xx + zz) * -1.0, yz - u],
-            [xz - v, yz + u, (xx + yy) * -1.0],
-        ]
-    )
+    first = (yy + zz) * -1.0, xy - w, xz + v
+    second = xy + w, (xx + zz) * -1.0, yz - u
+    third = xz - v, yz + u, (xx + yy) * -1.0
+    return Matrix([first, second, third])
 
 
-def vee(matrix) -> Vector:
+def vee(matrix: Matrix) -> Vector:
     """Integral of x cross P x dm, for the matrix P S."""
     (_, xy, xz), (yx, _, yz), (zx, zy, _) = matrix
     return Vector(zy - yz, xz - zx, yx - xy)

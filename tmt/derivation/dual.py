@@ -5,9 +5,12 @@ be nested (a derivative inside a step that is itself differentiated): each diffe
 a number of another level is a constant to it.
 """
 
+from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 
-from tmt.derivation.vectors import arctan, cos, sin, sqrt
+from tmt.scalar import Scalar
+
+from .vectors import Scalars, arctan, cos, sin, sqrt
 
 levels = count()
 
@@ -18,21 +21,21 @@ class Dual:
     __slots__ = ("level", "slope", "value")
     __array_ufunc__ = None  # else ndarray * Dual would be taken apart by NumPy
 
-    def __init__(self, value, slope, level):
+    def __init__(self, value: Scalar, slope: Scalar, level: int):
         self.value, self.slope, self.level = value, slope, level
 
-    def new(self, value, slope) -> "Dual":
+    def new(self, value: Scalar, slope: Scalar) -> "Dual":
         return Dual(value, slope, self.level)
 
-    def parts(self, other):
+    def parts(self, other: Scalar) -> tuple[Scalar, Scalar]:
         """Value and slope of another scalar at this level; a constant has slope 0."""
         return (other.value, other.slope) if getattr(other, "level", None) == self.level else (other, 0.0)
 
-    def outranked(self, other) -> bool:
+    def outranked(self, other: Scalar) -> bool:
         """Whether the other is a dual number of an inner differentiation: then it decides."""
         return isinstance(other, Dual) and other.level > self.level
 
-    def __add__(self, other):
+    def __add__(self, other: Scalar) -> Scalar:
         if isinstance(other, float):  # constants are many, and zeros and ones among them
             return self if other == 0.0 else self.new(self.value + other, self.slope)
         if self.outranked(other):
@@ -42,7 +45,7 @@ class Dual:
 
     __radd__ = __add__
 
-    def __sub__(self, other):
+    def __sub__(self, other: Scalar) -> Scalar:
         if isinstance(other, float):
             return self if other == 0.0 else self.new(self.value - other, self.slope)
         if self.outranked(other):
@@ -50,13 +53,13 @@ class Dual:
         value, slope = self.parts(other)
         return self.new(self.value - value, self.slope - slope)
 
-    def __neg__(self):
+    def __neg__(self) -> "Dual":
         return self.new(-self.value, -self.slope)
 
-    def __rsub__(self, other):
+    def __rsub__(self, other: Scalar) -> Scalar:
         return self * -1.0 + other
 
-    def __mul__(self, other):
+    def __mul__(self, other: Scalar) -> Scalar:
         if isinstance(other, float):
             if other in (0.0, 1.0):
                 return self if other else 0.0
@@ -68,7 +71,7 @@ class Dual:
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other):
+    def __truediv__(self, other: Scalar) -> Scalar:
         if isinstance(other, float):
             return self.new(self.value / other, self.slope / other)
         if self.outranked(other):
@@ -77,17 +80,19 @@ class Dual:
         quotient = self.value / value
         return self.new(quotient, (self.slope - quotient * slope) / value)
 
-    def __rtruediv__(self, other):
+    def __rtruediv__(self, other: Scalar) -> Scalar:
         return self.new(*self.parts(other)) / self
 
 
-def seeded(values, slopes) -> list[Dual]:
+def seeded(values: Iterable[Scalar], slopes: Iterable[Scalar]) -> list[Dual]:
     """Dual numbers of one new level with these values and slopes."""
     level = next(levels)
     return [Dual(value, slope, level) for value, slope in zip(values, slopes)]
 
 
-def jacobian(function, x, directions=None) -> list:
+def jacobian(
+    function: Callable[[list[Scalar]], Iterable[Scalar]], x: Scalars, directions: Sequence[Scalars] = ()
+) -> list[list[Scalar]]:
     """d function_i / d x_j (rows i, columns j) of a function from a list of scalars to a list of scalars.
 
     directions: lists as long as x, along which it is differentiated in place of along each x_j.
@@ -99,7 +104,7 @@ def jacobian(function, x, directions=None) -> list:
     return [list(row) for row in zip(*columns)]
 
 
-def unit_vectors(n) -> list:
+def unit_vectors(n: int) -> list[list[float]]:
     return [[1.0 if i == j else 0.0 for i in range(n)] for j in range(n)]
 
 
@@ -109,5 +114,5 @@ sqrt.register(Dual, lambda x: _root(x, sqrt(x.value)))
 arctan.register(Dual, lambda x: x.new(arctan(x.value), x.slope / (1.0 + x.value * x.value)))
 
 
-def _root(x, root):
+def _root(x: Dual, root: Scalar) -> Dual:
     return x.new(root, x.slope / (root * 2.0))

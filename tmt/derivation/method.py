@@ -19,20 +19,16 @@ arrays (one element per state), complex numbers, mpmath numbers, traced or symbo
 of them, qd and tau of nv. Vectors are in the inertial frame unless they are said to be in body axes.
 """
 
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from tmt.derivation.dual import jacobian
-from tmt.derivation.vectors import (
-    IDENTITY,
-    ZERO,
-    Matrix,
-    Vector,
-    rotation,
-    solve,
-    total,
-    total_vector,
-    turn_of,
-)
+from tmt.scalar import Scalar
+
+from .dual import jacobian
+from .mechanism import AnyTree, origin_in_parent, turn_in_parent
+from .vectors import IDENTITY, ZERO, Matrix, Scalars, Vector, solve, total, total_vector
+
+Terms = Callable[[AnyTree, Scalars, Scalars], tuple[list[list[Scalar]], list[Scalar]]]  # Mbar and h
 
 
 class Frame(NamedTuple):
@@ -40,67 +36,66 @@ class Frame(NamedTuple):
 
     origin: Vector  # m
     turn: Matrix  # body axes -> inertial axes
-    axes: list  # of its speeds, inertial axes
+    axes: list[Vector]  # of its speeds, inertial axes
     slides: bool  # along its axis; else it turns about its axes
     omega: Vector  # rad/s
     origin_conv: Vector  # acceleration of the origin at qdd = 0, m/s2
     omega_conv: Vector  # angular acceleration at qdd = 0, rad/s2
+
+    def column(self, axis: Vector, point: Vector, to_body: Matrix) -> tuple[Vector, Vector]:
+        """Velocity of a point (inertial axes) and angular velocity (body axes) for a unit speed of one of its axes."""
+        if self.slides:
+            return axis, ZERO
+        return axis.cross(point - self.origin), to_body @ axis
 
 
 class Body(NamedTuple):
     """What TMT needs of one body."""
 
     x: Vector  # CoM, m
-    T: list  # nv columns, dx/dq, m/rad
-    B: list  # nv columns, body axes
+    T: list[Vector]  # nv columns, dx/dq, m/rad
+    B: list[Vector]  # nv columns, body axes
     omega: Vector  # body axes, rad/s
     v_conv: Vector  # d(T qd)/dq qd, m/s2
     w_conv: Vector  # d(B qd)/dq qd, body axes, rad/s2
-    mass: float
+    mass: Scalar
     inertia: Matrix  # body axes
 
 
 WORLD = Frame(ZERO, IDENTITY, [], False, ZERO, ZERO, ZERO)
 
 
-def joint_frames(tree, q, qd=None) -> list[Frame]:
+def joint_frames(tree: AnyTree, q: Scalars, qd: Scalars | None = None) -> list[Frame]:
     """The n joints' frames at positions q (rad, m) and speeds qd (per s, default at rest), walked outward."""
     qd = [0.0] * len(tree.axis) if qd is None else qd
-    frames = []
+    frames: list[Frame] = []
     for i, joint in enumerate(tree.coordinates.joints):
-        p = frames[tree.parent[i]] if tree.parent[i] >= 0 else WORLD
-        own = [Vector(*axis) for axis in tree.axis[joint.qd]]
+        parent = frames[tree.parent[i]] if tree.parent[i] >= 0 else WORLD
+        origin, origin_conv = carried(parent, origin_in_parent(tree, i, q))
+        axes = [Vector(*axis) for axis in tree.axis[joint.qd]]
         if joint.kind == "slide":
-            axis = p.turn @ own[0]
-            origin, origin_conv = carried(
-                p, Vector(*tree.offset[i]) + own[0] * (q[joint.q.start] - tree.reference[i])
-            )
-            origin_conv = origin_conv + p.omega.cross(axis * (qd[joint.qd.start] * 2.0))  # Coriolis
-            frames.append(Frame(origin, p.turn, [axis], True, p.omega, origin_conv, p.omega_conv))
+            axis = parent.turn @ axes[0]
+            origin_conv = origin_conv + parent.omega.cross(axis * (qd[joint.qd.start] * 2.0))  # Coriolis
+            moved = parent._replace(origin=origin, axes=[axis], slides=True, origin_conv=origin_conv)
+            frames.append(moved)
             continue
-        origin, origin_conv = carried(p, Vector(*tree.offset[i]))
-        if joint.kind == "ball":  # its axes turn with it
-            frame = Matrix(own)
-            turn = p.turn @ (frame.transposed @ turn_of(q[joint.q]) @ frame)
-            axes = [turn @ axis for axis in own]
-        else:
-            turn = p.turn @ rotation(tree.axis[joint.qd.start], q[joint.q.start] - tree.reference[i])
-            axes = [p.turn @ own[0]]
+        turn = parent.turn @ turn_in_parent(tree, i, q)
+        carrier = turn if joint.kind == "ball" else parent.turn  # the axes of a ball turn with it
+        axes = [carrier @ axis for axis in axes]
         spin = total_vector(axis * rate for axis, rate in zip(axes, qd[joint.qd]))
-        frames.append(
-            Frame(origin, turn, axes, False, p.omega + spin, origin_conv, p.omega_conv + p.omega.cross(spin))
-        )
+        omega, omega_conv = parent.omega + spin, parent.omega_conv + parent.omega.cross(spin)
+        frames.append(Frame(origin, turn, axes, False, omega, origin_conv, omega_conv))
     return frames
 
 
-def carried(frame, point):
+def carried(frame: Frame, point: Vector) -> tuple[Vector, Vector]:
     """Position and acceleration at qdd = 0 of a point fixed in a frame, given in its axes (m)."""
     r = frame.turn @ point
     turning = frame.omega_conv.cross(r) + frame.omega.cross(frame.omega.cross(r))
     return frame.origin + r, frame.origin_conv + turning
 
 
-def bodies(tree, q, qd=None) -> list[Body]:
+def bodies(tree: AnyTree, q: Scalars, qd: Scalars | None = None) -> list[Body]:
     """T_b, B_b and the convective terms of every body, at positions q and speeds qd (default at rest)."""
     frames = joint_frames(tree, q, qd)
     result = []
@@ -108,30 +103,19 @@ def bodies(tree, q, qd=None) -> list[Body]:
         frame = frames[joint] if joint >= 0 else WORLD
         x, v_conv = carried(frame, Vector(*tree.com[b]))
         to_body = frame.turn.transposed
-        T, B = [], []
-        for f, moved in zip(frames, tree.moves(b)):
-            for axis in f.axes:
-                T.append(ZERO if not moved else axis if f.slides else axis.cross(x - f.origin))
-                B.append(ZERO if not moved or f.slides else to_body @ axis)
-        result.append(
-            Body(
-                x,
-                T,
-                B,
-                to_body @ frame.omega,
-                v_conv,
-                to_body @ frame.omega_conv,
-                tree.mass[b],
-                Matrix(tree.inertia[b]),
-            )
-        )
+        columns = []
+        for mover, moves in zip(frames, tree.moves(b)):
+            columns += [mover.column(axis, x, to_body) if moves else (ZERO, ZERO) for axis in mover.axes]
+        T, B = map(list, zip(*columns))
+        omega, w_conv = to_body @ frame.omega, to_body @ frame.omega_conv
+        result.append(Body(x, T, B, omega, v_conv, w_conv, tree.mass[b], Matrix(tree.inertia[b])))
     return result
 
 
-def mass_matrix(parts, armature=()) -> list:
+def mass_matrix(parts: Sequence[Body], armature: Scalars = ()) -> list[list[Scalar]]:
     """Mbar (nv rows of nv, kg m2) of the bodies: sum_b T' m T + B' I B, and the armature on its diagonal."""
     n = len(parts[0].T)
-    M = [[0.0] * n for _ in range(n)]
+    M: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
     for b in parts:
         moving = [k for k in range(n) if b.T[k] is not ZERO]  # the columns of all other joints are zero
         for j in moving:
@@ -139,83 +123,93 @@ def mass_matrix(parts, armature=()) -> list:
             for i in moving:
                 M[i][j] = M[i][j] + (b.T[i].dot(force) + b.B[i].dot(moment))
     for i, rotor in enumerate(armature):
-        M[i][i] = M[i][i] + rotor if rotor else M[i][i]
+        if rotor:
+            M[i][i] = M[i][i] + rotor
     return M
 
 
-def bias(parts, gravity) -> list:
+def bias(parts: Sequence[Body], gravity: Iterable[Scalar]) -> list[Scalar]:
     """h (nv, N m) of the bodies: Mbar qdd + h = tau - D qd; at rest the torque that holds them."""
     g = Vector(*gravity)
-    n = len(parts[0].T)
     newton = [b.mass * (b.v_conv - g) for b in parts]
     euler = [b.inertia @ b.w_conv + b.omega.cross(b.inertia @ b.omega) for b in parts]
-    return [
-        total(b.T[i].dot(f) + b.B[i].dot(m) for b, f, m in zip(parts, newton, euler) if b.T[i] is not ZERO)
-        for i in range(n)
-    ]
+
+    def component(i: int) -> Scalar:
+        terms = zip(parts, newton, euler)
+        return total(b.T[i].dot(f) + b.B[i].dot(m) for b, f, m in terms if b.T[i] is not ZERO)
+
+    return [component(i) for i in range(len(parts[0].T))]
 
 
-def mass_matrix_and_bias(tree, q, qd) -> tuple[list, list]:
+def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[list[Scalar]], list[Scalar]]:
     """Mbar and h at positions q and speeds qd."""
     parts = bodies(tree, q, qd)
     return mass_matrix(parts, tree.armature), bias(parts, tree.gravity)
 
 
-def bias_rates(tree, q, qd, terms=mass_matrix_and_bias) -> list:
+def bias_rates(
+    tree: AnyTree, q: Scalars, qd: Scalars, terms: Terms = mass_matrix_and_bias
+) -> list[list[Scalar]]:
     """dh/dqd (nv rows of nv, N m s/rad): the exact derivative of the bias by the speeds, by dual numbers."""
-    own = getattr(terms, "bias_rates", None)
-    return own(tree, q, qd) if own else jacobian(lambda rates: terms(tree, q, rates)[1], qd)
+    of_terms = getattr(terms, "bias_rates", None)
+    return of_terms(tree, q, qd) if of_terms else jacobian(lambda rates: terms(tree, q, rates)[1], qd)
 
 
-def spring_torque(tree, q) -> list:
+def from_rest(tree: AnyTree, q: Scalars) -> list[tuple[Scalar, Scalar]]:
+    """The stiffness of the spring and the movement from its rest, rad or m, for each speed, (nv,)."""
+    movement = tree.coordinates.difference(q, tree.rest)
+    joints = zip(tree.stiffness, tree.coordinates.joints)
+    return [(stiffness, movement[k]) for stiffness, joint in joints for k in joint.speeds]
+
+
+def spring_torque(tree: AnyTree, q: Scalars) -> list[Scalar]:
     """k (q - rest) (nv, N m or N), which springs take off the force; of a ball k times the movement from its rest."""
-    off = tree.coordinates.difference(q, tree.rest) if tree.has_springs else [0.0] * len(tree.axis)
-    return [k * x for k, joint in zip(tree.stiffness, tree.coordinates.joints) for x in off[joint.qd]]
+    if not tree.has_springs:
+        return [0.0] * len(tree.axis)
+    return [stiffness * x for stiffness, x in from_rest(tree, q)]
 
 
-def fed_back(tree, q, qd) -> list:
+def fed_back(tree: AnyTree, q: Scalars, qd: Scalars) -> list[Scalar]:
     """P q + S qd (nv, N m or N), which a linear controller takes off the force; no entry of P is that of a ball."""
     positions = [q[i] for i in tree.coordinates.first_positions]
-    terms = [[] for _ in qd]
+    terms: list[list[Scalar]] = [[] for _ in qd]
     for gain, values in ((tree.position_gain, positions), (tree.speed_gain, qd)):
-        for own, row in zip(terms, gain):
-            own += [g * x for g, x in zip(row, values) if g]
-    return [total(own) for own in terms]
+        for terms_of_speed, row in zip(terms, gain):
+            terms_of_speed += [g * x for g, x in zip(row, values) if g]
+    return [total(terms_of_speed) for terms_of_speed in terms]
 
 
-def reduced_force(tree, h, q, qd, tau) -> list:
+def reduced_force(tree: AnyTree, h: Scalars, q: Scalars, qd: Scalars, tau: Scalars) -> list[Scalar]:
     """Qbar = tau - D qd - k (q - rest) - P q - S qd - h (nv, N m)."""
     Qbar = [t - d * v - hi for t, d, v, hi in zip(tau, tree.damping, qd, h)]
     if tree.has_springs:
         Qbar = [Q - s for Q, s in zip(Qbar, spring_torque(tree, q))]
-    return [Q - f for Q, f in zip(Qbar, fed_back(tree, q, qd))] if tree.has_gains else Qbar
+    if tree.has_gains:
+        Qbar = [Q - f for Q, f in zip(Qbar, fed_back(tree, q, qd))]
+    return Qbar
 
 
-def acceleration(tree, q, qd, tau, terms=mass_matrix_and_bias) -> list:
+def acceleration(
+    tree: AnyTree, q: Scalars, qd: Scalars, tau: Scalars, terms: Terms = mass_matrix_and_bias
+) -> list[Scalar]:
     """qdd (nv, rad/s2) from Mbar qdd = Qbar = tau - D qd - k (q - rest) - h."""
     M, h = terms(tree, q, qd)
     return solve(M, reduced_force(tree, h, q, qd, tau))
 
 
-def potential(parts, gravity):
+def potential(parts: Sequence[Body], gravity: Iterable[Scalar]) -> Scalar:
     """Potential energy in J, zero with every centre of mass at the height of the origin."""
     return total(b.mass * (Vector(*gravity) * -1.0).dot(b.x) for b in parts)
 
 
-def spring_energy(tree, q):
+def spring_energy(tree: AnyTree, q: Scalars) -> Scalar:
     """Energy of the springs in J."""
     if not tree.has_springs:
         return 0.0
-    off = tree.coordinates.difference(q, tree.rest)
-    return total(
-        0.5 * k * (x * x)
-        for k, joint in zip(tree.stiffness, tree.coordinates.joints)
-        for x in off[joint.qd]
-        if k
-    )
+    return total(0.5 * stiffness * (x * x) for stiffness, x in from_rest(tree, q) if stiffness)
 
 
-def kinetic(parts, qd, armature=()):
+def kinetic(parts: Sequence[Body], qd: Scalars, armature: Scalars = ()) -> Scalar:
     """Kinetic energy in J: of translation with v = T qd, of rotation with omega in body axes, of rotors."""
     result = total(0.5 * rotor * (rate * rate) for rotor, rate in zip(armature, qd) if rotor)
     for b in parts:

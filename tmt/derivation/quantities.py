@@ -6,10 +6,13 @@ served from it.
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+from tmt.scalar import Scalar
 
 from . import method
-from .vectors import ZERO, solve
+from .mechanism import AnyTree
+from .vectors import ZERO, Scalars, solve
 
 
 class State:
@@ -18,7 +21,7 @@ class State:
     q (nq), qd, tau (nv): sequences of scalars; at rest and without torque where they are not given.
     """
 
-    def __init__(self, tree, q, qd=None, tau=None):
+    def __init__(self, tree: AnyTree, q: Scalars, qd: Scalars | None = None, tau: Scalars | None = None):
         nothing = [0.0] * len(tree.axis)
         self.tree, self.q, self.moves = tree, q, qd is not None
         self.qd, self.tau = qd or nothing, tau or nothing
@@ -28,44 +31,44 @@ class State:
         return method.bodies(self.tree, self.q, self.qd if self.moves else None)
 
     @cached_property
-    def mass_matrix(self) -> list:
+    def mass_matrix(self) -> list[list[Scalar]]:
         return method.mass_matrix(self.bodies, self.tree.armature)
 
     @cached_property
-    def bias(self) -> list:
+    def bias(self) -> list[Scalar]:
         return method.bias(self.bodies, self.tree.gravity)
 
     @property
-    def gravity_balance(self) -> list:
+    def gravity_balance(self) -> list[Scalar]:
         at_rest = [b._replace(omega=ZERO, v_conv=ZERO, w_conv=ZERO) for b in self.bodies]
         return method.bias(at_rest, self.tree.gravity)
 
     @property
-    def force(self) -> list:
+    def force(self) -> list[Scalar]:
         """Qbar."""
         return method.reduced_force(self.tree, self.bias, self.q, self.qd, self.tau)
 
     @property
-    def acceleration(self) -> list:
+    def acceleration(self) -> list[Scalar]:
         return solve(self.mass_matrix, self.force)
 
     @property
-    def potential_energy(self):
+    def potential_energy(self) -> Scalar:
         return method.potential(self.bodies, self.tree.gravity) + method.spring_energy(self.tree, self.q)
 
     @property
-    def energy(self):
+    def energy(self) -> Scalar:
         return self.potential_energy + method.kinetic(self.bodies, self.qd, self.tree.armature)
 
 
 class Quantity(NamedTuple):
     """A quantity of a state."""
 
-    takes: tuple  # of "q", "qd", "tau"
-    shape: tuple  # m bodies, nv speeds
+    takes: tuple[str, ...]  # of "q", "qd", "tau"
+    shape: tuple[int | str, ...]  # m bodies, nv speeds
     unit: str
-    of: Callable  # State -> nested lists of scalars in that shape
-    parts: tuple = ()  # the names of the arrays of which there are several, in that order
+    of: Callable[[State], Any]  # -> nested lists of scalars in that shape
+    parts: tuple[str, ...] = ()  # the names of the arrays of which there are several, in that order
 
 
 Q, QD, TAU = ("q",), ("q", "qd"), ("q", "qd", "tau")
@@ -90,7 +93,7 @@ QUANTITIES = {
 }  # fmt: skip
 
 
-def shape_of(name: str, tree) -> tuple:
+def shape_of(name: str, tree: AnyTree) -> tuple[int, ...]:
     """The shape of a quantity of a tree."""
     sizes = {"m": len(tree.mass), "nv": len(tree.axis)}
-    return tuple(sizes.get(size, size) for size in QUANTITIES[name].shape)
+    return tuple(size if isinstance(size, int) else sizes[size] for size in QUANTITIES[name].shape)

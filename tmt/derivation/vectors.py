@@ -4,32 +4,39 @@ A scalar is anything with + - * / that `sin` and `cos` know, and for ball joints
 registers itself with `sin.register` and so on; nothing else has to change.
 """
 
+from collections.abc import Iterable, Iterator, Sequence
 from functools import singledispatch
+from typing import Any, overload
 
 import mpmath
 import numpy as np
+from numpy.typing import NDArray
+
+from tmt.scalar import Scalar
+
+Scalars = Sequence[Scalar] | NDArray[Any]
 
 
 @singledispatch
-def sin(angle):
+def sin(angle: Scalar) -> Scalar:
     """Sine of a scalar of any registered type, angle in rad."""
     return np.sin(angle)
 
 
 @singledispatch
-def cos(angle):
+def cos(angle: Scalar) -> Scalar:
     """Cosine of a scalar of any registered type, angle in rad."""
     return np.cos(angle)
 
 
 @singledispatch
-def sqrt(value):
+def sqrt(value: Scalar) -> Scalar:
     """Square root of a scalar of any registered type."""
     return np.sqrt(value)
 
 
 @singledispatch
-def arctan(value):
+def arctan(value: Scalar) -> Scalar:
     """Arc tangent of a scalar of any registered type, in rad."""
     return np.arctan(value)
 
@@ -46,27 +53,27 @@ class Vector:
     __slots__ = ("x", "y", "z")
     __array_ufunc__ = None  # else ndarray * Vector would be taken apart by NumPy
 
-    def __init__(self, x, y, z):
+    def __init__(self, x: Scalar, y: Scalar, z: Scalar):
         self.x, self.y, self.z = x, y, z
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Scalar]:
         return iter((self.x, self.y, self.z))
 
-    def __add__(self, other):
+    def __add__(self, other: "Vector") -> "Vector":
         return Vector(self.x + other.x, self.y + other.y, self.z + other.z)
 
-    def __sub__(self, other):
+    def __sub__(self, other: "Vector") -> "Vector":
         return Vector(self.x - other.x, self.y - other.y, self.z - other.z)
 
-    def __mul__(self, scalar):
+    def __mul__(self, scalar: Scalar) -> "Vector":
         return Vector(self.x * scalar, self.y * scalar, self.z * scalar)
 
     __rmul__ = __mul__
 
-    def dot(self, other):
+    def dot(self, other: "Vector") -> Scalar:
         return self.x * other.x + self.y * other.y + self.z * other.z
 
-    def cross(self, other):
+    def cross(self, other: "Vector") -> "Vector":
         return Vector(
             self.y * other.z - self.z * other.y,
             self.z * other.x - self.x * other.z,
@@ -82,74 +89,77 @@ class Matrix:
 
     __slots__ = ("rows",)
 
-    def __init__(self, rows):
+    def __init__(self, rows: Iterable[Iterable[Scalar]]):
         self.rows = tuple(row if isinstance(row, Vector) else Vector(*row) for row in rows)
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Vector]:
         return iter(self.rows)
 
-    def __add__(self, other):
+    def __add__(self, other: "Matrix") -> "Matrix":
         return Matrix([row + more for row, more in zip(self, other)])
 
-    def __sub__(self, other):
+    def __sub__(self, other: "Matrix") -> "Matrix":
         return Matrix([row - less for row, less in zip(self, other)])
 
-    def __matmul__(self, other):
+    @overload
+    def __matmul__(self, other: Vector) -> Vector: ...
+    @overload
+    def __matmul__(self, other: "Matrix") -> "Matrix": ...
+    def __matmul__(self, other: "Vector | Matrix") -> "Vector | Matrix":
         if isinstance(other, Vector):
             return Vector(*(row.dot(other) for row in self.rows))
         columns = other.transposed.rows
         return Matrix([[row.dot(column) for column in columns] for row in self.rows])
 
     @property
-    def transposed(self):
+    def transposed(self) -> "Matrix":
         return Matrix(zip(*self.rows))
 
 
 IDENTITY = Matrix([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
-def rotation(axis, angle):
+def outer(a: Vector, b: Vector) -> Matrix:
+    """a b'."""
+    return Matrix([b * component for component in a])
+
+
+def rotation(axis: Iterable[Scalar], angle: Scalar) -> Matrix:
     """Matrix that turns by `angle` (rad, right-handed) about the unit vector `axis`.
 
     R = a a' + cos (1 - a a') + sin [a]x, grouped so that a coordinate axis leaves exact zeros and ones.
     """
     x, y, z = axis
     s, c = sin(angle), cos(angle)
-    return Matrix(
-        [
-            [x * x + c * (1 - x * x), x * y - c * (x * y) - s * z, x * z - c * (x * z) + s * y],
-            [x * y - c * (x * y) + s * z, y * y + c * (1 - y * y), y * z - c * (y * z) - s * x],
-            [x * z - c * (x * z) - s * y, y * z - c * (y * z) + s * x, z * z + c * (1 - z * z)],
-        ]
-    )
+    first = x * x + c * (1 - x * x), x * y - c * (x * y) - s * z, x * z - c * (x * z) + s * y
+    second = x * y - c * (x * y) + s * z, y * y + c * (1 - y * y), y * z - c * (y * z) - s * x
+    third = x * z - c * (x * z) - s * y, y * z - c * (y * z) + s * x, z * z + c * (1 - z * z)
+    return Matrix([first, second, third])
 
 
-def turn_of(quaternion):
+def turn_of(quaternion: Iterable[Scalar]) -> Matrix:
     """Matrix that turns as a quaternion (w, x, y, z) of any length: R = 1 + 2 (w [v]x + [v]x [v]x) / (p . p)."""
     w, x, y, z = quaternion
     scale = 2.0 / (w * w + x * x + y * y + z * z)
     a, b, c = x * scale, y * scale, z * scale
     xx, yy, zz, xy, xz, yz = x * a, y * b, z * c, x * b, x * c, y * c
     wx, wy, wz = w * a, w * b, w * c
-    return Matrix(
-        [
-            [1.0 - (yy + zz), xy - wz, xz + wy],
-            [xy + wz, 1.0 - (xx + zz), yz - wx],
-            [xz - wy, yz + wx, 1.0 - (xx + yy)],
-        ]
-    )
+    first = 1.0 - (yy + zz), xy - wz, xz + wy
+    second = xy + wz, 1.0 - (xx + zz), yz - wx
+    third = xz - wy, yz + wx, 1.0 - (xx + yy)
+    return Matrix([first, second, third])
 
 
-def solve(matrix, right):
+def solve(matrix: Sequence[Scalars], right: Scalars) -> list[Scalar]:
     """Solution x of `matrix` x = `right`, for a symmetric positive definite matrix given by rows.
 
     Factorised as U D U' from the last row to the first, without square roots or pivots (none are needed: it is positive
-    definite). In that order a hinge meets only its ancestors: zeros between branches stay zeros, as in MuJoCo.
+    definite). In that order a joint meets only its ancestors: zeros between branches stay zeros, as in MuJoCo.
     """
     n = len(right)
-    scaled = [[None] * n for _ in range(n)]  # U D
-    upper = [[None] * n for _ in range(n)]
-    inverse = [None] * n  # of D
+    scaled: list[list[Scalar]] = [[None] * n for _ in range(n)]  # U D
+    upper: list[list[Scalar]] = [[None] * n for _ in range(n)]
+    inverse: list[Scalar] = [None] * n  # of D
     for j in reversed(range(n)):
         behind = range(j + 1, n)
         inverse[j] = 1.0 / (matrix[j][j] - total(scaled[j][k] * upper[j][k] for k in behind))
@@ -164,7 +174,7 @@ def solve(matrix, right):
     return x
 
 
-def solve_any(matrix, right):
+def solve_any(matrix: Sequence[Scalars], right: Scalars) -> list[Scalar]:
     """Solution x of `matrix` x = `right` for any matrix that needs no pivots, given by rows: L U.
 
     MuJoCo's implicit integrator factorises its unsymmetric matrix without pivots too.
@@ -182,12 +192,12 @@ def solve_any(matrix, right):
     return x
 
 
-def total(terms):
+def total(terms: Iterable[Scalar]) -> Scalar:
     """Sum of scalars of any type, 0.0 if there are none."""
     return sum(terms, 0.0)
 
 
-def total_vector(vectors):
+def total_vector(vectors: Iterable[Vector]) -> Vector:
     """Sum of vectors: a single one is itself."""
     first, *more = vectors
     return sum(more, first)

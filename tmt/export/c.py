@@ -3,37 +3,29 @@
 import math
 import re
 from collections.abc import Sequence
-from math import prod
 
-from .statements import Syntax, Writer
+from .statements import Function, Program, Syntax, statements
 
-DOUBLE = Syntax()
 LEAST = 1.2e-38  # of floats: what keeps a root from zero must not become zero
-SINGLE = Syntax(
-    number=lambda value: f"{math.copysign(max(abs(value), LEAST), value) if value else 0.0!r}f",
-    sqrt="sqrtf",
-    arctan="atanf",
-)
 
 
-def source(name: str, head: Sequence[str], functions: Sequence, single: bool) -> str:
+def source(program: Program) -> str:
     """The source file: all functions, and what they need."""
-    parts = [comment(head), "#include <math.h>"]
-    for function in functions:
-        begin = f"{comment([function.title])}\n{declaration(name, function, single)}"
-        parts.append(f"{begin}\n{{\n{body(function, single)}\n}}")
+    parts = [comment(program.head), "#include <math.h>"]
+    parts += [f"{declared(program, f)}\n{{\n{body(f, program.single)}\n}}" for f in program.functions]
     return "\n\n".join(parts) + "\n"
 
 
-def header(name: str, head: Sequence[str], functions: Sequence, single: bool) -> str:
+def header(program: Program) -> str:
     """The declarations, for C and C++."""
-    guard, (nq, nv, _) = f"{name.upper()}_H", functions[0].sizes
+    name, sizes, guard = program.name, program.functions[0].sizes, f"{program.name.upper()}_H"
+    note = "Arrays of more than one dimension are stored by rows; they may not overlap."
     parts = [
-        comment([*head, "", "Arrays of more than one dimension are stored by rows; they may not overlap."]),
+        comment([*program.head, "", note]),
         f"#ifndef {guard}\n#define {guard}",
         '#ifdef __cplusplus\nextern "C" {\n#endif',
-        f"enum {{ {name}_nq = {nq}, {name}_nv = {nv} }};",
-        *(f"{comment([function.title])}\n{declaration(name, function, single)};" for function in functions),
+        f"enum {{ {name}_nq = {sizes['q']}, {name}_nv = {sizes['qd']} }};",
+        *(f"{declared(program, function)};" for function in program.functions),
         "#ifdef __cplusplus\n}\n#endif",
         "#endif",
     ]
@@ -50,20 +42,30 @@ def comment(lines: Sequence[str]) -> str:
     return "/* " + "\n".join(line.rstrip() for line in text.split("\n")) + " */"
 
 
-def declaration(name: str, function, single: bool) -> str:
-    taken = [f"const {kind(single)} {x}[{size}]" for x, size in zip(function.takes, function.sizes)]
-    made = [f"{kind(single)} {x}[{prod(function.shape)}]" for x in function.results]
-    return f"void {name}_{function.name}({', '.join(taken + made)})"
+def declared(program: Program, function: Function) -> str:
+    """What a function returns, and its declaration."""
+    number = kind(program.single)
+    arguments = [f"const {number} {x}[{function.sizes[x]}]" for x in function.takes]
+    arguments += [f"{number} {x}[{function.size}]" for x in function.results]
+    declaration = f"void {program.name}_{function.name}({', '.join(arguments)})"
+    return f"{comment([function.title])}\n{declaration}"
 
 
-def body(function, single: bool) -> str:
+def body(function: Function, single: bool) -> str:
     """The lines of a function, whose results are written last."""
-    writer = Writer(function.traced, [f"{x}[{k}]" for x, k in function.inputs], SINGLE if single else DOUBLE)
-    used = {x for x, k in function.inputs if (x, k) in function.used}
+    used = {x for x, _ in function.used}
     lines = [f"(void){x};" for x in function.takes if x not in used]
-    for name, text, of in writer.assignments:
-        value = f"{of}{'f' * single}({text})" if of else text
-        lines.append(f"const {kind(single)} {name} = {value};")
-    size = prod(function.shape)
-    lines += [f"{function.results[k // size]}[{k % size}] = {text};" for k, text in enumerate(writer.results)]
-    return "\n".join(f"    {line}" for line in lines)
+    syntax = Syntax(
+        input="{x}[{k}]",
+        assignment=f"const {kind(single)} {{name}} = {{value}};",
+        result="{x}[{k}] = {value};",
+        function="{}f" if single else "{}",
+        number=float_literal if single else repr,
+    )
+    assignments, results = statements(function, syntax)
+    return "\n".join(f"    {line}" for line in [*lines, *assignments, *results])
+
+
+def float_literal(value: float) -> str:
+    size = max(abs(value), LEAST) if value else 0.0
+    return f"{math.copysign(size, value)!r}f"

@@ -4,7 +4,7 @@ import html
 import re
 from collections.abc import Sequence
 
-from .latex import Token, fits, formulas, head, labelled
+from .formulas import Formula, Token, introduction, sections, tables
 from .symbols import Symbolic
 
 HTML = """<!DOCTYPE html>
@@ -28,47 +28,40 @@ pre {{ font-size: .75rem; color: #555; white-space: pre-wrap; margin-top: 3rem; 
 def page(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     """An HTML page with MathML that needs no network: what `latex` shows."""
     equations = []
-    for letter, title, entries in formulas(symbolic):
-        equations.append(f"<h2>{html.escape(title[0].upper() + title[1:])}</h2>")
-        if fits(entries):
-            rows = "".join(f"<mtr>{''.join(f'<mtd>{mathml(e)}</mtd>' for e in row)}</mtr>" for row in entries)
-            matrix = f"<mi>{letter}</mi><mo>=</mo><mo>(</mo><mtable>{rows}</mtable><mo>)</mo>"
+    for section in sections(symbolic):
+        equations.append(f"<h2>{html.escape(section.heading)}</h2>")
+        if section.fits:
+            rows = "".join(map(matrix_row, section.rows))
+            matrix = f"<mi>{section.letter}</mi><mo>=</mo><mo>(</mo><mtable>{rows}</mtable><mo>)</mo>"
             equations.append(f"<p><math>{matrix}</math></p>")
         else:
-            equations += [
-                f'<p class="entry"><math>{in_mathml(Token(name))}<mo>=</mo></math> {in_lines(formula)}</p>'
-                for name, formula in labelled(letter, entries)
-            ]
-    joints = [
-        (mathml_of(symbolic.display[q]), html.escape(text)) for q, text in zip(symbolic.q, symbolic.joints)
-    ]
-    rows = [
-        (
-            mathml_of(symbolic.display[symbol]),
-            f"{row.value:.6g}",
-            row.unit.replace("2", "²"),
-            html.escape(row.meaning),
-        )
-        for symbol, row in symbolic.parameters.items()
-    ]
-    tables = [
-        f"<table>{''.join('<tr>' + ''.join(f'<td>{cell}</td>' for cell in row) + '</tr>' for row in part)}</table>"
-        for part in (joints, rows)
-        if part
-    ]
+            equations += [entry(Token(name), formula) for name, formula in section.labelled]
     return HTML.format(
         lines=html.escape("\n".join(head_lines)),
-        text=html.escape(" ".join(head(symbolic))),
-        tables="\n".join(tables),
+        text=html.escape(introduction(symbolic)),
+        tables="\n".join(map(table, tables(symbolic))),
         equations="\n".join(equations),
     )
 
 
-def mathml_of(display: str) -> str:
-    return f"<math>{in_mathml(Token(display))}</math>"
+def entry(name: Token, formula: Formula) -> str:
+    return f'<p class="entry"><math>{in_mathml(name)}<mo>=</mo></math> {in_lines(formula)}</p>'
 
 
-def mathml(formula) -> str:
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """A table of a symbol and texts."""
+    lines = []
+    for symbol, *texts in rows:
+        cells = [f"<math>{in_mathml(Token(symbol))}</math>", *map(html.escape, texts)]
+        lines.append(f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>")
+    return f"<table>{''.join(lines)}</table>"
+
+
+def matrix_row(entries: Sequence[Formula]) -> str:
+    return f"<mtr>{''.join(f'<mtd>{mathml(formula)}</mtd>' for formula in entries)}</mtr>"
+
+
+def mathml(formula: Formula) -> str:
     """A formula with a narrow space between factors."""
     text = ""
     for token, before in zip(formula, [Token("", "open"), *formula]):
@@ -77,9 +70,9 @@ def mathml(formula) -> str:
     return f"<mrow>{text or '<mn>0</mn>'}</mrow>"
 
 
-def in_lines(formula) -> str:
+def in_lines(formula: Formula) -> str:
     """A formula in pieces that end where a line may be broken: before an operator."""
-    pieces = [[]]
+    pieces: list[Formula] = [[]]
     for token in formula:
         if token.kind == "operator" and pieces[-1]:
             pieces.append([])
@@ -87,10 +80,10 @@ def in_lines(formula) -> str:
     return "<wbr>".join(f"<math>{mathml(piece)}</math>" for piece in pieces)
 
 
-def in_mathml(token) -> str:
+def in_mathml(token: Token) -> str:
     """A token; symbols are read from their LaTeX, such as \\dot{q}_{1}."""
     if token.kind == "symbol":
-        dot, name, index = re.fullmatch(r"(\\dot)?[{\\]*(\w+?)}?(?:_\{?(.*?)\}?)?", token.text).groups()
+        dot, name, index = re.findall(r"^(\\dot)?[{\\]*(\w+?)}?(?:_\{?(.*?)\}?)?$", token.text)[0]
         text = f"<mi>{f'&{name};' if len(name) > 1 else name}</mi>"
         text = f'<mover accent="true">{text}<mo>˙</mo></mover>' if dot else text
         text = f"<msub>{text}<mrow><mi mathvariant='normal'>{index}</mi></mrow></msub>" if index else text

@@ -1,11 +1,14 @@
 """Functions in Python that need NumPy alone and take any batch of states."""
 
-from collections.abc import Sequence
-from math import prod
+from .statements import Function, Program, Syntax, statements
 
-from .statements import Syntax, Writer
-
-SYNTAX = Syntax(sqrt="np.sqrt", arctan="np.arctan")
+SYNTAX = Syntax(
+    input="{x}{k}",
+    assignment="{name} = {value}",
+    result="{x}[..., {k}] = {value}",
+    function="np.{}",
+    arctan="arctan",
+)
 HEAD = '''import numpy as np
 
 NQ, NV = {nq}, {nv}
@@ -21,23 +24,27 @@ def arrays(*states):
 '''
 
 
-def source(name: str, head: Sequence[str], functions: Sequence) -> str:
+def source(program: Program) -> str:
     """The module; its functions have the names of the quantities."""
-    lines = "\n".join(line.rstrip().replace("\\", "\\\\").replace('"""', "'''") for line in head).strip()
-    nq, nv, _ = functions[0].sizes
-    texts = "".join(f"\n\n{text(function)}\n" for function in functions)
-    return f'"""{lines}\n"""\n\n{HEAD.format(nq=nq, nv=nv)}{texts}'
+    head = "\n".join(line.rstrip().replace("\\", "\\\\").replace('"""', "'''") for line in program.head)
+    sizes = program.functions[0].sizes
+    texts = "".join(f"\n\n{text(function)}\n" for function in program.functions)
+    return f'"""{head.strip()}\n"""\n\n{HEAD.format(nq=sizes["q"], nv=sizes["qd"])}{texts}'
 
 
-def text(function) -> str:
+def text(function: Function) -> str:
     """One function."""
-    takes, results, size = function.takes, function.results, prod(function.shape)
-    writer = Writer(function.traced, [f"{x}{k}" for x, k in function.inputs], SYNTAX)
-    lines = [f'"""{function.title}"""', f"{', '.join(takes)}, batch = arrays({', '.join(takes)})"]
-    lines += [f"{x}{k} = {x}[..., {k}]" for x, k in function.inputs if (x, k) in function.used]
-    lines += [f"{name} = {f'np.{of}({value})' if of else value}" for name, value, of in writer.assignments]
-    lines += [f"{', '.join(results)} = {', '.join([f'np.empty((*batch, {size}))'] * len(results))}"]
-    lines += [f"{results[k // size]}[..., {k % size}] = {value}" for k, value in enumerate(writer.results)]
+    takes, results = ", ".join(function.takes), ", ".join(function.results)
+    assignments, values = statements(function, SYNTAX)
+    empty = ", ".join([f"np.empty((*batch, {function.size}))"] * len(function.results))
     shape = ", ".join(["*batch", *map(str, function.shape)])
-    lines.append(f"return {', '.join(f'{result}.reshape({shape})' for result in results)}")
-    return f"def {function.name}({', '.join(takes)}):\n" + "\n".join(f"    {line}" for line in lines)
+    lines = [
+        f'"""{function.title}"""',
+        f"{takes}, batch = arrays({takes})",
+        *(f"{x}{k} = {x}[..., {k}]" for x, k in function.used),
+        *assignments,
+        f"{results} = {empty}",
+        *values,
+        f"return {', '.join(f'{result}.reshape({shape})' for result in function.results)}",
+    ]
+    return "\n".join([f"def {function.name}({takes}):", *(f"    {line}" for line in lines)])

@@ -2,43 +2,51 @@
 
 import itertools
 from collections import Counter, defaultdict
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import reduce
 
-from .trigonometry import NOISE, Ring
+from tmt.scalar import Scalar
+
+from .names import Names
+from .trigonometry import NOISE, Expression, Polynomial, Ring
 
 FEW_TERMS, FEW_FACTORED = 40, 6  # of a polynomial of which every form is tried, of one that is factored
+
+Parallel = Mapping[int, tuple[int, int]]
+Term = tuple[Expression, dict[Expression, Expression]]  # of a sum: a number, {factor: power}
+Harmonics = dict[tuple[bool, tuple[int, ...]], Scalar]  # {(is_sine, k): number}, of sums of k_i times angle i
 
 
 class Forms:
     """Expressions of polynomials of a Ring.
 
-    symbols: those of the ring. masses, speeds: those of them that are taken out of sums; others are where all terms have them.
-    angles: SymPy expressions. parallel: {i: (j, sign)} where hinge i turns on hinge j about sign times its axis.
+    Masses and speeds are taken out of sums, other symbols where all terms have them. angles: SymPy expressions.
+    parallel: {i: (j, sign)} where hinge i turns on hinge j about sign times its axis.
     """
 
-    def __init__(self, ring: Ring, symbols, masses, speeds, angles, parallel):
-        self.ring, self.symbols, self.masses, self.speeds = ring, symbols, set(masses), set(speeds)
+    def __init__(self, ring: Ring, names: Names, angles: Sequence[Expression], parallel: Parallel):
+        self.ring, self.symbols, self.masses, self.speeds = ring, ring.symbols, names.masses, set(names.qd)
         self.angles, self.parallel, self.sums = angles, parallel, list(angles)
         for i, (j, sign) in parallel.items():
             self.sums[i] = angles[i] + sign * self.sums[j]
-        self.found, self.multiples = {}, {(): (ring.functions.one, ring.functions.zero)}
+        self.found: dict[Polynomial, Expression] = {}
+        # cosine and sine of a sum of k_i times angle i
+        none: tuple[int, ...] = ()
+        self.multiples = {none: (ring.functions.one, ring.functions.zero)}
 
-    def shortest(self, poly):
+    def shortest(self, poly: Polynomial) -> Expression:
         """The shortest expression that is found for a polynomial in symbols, sines and cosines."""
         from sympy import Mul
 
-        count, parts, terms, products = (
-            len(self.symbols),
-            defaultdict(lambda: self.ring.functions.zero),
-            [],
-            set(),
-        )
+        count, terms, products = len(self.symbols), [], set()
+        parts: dict[tuple[int, ...], Polynomial] = defaultdict(lambda: self.ring.functions.zero)
         for monomial, number in poly.items():
             parts[monomial[:count]][monomial[count:]] = number
         for monomial, part in parts.items():
             number = part.content() if self.ring.exact else self.ring.ring.domain.one
-            factors = {s: power for s, power in zip(self.symbols, monomial) if power and s not in self.speeds}
-            speeds = Mul(*(s**power for s, power in zip(self.symbols, monomial) if s in self.speeds))
+            powers = {symbol: power for symbol, power in zip(self.symbols, monomial) if power}
+            factors = {symbol: power for symbol, power in powers.items() if symbol not in self.speeds}
+            speeds = Mul(*(symbol**power for symbol, power in powers.items() if symbol in self.speeds))
             if speeds != 1:  # a product of speeds is one factor
                 factors[speeds] = 1
                 products.add(speeds)
@@ -46,27 +54,27 @@ class Forms:
         last = set(self.symbols) - self.masses
         return min((grouped(terms, first, last) for first in (self.masses, products, ())), key=cost)
 
-    def form(self, poly):
+    def form(self, poly: Polynomial) -> Expression:
         """The shortest form of a polynomial in sines and cosines alone."""
         if poly not in self.found:
             self.found[poly] = min(self.candidates(poly), key=cost)
         return self.found[poly]
 
-    def candidates(self, poly):
+    def candidates(self, poly: Polynomial) -> Iterator[Expression]:
         """Forms of a polynomial in sines and cosines: of the angles, of sums of parallel hinges' angles, and its harmonics."""
         few, harmonics = len(poly) <= FEW_TERMS, self.harmonics(poly)
-        spaces = [(poly, self.angles)] + [(self.of_sums(harmonics), self.sums)] * bool(self.parallel)
+        spaces = [(poly, self.angles)]
+        if self.parallel:
+            spaces.append((self.of_sums(harmonics), self.sums))
         for poly, angles in spaces:
-            squared = [
-                pair for pair in self.ring.places if few and any(monomial[pair[1]] > 1 for monomial in poly)
-            ]
+            squared = [pair for pair in self.ring.places if few and has_square(poly, pair[1])]
             for turned in itertools.product([False, True], repeat=len(squared)):
                 self.ring.check_time()
                 pairs = [pair[::-1] for pair, turn in zip(squared, turned) if turn]
                 yield from self.expressions(self.ring.reduced(poly, pairs), angles)
         yield self.of_harmonics(harmonics)
 
-    def expressions(self, poly, angles):
+    def expressions(self, poly: Polynomial, angles: Sequence[Expression]) -> Iterator[Expression]:
         """A polynomial with its common factors taken out, and as a product of polynomials."""
         from sympy import Mul
 
@@ -74,27 +82,22 @@ class Forms:
         if self.ring.exact and len(poly) <= FEW_FACTORED:
             number, factors = poly.factor_list()
             if len(factors) > 1 and angles is self.angles:  # each factor may have a shorter form of its own
-                forms = [
-                    self.form(self.ring.reduced(factor, self.ring.places)) ** power
-                    for factor, power in factors
-                ]
-                yield Mul(self.number(number), *forms)
+                reduced = [(self.ring.reduced(factor, self.ring.places), power) for factor, power in factors]
+                yield Mul(self.number(number), *(self.form(factor) ** power for factor, power in reduced))
 
-    def expression(self, poly, angles):
+    def expression(self, poly: Polynomial, angles: Sequence[Expression]) -> Expression:
         from sympy import cos, sin
 
-        functions = {
-            place: of(angle)
-            for pair, angle in zip(self.ring.places, angles)
-            for place, of in zip(pair, (sin, cos))
-        }
+        functions: dict[int, Expression] = {}
+        for (sine, cosine), angle in zip(self.ring.places, angles):
+            functions |= {sine: sin(angle), cosine: cos(angle)}
         terms = []
         for monomial, number in poly.items():
             factors = {of: monomial[place] for place, of in functions.items() if monomial[place]}
             terms.append((self.number(number), factors))
         return grouped(terms, (), ())
 
-    def number(self, value):
+    def number(self, value: Scalar) -> Expression:
         from sympy import Float, Integer, Rational
 
         if self.ring.exact:
@@ -102,52 +105,53 @@ class Forms:
         value = float(value)
         return Integer(int(value)) if value.is_integer() else Float(value)
 
-    def harmonics(self, poly) -> dict:
-        """A polynomial as a sum of sines and cosines of sums of k_i times angle i, {(is_sine, k): number}."""
-        one, result = self.ring.ring.domain.one, Counter()
+    def harmonics(self, poly: Polynomial) -> Harmonics:
+        """A polynomial as a sum of sines and cosines of sums of angles."""
+        result: Counter[tuple[bool, tuple[int, ...]]] = Counter()
         for monomial, number in poly.items():
             sines = sum(monomial[place] for place, _ in self.ring.places)
-            parts = {
-                (): number * (-1) ** (sines // 2)
-            }  # of exp(i k q), divided by i where the number of sines is odd
+            # of exp(i k q), divided by i where the number of sines is odd
+            parts: dict[tuple[int, ...], Scalar] = {(): number * (-1) ** (sines // 2)}
             for s, c in self.ring.places:
-                own = {0: one}
-                # 2 i sin = z - 1/z, 2 cos = z + 1/z with z = exp(i q)
-                for sign in [-1] * monomial[s] + [1] * monomial[c]:
-                    turned = Counter()
-                    for k, part in own.items():
-                        turned[k + 1] += part / 2
-                        turned[k - 1] += sign * part / 2
-                    own = turned
-                parts = {
-                    (*k, more): part * factor for k, part in parts.items() for more, factor in own.items()
-                }
+                waves = self.waves(monomial[s], monomial[c]).items()
+                parts = {(*k, more): part * share for k, part in parts.items() for more, share in waves}
             for k, part in parts.items():
                 sign = next((1 if x > 0 else -1 for x in k if x), 1)
                 result[sines % 2 == 1, tuple(sign * x for x in k)] += part * (sign if sines % 2 else 1)
         least = 0 if self.ring.exact else NOISE * max(map(abs, result.values()), default=0)
         return {harmonic: number for harmonic, number in result.items() if abs(number) > least}
 
-    def of_harmonics(self, harmonics):
+    def waves(self, sines: int, cosines: int) -> dict[int, Scalar]:
+        """(i sin q)^sines (cos q)^cosines as {k: the factor of exp(i k q)}: 2 i sin q = z - 1/z, 2 cos q = z + 1/z."""
+        waves: dict[int, Scalar] = {0: self.ring.ring.domain.one}
+        for sign in [-1] * sines + [1] * cosines:
+            turned: dict[int, Scalar] = Counter()
+            for k, part in waves.items():
+                turned[k + 1] += part / 2
+                turned[k - 1] += sign * part / 2
+            waves = turned
+        return waves
+
+    def of_harmonics(self, harmonics: Harmonics) -> Expression:
         from sympy import Add, Mul, cos, sin
 
-        waves = {
-            (is_sine, k): (sin if is_sine else cos)(Add(*map(Mul, k, self.angles)))
-            for is_sine, k in harmonics
-        }
-        return Add(*(self.number(number) * waves[harmonic] for harmonic, number in harmonics.items()))
+        terms = []
+        for (is_sine, k), number in harmonics.items():
+            angle = Add(*map(Mul, k, self.angles))
+            terms.append(self.number(number) * (sin(angle) if is_sine else cos(angle)))
+        return Add(*terms)
 
-    def of_sums(self, harmonics):
+    def of_sums(self, harmonics: Harmonics) -> Polynomial:
         """Harmonics as a polynomial in sines and cosines of the sums of angles of parallel hinges."""
         result = self.ring.functions.zero
-        for (is_sine, k), number in harmonics.items():
-            k = list(k)
+        for (is_sine, multiples), number in harmonics.items():
+            k = list(multiples)
             for i, (j, sign) in self.parallel.items():
                 k[j] -= sign * k[i]
             result += self.multiple(tuple(k))[is_sine] * number
         return self.ring.reduced(result, self.ring.places)
 
-    def multiple(self, k):
+    def multiple(self, k: tuple[int, ...]) -> tuple[Polynomial, Polynomial]:
         """Cosine and sine of a sum of k_i times angle i."""
         if k not in self.multiples:
             cosine, sine = self.multiple(k[:-1])
@@ -155,23 +159,26 @@ class Forms:
             s = s if k[-1] > 0 else -s
             for _ in range(abs(k[-1])):
                 cosine, sine = cosine * c - sine * s, sine * c + cosine * s
-            self.multiples[k] = (
-                self.ring.reduced(cosine, self.ring.places),
-                self.ring.reduced(sine, self.ring.places),
-            )
+            reduced = [self.ring.reduced(poly, self.ring.places) for poly in (cosine, sine)]
+            self.multiples[k] = reduced[0], reduced[1]
         return self.multiples[k]
 
 
-def cost(form) -> int:
+def has_square(poly: Polynomial, place: int) -> bool:
+    """Whether a term has a higher power than one of a generator."""
+    return any(monomial[place] > 1 for monomial in poly)
+
+
+def cost(form: Expression) -> int:
     """The number of operations in an expression; a minus in front of a product is free."""
     return form.count_ops() - bool(form.as_coeff_Mul()[0].is_negative)
 
 
-def term(number, form, factors):
-    """A term of a sum, (number, {factor: power}), of a number, an expression and further factors."""
+def term(number: Expression, form: Expression, symbols: Mapping[Expression, Expression]) -> Term:
+    """A term of a sum, of a number, an expression and further factors."""
     from sympy import Mul
 
-    factors = dict(factors)
+    factors = dict(symbols)
     for factor in Mul.make_args(form):
         if factor.is_number:
             number *= factor
@@ -181,7 +188,7 @@ def term(number, form, factors):
     return number, factors
 
 
-def grouped(terms, first, last):
+def grouped(terms: list[Term], first: Collection[Expression], last: Collection[Expression]) -> Expression:
     """The sum of terms, a factor that several of them have taken out: of `first` if possible, of `last` only if all have it."""
     from sympy import Add, Mul
 
@@ -192,20 +199,20 @@ def grouped(terms, first, last):
         if count > 1 and (count == len(terms) or factor[0] not in last)
     }
     if not shared:
-        return Add(
-            *(Mul(number, *(base**power for base, power in factors.items())) for number, factors in terms)
-        )
-    base, power = max(shared, key=shared.get)
-    size = content([number for number, factors in terms if factors.get(base) == power])
-    inside = [
-        (n / size, {b: p for b, p in fs.items() if b != base}) for n, fs in terms if fs.get(base) == power
-    ]
+        products = [(number, *(base**power for base, power in factors.items())) for number, factors in terms]
+        return Add(*(Mul(*product) for product in products))
+    base, power = max(shared, key=lambda factor: shared[factor])
+    having = [(number, dict(factors)) for number, factors in terms if factors.get(base) == power]
+    size = content([number for number, _ in having])
+    for _, factors in having:
+        del factors[base]
+    inside = [(number / size, factors) for number, factors in having]
     outside = [(number, factors) for number, factors in terms if factors.get(base) != power]
     rest = [grouped(outside, first, last)] if outside else []
     return Add(Mul(size, base**power, grouped(inside, first, last)), *rest)
 
 
-def content(numbers):
+def content(numbers: Sequence[Expression]) -> Expression:
     """What is taken out of a sum with these coefficients: their common divisor, with the sign of most of them."""
     from sympy import Integer, gcd
 

@@ -1,9 +1,10 @@
 """A traced function as assignments in a programming language: one for each value that is used twice or is long."""
 
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from math import prod
+from typing import Any, NamedTuple
 
 from tmt.compiled.straight import Traced
 
@@ -11,70 +12,122 @@ LONGEST = 40  # characters of an expression that stands within another
 SUM, PRODUCT, ATOM = 1, 2, 3  # how strongly the parts of an expression are bound
 
 
-@dataclass(frozen=True)
-class Syntax:
-    """How a language writes what is not the same in all."""
-
-    number: Callable = repr
-    times: str = "*"
-    over: str = "/"
-    sqrt: str = "sqrt"
-    arctan: str = "atan"
-
-
-class Assignment(NamedTuple):
-    """The value of an expression, or of a function ("sin" or "cos") of it."""
+class Function(NamedTuple):
+    """A quantity that is written as a function."""
 
     name: str
-    expression: str
-    function: str = ""
+    title: str  # what it returns, with units
+    takes: tuple[str, ...]  # of "q", "qd", "tau"
+    sizes: dict[str, int]  # of these
+    shape: tuple[int, ...]  # of a result
+    results: tuple[str, ...]  # names of the results
+    traced: Traced
+
+    @property
+    def size(self) -> int:
+        """How many numbers a result has."""
+        return prod(self.shape)
+
+    @property
+    def inputs(self) -> list[tuple[str, int]]:
+        """The name and the place of each number that is taken, in the order of the traced inputs."""
+        return [(name, k) for name, size in self.sizes.items() for k in range(size)]
+
+    @property
+    def used(self) -> list[tuple[str, int]]:
+        """Those of the inputs on which a result depends."""
+        nodes = set(self.traced.nodes)
+        return [place for place, x in zip(self.inputs, self.traced.inputs) if x.i in nodes]
+
+
+class Program(NamedTuple):
+    """What a file is written from."""
+
+    name: str
+    head: Sequence[str]  # lines of the comment that it begins with
+    functions: Sequence[Function]
+    single: bool  # float in C
+
+
+@dataclass(frozen=True)
+class Syntax:
+    """How a language writes what is not the same in all, as formats; k counts from 0, n from 1."""
+
+    input: str  # of a number of x
+    assignment: str  # of the value of an expression to a name
+    result: str  # of a value to a number of the result x
+    function: str = "{}"  # sin, cos, sqrt and arctan
+    arctan: str = "atan"
+    number: Callable[[float], str] = repr
+    times: str = "*"
+    over: str = "/"
+
+
+def statements(function: Function, syntax: Syntax) -> tuple[list[str], list[str]]:
+    """The assignments of a function, and those of its results."""
+    inputs = [syntax.input.format(x=x, k=k, n=k + 1) for x, k in function.inputs]
+    writer, results = Writer(function.traced, inputs, syntax), []
+    for number, value in enumerate(writer.results):
+        result, k = divmod(number, function.size)
+        results.append(syntax.result.format(x=function.results[result], k=k, n=k + 1, value=value))
+    return writer.assignments, results
 
 
 class Writer:
     """The assignments of a traced function, and the expressions of its results; `inputs` are the expressions of its inputs."""
 
-    def __init__(self, traced: Traced, inputs: list[str], syntax: Syntax):
+    def __init__(self, traced: Traced, inputs: Sequence[str], syntax: Syntax):
         self.tape, self.syntax = traced.tape, syntax
         outputs = [self.tape.lift(x) for x in traced.outputs]
         self.uses = Counter(x.i for x in outputs)
+        self.items: dict[int, list[tuple[int, int]]] = defaultdict(
+            list
+        )  # of a sine and cosine: [(which, node)]
         for i in traced.nodes:
             self.uses.update(self.tape.operands(i))
-        self.known = {
-            x.i: (name, ATOM) for x, name in zip(traced.inputs, inputs)
-        }  # by node: (text, how it is bound)
-        self.items = {}  # of a sine and cosine: [(which, node)]
-        for i in traced.nodes:
             kind, arguments = self.tape.nodes[i]
             if kind == "item":
-                self.items.setdefault(arguments[0], []).append((arguments[1], i))
+                self.items[arguments[0]].append((arguments[1], i))
+        # the text of each node, and how it is bound
+        self.known = {x.i: (name, ATOM) for x, name in zip(traced.inputs, inputs)}
         self.assignments = list(self.written(traced.nodes))
         self.results = [self.text(x.i) for x in outputs]
 
-    def written(self, order: list[int]) -> Iterator[Assignment]:
+    def written(self, order: Sequence[int]) -> Iterator[str]:
         for i in order:
             kind, arguments = self.tape.nodes[i]
             if kind == "number":
-                self.known[i] = self.syntax.number(float(arguments[0])), SUM if arguments[0] < 0.0 else ATOM
+                value = float(arguments[0])
+                self.known[i] = self.syntax.number(value), SUM if value < 0.0 else ATOM
             elif kind == "sincos":
                 for which, item in self.items[i]:
-                    name = f"{'sc'[which]}{i}"
-                    self.known[item] = name, ATOM
-                    yield Assignment(name, self.text(arguments[0]), ("sin", "cos")[which])
+                    yield self.assigned(
+                        item, f"{'sc'[which]}{i}", self.call(("sin", "cos")[which], arguments[0])
+                    )
             elif kind not in ("input", "item"):
-                text, bound = self.expression(kind, arguments)
+                self.known[i] = self.expression(kind, arguments)
+                text, _ = self.known[i]
                 if self.uses[i] > 1 or len(text) > LONGEST:
-                    yield Assignment(f"x{i}", text)
-                    text, bound = f"x{i}", ATOM
-                self.known[i] = text, bound
+                    yield self.assigned(i, f"x{i}", text)
+
+    def assigned(self, i: int, name: str, value: str) -> str:
+        """The assignment of a node to a name, which stands for it from then on."""
+        self.known[i] = name, ATOM
+        return self.syntax.assignment.format(name=name, value=value)
 
     def text(self, i: int, least: int = SUM) -> str:
         """The expression of a node, in brackets where it is bound less than `least`."""
         text, bound = self.known[i]
         return text if bound >= least else f"({text})"
 
-    def expression(self, kind: str, operands: tuple) -> tuple[str, int]:
-        if kind in ("sqrt", "arctan"):
-            return f"{getattr(self.syntax, kind)}({self.text(operands[0])})", ATOM
+    def call(self, function: str, i: int) -> str:
+        return f"{self.syntax.function.format(function)}({self.text(i)})"
+
+    def expression(self, kind: str, operands: Sequence[Any]) -> tuple[str, int]:
+        if kind == "sqrt":
+            return self.call("sqrt", operands[0]), ATOM
+        if kind == "arctan":
+            return self.call(self.syntax.arctan, operands[0]), ATOM
         if kind == "neg":
             return f"-{self.text(operands[0], PRODUCT)}", SUM
         a, b = operands

@@ -2,23 +2,24 @@
 
 import operator
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from tmt.arm import ARM
 from tmt.derivation.quantities import State
 from tmt.model.tree import Tree
+from tmt.scalar import Scalar
 
-from .names import EPS, Names, number
+from .names import EPS, Names, Parameter, number
 from .shortest import Forms
-from .trigonometry import Ring, TooLong
+from .trigonometry import Angle, Expression, Ring, TooLong, Trig
 
-QUANTITIES = ("mass_matrix", "bias", "gravity_balance")
 TITLES = {
     "mass_matrix": ("M", "mass matrix"),
     "bias": ("h", "bias: Coriolis, centrifugal and gravity terms"),
     "gravity_balance": ("G", "torque or force that balances gravity"),
 }
+QUANTITIES = tuple(TITLES)
 NOISE = 1e-16  # of the largest coefficient of an entry: left over where terms cancel
 
 
@@ -30,26 +31,20 @@ class Symbolic(NamedTuple):
     entries: {quantity: Matrix}. display: {symbol: LaTeX}. note: "", or why parameters have no names.
     """
 
-    q: list
-    qd: list
-    joint_names: tuple
-    joints: list
-    parameters: dict
+    q: list[Expression]
+    qd: list[Expression]
+    joint_names: tuple[str, ...]
+    joints: list[str]
+    parameters: dict[Expression, Parameter]
     named: bool
-    entries: dict
-    display: dict
+    entries: dict[str, Expression]
+    display: dict[Expression, str]
     note: str
 
-    def numbers(self, quantity: str):
-        """The Matrix of a quantity with the values of the parameters in it."""
-        return self.entries[quantity].subs({symbol: row.value for symbol, row in self.parameters.items()})
 
-    def pair(self, quantity: str) -> tuple:
-        """`numbers` and the list of its symbols, as compare.assert_agrees takes it."""
-        return self.numbers(quantity), self.q + self.qd * (quantity == "bias")
-
-
-def symbolic(tree: Tree = ARM, quantities=QUANTITIES, seconds: float = 60.0, named: bool = True) -> Symbolic:
+def symbolic(
+    tree: Tree = ARM, quantities: Sequence[str] = QUANTITIES, seconds: float = 60.0, named: bool = True
+) -> Symbolic:
     """Mbar, h and the torque that balances gravity of a Tree of hinges and slides, simplified.
 
     quantities: some of QUANTITIES. seconds: the time that it may take; parameters that have no names by half of it are numbers.
@@ -67,65 +62,88 @@ def symbolic(tree: Tree = ARM, quantities=QUANTITIES, seconds: float = 60.0, nam
     start, note = time.monotonic(), ""
     if named:
         try:
-            return derived(tree, quantities, Names(tree, True), start + seconds / 2, note)
+            return derived(Names(tree, True), quantities, start + seconds / 2, note)
         except TooLong:
             note = f"numbers in place of named parameters, which would take more than {seconds / 2:g} s"
     try:
-        return derived(tree, quantities, Names(tree, False), start + seconds, note)
+        return derived(Names(tree, False), quantities, start + seconds, note)
     except TooLong:
-        raise ValueError(
-            f"symbolic equations of these {len(tree.kind)} joints take more than {seconds:g} s"
-        ) from None
+        longest = f"take more than {seconds:g} s"
+        raise ValueError(f"symbolic equations of these {len(tree.kind)} joints {longest}") from None
 
 
-def derived(tree, quantities, names: Names, deadline, note) -> Symbolic:
+def derived(names: Names, quantities: Sequence[str], deadline: float, note: str) -> Symbolic:
     """The equations with the parameters that `names` has; TooLong at the deadline."""
     import sympy
 
+    tree = names.source
     places = {i: sympy.Dummy() for i, kind in enumerate(tree.kind) if kind == "slide"}
     hinges = [i for i, kind in enumerate(tree.kind) if kind == "hinge"]
     from_reference = [symbol - number(value) for symbol, value in zip(names.q, tree.reference)]
     parallel = {hinges.index(i): (hinges.index(j), sign) for i, (j, sign) in parallel_hinges(tree).items()}
     symbols = sorted(names.parameters, key=str)
-    masses = [symbol for symbol in symbols if names.parameters[symbol].unit == "kg"]
     angles = [from_reference[i] for i in hinges]
-    symbols = [*symbols, *places.values(), *names.qd]
-    ring = Ring(symbols, len(angles), names.is_exact, deadline)
-    forms = Forms(ring, symbols, masses, names.qd, angles, parallel)
-    zero, joints = ring.scalar(0), range(len(tree.kind))
-    variables = [ring.scalar(places[i]) if i in places else ring.angle(hinges.index(i)) for i in joints]
-    state = State(names.tree(ring.scalar), variables)
+    ring = Ring([*symbols, *places.values(), *names.qd], len(angles), names.is_exact, deadline)
+    forms = Forms(ring, names, angles, parallel)
+    variables = [
+        ring.scalar(places[i]) if i in places else ring.angle(hinges.index(i)) for i in range(len(tree.kind))
+    ]
 
-    def expression(scalar):
+    def expression(scalar: Scalar) -> Expression:
         ring.check_time()
-        form = forms.shortest(ring.without_noise((zero + scalar).poly, 0 if names.is_exact else NOISE))
-        return form.xreplace({place: from_reference[i] for i, place in places.items()})
+        poly = ring.without_noise((ring.scalar(0) + scalar).poly, 0 if names.is_exact else NOISE)
+        return forms.shortest(poly).xreplace({place: from_reference[i] for i, place in places.items()})
 
-    entries = {}
-    if "mass_matrix" in quantities:
-        upper = {(i, j): expression(state.mass_matrix[i][j]) for i in joints for j in joints if i <= j}
-        entries["mass_matrix"] = sympy.Matrix([[upper[min(i, j), max(i, j)] for j in joints] for i in joints])
-    if set(quantities) - {"mass_matrix"}:
-        entries["gravity_balance"] = sympy.Matrix([expression(entry) for entry in state.gravity_balance])
-    if "bias" in quantities:
-        M = [[zero + entry for entry in row] for row in state.mass_matrix]
-        rates = [[[M[i][j].derivative(variables[k]) for k in joints] for j in joints] for i in joints]
-        qd = [ring.scalar(symbol) for symbol in names.qd]
-        h = list(entries["gravity_balance"])
-        for i in joints:  # h_i = sum over j, k of (dM_ij/dq_k - dM_jk/dq_i / 2) qd_j qd_k, and gravity
-            terms = [qd[j] * qd[k] * (rates[i][j][k] - rates[j][k][i] * 0.5) for j in joints for k in joints]
-            h[i] += expression(sum(terms, zero))
-        entries["bias"] = sympy.Matrix(h)
+    state = State(names.mechanism(ring.scalar), variables)
+    derivations: dict[str, Callable[[], Expression]] = {
+        "mass_matrix": lambda: symmetric(state.mass_matrix, expression),
+        "gravity_balance": lambda: sympy.Matrix([expression(entry) for entry in state.gravity_balance]),
+        "bias": lambda: sympy.Matrix(
+            [expression(x) for x in coriolis(ring, state.mass_matrix, variables, names.qd)]
+        ),
+    }
+    needed = {"gravity_balance", *quantities} if "bias" in quantities else {*quantities}
+    entries = {name: derive() for name, derive in derivations.items() if name in needed}
+    if "bias" in needed:
+        entries["bias"] += entries["gravity_balance"]
     entries = {name: entries[name] for name in quantities}
     used = set().union(*(matrix.free_symbols for matrix in entries.values()))
     parameters = {symbol: row for symbol, row in names.parameters.items() if symbol in used}
     display = {s: names.display[s] for s in (*names.q, *names.qd, *parameters)}
-    return Symbolic(
-        names.q, names.qd, tree.joint_names, names.joints, parameters, names.named, entries, display, note
-    )
+    joints = tree.joint_names, names.joints
+    return Symbolic(names.q, names.qd, *joints, parameters, names.named, entries, display, note)
 
 
-def parallel_hinges(tree) -> dict:
+def symmetric(M: Sequence[Sequence[Scalar]], expression: Callable[[Scalar], Expression]) -> Expression:
+    """A symmetric Matrix of the expressions of the entries on and above its diagonal."""
+    import sympy
+
+    n = range(len(M))
+    upper = {(i, j): expression(M[i][j]) for i in n for j in n if i <= j}
+    return sympy.Matrix([[upper[min(i, j), max(i, j)] for j in n] for i in n])
+
+
+def coriolis(
+    ring: Ring,
+    mass_matrix: Sequence[Sequence[Scalar]],
+    q: Sequence[Angle | Trig],
+    speeds: Sequence[Expression],
+) -> list[Scalar]:
+    """The bias without gravity: sum over j, k of (dM_ij/dq_k - dM_jk/dq_i / 2) qd_j qd_k."""
+    zero, n = ring.scalar(0), range(len(q))
+    M = [[zero + entry for entry in row] for row in mass_matrix]
+    rates = [[[M[i][j].derivative(q[k]) for k in n] for j in n] for i in n]
+    qd = [ring.scalar(symbol) for symbol in speeds]
+    products = {(j, k): qd[j] * qd[k] for j in n for k in n}
+
+    def entry(i: int) -> Scalar:
+        terms = [products[j, k] * (rates[i][j][k] - rates[j][k][i] * 0.5) for j in n for k in n]
+        return sum(terms, zero)
+
+    return [entry(i) for i in n]
+
+
+def parallel_hinges(tree: Tree) -> dict[int, tuple[int, int]]:
     """{i: (j, sign)} of hinges i that turn, with no other hinge between them, on hinge j about sign times its axis."""
     found = {}
     for i, kind in enumerate(tree.kind):
@@ -138,18 +156,6 @@ def parallel_hinges(tree) -> dict:
     return found
 
 
-PYTHON = """{comment}
-import sympy
-from sympy import cos, sin
-
-q = {q} = sympy.symbols({q_names!r}, seq=True)
-qd = {qd} = sympy.symbols({qd_names!r}, seq=True)
-joint_names = {joint_names!r}
-{parameters}
-{matrices}
-"""
-
-
 def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     """Python text with SymPy: symbols, `parameters` {symbol: value}, matrices M, h and G, and mass_matrix, bias and gravity.
 
@@ -158,36 +164,29 @@ def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     """
     from sympy.printing.str import StrPrinter
 
-    class Printer(StrPrinter):
-        def _print_Float(self, expr):
-            return repr(float(expr))
+    class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types
+        def _print_Float(self, expression: Expression) -> str:
+            return repr(float(expression))
 
+    printed = Printer().doprint
+    q, qd = (list(map(str, symbols)) for symbols in (symbolic.q, symbolic.qd))
     lines = [
-        f"{symbol} = sympy.Symbol({str(symbol)!r})  # {row.meaning}, {row.unit}"
-        for symbol, row in symbolic.parameters.items()
+        *(f"# {line}" for line in head_lines),
+        "import sympy",
+        "from sympy import cos, sin",
+        "",
+        f"q = {', '.join(q)}, = sympy.symbols({' '.join(q)!r}, seq=True)",
+        f"qd = {', '.join(qd)}, = sympy.symbols({' '.join(qd)!r}, seq=True)",
+        f"joint_names = {list(symbolic.joint_names)!r}",
     ]
+    for symbol, row in symbolic.parameters.items():
+        lines.append(f"{symbol} = sympy.Symbol({str(symbol)!r})  # {row.meaning}, {row.unit}")
     values = ", ".join(f"{symbol}: {row.value!r}" for symbol, row in symbolic.parameters.items())
     lines.append(f"parameters = {{{values}}}")
-    matrices = []
     for name, matrix in symbolic.entries.items():
         letter, title = TITLES[name]
-        rows = [
-            ",\n".join(
-                f"    [{', '.join(Printer().doprint(entry) for entry in row)}]" for row in matrix.tolist()
-            )
-        ]
-        symbols = "[*q, *qd]" if name == "bias" else "[*q]"
-        own = {"gravity_balance": "gravity"}.get(name, name)
-        matrices.append(
-            f"# {title}\n{letter} = sympy.Matrix([\n{rows[0]},\n])\n{own} = ({letter}.subs(parameters), {symbols})"
-        )
-    return PYTHON.format(
-        comment="\n".join(f"# {line}" for line in head_lines),
-        q=", ".join(map(str, symbolic.q)) + ",",
-        qd=", ".join(map(str, symbolic.qd)) + ",",
-        q_names=" ".join(map(str, symbolic.q)),
-        qd_names=" ".join(map(str, symbolic.qd)),
-        joint_names=list(symbolic.joint_names),
-        parameters="\n".join(lines),
-        matrices="\n".join(matrices),
-    )
+        rows = [f"    [{', '.join(map(printed, row))}]," for row in matrix.tolist()]
+        lines += [f"# {title}", f"{letter} = sympy.Matrix([", *rows, "])"]
+        variables = "[*q, *qd]" if name == "bias" else "[*q]"
+        lines.append(f"{name.removesuffix('_balance')} = ({letter}.subs(parameters), {variables})")
+    return "\n".join(lines) + "\n"

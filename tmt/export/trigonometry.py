@@ -1,14 +1,20 @@
 """Polynomials in sines and cosines as scalars of the method, reduced by sin^2 = 1 - cos^2: those of equal functions are equal."""
 
 import time
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 from tmt.derivation.vectors import Vector, cos, sin
+from tmt.scalar import Scalar
 
-PRECISION = (
-    120  # bits of coefficients that are not rational: the rounding of a sum is far below that of its doubles
-)
+# bits of coefficients that are not rational: the rounding of a sum is far below that of its doubles
+PRECISION = 120
 NOISE = 1e-25  # of the largest coefficient of a polynomial
 LARGEST_PRODUCT = 3_000_000  # pairs of terms in one product: some seconds
+
+
+Polynomial = Any  # of SymPy, which need not be installed
+Expression = Any  # of SymPy
 
 
 class TooLong(Exception):
@@ -21,17 +27,15 @@ class Ring:
     exact: whether coefficients are rational; else they have PRECISION bits. functions: the ring of sines and cosines alone.
     """
 
-    def __init__(self, symbols, n, exact, deadline):
+    def __init__(self, symbols: Sequence[Expression], n: int, exact: bool, deadline: float):
         from sympy import QQ, Dummy, RealField
         from sympy.polys.rings import PolyRing
 
         domain = QQ if exact else RealField(prec=PRECISION)
         functions = [Dummy() for _ in range(2 * n)]  # sines, then cosines
-        self.ring, self.functions = (
-            PolyRing([*symbols, *functions], domain, "lex"),
-            PolyRing(functions, domain, "lex"),
-        )
-        self.exact, self.deadline = exact, deadline
+        self.ring = PolyRing([*symbols, *functions], domain, "lex")
+        self.functions = PolyRing(functions, domain, "lex")
+        self.symbols, self.exact, self.deadline = symbols, exact, deadline
         self.places = [(i, n + i) for i in range(n)]  # of sine and cosine in self.functions
         self.pairs = [(len(symbols) + s, len(symbols) + c) for s, c in self.places]  # and in self.ring
 
@@ -39,31 +43,32 @@ class Ring:
         if time.monotonic() > self.deadline:
             raise TooLong
 
-    def scalar(self, value) -> "Trig":
+    def scalar(self, value: Expression) -> "Trig":
         """A number, or an expression in the symbols."""
         return Trig(self, self.ring.from_expr(value) if hasattr(value, "free_symbols") else self.ring(value))
 
-    def angle(self, i) -> "Angle":
+    def angle(self, i: int) -> "Angle":
         return Angle(*(Trig(self, self.ring.gens[place]) for place in self.pairs[i]))
 
-    def reduced(self, poly, pairs):
+    def reduced(self, poly: Polynomial, pairs: Iterable[tuple[int, int]]) -> Polynomial:
         """The polynomial with squares of the first generator of each pair replaced by 1 - the square of the second."""
         for first, second in pairs:
             if any(monomial[first] > 1 for monomial in poly):
                 low, high, cosine = poly.ring.zero, poly.ring.zero, poly.ring.gens[second]
                 for monomial, number in poly.items():
-                    power = monomial[first]
-                    rest = (*monomial[:first], power - 2 * (power > 1), *monomial[first + 1 :])
-                    (high if power > 1 else low)[rest] = number
+                    if monomial[first] > 1:
+                        rest = (*monomial[:first], monomial[first] - 2, *monomial[first + 1 :])
+                        high[rest] = number
+                    else:
+                        low[monomial] = number
                 poly = low + self.reduced(high * (1 - cosine**2), [(first, second)])
         return poly if self.exact else self.without_noise(poly, NOISE)
 
-    def without_noise(self, poly, noise):
+    def without_noise(self, poly: Polynomial, noise: float) -> Polynomial:
         """The polynomial without coefficients of at most `noise` times the largest."""
         least = noise * max(map(abs, poly.values()), default=0)
-        return poly.ring.from_dict(
-            {monomial: number for monomial, number in poly.items() if abs(number) > least}
-        )
+        left = {monomial: number for monomial, number in poly.items() if abs(number) > least}
+        return poly.ring.from_dict(left)
 
 
 class Trig:
@@ -71,25 +76,25 @@ class Trig:
 
     __slots__ = ("poly", "ring")
 
-    def __init__(self, ring, poly):
+    def __init__(self, ring: Ring, poly: Polynomial):
         self.ring, self.poly = ring, poly
 
-    def new(self, poly) -> "Trig":
+    def new(self, poly: Polynomial) -> "Trig":
         return Trig(self.ring, poly)
 
-    def other(self, value):
+    def other(self, value: Scalar) -> Polynomial:
         return value.poly if isinstance(value, Trig) else self.ring.ring(self.ring.ring.domain.convert(value))
 
-    def __add__(self, other):
+    def __add__(self, other: Scalar) -> "Trig":
         return self.new(self.poly + self.other(other))
 
-    def __sub__(self, other):
+    def __sub__(self, other: Scalar) -> "Trig":
         return self.new(self.poly - self.other(other))
 
-    def __rsub__(self, other):
+    def __rsub__(self, other: Scalar) -> "Trig":
         return self.new(self.other(other) - self.poly)
 
-    def __mul__(self, other):
+    def __mul__(self, other: Scalar) -> Scalar:
         if isinstance(other, Vector):
             return other * self
         self.ring.check_time()
@@ -100,7 +105,7 @@ class Trig:
 
     __radd__, __rmul__ = __add__, __mul__
 
-    def derivative(self, variable) -> "Trig":
+    def derivative(self, variable: "Angle | Trig") -> "Trig":
         """By an Angle, or by a Trig that is a symbol."""
         if isinstance(variable, Angle):
             s, c = variable.sine.poly, variable.cosine.poly
@@ -111,10 +116,10 @@ class Trig:
 class Angle:
     """The angle of a hinge from its reference: its sine and cosine."""
 
-    def __init__(self, sine, cosine):
+    def __init__(self, sine: Trig, cosine: Trig):
         self.sine, self.cosine = sine, cosine
 
-    def __sub__(self, reference):
+    def __sub__(self, reference: Scalar) -> "Angle":
         return self
 
 

@@ -15,12 +15,12 @@ from itertools import chain
 
 import numpy as np
 
+from tmt.derivation.coordinates import FLAT, Flat, normalized, product
 from tmt.derivation.dual import Dual, jacobian, seeded, unit_vectors
 from tmt.derivation.vectors import solve_any
 from tmt.methods.dynamics import Values
 from tmt.methods.stepping import Joints, Slope, State
 from tmt.methods.tableau import Numbers, Tableau
-from tmt.model.coordinates import FLAT, Flat, normalized, product
 from tmt.scalar import Scalar
 
 ITERATIONS = (

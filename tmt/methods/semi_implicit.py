@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeVar
 
+from tmt.derivation.coordinates import FLAT
 from tmt.methods.dynamics import LITERAL, Implicit, Terms, Values, dynamics_of
 from tmt.methods.stepping import Joints, Method, Slope, State, advance, increments
-from tmt.model.coordinates import FLAT
 from tmt.model.tree import Tree
 from tmt.scalar import Scalar
 

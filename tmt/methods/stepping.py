@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
 from typing import Any
 
+from tmt.derivation.coordinates import FLAT, Coordinates, Flat
 from tmt.methods.dynamics import LITERAL, Terms, Values, dynamics_of
-from tmt.model.coordinates import FLAT, Coordinates, Flat
 from tmt.model.tree import Tree
 from tmt.model.values import shown
 from tmt.scalar import Scalar

@@ -8,78 +8,87 @@ import math
 import numbers
 import os
 from collections.abc import Callable
+from typing import Any, TypeVar, cast
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from tmt.model.lock import CLOSE_TO_ONE
-from tmt.model.tree import Tree
-from tmt.model.values import real_numbers, shown
+from .lock import CLOSE_TO_ONE
+from .tree import Tree
+from .values import real_numbers, shown
 
-SMALL = 1e8  # B, that any machine has
+ALWAYS_FREE = 1e8  # B, that any machine has
+Array = NDArray[np.float64]
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def quantity(function: Callable) -> Callable:
+def quantity(function: Function) -> Function:
     """The function without NumPy's warnings, which no caller can place; what does not fit into memory is a ValueError."""
 
     @functools.wraps(function)
-    def evaluated(*arguments, **named):
+    def evaluated(*arguments: Any, **named: Any) -> Any:
         try:
             with np.errstate(all="ignore"):
                 return function(*arguments, **named)
         except MemoryError as error:
-            raise ValueError(
-                f"{function.__name__} of these states does not fit into memory: {error}"
-            ) from None
+            name = function.__name__
+            raise ValueError(f"{name} of these states does not fit into memory: {error}") from None
 
-    return evaluated
+    return cast(Function, evaluated)
 
 
-def states(model, **arrays) -> list:
+def states(model: Tree, **arrays: ArrayLike) -> list[list[Array]]:
     """Each array as nq scalars (q) or nv of one batch shape, after a check of type, shape and values."""
     checked_model(model)
-    coordinates, checked = model.coordinates, []
-    for name, values in arrays.items():
-        n = coordinates.nq if name == "q" else coordinates.nv
-        array = real_numbers(values)
-        if array is None:
-            raise ValueError(f"{name} is {shown(values)}; real numbers of shape (..., {n}) are expected")
-        if array.ndim == 0 or array.shape[-1] != n:
-            kinds = dict.fromkeys(model.kind)
-            each = " or ".join(kind for kind in kinds if kind != "ball")
-            one = [f"one number per {each}"] * bool(each)
-            one += [f"{'four' if name == 'q' else 'three'} per ball"] * ("ball" in kinds)
-            names = ", ".join(model.joint_names)
-            raise ValueError(
-                f"{name} has shape {array.shape}; (..., {n}) is expected, {', '.join(one)} ({names})"
-            )
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name} has values that are not finite; finite numbers are expected")
-        if name == "q":
-            for joint in coordinates.balls:
-                off = np.abs(np.linalg.norm(array[..., joint.q], axis=-1) - 1.0)
-                if off.size and off.max() > CLOSE_TO_ONE:
-                    ball = model.joint_names[coordinates.joints.index(joint)]
-                    found = array[..., joint.q].reshape(-1, 4)[np.argmax(off)]
-                    wanted = "a quaternion w, x, y, z of length 1 is expected"
-                    raise ValueError(f"q of {ball!r} is {found.tolist()}; {wanted}")
-        checked.append(array)
-    batches = [array.shape[:-1] for array in checked]
+    checked = {name: _state(model, name, values) for name, values in arrays.items()}
+    if "q" in checked:
+        _check_quaternions(model, checked["q"])
     try:
-        batch = np.broadcast_shapes(*batches)
+        batch = np.broadcast_shapes(*(array.shape[:-1] for array in checked.values()))
     except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in zip(arrays, checked))
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in checked.items())
         raise ValueError(f"the batch shapes do not fit together: {shapes}") from None
-    checked = [np.broadcast_to(array, (*batch, array.shape[-1])) for array in checked]
-    return [[array[..., i] for i in range(array.shape[-1])] for array in checked]
+    together = [np.broadcast_to(array, (*batch, array.shape[-1])) for array in checked.values()]
+    return [[array[..., i] for i in range(array.shape[-1])] for array in together]
 
 
-def checked_model(model) -> None:
+def _state(model: Tree, name: str, values: ArrayLike) -> Array:
+    """The values as an array (..., nq) of q, or (..., nv) of qd and tau."""
+    n = model.coordinates.nq if name == "q" else model.coordinates.nv
+    array = real_numbers(values)
+    if array is None:
+        raise ValueError(f"{name} is {shown(values)}; real numbers of shape (..., {n}) are expected")
+    if array.ndim == 0 or array.shape[-1] != n:
+        kinds = dict.fromkeys(model.kind)
+        numbers = " or ".join(kind for kind in kinds if kind != "ball")
+        parts = [f"one number per {numbers}"] if numbers else []
+        if "ball" in kinds:
+            parts.append("four per ball" if name == "q" else "three per ball")
+        expected = f"(..., {n}) is expected, {', '.join(parts)} ({', '.join(model.joint_names)})"
+        raise ValueError(f"{name} has shape {array.shape}; {expected}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} has values that are not finite; finite numbers are expected")
+    return array
+
+
+def _check_quaternions(model: Tree, q: Array) -> None:
+    """Raise ValueError unless the quaternions of all balls have length 1."""
+    places = dict(zip(model.joint_names, model.coordinates.joints))
+    for name in [name for name, joint in places.items() if joint.kind == "ball"]:
+        quaternions = q[..., places[name].q].reshape(-1, 4)
+        off = np.abs(np.linalg.norm(quaternions, axis=-1) - 1.0)
+        if off.size and off.max() > CLOSE_TO_ONE:
+            expected = "a quaternion w, x, y, z of length 1 is expected"
+            raise ValueError(f"q of {name!r} is {quaternions[np.argmax(off)].tolist()}; {expected}")
+
+
+def checked_model(model: Any) -> None:
     """Raise ValueError unless it is a Tree."""
     if not isinstance(model, Tree):
         raise ValueError(f"model is {shown(model)}; a tmt.Tree is expected")
 
 
-def positive(name, value, kind) -> float:
+def positive(name: str, value: Any, kind: str) -> float:
     """The value as a finite float above 0."""
     if type(value) is float and 0.0 < value < math.inf:
         return value
@@ -92,30 +101,31 @@ def positive(name, value, kind) -> float:
     return number
 
 
-def whole(name, value) -> int:
+def whole(name: str, value: Any) -> int:
     """The value as an int of at least 1 that compiled code can count to."""
     if type(value) is int and 1 <= value < 2**63:
         return value
-    if not isinstance(value, numbers.Integral) or isinstance(value, bool) or value < 1:
+    number = int(value) if isinstance(value, numbers.Integral) and not isinstance(value, bool) else 0
+    if number < 1:
         raise ValueError(f"{name} is {shown(value)}; a whole number of at least 1 is expected")
-    if value >= 2**63:
+    if number >= 2**63:
         raise ValueError(f"{name} is {shown(value)}; a whole number below 2^63 is expected")
-    return int(value)
+    return number
 
 
-def paths(runs, steps, every, nq, nv) -> tuple[np.ndarray, np.ndarray]:
+def paths(runs: int, steps: int, every: int, nq: int, nv: int) -> tuple[Array, Array]:
     """Arrays for the q and qd of all runs, (runs, steps / every + 1, nq or nv); ValueError if there is no memory for them."""
     records = steps // every + 1
     size = runs * records * (nq + nv) * 8
     try:
-        if size > SMALL and size > memory():
+        if size > ALWAYS_FREE and size > memory():
             raise MemoryError
         return np.empty((runs, records, nq)), np.empty((runs, records, nv))
     except MemoryError:
-        size = f"{size / 1e9:.3g} GB" if size < 10**100 else "more than 1e+100 B"
+        needed = f"{size / 1e9:.3g} GB" if size < 10**100 else "more than 1e+100 B"
         raise ValueError(
-            f"steps is {shown(steps)}: with {nq} positions and {nv} speeds the states of {runs} runs would take {size} of "
-            "memory, more than there is; with every=k each k-th of them is kept"
+            f"steps is {shown(steps)}: with {nq} positions and {nv} speeds the states of {runs} runs would take "
+            f"{needed} of memory, more than there is; with every=k each k-th of them is kept"
         ) from None
 
 

@@ -1,120 +1,142 @@
 """A Tree with some joints locked."""
 
+from __future__ import annotations
+
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from tmt.derivation.vectors import IDENTITY, ZERO, Matrix, Vector, rotation, turn_of
-from tmt.model.values import numbers_of, shown
+from tmt.derivation.mechanism import origin_in_parent, turn_in_parent
+from tmt.derivation.vectors import IDENTITY, ZERO, Matrix, Vector
+
+from .values import numbers_of, shown
+
+if TYPE_CHECKING:
+    from .tree import Tree
 
 CLOSE_TO_ONE = 1e-6  # how far the length of a quaternion may be from 1
+Value = TypeVar("Value")
 
 
-def locked(tree, angles: Mapping):
+class Carrier(NamedTuple):
+    """What carries a frame: a free joint of the new tree, and where the frame is in that joint's frame."""
+
+    joint: int
+    origin: Vector
+    turn: Matrix
+
+    def point(self, point: Sequence[float]) -> tuple[float, float, float]:
+        """A point of the frame, in the axes and from the origin of the free joint's."""
+        turned = Vector(*point)
+        if self.turn is not IDENTITY:
+            turned = self.turn @ turned
+        x, y, z = self.origin + turned
+        return x, y, z
+
+    def direction(self, direction: Sequence[float]) -> tuple[float, float, float]:
+        return self._replace(origin=ZERO).point(direction)
+
+    def tensor(self, tensor: Sequence[Sequence[float]]) -> Any:
+        """A symmetric tensor in the axes of the free joint's frame."""
+        if self.turn is IDENTITY:
+            return tensor
+        turned = np.array([list(row) for row in self.turn @ Matrix(tensor) @ self.turn.transposed])
+        return (turned + turned.T) / 2.0
+
+    def onward(self, origin: Vector, turn: Matrix) -> Carrier:
+        """The same of another frame, which is fixed in this one."""
+        turned = self.turn if turn is IDENTITY else self.turn @ turn
+        return Carrier(self.joint, Vector(*self.point(tuple(origin))), turned)
+
+
+WORLD = Carrier(-1, ZERO, IDENTITY)
+
+
+def locked(tree: Tree, angles: Mapping[str, Any]) -> Tree:
     """What Tree.lock says."""
     names, joints = tree.joint_names, tree.coordinates.joints
     if not isinstance(angles, Mapping):
-        raise ValueError(
-            f"lock is given {shown(angles)}; a dict of angles in rad by the names of hinges is expected"
-        )
+        expected = "a dict of positions by the names of joints is expected"
+        raise ValueError(f"lock is given {shown(angles)}; {expected}")
     if unknown := [name for name in angles if name not in names]:
-        raise ValueError(f"there is no hinge {shown(unknown[0])} to lock; the hinges are {', '.join(names)}")
+        raise ValueError(f"there is no joint {shown(unknown[0])} to lock; the joints are {', '.join(names)}")
     if len(angles) == len(names):
-        raise ValueError(f"all hinges ({', '.join(names)}) are locked; at least one must be free")
+        raise ValueError(f"all joints ({', '.join(names)}) are locked; at least one must be free")
     if not angles:
         return tree
-    held = {name: _position(tree.kind[names.index(name)], value) for name, value in angles.items()}
-    free = [i for i, name in enumerate(names) if name not in held]
+    q = list(tree.zero)
+    for name, value in angles.items():
+        joint = joints[names.index(name)]
+        q[joint.q] = _position(joint.kind, value)
+    free = [i for i, name in enumerate(names) if name not in angles]
+    speeds = [k for i in free for k in joints[i].speeds]
+    _refuse_fed_back(tree, angles.keys(), q)
 
-    # of each joint's frame: the free joint that carries it now, and where it is in the frame of that one
-    frames = []
-
-    def frame(joint):
-        return frames[joint] if joint >= 0 else (-1, ZERO, IDENTITY)
-
-    for i, name in enumerate(names):
-        carrier, origin, turn = frame(tree.parent[i])
+    before: list[Carrier] = []  # of the frame of the joint before each
+    frames: list[Carrier] = []  # of its own
+    for i in range(len(names)):
+        before.append(frames[tree.parent[i]] if tree.parent[i] >= 0 else WORLD)
         if i in free:
-            frames.append((free.index(i), ZERO, turn))
+            frames.append(Carrier(free.index(i), ZERO, before[i].turn))
         else:
-            shift, turned = _placed(tree, i, held[name])
-            frames.append((carrier, _moved(origin, turn, shift), turn if turned is None else turn @ turned))
-
-    _refuse_fed_back(tree, held, free)
-    before = {i: frame(tree.parent[i]) for i in free}
-    carried = [frame(joint) for joint in tree.body_joint]
-    at = [k for i in free for k in range(*joints[i].q.indices(len(tree.rest)))]
-    by = [(i, k) for i in free for k in range(*joints[i].qd.indices(len(tree.axis)))]
+            frames.append(before[i].onward(*_fixed(tree, i, q)))
+    carried = [frames[joint] if joint >= 0 else WORLD for joint in tree.body_joint]
     return replace(
         tree,
-        joint_names=[names[i] for i in free],
-        parent=[before[i][0] for i in free],
-        offset=[tuple(_moved(*before[i][1:], tree.offset[i])) for i in free],
-        axis=[tuple(_moved(ZERO, before[i][2], tree.axis[k])) for i, k in by],
-        damping=[tree.damping[k] for _, k in by],
-        body_joint=[carrier for carrier, _, _ in carried],
-        com=[tuple(_moved(origin, turn, com)) for com, (_, origin, turn) in zip(tree.com, carried)],
-        inertia=[_turned(turn, inertia) for inertia, (_, _, turn) in zip(tree.inertia, carried)],
-        kind=[tree.kind[i] for i in free],
-        armature=[tree.armature[k] for _, k in by],
-        stiffness=[tree.stiffness[i] for i in free],
-        rest=[tree.rest[k] for k in at],
-        reference=[tree.reference[i] for i in free],
-        position_gain=_gains_of_free(tree.position_gain, by),
-        speed_gain=_gains_of_free(tree.speed_gain, by),
+        joint_names=chosen(names, free),
+        parent=tuple(before[i].joint for i in free),
+        offset=tuple(before[i].point(tree.offset[i]) for i in free),
+        axis=tuple(before[i].direction(tree.axis[k]) for i in free for k in joints[i].speeds),
+        damping=chosen(tree.damping, speeds),
+        body_joint=tuple(carrier.joint for carrier in carried),
+        com=tuple(carrier.point(com) for carrier, com in zip(carried, tree.com)),
+        inertia=tuple(carrier.tensor(inertia) for carrier, inertia in zip(carried, tree.inertia)),
+        kind=chosen(tree.kind, free),
+        armature=chosen(tree.armature, speeds),
+        stiffness=chosen(tree.stiffness, free),
+        rest=tuple(value for i in free for value in tree.rest[joints[i].q]),
+        reference=chosen(tree.reference, free),
+        position_gain=tuple(chosen(row, speeds) for row in chosen(tree.position_gain, speeds)),
+        speed_gain=tuple(chosen(row, speeds) for row in chosen(tree.speed_gain, speeds)),
     )
 
 
-def _gains_of_free(gain, by) -> list:
-    """The rows and columns of a controller's gain at the speeds of the free joints."""
-    return [[gain[k][l] for _, l in by] for _, k in by] if gain else []
+def chosen(values: Sequence[Value], places: Sequence[int]) -> tuple[Value, ...]:
+    """The values at some places; () of none."""
+    return tuple(values[i] for i in places) if values else ()
 
 
-def _refuse_fed_back(tree, held, free):
+def _refuse_fed_back(tree: Tree, locked_names: Any, q: Sequence[float]) -> None:
     """Raise ValueError if the position of a locked joint makes a torque at a free one: a Tree has no place for it."""
-    names, joints = tree.joint_names, tree.coordinates.joints
-    for name, position in held.items() if tree.position_gain else ():
-        l = joints[names.index(name)].qd.start
-        for i in free:
-            if position and any(
-                tree.position_gain[k][l] for k in range(*joints[i].qd.indices(len(tree.axis)))
-            ):
+    joints = dict(zip(tree.joint_names, tree.coordinates.joints))
+    for name in locked_names if tree.position_gain else ():
+        position = q[joints[name].q.start]
+        for other, joint in joints.items():
+            gains = [tree.position_gain[k][joints[name].qd.start] for k in joint.speeds]
+            if other not in locked_names and position and any(gains):
                 raise ValueError(
-                    f"{name!r} cannot be locked at {shown(position)}: its position makes a torque at {names[i]!r} "
+                    f"{name!r} cannot be locked at {shown(position)}: its position makes a torque at {other!r} "
                     "(position_gain); a joint that is fed back to itself alone, or 0, is expected"
                 )
 
 
-def _placed(tree, i, position):
-    """Where joint i at a position puts the frame that it carries, in the parent's frame: origin, and turn if there is one."""
+def _fixed(tree: Tree, i: int, q: Sequence[float]) -> tuple[Vector, Matrix]:
+    """Origin and turn of joint i's frame in its parent's: at the reference it rounds nothing."""
     joint = tree.coordinates.joints[i]
-    if joint.kind == "ball":
-        own = Matrix(tree.axis[joint.qd]).transposed
-        return tree.offset[i], own @ turn_of(position) @ own.transposed if any(position[1:]) else None
-    off, axis = position - tree.reference[i], tree.axis[joint.qd.start]
-    if joint.kind == "slide" and off:
-        return Vector(*tree.offset[i]) + Vector(*axis) * off, None
-    return tree.offset[i], rotation(axis, off) if off and joint.kind == "hinge" else None
+    off = any(q[joint.q][1:]) if joint.kind == "ball" else q[joint.q.start] != tree.reference[i]
+    if not off:
+        return Vector(*tree.offset[i]), IDENTITY
+    return origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)
 
 
-def _moved(origin, turn, point):
-    """A point of a frame in the axes and from the origin of the one that carries it."""
-    return origin + (turn @ Vector(*point) if turn is not IDENTITY else Vector(*point))
-
-
-def _turned(turn, inertia):
-    """A tensor in the axes of the frame that carries it, symmetric."""
-    if turn is IDENTITY:
-        return inertia
-    tensor = np.array([list(row) for row in turn @ Matrix(inertia) @ turn.transposed])
-    return (tensor + tensor.T) / 2.0
-
-
-def _position(kind, value):
-    """A position that is given for one joint: a float, or a quaternion."""
-    (position,) = numbers_of("lock", [value], (1, 4) if kind == "ball" else (1,))
-    if kind == "ball" and abs(math.hypot(*position) - 1.0) > CLOSE_TO_ONE:
+def _position(kind: str, value: Any) -> tuple[float, ...]:
+    """A position that is given for one joint: one number, or the four of a quaternion."""
+    if kind != "ball":
+        return numbers_of("lock", [value], (1,))
+    (quaternion,) = numbers_of("lock", [value], (1, 4))
+    if abs(math.hypot(*quaternion) - 1.0) > CLOSE_TO_ONE:
         raise ValueError(f"lock is given {shown(value)}; a quaternion of length 1 is expected")
-    return position
+    return quaternion

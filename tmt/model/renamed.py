@@ -3,48 +3,42 @@
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from functools import wraps
+from functools import partial, wraps
 from typing import Any
 
 
-def accepts_former_names(former: Mapping[str, str]) -> Callable[[type], type]:
+def accepts_former_names(former: Mapping[str, str]) -> Callable[[Any], Any]:
     """A decorator of a dataclass: it accepts and has the fields `former`, {former name: name}.
 
     ValueError for a field that is none.
     """
 
-    def decorated(cls: type) -> type:
-        initialize = cls.__init__
-        known = [field.name for field in fields(cls)]
+    def decorated(cls: Any) -> Any:
+        initialize, known = cls.__init__, [field.name for field in fields(cls)]
 
         @wraps(initialize)
         def __init__(self: Any, *values: Any, **named: Any) -> None:
-            for name in (
-                former.keys() & named.keys()
-            ):  # those of dataclasses.replace stand beside the new ones
-                warn(cls, name, former[name])
+            for name in former.keys() & named.keys():  # dataclasses.replace gives the new ones too
+                warn(name, former[name])
                 named[former[name]] = named.pop(name)
             if unknown := [name for name in named if name not in known]:
-                raise ValueError(
-                    f"a {cls.__name__} has no field {unknown[0]!r}; its fields are {', '.join(known)}"
-                )
+                expected = f"its fields are {', '.join(known)}"
+                raise ValueError(f"a {cls.__name__} has no field {unknown[0]!r}; {expected}")
             initialize(self, *values, **named)
 
-        def property_of(name: str) -> property:
-            def value(self: Any) -> Any:
-                warn(cls, name, former[name])
-                return getattr(self, former[name])
-
-            return property(value, doc=f"Former name of `{former[name]}`.")
-
         cls.__init__ = __init__
-        for name in former:
-            setattr(cls, name, property_of(name))
+        for name, new in former.items():
+            setattr(cls, name, property(partial(value, name=name, new=new), doc=f"Former name of `{new}`."))
         return cls
 
     return decorated
 
 
-def warn(cls: type, name: str, new: str) -> None:
-    text = f"{cls.__name__}.{name} is called {new}; the former name will be removed in version 3"
+def value(instance: Any, name: str, new: str) -> Any:
+    warn(name, new)
+    return getattr(instance, new)
+
+
+def warn(name: str, new: str) -> None:
+    text = f"Tree.{name} is called {new}; the former name will be removed in version 3"
     warnings.warn(text, DeprecationWarning, stacklevel=3)

@@ -5,34 +5,37 @@ no larger than its rounding is zero.
 """
 
 import math
+from collections.abc import Iterable
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tmt.derivation import method
+from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.vectors import ZERO
 
+Array = NDArray[np.float64]
 ZERO_BELOW = 64 * np.finfo(float).eps  # an eigenvalue of the scaled Mbar, for each hinge
 CLEAR = 1e-6  # a share of the inertia that is carried, far above rounding
 APART = 1e-3  # sine of the angle between two axes that are clearly not parallel
 
 
-def scales(tree) -> np.ndarray:
+def scales(tree: Mechanism[float]) -> Array:
     """The largest value of each Mbar_ii, kg m2, (nv,): with all that the joint carries stretched out, slides by 1 m."""
-    sums, joints = np.array(tree.armature), tree.coordinates.joints
-    for mass, com, inertia, joint in zip(tree.mass, tree.com, tree.inertia, tree.body_joint):
+    sums = np.array(tree.armature)
+    for mass, com, inertia, carrier in zip(tree.mass, tree.com, tree.inertia, tree.body_joint):
         reach, spread = math.hypot(*com), sum(abs(inertia[i][i]) for i in range(3))
-        while joint >= 0:
-            slides = tree.kind[joint] == "slide"
-            sums[joints[joint].qd] += mass if slides else mass * reach * reach + spread
-            reach += math.hypot(*tree.offset[joint]) + slides
-            joint = tree.parent[joint]
+        for i in tree.path(carrier):
+            slides = tree.kind[i] == "slide"
+            sums[tree.coordinates.joints[i].qd] += mass if slides else mass * reach * reach + spread
+            reach += math.hypot(*tree.offset[i]) + slides
     return sums
 
 
 @lru_cache(maxsize=256)  # not in the Tree: vars(tree) are its fields
-def never(tree) -> bool:
+def never(tree: Mechanism[float]) -> bool:
     """Whether Mbar is regular at every q, by an argument from the tips inward: False may also mean unknown.
 
     A joint whose own rotor has inertia is at rest if nothing moves. A body with inertia about every axis is at rest only if
@@ -40,50 +43,42 @@ def never(tree) -> bool:
     body, if those are one joint, or two hinges in a row that are not parallel. If it does not turn, its mass is at rest only
     if none of the slides moves that move it, if those are in a row and none of their directions follows from the others.
     """
-    size, joints, resting = scales(tree), tree.coordinates.joints, set()
-    for i, joint in enumerate(joints):
-        if min(np.divide(tree.armature[joint.qd], size[joint.qd])) > CLEAR:
-            resting.add(i)
-    for joint, mass, inertia in sorted(
-        zip(tree.body_joint, tree.mass, tree.inertia), key=lambda body: body[0]
-    ):
-        chain = []
-        while joint >= 0:
-            chain.append(joint)
-            joint = tree.parent[joint]
-        still = [joint for joint in chain if joint not in resting]
-        turning = [joint for joint in still if tree.kind[joint] != "slide"]
-        sliding = [joint for joint in still if tree.kind[joint] == "slide"]
+    size, joints = scales(tree), tree.coordinates.joints
+    first_speed = [joint.qd.start for joint in joints]
+    shares = [np.divide(tree.armature[joint.qd], size[joint.qd]).min() for joint in joints]
+    resting = {i for i, share in enumerate(shares) if share > CLEAR}
+    bodies = zip(tree.body_joint, tree.mass, tree.inertia)
+    for carrier, mass, inertia in sorted(bodies, key=lambda body: body[0]):
+        moving = [i for i in tree.path(carrier) if i not in resting]
+        turning = [i for i in moving if tree.kind[i] != "slide"]
+        sliding = [i for i in moving if tree.kind[i] == "slide"]
         if turning:
-            largest = max(size[k] for joint in turning for k in range(*joints[joint].qd.indices(len(size))))
+            largest = max(size[joints[i].qd].max() for i in turning)
             if np.linalg.eigvalsh(inertia)[0] < CLEAR * largest or not _turn_alone(tree, turning):
                 continue
         if sliding:
-            axes = np.array([tree.axis[joints[joint].qd.start] for joint in sliding])
+            axes = np.array([tree.axis[first_speed[i]] for i in sliding])
             in_a_row = all(tree.parent[outer] == inner for outer, inner in pairwise(sliding))
-            clear = mass > CLEAR * max(size[joints[joint].qd.start] for joint in sliding)
-            if not (clear and in_a_row and np.linalg.svd(axes)[1].min() > APART and len(sliding) <= 3):
+            has_mass = mass > CLEAR * max(size[first_speed[i]] for i in sliding)
+            if not (has_mass and in_a_row and np.linalg.svd(axes)[1].min() > APART and len(sliding) <= 3):
                 continue
-        resting.update(still)
+        resting.update(moving)
     return len(resting) == len(joints)
 
 
-def _turn_alone(tree, turning) -> bool:
+def _turn_alone(tree: Mechanism[float], turning: list[int]) -> bool:
     """Whether a body that does not turn has these joints at rest, from the tip inward."""
     if len(turning) == 1:
         return True
-    outer, *inner = turning
-    axes = [tree.axis[tree.coordinates.joints[joint].qd.start] for joint in turning]
-    hinges = "ball" not in (tree.kind[joint] for joint in turning)
-    return (
-        len(inner) == 1
-        and hinges
-        and tree.parent[outer] == inner[0]
-        and np.linalg.norm(np.cross(*axes)) > APART
-    )
+    outer, inner = turning[:2]
+    kinds = {tree.kind[i] for i in turning}
+    if len(turning) > 2 or kinds != {"hinge"} or tree.parent[outer] != inner:
+        return False
+    axes = np.array([tree.axis[tree.coordinates.joints[i].qd.start] for i in turning])
+    return bool(np.linalg.norm(np.cross(axes[0], axes[1])) > APART)
 
 
-def mass_matrices(tree, q) -> np.ndarray:
+def mass_matrices(tree: Mechanism[float], q: Array) -> Array:
     """Mbar at positions q (N, nq): (N, nv, nv), in time that grows less with n than that of the method's own sums."""
     count, n = len(q), len(tree.axis)
     total = np.zeros((count, n, n)) + np.diag(tree.armature)
@@ -99,7 +94,7 @@ def mass_matrices(tree, q) -> np.ndarray:
     return total
 
 
-def found(tree, M) -> np.ndarray:
+def found(tree: Mechanism[float], M: Array) -> NDArray[np.bool_]:
     """Which joints move without moving mass at each state of Mbar (..., nv, nv): (..., n) of bool, none where it is regular."""
     root = np.sqrt(scales(tree))
     values, vectors = np.linalg.eigh(M / np.multiply.outer(root, root))
@@ -109,7 +104,7 @@ def found(tree, M) -> np.ndarray:
     return np.stack([speeds[..., joint.qd].any(axis=-1) for joint in tree.coordinates.joints], axis=-1)
 
 
-def reason(tree, moving) -> str:
+def reason(tree: Mechanism[float], moving: Iterable[bool]) -> str:
     """Which joints, as given by `found`, move without moving mass, in words."""
     chosen = [i for i, moves in enumerate(moving) if moves]
     names = [repr(tree.joint_names[i]) for i in chosen]
@@ -121,7 +116,7 @@ def reason(tree, moving) -> str:
     return f"{kind}s {', '.join(names)} {move} together without moving any mass"
 
 
-def check_tree(tree) -> None:
+def check_tree(tree: Mechanism[float]) -> None:
     """Raise ValueError if Mbar is singular at every q, or its numbers are beyond those of a double."""
     with np.errstate(all="ignore"):
         size = scales(tree)
@@ -131,7 +126,7 @@ def check_tree(tree) -> None:
         if not np.isfinite(size).all() or size.min() < np.finfo(float).tiny / CLEAR:
             sizes = f"from {size.min():.3g} to {size.max():.3g} kg m2"
             raise ValueError(f"Mbar of the Tree has sizes {sizes}; doubles cannot hold that")
-        if tree.never_singular:
+        if never(tree):
             return
         # two states with nothing special about them: singular at both is singular everywhere
         places = 1 + np.arange(tree.coordinates.nq)
@@ -144,9 +139,9 @@ def check_tree(tree) -> None:
         raise ValueError(f"{reason(tree, turning[0])}; Mbar is singular at every q")
 
 
-def first(tree, q, M=None) -> tuple[int, str] | None:
+def first(tree: Mechanism[float], q: Array, M: Array | None = None) -> tuple[int, str] | None:
     """The first of the states q (N, nq) at which Mbar is singular, and why; None if there is none."""
-    if tree.never_singular or not len(q):
+    if never(tree) or not len(q):
         return None
     turning = found(tree, mass_matrices(tree, q) if M is None else M)
     bad = turning.any(axis=-1)

@@ -1,30 +1,33 @@
 """A kinematic tree of joints that carry rigid bodies, as plain numbers."""
 
+from __future__ import annotations
+
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from tmt.model import singular
-from tmt.model.coordinates import KINDS, Coordinates, coordinates_of
-from tmt.model.lock import CLOSE_TO_ONE, locked
-from tmt.model.renamed import accepts_former_names
-from tmt.model.values import names, numbers_of, shown
+from tmt.derivation.coordinates import KINDS, Coordinates
+from tmt.derivation.mechanism import Indices, Mechanism, Names, Numbers, Rows
+
+from . import singular
+from .lock import CLOSE_TO_ONE, locked
+from .renamed import accepts_former_names
+from .values import listed, names, numbers_of, shown
 
 OPTIONAL = ("reference", "armature", "stiffness", "rest")  # fields that may be left out
 GAINS = ("position_gain", "speed_gain")  # and those of a controller, which are () where there is none
-
-
-Numbers = tuple[float, ...]
-Rows = tuple[Numbers, ...]
+NOT_NEGATIVE = {"mass": "kg", "damping": "N m s/rad", "armature": "kg m2", "stiffness": "N m/rad"}
+NAMES_SHOWN = 60  # characters
 
 
 @accepts_former_names({"hinge_names": "joint_names", "body_hinge": "body_joint"})
 @dataclass(frozen=True)
-class Tree:
+class Tree(Mechanism[float]):
     """A tree of n joints and m rigid bodies; at their reference positions every frame is parallel to the inertial frame.
 
     A joint is a hinge, a slide or a ball; a free joint is three slides and a ball. Each has a frame that moves with it, with
@@ -85,30 +88,11 @@ class Tree:
     (2.0,)
     """
 
-    joint_names: tuple[str, ...]
-    parent: tuple[int, ...]
-    offset: Rows
-    axis: Rows
-    damping: Numbers
-    body_names: tuple[str, ...]
-    body_joint: tuple[int, ...]
-    mass: Numbers
-    com: Rows
-    inertia: tuple[Rows, ...]
-    gravity: Numbers
-    kind: tuple[str, ...] = ()
-    armature: Numbers = ()
-    stiffness: Numbers = ()
-    rest: Numbers = ()
-    reference: Numbers = ()
-    position_gain: Rows = ()
-    speed_gain: Rows = ()
-
     def __post_init__(self) -> None:
         for name in ("joint_names", "body_names"):
-            object.__setattr__(self, name, names(name, getattr(self, name)))
+            self._set(name, names(name, getattr(self, name)))
         n, m = len(self.joint_names), len(self.body_names)
-        object.__setattr__(self, "kind", _kinds(self.kind, n))
+        self._set("kind", _kinds(self.kind, n))
         nq, nv = self.coordinates.nq, self.coordinates.nv
         shapes = {
             "parent": (n,), "offset": (n, 3), "axis": (nv, 3), "damping": (nv,),
@@ -119,25 +103,15 @@ class Tree:
             value = getattr(self, name)
             if name in OPTIONAL and isinstance(value, tuple | list) and not value:
                 value = self.zero if name == "rest" else (0.0,) * shape[0]
-            object.__setattr__(self, name, numbers_of(name, value, shape))
+            self._set(name, numbers_of(name, value, shape))
         for name in GAINS:
-            object.__setattr__(self, name, _gain(name, getattr(self, name), self.coordinates))
+            self._set(name, _gain(name, getattr(self, name), self.coordinates))
         if n == 0 or m == 0:
             raise ValueError("a Tree needs at least one joint and one body")
-        for name, joints, ends in (
-            ("parent", self.parent, range(n)),
-            ("body_joint", self.body_joint, [n] * m),
-        ):
-            for i, (joint, end) in enumerate(zip(joints, ends)):
-                if joint != int(joint) or not -1 <= joint < end:
-                    raise ValueError(
-                        f"Tree.{name}[{i}] is {joint:g}; a whole number from -1 to {end - 1} is expected"
-                    )
-            object.__setattr__(self, name, tuple(int(joint) for joint in joints))
-        object.__setattr__(self, "axis", tuple(_direction(i, axis) for i, axis in enumerate(self.axis)))
-        if min(self.mass) < 0.0:
-            raise ValueError(f"Tree.mass is {shown(self.mass)}; masses of at least 0 kg are expected")
-        for name, unit in (("damping", "N m s/rad"), ("armature", "kg m2"), ("stiffness", "N m/rad")):
+        self._set("parent", _indices("parent", self.parent, range(n)))
+        self._set("body_joint", _indices("body_joint", self.body_joint, [n] * m))
+        self._set("axis", tuple(_direction(i, axis) for i, axis in enumerate(self.axis)))
+        for name, unit in NOT_NEGATIVE.items():
             if min(getattr(self, name)) < 0.0:
                 values = shown(getattr(self, name))
                 raise ValueError(f"Tree.{name} is {values}; values of at least 0 {unit} are expected")
@@ -146,53 +120,31 @@ class Tree:
                 _check_ball(i, np.array(self.axis[joint.qd]), self.reference[i], self.rest[joint.q])
         for name, inertia in zip(self.body_names, self.inertia):
             _check_inertia(name, np.array(inertia))
-        massive = [any(self.armature[joint.qd]) for joint in self.coordinates.joints]
-        for mass, inertia, joint in zip(self.mass, self.inertia, self.body_joint):
-            while joint >= 0 and (mass or np.any(inertia)):
-                massive[joint], joint = True, self.parent[joint]
-        for kind, name, moves_mass in zip(self.kind, self.joint_names, massive):
-            if not moves_mass:
-                raise ValueError(
-                    f"{kind} {name!r} moves nothing that has mass or inertia; Mbar would be singular"
-                )
         singular.check_tree(self)
 
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
     def __repr__(self) -> str:
-        """The fields, without those that may be left out and say nothing."""
-        n, nv = len(self.parent), len(self.axis)
-        nothing, plain = (0.0,) * n, {"kind": ("hinge",) * n, "armature": (0.0,) * nv, "rest": self.zero}
-        plain |= {"stiffness": nothing, "reference": nothing} | dict.fromkeys(GAINS, ())
-        said = {field.name: getattr(self, field.name) for field in fields(self)}
-        return f"Tree({', '.join(f'{name}={value}' for name, value in said.items() if value != plain.get(name))})"
+        """The joints and the number of bodies."""
+        n, m = len(self.joint_names), len(self.body_names)
+        names = shorten(", ".join(self.joint_names), NAMES_SHOWN, placeholder=" ...")
+        return f"Tree({n} joint{'s' if n > 1 else ''}: {names}; {m} {'bodies' if m > 1 else 'body'})"
 
     @property
-    def coordinates(self) -> Coordinates:
-        """The places of the joints in q (nq) and qd (nv)."""
-        return coordinates_of(self.kind)
-
-    @property
-    def has_springs(self) -> bool:
-        return any(self.stiffness)
-
-    @property
-    def has_gains(self) -> bool:
-        return bool(self.position_gain or self.speed_gain)
-
-    @property
-    def zero(self) -> Numbers:
+    def zero(self) -> Numbers[float]:
         """The reference position, (nq,): every frame is parallel to the inertial frame."""
-        return tuple(
-            value
-            for kind, reference in zip(self.kind, self.reference)
-            for value in ((1.0, 0.0, 0.0, 0.0) if kind == "ball" else (reference,))
-        )
+        position: Numbers[float] = ()
+        for kind, reference in zip(self.kind, self.reference):
+            position += (1.0, 0.0, 0.0, 0.0) if kind == "ball" else (reference,)
+        return position
 
     @property
     def never_singular(self) -> bool:
         """Whether Mbar is known to be regular at every q; else it may be singular at some."""
         return singular.never(self)
 
-    def lock(self, angles: Mapping[str, ArrayLike]) -> "Tree":
+    def lock(self, angles: Mapping[str, ArrayLike]) -> Tree:
         """The tree without the joints that are named in `angles`: they stay there, at rest.
 
         What hangs on a locked joint is carried by the joint before it, its vectors turned so that all frames are again parallel
@@ -222,28 +174,33 @@ class Tree:
         """
         return locked(self, angles)
 
-    def moves(self, body: int) -> list[bool]:
-        """Which of the n joints move the body: those on its path to the world."""
-        on_path = [False] * len(self.parent)
-        joint = self.body_joint[body]
-        while joint >= 0:
-            on_path[joint] = True
-            joint = self.parent[joint]
-        return on_path
+
+def stated(tree: Tree) -> str:
+    """All numbers and names of a Tree: equal for equal trees alone."""
+    return repr([getattr(tree, field.name) for field in fields(tree)])
 
 
-def _kinds(values: Any, n: int) -> tuple[str, ...]:
+def _kinds(values: Any, n: int) -> Names:
     """The kinds of the joints; hinges where none is given."""
-    listed = isinstance(values, (list, tuple)) or (isinstance(values, np.ndarray) and values.ndim == 1)
-    kinds = tuple(values) if listed else (None,)
-    if isinstance(values, (list, tuple)) and not kinds:
+    if isinstance(values, (list, tuple)) and not values:
         return ("hinge",) * n
+    kinds = listed(values) or ()
     if len(kinds) != n or not all(isinstance(kind, str) and kind in KINDS for kind in kinds):
         raise ValueError(f"Tree.kind is {shown(values)}; {n} of {', '.join(KINDS)} are expected")
     return tuple(map(str, kinds))
 
 
-def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows:
+def _indices(name: str, values: Iterable[float], ends: Iterable[int]) -> Indices:
+    """Numbers of joints before these ends, or -1."""
+    indices = list(values)
+    for i, (index, end) in enumerate(zip(indices, ends)):
+        if index != int(index) or not -1 <= index < end:
+            expected = f"a whole number from -1 to {end - 1} is expected"
+            raise ValueError(f"Tree.{name}[{i}] is {index:g}; {expected}")
+    return tuple(map(int, indices))
+
+
+def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows[float]:
     """The rows of a gain, (nv, nv); () where nothing is fed back."""
     if isinstance(values, tuple | list) and not values:
         return ()
@@ -251,12 +208,12 @@ def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows:
     fed = np.array(rows) != 0.0
     for i, joint in enumerate(coordinates.joints):
         if joint.kind == "ball" and (fed[joint.qd].any() or fed[:, joint.qd].any()):
-            why = "a ball; of hinges and slides alone is it accepted"
-            raise ValueError(f"Tree.{name} has an entry of joint {i}, {why}")
+            expected = "entries of hinges and slides alone are accepted"
+            raise ValueError(f"Tree.{name} has an entry of joint {i}, a ball; {expected}")
     return rows if fed.any() else ()
 
 
-def _check_ball(i: int, axes: np.ndarray, reference: float, rest: Numbers) -> None:
+def _check_ball(i: int, axes: NDArray[np.float64], reference: float, rest: Numbers[float]) -> None:
     """Raise ValueError unless joint i can be a ball."""
     if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0.0:
         raise ValueError(
@@ -268,7 +225,7 @@ def _check_ball(i: int, axes: np.ndarray, reference: float, rest: Numbers) -> No
         raise ValueError(f"Tree.rest of joint {i}, a ball, is {rest}; a quaternion of length 1 is expected")
 
 
-def _direction(i: int, axis: Numbers) -> Numbers:
+def _direction(i: int, axis: Numbers[float]) -> Numbers[float]:
     """The axis of speed i at length 1, however long it is."""
     exponent = math.frexp(max(map(abs, axis)))[1]
     axis = tuple(math.ldexp(a, -exponent) for a in axis)  # exact, and the squares neither overflow nor vanish
@@ -278,7 +235,7 @@ def _direction(i: int, axis: Numbers) -> Numbers:
     return tuple(a / length for a in axis)
 
 
-def _check_inertia(name: str, inertia: np.ndarray) -> None:
+def _check_inertia(name: str, inertia: NDArray[np.float64]) -> None:
     """Raise ValueError unless the 3 x 3 tensor can belong to a rigid body."""
     scale = np.abs(inertia).max()
     if np.abs(inertia - inertia.T).max() > 1e-12 * scale:

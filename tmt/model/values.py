@@ -1,11 +1,13 @@
 """What is given, as plain values: numbers, names, and how they are said in a message."""
 
 import reprlib
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 
-def shown(value) -> str:
+def shown(value: Any) -> str:
     """What was given, in one short line."""
     try:
         return " ".join(reprlib.repr(value).split())
@@ -13,7 +15,7 @@ def shown(value) -> str:
         return f"a {type(value).__name__}"
 
 
-def real_numbers(values) -> np.ndarray | None:
+def real_numbers(values: Any) -> NDArray[np.float64] | None:
     """The values as an array of float, None if they are anything else but real numbers: truth values, masked ones, text."""
     try:
         if _masked(values):
@@ -26,25 +28,29 @@ def real_numbers(values) -> np.ndarray | None:
         return None
 
 
-def _masked(values) -> bool:
+def _masked(values: Any) -> bool:
     """Whether an entry is masked: NumPy would ignore the mask."""
     if isinstance(values, (list, tuple)):
         return any(_masked(value) for value in values if not isinstance(value, float))
     return isinstance(values, np.ma.MaskedArray) and bool(np.ma.getmaskarray(values).any())
 
 
-def names(field, values):
+def listed(values: Any) -> tuple[Any, ...] | None:
+    """The values of a list, a tuple or an array of one dimension; None of anything else."""
+    is_row = isinstance(values, np.ndarray) and values.ndim == 1
+    return tuple(values) if is_row or isinstance(values, (list, tuple)) else None
+
+
+def names(field: str, values: Any) -> tuple[str, ...]:
     """The values as a tuple of different strings that can stand in a line."""
-    listed = isinstance(values, (list, tuple)) or (isinstance(values, np.ndarray) and values.ndim == 1)
-    names = tuple(values) if listed else (None,)
-    if not all(isinstance(name, str) and name.isprintable() for name in names) or len(set(names)) < len(
-        names
-    ):
+    found = listed(values) or ()
+    are_names = all(isinstance(name, str) and name.isprintable() for name in found)
+    if listed(values) is None or not are_names or len(set(found)) < len(found):
         raise ValueError(f"Tree.{field} is {shown(values)}; different names are expected")
-    return tuple(map(str, names))
+    return tuple(map(str, found))
 
 
-def numbers_of(name, values, shape):
+def numbers_of(name: str, values: Any, shape: tuple[int, ...]) -> Any:
     """The values as nested tuples of float, after a check of their shape."""
     array = real_numbers(values)
     if array is None:
@@ -53,8 +59,9 @@ def numbers_of(name, values, shape):
         raise ValueError(f"Tree.{name} has shape {array.shape}; {shape} is expected")
     if not np.isfinite(array).all():
         raise ValueError(f"Tree.{name} is {shown(values)}; finite numbers are expected")
-
-    def nested(item):
-        return tuple(map(nested, item)) if isinstance(item, list) else item
-
     return nested(array.tolist())
+
+
+def nested(item: Any) -> Any:
+    """Lists as tuples, at every depth."""
+    return tuple(map(nested, item)) if isinstance(item, list) else item

@@ -54,9 +54,10 @@ EDITS = (
     Edit("export.checks", "Row.passed", "self.of_mujoco <= 1.0 and self.of_exact <= 1.0", "self.of_mujoco <= 1.0",
          "exported equations are not compared with the exact values"),
     Edit("export.checks", "Outcome.passed", "all(_1)", "any(_1)", "one quantity that agrees is enough"),
-    Edit("export.checks", "rows_of", "factor * np.asarray(scale)", "2.0 * factor * np.asarray(scale)", "tolerance x 2"),
-    Edit("export.checks", "checked", "FACTOR * eps", "FACTOR * 1.2e-07", "doubles have the tolerance of floats"),
-    Edit("export.checks", "worst_of", "value / most if most and np.isfinite(value) else 0.0 if value == 0.0 else np.inf",
+    Edit("export.checks", "Judge.largest", "self.factor * np.asarray(scale)", "2.0 * self.factor * np.asarray(scale)",
+         "tolerance x 2"),
+    Edit("export.checks", "Judge.__init__", "FACTOR * eps", "FACTOR * 1.2e-07", "doubles have the tolerance of floats"),
+    Edit("export.checks", "worst_of", "value / most if most and np.isfinite(value) else np.inf",
          "value / most if most and np.isfinite(value) else 0.0", "what is no number agrees"),
     # scales
     Edit("judge.scale", "levers", "links[..., i]", "100.0 * links[..., i]", "levers x 100", nth=2),

@@ -6,7 +6,7 @@ EDITS = (
     Edit("tree", "_check_inertia", "np.abs(inertia - inertia.T).max() > _1", "False", "an inertia need not be symmetric"),
     Edit("tree", "_check_inertia", "a + b < _1", "False", "one principal inertia may be larger than the other two"),
     Edit("values", "numbers_of", "not np.isfinite(array).all()", "False", "a number of a Tree may be infinite"),
-    Edit("given", "states", "not np.isfinite(array).all()", "False", "a state may be infinite"),
+    Edit("arguments", "_state", "not np.isfinite(array).all()", "False", "a state may be infinite"),
     Edit("sine", "LIMIT", "2.0**49", "2.0**60", "hinges may turn beyond 2^49 rad"),
     Edit("singular", "check_tree", "turning.any(axis=-1).all()", "False", "a Tree may be singular at every q"),
     Edit("implicit", "CLOSE", "1e-10", "1e-2", "Newton's method stops at two digits"),

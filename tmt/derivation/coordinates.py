@@ -1,0 +1,181 @@
+"""Where the position and the speeds of each joint stand in q and qd, and how positions move; over any scalar.
+
+A hinge has an angle and its rate, a slide a length and its rate. A ball has a quaternion (w, x, y, z), which turns components
+in its own frame to components in that of its parent, and three speeds: its angular velocity in its own frame. So q has nq
+numbers and qd has nv. A movement u is as a speed that acts for a unit of time: nv numbers.
+
+For a ball the position after a movement is p o exp(u / 2), o being the product of quaternions. Along a motion that starts at
+p, u changes by ud = dexp^-1(u) omega (Hairer, Lubich, Wanner, Geometric Numerical Integration, IV.8), here for u that turns
+with the body: omega + u x omega / 2 + c u x (u x omega), c = (1 - (s / 2) cot(s / 2)) / s^2, s = |u|.
+"""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+from tmt.scalar import Scalar
+
+from .vectors import Scalars, Vector, arctan, cos, sin, sqrt
+
+KINDS = {"hinge": (1, 1), "slide": (1, 1), "ball": (4, 3)}  # how many numbers of q and of qd
+TINY = 1e-300  # under a root: its own square root is far below any rounding, and no direction is undefined
+
+
+class Flat:
+    """Coordinates of any number of hinges and slides: positions move like numbers, and speeds are their rates."""
+
+    balls: tuple["Joint", ...] = ()
+
+    def move(self, q: Scalars, u: Scalars) -> list[Scalar]:
+        return [x + y for x, y in zip(q, u)]
+
+    def tangent(self, q: Scalars, dq: Scalars) -> list[Scalar]:
+        return list(dq)
+
+    def component_rates(self, q: Scalars, qd: Scalars) -> list[Scalar]:
+        return list(qd)
+
+    def rates(self, u: Scalars, qd: Scalars) -> list[Scalar]:
+        return list(qd)
+
+
+class Ball:
+    """Coordinates of one ball: a quaternion of length 1 that moves by angular velocities in its own frame."""
+
+    def move(self, q: Scalars, u: Scalars) -> list[Scalar]:
+        return normalized(product(q, exponential(u)))
+
+    def tangent(self, q: Scalars, dq: Scalars) -> list[Scalar]:
+        return [2.0 * x for x in product(conjugate(q), dq)[1:]]
+
+    def component_rates(self, q: Scalars, qd: Scalars) -> list[Scalar]:
+        return [0.5 * x for x in product(q, [0.0, *qd])]
+
+    def rates(self, u: Scalars, qd: Scalars) -> list[Scalar]:
+        return inverse_derivative(u, qd)
+
+
+FLAT, BALL = Flat(), Ball()
+
+
+class Joint(NamedTuple):
+    """One joint's place in q and qd."""
+
+    kind: str
+    q: slice
+    qd: slice
+
+    @property
+    def speeds(self) -> range:
+        """The numbers of its speeds in qd."""
+        return range(self.qd.start, self.qd.stop)
+
+    @property
+    def rule(self) -> Flat | Ball:
+        """How it moves."""
+        return BALL if self.kind == "ball" else FLAT
+
+
+class Coordinates(NamedTuple):
+    """The places of all joints."""
+
+    joints: tuple[Joint, ...]
+    nq: int
+    nv: int
+
+    @property
+    def balls(self) -> list[Joint]:
+        return [joint for joint in self.joints if joint.kind == "ball"]
+
+    @property
+    def first_positions(self) -> list[int]:
+        """For each speed (nv,) the number in q of its joint's first position: of a hinge or slide its only one."""
+        return [joint.q.start for joint in self.joints for _ in joint.speeds]
+
+    def move(self, q: Scalars, u: Scalars) -> list[Scalar]:
+        """The position after a movement u from q, quaternions of length 1."""
+        return [x for joint in self.joints for x in joint.rule.move(q[joint.q], u[joint.qd])]
+
+    def difference(self, q1: Scalars, q0: Scalars) -> list[Scalar]:
+        """The movement from q0 to q1, (nv,): of a ball the shortest."""
+        movement: list[Scalar] = []
+        for joint in self.joints:
+            if joint.kind == "ball":
+                movement += self.logarithm(product(conjugate(q0[joint.q]), q1[joint.q]))
+            else:
+                movement.append(q1[joint.q.start] - q0[joint.q.start])
+        return movement
+
+    @staticmethod
+    def logarithm(p: Scalars) -> list[Scalar]:
+        """Of a quaternion, see below."""
+        return logarithm(p)
+
+    def tangent(self, q: Scalars, dq: Scalars) -> list[Scalar]:
+        """The movement that changes q by small dq, linear in dq."""
+        return [x for joint in self.joints for x in joint.rule.tangent(q[joint.q], dq[joint.q])]
+
+    def component_rates(self, q: Scalars, qd: Scalars) -> list[Scalar]:
+        """dq/dt at speeds qd, (nq,): of a ball p o (0, omega) / 2."""
+        return [x for joint in self.joints for x in joint.rule.component_rates(q[joint.q], qd[joint.qd])]
+
+    def rates(self, u: Scalars, qd: Scalars) -> list[Scalar]:
+        """du/dt at speeds qd, of a motion that has moved by u."""
+        return [x for joint in self.joints for x in joint.rule.rates(u[joint.qd], qd[joint.qd])]
+
+
+@lru_cache(maxsize=256)
+def coordinates_of(kinds: tuple[str, ...]) -> Coordinates:
+    """The coordinates of joints of these kinds."""
+    joints, nq, nv = [], 0, 0
+    for kind in kinds:
+        positions, speeds = KINDS[kind]
+        joints.append(Joint(kind, slice(nq, nq + positions), slice(nv, nv + speeds)))
+        nq, nv = nq + positions, nv + speeds
+    return Coordinates(tuple(joints), nq, nv)
+
+
+def product(p: Scalars, r: Scalars) -> list[Scalar]:
+    """The product p o r of two quaternions: the turn r, then p."""
+    (a, x, y, z), (b, u, v, w) = p, r
+    return [
+        a * b - x * u - y * v - z * w,
+        a * u + x * b + y * w - z * v,
+        a * v + y * b + z * u - x * w,
+        a * w + z * b + x * v - y * u,
+    ]
+
+
+def conjugate(p: Scalars) -> list[Scalar]:
+    """The inverse of a quaternion of length 1."""
+    return [p[0], *(x * -1.0 for x in p[1:])]
+
+
+def normalized(p: Scalars) -> list[Scalar]:
+    """The quaternion at length 1."""
+    length = sqrt(sum((x * x for x in p[1:]), p[0] * p[0]))
+    return [x / length for x in p]
+
+
+def exponential(u: Scalars) -> list[Scalar]:
+    """The quaternion that turns by |u| rad about u."""
+    x, y, z = u
+    half = sqrt(x * x + y * y + z * z + TINY) * 0.5
+    share = sin(half) / half * 0.5
+    return [cos(half), x * share, y * share, z * share]
+
+
+def logarithm(p: Scalars) -> list[Scalar]:
+    """The movement u, |u| at most pi rad, with exponential(u) = p or -p; |p| = 1."""
+    w, x, y, z = p
+    size, length = sqrt(w * w + TINY), sqrt(x * x + y * y + z * z + TINY)
+    share = arctan(length / (1.0 + size)) * 4.0 / length * (w / size)
+    return [x * share, y * share, z * share]
+
+
+def inverse_derivative(movement: Scalars, speeds: Scalars) -> list[Scalar]:
+    """dexp^-1(u) omega, see above."""
+    u, omega = Vector(*movement), Vector(*speeds)
+    half = sqrt(u.dot(u) + TINY) * 0.5
+    share = (1.0 - half * cos(half) / sin(half)) / (half * half) * 0.25
+    once = u.cross(omega)
+    return list(omega + once * 0.5 + u.cross(once) * share)

@@ -1,0 +1,89 @@
+"""The numbers of a tree of joints and bodies, as the method takes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from tmt.scalar import Scalar
+
+from .coordinates import Coordinates, coordinates_of
+from .vectors import IDENTITY, Matrix, Scalars, Vector, rotation, turn_of
+
+Number = TypeVar("Number")
+Names = tuple[str, ...]
+Indices = tuple[int, ...]
+Numbers = tuple[Number, ...]
+Rows = tuple[tuple[Number, ...], ...]
+
+
+@dataclass(frozen=True)
+class Mechanism(Generic[Number]):
+    """The fields of `tmt.Tree`, which says what they are, in any type of number and unchecked."""
+
+    joint_names: Names
+    parent: Indices
+    offset: Rows[Number]
+    axis: Rows[Number]
+    damping: Numbers[Number]
+    body_names: Names
+    body_joint: Indices
+    mass: Numbers[Number]
+    com: Rows[Number]
+    inertia: tuple[Rows[Number], ...]
+    gravity: Numbers[Number]
+    kind: Names = ()
+    armature: Numbers[Number] = ()
+    stiffness: Numbers[Number] = ()
+    rest: Numbers[Number] = ()
+    reference: Numbers[Number] = ()
+    position_gain: Rows[Number] = ()
+    speed_gain: Rows[Number] = ()
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """The places of the joints in q (nq) and qd (nv)."""
+        return coordinates_of(self.kind)
+
+    @property
+    def has_springs(self) -> bool:
+        return any(self.stiffness)
+
+    @property
+    def has_gains(self) -> bool:
+        return bool(self.position_gain or self.speed_gain)
+
+    def path(self, joint: int) -> list[int]:
+        """The joint and those before it, from the tip inward; none of -1, the world."""
+        joints = []
+        while joint >= 0:
+            joints.append(joint)
+            joint = self.parent[joint]
+        return joints
+
+    def moves(self, body: int) -> list[bool]:
+        """Which of the n joints move the body: those on its path to the world."""
+        path = self.path(self.body_joint[body])
+        return [joint in path for joint in range(len(self.parent))]
+
+
+AnyTree = Mechanism[Scalar]
+
+
+def origin_in_parent(tree: AnyTree, i: int, q: Scalars) -> Vector:
+    """Origin of joint i's frame in its parent's, at the position q of the tree (nq,)."""
+    joint, offset = tree.coordinates.joints[i], Vector(*tree.offset[i])
+    if joint.kind != "slide":
+        return offset
+    return offset + Vector(*tree.axis[joint.qd.start]) * (q[joint.q.start] - tree.reference[i])
+
+
+def turn_in_parent(tree: AnyTree, i: int, q: Scalars) -> Matrix:
+    """Turn of joint i's frame in its parent's, which takes components in it to those in the parent's."""
+    joint = tree.coordinates.joints[i]
+    if joint.kind == "slide":
+        return IDENTITY
+    if joint.kind == "ball":
+        axes = Matrix(tree.axis[joint.qd])
+        return axes.transposed @ turn_of(q[joint.q]) @ axes
+    return rotation(tree.axis[joint.qd.start], q[joint.q.start] - tree.reference[i])
