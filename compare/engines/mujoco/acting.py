@@ -9,16 +9,14 @@ import numpy as np
 from mujoco.rollout import rollout
 
 from ...robots.actuators import Drive, Rows
-from ...robots.case import Coordinates
-from .actuators import control_of
+from ...robots.coordinates import FREE, Coordinates
 from .engine import MOST_ITERATIONS, SOLVED, UNLIMITED
-from .inventory import NOT_HAD_FIELDS, open_equalities
+from .inventory import NOT_HAD_FIELDS, open_equalities, set_fields
 from .linear import NUDGE
-from .names import INTEGRATORS, bit, kind_of, output_of
+from .names import INTEGRATORS, bit, control_of, kind_of, output_of
 
 # besides the joints' springs and dampers these drive a robot here and stay
 DRIVES = ("body_gravcomp", "tendon_stiffness", "tendon_damping")
-FREE = ("slide", "slide", "slide", "ball")
 # it is implicit in the constraints' springs and dampers
 DISCRETE = getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", None)
 
@@ -46,11 +44,7 @@ class Acting:
             m.opt.disableflags &= ~(bit("CONSTRAINT") | bit("EQUALITY"))
             m.opt.tolerance, m.opt.iterations = SOLVED, max(m.opt.iterations, MOST_ITERATIONS)
         m.opt.enableflags, m.opt.density, m.opt.viscosity = 0, 0.0, 0.0
-        for name in set(NOT_HAD_FIELDS) - set(DRIVES):
-            if hasattr(m, name):
-                getattr(m, name)[:] = 0
-        for name in UNLIMITED:
-            getattr(m, name)[:] = 0
+        set_fields(m, (*(set(NOT_HAD_FIELDS) - set(DRIVES)), *UNLIMITED), 0)
         for i, one in enumerate(drive.actuators):
             if not one.acts or i in cut:
                 m.actuator_gaintype[i] = mujoco.mjtGain.mjGAIN_FIXED

@@ -1,15 +1,22 @@
 """The actuators, tendons and gravity compensation of a compiled model."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from functools import partial
 
 import mujoco
 import numpy as np
 
 from ...robots.actuators import Actuator, Drive, Tendon
-from .names import OF_A_JOINT, element_name, joint_name, kind_of, number_of_actuators, on, output_of
-from .source import editable_again
+from .names import (
+    OF_A_JOINT,
+    control_of,
+    element_name,
+    joint_name,
+    kind_of,
+    number_of_actuators,
+    on,
+    output_of,
+)
+from .source import Source
 
 WITH_LENGTH = (
     *OF_A_JOINT,
@@ -28,19 +35,19 @@ NOT_LINEAR = {
 }
 
 
-def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Mapping[int, str]) -> Drive:
+def drive_of(source: Source, bodies: Sequence[int], keys: Mapping[int, str]) -> Drive:
     """Actuators, tendons and gravity compensation of a compiled model.
 
-    source: what it was read from, a Path, text or None; bodies: of the Tree, by number; keys: names of keyframes.
+    bodies: of the Tree, by number; keys: names of keyframes.
     """
+    model = source.model
     passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
+    tendons = [tendon_of(model, i) for i in range(model.ntendon)]
     return Drive(
         actuators=tuple(actuator(model, i) for i in range(number_of_actuators(model))),
-        tendons=tuple(
-            one for one in map(partial(tendon, model), range(model.ntendon)) if one.stiffness or one.damping
-        ),
+        tendons=tuple(tendon for tendon in tendons if tendon.stiffness or tendon.damping),
         compensation=tuple(map(float, model.body_gravcomp[list(bodies)] * passive)),
-        controls={keys[k]: u for k, u in stated_controls(model, source).items() if k in keys},
+        controls={keys[k]: u for k, u in stated_controls(source).items() if k in keys},
         unknown=unknown_springs(model),
         explicit_damping=not on(model, "EULERDAMP"),
     )
@@ -77,13 +84,6 @@ def force_range(m: mujoco.MjModel, i: int) -> tuple[float, float] | None:
     if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT and m.jnt_actfrclimited[j] and gear:
         ranges.append(np.sort(m.jnt_actfrcrange[j] / gear))
     return (float(max(low for low, _ in ranges)), float(min(high for _, high in ranges))) if ranges else None
-
-
-def control_of(m: mujoco.MjModel, i: int) -> tuple[int, int]:
-    """The index of the first control of an actuator, and the number of its controls."""
-    if hasattr(m, "actuator_ctrlnum"):
-        return int(m.actuator_ctrladr[i]), int(m.actuator_ctrlnum[i])
-    return i, 1
 
 
 def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inputs: int) -> str:
@@ -144,18 +144,14 @@ def tendon_moment(m: mujoco.MjModel, i: int) -> np.ndarray | None:
     return moment
 
 
-def tendon(m: mujoco.MjModel, i: int) -> Tendon:
+def tendon_of(m: mujoco.MjModel, i: int) -> Tendon:
     """The spring and the damper of a tendon."""
     moment = tendon_moment(m, i)
     low, high = map(float, m.tendon_lengthspring[i])
+    stiffness, damping = m.tendon_stiffness[i] * on(m, "SPRING"), m.tendon_damping[i] * on(m, "DAMPER")
+    at_all_postures = None if moment is None else tuple(moment.tolist())
     return Tendon(
-        element_name(m, "tendon", i),
-        i,
-        None if moment is None else tuple(moment.tolist()),
-        float(m.tendon_stiffness[i]) * on(m, "SPRING"),
-        float(m.tendon_damping[i]) * on(m, "DAMPER"),
-        low,
-        high,
+        element_name(m, "tendon", i), i, at_all_postures, float(stiffness), float(damping), low, high
     )
 
 
@@ -171,29 +167,26 @@ def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
     return reasons
 
 
-def stated_controls(m: mujoco.MjModel, source) -> dict[int, tuple]:
+def stated_controls(source: Source) -> dict[int, tuple[float | None, ...]]:
     """By the number of a keyframe u of each actuator, None where it states none.
 
     u of an integrator is its activation, of a filter the control, at which it settles. The compiled model has zeros where a file
     states none: the file tells. Of a model compiled elsewhere all zeros are none.
     """
-    spec = None  # its keyframes live as long as it does
-    if source is not None:
-        with suppress(ValueError):
-            spec = editable_again(source)
+    m, spec = source.model, source.spec
     keys = spec.keys if spec is not None and len(spec.keys) == m.nkey else None
     controls = {}
     for k in range(m.nkey):
-        control = len(keys[k].ctrl) > 0 if keys else m.key_ctrl[k].any()
-        activation = len(keys[k].act) > 0 if keys else m.key_act[k].any()
-        stated = [None] * number_of_actuators(m)
-        for i in range(len(stated)):
+        has_controls = len(keys[k].ctrl) > 0 if keys else m.key_ctrl[k].any()
+        has_activations = len(keys[k].act) > 0 if keys else m.key_act[k].any()
+        stated: list[float | None] = []
+        for i in range(number_of_actuators(m)):
             place, inputs = control_of(m, i)
             if kind(mujoco.mjtDyn, m.actuator_dyntype[i]) == "INTEGRATOR":
-                stated[i] = float(m.key_act[k, m.actuator_actadr[i]]) if activation else None
-            elif inputs and control:
-                stated[i] = float(m.key_ctrl[k, place])
-        if stated and (control or activation):
+                stated.append(float(m.key_act[k, m.actuator_actadr[i]]) if has_activations else None)
+            else:
+                stated.append(float(m.key_ctrl[k, place]) if inputs and has_controls else None)
+        if stated and (has_controls or has_activations):
             controls[k] = tuple(stated)
     return controls
 

@@ -9,10 +9,9 @@ import numpy as np
 
 from ..outside.model import together
 from .inventory import switch_off
-from .names import INTEGRATORS, bit, joint_places, rotors
-from .parameters import matrix, tensor
+from .names import INTEGRATORS, bit, joint_places, matrix, rotors, tensor
 from .reading import carriers
-from .source import locked_model
+from .source import Source
 
 HELD = (
     "body_parentid", "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat", "jnt_bodyid",
@@ -28,7 +27,7 @@ class Bare:
     """
 
     def __init__(self, path: Path, names: Sequence[str], rotors_in_joints: bool = False):
-        self.model = locked_model(path, {}, bare=True)
+        self.model = Source(path).without({}, bare=True)
         switch_off(self.model)
         self.model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
         self.model.opt.disableflags |= bit(
@@ -58,7 +57,7 @@ class Bare:
     def numbers(self, held: Callable[[str], np.ndarray]) -> dict[str, np.ndarray]:
         """ReadModel.numbers, except gravity, of what an engine holds by MuJoCo's names, see HELD."""
         m = SimpleNamespace(nbody=self.model.nbody, **{name: held(name) for name in HELD})
-        carrier, has_joint = carriers(m, self.places), set(m.jnt_bodyid.tolist())
+        carrier, has_joint = carriers(m, list(self.places.values())), set(m.jnt_bodyid.tolist())
         frames, carried = [(np.zeros(3), np.eye(3))], {joint: [] for joint in range(len(self.places))}
         for body in range(1, m.nbody):
             (at, turn), is_carried = frames[m.body_parentid[body]], body not in has_joint
@@ -66,7 +65,7 @@ class Bare:
             at, turn = own if is_carried else frames[0]  # in the axes of the body that the joint moves
             frames.append((at, turn))
             if carrier[body] >= 0:
-                inertia = turn @ tensor(m.body_iquat[body], m.body_inertia[body]) @ turn.T
+                inertia = turn @ tensor(matrix(m.body_iquat[body]), m.body_inertia[body]) @ turn.T
                 carried[carrier[body]].append((m.body_mass[body], at + turn @ m.body_ipos[body], inertia))
         mass, moments = zip(*(together(bodies) for bodies in carried.values()))
         speeds = {

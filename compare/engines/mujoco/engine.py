@@ -1,6 +1,7 @@
 """MuJoCo as an engine: a compiled model, what a case changes in it, and its actuators under constant controls."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -11,11 +12,10 @@ from tmt.methods import lone_speeds
 from ...robots.actuators import Controller
 from ...robots.case import Case
 from .. import Engine, Method
-from .actuators import control_of
 from .dynamics import MujocoDynamics
-from .inventory import switch_off
-from .names import INTEGRATORS, bit
-from .source import locked_model
+from .inventory import set_fields, switch_off
+from .names import INTEGRATORS, bit, control_of
+from .source import Source
 
 SCHEMES = {  # MuJoCo's integrator: the method of tmt that is the same scheme, where no ball, no spring makes them differ
     "Euler": "semi_implicit_euler",
@@ -63,19 +63,25 @@ ACTING, IDLE = 0, 1  # groups of actuators
 class Mujoco(Engine):
     """MuJoCo with one compiled model of given joints.
 
-    bodies: their numbers in the model. source: what the model was read from, a Path or MJCF text; None if the model was changed
-    since then, so that no joint can be locked. bare: all that a Tree does not have is switched off, see inventory. warnings: of
-    MuJoCo's compiler, one line each.
+    bodies: their numbers in the model. bare: all that a Tree does not have is switched off, see inventory.
     """
 
     name = "mujoco"
     methods = METHODS
 
-    def __init__(self, model, joints, bodies, source, bare=False, warnings=(), methods=METHODS):
-        self.model, self.source, self.joints, self.bodies = model, source, tuple(joints), list(bodies)
-        self.methods, self.bare, self.warnings, self.cache = methods, bare, warnings, {}
+    def __init__(
+        self,
+        source: Source,
+        joints: Sequence[str],
+        bodies: Sequence[int],
+        bare: bool = False,
+        methods: Mapping[str, Method] = METHODS,
+    ) -> None:
+        self.source, self.model, self.joints, self.bodies = source, source.model, tuple(joints), list(bodies)
+        self.methods, self.bare = methods, bare
+        self.cache: dict[tuple[object, ...], MujocoDynamics] = {}
 
-    def __getstate__(self):
+    def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"cache": {}}
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
@@ -95,9 +101,10 @@ class Mujoco(Engine):
         return dynamics
 
     def dynamics(self, case: Case) -> MujocoDynamics:
-        model = mujoco.MjModel.__copy__(self.model)
-        if case.locked:
-            model = locked_model(self.source, case.locked, self.bare)
+        is_locked = bool(case.locked)
+        model = (
+            self.source.without(case.locked, self.bare) if is_locked else mujoco.MjModel.__copy__(self.model)
+        )
         if self.bare:
             switch_off(model)
         if not case.scene.gravity:
@@ -115,9 +122,7 @@ def engaged(model: mujoco.MjModel, controller: Controller) -> tuple[np.ndarray, 
     Euler's scheme). Activations are constant: the control of a filter equals its activation, that of an integrator is 0.
     """
     model.opt.disableflags &= ~bit("ACTUATION")
-    for name in UNLIMITED:
-        if hasattr(model, name):
-            getattr(model, name)[:] = 0
+    set_fields(model, UNLIMITED, 0)
     model.opt.solver, model.opt.tolerance = mujoco.mjtSolver.mjSOL_NEWTON, SOLVED
     model.opt.iterations = max(model.opt.iterations, MOST_ITERATIONS)
     ctrl, act = np.zeros(model.nu), np.zeros(model.na)

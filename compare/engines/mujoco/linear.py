@@ -6,9 +6,8 @@ import mujoco
 import numpy as np
 
 from ...robots.actuators import Drive
-from .actuators import control_of
 from .dynamics import MujocoDynamics
-from .names import INTEGRATORS, bit, element_name, output_of
+from .names import INTEGRATORS, bit, control_of, element_name, output_of
 
 NUDGE = 1e-6  # of central differences, rad and rad/s
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on

@@ -7,9 +7,8 @@ import mujoco
 import numpy as np
 
 from .inventory import take_away
-from .names import joint_name, kind_of
-from .parameters import matrix
-from .source import compiled
+from .names import joint_name, kind_of, matrix
+from .source import Source
 
 KINDS = {"hinge": "continuous", "slide": "prismatic"}
 FAR = "1e9"  # limits that nothing reaches: a prismatic joint has to state some
@@ -24,7 +23,7 @@ def urdf(source: mujoco.MjModel | Path | str, has_free_bodies: bool = False) -> 
     link has its origin on the axis of its hinge. Of several joints in one body all but the last move a link without mass, and a
     body without a joint hangs on a fixed one. URDF has no gravity, armature or springs; geoms, limits and friction are left out.
     """
-    model = mujoco.MjModel.__copy__(source) if isinstance(source, mujoco.MjModel) else compiled(source)[0]
+    model = mujoco.MjModel.__copy__(source if isinstance(source, mujoco.MjModel) else Source(source).model)
     take_away(model)  # what a flag of the file disables is zero
     names = [joint_name(model, j) for j in range(model.njnt)]
     for j, name in enumerate(names):

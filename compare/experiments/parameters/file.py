@@ -17,7 +17,7 @@ def rows_of_file(setup: Setup) -> Result:
     )
     causes, reading = [], setup.reading
     kinds = dict(zip(setup.robot.joints, setup.robot.tree.kind))
-    for number in stated_numbers(reading.source, reading.model):
+    for number in stated_numbers(reading.source):
         slides = kinds.get(number.place, "slide") == "slide"  # the first of a free joint is a slide
         unit = unit_of(number.quantity, slides)
         compiled, is_stated = np.ravel(number.compiled).astype(float), number.stated is not None
@@ -38,5 +38,12 @@ def rows_of_file(setup: Setup) -> Result:
 def add_inventory(result: Result, features: Sequence) -> None:
     """The table of the features of the file: modelled, switched off or opened."""
     result.tables["inventory"] = [
-        feature._asdict() | {"names": ";".join(feature.names)} for feature in features
+        {
+            "feature": f.feature,
+            "count": f.count,
+            "names": ";".join(f.names),
+            "treatment": f.treatment,
+            "reason": f.reason,
+        }
+        for f in features
     ]

@@ -57,7 +57,7 @@ def drawn_motion(case: Case, runs: Mapping[tuple, dict]) -> Drawn | None:
     for name in case.robot.compared:
         times, q = frames(case, curve["t"], *curve[name], curve["ended"][name])
         alive = np.isfinite(q).all(axis=1)
-        whole = case.whole_positions(np.where(alive[:, None], q, case.q))
+        whole = case.positions_of_all(np.where(alive[:, None], q, case.q))
         of_robot, links = stick_figure(case.robot, whole, crosses=True)
         points[name] = np.where(alive[:, None, None], as_seen(of_robot), np.nan)
         positions[name] = q

@@ -38,7 +38,7 @@ EDITS = (
     Edit("parameters.numbers", "check_forces", "np.abs(sample.qd * tree.damping).max()",
          "1e6 * np.abs(sample.qd * tree.damping).max()", "the tolerance of forces x 1e6"),
     Edit("parameters.numbers", "check_forces", "np.abs(force).max()", "0.0 * np.abs(force).max()", "no force is seen"),
-    Edit("reference", "compared_with", "path is None or has_hinges(path, ARM.joints)", "True",
+    Edit("reference", "compared_with", "path is None or has_hinges(source, ARM.joints)", "True",
          "any file is that of the arm"),
     Edit("mujoco.remarks", "remarks", "feature.treatment in (OFF, OPEN, LEFT_OUT)", "feature.treatment == OFF",
          "an open tree is not said"),
