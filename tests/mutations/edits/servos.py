@@ -34,7 +34,7 @@ EDITS = (
          "a gain that depends on the length is not stiff"),
     Edit("compare.robots.actuators", "Actuator.damping", "self.gain[2] * u + self.bias[2]", "self.bias[2]",
          "a gain that depends on the speed does not brake"),
-    Edit("compare.robots.actuators", "Drive.control", "one.target(length)", "0.0", "targets that no file states are zero"),
+    Edit("compare.robots.actuators", "Drive.control", "actuator.target(length)", "0.0", "targets that no file states are zero"),
     Edit("case", "Case.controller", "coordinates.from_degrees(_1, positions=False)", "_1", "targets are moved by radians"),
     Edit("mujoco.actuators", "stated_controls", "len(keys[k].ctrl) > 0", "m.key_ctrl[k].any()",
          "a control of zero that a keyframe states is none"),
