@@ -94,7 +94,7 @@ def compared_with(
     """
     source, shown = Source(Path(path or ARM.mjcf)), in_one_line(shown or path or "mjcf/arm.xml")
     if reference == "arm" or (reference is None and (path is None or has_hinges(source, ARM.joints))):
-        robot, renamed = ARM, ()
+        robot, renamed = ARM, Matched(ARM.joints, ()).renamed
         if not has_hinges(source, ARM.joints):
             names, renamed = joints_matched(ARM, read(source), shown, "the arm")
             robot = ARM.with_joints(names)
@@ -104,7 +104,7 @@ def compared_with(
     reading = read(source)
     said = tuple(map(say, remarks(reading, has_scenes=True)))
     of_file = Reference("model", shown, said, reading.warnings, source=in_one_line(reference or ""))
-    if is_solution(reference):
+    if reference and is_solution(reference):
         stated = read(Path(solution or reference))
         names, renamed = joints_matched(stated, reading, shown, of_file.source)
         # its actuators do not act: those of the file may differ
