@@ -9,7 +9,7 @@ import tmt
 from compare.engines.mujoco import load, parse
 from compare.engines.mujoco.linear import left_to_itself
 from compare.engines.mujoco.parameters import parameters
-from compare.experiments.parameters import stated
+from compare.experiments.parameters import stated_of_hinges
 from compare.robots.arm import ARM
 
 REST = np.zeros(3)
@@ -49,5 +49,6 @@ def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path
     assert np.allclose(alone["q"], motion.q, atol=1e-13) and np.allclose(alone["qd"], motion.v, atol=1e-12)
     compiled = parameters(dynamics)
     assert all(
-        np.allclose(compiled[name], numbers, atol=1e-14) for name, numbers in stated(case.tree).items()
+        np.allclose(compiled[name], numbers, atol=1e-14)
+        for name, numbers in stated_of_hinges(case.tree).items()
     )

@@ -1,6 +1,7 @@
 """The actuators, tendons and gravity compensation of a compiled model."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,21 +13,21 @@ from .names import (
     element_name,
     joint_name,
     kind_of,
+    names_where,
     number_of_actuators,
     on,
     output_of,
 )
 from .source import Source
 
-WITH_LENGTH = (
+WITH_LENGTH = [
     *OF_A_JOINT,
-    mujoco.mjtTrn.mjTRN_SLIDERCRANK,
-    mujoco.mjtTrn.mjTRN_TENDON,
-    mujoco.mjtTrn.mjTRN_SITE,
-)
+    *(getattr(mujoco.mjtTrn, f"mjTRN_{name}") for name in ("SLIDERCRANK", "TENDON", "SITE")),
+]
 GAINS = {"FIXED": 1, "AFFINE": 3}  # how many numbers of its law each kind has
 BIASES = {"NONE": 0, "AFFINE": 3}
 DYNAMICS = {"NONE": "none", "INTEGRATOR": "integrator", "FILTER": "filter", "FILTEREXACT": "filterexact"}
+NAMED_LAWS = {"DCMOTOR": "a DC motor", "USER": "a user-defined law"}
 GROUPS = 31  # that can be switched off
 # springs and dampers that are left out where these fields are not 0: by element
 NOT_LINEAR = {
@@ -92,9 +93,7 @@ def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inpu
         return "a plugin"
     for word, known in ((dynamics, DYNAMICS), (gain, GAINS), (bias, BIASES)):
         if word not in known:
-            return {"DCMOTOR": "a DC motor", "USER": "a user-defined law"}.get(
-                word, f"a law of type {word.lower()}"
-            )
+            return NAMED_LAWS.get(word, f"a law of type {word.lower()}")
     if inputs != 1:
         return f"{inputs} controls"
     if np.any(getattr(m, "actuator_delay", np.zeros(i + 1))[i]):
@@ -102,10 +101,8 @@ def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inpu
     transmission = mujoco.mjtTrn(m.actuator_trntype[i])
     if transmission not in WITH_LENGTH:
         return f"a transmission of type {transmission.name.removeprefix('mjTRN_').lower()}"
-    damping = (getattr(m, name, np.zeros(i + 1))[i] for name in ("actuator_damping", "actuator_dampingpoly"))
-    if any(map(np.any, damping)):
-        return "damping of its own"
-    return ""
+    damping = [getattr(m, f"actuator_{name}", np.zeros(i + 1))[i] for name in ("damping", "dampingpoly")]
+    return "damping of its own" if any(map(np.any, damping)) else ""
 
 
 def off(m: mujoco.MjModel, i: int) -> str:
@@ -118,7 +115,7 @@ def off(m: mujoco.MjModel, i: int) -> str:
     return ""
 
 
-def moment_of(m: mujoco.MjModel, i: int) -> tuple[str, tuple | None]:
+def moment_of(m: mujoco.MjModel, i: int) -> tuple[str, tuple[float, ...] | None]:
     """The first joint on which an actuator acts, or ""; and dl/dq where it is the same everywhere, else None."""
     transmission, target = mujoco.mjtTrn(m.actuator_trntype[i]), int(m.actuator_trnid[i, 0])
     joint, moment = "", None
@@ -160,10 +157,8 @@ def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
     reasons = {}
     for element, fields in NOT_LINEAR.items():
         for field in fields:
-            values = np.asarray(getattr(m, field, ()))
-            for k in np.flatnonzero(values.reshape(len(values), -1).any(axis=1)) if len(values) else ():
-                number = m.dof_jntid[k] if field.startswith("dof_") else k
-                reasons[f"{element} {element_name(m, element, number)}"] = f"{field} is not 0"
+            for name in names_where(m, field, np.asarray(getattr(m, field, ())) != 0):
+                reasons[f"{element} {name}"] = f"{field} is not 0"
     return reasons
 
 
@@ -191,11 +186,11 @@ def stated_controls(source: Source) -> dict[int, tuple[float | None, ...]]:
     return controls
 
 
-def kind(enum, value) -> str:
-    """The name of a member without its prefix."""
+def kind(enum: Callable[[int], Any], value: int) -> str:
+    """The name of a member of an enum of MuJoCo's, without its prefix."""
     return enum(int(value)).name.partition("_")[2]
 
 
-def law(values, count: int) -> tuple:
+def law(values: np.ndarray, count: int) -> tuple[float, ...]:
     """The first numbers of a law, filled up with zeros to three."""
     return (*map(float, values[:count]), *[0.0] * (3 - count))

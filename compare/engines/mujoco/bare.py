@@ -30,12 +30,10 @@ class Bare:
         self.model = Source(path).without({}, bare=True)
         switch_off(self.model)
         self.model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
-        self.model.opt.disableflags |= bit(
-            "WARMSTART"
-        )  # its solver starts from the unconstrained acceleration
-        self.model.opt.solver = (
-            mujoco.mjtSolver.mjSOL_NEWTON
-        )  # of constraints, which are off; both refuse PGS
+        # its solver starts from the unconstrained acceleration
+        self.model.opt.disableflags |= bit("WARMSTART")
+        # of constraints, which are off; both refuse PGS
+        self.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
         if rotors_in_joints and hasattr(self.model, "actuator_armature"):
             self.model.dof_armature += rotors(self.model)
             self.model.actuator_armature[:] = 0.0
@@ -49,7 +47,7 @@ class Bare:
         self.qpos = np.array([i for place in self.places.values() for i in place.qpos])
         self.dofs = np.array([i for place in self.places.values() for i in place.dofs])
 
-    def with_integrator(self, name: str):
+    def with_integrator(self, name: str) -> mujoco.MjModel:
         """The model, which has this integrator now."""
         self.model.opt.integrator = INTEGRATORS[name]
         return self.model
@@ -58,20 +56,18 @@ class Bare:
         """ReadModel.numbers, except gravity, of what an engine holds by MuJoCo's names, see HELD."""
         m = SimpleNamespace(nbody=self.model.nbody, **{name: held(name) for name in HELD})
         carrier, has_joint = carriers(m, list(self.places.values())), set(m.jnt_bodyid.tolist())
-        frames, carried = [(np.zeros(3), np.eye(3))], {joint: [] for joint in range(len(self.places))}
+        frames = [(np.zeros(3), np.eye(3))]  # of each body in the axes of the last one that a joint moves
+        carried: list[list[tuple[float, np.ndarray, np.ndarray]]] = [[] for _ in self.places]
         for body in range(1, m.nbody):
-            (at, turn), is_carried = frames[m.body_parentid[body]], body not in has_joint
-            own = (at + turn @ m.body_pos[body], turn @ matrix(m.body_quat[body]))
-            at, turn = own if is_carried else frames[0]  # in the axes of the body that the joint moves
+            at, turn = frames[0]
+            if body not in has_joint:
+                at, turn = frames[m.body_parentid[body]]
+                at, turn = at + turn @ m.body_pos[body], turn @ matrix(m.body_quat[body])
             frames.append((at, turn))
             if carrier[body] >= 0:
                 inertia = turn @ tensor(matrix(m.body_iquat[body]), m.body_inertia[body]) @ turn.T
                 carried[carrier[body]].append((m.body_mass[body], at + turn @ m.body_ipos[body], inertia))
-        mass, moments = zip(*(together(bodies) for bodies in carried.values()))
-        speeds = {
-            "armature": m.dof_armature,
-            "damping": m.dof_damping,
-            "stiffness": m.jnt_stiffness[m.dof_jntid],
-        }
-        speeds = {name: values[self.dofs] for name, values in speeds.items()}
-        return {"mass": np.array(mass), "moments": np.array(moments)} | speeds
+        mass, moments = zip(*map(together, carried))
+        numbers = {"mass": np.array(mass), "moments": np.array(moments)}
+        numbers |= {"armature": m.dof_armature[self.dofs], "damping": m.dof_damping[self.dofs]}
+        return numbers | {"stiffness": m.jnt_stiffness[m.dof_jntid][self.dofs]}

@@ -6,13 +6,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-import tmt
+from tmt import Tree
 from tmt.methods import lone_speeds
 
 from ...robots.actuators import Controller
 from ...robots.case import Case
 from .. import Engine, Method
-from .dynamics import MujocoDynamics
+from .dynamics import Engaged, MujocoDynamics
 from .inventory import set_fields, switch_off
 from .names import INTEGRATORS, bit, control_of
 from .source import Source
@@ -27,7 +27,7 @@ SCHEMES = {  # MuJoCo's integrator: the method of tmt that is the same scheme, w
 FROM_4 = int(mujoco.__version__.split(".")[0]) >= 4
 
 
-def methods_for(tree: tmt.Tree | None = None) -> dict[str, Method]:
+def methods_for(tree: Tree | None = None) -> dict[str, Method]:
     """MuJoCo's integrators for a Tree, by name, each with the method of tmt that is the same scheme; None: only hinges.
 
     Measured step by step: implicitfast and discrete are implicit in the bias of a free body on its own; discrete also in
@@ -63,7 +63,8 @@ ACTING, IDLE = 0, 1  # groups of actuators
 class Mujoco(Engine):
     """MuJoCo with one compiled model of given joints.
 
-    bodies: their numbers in the model. bare: all that a Tree does not have is switched off, see inventory.
+    bodies: their numbers in the model. bare: all that a Tree does not have is switched off, see inventory. tree: its methods are
+    those for a Tree, see methods_for.
     """
 
     name = "mujoco"
@@ -75,10 +76,10 @@ class Mujoco(Engine):
         joints: Sequence[str],
         bodies: Sequence[int],
         bare: bool = False,
-        methods: Mapping[str, Method] = METHODS,
+        tree: Tree | None = None,
     ) -> None:
         self.source, self.model, self.joints, self.bodies = source, source.model, tuple(joints), list(bodies)
-        self.methods, self.bare = methods, bare
+        self.methods, self.bare = methods_for(tree), bare
         self.cache: dict[tuple[object, ...], MujocoDynamics] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -92,8 +93,8 @@ class Mujoco(Engine):
 
         A model with locked joints is compiled again from the source, without them; ModelError if that is not possible.
         """
-        changes = tuple(case.locked.items()), case.scene.gravity, case.scene.damping, case.joints
-        changes += (case.controller.controls,) if case.controller else ()
+        controls = case.controller.controls if case.controller else None
+        changes = tuple(case.locked.items()), case.scene.gravity, case.scene.damping, case.joints, controls
         dynamics = self.cache.pop(changes, None) or self.dynamics(case)
         self.cache[changes] = dynamics
         if len(self.cache) > MODELS:
@@ -101,22 +102,21 @@ class Mujoco(Engine):
         return dynamics
 
     def dynamics(self, case: Case) -> MujocoDynamics:
-        is_locked = bool(case.locked)
-        model = (
-            self.source.without(case.locked, self.bare) if is_locked else mujoco.MjModel.__copy__(self.model)
-        )
+        model = mujoco.MjModel.__copy__(self.model)
+        if case.locked:
+            model = self.source.without(case.locked, self.bare)
         if self.bare:
             switch_off(model)
         if not case.scene.gravity:
             model.opt.gravity[:] = 0.0
-        controls = engaged(model, case.controller) if case.controller else ()
-        dynamics = MujocoDynamics(model, case.coordinates, self.bodies, case.tree.zero, self.bare, *controls)
+        actuators = engaged(model, case.controller) if case.controller else Engaged()
+        dynamics = MujocoDynamics(model, case, self.bodies, self.bare, actuators)
         dynamics.model.dof_damping[dynamics.dofs] += case.added_damping
         return dynamics
 
 
-def engaged(model: mujoco.MjModel, controller: Controller) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Switch on the actuators of a model that take part, without any range; their controls, activations and constant torque.
+def engaged(model: mujoco.MjModel, controller: Controller) -> Engaged:
+    """Switch on the actuators of a model that take part, without any range.
 
     `discrete` solves by iteration where a tendon couples branches: here to rounding and by Newton's method (with PGS it is
     Euler's scheme). Activations are constant: the control of a filter equals its activation, that of an integrator is 0.
@@ -135,4 +135,4 @@ def engaged(model: mujoco.MjModel, controller: Controller) -> tuple[np.ndarray, 
             if model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
                 act[model.actuator_actadr[i]] = u
     model.opt.disableactuator = 1 << IDLE
-    return ctrl, act, controller.torque
+    return Engaged(ctrl, act, controller.torque)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...robots import Feature
-from .names import bit, control_of, element_name, kind_of, number_of_actuators, on
+from .names import bit, control_of, element_name, kind_of, names_where, number_of_actuators, on
 
 KINDS = ("hinge", "slide", "ball", "free")
 MODELLED, OFF, OPEN, LEFT_OUT = "modelled", "switched_off", "open_tree", "left_out"
@@ -92,15 +92,6 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
 def usable_keys(m: mujoco.MjModel) -> np.ndarray:
     """Of each keyframe whether its numbers are finite and of at most MOST, (nkey,)."""
     return (np.abs(np.hstack([m.key_qpos, m.key_act, m.key_ctrl])) <= MOST).all(axis=1)
-
-
-def names_where(m: mujoco.MjModel, field: str, holds: np.ndarray) -> list[str]:
-    """The names of the elements (of speeds: the joints) for which something holds of a number in their row of a field."""
-    prefix, rows = field.partition("_")[0], np.flatnonzero([row.any() for row in holds])
-    if prefix == "dof":
-        rows = np.unique(m.dof_jntid[rows])
-    kind = {"dof": "joint", "jnt": "joint"}.get(prefix, prefix)
-    return [element_name(m, kind, row) for row in rows]
 
 
 def open_equalities(m: mujoco.MjModel) -> tuple[str, ...]:

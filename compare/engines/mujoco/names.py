@@ -3,7 +3,7 @@
 A free joint is four joints of a Tree: slides along the world's x, y and z axes, read at the origin, and a ball.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -13,6 +13,7 @@ from tmt.model.coordinates import KINDS as NUMBERS  # of a joint in qpos and in 
 
 from ...robots.coordinates import FREE, Coordinates
 
+Integer = int | np.integer[Any]
 # those that the installed version has; discrete came with 3.13
 MEMBERS = {
     name: getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}", None)
@@ -42,7 +43,7 @@ def on(m: mujoco.MjModel, flag: str) -> bool:
     return not m.opt.disableflags & bit(flag)
 
 
-def element_name(m: mujoco.MjModel, kind: str, number: int) -> str:
+def element_name(m: mujoco.MjModel, kind: str, number: Integer) -> str:
     """The name of an element of a kind, by mujoco.MjModel's names of kinds.
 
     `joint 3` where it has none that can be printed in a line; that is never the name of another element.
@@ -54,8 +55,17 @@ def element_name(m: mujoco.MjModel, kind: str, number: int) -> str:
     return name
 
 
-def joint_name(m: mujoco.MjModel, number: int) -> str:
+def joint_name(m: mujoco.MjModel, number: Integer) -> str:
     return element_name(m, "joint", number)
+
+
+def names_where(m: mujoco.MjModel, field: str, holds: np.ndarray) -> list[str]:
+    """The names of the elements (of speeds: the joints) for which something holds of a number in their row of a field."""
+    prefix, rows = field.partition("_")[0], np.flatnonzero([row.any() for row in holds])
+    if prefix == "dof":
+        rows = np.unique(m.dof_jntid[rows])
+    kind = {"dof": "joint", "jnt": "joint"}.get(prefix, prefix)
+    return [element_name(m, kind, row) for row in rows]
 
 
 def kind_of(m: mujoco.MjModel, number: int) -> str:

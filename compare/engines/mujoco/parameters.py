@@ -179,13 +179,13 @@ def of_joint(model: mujoco.MjModel, joint: mujoco.MjsJoint, number: int) -> list
 
 def in_frames(pos: ArrayLike, frame: mujoco.MjsFrame | None) -> tuple[np.ndarray, np.ndarray, float]:
     """A position, (3,), through a frame of the file and those around it, the turn of all, (3, 3), and the sum of lengths."""
-    pos, turn = np.array(pos, float), np.eye(3)
-    length = float(np.linalg.norm(pos))
+    place, turn = np.array(pos, float), np.eye(3)
+    length = float(np.linalg.norm(place))
     while frame is not None:
         R = matrix(orientation(frame.quat, frame.alt, frame.compiler))
         length += float(np.linalg.norm(frame.pos))
-        pos, turn, frame = frame.pos + R @ pos, R @ turn, frame.frame
-    return pos, turn, length
+        place, turn, frame = frame.pos + R @ place, R @ turn, frame.frame
+    return place, turn, length
 
 
 def orientation(quat: np.ndarray, other: mujoco.MjsOrientation, options: mujoco.MjsCompiler) -> np.ndarray:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -11,7 +12,7 @@ import tmt
 
 from ...robots.file import RobotFile
 from .actuators import drive_of
-from .engine import Mujoco, methods_for
+from .engine import Mujoco
 from .inventory import features, refuse, refuse_numbers, take_away, usable_keys
 from .names import MEMBERS, Place, element_name, joint_name, joint_places, kind_of, moving, rotors, tensor
 from .source import ModelError, Source
@@ -108,24 +109,25 @@ def tree_of(compiled: mujoco.MjModel, joints: Mapping[str, Place], bodies: Seque
     inertia = [tensor(data.ximat[body].reshape(3, 3), model.body_inertia[body]) for body in bodies]
     origins = [anchors[before] if before >= 0 else np.zeros(3) for before in parents]
     speeds = [i for place in places for i in place.dofs]
-    return tmt.Tree(
-        joint_names=list(joints),
-        parent=parents,
-        offset=[anchor - origin for anchor, origin in zip(anchors, origins)],
-        axis=axes,
-        damping=model.dof_damping[speeds],
-        body_names=[element_name(model, "body", body) for body in bodies],
-        body_joint=joint_of_body,
-        mass=model.body_mass[bodies],
-        com=[data.xipos[body] - anchors[joint] for body, joint in zip(bodies, joint_of_body)],
-        inertia=[(moments + moments.T) / 2.0 for moments in inertia],
-        gravity=model.opt.gravity,
-        kind=[place.kind for place in places],
-        armature=(model.dof_armature + rotors(model))[speeds],
-        stiffness=[model.jnt_stiffness[place.joint] for place in places],
-        rest=[model.qpos_spring[i] for place in places for i in place.qpos],
-        reference=reference,
-    )
+    numbers: dict[str, Any] = {
+        "joint_names": list(joints),
+        "parent": parents,
+        "offset": [anchor - origin for anchor, origin in zip(anchors, origins)],
+        "axis": axes,
+        "damping": model.dof_damping[speeds],
+        "body_names": [element_name(model, "body", body) for body in bodies],
+        "body_joint": joint_of_body,
+        "mass": model.body_mass[bodies],
+        "com": [data.xipos[body] - anchors[joint] for body, joint in zip(bodies, joint_of_body)],
+        "inertia": [(moments + moments.T) / 2.0 for moments in inertia],
+        "gravity": model.opt.gravity,
+        "kind": [place.kind for place in places],
+        "armature": (model.dof_armature + rotors(model))[speeds],
+        "stiffness": [model.jnt_stiffness[place.joint] for place in places],
+        "rest": [model.qpos_spring[i] for place in places for i in place.qpos],
+        "reference": reference,
+    }
+    return tmt.Tree(**numbers)
 
 
 def carriers(model: mujoco.MjModel, places: Sequence[Place]) -> list[int]:
@@ -145,7 +147,7 @@ def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
     """
     tree = (solution or reading).tree
     bodies = bodies_as_in(solution, reading) if solution else reading.bodies
-    return Mujoco(reading.source, tree.joint_names, bodies, bare=True, methods=methods_for(tree))
+    return Mujoco(reading.source, tree.joint_names, bodies, bare=True, tree=tree)
 
 
 def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:

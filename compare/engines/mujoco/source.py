@@ -45,7 +45,8 @@ class Source:
 
     def __init__(self, origin: Path | str | mujoco.MjModel) -> None:
         self.origin: Path | str | None = None
-        self.text, self.warnings = "", ()
+        self.text = ""
+        self.warnings: tuple[str, ...] = ()
         self._spec: mujoco.MjSpec | None = None
         if isinstance(origin, mujoco.MjModel):
             self.model = mujoco.MjModel.__copy__(origin)
