@@ -28,13 +28,17 @@ MODULES = {dotted(file) for file in [*FILES, *OF_TMT]}
 
 @cache
 def imports(path) -> frozenset[str]:
-    """Full names of what a file imports, wherever in it: a module, or a name in one."""
+    """Full names of what a file imports, wherever in it: a module, or a name in one; types of its own folder do not count."""
     package = dotted(path) if path.name == "__init__.py" else dotted(path).rpartition(".")[0]
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    found, nodes = set(), list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    of_types = [
+        node for node in nodes if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    ]
+    for_types = [inner for node in of_types for inner in node.body if getattr(inner, "level", 0) == 1]
+    for node in nodes:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
+        elif isinstance(node, ast.ImportFrom) and node not in for_types:
             base = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
             start = ".".join([*base, *filter(None, [node.module])])
             found |= {f"{start}.{alias.name}" for alias in node.names}

@@ -1,7 +1,6 @@
 """A robot that is read from a file: postures, scenes, and the damping and steps that are chosen for it."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,36 +11,50 @@ from servo_models import INERTIA, hinge
 import tmt
 from compare.engines.mujoco import engine, read
 from compare.experiments.speed.settings import scenes_of as scenes_of_speed
+from compare.robots import Feature
 from compare.robots.actuators import Drive
 from compare.robots.coordinates import floats, free_joints
-from compare.robots.file import COARSER, DURATION, SERVOS_ACT, added_damping, coarsest, robot_of, scenes_from
+from compare.robots.file import (
+    COARSER,
+    DURATION,
+    SERVOS_ACT,
+    RobotFile,
+    added_damping,
+    coarsest,
+    robot_of,
+    scenes_from,
+)
 
 ONE = replace(
     tmt.ARM.lock({"alpha": 0.0, "beta": 0.0}), gravity=(0.0, 0.0, 0.0)
 )  # one hinge, its inertia 0.0527 kg m2
 
 
-def reading_of(tree, **more):
-    """What a reader gives of a tree, with changes."""
-    known = {"name": "", "source": "text", "tree": tree, "features": ("one",), "keyframes": {}, "dt": 0.002}
-    known |= {"drive": Drive(), "qpos0": np.array(tree.zero), "ranges": (None,) * len(tree.joint_names)}
-    return SimpleNamespace(**known | more)
+ONLY = (Feature("hinge", ("one",), "modelled", ""),)
+
+
+def file_of(tree, **changes):
+    """The numbers of a file with a tree."""
+    file = RobotFile(
+        "", None, tree, ONLY, {}, np.array(tree.zero), (None,) * len(tree.kind), "Euler", 0.002, Drive()
+    )
+    return replace(file, **changes)
 
 
 def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
     arm, ranges = tmt.ARM, ((-1.0, 2.0), None, (0.0, 1.0))
     keys = {"home": np.array([0.1, 0.2, 0.3]), "again": np.array([0.1, 0.2, 0.3]), "middle": np.zeros(3)}
-    robot = robot_of(reading_of(arm, keyframes=keys, ranges=ranges), "my.xml")
+    robot = robot_of(file_of(arm, keyframes=keys, ranges=ranges), "my.xml")
     # the key called middle is zero, as qpos0 is; the middle of the ranges keeps its name
     assert list(robot.poses) == ["home", "key middle", "middle"]
     np.testing.assert_array_equal(robot.posture("middle"), [0.5, 0.0, 0.5])
     assert {scene.posture for scene in robot.scenes} == {"home"}
-    ranged = robot_of(reading_of(arm, ranges=ranges), "my.xml")
+    ranged = robot_of(file_of(arm, ranges=ranges), "my.xml")
     assert list(ranged.poses) == ["qpos0", "middle"] and ranged.scenes[0].posture == "middle"
-    alone = robot_of(reading_of(arm), "my.xml")
+    alone = robot_of(file_of(arm), "my.xml")
     assert list(alone.poses) == ["qpos0"] and alone.scenes[0].posture == "qpos0" and alone.is_read
     keys = {name: np.full(3, 0.1 * k) for k, name in enumerate(["qpos0", "key qpos0"], start=1)}
-    assert list(robot_of(reading_of(arm, keyframes=keys), "my.xml").poses) == [
+    assert list(robot_of(file_of(arm, keyframes=keys), "my.xml").poses) == [
         "key key qpos0",
         "key qpos0",
         "qpos0",
@@ -98,7 +111,7 @@ def test_a_free_body_is_thrown_up_and_tumbles():
 
 def test_what_rests_where_it_is_let_go_is_set_going():
     still = replace(tmt.ARM, gravity=(0.0, 0.0, 0.0))
-    names = [scene.name for scene in robot_of(reading_of(still), "my.xml").scenes]
+    names = [scene.name for scene in robot_of(file_of(still), "my.xml").scenes]
     assert names == ["qpos0, set going", "qpos0, set going, damped"]
     zero = np.zeros(3)
     fastest = np.abs(tmt.acceleration(zero, zero, zero, replace(still, gravity=(0.0, 0.0, -1.0)))).max()

@@ -24,7 +24,7 @@ class Model(ReadModel):
         import warp
 
         from .mujoco.names import joint_places, kind_of
-        from .mujoco.source import compiled
+        from .mujoco.source import Source
 
         builder, warp.config.enable_backward = newton.ModelBuilder(), False
         is_urdf, mjcf = file.path.suffix == ".urdf", {"skip_equality_constraints": True}
@@ -34,7 +34,7 @@ class Model(ReadModel):
         self.newton, self.model = newton, builder.finalize(device="cpu")
         for name in OFF:
             getattr(self.model, f"joint_{name}").zero_()
-        own, _ = compiled(file.path)  # for the order of its joints and their `ref`
+        own = Source(file.path).model  # for the order of its joints and their `ref`
         if (self.model.joint_coord_count, self.model.joint_dof_count) != (own.nq, own.nv):
             raise Unread(f"it has read {self.model.joint_dof_count} speeds, the file has {own.nv}")
         firsts, children = self.model.joint_qd_start.numpy().tolist(), self.model.joint_child.numpy()

@@ -52,7 +52,7 @@ def compare_file(
     row = {"sha256": hashlib.sha256(next(iter(bundle.values()))).hexdigest()}
     try:
         compared = compared_with(options.reference, str(path), shown=shown, solution=solution)
-        reading = compared.reading or read(path)
+        reading = compared.reading or read(compared.mujoco.source)
     except JointsDiffer as error:
         reference = "arm" if options.reference == "arm" else SOLUTION
         return row | {"verdict": DIFFER, "reason": error.why, "reference": reference}, {}

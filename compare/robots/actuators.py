@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+Range = tuple[float, float]  # (low, high)
 ON_EDGE = 1e-9  # m or rad, distance from the edge of a dead band that counts as on the edge
 
 
@@ -23,14 +24,14 @@ class Actuator:
 
     name: str
     joint: str  # the first joint on which it acts; "": none
-    moment: tuple | None
-    gain: tuple = (0.0, 0.0, 0.0)  # g0, g1, g2
-    bias: tuple = (0.0, 0.0, 0.0)  # b0, b1, b2
+    moment: tuple[float, ...] | None
+    gain: tuple[float, ...] = (0.0, 0.0, 0.0)  # g0, g1, g2
+    bias: tuple[float, ...] = (0.0, 0.0, 0.0)  # b0, b1, b2
     dynamics: str = "none"  # or integrator, filter, filterexact: then u is the activation
     time_constant: float = 0.0  # s, of a filter
-    control_range: tuple | None = None  # (low, high)
-    activation_range: tuple | None = None
-    force_range: tuple | None = None  # N or N m
+    control_range: Range | None = None
+    activation_range: Range | None = None
+    force_range: Range | None = None  # N or N m
     off: str = ""  # why it exerts no force; "": it does
     refused: str = ""  # why its law is not supported; "": it is
 
@@ -53,19 +54,17 @@ class Actuator:
     def clamped(self, u: float) -> float:
         """u within the ranges of the control and of the activation."""
         for limits in (self.control_range, self.activation_range if self.dynamics != "none" else None):
-            u = u if limits is None else min(max(u, limits[0]), limits[1])
+            if limits is not None:
+                u = min(max(u, limits[0]), limits[1])
         return float(u)
 
     def force(self, u: float, length: float) -> float:
         return (self.gain[0] + self.gain[1] * length) * u + self.bias[0] + self.bias[1] * length
 
     def largest(self, u: float, length: float) -> float:
-        return max(
-            abs(self.gain[0] * u),
-            abs(self.gain[1] * length * u),
-            abs(self.bias[0]),
-            abs(self.bias[1] * length),
-        )
+        """The largest of the terms that are added in the force."""
+        terms = self.gain[0] * u, self.gain[1] * length * u, self.bias[0], self.bias[1] * length
+        return max(map(abs, terms))
 
     def stiffness(self, u: float) -> float:
         """-d force/dl."""
@@ -85,7 +84,7 @@ class Tendon(NamedTuple):
 
     name: str
     number: int  # index in the model
-    moment: tuple | None  # (nv,), see Actuator
+    moment: tuple[float, ...] | None  # (nv,), see Actuator
     stiffness: float  # N/m, or as its length is measured
     damping: float
     low: float
@@ -127,23 +126,21 @@ class Drive:
     actuators: tuple[Actuator, ...] = ()
     tendons: tuple[Tendon, ...] = ()
     compensation: tuple[float, ...] = ()
-    controls: Mapping[str, tuple] = field(default_factory=dict)
+    controls: Mapping[str, tuple[float | None, ...]] = field(default_factory=dict)
     unknown: Mapping[str, str] = field(default_factory=dict)
     explicit_damping: bool = False  # the file disables EULERDAMP
 
     @property
     def refused(self) -> dict[str, str]:
         """Elements that are left out, by name, and why."""
-        return {actuator.name: actuator.refused for actuator in self.actuators if actuator.refused} | dict(
-            self.unknown
-        )
+        actuators = {actuator.name: actuator.refused for actuator in self.actuators if actuator.refused}
+        return actuators | dict(self.unknown)
 
     @property
     def feeds_back(self) -> bool:
         """Whether an actuator force depends on position or speed; if none does, there is no step limit."""
-        return any(
-            actuator.acts and any((*actuator.bias[1:], *actuator.gain[1:])) for actuator in self.actuators
-        )
+        laws = [(*actuator.bias[1:], *actuator.gain[1:]) for actuator in self.actuators if actuator.acts]
+        return any(map(any, laws))
 
     def control(self, posture: str, lengths: Sequence[float]) -> np.ndarray:
         """u of each actuator at a posture, within its range: that of the keyframe, else the target is the posture.
@@ -151,16 +148,17 @@ class Drive:
         lengths: of the transmissions there.
         """
         stated = self.controls.get(posture, (None,) * len(self.actuators))
-        triples = zip(self.actuators, stated, lengths)
-        chosen = [one.target(length) if u is None else one.clamped(u) for one, u, length in triples]
-        return np.array(chosen)
+        controls = []
+        for actuator, u, length in zip(self.actuators, stated, lengths):
+            controls.append(actuator.target(length) if u is None else actuator.clamped(u))
+        return np.array(controls)
 
 
 class Controller(NamedTuple):
     """Actuators with constant controls: generalized force torque - position_gain @ q - speed_gain @ qd."""
 
-    controls: tuple  # u of each actuator; None: left out
-    left_out: dict  # by name, why
+    controls: tuple[float | None, ...]  # u of each actuator; None: left out
+    left_out: dict[str, str]  # by name, why
     torque: np.ndarray  # (nv,) N m or N
     position_gain: np.ndarray  # (nv, nv) N m/rad
     speed_gain: np.ndarray  # (nv, nv) N m s/rad
@@ -178,24 +176,26 @@ def reason(actuator: Actuator, u: float) -> str:
     return "it pushes away from its target" if actuator.stiffness(u) < 0.0 else ""
 
 
-def controller(drive: Drive, posture: object, q: np.ndarray, targets: np.ndarray | float = 0.0) -> Controller:
+def controller(
+    drive: Drive, posture: str | tuple[float, ...], q: np.ndarray, targets: np.ndarray | float = 0.0
+) -> Controller:
     """The controller at a posture: its torque is sum of J' ((g0 u + b0) + (g1 u + b1) J q + (g2 u + b2) J qd), l = J q.
 
     The controls are those of the keyframe, else the targets are the posture. posture: its name, or numbers; q: (nv,) rad or m,
     of a ball any numbers; targets: (nv,) rad or m, shift of the targets: the target length of a servo by |J| @ targets.
     """
     moved, n = np.broadcast_to(targets, len(q)), len(q)
-    moments = [
-        np.zeros(n) if actuator.moment is None else np.array(actuator.moment) for actuator in drive.actuators
-    ]
-    stated = drive.control(posture if isinstance(posture, str) else "", [moment @ q for moment in moments])
+    moments = [np.array(actuator.moment or (0.0,) * n) for actuator in drive.actuators]
+    lengths = [moment @ q for moment in moments]
+    stated = drive.control(posture if isinstance(posture, str) else "", lengths)
     torque, position_gain, speed_gain = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
-    controls, left_out = {actuator.name: None for actuator in drive.actuators}, {}
-    for actuator, moment, u in zip(drive.actuators, moments, stated):
+    controls: dict[str, float | None] = dict.fromkeys(actuator.name for actuator in drive.actuators)
+    left_out = {}
+    for actuator, moment, u in zip(drive.actuators, moments, stated.tolist()):
         if why := reason(actuator, u):
             left_out[actuator.name] = why
             continue
-        u = controls[actuator.name] = moved_target(actuator, float(u), float(np.abs(moment) @ moved))
+        u = controls[actuator.name] = moved_target(actuator, u, float(np.abs(moment) @ moved))
         torque += moment * actuator.force(u, 0.0)
         position_gain += np.outer(moment, moment) * actuator.stiffness(u)
         speed_gain += np.outer(moment, moment) * actuator.damping(u)

@@ -2,14 +2,15 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import tmt
 
 from ..core.finding import Finding
-from . import Claims, Printed, Question, Robot
 from .case import Scene
+from .robot import Claims, Printed, Question, Robot
 
 POSTURES = {  # deg, (alpha, beta, gamma); the assignment's named postures
     "zero": (0, 0, 0),
@@ -28,8 +29,7 @@ SCENES = (
     Scene(
         "thrown, no gravity",
         "bent",
-        "free",
-        (100.0, 200.0, -150.0),
+        speed=(100.0, 200.0, -150.0),
         gravity=False,
         judged=4.5,
         tags=("full only",),
@@ -76,33 +76,28 @@ CLAIMS = Claims(
 )
 
 
-def landmarks(q: np.ndarray) -> list:
+def landmarks(q: np.ndarray) -> list[Any]:
     """Shoulder, elbow and finger tips, vectors in the world of numbers or arrays (times,), m, at angles q (times, 3), rad."""
     return tmt.arm.points(list(q.T))
 
 
-def remarks(answers: Mapping, dynamics: Mapping) -> list[Finding]:
+def remarks(answers: Mapping[str, Any], dynamics: Mapping[str, Any]) -> list[Finding]:
     """Errors in the printed solution. answers: by item, those of TMT (`.tmt`) and MuJoCo (`.mujoco`); dynamics: by engine."""
     q, qd = ARM.posture("ball catch"), np.ones(3)
     c, s = np.cos(q[1]), np.sin(q[1])
-    engines = {"TMT": dynamics["tmt"], "MuJoCo": dynamics["mujoco"]}
-    right = {label: engine.angular_velocities(q, qd)[0] for label, engine in engines.items()}
     stated = {
         "text": np.array([qd[1], c * qd[0], s * qd[0]]),  # (bd, 0, 0) + Rb (0, ad, 0)
         "matrix": np.array([[0.0, 1.0, 0.0], [c, 0.0, 0.0], [-s, 0.0, 0.0]]) @ qd,  # B_1
     }
-    differences = {
-        name: {label: float(np.abs(values - omega).max()) for label, omega in right.items()}
-        for name, values in stated.items()
-    }
-    sign = {"printed": PRINTED[0].values[0], "tmt": answers["c"].tmt[0], "mujoco": answers["c"].mujoco[0]}
-    findings = {
-        "transposes": differences,
-        "stacked_transform": {},
-        "equations": {},
-        "program": {},
-        "sign": sign,
-    }
+    engines = {"TMT": dynamics["tmt"], "MuJoCo": dynamics["mujoco"]}
+    right = {label: engine.angular_velocities(q, qd)[0] for label, engine in engines.items()}
+    transposes = {}
+    for name, values in stated.items():
+        transposes[name] = {label: float(np.abs(values - omega).max()) for label, omega in right.items()}
+    holding = np.array(PRINTED[0].values)
+    sign = {"printed": holding[0], "tmt": answers["c"].tmt[0], "mujoco": answers["c"].mujoco[0]}
+    findings: dict[str, Mapping[str, Any]] = {"transposes": transposes}
+    findings |= {"stacked_transform": {}, "equations": {}, "program": {}, "sign": sign}
     return [Finding("arm", kind, values) for kind, values in findings.items()]
 
 

@@ -4,8 +4,10 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from tmt.model.coordinates import Joint
 
 import tmt
 from tmt import literal
@@ -15,10 +17,13 @@ from tmt.model.tree import GAINS
 from ..core.words import some_of
 from .actuators import Controller, controller
 from .coordinates import KINDS as KINDS
-from .coordinates import Coordinates
+from .coordinates import Coordinates as Coordinates
 from .coordinates import fastest_rates as fastest_rates
 from .coordinates import rates_at as rates_at
 from .validation import WrongField, are_numbers, is_number
+
+if TYPE_CHECKING:
+    from .robot import Robot
 
 SEED = 10  # of every random number in a report
 MAX_STEPS = 20_000  # of a run; the finest of an experiment takes 128 times as many
@@ -35,42 +40,41 @@ class Scene:
     """
 
     name: str
-    posture: str | tuple = ()  # name, or one number per joint, deg (m, quaternion); (): all zero
-    torque: str | tuple = (
-        "free"  # "hold": balance of gravity and springs at the start; "servos": own actuators; or N m
+    posture: str | tuple[float, ...] = ()  # name, or one number per joint, deg (m, quaternion); (): all zero
+    # "hold": balance of gravity and springs at the start; "servos": own actuators; or N m
+    torque: str | tuple[float, ...] = "free"
+    speed: tuple[float, ...] = ()  # deg/s (m/s) at the start; (): at rest
+    damping: float | tuple[float, ...] = (
+        0.0  # N m s/rad (N s/m), added to that of all joints, or of each speed
     )
-    speed: tuple = ()  # deg/s (m/s) at the start; (): at rest
-    damping: float | tuple = 0.0  # N m s/rad (N s/m), added to that of all joints, or of each speed
-    targets: float | tuple = 0.0  # deg (m), shift of the targets of the servos, of all joints or each speed
+    targets: float | tuple[float, ...] = 0.0  # deg (m), shift of the targets of the servos, all or each speed
     gravity: bool = True  # that of the model, or none
-    locked: tuple = ()  # names of joints that keep their position
+    locked: tuple[str, ...] = ()  # names of joints that keep their position
     duration: float = 5.0  # s
     dt: float = 5.0 / 64  # s, the largest step; all others divide it
     judged: float | None = None  # s during which the band of rounding must be narrow; None: always
-    tags: tuple = ()  # see robots.Robot
+    tags: tuple[str, ...] = ()  # see robots.Robot
 
-    def __post_init__(self):
-        self.require("name", is_text(self.name), "a text in one line, not empty")
+    def __post_init__(self) -> None:
+        is_name = isinstance(self.name, str) and bool(self.name.strip()) and self.name.isprintable()
+        self.require("name", is_name, "a text in one line, not empty")
         is_posture = isinstance(self.posture, str) or are_numbers(self.posture)
         self.set("posture", is_posture, "the name of a posture, or numbers")
         is_torque = self.torque in TORQUES if isinstance(self.torque, str) else are_numbers(self.torque)
         self.set("torque", is_torque, "free, hold, servos, or a torque in N m for each joint")
         self.set("speed", are_numbers(self.speed), "a speed in deg/s for each joint")
-        accepted = f"a time from {TIMES[0]:g} to {TIMES[1]:g} s"
-        for name in ("duration", "dt"):
-            self.set(
-                name, is_number(getattr(self, name)) and TIMES[0] <= getattr(self, name) <= TIMES[1], accepted
-            )
+        for name, time in (("duration", self.duration), ("dt", self.dt)):
+            is_time = is_number(time) and TIMES[0] <= time <= TIMES[1]
+            self.set(name, is_time, f"a time from {TIMES[0]:g} to {TIMES[1]:g} s")
         accepted = "a number of at least 0 N m s/rad, or one for each joint"
         self.set("damping", is_each(self.damping) and np.min(self.damping) >= 0.0, accepted)
         self.set("targets", is_each(self.targets), "a movement in deg (m), of all joints or each")
         self.require("targets", not np.any(self.targets) or self.torque == "servos", 'torque = "servos"')
         self.require("gravity", isinstance(self.gravity, bool | np.bool_), "true or false")
         object.__setattr__(self, "gravity", bool(self.gravity))
+        divides = abs(self.steps * self.dt - self.duration) <= 1e-9 * self.duration and self.steps >= 1
         accepted = f"a step that divides {self.duration:g} s into at most {MAX_STEPS:,} steps"
-        self.require("dt", self.duration / self.dt <= MAX_STEPS, accepted)
-        left = abs(self.steps * self.dt - self.duration)
-        self.require("dt", self.steps >= 1 and left <= 1e-9 * self.duration, accepted)
+        self.require("dt", divides and self.duration / self.dt <= MAX_STEPS, accepted)
         if self.judged is not None:
             is_time = is_number(self.judged) and 0.0 <= self.judged <= self.duration
             self.set("judged", is_time, f"a time in s of at most {self.duration:g}")
@@ -98,62 +102,59 @@ class Scene:
         return round(self.duration / self.dt)
 
 
-def is_text(value: object) -> bool:
-    return isinstance(value, str) and bool(value.strip()) and value.isprintable()
-
-
-def is_each(value: object) -> bool:
+def is_each(value: Any) -> bool:
     """Whether a value is a number, or a sequence of numbers that is not empty."""
-    return is_number(value) or (are_numbers(value) and len(value) > 0)
+    return is_number(value) or (are_numbers(value) and np.size(value) > 0)
 
 
 @dataclass(frozen=True)
 class Case:
     """A robot with a scene. Raises WrongField if this robot cannot have the scene."""
 
-    robot: object  # a robots.Robot
+    robot: "Robot"
     scene: Scene
 
-    def __post_init__(self):
-        names, scene, whole = self.robot.joints, self.scene, self.robot.coordinates
-
-        def numbers(each: tuple, unit: str) -> str:
-            units = ", ".join(dict.fromkeys(unit.format(KINDS[kind]) for kind in whole.all_kinds))
-            return f"{len(each)} numbers, one per joint ({some_of(each)}), in {units}"
-
-        count = numbers(whole.positions, "{0.position_given}")
-        if isinstance(scene.posture, str):
-            named = self.robot.postures or self.robot.positions
-            postures = [name for name, q in self.robot.poses.items() if len(q) == whole.nq and named]
-            accepted = " or ".join(filter(None, [", ".join(postures), count]))
-            scene.require("posture", scene.posture in postures, accepted)
-        elif scene.posture:
-            scene.require("posture", len(scene.posture) == whole.nq, count)
-            for joint in whole.places.balls:
-                is_unit = abs(np.linalg.norm(scene.posture[joint.q]) - 1.0) <= CLOSE_TO_ONE
-                scene.require("posture", is_unit, "a quaternion w, x, y, z of length 1 for each ball")
+    def __post_init__(self) -> None:
+        scene, names, coordinates = self.scene, self.robot.joints, self.robot.coordinates
+        self.require_posture()
         units = {"torque": "{0.force}", "speed": "{0.speed_given}", "damping": "{0.force} s/{0.unit}"}
         for name, unit in (units | {"targets": "{0.movement_given}"}).items():
             value = getattr(scene, name)
             is_each = isinstance(value, tuple) and (value or name != "speed")
-            scene.require(name, not is_each or len(value) == whole.nv, numbers(whole.speeds, unit))
-        mixed = len({*whole.all_kinds} - {"ball"}) > 1 and isinstance(scene.targets, float) and scene.targets
-        scene.require("targets", not mixed, numbers(whole.speeds, "{0.movement_given}"))
+            scene.require(name, not is_each or len(value) == coordinates.nv, self.counted("speeds", unit))
+        has_units = len({*coordinates.all_kinds} - {"ball"}) > 1  # of several kinds
+        is_mixed = has_units and isinstance(scene.targets, float) and scene.targets != 0.0
+        scene.require("targets", not is_mixed, self.counted("speeds", "{0.movement_given}"))
         if scene.torque == "servos":
-            acts = any(u is not None for u in self.controller.controls)
+            acts = self.controller is not None and any(u is not None for u in self.controller.controls)
             scene.require("torque", acts, "free, hold or numbers: this robot has no actuator that takes part")
             scene.require("locked", not scene.locked, "no locked joint together with servos")
         is_right = set(scene.locked) <= set(names) and len(scene.locked) < len(names)
         scene.require("locked", is_right, f"at most {len(names) - 1} of {some_of(names)}")
-        moving = (
-            any(any(scene.speed[self.places[name].qd]) for name in scene.locked) if scene.speed else False
-        )
+        locked = [coordinates.by_name[name] for name in scene.locked]
+        moving = any(any(scene.speed[joint.qd]) for joint in locked)
         scene.require("speed", not moving, f"speed 0 for locked joints ({', '.join(scene.locked)})")
 
-    @cached_property
-    def places(self) -> dict:
-        """The kind of each joint of the robot and its indices in q and v, by name."""
-        return dict(zip(self.robot.joints, self.robot.coordinates.places.joints))
+    def require_posture(self) -> None:
+        """WrongField unless the posture is a name of the robot's, or one number per position and quaternions of length 1."""
+        scene, robot, coordinates = self.scene, self.robot, self.robot.coordinates
+        count = self.counted("positions", "{0.position_given}")
+        if isinstance(scene.posture, str):
+            named = [*robot.postures, *robot.positions]
+            postures = [name for name in named if len(robot.posture(name)) == coordinates.nq]
+            accepted = " or ".join(filter(None, [", ".join(postures), count]))
+            scene.require("posture", scene.posture in postures, accepted)
+        elif scene.posture:
+            scene.require("posture", len(scene.posture) == coordinates.nq, count)
+            for joint in coordinates.places.balls:
+                is_unit = abs(np.linalg.norm(scene.posture[joint.q]) - 1.0) <= CLOSE_TO_ONE
+                scene.require("posture", bool(is_unit), "a quaternion w, x, y, z of length 1 for each ball")
+
+    def counted(self, what: str, unit: str) -> str:
+        """How many numbers are accepted for the positions or the speeds of all joints, and in which units of a Kind."""
+        names: tuple[str, ...] = getattr(self.robot.coordinates, what)
+        units = dict.fromkeys(unit.format(KINDS[kind]) for kind in self.robot.coordinates.all_kinds)
+        return f"{len(names)} numbers, one per joint ({some_of(names)}), in {', '.join(units)}"
 
     @property
     def name(self) -> str:
@@ -184,38 +185,46 @@ class Case:
 
     @property
     def coordinates(self) -> Coordinates:
-        return Coordinates(self.joints, tuple(self.places[name].kind for name in self.joints))
+        return Coordinates(self.joints, tuple(joint.kind for joint in self.unlocked))
+
+    @cached_property
+    def unlocked(self) -> tuple[Joint, ...]:
+        """The joints that are not locked, with their places in q and v of all joints."""
+        by_name = self.robot.coordinates.by_name
+        return tuple(by_name[name] for name in self.joints)
 
     @cached_property
     def controller(self) -> Controller | None:
         """The robot's own actuators, if they act."""
         if self.scene.torque != "servos":
             return None
-        whole = self.robot.coordinates
-        q = self.posture[whole.places.first_positions]
-        targets = whole.from_degrees(np.broadcast_to(self.scene.targets, whole.nv), positions=False)
-        return controller(self.robot.drive, self.scene.posture, q, targets)
+        coordinates = self.robot.coordinates
+        q = self.posture[coordinates.places.first_positions]
+        targets = np.broadcast_to(self.scene.targets, coordinates.nv)
+        moved = coordinates.from_degrees(targets, positions=False)
+        return controller(self.robot.drive, self.scene.posture, q, moved)
 
     @cached_property
-    def whole(self) -> tmt.Tree:
+    def unlocked_tree(self) -> tmt.Tree:
         """The robot's Tree with the damping, actuators and gravity of the scene; no joint is locked."""
         tree, scene = self.robot.tree, self.scene
         gravity = tree.gravity if scene.gravity else (0.0, 0.0, 0.0)
         gains = {name: getattr(self.controller, name) for name in GAINS} if self.controller else {}
-        return dataclasses.replace(
-            tree, damping=np.add(tree.damping, scene.damping), gravity=gravity, **gains
-        )
+        damping = tuple(np.add(tree.damping, scene.damping).tolist())
+        return dataclasses.replace(tree, damping=damping, gravity=gravity, **gains)
 
     @property
-    def locked(self) -> Mapping[str, float | tuple]:
+    def locked(self) -> Mapping[str, float | tuple[float, ...]]:
         """The positions of the locked joints by name, rad or m; of a ball its quaternion."""
-        values = {name: tuple(map(float, self.posture[place.q])) for name, place in self.places.items()}
-        return {name: q if len(q) > 1 else q[0] for name, q in values.items() if name in self.scene.locked}
+        by_name, posture = self.robot.coordinates.by_name, self.posture
+        positions = {name: posture[by_name[name].q].tolist() for name in self.robot.joints}
+        locked = {name: q for name, q in positions.items() if name in self.scene.locked}
+        return {name: tuple(q) if len(q) > 1 else q[0] for name, q in locked.items()}
 
     @cached_property
     def tree(self) -> tmt.Tree:
-        """The whole Tree without the locked joints."""
-        return self.whole.lock(self.locked)
+        """The robot's Tree in the scene, without the locked joints."""
+        return self.unlocked_tree.lock(self.locked)
 
     @property
     def posture(self) -> np.ndarray:
@@ -224,14 +233,15 @@ class Case:
 
     @cached_property
     def q(self) -> np.ndarray:
-        """Positions of the free joints at t = 0, rad, (nq,)."""
-        return self.posture[self._free("q")]
+        """Positions of the unlocked joints at t = 0, rad, (nq,)."""
+        return self.posture[self.indices("q")]
 
     @cached_property
     def v(self) -> np.ndarray:
-        """Speeds of the free joints at t = 0, rad/s, (nv,)."""
-        whole = self.robot.coordinates
-        return whole.from_degrees(self.scene.speed or (0.0,) * whole.nv, positions=False)[self._free("qd")]
+        """Speeds of the unlocked joints at t = 0, rad/s, (nv,)."""
+        coordinates = self.robot.coordinates
+        speeds = self.scene.speed or (0.0,) * coordinates.nv
+        return coordinates.from_degrees(speeds, positions=False)[self.indices("qd")]
 
     @property
     def start(self) -> tuple[np.ndarray, np.ndarray]:
@@ -239,38 +249,34 @@ class Case:
 
     @cached_property
     def tau(self) -> np.ndarray:
-        """Torque at the free joints, N m, (nv,)."""
-        torque = self.scene.torque
+        """Torque at the unlocked joints, N m, (nv,)."""
+        torque: Any = self.scene.torque
         if torque == "hold":
-            torque = literal.gravity_balance(self.posture, self.whole)
-            if self.whole.has_springs:
-                torque = torque + literal.spring_torque(self.posture, self.whole)
+            torque = literal.gravity_balance(self.posture, self.unlocked_tree)
+            if self.unlocked_tree.has_springs:
+                torque = torque + literal.spring_torque(self.posture, self.unlocked_tree)
         elif self.controller:
             torque = self.controller.torque
         elif torque == "free":
-            torque = (0.0,) * self.robot.coordinates.nv
-        return np.array(torque)[self._free("qd")]
+            torque = np.zeros(self.robot.coordinates.nv)
+        return np.array(torque)[self.indices("qd")]
 
     @property
     def added_damping(self) -> np.ndarray:
-        """The damping that the scene adds to the free joints, N m s/rad, (nv,)."""
-        return self.free(np.broadcast_to(self.scene.damping, self.robot.coordinates.nv))
+        """The damping that the scene adds to the unlocked joints, N m s/rad, (nv,)."""
+        return np.broadcast_to(self.scene.damping, self.robot.coordinates.nv)[self.indices("qd")]
 
-    def free(self, values: np.ndarray) -> np.ndarray:
-        """The entries of the free joints, of values for all speeds, (nv,)."""
-        return values[self._free("qd")]
+    def indices(self, of: Literal["q", "qd"]) -> list[int]:
+        """The indices of the unlocked joints in q or v of all joints."""
+        slices: list[slice] = [getattr(joint, of) for joint in self.unlocked]
+        return [i for place in slices for i in range(place.start, place.stop)]
 
-    def whole_positions(self, q: np.ndarray) -> np.ndarray:
-        """Positions of all joints, (..., nq), from those of the free joints, (..., nq)."""
-        whole = np.tile(self.posture, (*np.shape(q)[:-1], 1))
-        whole[..., self._free("q")] = q
-        return whole
+    def positions_of_all(self, q: np.ndarray) -> np.ndarray:
+        """Positions of all joints, (..., nq), from those of the unlocked joints, (..., nq)."""
+        positions = np.tile(self.posture, (*np.shape(q)[:-1], 1))
+        positions[..., self.indices("q")] = q
+        return positions
 
-    def _free(self, which):
-        """The indices of the free joints in q or qd of all."""
-        slices = [getattr(self.places[name], which) for name in self.joints]
-        return [i for at in slices for i in range(at.start, at.stop)]
-
-    def changed(self, **changes) -> "Case":
+    def changed(self, **changes: Any) -> "Case":
         """The same robot; the scene with other values."""
         return Case(self.robot, dataclasses.replace(self.scene, **changes))

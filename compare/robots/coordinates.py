@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from tmt import Tree
 from tmt.derivation import coordinates
 from tmt.derivation.composite import mass_matrix_and_bias
+from tmt.derivation.coordinates import Joint
 
 
 class Kind(NamedTuple):
@@ -18,12 +19,13 @@ class Kind(NamedTuple):
     position_given: str  # unit in scenes
     speed_given: str
     movement_given: str
+    random: tuple[float, float]  # random positions of a joint without a range
 
 
 KINDS = {
-    "hinge": Kind(1, "rad", "N m", "deg", "deg/s", "deg"),
-    "slide": Kind(1, "m", "N", "m", "m/s", "m"),
-    "ball": Kind(3, "rad", "N m", "quaternions", "deg/s", "deg"),
+    "hinge": Kind(1, "rad", "N m", "deg", "deg/s", "deg", (-np.pi, np.pi)),
+    "slide": Kind(1, "m", "N", "m", "m/s", "m", (-0.5, 0.5)),
+    "ball": Kind(3, "rad", "N m", "quaternions", "deg/s", "deg", (-np.pi, np.pi)),
 }
 FREE = ("slide", "slide", "slide", "ball")
 
@@ -39,12 +41,22 @@ class Coordinates(NamedTuple):
 
     @property
     def places(self) -> coordinates.Coordinates:
-        """The indices of each joint in q and v."""
+        """The places of all joints in q and v."""
         return coordinates.coordinates_of(self.all_kinds)
+
+    @property
+    def by_name(self) -> dict[str, Joint]:
+        """The kind and the place of each joint."""
+        return dict(zip(self.names, self.places.joints))
 
     @property
     def all_kinds(self) -> tuple[str, ...]:
         return self.kinds or ("hinge",) * len(self.names)
+
+    @property
+    def kinds_of_speeds(self) -> list[str]:
+        """The kind of the joint of each speed, (nv,)."""
+        return [kind for kind in self.all_kinds for _ in range(KINDS[kind].speeds)]
 
     @property
     def nq(self) -> int:
@@ -61,7 +73,7 @@ class Coordinates(NamedTuple):
     @property
     def units(self) -> tuple[str, ...]:
         """The units of a movement, (nv,); of the speeds: the same per s."""
-        return tuple(unit for kind in self.all_kinds for unit in [KINDS[kind].unit] * KINDS[kind].speeds)
+        return tuple(KINDS[kind].unit for kind in self.kinds_of_speeds)
 
     @property
     def speeds(self) -> tuple[str, ...]:
@@ -73,22 +85,18 @@ class Coordinates(NamedTuple):
         """The names of the numbers of a position: the joint; for a ball "name w"."""
         return self._named("wxyz")
 
-    def _named(self, parts):
-        pairs = zip(self.names, self.all_kinds)
-        return tuple(
-            name + part
-            for name, kind in pairs
-            for part in ([f" {p}" for p in parts] if kind == "ball" else [""])
-        )
+    def _named(self, components: str) -> tuple[str, ...]:
+        names: list[str] = []
+        for name, kind in zip(self.names, self.all_kinds):
+            names += [f"{name} {component}" for component in components] if kind == "ball" else [name]
+        return tuple(names)
 
     def difference(self, q1: np.ndarray, q0: np.ndarray) -> np.ndarray:
         """The movement from q0 to q1, (..., nq) -> (..., nv); for a ball the shortest rotation vector in its own axes."""
         if not self.has_balls:
             return np.subtract(q1, q0)
-        q1, q0 = np.broadcast_arrays(q1, q0)
-        return np.stack(
-            self.places.difference(*([q[..., i] for i in range(self.nq)] for q in (q1, q0))), axis=-1
-        )
+        end, start = (np.moveaxis(q, -1, 0) for q in np.broadcast_arrays(q1, q0))
+        return np.stack(self.places.difference(list(end), list(start)), axis=-1)
 
     def move(self, q: np.ndarray, dv: np.ndarray) -> np.ndarray:
         """The position after a movement, (..., nq)."""
@@ -96,10 +104,12 @@ class Coordinates(NamedTuple):
             return np.add(q, dv)
         batch = np.broadcast_shapes(np.shape(q)[:-1], np.shape(dv)[:-1])
         q, dv = np.broadcast_to(q, (*batch, self.nq)), np.broadcast_to(dv, (*batch, self.nv))
-        moved = self.places.move([q[..., i] for i in range(self.nq)], [dv[..., i] for i in range(self.nv)])
+        moved = self.places.move(list(np.moveaxis(q, -1, 0)), list(np.moveaxis(dv, -1, 0)))
         return np.stack(moved, axis=-1)
 
-    def random(self, rng: np.random.Generator, count: int, ranges: Sequence = ()) -> np.ndarray:
+    def random(
+        self, rng: np.random.Generator, count: int, ranges: Sequence[tuple[float, float] | None] = ()
+    ) -> np.ndarray:
         """Random positions, (count, nq), within the range of each joint, (low, high) or None.
 
         Without a range: a full turn of a hinge, 1 m of a slide. A ball: uniform over all rotations.
@@ -112,9 +122,7 @@ class Coordinates(NamedTuple):
                 turns = rng.normal(size=(count, 4))
                 q[:, joint.q] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
             else:
-                q[:, joint.q.start] = rng.uniform(
-                    *(limits or {"hinge": (-np.pi, np.pi), "slide": (-0.5, 0.5)}[joint.kind]), count
-                )
+                q[:, joint.q.start] = rng.uniform(*(limits or KINDS[joint.kind].random), count)
         return q
 
     def from_degrees(self, values: ArrayLike, positions: bool) -> np.ndarray:
@@ -148,13 +156,13 @@ def rates_at(tree: Tree, q: np.ndarray) -> tuple[float, float]:
     return fastest_rates(tree, np.linalg.pinv(np.array(inertia), hermitian=True))
 
 
-def fastest_rates(tree: Tree, inverse: np.ndarray, added: tuple = ()) -> tuple[float, float]:
+def fastest_rates(tree: Tree, inverse: np.ndarray, added: Sequence[float] = ()) -> tuple[float, float]:
     """The fastest decay rate by damping and the fastest frequency by springs, 1/s.
 
     inverse: of Mbar, (nv, nv); added: damping in addition to that of the joints.
     """
-    of_speeds = [k for kind, k in zip(tree.kind, tree.stiffness) for _ in range(KINDS[kind].speeds)]
-    damped, stiff = np.diag(np.add(tree.damping, added or 0.0)), np.diag(of_speeds)
+    stiffness = np.repeat(tree.stiffness, [KINDS[kind].speeds for kind in tree.kind])
+    damped, stiff = np.diag(np.add(tree.damping, added or 0.0)), np.diag(stiffness)
     if tree.has_gains:
         damped, stiff = damped + (tree.speed_gain or 0.0), stiff + (tree.position_gain or 0.0)
     decay, square = (np.abs(np.linalg.eigvals(inverse @ part)).max() for part in (damped, stiff))

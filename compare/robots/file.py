@@ -1,9 +1,9 @@
 """A robot that is read from a file: its postures and scenes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -12,15 +12,16 @@ from tmt import literal
 from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
 from tmt.model.tree import GAINS
 
-from . import Robot
 from .actuators import Drive, controller
-from .case import KINDS, Coordinates, Scene, fastest_rates
-from .coordinates import free_joints
+from .case import Scene
+from .coordinates import Coordinates, fastest_rates, free_joints
+from .robot import Feature, Range, Robot
 
 DURATION = 1.0  # s; longer free motions are chaotic
 MIN_STEPS, MAX_STEPS_OF_A_FILE = 64, 8192  # of a scene, with its largest step
 COARSER = 4  # largest step / step of the file
 OWN_POSTURES = "qpos0", "middle"  # their names
+SAME_POSTURE = 1e-9  # rad or m
 SERVOS_ACT = 0.25  # s, duration of scenes with servos; their fast modes need short steps
 MOVED_TARGETS = {"hinge": 6.0, "slide": 0.02, "ball": 0.0}  # deg or m, in a step response
 STILL = 1e-6  # rad/s2 or m/s2, acceleration that counts as rest
@@ -28,78 +29,73 @@ THROWN_UP, TUMBLING = 2.0, (120.0, 60.0, -90.0)  # m/s, and deg/s about a free b
 SET_GOING = {"hinge": 60.0, "slide": 0.2, "ball": 60.0}  # deg/s or m/s
 
 
-class Reading(Protocol):
-    """A file as it was read, see engines.mujoco.reading."""
+@dataclass(frozen=True)
+class RobotFile:
+    """The numbers of a file as they were compiled."""
 
-    name: str
-    source: Path | str
+    name: str  # of the model, "": it has none that can be printed in a line
+    path: Path | None  # None: the model is a text, or was compiled elsewhere
     tree: tmt.Tree
-    features: tuple
-    keyframes: Mapping[str, np.ndarray]
-    qpos0: np.ndarray
-    ranges: tuple
-    drive: Drive
-    dt: float
+    features: tuple[Feature, ...]  # in a fixed order
+    keyframes: Mapping[str, np.ndarray]  # positions of the Tree, (nq,), by the key's name or `key 0`
+    qpos0: np.ndarray  # (nq,)
+    ranges: tuple[Range, ...]  # of each joint; a ball's of the angle of its turn
+    integrator: str  # by MuJoCo's name
+    dt: float  # s
+    drive: Drive  # actuators, tendons, gravity compensation; controls by the names of `keyframes`
 
 
-def robot_of(reading: Reading, shown: str) -> Robot:
+def robot_of(file: RobotFile, shown: str) -> Robot:
     """The robot of a file, called `shown` in reports, with the numbers that MuJoCo compiled."""
-    keys = names_of_keys(reading)
-    positions = named_positions(reading, keys)
+    keys = names_of_keys(file)
+    positions = named_positions(file, keys)
     start = next(name for name in positions if name != "qpos0" or len(positions) == 1)
-    drive = replace(reading.drive, controls={keys[name]: u for name, u in reading.drive.controls.items()})
+    drive = replace(file.drive, controls={keys[name]: u for name, u in file.drive.controls.items()})
     return Robot(
-        name=reading.name or Path(shown).stem or shown,
-        mjcf=reading.source if isinstance(reading.source, Path) else Path(shown),
-        tree=reading.tree,
+        name=file.name or Path(shown).stem or shown,
+        mjcf=file.path or Path(shown),
+        tree=file.tree,
         postures={},
         positions=positions,
-        ranges=tuple(reading.ranges),
-        scenes=scenes_from(reading.tree, start, np.array(positions[start]), reading.dt, drive),
+        ranges=file.ranges,
+        scenes=scenes_from(file.tree, start, np.array(positions[start]), file.dt, drive),
         described=Path(shown).name or shown,
-        features=tuple(reading.features),
+        features=file.features,
         drive=drive,
     )
 
 
-def robot_of_solution(
-    reading: Reading, shown: str, solution: Reading, whose: str, names: Sequence[str]
-) -> tuple[Robot, Reading]:
-    """The robot of a file with the numbers, postures and scenes of a solution, called `whose`; and that solution.
-
-    names: of the file's joints, in the order of the solution's. Actuators do not act: those of the file may differ.
-    """
-    solution = replace(solution, tree=replace(solution.tree, joint_names=tuple(names)), drive=Drive())
-    stated = {"stated_in": whose, "features_stated": tuple(solution.features)}
-    of_file = {"mjcf": reading.source, "features": tuple(reading.features)}
-    robot = replace(robot_of(solution, shown), **stated, **of_file)
-    return robot, solution
+def robot_of_solution(file: RobotFile, shown: str, solution: RobotFile, whose: str) -> Robot:
+    """The robot of a file with the numbers, postures and scenes of a solution, called `whose`, whose joints have its names."""
+    robot = robot_of(solution, shown)
+    mjcf, features = file.path or robot.mjcf, file.features
+    return replace(robot, mjcf=mjcf, features=features, stated_in=whose, features_stated=solution.features)
 
 
-def names_of_keys(reading: Reading) -> dict[str, str]:
+def names_of_keys(file: RobotFile) -> dict[str, str]:
     """The name of the posture of each keyframe: that of the keyframe, different from OWN_POSTURES."""
     names = {}
-    for name in reading.keyframes:
+    for name in file.keyframes:
         unique = name
-        while unique in OWN_POSTURES or (unique != name and unique in reading.keyframes):
+        while unique in OWN_POSTURES or (unique != name and unique in file.keyframes):
             unique = f"key {unique}"
         names[name] = unique
     return names
 
 
-def named_positions(reading: Reading, names: Mapping[str, str]) -> dict[str, tuple]:
+def named_positions(file: RobotFile, names: Mapping[str, str]) -> dict[str, tuple[float, ...]]:
     """Postures by name, (nq,) each: keyframes, qpos0, the middle of the ranges; of equal postures only the first."""
-    coordinates = Coordinates(reading.tree.joint_names, reading.tree.kind)
-    middle = np.array(reading.qpos0, dtype=float)
-    for joint, limits in zip(coordinates.places.joints, reading.ranges):
+    coordinates = Coordinates(file.tree.joint_names, file.tree.kind)
+    middle = np.array(file.qpos0, dtype=float)
+    for joint, limits in zip(coordinates.places.joints, file.ranges):
         if limits and joint.kind != "ball":
             middle[joint.q] = np.mean(limits)
-    own = dict(zip(OWN_POSTURES, (reading.qpos0, middle)))
-    positions = {}
-    for name, q in ({names[key]: q for key, q in reading.keyframes.items()} | own).items():
-        if not any(
-            np.abs(coordinates.difference(q, np.array(other))).max() < 1e-9 for other in positions.values()
-        ):
+    postures = {names[key]: q for key, q in file.keyframes.items()}
+    postures |= dict(zip(OWN_POSTURES, (file.qpos0, middle)))
+    positions: dict[str, tuple[float, ...]] = {}
+    for name, q in postures.items():
+        movements = [coordinates.difference(q, np.array(other)) for other in positions.values()]
+        if all(np.abs(movement).max() >= SAME_POSTURE for movement in movements):
             positions[name] = tuple(map(float, q))
     return positions
 
@@ -113,32 +109,33 @@ def scenes_from(
     compared on a thrown free body, because one that is let go may only fall.
     start, q: the posture, name and (nq,); dt: step of the file, s; drive: its actuators.
     """
-    coordinates = Coordinates(tree.joint_names, tree.kind)
+    coordinates, free = Coordinates(tree.joint_names, tree.kind), free_joints(tree)
     mass_matrix, weight = map(np.array, mass_matrix_and_bias(tree, q.tolist(), [0.0] * coordinates.nv))
-    root = np.sqrt(
-        np.where(np.diag(mass_matrix) > 0.0, np.diag(mass_matrix), 1.0)
-    )  # joints of very different inertia
+    # joints may have very different inertia
+    root = np.sqrt(np.where(np.diag(mass_matrix) > 0.0, np.diag(mass_matrix), 1.0))
     inverse = np.linalg.pinv(mass_matrix / np.outer(root, root), hermitian=True) / np.outer(root, root)
     accelerations = inverse @ -(weight + literal.spring_torque(q, tree))
-    added = added_damping(inverse, accelerations)
-    rests = np.abs(accelerations).max() < STILL
-    going = {"speed": tuple(v for kind in tree.kind for v in [SET_GOING[kind]] * KINDS[kind].speeds)}
-    how, speed = ("set going", going) if rests else ("let go", {})
-    timing = {"duration": DURATION, "dt": DURATION / coarsest(tree, inverse, dt), "judged": 0.0}
-    damped = timing | {"dt": DURATION / coarsest(tree, inverse, dt, added)}
-    made = [] if rests else [Scene(f"{start}, held", start, "hold", tags=("own",), **timing)]
-    tags = ("own", "speed", "regular")
-    if free := free_joints(tree):
-        made.append(Scene(f"{start}, thrown", start, speed=thrown(tree), tags=tags, **timing))
-        turns = np.delete(
-            accelerations, [tree.coordinates.joints[i + k].qd.start for i in free for k in range(3)]
-        )
-        tags = ("own", "speed") if rests or np.abs(turns).max() >= STILL else ("own", "falls")
-    made += [
-        Scene(f"{start}, {how}", start, tags=tags, **speed, **timing),
-        Scene(f"{start}, {how}, damped", start, damping=added, tags=("own", "full only"), **speed, **damped),
-    ]
-    return (*made, *servo_scenes(tree, start, q, dt, drive or Drive(), inverse))
+    damping = added_damping(inverse, accelerations)
+    longest = DURATION / coarsest(tree, inverse, dt)
+    let_go = partial(Scene, posture=start, duration=DURATION, dt=longest, judged=0.0)
+    scenes = []
+    turns, is_at_rest = accelerations, np.abs(accelerations).max() < STILL
+    if not is_at_rest:
+        scenes.append(let_go(f"{start}, held", torque="hold", tags=("own",)))
+    if free:
+        scenes.append(let_go(f"{start}, thrown", speed=thrown(tree), tags=("own", "speed", "regular")))
+        slides = [tree.coordinates.joints[i + k].qd.start for i in free for k in range(3)]
+        turns = np.delete(accelerations, slides)
+    how, tags = f"{start}, let go", ("own", "speed") if free else ("own", "speed", "regular")
+    if is_at_rest:
+        how = f"{start}, set going"
+        let_go = partial(let_go, speed=tuple(SET_GOING[kind] for kind in coordinates.kinds_of_speeds))
+    elif free and np.abs(turns).max() < STILL:
+        tags = ("own", "falls")
+    scenes.append(let_go(how, tags=tags))
+    longest = DURATION / coarsest(tree, inverse, dt, damping)
+    scenes.append(let_go(f"{how}, damped", damping=damping, tags=("own", "full only"), dt=longest))
+    return (*scenes, *servo_scenes(tree, start, q, dt, drive or Drive(), inverse))
 
 
 def servo_scenes(
@@ -148,31 +145,19 @@ def servo_scenes(
 
     A robot with a free body has no gravity in them. If a servo is too fast for MAX_STEPS_OF_A_FILE, methods are not compared.
     """
-    positions = np.array(q)[tree.coordinates.first_positions]
-    acting = controller(drive, start, positions)
+    acting = controller(drive, start, np.array(q)[tree.coordinates.first_positions])
     if not acting.position_gain.any():
         return []
     driven = replace(tree, **{name: getattr(acting, name) for name in GAINS})
-    count, least = (
-        coarsest(driven, inverse, dt, duration=SERVOS_ACT),
-        SERVOS_ACT * max(fastest_rates(driven, inverse)),
-    )
-    free = bool(free_joints(tree))
-    settings = {"gravity": not free, "duration": SERVOS_ACT, "dt": SERVOS_ACT / count, "judged": 0.0}
-    kinds = (joint.kind for joint in tree.coordinates.joints for _ in tree.axis[joint.qd])
+    count = coarsest(driven, inverse, dt, duration=SERVOS_ACT)
+    least = SERVOS_ACT * max(fastest_rates(driven, inverse))
+    acted = partial(Scene, posture=start, torque="servos", gravity=not free_joints(tree), judged=0.0)
+    timed = partial(acted, duration=SERVOS_ACT, dt=SERVOS_ACT / count)
+    held = timed(f"{start}, held by servos", tags=("own", "full only"))
+    kinds = Coordinates(tree.joint_names, tree.kind).kinds_of_speeds
     moved = tuple(MOVED_TARGETS[kind] for kind in kinds)
-    followed = ("speed",) if least <= count else ()
-    return [
-        Scene(f"{start}, held by servos", start, "servos", tags=("own", "full only"), **settings),
-        Scene(
-            f"{start}, step of the servos",
-            start,
-            "servos",
-            targets=moved,
-            tags=("own", "servos", *followed),
-            **settings,
-        ),
-    ]
+    tags = ("own", "servos", "speed") if least <= count else ("own", "servos")
+    return [held, replace(held, name=f"{start}, step of the servos", targets=moved, tags=tags)]
 
 
 def added_damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float, ...]:
@@ -186,7 +171,7 @@ def added_damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float
 
 
 def coarsest(
-    tree: tmt.Tree, inverse: np.ndarray, dt: float, added: tuple = (), duration: float = DURATION
+    tree: tmt.Tree, inverse: np.ndarray, dt: float, added: Sequence[float] = (), duration: float = DURATION
 ) -> int:
     """The number of steps of a scene, 64, 128 ... 8192: about four times the step of the file.
 
@@ -200,9 +185,9 @@ def coarsest(
 
 
 def thrown(tree: tmt.Tree) -> tuple[float, ...]:
-    """Speeds, (nv,) m/s and deg/s, of tumbling free bodies; () if there are none."""
-    speed, free = np.zeros(tree.coordinates.nv), free_joints(tree)
-    for i in free:
+    """Speeds, (nv,) m/s and deg/s, of tumbling free bodies; zero of all else."""
+    speed = np.zeros(tree.coordinates.nv)
+    for i in free_joints(tree):
         speed[tree.coordinates.joints[i + 2].qd.start] = THROWN_UP
         speed[tree.coordinates.joints[i + 3].qd] = TUMBLING
-    return tuple(map(float, speed)) if free else ()
+    return tuple(speed.tolist())

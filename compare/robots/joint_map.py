@@ -36,46 +36,52 @@ class Joint(NamedTuple):
     unit: str = ""  # of PER_UNIT
     slides: bool = False
 
-    def __str__(self):
-        exact = f"{'+' * (self.zero > 0.0)}{float(self.zero)!r}"
-        zero = f"{exact}m" if self.zero else ""
+    def __str__(self) -> str:
+        zero = f"{float(self.zero):+}m" if self.zero else ""
         if self.zero and not self.slides:
             degrees = np.degrees(self.zero)
-            whole = abs(degrees - round(degrees, 6)) <= 1e-9
-            zero = f"{round(degrees, 6):+.10g}deg" if whole else f"{exact}rad"
-        return f"{'-' * (self.sign < 0.0)}{self.name}{zero}{' in ' * bool(self.unit)}{self.unit}"
+            is_short = abs(degrees - round(degrees, 6)) <= 1e-9
+            zero = f"{round(degrees, 6):+.10g}deg" if is_short else f"{float(self.zero):+}rad"
+        sign, unit = "-" if self.sign < 0.0 else "", f" in {self.unit}" if self.unit else ""
+        return f"{sign}{self.name}{zero}{unit}"
 
 
 class JointMap:
-    """Converts positions (..., nq), speeds (..., nv), Mbar and forces between a model and a user's equations (`own`)."""
+    """Converts positions (..., nq), speeds (..., nv), Mbar and forces between a model and a user's equations (`own`).
 
-    def __init__(self, coordinates: Coordinates, joints: Sequence[Joint]):
-        places = dict(zip(coordinates.names, coordinates.places.joints))
+    q, v: the index in the model of each own position and speed. The others are factors of own positions (sign, of_q), zeros,
+    and factors of own speeds (sense, of_v).
+    """
+
+    def __init__(self, coordinates: Coordinates, joints: Sequence[Joint]) -> None:
         self.joints = tuple(joints)
-        chosen = [places[joint.name] for joint in joints]
-        self.q = np.array([i for place in chosen for i in range(place.q.start, place.q.stop)], int)
-        self.v = np.array([i for place in chosen for i in range(place.qd.start, place.qd.stop)], int)
-        self.sign, self.zero, self.sense = np.ones(len(self.q)), np.zeros(len(self.q)), np.ones(len(self.v))
-        self.of_q, self.of_v = np.ones(len(self.q)), np.ones(len(self.v))
-        at = by = 0
-        for joint, (kind, q, v) in zip(joints, chosen):
-            if kind != "ball":
-                self.sign[at] = self.sense[by] = joint.sign
-                self.zero[at] = joint.zero
-                self.of_q[at], self.of_v[by] = PER_UNIT[joint.unit]
-            at, by = at + q.stop - q.start, by + v.stop - v.start
+        places = [coordinates.by_name[joint.name] for joint in joints]
+        self.q = np.concatenate([np.arange(place.q.start, place.q.stop) for place in places])
+        self.v = np.concatenate([np.arange(place.qd.start, place.qd.stop) for place in places])
+        positions = [place.q.stop - place.q.start for place in places]
+        speeds = [place.qd.stop - place.qd.start for place in places]
+        # a ball has no sign, zero or unit
+        stated = [
+            joint if place.kind != "ball" else Joint(joint.name) for joint, place in zip(joints, places)
+        ]
+        signs, units = [joint.sign for joint in stated], [PER_UNIT[joint.unit] for joint in stated]
+        self.sign, self.sense = np.repeat(signs, positions), np.repeat(signs, speeds)
+        self.zero = np.repeat([joint.zero for joint in stated], positions)
+        self.of_q = np.repeat([of_position for of_position, _ in units], positions)
+        self.of_v = np.repeat([of_speed for _, of_speed in units], speeds)
 
     @property
     def is_same(self) -> bool:
         """Whether the joints are those of the model."""
-        same = self.sign.min() == self.of_q.min() == self.of_q.max() == 1.0 and not self.zero.any()
-        return bool(same and (self.of_v == 1.0).all() and (self.q == np.arange(len(self.q))).all())
+        factors = np.concatenate([self.sign, self.of_q, self.of_v])
+        in_order = (self.q == np.arange(len(self.q))).all()
+        return bool(in_order and (factors == 1.0).all() and not self.zero.any())
 
     def after(self, first: "JointMap", coordinates: Coordinates) -> "JointMap | None":
         """The composition: first, then this map. None if it cannot be stated, for example degrees of degrees."""
-        places, joints = {name: i for i, name in enumerate(coordinates.names)}, []
+        inner_joints, joints = dict(zip(coordinates.names, first.joints)), []
         for stated in self.joints:
-            inner = first.joints[places[stated.name]]
+            inner = inner_joints[stated.name]
             if stated.unit and inner.unit:
                 return None
             zero = stated.sign * inner.zero + stated.zero / PER_UNIT[inner.unit][0]
@@ -117,6 +123,7 @@ def within_a_turn(zero: float, slides: bool) -> float:
 
 
 def put(values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Own values, (..., n), at their indices in the model."""
     return np.asarray(values)[..., np.argsort(at)]
 
 
@@ -133,44 +140,37 @@ def joint_map(coordinates: Coordinates, stated: Sequence[str] | None) -> JointMa
     if twice:
         raise JointsError(f"joint {twice[0]!r} is stated twice")
     if missing:
-        raise JointsError(
-            f"joints without {listed(missing)}; expected all {len(coordinates.names)} of the model"
-        )
+        count = len(coordinates.names)
+        raise JointsError(f"joints without {listed(missing)}; expected all {count} of the model")
     return JointMap(coordinates, joints)
 
 
 def read_joint(text: str, coordinates: Coordinates) -> Joint:
     """A stated joint; a joint with exactly this name has priority."""
-    kinds = dict(zip(coordinates.names, (joint.kind for joint in coordinates.places.joints)))
+    kinds = dict(zip(coordinates.names, coordinates.all_kinds))
     if text in kinds:
         return Joint(text)
-    rest, unit = text, ""
-    for name in PER_UNIT:
-        if name and rest.endswith(f" in {name}"):
-            rest, unit = rest.removesuffix(f" in {name}").rstrip(), name
-            break
-    sign, zero = 1.0, 0.0
-    if rest not in kinds and rest.startswith("-"):
-        rest, sign = rest[1:], -1.0
-    if rest not in kinds and (match := STATED.fullmatch(rest)):
-        rest, value = match["name"], float(match["offset"])
-        zero = np.radians(value) if match["measure"] == "deg" else value
-        if rest in kinds and (match["measure"] == "m") != (kinds[rest] == "slide"):
-            raise JointsError(
-                f"joint {text!r}: {rest} is a {kinds[rest]}, its zero cannot be in {match['measure']}"
-            )
-    name, measured, measure = rest.rpartition(" in ")
-    if rest not in kinds and measured and name.removeprefix("-") in kinds:
-        raise JointsError(
-            f"joint {text!r}: unknown unit {measure!r}; known: {', '.join(filter(None, PER_UNIT))}"
-        )
-    if rest not in kinds:
+    units = [unit for unit in PER_UNIT if unit and text.endswith(f" in {unit}")]
+    unit = units[0] if units else ""
+    name, sign, zero = text.removesuffix(f" in {unit}").rstrip() if unit else text, 1.0, 0.0
+    if name not in kinds and name.startswith("-"):
+        name, sign = name[1:], -1.0
+    if name not in kinds and (match := STATED.fullmatch(name)):
+        name, value, measure = match["name"], float(match["offset"]), match["measure"]
+        zero = float(np.radians(value)) if measure == "deg" else value
+        if name in kinds and (measure == "m") != (kinds[name] == "slide"):
+            raise JointsError(f"joint {text!r}: {name} is a {kinds[name]}, its zero cannot be in {measure}")
+    if name not in kinds:
+        before, is_measured, measure = name.rpartition(" in ")
+        if is_measured and before.removeprefix("-") in kinds:
+            known = ", ".join(filter(None, PER_UNIT))
+            raise JointsError(f"joint {text!r}: unknown unit {measure!r}; known: {known}")
         raise JointsError(f"unknown joint {text!r}; known: {listed(coordinates.names)}, stated as {FORMS}")
-    if kinds[rest] == "ball" and (sign, zero, unit) != (1.0, 0.0, ""):
-        raise JointsError(f"joint {text!r}: {rest} is a ball, only its name can be stated")
-    if kinds[rest] == "slide" and unit:
-        raise JointsError(f"joint {text!r}: {rest} is a slide, its unit is m")
-    return Joint(rest, sign, float(zero), unit, kinds[rest] == "slide")
+    if kinds[name] == "ball" and (sign, zero, unit) != (1.0, 0.0, ""):
+        raise JointsError(f"joint {text!r}: {name} is a ball, only its name can be stated")
+    if kinds[name] == "slide" and unit:
+        raise JointsError(f"joint {text!r}: {name} is a slide, its unit is m")
+    return Joint(name, sign, zero, unit, kinds[name] == "slide")
 
 
 # joints of two files
@@ -196,28 +196,27 @@ def matched_joints(reference: tmt.Tree, tree: tmt.Tree, whose: str) -> Matched:
     from scipy.optimize import linear_sum_assignment  # slow import
 
     pairs = same_names(reference.joint_names, tree.joint_names)
-    left = [i for i in range(len(reference.joint_names)) if i not in pairs]
-    free = [j for j in range(len(tree.joint_names)) if j not in pairs.values()]
+    stated = [i for i in range(len(reference.joint_names)) if i not in pairs]
+    others = [j for j in range(len(tree.joint_names)) if j not in pairs.values()]
     costs = costs_of(reference, tree)
-    rows, columns = linear_sum_assignment(costs[np.ix_(left, free)])
-    pairs |= {left[i]: free[j] for i, j in zip(rows, columns) if costs[left[i], free[j]] < OTHER_TYPE}
+    rows, columns = linear_sum_assignment(costs[np.ix_(stated, others)])
+    for row, column in zip(rows, columns):
+        if costs[stated[row], others[column]] < OTHER_TYPE:
+            pairs[stated[row]] = others[column]
     refuse_unmatched(reference, tree, pairs, whose)
     names = tuple(tree.joint_names[pairs[i]] for i in range(len(reference.joint_names)))
-    other = [f"{name} as {right}" for name, right in zip(names, reference.joint_names) if name != right]
-    return Matched(names, tuple(other))
+    renamed = [f"{name} as {right}" for name, right in zip(names, reference.joint_names) if name != right]
+    return Matched(names, tuple(renamed))
 
 
 def same_names(reference: Sequence[str], names: Sequence[str]) -> dict[int, int]:
     """Joints of the same name, also with other capital letters: {index: index}."""
     pairs = {i: names.index(name) for i, name in enumerate(reference) if name in names}
-    small, right = [name.casefold() for name in names], [name.casefold() for name in reference]
+    lower, right = [name.casefold() for name in names], [name.casefold() for name in reference]
     for i, name in enumerate(right):
-        if (
-            i not in pairs
-            and small.count(name) == right.count(name) == 1
-            and small.index(name) not in pairs.values()
-        ):
-            pairs[i] = small.index(name)
+        is_only_one = lower.count(name) == right.count(name) == 1
+        if i not in pairs and is_only_one and lower.index(name) not in pairs.values():
+            pairs[i] = lower.index(name)
     return pairs
 
 
@@ -226,19 +225,17 @@ def costs_of(reference: tmt.Tree, tree: tmt.Tree) -> np.ndarray:
     (anchors, depths, axes), (other_anchors, other_depths, other_axes) = map(places_of, (reference, tree))
     along = np.einsum("id,jd->ij", axes, other_axes)
     apart = np.linalg.norm(anchors[:, None] - other_anchors, axis=-1)
-    costs = (
-        OF_AXIS * (1.0 - np.abs(along))
-        + OF_SENSE * (along < 0.0)
-        + OF_DEPTH * np.abs(np.subtract.outer(depths, other_depths))
-    )
-    costs += OF_PLACE * apart / max(np.ptp(anchors, axis=0).max(), np.ptp(other_anchors, axis=0).max(), 1e-9)
+    size = max(np.ptp(anchors, axis=0).max(), np.ptp(other_anchors, axis=0).max(), 1e-9)
+    costs = OF_AXIS * (1.0 - np.abs(along)) + OF_SENSE * (along < 0.0) + OF_PLACE * apart / size
+    costs += OF_DEPTH * np.abs(np.subtract.outer(depths, other_depths))
     costs += OF_ORDER * np.abs(np.subtract.outer(np.arange(len(depths)), np.arange(len(other_depths))))
     return np.where(np.array(reference.kind)[:, None] == np.array(tree.kind), costs, OTHER_TYPE)
 
 
 def places_of(tree: tmt.Tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The anchor of each joint in the world, m (n, 3), its depth in the tree (n,), its first axis (n, 3)."""
-    anchors, depths = [], []
+    anchors: list[np.ndarray] = []
+    depths: list[int] = []
     for parent, offset in zip(tree.parent, tree.offset):
         anchors.append(np.add(offset, anchors[parent] if parent >= 0 else 0.0))
         depths.append(depths[parent] + 1 if parent >= 0 else 0)
@@ -248,16 +245,14 @@ def places_of(tree: tmt.Tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def refuse_unmatched(reference: tmt.Tree, tree: tmt.Tree, pairs: Mapping[int, int], whose: str) -> None:
     """Unmatched, if a joint is missing, additional, or of another kind."""
-    ours, theirs = (dict(zip(one.joint_names, one.kind)) for one in (reference, tree))
-    pairs_of_names = [(reference.joint_names[i], tree.joint_names[j]) for i, j in sorted(pairs.items())]
-    wrong = [
-        f"joint {name} is a {theirs[name]}, expected a {ours[expected]} as in {whose}"
-        for expected, name in pairs_of_names
-        if ours[expected] != theirs[name]
-    ]
-    missing = [f"{name} ({kind})" for i, (name, kind) in enumerate(ours.items()) if i not in pairs]
-    extra = [f"{name} ({kind})" for j, (name, kind) in enumerate(theirs.items()) if j not in pairs.values()]
-    wrong += [f"missing joints: {some_of(missing)}"] if missing else []
-    wrong += [f"additional joints: {some_of(extra)}"] if extra else []
+    wrong = []
+    for i, j in sorted(pairs.items()):
+        if reference.kind[i] != tree.kind[j]:
+            expected = f"expected a {reference.kind[i]} as in {whose}"
+            wrong.append(f"joint {tree.joint_names[j]} is a {tree.kind[j]}, {expected}")
+    for word, joints, matched in (("missing", reference, pairs.keys()), ("additional", tree, pairs.values())):
+        named = [f"{name} ({kind})" for name, kind in zip(joints.joint_names, joints.kind)]
+        if left := [text for k, text in enumerate(named) if k not in matched]:
+            wrong.append(f"{word} joints: {some_of(left)}")
     if wrong:
         raise Unmatched("; ".join(wrong))

@@ -2,26 +2,17 @@
 
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from . import Robot
 from .case import Case, Scene
+from .robot import Robot
 from .validation import WrongField, are_numbers, is_number, shorten
 
 KEYS = (
-    "name",
-    "posture",
-    "q",
-    "speed",
-    "torque",
-    "targets",
-    "gravity",
-    "damping",
-    "locked",
-    "duration",
-    "dt",
-)
+    "name", "posture", "q", "speed", "torque", "targets", "gravity", "damping", "locked", "duration", "dt"
+)  # fmt: skip
 STEPS = 64  # of a scene without dt
 NEARLY_ONE = 1e-3  # accepted deviation of the length of a quaternion from 1, for few digits
 
@@ -53,7 +44,8 @@ def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
     entries = content.get("scene")
     if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
         raise SceneError(f"{path} has no array of scenes; expected a table [[scene]] for each")
-    scenes, names = [], {scene.name: f"a scene of {robot.name}" for scene in robot.scenes}
+    scenes: list[Scene] = []
+    names = {scene.name: f"a scene of {robot.name}" for scene in robot.scenes}
     for number, entry in enumerate(entries, start=1):
         named = f" ({in_toml(entry['name'])})" if "name" in entry else ""
         where = f"{path}, scene {number}{named}"
@@ -65,70 +57,71 @@ def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
     return tuple(scenes)
 
 
-def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
+def scene_of(where: str, entry: dict[str, Any], robot: Robot) -> Scene:
     """One entry as a scene of the robot."""
+    values: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()
+    }
 
-    def refuse(key: str, accepted: str) -> SceneError:
-        return SceneError(
-            f"{where}: {key} is {in_toml(entry.get(key, values.get(key)))}; expected {accepted}"
-        )
+    def refused(key: str, accepted: str) -> SceneError:
+        value = in_toml(entry.get(key, values.get(key)))
+        return SceneError(f"{where}: {key} is {value}; expected {accepted}")
 
-    values = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
     for key in entry:
         if key not in KEYS:
             raise SceneError(f"{where}: {key} is unknown; known: {', '.join(KEYS)}")
     if "name" not in entry:
         raise SceneError(f"{where}: it has no name; every scene needs one")
     if not isinstance(entry["name"], str) or not entry["name"].isprintable():
-        raise refuse("name", "a string in one line")
+        raise refused("name", "a string in one line")
     if "posture" in entry and "q" in entry:
         raise SceneError(f"{where}: both posture and q are given; expected one of them")
     if not isinstance(entry.get("posture", ""), str):
-        raise refuse("posture", f"one of {', '.join(robot.poses)}; numbers are given as q")
+        raise refused("posture", f"one of {', '.join(robot.poses)}; numbers are given as q")
     if isinstance(entry.get("q"), str):
-        raise refuse("q", f"{robot.coordinates.nq} numbers, one per joint")
+        raise refused("q", f"{robot.coordinates.nq} numbers, one per joint")
     if "q" in values:
         values["posture"] = with_unit_quaternions(where, values.pop("q"), robot)
     if "duration" in values and "dt" not in values:
         if not is_number(values["duration"]):
-            raise refuse("duration", "a time in s")
+            raise refused("duration", "a time in s")
         values["dt"] = values["duration"] / STEPS
     try:
         scene = Scene(**values, judged=0.0, tags=("own",))
         Case(robot, scene)
-        return scene
     except WrongField as error:
-        raise refuse(
-            "q" if error.field == "posture" and "q" in entry else error.field, error.accepted
-        ) from None
+        is_q = error.field == "posture" and "q" in entry
+        raise refused("q" if is_q else error.field, error.accepted) from None
     except ValueError as error:
         raise SceneError(f"{where}: {' '.join(str(error).split())}") from None
+    return scene
 
 
-def with_unit_quaternions(where: str, q: object, robot: Robot) -> object:
+def with_unit_quaternions(where: str, q: Any, robot: Robot) -> Any:
     """A position with normalized quaternions; SceneError if the length of one is not nearly 1."""
     if not are_numbers(q) or len(q) != robot.coordinates.nq:
         return q
     position = np.array(q, dtype=float)
-    for name, joint in zip(robot.joints, robot.coordinates.places.joints):
+    for name, joint in robot.coordinates.by_name.items():
         length = float(np.linalg.norm(position[joint.q])) if joint.kind == "ball" else 1.0
         if not abs(length - 1.0) <= NEARLY_ONE:
             text = f"q is {in_toml(q)}; the quaternion of {name} has length {length:.6g}, expected 1"
             raise SceneError(f"{where}: {text}")
         position[joint.q] /= length
-    return tuple(map(float, position))
+    return tuple(position.tolist())
 
 
 def in_toml(value: object) -> str:
     """A value in the syntax of TOML, in one line, shortened."""
+    return shorten(" ".join(all_in_toml(value).split()))
 
-    def whole(value):
-        if isinstance(value, bool):
-            return str(value).lower()
-        if isinstance(value, list | tuple):
-            return f"[{', '.join(map(whole, value))}]"
-        if isinstance(value, dict):
-            return f"{{{', '.join(f'{key} = {whole(part)}' for key, part in value.items())}}}"
-        return repr(value) if isinstance(value, str | float | int) else str(value)
 
-    return shorten(" ".join(whole(value).split()))
+def all_in_toml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(all_in_toml, value))}]"
+    if isinstance(value, dict):
+        parts = [f"{key} = {all_in_toml(part)}" for key, part in value.items()]
+        return f"{{{', '.join(parts)}}}"
+    return repr(value) if isinstance(value, str | float | int) else str(value)

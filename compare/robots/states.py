@@ -1,14 +1,16 @@
 """The states at which engines are compared: named postures and random states."""
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+import tmt
 from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
 
 from ..core.finding import Finding
-from . import Robot
 from .case import SEED
+from .robot import Robot
 
 if TYPE_CHECKING:
     from tmt.exact.many import Pairs
@@ -18,25 +20,30 @@ SHOWN_NUMBERS = 8  # maximum size of q in a sentence
 MOST_NUMBERS = 2_000_000  # maximum size of T_b of all random states
 
 
+@dataclass(eq=False)
 class Sample:
-    """States q (states, nq) rad, qd rad/s and tau N m (states, nv), with exact values for the first `exact_states`.
+    """States q (states, nq) rad, qd rad/s and tau N m (states, nv), with exact values for the first `exact_states`."""
 
-    states: their names, if they have any; notes: findings about what is left out.
-    """
-
-    def __init__(self, tree, name, q, qd, tau, exact_states, states=(), notes=()):
-        self.tree, self.name, self.q, self.qd, self.tau = tree, name, q, qd, tau
-        self.exact_states, self.states, self.notes = exact_states, states, notes
-        self.found = {}
+    tree: tmt.Tree
+    name: str
+    q: np.ndarray
+    qd: np.ndarray
+    tau: np.ndarray
+    exact_states: int
+    states: tuple[str, ...] = ()  # their names, if they have any
+    notes: tuple[Finding, ...] = ()  # about what is left out
+    exact_values: dict[str, "Pairs"] = field(
+        default_factory=dict, repr=False
+    )  # as far as they were asked for
 
     def exact(self, function: str, part: int | None = None) -> "Pairs":
         """The exact values of a function of tmt, or of one of its arrays, at the first states."""
         from tmt.exact.many import exact_of_many  # loads the compiler
 
-        if function not in self.found:
+        if function not in self.exact_values:
             states = (values[: self.exact_states] for values in (self.q, self.qd, self.tau))
-            self.found[function] = exact_of_many(self.tree, function, *states)
-        return self.found[function].part(part)
+            self.exact_values[function] = exact_of_many(self.tree, function, *states)
+        return self.exact_values[function].part(part)
 
     def describe(self, i: int) -> str:
         """The name of state i, or its q."""
@@ -51,9 +58,8 @@ class Sample:
         """The first states, without exact values."""
         if count >= len(self.q):
             return self
-        return Sample(
-            self.tree, self.name, *(a[:count] for a in (self.q, self.qd, self.tau)), 0, self.states[:count]
-        )
+        q, qd, tau = self.q[:count], self.qd[:count], self.tau[:count]
+        return Sample(self.tree, self.name, q, qd, tau, 0, self.states[:count])
 
 
 def named(robot: Robot) -> Sample:
@@ -70,17 +76,18 @@ def random(robot: Robot, states: int, exact_states: int, seed: int = SEED) -> Sa
     """Random states: positions within the ranges of the joints; see `largest_speeds_and_torques`. Large robots have fewer."""
     rng, wanted, nv = np.random.default_rng(seed), states, robot.coordinates.nv
     states = min(wanted, max(1, MOST_NUMBERS // (3 * len(robot.tree.mass) * nv)))
-    fewer = Finding("shared", "fewer_states", {"count": states, "states": wanted, "seconds": None})
-    notes = [fewer] * (states < wanted)
+    notes = []
+    if states < wanted:
+        values = {"count": states, "states": wanted, "seconds": None}
+        notes.append(Finding("shared", "fewer_states", values))
     if nv > MOST_SPEEDS:
         exact_states = 0
         notes.append(Finding("shared", "no_exact_values", {"speeds": nv, "most": MOST_SPEEDS}))
     q = robot.coordinates.random(rng, states, robot.ranges)
     most = largest_speeds_and_torques(robot)[:, None]
     speeds, torques = rng.uniform(-most, most, (2, states, nv))
-    return Sample(
-        robot.tree, "random states", q, speeds, torques, min(exact_states, states), notes=tuple(notes)
-    )
+    exact_states = min(exact_states, states)
+    return Sample(robot.tree, "random states", q, speeds, torques, exact_states, notes=tuple(notes))
 
 
 def seconds(robot: Robot) -> float:
@@ -96,13 +103,11 @@ def largest_speeds_and_torques(robot: Robot) -> np.ndarray:
     """
     if not robot.ranges:
         return np.full((2, robot.coordinates.nv), 10.0)
-    speeds = []
+    speeds: list[float] = []
     for joint, limits in zip(robot.coordinates.places.joints, robot.ranges):
-        low, high = (
-            limits
-            if limits and joint.kind != "ball"
-            else (0.0, 1.0 if joint.kind == "slide" else 2.0 * np.pi)
-        )
+        low, high = 0.0, 1.0 if joint.kind == "slide" else 2.0 * np.pi
+        if limits and joint.kind != "ball":
+            low, high = limits
         speeds += [high - low] * (joint.qd.stop - joint.qd.start)
     mass_matrix, _ = mass_matrix_and_bias(robot.tree, robot.tree.zero, [0.0] * robot.coordinates.nv)
     return np.array([speeds, 10.0 * np.diag(mass_matrix)])

@@ -3,12 +3,13 @@
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tmt import literal
 from tmt.derivation import method
 
-from . import Robot
 from .coordinates import free_joints
+from .robot import Robot
 
 ELEVATION, AZIMUTH = 20.0, -70.0  # deg, of the camera
 _E, _A = np.radians([ELEVATION, AZIMUTH])
@@ -25,8 +26,9 @@ def stick_figure(
     crosses: with the axes of balls at the end of a chain, to show their rotation.
     """
     if robot.landmarks:
-        points = np.stack([along_run(point, q) for point in robot.landmarks(q)], axis=1).astype(float)
-        return points, [(k, k + 1) for k in range(points.shape[1] - 1)]
+        landmarks = [along_run(point, q) for point in robot.landmarks(q)]
+        sticks = [(k, k + 1) for k in range(len(landmarks) - 1)]
+        return np.stack(landmarks, axis=1).astype(float), sticks
     tree, free = robot.tree, {i + k for i in free_joints(robot.tree) for k in range(4)}
     frames = method.joint_frames(tree, list(q.T))
     points = [along_run(frame.origin, q) for frame in frames]
@@ -41,11 +43,11 @@ def stick_figure(
             links += [(joint, len(points) + k) for k in range(len(ends))]
             points += ends
     joined = sorted({point for link in links for point in link})
-    pairs = [(joined.index(one), joined.index(other)) for one, other in links]
+    pairs = [(joined.index(start), joined.index(end)) for start, end in links]
     return np.stack([points[k] for k in joined], axis=1).astype(float), pairs
 
 
-def along_run(vector: Iterable, q: np.ndarray) -> np.ndarray:
+def along_run(vector: Iterable[ArrayLike], q: np.ndarray) -> np.ndarray:
     """A vector whose parts are numbers or arrays (times,), as (times, 3)."""
     return np.stack([np.broadcast_to(part, len(q)) for part in vector], axis=-1)
 

@@ -1,5 +1,7 @@
 """Validation of what users give for a scene."""
 
+from typing import Any
+
 import numpy as np
 
 
@@ -21,7 +23,7 @@ def is_number(value: object) -> bool:
     return number.ndim == 0 and number.dtype.kind in "iuf" and bool(np.isfinite(number))
 
 
-def are_numbers(values: object) -> bool:
+def are_numbers(values: Any) -> bool:
     """Whether a value is a sequence of finite real numbers."""
     row = np.ndim(values) == 1 if isinstance(values, np.ndarray) else isinstance(values, tuple | list | range)
     return row and all(is_number(value) for value in values)

@@ -166,7 +166,7 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict])
     of_numbers = []
     if len(failed) == 1 and not setup.robot.own:
         result, _ = attempt("parameters", module("parameters").rows, setup)
-        of_numbers = result.curves["causes"] if result else []
+        of_numbers = result.causes if result else []
     if (known or of_numbers) and setup.robot.is_stated:
         return in_one(setup, of_numbers)
     is_first = failed[-1] in DIAGNOSED and not any(name in DIAGNOSED for name in failed[:-1])

@@ -1,6 +1,6 @@
 """The reference of a file: the arm's stated numbers, those of a solution, tmt's equations for the model, or a user's own."""
 
-import dataclasses
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,16 +9,17 @@ import numpy as np
 from ..core.text import say
 from ..core.words import in_one_line
 from ..engines import Engine
-from ..engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, load, read
+from ..engines.mujoco import ModelError, Mujoco, Reading, Source, engine, has_hinges, parse, read
 from ..engines.mujoco.names import integrator_by_name
 from ..engines.mujoco.remarks import of_source, remarks
 from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import OwnFileError, aside, own_object, raised_in
 from ..robots import Robot
+from ..robots.actuators import Drive
 from ..robots.arm import ARM
 from ..robots.case import SEED
 from ..robots.file import robot_of, robot_of_solution
-from ..robots.joint_map import JointsError, Unmatched, joint_map, matched_joints
+from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, matched_joints
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 SOLUTION = "solution"  # the kind of reference that is another file
@@ -38,7 +39,7 @@ class Reference(NamedTuple):
     remarks: tuple[str, ...] = ()  # what is fixed, changed or switched off, a line each
     warnings: tuple[str, ...] = ()  # of MuJoCo's compiler, one line each
     source: str = ""  # the solution, or the place of own equations, as given, in one line
-    own: Engine | None = None  # of these equations
+    own: Own | None = None  # the engine of these equations
     renamed: tuple[str, ...] = ()  # "wrist as hand": joints matched under other names
 
     @property
@@ -69,58 +70,62 @@ class Compared(NamedTuple):
         if dt is None and integrator is None:
             return None
         if self.reading is None:
-            raise ModelError(
-                f"--dt and --integrator need a robot's file; the numbers of {self.robot.name} are stated"
-            )
+            stated = f"the numbers of {self.robot.name} are stated"
+            raise ModelError(f"--dt and --integrator need a robot's file; {stated}")
         try:
-            return self.reading.dt if dt is None else dt, integrator_by_name(
-                integrator or self.reading.integrator
-            )
+            name = integrator_by_name(integrator or self.reading.integrator)
         except ValueError as error:
             raise ModelError(f"--integrator: {error}") from None
+        return self.reading.dt if dt is None else dt, name
 
 
-def compared_with(reference, path, joints=None, shown=None, solution=None) -> Compared:
+def compared_with(
+    reference: str | None,
+    path: str | None,
+    joints: str | None = None,
+    shown: str | None = None,
+    solution: str | None = None,
+) -> Compared:
     """A file (None: the arm's) and a reference (None: the arm, if the file has exactly its hinges, else the compiled model).
 
-    All are texts. joints: of own equations, separated by commas, see joint_map; shown: the name of the file, if not its path;
-    solution: the path of the solution, if not `reference`. ModelError, in one line, for a file that cannot be compared,
-    JointsDiffer for different joints, OwnFileError for equations that cannot be used.
+    joints: of own equations, separated by commas, see joint_map; shown: the name of the file, if not its path; solution: the
+    path of the solution, if not `reference`. ModelError, in one line, for a file that cannot be compared, JointsDiffer for
+    different joints, OwnFileError for equations that cannot be used.
     """
-    file, shown, source = (
-        path or ARM.mjcf,
-        in_one_line(shown or path or "mjcf/arm.xml"),
-        in_one_line(reference or ""),
-    )
-    if reference == "arm" or (reference is None and (path is None or has_hinges(path, ARM.joints))):
-        robot, renamed = ARM, ()
-        if not has_hinges(file, ARM.joints):
-            names, renamed = joints_matched(ARM, read(Path(file)), shown, "the arm")
+    source, shown = Source(Path(path or ARM.mjcf)), in_one_line(shown or path or "mjcf/arm.xml")
+    if reference == "arm" or (reference is None and (path is None or has_hinges(source, ARM.joints))):
+        robot, renamed = ARM, Matched(ARM.joints, ()).renamed
+        if not has_hinges(source, ARM.joints):
+            names, renamed = joints_matched(ARM, read(source), shown, "the arm")
             robot = ARM.with_joints(names)
-        mujoco = load(file, robot.tree)
-        said = tuple(map(say, of_source(Path(file), mujoco.model))) if path else ()
-        return Compared(Reference("arm", shown, said, mujoco.warnings, renamed=renamed), robot, mujoco, None)
-    reading = read(Path(file))
-    of_file = Reference("model", shown, tuple(map(say, remarks(reading, has_scenes=True))), reading.warnings)
-    if is_solution(reference):
+        said = tuple(map(say, of_source(source))) if path else ()
+        of_arm = Reference("arm", shown, said, source.warnings, renamed=renamed)
+        return Compared(of_arm, robot, parse(source, robot.tree), None)
+    reading = read(source)
+    said = tuple(map(say, remarks(reading, has_scenes=True)))
+    of_file = Reference("model", shown, said, reading.warnings, source=in_one_line(reference or ""))
+    if reference and is_solution(reference):
         stated = read(Path(solution or reference))
-        names, renamed = joints_matched(stated, reading, shown, source)
-        robot, stated = robot_of_solution(reading, shown, stated, source, names)
-        of_file = of_file._replace(kind=SOLUTION, source=source, renamed=renamed)
-        return Compared(of_file, robot, engine(reading, stated), reading)
+        names, renamed = joints_matched(stated, reading, shown, of_file.source)
+        # its actuators do not act: those of the file may differ
+        stated = replace(stated, tree=replace(stated.tree, joint_names=names), drive=Drive())
+        robot = robot_of_solution(reading, shown, stated, of_file.source)
+        return Compared(
+            of_file._replace(kind=SOLUTION, renamed=renamed), robot, engine(reading, stated), reading
+        )
     robot, mujoco = robot_of(reading, shown), engine(reading)
     if reference in (None, "model"):
-        return Compared(of_file, robot, mujoco, reading)
+        return Compared(of_file._replace(source=""), robot, mujoco, reading)
     own = own_engine(reference, robot, mujoco, joints)
-    robot = dataclasses.replace(robot, own=tuple(own.equations.functions))
-    return Compared(of_file._replace(kind="own", source=source, own=own), robot, mujoco, reading)
+    robot = replace(robot, own=tuple(own.equations.functions))
+    return Compared(of_file._replace(kind="own", own=own), robot, mujoco, reading)
 
 
 def is_solution(reference: str | None) -> bool:
     return (reference or "").lower().endswith((".xml", ".mjcf"))
 
 
-def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose: str) -> tuple[tuple, tuple]:
+def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose: str) -> Matched:
     """The file's joints in the order of the stated ones, and those matched under other names. JointsDiffer if any is left."""
     try:
         return matched_joints(stated.tree, reading.tree, whose)

@@ -9,7 +9,7 @@ import tmt
 from compare.engines.mujoco import load, parse
 from compare.engines.mujoco.linear import left_to_itself
 from compare.engines.mujoco.parameters import parameters
-from compare.experiments.parameters import stated
+from compare.experiments.parameters import stated_of_hinges
 from compare.robots.arm import ARM
 
 REST = np.zeros(3)
@@ -42,12 +42,9 @@ def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path
     dynamics, (q, v, tau), dt = load(robot.mjcf, robot.tree).of(case), rng.uniform(-1.0, 1.0, (3, 4)), 0.01
     ours, motion = tmt.simulate(q, v, tau, dt, 5, "rk4", case.tree), dynamics.run(q, v, tau, dt, 5, "RK4")
     assert np.allclose(motion.q, ours.q, atol=1e-11) and np.allclose(motion.v, ours.qd, atol=1e-10)
-    alone, motion = (
-        left_to_itself(dynamics, q, v, tau, dt, 5, "Euler"),
-        dynamics.run(q, v, tau, dt, 5, "Euler"),
-    )
+    alone = left_to_itself(dynamics, q, v, tau, dt, 5, "Euler")
+    motion = dynamics.run(q, v, tau, dt, 5, "Euler")
     assert np.allclose(alone["q"], motion.q, atol=1e-13) and np.allclose(alone["qd"], motion.v, atol=1e-12)
-    compiled = parameters(dynamics)
-    assert all(
-        np.allclose(compiled[name], numbers, atol=1e-14) for name, numbers in stated(case.tree).items()
-    )
+    compiled, stated = parameters(dynamics), stated_of_hinges(case.tree)
+    for name in compiled.keys() & stated.keys():
+        assert np.allclose(compiled[name], stated[name], atol=1e-14), name

@@ -11,7 +11,7 @@ from edited import XML
 
 from compare.engines.mujoco import ModelError, load, parse, read
 from compare.engines.mujoco.parameters import parameters
-from compare.engines.mujoco.source import compiled_without, editable, without_visuals
+from compare.engines.mujoco.source import compiled_without, without_visuals
 from compare.robots.arm import ARM
 
 JOINTS = 'name="gamma" type="hinge"'
@@ -95,7 +95,7 @@ def test_body_axes_are_those_of_the_world_at_zero(rng):
 @pytest.mark.filterwarnings("ignore:compiler attribute")
 def test_what_is_taken_out_changes_no_number_of_the_motion(compiler, option):
     def spec():
-        return editable(
+        return mujoco.MjSpec.from_string(
             f"<mujoco><compiler {compiler}/>{option}{ASSETS.replace(str(PIXELS), '2')}{BODIES}</mujoco>"
         )
 

@@ -79,7 +79,7 @@ def test_a_point_mass_that_is_fixed_to_a_body_counts(rng):
 def test_a_published_file_is_the_same_in_both_and_with_joints_locked(path, rng):
     reading = compared(path, rng, states=1)
     assert_locked(reading, [name for name in reading.tree.joint_names if rng.random() < 0.3], rng)
-    for row in stated_numbers(reading.source, reading.model):
+    for row in stated_numbers(reading.source):
         if row.stated is not None and not row.why:
             assert np.allclose(row.stated, row.compiled, rtol=1e-6, atol=1e-12), row
 

@@ -6,7 +6,7 @@ import pytest
 from files import PLAIN, URDF, mjcf
 from models import PATHS
 
-from compare.engines.mujoco import read
+from compare.engines.mujoco import Source
 from compare.engines.mujoco.parameters import stated_numbers
 
 SMALL = 1e-14  # relative; of a tensor up to MuJoCo 3.10: its principal moments are found to about 1e-6
@@ -19,8 +19,7 @@ def difference(row):
 
 
 def rows_of(text):
-    reading = read(text)
-    return {(row.place, row.quantity): row for row in stated_numbers(reading.source, reading.model)}
+    return {(row.place, row.quantity): row for row in stated_numbers(Source(text))}
 
 
 FRAMES = """<frame pos="0.1 0.2 0.3" euler="10 20 30"><body name="b" pos="1 2 3" euler="40 50 60">

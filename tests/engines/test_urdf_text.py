@@ -69,4 +69,4 @@ def assert_the_same(source, rng, states=5):
 )
 def test_what_a_urdf_cannot_say_is_refused(name, why):
     with pytest.raises(ValueError, match=why):
-        urdf(PATHS[name])
+        urdf(read(PATHS[name]).model)

@@ -3,22 +3,22 @@
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from types import MappingProxyType
+from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco.rollout import rollout
 
 from ...robots.actuators import Drive, Rows
-from ...robots.case import Coordinates
-from .actuators import control_of
+from ...robots.coordinates import FREE, Coordinates
+from .dynamics import Array
 from .engine import MOST_ITERATIONS, SOLVED, UNLIMITED
-from .inventory import NOT_HAD_FIELDS, open_equalities
+from .inventory import NOT_HAD_FIELDS, open_equalities, set_fields
 from .linear import NUDGE
-from .names import INTEGRATORS, bit, kind_of, output_of
+from .names import INTEGRATORS, bit, control_of, kind_of, output_of
 
 # besides the joints' springs and dampers these drive a robot here and stay
 DRIVES = ("body_gravcomp", "tendon_stiffness", "tendon_damping")
-FREE = ("slide", "slide", "slide", "ball")
 # it is implicit in the constraints' springs and dampers
 DISCRETE = getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", None)
 
@@ -46,11 +46,7 @@ class Acting:
             m.opt.disableflags &= ~(bit("CONSTRAINT") | bit("EQUALITY"))
             m.opt.tolerance, m.opt.iterations = SOLVED, max(m.opt.iterations, MOST_ITERATIONS)
         m.opt.enableflags, m.opt.density, m.opt.viscosity = 0, 0.0, 0.0
-        for name in set(NOT_HAD_FIELDS) - set(DRIVES):
-            if hasattr(m, name):
-                getattr(m, name)[:] = 0
-        for name in UNLIMITED:
-            getattr(m, name)[:] = 0
+        set_fields(m, (*(set(NOT_HAD_FIELDS) - set(DRIVES)), *UNLIMITED), 0)
         for i, one in enumerate(drive.actuators):
             if not one.acts or i in cut:
                 m.actuator_gaintype[i] = mujoco.mjtGain.mjGAIN_FIXED
@@ -62,14 +58,15 @@ class Acting:
         if weightless:
             m.opt.gravity[:] = 0.0
         self.data = mujoco.MjData(m)
-        kinds = [FREE if kind_of(m, j) == "free" else (kind_of(m, j),) for j in range(m.njnt)]
-        kinds = tuple(kind for of_joint in kinds for kind in of_joint)
-        self.coordinates = Coordinates(tuple(map(str, range(len(kinds)))), kinds)
+        kinds: list[str] = []
+        for j in range(m.njnt):
+            kinds += FREE if kind_of(m, j) == "free" else [kind_of(m, j)]
+        self.coordinates = Coordinates(tuple(map(str, range(len(kinds)))), tuple(kinds))
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "data"}
 
-    def __setstate__(self, state: dict) -> None:
+    def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self.data = mujoco.MjData(self.model)  # a pickled one with a plugin ends the process
 
@@ -142,8 +139,9 @@ class Acting:
         return [int(self.model.actuator_actadr[i]) for i in filters]
 
     def deviations(
-        self, q, u, dt, integrator, steps: Sequence[int], movement=0.0, speed=0.0, activation=0.0, jump=0.0
-    ) -> Iterator[np.ndarray]:
+        self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str, steps: Sequence[int],
+        movement: Array = 0.0, speed: Array = 0.0, activation: Array = 0.0, jump: Array = 0.0,
+    ) -> Iterator[np.ndarray]:  # fmt: skip
         """Deviations from q after each step of a run, then of filters' activations from u; one array for each part of the run.
 
         steps: their number in each part. Each array is (steps, nv + filters), in rad or m. The run starts at q with a small

@@ -1,25 +1,33 @@
 """The actuators, tendons and gravity compensation of a compiled model."""
 
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from ...robots.actuators import Actuator, Drive, Tendon
-from .names import OF_A_JOINT, element_name, joint_name, kind_of, number_of_actuators, on, output_of
-from .source import editable_again
-
-WITH_LENGTH = (
-    *OF_A_JOINT,
-    mujoco.mjtTrn.mjTRN_SLIDERCRANK,
-    mujoco.mjtTrn.mjTRN_TENDON,
-    mujoco.mjtTrn.mjTRN_SITE,
+from .names import (
+    OF_A_JOINT,
+    control_of,
+    element_name,
+    joint_name,
+    kind_of,
+    names_where,
+    number_of_actuators,
+    on,
+    output_of,
 )
+from .source import Source
+
+WITH_LENGTH = [
+    *OF_A_JOINT,
+    *(getattr(mujoco.mjtTrn, f"mjTRN_{name}") for name in ("SLIDERCRANK", "TENDON", "SITE")),
+]
 GAINS = {"FIXED": 1, "AFFINE": 3}  # how many numbers of its law each kind has
 BIASES = {"NONE": 0, "AFFINE": 3}
 DYNAMICS = {"NONE": "none", "INTEGRATOR": "integrator", "FILTER": "filter", "FILTEREXACT": "filterexact"}
+NAMED_LAWS = {"DCMOTOR": "a DC motor", "USER": "a user-defined law"}
 GROUPS = 31  # that can be switched off
 # springs and dampers that are left out where these fields are not 0: by element
 NOT_LINEAR = {
@@ -28,19 +36,19 @@ NOT_LINEAR = {
 }
 
 
-def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Mapping[int, str]) -> Drive:
+def drive_of(source: Source, bodies: Sequence[int], keys: Mapping[int, str]) -> Drive:
     """Actuators, tendons and gravity compensation of a compiled model.
 
-    source: what it was read from, a Path, text or None; bodies: of the Tree, by number; keys: names of keyframes.
+    bodies: of the Tree, by number; keys: names of keyframes.
     """
+    model = source.model
     passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
+    tendons = [tendon_of(model, i) for i in range(model.ntendon)]
     return Drive(
         actuators=tuple(actuator(model, i) for i in range(number_of_actuators(model))),
-        tendons=tuple(
-            one for one in map(partial(tendon, model), range(model.ntendon)) if one.stiffness or one.damping
-        ),
+        tendons=tuple(tendon for tendon in tendons if tendon.stiffness or tendon.damping),
         compensation=tuple(map(float, model.body_gravcomp[list(bodies)] * passive)),
-        controls={keys[k]: u for k, u in stated_controls(model, source).items() if k in keys},
+        controls={keys[k]: u for k, u in stated_controls(source).items() if k in keys},
         unknown=unknown_springs(model),
         explicit_damping=not on(model, "EULERDAMP"),
     )
@@ -79,22 +87,13 @@ def force_range(m: mujoco.MjModel, i: int) -> tuple[float, float] | None:
     return (float(max(low for low, _ in ranges)), float(min(high for _, high in ranges))) if ranges else None
 
 
-def control_of(m: mujoco.MjModel, i: int) -> tuple[int, int]:
-    """The index of the first control of an actuator, and the number of its controls."""
-    if hasattr(m, "actuator_ctrlnum"):
-        return int(m.actuator_ctrladr[i]), int(m.actuator_ctrlnum[i])
-    return i, 1
-
-
 def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inputs: int) -> str:
     """Why the law of an actuator cannot be evaluated here; "" if it can."""
     if m.actuator_plugin[i] >= 0:
         return "a plugin"
     for word, known in ((dynamics, DYNAMICS), (gain, GAINS), (bias, BIASES)):
         if word not in known:
-            return {"DCMOTOR": "a DC motor", "USER": "a user-defined law"}.get(
-                word, f"a law of type {word.lower()}"
-            )
+            return NAMED_LAWS.get(word, f"a law of type {word.lower()}")
     if inputs != 1:
         return f"{inputs} controls"
     if np.any(getattr(m, "actuator_delay", np.zeros(i + 1))[i]):
@@ -102,10 +101,8 @@ def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inpu
     transmission = mujoco.mjtTrn(m.actuator_trntype[i])
     if transmission not in WITH_LENGTH:
         return f"a transmission of type {transmission.name.removeprefix('mjTRN_').lower()}"
-    damping = (getattr(m, name, np.zeros(i + 1))[i] for name in ("actuator_damping", "actuator_dampingpoly"))
-    if any(map(np.any, damping)):
-        return "damping of its own"
-    return ""
+    damping = [getattr(m, f"actuator_{name}", np.zeros(i + 1))[i] for name in ("damping", "dampingpoly")]
+    return "damping of its own" if any(map(np.any, damping)) else ""
 
 
 def off(m: mujoco.MjModel, i: int) -> str:
@@ -118,7 +115,7 @@ def off(m: mujoco.MjModel, i: int) -> str:
     return ""
 
 
-def moment_of(m: mujoco.MjModel, i: int) -> tuple[str, tuple | None]:
+def moment_of(m: mujoco.MjModel, i: int) -> tuple[str, tuple[float, ...] | None]:
     """The first joint on which an actuator acts, or ""; and dl/dq where it is the same everywhere, else None."""
     transmission, target = mujoco.mjtTrn(m.actuator_trntype[i]), int(m.actuator_trnid[i, 0])
     joint, moment = "", None
@@ -144,18 +141,14 @@ def tendon_moment(m: mujoco.MjModel, i: int) -> np.ndarray | None:
     return moment
 
 
-def tendon(m: mujoco.MjModel, i: int) -> Tendon:
+def tendon_of(m: mujoco.MjModel, i: int) -> Tendon:
     """The spring and the damper of a tendon."""
     moment = tendon_moment(m, i)
     low, high = map(float, m.tendon_lengthspring[i])
+    stiffness, damping = m.tendon_stiffness[i] * on(m, "SPRING"), m.tendon_damping[i] * on(m, "DAMPER")
+    at_all_postures = None if moment is None else tuple(moment.tolist())
     return Tendon(
-        element_name(m, "tendon", i),
-        i,
-        None if moment is None else tuple(moment.tolist()),
-        float(m.tendon_stiffness[i]) * on(m, "SPRING"),
-        float(m.tendon_damping[i]) * on(m, "DAMPER"),
-        low,
-        high,
+        element_name(m, "tendon", i), i, at_all_postures, float(stiffness), float(damping), low, high
     )
 
 
@@ -164,45 +157,40 @@ def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
     reasons = {}
     for element, fields in NOT_LINEAR.items():
         for field in fields:
-            values = np.asarray(getattr(m, field, ()))
-            for k in np.flatnonzero(values.reshape(len(values), -1).any(axis=1)) if len(values) else ():
-                number = m.dof_jntid[k] if field.startswith("dof_") else k
-                reasons[f"{element} {element_name(m, element, number)}"] = f"{field} is not 0"
+            for name in names_where(m, field, np.asarray(getattr(m, field, ())) != 0):
+                reasons[f"{element} {name}"] = f"{field} is not 0"
     return reasons
 
 
-def stated_controls(m: mujoco.MjModel, source) -> dict[int, tuple]:
+def stated_controls(source: Source) -> dict[int, tuple[float | None, ...]]:
     """By the number of a keyframe u of each actuator, None where it states none.
 
     u of an integrator is its activation, of a filter the control, at which it settles. The compiled model has zeros where a file
     states none: the file tells. Of a model compiled elsewhere all zeros are none.
     """
-    spec = None  # its keyframes live as long as it does
-    if source is not None:
-        with suppress(ValueError):
-            spec = editable_again(source)
+    m, spec = source.model, source.spec
     keys = spec.keys if spec is not None and len(spec.keys) == m.nkey else None
     controls = {}
     for k in range(m.nkey):
-        control = len(keys[k].ctrl) > 0 if keys else m.key_ctrl[k].any()
-        activation = len(keys[k].act) > 0 if keys else m.key_act[k].any()
-        stated = [None] * number_of_actuators(m)
-        for i in range(len(stated)):
+        has_controls = len(keys[k].ctrl) > 0 if keys else m.key_ctrl[k].any()
+        has_activations = len(keys[k].act) > 0 if keys else m.key_act[k].any()
+        stated: list[float | None] = []
+        for i in range(number_of_actuators(m)):
             place, inputs = control_of(m, i)
             if kind(mujoco.mjtDyn, m.actuator_dyntype[i]) == "INTEGRATOR":
-                stated[i] = float(m.key_act[k, m.actuator_actadr[i]]) if activation else None
-            elif inputs and control:
-                stated[i] = float(m.key_ctrl[k, place])
-        if stated and (control or activation):
+                stated.append(float(m.key_act[k, m.actuator_actadr[i]]) if has_activations else None)
+            else:
+                stated.append(float(m.key_ctrl[k, place]) if inputs and has_controls else None)
+        if stated and (has_controls or has_activations):
             controls[k] = tuple(stated)
     return controls
 
 
-def kind(enum, value) -> str:
-    """The name of a member without its prefix."""
+def kind(enum: Callable[[int], Any], value: int) -> str:
+    """The name of a member of an enum of MuJoCo's, without its prefix."""
     return enum(int(value)).name.partition("_")[2]
 
 
-def law(values, count: int) -> tuple:
+def law(values: np.ndarray, count: int) -> tuple[float, ...]:
     """The first numbers of a law, filled up with zeros to three."""
     return (*map(float, values[:count]), *[0.0] * (3 - count))

@@ -9,10 +9,9 @@ import numpy as np
 
 from ..outside.model import together
 from .inventory import switch_off
-from .names import INTEGRATORS, bit, joint_places, rotors
-from .parameters import matrix, tensor
+from .names import INTEGRATORS, bit, joint_places, matrix, rotors, tensor
 from .reading import carriers
-from .source import locked_model
+from .source import Source
 
 HELD = (
     "body_parentid", "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat", "jnt_bodyid",
@@ -28,15 +27,13 @@ class Bare:
     """
 
     def __init__(self, path: Path, names: Sequence[str], rotors_in_joints: bool = False):
-        self.model = locked_model(path, {}, bare=True)
+        self.model = Source(path).without({}, bare=True)
         switch_off(self.model)
         self.model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
-        self.model.opt.disableflags |= bit(
-            "WARMSTART"
-        )  # its solver starts from the unconstrained acceleration
-        self.model.opt.solver = (
-            mujoco.mjtSolver.mjSOL_NEWTON
-        )  # of constraints, which are off; both refuse PGS
+        # its solver starts from the unconstrained acceleration
+        self.model.opt.disableflags |= bit("WARMSTART")
+        # of constraints, which are off; both refuse PGS
+        self.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
         if rotors_in_joints and hasattr(self.model, "actuator_armature"):
             self.model.dof_armature += rotors(self.model)
             self.model.actuator_armature[:] = 0.0
@@ -50,7 +47,7 @@ class Bare:
         self.qpos = np.array([i for place in self.places.values() for i in place.qpos])
         self.dofs = np.array([i for place in self.places.values() for i in place.dofs])
 
-    def with_integrator(self, name: str):
+    def with_integrator(self, name: str) -> mujoco.MjModel:
         """The model, which has this integrator now."""
         self.model.opt.integrator = INTEGRATORS[name]
         return self.model
@@ -58,21 +55,19 @@ class Bare:
     def numbers(self, held: Callable[[str], np.ndarray]) -> dict[str, np.ndarray]:
         """ReadModel.numbers, except gravity, of what an engine holds by MuJoCo's names, see HELD."""
         m = SimpleNamespace(nbody=self.model.nbody, **{name: held(name) for name in HELD})
-        carrier, has_joint = carriers(m, self.places), set(m.jnt_bodyid.tolist())
-        frames, carried = [(np.zeros(3), np.eye(3))], {joint: [] for joint in range(len(self.places))}
+        carrier, has_joint = carriers(m, list(self.places.values())), set(m.jnt_bodyid.tolist())
+        frames = [(np.zeros(3), np.eye(3))]  # of each body in the axes of the last one that a joint moves
+        carried: list[list[tuple[float, np.ndarray, np.ndarray]]] = [[] for _ in self.places]
         for body in range(1, m.nbody):
-            (at, turn), is_carried = frames[m.body_parentid[body]], body not in has_joint
-            own = (at + turn @ m.body_pos[body], turn @ matrix(m.body_quat[body]))
-            at, turn = own if is_carried else frames[0]  # in the axes of the body that the joint moves
+            at, turn = frames[0]
+            if body not in has_joint:
+                at, turn = frames[m.body_parentid[body]]
+                at, turn = at + turn @ m.body_pos[body], turn @ matrix(m.body_quat[body])
             frames.append((at, turn))
             if carrier[body] >= 0:
-                inertia = turn @ tensor(m.body_iquat[body], m.body_inertia[body]) @ turn.T
+                inertia = turn @ tensor(matrix(m.body_iquat[body]), m.body_inertia[body]) @ turn.T
                 carried[carrier[body]].append((m.body_mass[body], at + turn @ m.body_ipos[body], inertia))
-        mass, moments = zip(*(together(bodies) for bodies in carried.values()))
-        speeds = {
-            "armature": m.dof_armature,
-            "damping": m.dof_damping,
-            "stiffness": m.jnt_stiffness[m.dof_jntid],
-        }
-        speeds = {name: values[self.dofs] for name, values in speeds.items()}
-        return {"mass": np.array(mass), "moments": np.array(moments)} | speeds
+        mass, moments = zip(*map(together, carried))
+        numbers = {"mass": np.array(mass), "moments": np.array(moments)}
+        numbers |= {"armature": m.dof_armature[self.dofs], "damping": m.dof_damping[self.dofs]}
+        return numbers | {"stiffness": m.jnt_stiffness[m.dof_jntid][self.dofs]}

@@ -16,6 +16,7 @@ from tmt.compiled.machine import Library
 from .dynamics import MujocoDynamics
 from .names import bit
 
+Run = Callable[[int], None]  # how many times
 TINY_STEP = 1e-9  # s: a loop of steps stays where it starts
 
 
@@ -38,7 +39,7 @@ class MinimalCalls:
     def unavailable() -> str | None:
         return None if library() else "MuJoCo's library was not found in its package"
 
-    def loops(self, q, v, tau) -> dict[str, tuple[str, Callable]]:
+    def loops(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> dict[str, tuple[str, Run]]:
         """For each way: (quantity, run(count)), where run repeats it count times at one state.
 
         q, v, tau: (n,) rad, rad/s, N m. mj_forward does all that MuJoCo does for an acceleration; the equal work is only what
@@ -46,23 +47,24 @@ class MinimalCalls:
         """
         self.place(q, v, tau)
         mujoco.mj_forward(self.model, self.data)
-        addresses = [
-            self.model._address,
-            self.data._address,
-            self.force.ctypes.data,
-            self.solution.ctypes.data,
-        ]
+        path = library() or ""
 
-        def run(*names):
-            loop = repeated(library(), names)
-            # what the addresses point to must live as long as the call
-            return lambda count, _=self: loop(*addresses, count)
+        def run(*names: str) -> Run:
+            loop = repeated(path, names)
 
-        def called(count):
+            def repeat(
+                count: int,
+            ) -> None:  # of self: what the addresses point to must live as long as the call
+                structures = self.model._address, self.data._address
+                loop(*structures, self.force.ctypes.data, self.solution.ctypes.data, count)
+
+            return repeat
+
+        def called(count: int) -> None:
             for _ in range(count):
                 mujoco.mj_forward(self.model, self.data)
 
-        mass_matrix = "mj_makeM" if hasattr(ctypes.CDLL(library()), "mj_makeM") else "mj_crb"
+        mass_matrix = "mj_makeM" if hasattr(ctypes.CDLL(path), "mj_makeM") else "mj_crb"
         before, after = ("mj_kinematics", "mj_comPos", mass_matrix), ("mj_comVel", "mj_rne")
         return {
             "MuJoCo, mj_forward called from Python": ("forward_dynamics", called),
@@ -71,13 +73,13 @@ class MinimalCalls:
             "MuJoCo, mj_step": ("rk4_step", run("mj_step")),
         }
 
-    def place(self, q, v, tau) -> None:
+    def place(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> None:
         d = self.data
         d.qpos[self.qpos], d.qvel[self.dofs], d.qfrc_applied[self.dofs] = q, v, tau
 
 
 @cache
-def repeated(path: str, names: tuple[str, ...]) -> Callable:
+def repeated(path: str, names: tuple[str, ...]) -> Callable[..., None]:
     """run(model, data, bias, acceleration, count): functions of the library one after the other, count times."""
     more = {"mj_rne": ", i32 0, ptr %bias", "mj_solveM": ", ptr %acceleration, ptr %bias, i32 1"}
     lines = ""

@@ -6,14 +6,20 @@
 MuJoCo's derived fields belong to the last mj_forward, not to the last step: every quantity is evaluated with mj_forward.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from mujoco.rollout import rollout
+from numpy.typing import ArrayLike
 
+from ...robots.case import Case
 from .. import GRID, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
 from .names import EVALUATIONS, INTEGRATORS, bit, element_name, joint_places, moving, number_of_actuators
+
+Array = np.ndarray | float
+Read = Callable[[mujoco.MjData], ArrayLike]  # a quantity of a state
 
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
 _log = mujoco.MjLogConfig.get()
@@ -21,193 +27,216 @@ _log.logto_file = _log.logto_console = False
 _log.set()
 
 
+class Engaged(NamedTuple):
+    """Actuators that act under constant controls."""
+
+    ctrl: Array = 0.0
+    act: Array = 0.0  # activations
+    torque: Array = 0.0  # the constant part of their generalized force, (nv,)
+
+
 class MujocoDynamics:
     """MuJoCo with one model; quantities at any states q (..., nq), v and tau (..., nv), joints in the order of the coordinates.
 
-    bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the position zero, (nq,).
-    bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move. ctrl, act: constant
-    controls and activations of its actuators; of a given torque only the part beyond their constant part is applied.
+    bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the position zero.
+    bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move. engaged: its
+    actuators; of a given torque only the part beyond their constant part is applied.
     """
 
-    def __init__(self, model, coordinates, bodies, zero, bare=False, ctrl=0.0, act=0.0, constant=0.0):
+    def __init__(
+        self, model: mujoco.MjModel, case: Case, bodies: Sequence[int], bare: bool, engaged: Engaged
+    ) -> None:
         # where states are evaluated the file's integrator must not matter, as `discrete` does
         model.opt.integrator = INTEGRATORS["RK4"]
         model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)
         if bare:  # their height would count in the energy
             model.body_mass[np.setdiff1d(np.flatnonzero(~moving(model)), bodies)] = 0.0
         self.model, self.data = model, mujoco.MjData(model)
-        self.data.ctrl[:], self.data.act[:], self.constant = ctrl, act, constant
-        self.coordinates, self.bodies, self.bare = coordinates, list(bodies), bare
+        self.data.ctrl[:], self.data.act[:], self.constant = engaged
+        self.coordinates, self.bodies, self.bare = case.coordinates, list(bodies), bare
         by_name = joint_places(model)
-        joints = [by_name[name] for name in coordinates.names]
-        self.joints = np.array([place.joint for place in joints])
-        self.qpos = np.array([i for place in joints for i in place.qpos])
-        self.dofs = np.array([i for place in joints for i in place.dofs])
-        self.forward(zero)
+        places = [by_name[name] for name in case.joints]
+        self.joints = np.array([place.joint for place in places])
+        self.qpos = np.array([i for place in places for i in place.qpos])
+        self.dofs = np.array([i for place in places for i in place.dofs])
+        self.forward(np.array(case.tree.zero))
         self.zero_axes = self.turns(self.data.xmat)
 
-    def com_positions(self, q) -> np.ndarray:
+    def com_positions(self, q: Array) -> np.ndarray:
         """CoM positions in the world, m, (..., m, 3): xipos."""
         return self._each(lambda d: d.xipos[self.bodies], q)
 
-    def angular_velocities(self, q, v) -> np.ndarray:
+    def angular_velocities(self, q: Array, v: Array) -> np.ndarray:
         """Angular velocities in body axes, rad/s, (..., m, 3): R' times the angular part of cvel."""
         return self._each(lambda d: self._to_body(d.cvel[self.bodies, :3]), q, v)
 
-    def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
+    def jacobians(self, q: Array) -> tuple[np.ndarray, np.ndarray]:
         """T_b and B_b, (..., m, 3, nv): mj_jacBodyCom, its rotational part turned into body axes."""
-        pairs = self._each(
-            lambda d: self._of_bodies(lambda T, B, b: mujoco.mj_jacBodyCom(self.model, d, T, B, b)), q
-        )
+
+        def both(d: mujoco.MjData) -> np.ndarray:
+            return self._of_bodies(lambda T, B, body: mujoco.mj_jacBodyCom(self.model, d, T, B, body))
+
+        pairs = self._each(both, q)
         return pairs[..., 0, :, :, :], pairs[..., 1, :, :, :]
 
-    def convective_terms(self, q, v) -> tuple[np.ndarray, np.ndarray]:
+    def convective_terms(self, q: Array, v: Array) -> tuple[np.ndarray, np.ndarray]:
         """v_conv, world, and w_conv, body axes, (..., m, 3): mj_jacDot times qvel."""
 
-        def terms(d):
-            rates = self._of_bodies(
-                lambda T, B, body: mujoco.mj_jacDot(self.model, d, T, B, d.xipos[body], body)
-            )
-            return rates @ d.qvel[self.dofs]
+        def terms(d: mujoco.MjData) -> np.ndarray:
+            def rates(T: np.ndarray, B: np.ndarray, body: int) -> None:
+                mujoco.mj_jacDot(self.model, d, T, B, d.xipos[body], body)
+
+            return self._of_bodies(rates) @ d.qvel[self.dofs]
 
         pairs = self._each(terms, q, v)
         return pairs[..., 0, :, :], pairs[..., 1, :, :]
 
-    def mass_matrix(self, q) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> np.ndarray:
         """M, kg m2, (..., nv, nv): mj_fullM."""
         full = np.zeros((self.model.nv, self.model.nv))
 
-        def dense(d):
+        def dense(d: mujoco.MjData) -> np.ndarray:
             mujoco.mj_fullM(self.model, d, full)
             return full[np.ix_(self.dofs, self.dofs)]
 
         return self._each(dense, q)
 
-    def bias(self, q, v) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> np.ndarray:
         """h, N m, (..., nv): qfrc_bias."""
         return self._each(lambda d: d.qfrc_bias[self.dofs], q, v)
 
-    def gravity_balance(self, q) -> np.ndarray:
+    def gravity_balance(self, q: Array) -> np.ndarray:
         """N m, (..., nv): qfrc_bias at rest."""
         return self.bias(q, 0.0)
 
-    def spring_torque(self, q) -> np.ndarray:
+    def spring_torque(self, q: Array) -> np.ndarray:
         """N m, (..., nv): -qfrc_spring."""
         return self._each(lambda d: -d.qfrc_spring[self.dofs], q)
 
-    def acceleration(self, q, v, tau) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, tau: Array) -> np.ndarray:
         """a, rad/s2, (..., nv): qacc."""
         return self._each(lambda d: d.qacc[self.dofs], q, v, self.applied(tau))
 
-    def inverse(self, q, v, a) -> np.ndarray:
+    def inverse(self, q: Array, v: Array, a: Array) -> np.ndarray:
         """The torque for which a is the acceleration, N m, (..., nv): mj_inverse."""
 
-        def torque(d):
+        def torque(d: mujoco.MjData) -> np.ndarray:
             d.qacc[self.dofs] = d.qfrc_applied[self.dofs]
             mujoco.mj_inverse(self.model, d)
             return d.qfrc_inverse[self.dofs]
 
         return self._each(torque, q, v, a)  # a travels in the place of tau
 
-    def acting_actuators(self, q, v) -> list[str]:
+    def acting_actuators(self, q: Array, v: Array) -> list[str]:
         """The names of the actuators that exert a force at a state."""
         forces = self._each(lambda d: d.actuator_force, q, v).reshape(-1, number_of_actuators(self.model))
-        return [element_name(self.model, "actuator", i) for i in np.flatnonzero(forces.any(axis=0))]
+        return [element_name(self.model, "actuator", i) for i in np.flatnonzero(forces.any(axis=0)).tolist()]
 
-    def other_forces(self, q, v) -> dict:
+    def other_forces(self, q: Array, v: Array) -> dict[str, np.ndarray]:
         """Forces that the case's equations do not have, by source, N m, (..., nv) each."""
         D, has_springs = self.model.dof_damping, self.bare
-        passive = "fluid and tendons" if has_springs else "springs, fluid and tendons"
+
+        def passive(d: mujoco.MjData) -> np.ndarray:
+            return (d.qfrc_passive + D * d.qvel - has_springs * d.qfrc_spring)[self.dofs]
+
         return {
-            passive: self._each(
-                lambda d: (d.qfrc_passive + D * d.qvel - has_springs * d.qfrc_spring)[self.dofs], q, v
-            ),
+            "fluid and tendons" if has_springs else "springs, fluid and tendons": self._each(passive, q, v),
             "actuators": self._each(lambda d: d.qfrc_actuator[self.dofs], q, v),
             "constraints and contacts": self._each(lambda d: d.qfrc_constraint[self.dofs], q, v),
         }
 
-    def potential_energy(self, q) -> np.ndarray:
+    def potential_energy(self, q: Array) -> np.ndarray:
         """V, J, (...): mj_energyPos."""
+        return self._energies(q, 0.0)[..., 0]
 
-        def energy(d):
-            mujoco.mj_energyPos(self.model, d)
-            return d.energy[0]
-
-        return self._each(energy, q)
-
-    def energy(self, q, v) -> np.ndarray:
+    def energy(self, q: Array, v: Array) -> np.ndarray:
         """Potential and kinetic energy together, J, (...): mj_energyPos and mj_energyVel."""
+        return self._energies(q, v).sum(axis=-1)
 
-        def energy(d):
+    def _energies(self, q: Array, v: Array) -> np.ndarray:
+        def energies(d: mujoco.MjData) -> np.ndarray:
             mujoco.mj_energyPos(self.model, d)
             mujoco.mj_energyVel(self.model, d)
-            return d.energy.sum()
+            return d.energy
 
-        return self._each(energy, q, v)
+        return self._each(energies, q, v)
 
-    def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
+    def run(
+        self,
+        q: Array,
+        v: Array,
+        tau: Array,
+        dt: float,
+        steps: int,
+        method: str,
+        tolerance: float | None = None,
+    ) -> Motion:
         """Motion under constant torque: q (..., steps + 1, nq), v (..., steps + 1, nv), NaN from where a run diverges."""
         batch = np.broadcast_shapes(*(np.shape(value)[:-1] for value in (q, v, tau)))
-        starts, follow = self.runner(q, v, tau, dt, steps, method, tolerance)
-        *paths, ended = self.path(starts, follow(), dt)
-        q, v = (path.reshape(*batch, steps + 1, path.shape[-1]) for path in paths)
+        starts, follow = self.runner((q, v, tau), dt, steps, method, tolerance)
+        q_path, v_path, ended = self.path(starts, follow(), dt)
+        q_path = q_path.reshape(*batch, steps + 1, q_path.shape[-1])
+        v_path = v_path.reshape(*batch, steps + 1, v_path.shape[-1])
         evaluations, ended = len(starts) * steps * EVALUATIONS[method], ended.reshape(batch)[()]
-        return Motion(dt * np.arange(steps + 1), q, v, evaluations, ended, steps)
+        return Motion(dt * np.arange(steps + 1), q_path, v_path, evaluations, ended, steps)
 
-    def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
-        every, dt = setting.every, setting.duration / setting.steps
-        starts, run = self.runner(q, v, tau, dt, setting.steps, method, setting.tolerance)
+    def prepare(self, q: Array, v: Array, tau: Array, setting: Setting, method: str) -> Prepared:
+        steps, every = int(setting.steps or 0), setting.every
+        dt, evaluations = setting.duration / steps, steps * EVALUATIONS[method]
+        starts, run = self.runner((q, v, tau), dt, steps, method, setting.tolerance)
         t = np.linspace(0.0, setting.duration, GRID + 1)
 
-        def read(states):
+        def read(states: np.ndarray) -> Motion:
             q, v, ended = self.path(starts, states, dt)
-            return Motion(
-                t, q[0, ::every], v[0, ::every], setting.steps * EVALUATIONS[method], ended[0], setting.steps
-            )
+            return Motion(t, q[0, ::every], v[0, ::every], evaluations, ended[0], steps)
 
         return run, read
 
-    def path(self, starts, states, dt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def path(
+        self, starts: np.ndarray, states: np.ndarray, dt: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q and v of runs (runs, steps + 1, ...), NaN from where one diverges, and why it does, or None."""
         states = np.concatenate([starts[:, None], states], axis=1)
-        states[np.diff(states[:, :, 0], axis=1, prepend=-dt) <= 0.0] = (
-            np.nan
-        )  # MuJoCo does not step from there
+        stands = np.diff(states[:, :, 0], axis=1, prepend=-dt) <= 0.0  # MuJoCo does not step from there
+        states[stands] = np.nan
         t, ended = dt * np.arange(states.shape[1]), np.full(len(states), None, dtype=object)
         for k, run in enumerate(states):
             states[k], ended[k] = as_far_as_it_goes(t, run, run[0], "a number is not finite")
         return states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs], ended
 
-    def runner(self, q, v, tau, dt, steps, method, tolerance) -> tuple[np.ndarray, Callable]:
+    def runner(
+        self, state: tuple[Array, Array, Array], dt: float, steps: int, method: str, tolerance: float | None
+    ) -> tuple[np.ndarray, Callable[[], np.ndarray]]:
         """The first states, time first, and a call that runs MuJoCo's C loop from them; it returns (runs, steps, ...)."""
         if tolerance is not None:
             raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
         model, data = self.own_copy(dt, method)
         model.opt.disableflags |= bit("AUTORESET")  # a reset would hide the divergence
+        q, v, tau = state
         rows, spec = rows_of_states(q, v, self.applied(tau))[1], mujoco.mjtState.mjSTATE_FULLPHYSICS
         runs = len(rows[0])
         starts = np.zeros((runs, mujoco.mj_stateSize(model, spec)))
         # rollout zeroes qfrc_applied unless it is the control, and leaves out the initial state
         torques = np.zeros((runs, steps, model.nu + model.nv))  # after the controls
         torques[:, :, : model.nu] = data.ctrl
-        for start, torque, *state in zip(starts, torques, *rows):
-            data.qpos[self.qpos], data.qvel[self.dofs], torque[:, model.nu + self.dofs] = state
+        for start, torque, *values in zip(starts, torques, *rows):
+            data.qpos[self.qpos], data.qvel[self.dofs], torque[:, model.nu + self.dofs] = values
             mujoco.mj_getState(model, data, start, spec)
         # filled, so that the first run does not have to fetch the memory
-        states, sensors = (
-            np.full((runs, steps, starts.shape[1]), np.nan),
-            np.zeros((runs, steps, model.nsensordata)),
-        )
+        states = np.full((runs, steps, starts.shape[1]), np.nan)
+        sensors = np.zeros((runs, steps, model.nsensordata))
         controls = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
         options = {"control_spec": controls, "nstep": steps, "state": states, "sensordata": sensors}
 
-        def run():
+        def run() -> np.ndarray:
             rollout([model] * runs, [data], starts, torques, skip_checks=True, **options)
             return states
 
         return starts, run
 
-    def own_copy(self, dt, integrator, q=0.0, v=0.0, tau=0.0) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    def own_copy(
+        self, dt: float, integrator: str, q: Array = 0.0, v: Array = 0.0, tau: Array = 0.0
+    ) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """A copy of the model with this step and integrator, and data at one state."""
         model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
         model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
@@ -215,32 +244,32 @@ class MujocoDynamics:
         data.ctrl[:], data.act[:] = self.data.ctrl, self.data.act
         return model, data
 
-    def applied(self, tau):
+    def applied(self, tau: Array) -> Array:
         """The part of torques that actuators do not exert."""
         return tau - self.constant
 
-    def _each(self, read, q, v=0.0, tau=0.0) -> np.ndarray:
+    def _each(self, read: Read, q: Array, v: Array = 0.0, tau: Array = 0.0) -> np.ndarray:
         """read(data) after mj_forward at each state, stacked to the batch shape of the states."""
         batch, states = rows_of_states(q, v, tau)
         values = [np.array(read(self.forward(*state))) for state in zip(*states)]
         return np.array(values).reshape((*batch, *values[0].shape))
 
-    def forward(self, q, v=0.0, tau=0.0) -> mujoco.MjData:
+    def forward(self, q: Array, v: Array = 0.0, tau: Array = 0.0) -> mujoco.MjData:
         d = self.data
         d.qpos[self.qpos], d.qvel[self.dofs], d.qfrc_applied[self.dofs] = q, v, tau
         mujoco.mj_forward(self.model, d)
         return d
 
-    def turns(self, xmat) -> np.ndarray:
+    def turns(self, xmat: np.ndarray) -> np.ndarray:
         """The orientations of the bodies, (m, 3, 3), of xmat or ximat."""
         return xmat[self.bodies].reshape(-1, 3, 3).copy()
 
-    def _to_body(self, vectors):
+    def _to_body(self, vectors: np.ndarray) -> np.ndarray:
         """World components to body axes, the axes of the world at the position zero."""
         turns = self.turns(self.data.xmat) @ self.zero_axes.transpose(0, 2, 1)
         return np.einsum("bji,bj...->bi...", turns, vectors)
 
-    def _of_bodies(self, fill: Callable) -> np.ndarray:
+    def _of_bodies(self, fill: Callable[[np.ndarray, np.ndarray, int], None]) -> np.ndarray:
         """(translation, rotation) rows that fill(T, B, body) gives, (2, m, 3, nv): our joints, rotation in body axes."""
         pair = np.zeros((2, len(self.bodies), 3, self.model.nv))
         for T, B, body in zip(*pair, self.bodies):
@@ -258,7 +287,7 @@ def convective_accelerations(
     """
     model, gravity = dynamics.model, dynamics.model.opt.gravity.copy()
 
-    def terms(d):
+    def terms(d: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
         both = np.zeros((len(dynamics.bodies), 6))
         d.qacc[:] = 0.0
         mujoco.mj_rnePostConstraint(model, d)

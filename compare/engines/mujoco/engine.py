@@ -1,21 +1,21 @@
 """MuJoCo as an engine: a compiled model, what a case changes in it, and its actuators under constant controls."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
 
-import tmt
+from tmt import Tree
 from tmt.methods import lone_speeds
 
 from ...robots.actuators import Controller
 from ...robots.case import Case
 from .. import Engine, Method
-from .actuators import control_of
-from .dynamics import MujocoDynamics
-from .inventory import switch_off
-from .names import INTEGRATORS, bit
-from .source import locked_model
+from .dynamics import Engaged, MujocoDynamics
+from .inventory import set_fields, switch_off
+from .names import INTEGRATORS, bit, control_of
+from .source import Source
 
 SCHEMES = {  # MuJoCo's integrator: the method of tmt that is the same scheme, where no ball, no spring makes them differ
     "Euler": "semi_implicit_euler",
@@ -27,7 +27,7 @@ SCHEMES = {  # MuJoCo's integrator: the method of tmt that is the same scheme, w
 FROM_4 = int(mujoco.__version__.split(".")[0]) >= 4
 
 
-def methods_for(tree: tmt.Tree | None = None) -> dict[str, Method]:
+def methods_for(tree: Tree | None = None) -> dict[str, Method]:
     """MuJoCo's integrators for a Tree, by name, each with the method of tmt that is the same scheme; None: only hinges.
 
     Measured step by step: implicitfast and discrete are implicit in the bias of a free body on its own; discrete also in
@@ -63,19 +63,26 @@ ACTING, IDLE = 0, 1  # groups of actuators
 class Mujoco(Engine):
     """MuJoCo with one compiled model of given joints.
 
-    bodies: their numbers in the model. source: what the model was read from, a Path or MJCF text; None if the model was changed
-    since then, so that no joint can be locked. bare: all that a Tree does not have is switched off, see inventory. warnings: of
-    MuJoCo's compiler, one line each.
+    bodies: their numbers in the model. bare: all that a Tree does not have is switched off, see inventory. tree: its methods are
+    those for a Tree, see methods_for.
     """
 
     name = "mujoco"
     methods = METHODS
 
-    def __init__(self, model, joints, bodies, source, bare=False, warnings=(), methods=METHODS):
-        self.model, self.source, self.joints, self.bodies = model, source, tuple(joints), list(bodies)
-        self.methods, self.bare, self.warnings, self.cache = methods, bare, warnings, {}
+    def __init__(
+        self,
+        source: Source,
+        joints: Sequence[str],
+        bodies: Sequence[int],
+        bare: bool = False,
+        tree: Tree | None = None,
+    ) -> None:
+        self.source, self.model, self.joints, self.bodies = source, source.model, tuple(joints), list(bodies)
+        self.methods, self.bare = methods_for(tree), bare
+        self.cache: dict[tuple[object, ...], MujocoDynamics] = {}
 
-    def __getstate__(self):
+    def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"cache": {}}
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
@@ -86,8 +93,8 @@ class Mujoco(Engine):
 
         A model with locked joints is compiled again from the source, without them; ModelError if that is not possible.
         """
-        changes = tuple(case.locked.items()), case.scene.gravity, case.scene.damping, case.joints
-        changes += (case.controller.controls,) if case.controller else ()
+        controls = case.controller.controls if case.controller else None
+        changes = tuple(case.locked.items()), case.scene.gravity, case.scene.damping, case.joints, controls
         dynamics = self.cache.pop(changes, None) or self.dynamics(case)
         self.cache[changes] = dynamics
         if len(self.cache) > MODELS:
@@ -97,27 +104,25 @@ class Mujoco(Engine):
     def dynamics(self, case: Case) -> MujocoDynamics:
         model = mujoco.MjModel.__copy__(self.model)
         if case.locked:
-            model = locked_model(self.source, case.locked, self.bare)
+            model = self.source.without(case.locked, self.bare)
         if self.bare:
             switch_off(model)
         if not case.scene.gravity:
             model.opt.gravity[:] = 0.0
-        controls = engaged(model, case.controller) if case.controller else ()
-        dynamics = MujocoDynamics(model, case.coordinates, self.bodies, case.tree.zero, self.bare, *controls)
+        actuators = engaged(model, case.controller) if case.controller else Engaged()
+        dynamics = MujocoDynamics(model, case, self.bodies, self.bare, actuators)
         dynamics.model.dof_damping[dynamics.dofs] += case.added_damping
         return dynamics
 
 
-def engaged(model: mujoco.MjModel, controller: Controller) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Switch on the actuators of a model that take part, without any range; their controls, activations and constant torque.
+def engaged(model: mujoco.MjModel, controller: Controller) -> Engaged:
+    """Switch on the actuators of a model that take part, without any range.
 
     `discrete` solves by iteration where a tendon couples branches: here to rounding and by Newton's method (with PGS it is
     Euler's scheme). Activations are constant: the control of a filter equals its activation, that of an integrator is 0.
     """
     model.opt.disableflags &= ~bit("ACTUATION")
-    for name in UNLIMITED:
-        if hasattr(model, name):
-            getattr(model, name)[:] = 0
+    set_fields(model, UNLIMITED, 0)
     model.opt.solver, model.opt.tolerance = mujoco.mjtSolver.mjSOL_NEWTON, SOLVED
     model.opt.iterations = max(model.opt.iterations, MOST_ITERATIONS)
     ctrl, act = np.zeros(model.nu), np.zeros(model.na)
@@ -130,4 +135,4 @@ def engaged(model: mujoco.MjModel, controller: Controller) -> tuple[np.ndarray, 
             if model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
                 act[model.actuator_actadr[i]] = u
     model.opt.disableactuator = 1 << IDLE
-    return ctrl, act, controller.torque
+    return Engaged(ctrl, act, controller.torque)

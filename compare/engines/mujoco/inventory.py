@@ -1,24 +1,16 @@
 """The features of a file: modelled by the equations, switched off by the comparison, or a reason to refuse the file."""
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Iterable
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .actuators import control_of
-from .names import bit, element_name, kind_of, number_of_actuators, on
+from ...robots import Feature
+from .names import bit, control_of, element_name, kind_of, names_where, number_of_actuators, on
 
 KINDS = ("hinge", "slide", "ball", "free")
 MODELLED, OFF, OPEN, LEFT_OUT = "modelled", "switched_off", "open_tree", "left_out"
-
-
-class Feature(NamedTuple):
-    feature: str
-    count: int
-    names: tuple[str, ...]
-    treatment: str  # modelled, switched_off, open_tree, left_out
-    reason: str
 
 
 REASONS = {
@@ -42,51 +34,41 @@ REASONS = {
     "unusable keyframe": (LEFT_OUT, "not every number is finite"),
     "other": (OFF, "it changes the motion; the equations do not have it"),
 }
-QUIET = (
-    "OVERRIDE",
-    "ENERGY",
-    "FWDINV",
-    "DIAGEXACT",
-)  # enable flags that cannot change a motion without contacts
+# enable flags that cannot change a motion without contacts
+QUIET = ("OVERRIDE", "ENERGY", "FWDINV", "DIAGEXACT")
 
 
 def features(m: mujoco.MjModel) -> tuple[Feature, ...]:
     """The features of a compiled model, always in the same order."""
     names = names_of_features(m)
-    rows = [(feature, names[feature]) for feature in REASONS if names[feature]]
-    return tuple(Feature(feature, len(own), tuple(own), *REASONS[feature]) for feature, own in rows)
+    return tuple(Feature(name, tuple(names[name]), *REASONS[name]) for name in REASONS if names[name])
 
 
 def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
     """The elements with each feature, by name."""
 
-    def named(kind: str, numbers) -> list[str]:
+    def named(kind: str, numbers: Iterable[int]) -> list[str]:
         return [element_name(m, kind, number) for number in numbers]
 
     def having(*fields: str) -> list[str]:
-        """The elements of which one of the fields is not zero."""
-        return [name for field in fields for name in names_where(m, field, np.any)]
+        """The elements of which one of the fields, if the installed MuJoCo has it, is not zero."""
+        holds = {field: np.asarray(getattr(m, field, ())) != 0 for field in fields}
+        return [name for field in fields for name in names_where(m, field, holds[field])]
 
     actuators, inputs = range(number_of_actuators(m)), m.actuator_ctrllimited
     controls = [inputs[place : place + count].any() for place, count in (control_of(m, i) for i in actuators)]
     clamped = [i for i in actuators if controls[i] or m.actuator_forcelimited[i] or m.actuator_actlimited[i]]
     constrained, damped, sprung = on(m, "CONSTRAINT"), on(m, "DAMPER"), on(m, "SPRING")
     has_friction = constrained and on(m, "FRICTIONLOSS")
-    flags = {
-        name[7:]: int(bit)
-        for name, bit in mujoco.mjtEnableBit.__members__.items()
-        if name.startswith("mjENBL_")
-    }
-    others = [
-        f"flag {name.lower()}" for name in flags if m.opt.enableflags & flags[name] and name not in QUIET
-    ]
-    others += ["flag eulerdamp"] * (not on(m, "EULERDAMP"))
-    for field, is_on in (
-        ("dof_dampingpoly", damped),
-        ("jnt_stiffnesspoly", sprung),
-        ("jnt_springyield", sprung),
-    ):
-        others += [f"{field} of {name}" for name in having(field) if is_on]
+    others = []
+    for name, member in mujoco.mjtEnableBit.__members__.items():
+        flag = name.removeprefix("mjENBL_")
+        if flag not in QUIET and name != flag and m.opt.enableflags & int(member):
+            others.append(f"flag {flag.lower()}")
+    if not on(m, "EULERDAMP"):
+        others.append("flag eulerdamp")
+    nonlinear = ("dof_dampingpoly",) * damped + ("jnt_stiffnesspoly", "jnt_springyield") * sprung
+    others += [f"{field} of {name}" for field in nonlinear for name in having(field)]
     return {
         **{kind: named("joint", [j for j in range(m.njnt) if kind_of(m, j) == kind]) for kind in KINDS},
         "armature": having("dof_armature", "actuator_armature"),
@@ -110,15 +92,6 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
 def usable_keys(m: mujoco.MjModel) -> np.ndarray:
     """Of each keyframe whether its numbers are finite and of at most MOST, (nkey,)."""
     return (np.abs(np.hstack([m.key_qpos, m.key_act, m.key_ctrl])) <= MOST).all(axis=1)
-
-
-def names_where(m: mujoco.MjModel, field: str, holds: Callable) -> list[str]:
-    """The names of the elements (of speeds: the joints) for whose row of a field something holds."""
-    values, prefix = np.asarray(getattr(m, field, ())), field.partition("_")[0]
-    rows = [i for i, row in enumerate(values) if holds(row)]
-    if prefix == "dof":
-        rows = np.unique(m.dof_jntid[rows])
-    return [element_name(m, {"dof": "joint", "jnt": "joint"}.get(prefix, prefix), row) for row in rows]
 
 
 def open_equalities(m: mujoco.MjModel) -> tuple[str, ...]:
@@ -147,15 +120,16 @@ def take_away(m: mujoco.MjModel) -> None:
     for flag in ("GRAVITY", "DAMPER", "SPRING", "EULERDAMP"):
         m.opt.disableflags &= ~bit(flag)
     m.opt.density = m.opt.viscosity = 0.0
-    for name in NOT_HAD_FIELDS:
+    set_fields(m, NOT_HAD_FIELDS, 0)
+    # a spring with a plastic state yields, at whatever force
+    set_fields(m, ("jnt_plasticadr", "tendon_plasticadr"), -1)
+
+
+def set_fields(m: mujoco.MjModel, names: Iterable[str], value: int) -> None:
+    """Set all numbers of some fields; those that the installed MuJoCo does not have are left out."""
+    for name in names:
         if hasattr(m, name):
-            getattr(m, name)[:] = 0
-    for name in (
-        "jnt_plasticadr",
-        "tendon_plasticadr",
-    ):  # a spring with a plastic state yields, at whatever force
-        if hasattr(m, name):
-            getattr(m, name)[:] = -1
+            getattr(m, name)[:] = value
 
 
 NOT_HAD_FIELDS = (
@@ -218,23 +192,17 @@ def refuse_numbers(m: mujoco.MjModel) -> None:
     """ValueError, in one line, for a number that is not finite, or beyond the range that is judged."""
     for field in NUMBERS:
         least = 0.0 if field in NOT_NEGATIVE else -MOST
-        for name in names_where(
-            m, field, lambda row, least=least: number_outside(row, least, MOST) is not None
-        ):
-            refuse_number(field.partition("_")[2], f" of {name!r}", getattr(m, field), least, MOST)
+        values = getattr(m, field)
+        for name in names_where(m, field, ~((values >= least) & (values <= MOST))):
+            refuse_number(field.partition("_")[2], f" of {name!r}", values, least, MOST)
     for word, values in (("gravity", m.opt.gravity), ("qpos0", m.qpos0), ("qpos_spring", m.qpos_spring)):
         refuse_number(word, "", values, -MOST, MOST)
     refuse_number("timestep", "", m.opt.timestep, *STEPS)
 
 
-def number_outside(values, least: float, most: float) -> float | None:
-    """The first of some numbers that is not in a range, or None."""
-    return next((number for number in np.ravel(values).tolist() if not least <= number <= most), None)
-
-
-def refuse_number(word: str, whose: str, values, least: float, most: float) -> None:
+def refuse_number(word: str, whose: str, values: ArrayLike, least: float, most: float) -> None:
     """ValueError, with the number, where one of some numbers is not in a range."""
-    if (number := number_outside(values, least, most)) is not None:
-        raise ValueError(
-            f"{word}{whose} is {number:g}{UNITS.get(word, '')}; expected from {least:g} to {most:g}"
-        )
+    for number in np.ravel(values).tolist():
+        if not least <= number <= most:
+            unit = UNITS.get(word, "")
+            raise ValueError(f"{word}{whose} is {number:g}{unit}; expected from {least:g} to {most:g}")

@@ -1,14 +1,13 @@
 """MuJoCo's own steps: their derivatives, runs with its automatic reset, and runs of a file's model as it is."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from ...robots.actuators import Drive
-from .actuators import control_of
-from .dynamics import MujocoDynamics
-from .names import INTEGRATORS, bit, element_name, output_of
+from .dynamics import Array, MujocoDynamics
+from .names import INTEGRATORS, bit, control_of, element_name, output_of
 
 NUDGE = 1e-6  # of central differences, rad and rad/s
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
@@ -31,7 +30,9 @@ def transition(
     return np.concatenate([coordinates.difference(q1, q0), v1 - v0], axis=1).T / (2.0 * NUDGE)
 
 
-def left_to_itself(dynamics: MujocoDynamics, q, qd, tau, dt: float, steps: int, integrator: str) -> dict:
+def left_to_itself(
+    dynamics: MujocoDynamics, q: Array, qd: Array, tau: Array, dt: float, steps: int, integrator: str
+) -> dict[str, Any]:
     """A run with MuJoCo's automatic reset: time (steps + 1,) s, of its own clock, q, qd; warnings: their number at the end."""
     model, data = dynamics.own_copy(dt, integrator, q, qd, tau)
     model.opt.disableflags &= ~bit("AUTORESET")
@@ -39,9 +40,8 @@ def left_to_itself(dynamics: MujocoDynamics, q, qd, tau, dt: float, steps: int, 
     for _ in range(steps):
         mujoco.mj_step(model, data)
         path.append((data.time, data.qpos[dynamics.qpos], data.qvel[dynamics.dofs]))
-    return dict(zip(("time", "q", "qd"), map(np.array, zip(*path)))) | {
-        "warnings": int(data.warning.number.sum())
-    }
+    time, positions, speeds = map(np.array, zip(*path))
+    return {"time": time, "q": positions, "qd": speeds, "warnings": int(data.warning.number.sum())}
 
 
 class WholeRun(NamedTuple):
@@ -50,7 +50,7 @@ class WholeRun(NamedTuple):
     speeds: np.ndarray  # root mean square of all speeds in each part, rad/s and m/s; NaN from where it fails
     failed_at: (
         float | None
-    )  # s: MuJoCo warns of a bad number, and resets it where it may; None: it runs to its end
+    )  # s: MuJoCo warns of a bad number, resets it where it may; None: it runs to its end
 
 
 def start_of(model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray) -> np.ndarray:

@@ -1,26 +1,24 @@
-"""MuJoCo's names and numbers: integrators, flags, and the joints of a compiled model as those of a Tree.
+"""MuJoCo's names and numbers: integrators, flags, rotations, and the joints of a compiled model as those of a Tree.
 
 A free joint is four joints of a Tree: slides along the world's x, y and z axes, read at the origin, and a ball.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tmt.derivation.coordinates import KINDS as NUMBERS  # of a joint in qpos and in qvel: MuJoCo has the same
 
-from ...robots.case import Coordinates
+from ...robots.coordinates import FREE, Coordinates
 
+Integer = int | np.integer[Any]
 # those that the installed version has; discrete came with 3.13
-NAMES = {
-    "Euler": "EULER",
-    "implicitfast": "IMPLICITFAST",
-    "discrete": "DISCRETE",
-    "implicit": "IMPLICIT",
-    "RK4": "RK4",
+MEMBERS = {
+    name: getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}", None)
+    for name in ("Euler", "implicitfast", "discrete", "implicit", "RK4")
 }
-MEMBERS = {name: getattr(mujoco.mjtIntegrator, f"mjINT_{member}", None) for name, member in NAMES.items()}
 INTEGRATORS = {name: member for name, member in MEMBERS.items() if member is not None}
 EVALUATIONS = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # of the dynamics, in a step
 OF_A_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # transmissions
@@ -45,22 +43,29 @@ def on(m: mujoco.MjModel, flag: str) -> bool:
     return not m.opt.disableflags & bit(flag)
 
 
-def own_name(name: str, what: str, number: int) -> str:
-    """The name of an element if it can be printed in a line, else `joint 3`."""
-    return name if name.strip() and name.isprintable() else f"{what} {number}"
+def element_name(m: mujoco.MjModel, kind: str, number: Integer) -> str:
+    """The name of an element of a kind, by mujoco.MjModel's names of kinds.
 
-
-def element_name(m: mujoco.MjModel, kind: str, number: int) -> str:
-    """own_name of an element of a kind, by mujoco.MjModel's names of kinds; not the name of another element."""
-    stated, known = getattr(m, kind)(int(number)).name, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
-    name = own_name(stated, kind, int(number))
-    while name != stated and mujoco.mj_name2id(m, known, name) >= 0:
+    `joint 3` where it has none that can be printed in a line; that is never the name of another element.
+    """
+    stated, type_of = getattr(m, kind)(int(number)).name, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+    name = stated if stated.strip() and stated.isprintable() else f"{kind} {int(number)}"
+    while name != stated and mujoco.mj_name2id(m, type_of, name) >= 0:
         name = f"unnamed {name}"
     return name
 
 
-def joint_name(m: mujoco.MjModel, number: int) -> str:
+def joint_name(m: mujoco.MjModel, number: Integer) -> str:
     return element_name(m, "joint", number)
+
+
+def names_where(m: mujoco.MjModel, field: str, holds: np.ndarray) -> list[str]:
+    """The names of the elements (of speeds: the joints) for which something holds of a number in their row of a field."""
+    prefix, rows = field.partition("_")[0], np.flatnonzero([row.any() for row in holds])
+    if prefix == "dof":
+        rows = np.unique(m.dof_jntid[rows])
+    kind = {"dof": "joint", "jnt": "joint"}.get(prefix, prefix)
+    return [element_name(m, kind, row) for row in rows]
 
 
 def kind_of(m: mujoco.MjModel, number: int) -> str:
@@ -84,21 +89,23 @@ def parts_of(name: str) -> list[str]:
 
 def joint_places(m: mujoco.MjModel) -> dict[str, Place]:
     """The joints of a Tree by name, in the order of the file."""
-    places = []
+    names: list[str] = []
+    places: list[Place] = []
     for number in range(m.njnt):
         name, kind = joint_name(m, number), kind_of(m, number)
-        parts = zip(parts_of(name), ["slide"] * 3 + ["ball"]) if kind == "free" else [(name, kind)]
+        is_free = kind == "free"
+        names += parts_of(name) if is_free else [name]
         q, v = int(m.jnt_qposadr[number]), int(m.jnt_dofadr[number])
-        for name, kind in parts:
-            nq, nv = NUMBERS[kind]
-            places.append((name, Place(kind, number, range(q, q + nq), range(v, v + nv))))
+        for part in FREE if is_free else (kind,):
+            nq, nv = NUMBERS[part]
+            places.append(Place(part, number, range(q, q + nq), range(v, v + nv)))
             q, v = q + nq, v + nv
-    coordinates = Coordinates(tuple(name for name, _ in places), tuple(place.kind for _, place in places))
+    coordinates = Coordinates(tuple(names), tuple(place.kind for place in places))
     for columns in (coordinates.names, coordinates.positions, coordinates.speeds):
         if twice := sorted({name for name in columns if columns.count(name) > 1}):
             parts = "a ball w has the speeds w x, w y, w z, and a free joint the parts w x, w y, w z, w turn"
             raise ValueError(f"two of its joints are called {twice[0]!r}; {parts}")
-    return dict(places)
+    return dict(zip(names, places))
 
 
 def moving(m: mujoco.MjModel) -> np.ndarray:
@@ -116,7 +123,14 @@ def aligns(joint: mujoco.MjsJoint) -> bool:
 
 def number_of_actuators(m: mujoco.MjModel) -> int:
     """From 3.10 to 4.0 the number of controls; since then an actuator may have several of them."""
-    return getattr(m, "nactuator", m.nu)
+    return int(getattr(m, "nactuator", m.nu))
+
+
+def control_of(m: mujoco.MjModel, actuator: int) -> tuple[int, int]:
+    """The index of the first control of an actuator, and the number of its controls."""
+    if hasattr(m, "actuator_ctrlnum"):
+        return int(m.actuator_ctrladr[actuator]), int(m.actuator_ctrlnum[actuator])
+    return actuator, 1
 
 
 def output_of(m: mujoco.MjModel, actuator: int) -> int:
@@ -139,3 +153,15 @@ def rotors(m: mujoco.MjModel) -> np.ndarray:
         added = m.actuator_armature[i] * m.actuator_gear[output_of(m, i), 0] ** 2
         diagonal[m.dof_jntid == m.actuator_trnid[i, 0]] += added
     return diagonal
+
+
+def matrix(quat: ArrayLike) -> np.ndarray:
+    """The rotation matrix of a quaternion, (3, 3)."""
+    R = np.zeros(9)
+    mujoco.mju_quat2Mat(R, np.array(quat, float))
+    return R.reshape(3, 3)
+
+
+def tensor(R: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """The tensor of principal moments (3,) about the columns of R, (3, 3)."""
+    return R @ np.diag(moments) @ R.T

@@ -1,73 +1,124 @@
-"""Compiled models from a source, a file or MJCF text: all of it, or without some of its joints.
+"""A file, or MJCF text, read once: what it states, and what MuJoCo compiles of it, with all of its joints or without some.
 
 Textures and visual meshes are nearly all of a robot's memory (252 MB of one quadruped, 22 kB without), and every copy copies
 them: what is only drawn is left out. No bodies are fused (fusestatic gives wrong inertias up to MuJoCo 3.10) and nothing is
-printed as XML (which has seven digits).
+printed as XML (which has seven digits). A URDF's meshes are found by their packages, and its floating base hangs on the world.
 """
 
+import os
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 
 from ...process.parts import is_pipe, named_by
 from .names import aligns, joint_name, joint_places, kind_of, parts_of, rotors
-from .urdf_file import advice, spec_of
 
 FROM_GEOMS = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
-KINDS_OF_PARTS = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]  # of a free joint
+PARTS_OF_FREE = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]
+ADVICE = {  # by what MuJoCo says of a file that it cannot compile
+    "Error opening file": "package://NAME/... is looked for in a folder NAME beside the file or above it, else beside the file",
+    "no decoder found": "MuJoCo reads STL, OBJ and MSH; collision meshes may be deleted: contacts are not compared",
+    "mass and inertia of moving bodies": "boundmass and boundinertia of <compiler> give some, or both joints in one body",
+}
+Positions = Mapping[str, float | tuple[float, ...]]  # of joints by name: rad, m or a quaternion
 
 
 class ModelError(ValueError):
     """A file that cannot be compared; the message is one line."""
 
-    def __str__(self):
+    def __str__(self) -> str:
         return " ".join(super().__str__().split())
 
 
-def name_of(source: Path | str | None) -> str:
-    """A source in a message: a Path, MJCF text, or None for a compiled model."""
-    return str(source) if isinstance(source, Path) else "the model" if source is None else "the text"
+class Source:
+    """A file (a Path), MJCF text, or a model that was compiled elsewhere, of which a copy is taken.
 
+    origin: the Path or the text; None: compiled elsewhere. text: what it says. model: without what is only drawn. warnings: of
+    MuJoCo's compiler, one line each. bodies, joints: their numbers in the model, in the order of the spec. ModelError, in one
+    line, where MuJoCo makes no model of it.
+    """
 
-def editable(source: Path | str) -> mujoco.MjSpec:
-    """The MjSpec of a file (a Path) or of MJCF text."""
-    if isinstance(source, Path):
-        return spec_of(source)
-    return mujoco.MjSpec.from_string(source)
+    def __init__(self, origin: Path | str | mujoco.MjModel) -> None:
+        self.origin: Path | str | None = None
+        self.text = ""
+        self.warnings: tuple[str, ...] = ()
+        self._spec: mujoco.MjSpec | None = None
+        if isinstance(origin, mujoco.MjModel):
+            self.model = mujoco.MjModel.__copy__(origin)
+        elif isinstance(origin, Path | str):
+            self.origin, self.text = origin, text_of(origin) if isinstance(origin, Path) else origin
+            self.compile(origin)
+        else:
+            raise ModelError(
+                f"cannot read a {type(origin).__name__}; expected a path, MJCF text or an MjModel"
+            )
 
+    def compile(self, origin: Path | str) -> None:
+        if not self.text.strip():
+            raise ModelError(f"{self} is empty; expected MJCF or URDF")
+        lines: list[str] = []
+        before = mujoco.get_mju_user_warning()
+        mujoco.set_mju_user_warning(lines.append)
+        try:
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                self._spec = parsed(origin, self.text)
+                spec = without_visuals(self._spec.copy())
+                self.model = spec.compile()
+            bytes(self.model.names).decode()
+        except UnicodeDecodeError:
+            raise ModelError(f"{self} has names that are not UTF-8; save it as UTF-8") from None
+        except ValueError as error:
+            is_model = "<mujoco" in self.text or "<robot" in self.text
+            problem = f"MuJoCo cannot compile {self}" if is_model else f"{self} is not MJCF"
+            advice = "".join(f"; {text}" for part, text in ADVICE.items() if part in str(error))
+            raise ModelError(f"{problem}: {error}{advice}") from None
+        finally:
+            mujoco.set_mju_user_warning(before)
+        lines += [str(warning.message) for warning in caught]
+        self.warnings = tuple(dict.fromkeys(" ".join(line.split()) for line in lines))
+        # elements have their numbers in the model only once compiled
+        self.bodies, self.joints = [body.id for body in spec.bodies], [joint.id for joint in spec.joints]
 
-def editable_again(source: Path | str) -> mujoco.MjSpec:
-    """The MjSpec, without the warnings of MuJoCo's compiler, which the first reading has."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return editable(source)
+    def __str__(self) -> str:
+        """Its name in a message."""
+        if self.origin is None:
+            return "the model"
+        return str(self.origin) if isinstance(self.origin, Path) else "the text"
 
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_spec": None}
 
-def compiled(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
-    """The model without what is only drawn, and the warnings of MuJoCo's compiler, one line each; ModelError if it fails."""
-    text = text_of(source) if isinstance(source, Path) else source
-    if not text.strip():
-        raise ModelError(f"{name_of(source)} is empty; expected MJCF or URDF")
-    lines, before = [], mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lines.append)
-    try:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            model = without_visuals(editable(source)).compile()
-        bytes(model.names).decode()
-    except UnicodeDecodeError:
-        raise ModelError(f"{name_of(source)} has names that are not UTF-8; save it as UTF-8") from None
-    except ValueError as error:
-        is_model = "<mujoco" in text or "<robot" in text
-        problem = f"MuJoCo cannot compile {name_of(source)}" if is_model else f"{name_of(source)} is not MJCF"
-        raise ModelError(f"{problem}: {error}{advice(str(error))}") from None
-    finally:
-        mujoco.set_mju_user_warning(before)
-    lines += [warning.message for warning in caught]
-    return model, tuple(dict.fromkeys(" ".join(str(line).split()) for line in lines))
+    @property
+    def spec(self) -> mujoco.MjSpec | None:
+        """What is stated: only copies of it are compiled. None: the model was compiled elsewhere."""
+        if self._spec is None and self.origin is not None:  # in another process
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # the first reading has them
+                self._spec = parsed(self.origin, self.text)
+        return self._spec
+
+    def without(self, positions: Positions, bare: bool = False) -> mujoco.MjModel:
+        """The compiled model without the joints named in `positions`, see names.joint_places.
+
+        Every body keeps its number. Keyframes and sensors are deleted, and the actuators and equalities of a locked joint; bare:
+        all tendons, equalities and geoms without mass, and all actuators except those with armature. ModelError if anything
+        else refers to a locked joint, or nothing is stated.
+        """
+        names = ", ".join(positions)
+        if self.spec is None:
+            raise ModelError(f"cannot lock {names}: the model was changed after it was read")
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # the compiler's, of the file as it is
+                return compiled_without(without_visuals(self.spec.copy()), positions, bare)
+        except ValueError as error:
+            raise ModelError(f"MuJoCo cannot compile {self} with locked joints {names}: {error}") from None
 
 
 def text_of(path: Path) -> str:
@@ -77,6 +128,39 @@ def text_of(path: Path) -> str:
         return path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise ModelError(f"cannot read {path}: {error.strerror}; expected an MJCF or URDF file") from None
+
+
+def parsed(origin: Path | str, text: str) -> mujoco.MjSpec:
+    """The MjSpec of a file (a Path) with this text, or of the text alone."""
+    if not isinstance(origin, Path):
+        return mujoco.MjSpec.from_string(text)
+    spec = mujoco.MjSpec.from_file(os.fsencode(origin))
+    free = [joint.parent.parent for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
+    bases = [body.name for body in free if body.parent == spec.worldbody]
+    if bases:  # of a URDF: its link with a free joint hangs on another one
+        spec = mujoco.MjSpec.from_string(on_the_world(text, bases[0]))
+        spec.modelfiledir = str(origin.parent)
+    for mesh in spec.meshes:
+        if "://" in mesh.file:
+            mesh.file = str(place_of(mesh.file, origin.absolute()) or mesh.file)
+    return spec
+
+
+def on_the_world(text: str, base: str) -> str:
+    """A URDF text in which a link is the world."""
+    robot = ElementTree.fromstring(text)
+    named = [(link, "name") for link in robot.iter("link")]
+    for element, key in named + [(end, "link") for end in robot.iter("parent")]:
+        if element.get(key) == base:
+            element.set(key, "world")
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
+def place_of(address: str, path: Path) -> Path | None:
+    """The file of package://NAME/... in a folder NAME beside a URDF or above it, else beside the URDF; None: it is not there."""
+    _, _, relative = address.partition("://")
+    places = [*(above / relative for above in path.parents), path.parent / Path(relative).name]
+    return next((place for place in places if place.is_file()), None)
 
 
 def without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
@@ -90,98 +174,81 @@ def without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     return spec
 
 
-def locked_model(source: Path | str | None, positions: Mapping, bare: bool = False) -> mujoco.MjModel:
-    """The compiled model without the joints named in `positions`, {name: rad, m or quaternion}, see names.joint_places.
-
-    Every body keeps its number. Keyframes and sensors are deleted, and the actuators and equalities of a locked joint; bare:
-    all tendons, equalities and geoms without mass, and all actuators except those with armature. ModelError if anything else
-    refers to a locked joint, or there is no source.
-    """
-    names = ", ".join(positions)
-    if source is None:
-        raise ModelError(f"cannot lock {names}: the model was changed after it was read")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the compiler's, of the file as it is
-            return compiled_without(without_visuals(editable(source)), positions, bare)
-    except ValueError as error:
-        raise ModelError(
-            f"MuJoCo cannot compile {name_of(source)} with locked joints {names}: {error}"
-        ) from None
-
-
-def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> mujoco.MjModel:
+def compiled_without(spec: mujoco.MjSpec, positions: Positions, bare: bool) -> mujoco.MjModel:
     """The model whose bodies and other joints are placed as mj_kinematics places them with the joints locked."""
-    whole = spec.compile()
-    data, places = mujoco.MjData(whole), joint_places(whole)
-    data.qpos[:] = whole.qpos0
+    model = spec.compile()
+    data, places = mujoco.MjData(model), joint_places(model)
+    data.qpos[:] = model.qpos0
     for name, place in places.items():
-        if name in positions or kind_of(whole, place.joint) == "free":
+        if name in positions or kind_of(model, place.joint) == "free":
             data.qpos[place.qpos] = positions.get(name, (1.0, 0.0, 0.0, 0.0) if place.kind == "ball" else 0.0)
-    mujoco.mj_kinematics(whole, data)
+    mujoco.mj_kinematics(model, data)
     for joint in spec.joints:
-        joint.name = joint_name(whole, joint.id)
+        joint.name = joint_name(model, joint.id)
     numbers = {joint.name: joint.id for joint in spec.joints}  # a change of the spec takes them away
     # a free joint goes as a whole, and the parts that stay are added
-    gone = {joint_name(whole, places[name].joint) for name in positions}
-    for body, number in [
-        (body, body.id) for body in spec.bodies if {joint.name for joint in body.joints} & gone
-    ]:
+    removed = {joint_name(model, places[name].joint) for name in positions}
+    moved = [body for body in spec.bodies if removed.intersection(joint.name for joint in body.joints)]
+    for body, number in [(body, body.id) for body in moved]:
         axes = data.xmat[number].reshape(3, 3)
-        parent, quat = whole.body_parentid[number], np.zeros(4)
+        parent, quat = model.body_parentid[number], np.zeros(4)
         mujoco.mju_mulQuat(quat, data.xquat[parent] * [1.0, -1.0, -1.0, -1.0], data.xquat[number])
         body.set_frame(body.parent.add_frame())
         body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-        body.pos, body.quat = (data.xpos[number] - data.xpos[parent]) @ data.xmat[parent].reshape(3, 3), quat
+        body.pos = (data.xpos[number] - data.xpos[parent]) @ data.xmat[parent].reshape(3, 3)
+        body.quat = quat
         for joint in list(body.joints):
             i = numbers[joint.name]
-            if joint.name not in gone:
+            if joint.name not in removed:
                 joint.set_frame(body.add_frame())
                 joint.pos, joint.axis = (data.xanchor[i] - data.xpos[number]) @ axes, data.xaxis[i] @ axes
-            elif kind_of(whole, i) == "free":
-                add_parts(
-                    body, joint, whole, whole.jnt_dofadr[i], set(parts_of(joint.name)) - set(positions), axes
-                )
-    clear(spec, gone, bare)
-    model = spec.compile()
-    for name, place in joint_places(
-        model
-    ).items():  # of springdamper the compiler chooses both by the inertia
+            elif kind_of(model, i) == "free":
+                add_parts(body, joint, model, model.jnt_dofadr[i], positions, axes)
+    clear(spec, removed, bare)
+    smaller = spec.compile()
+    # of springdamper the compiler chooses both by the inertia
+    for name, place in joint_places(smaller).items():
         before = places[name]
-        model.qpos_spring[place.qpos] = whole.qpos_spring[before.qpos]
-        model.dof_damping[place.dofs] = whole.dof_damping[before.dofs]
-        model.jnt_stiffness[place.joint] = whole.jnt_stiffness[before.joint]
-    return model
+        smaller.qpos_spring[place.qpos] = model.qpos_spring[before.qpos]
+        smaller.dof_damping[place.dofs] = model.dof_damping[before.dofs]
+        smaller.jnt_stiffness[place.joint] = model.jnt_stiffness[before.joint]
+    return smaller
 
 
 def add_parts(
-    body: mujoco.MjsBody, free, whole: mujoco.MjModel, dof: int, names: set[str], axes: np.ndarray
+    body: mujoco.MjsBody,
+    free: mujoco.MjsJoint,
+    model: mujoco.MjModel,
+    dof: int,
+    locked: Positions,
+    axes: np.ndarray,
 ) -> None:
-    """Add slides and a ball that a free joint consists of. dof: its first speed; axes: of the body, as columns."""
+    """Add the parts of a free joint that are not locked. dof: its first speed; axes: of the body, as columns."""
     if aligns(free):
         why = "is aligned with the inertia of its body: none of its parts can be locked"
         raise ValueError(f"free joint {free.name!r} {why}")
-    armature = float(whole.dof_armature[dof] + rotors(whole)[dof])  # of actuators too, which are deleted
+    armature = float(model.dof_armature[dof] + rotors(model)[dof])  # of actuators too, which are deleted
     no_defaults = {"ref": 0.0, "springdamper": np.zeros(2), "limited": mujoco.mjtLimited.mjLIMITED_FALSE}
-    for name, kind, axis in zip(parts_of(free.name), KINDS_OF_PARTS, [*axes, axes[2]]):
-        if name in names:
+    for name, kind, axis in zip(parts_of(free.name), PARTS_OF_FREE, [*axes, axes[2]]):
+        if name not in locked:
             body.add_joint(name=name, type=kind, axis=axis, pos=np.zeros(3), armature=armature, **no_defaults)
 
 
-def clear(spec: mujoco.MjSpec, gone: set[str], bare: bool) -> None:
+def clear(spec: mujoco.MjSpec, removed: set[str], bare: bool) -> None:
     """Delete what refers to joints of these names, then the joints: the other way round MuJoCo crashes."""
     elements = [*spec.keys, *spec.sensors]
-    elements += [e for e in spec.equalities if bare or {e.name1, e.name2} & gone]
-    elements += [a for a in spec.actuators if a.target in gone or (bare and not a.armature)]
+    elements += [
+        equality for equality in spec.equalities if bare or {equality.name1, equality.name2} & removed
+    ]
+    elements += [
+        motor for motor in spec.actuators if motor.target in removed or (bare and not motor.armature)
+    ]
     if bare:
         elements += [*spec.tendons, *spec.tuples, *spec.pairs]
-        stated = [
-            body
-            for body in spec.bodies
-            if body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS
-        ]
-        elements += [geom for body in stated for geom in body.geoms]
-    for element in (*elements, *[joint for joint in spec.joints if joint.name in gone]):
+        for body in spec.bodies:
+            if body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS:
+                elements += body.geoms
+    for element in (*elements, *[joint for joint in spec.joints if joint.name in removed]):
         spec.delete(element)
     used = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
     for asset in [asset for asset in (*spec.meshes, *spec.hfields) if bare and asset.name not in used]:

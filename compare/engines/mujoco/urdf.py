@@ -1,22 +1,21 @@
 """A URDF text of a compiled model, for engines whose readers of MJCF lose masses or joints."""
 
-from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .inventory import take_away
-from .names import joint_name, kind_of
-from .parameters import matrix
-from .source import compiled
+from .names import joint_name, kind_of, matrix
 
 KINDS = {"hinge": "continuous", "slide": "prismatic"}
+NO_JOINT = -1
 FAR = "1e9"  # limits that nothing reaches: a prismatic joint has to state some
 
 
-def urdf(source: mujoco.MjModel | Path | str, has_free_bodies: bool = False) -> str:
-    """A URDF text of a compiled model, an MJCF file (a Path) or MJCF text; ValueError where it cannot be one.
+def urdf(compiled: mujoco.MjModel, has_free_bodies: bool = False) -> str:
+    """A URDF text of a compiled model; ValueError where it cannot be one.
 
     Its base is fixed; has_free_bodies: with free joints, of type floating, of which readers make what they like.
 
@@ -24,52 +23,34 @@ def urdf(source: mujoco.MjModel | Path | str, has_free_bodies: bool = False) -> 
     link has its origin on the axis of its hinge. Of several joints in one body all but the last move a link without mass, and a
     body without a joint hangs on a fixed one. URDF has no gravity, armature or springs; geoms, limits and friction are left out.
     """
-    model = mujoco.MjModel.__copy__(source) if isinstance(source, mujoco.MjModel) else compiled(source)[0]
+    model = mujoco.MjModel.__copy__(compiled)
     take_away(model)  # what a flag of the file disables is zero
     names = [joint_name(model, j) for j in range(model.njnt)]
     for j, name in enumerate(names):
         if (kind := kind_of(model, j)) not in KINDS and not (has_free_bodies and kind == "free"):
-            raise ValueError(
-                f"joint {name!r} is of type {kind}; a URDF with a fixed base has only hinges and slides"
-            )
+            only = "a URDF with a fixed base has only hinges and slides"
+            raise ValueError(f"joint {name!r} is of type {kind}; {only}")
     robot = Element("robot", name="robot")
     SubElement(robot, "link", name="link0")
     origins = [np.zeros(3)]  # of the link of each body, in the frame of the body
     for body in range(1, model.nbody):
         parent, first = int(model.body_parentid[body]), int(model.body_jntadr[body])
-        link, position, turn = (
-            f"link{parent}",
-            model.body_pos[body] - origins[parent],
-            matrix(model.body_quat[body]),
-        )
-        joints, origin = list(range(first, first + int(model.body_jntnum[body]))) or [None], np.zeros(3)
-        for j in joints:
-            is_last, anchor, moved, turned = j == joints[-1], np.zeros(3), np.zeros(3), np.eye(3)
-            if j is None:
-                joint = Element("joint", name=unused(f"fixed{body}", names), type="fixed")
-            elif kind_of(model, j) == "free":
-                joint, position, turn = (
-                    Element("joint", name=names[j], type="floating"),
-                    np.zeros(3),
-                    np.eye(3),
-                )
-            else:
-                kind, axis, reference = (
-                    kind_of(model, j),
-                    model.jnt_axis[j],
-                    model.qpos0[model.jnt_qposadr[j]],
-                )
-                joint = Element("joint", name=names[j], type=KINDS[kind])
+        position, turn = model.body_pos[body] - origins[parent], matrix(model.body_quat[body])
+        link, origin = f"link{parent}", np.zeros(3)
+        for j in range(first, first + int(model.body_jntnum[body])) or [NO_JOINT]:
+            anchor, moved, turned = np.zeros(3), np.zeros(3), np.eye(3)
+            kind = kind_of(model, j) if j != NO_JOINT else ""
+            if kind == "free":
+                position, turn = np.zeros(3), np.eye(3)
+            elif kind:
+                axis, reference = model.jnt_axis[j], model.qpos0[model.jnt_qposadr[j]]
                 if kind == "hinge":
                     anchor, turned = model.jnt_pos[j].copy(), about(axis, -reference)
                 else:
                     moved = -reference * axis
-                SubElement(joint, "axis", xyz=text(axis))
-                SubElement(
-                    joint, "dynamics", damping=text(model.dof_damping[model.jnt_dofadr[j]]), friction="0"
-                )
-                SubElement(joint, "limit", lower="-" + FAR, upper=FAR, effort=FAR, velocity=FAR)
+            is_last = j in (NO_JOINT, first + int(model.body_jntnum[body]) - 1)
             child = f"link{body}" if is_last else f"link{body}_{j}"
+            joint = joint_of(model, j, kind, names[j] if kind else unused(f"fixed{body}", names))
             SubElement(joint, "origin", frame(position + turn @ (anchor - origin + moved), turn @ turned))
             SubElement(joint, "parent", link=link)
             SubElement(joint, "child", link=child)
@@ -78,6 +59,17 @@ def urdf(source: mujoco.MjModel | Path | str, has_free_bodies: bool = False) -> 
         origins.append(origin)
     indent(robot)
     return tostring(robot, encoding="unicode") + "\n"
+
+
+def joint_of(model: mujoco.MjModel, j: int, kind: str, name: str) -> Element:
+    """A joint without its place; kind: of MuJoCo's joint j, "" for a fixed one."""
+    joint = Element("joint", name=name, type=KINDS.get(kind, "floating" if kind else "fixed"))
+    if kind in KINDS:
+        SubElement(joint, "axis", xyz=text(model.jnt_axis[j]))
+        damping = text(model.dof_damping[model.jnt_dofadr[j]])
+        SubElement(joint, "dynamics", damping=damping, friction="0")
+        SubElement(joint, "limit", lower="-" + FAR, upper=FAR, effort=FAR, velocity=FAR)
+    return joint
 
 
 def link_of(name: str, model: mujoco.MjModel, body: int, origin: np.ndarray) -> Element:
@@ -100,7 +92,7 @@ def frame(position: np.ndarray, R: np.ndarray) -> dict[str, str]:
     return {"xyz": text(position), "rpy": text([roll, pitch, yaw])}
 
 
-def text(values) -> str:
+def text(values: ArrayLike) -> str:
     return " ".join(f"{value + 0.0:.17g}" for value in np.ravel(values))
 
 

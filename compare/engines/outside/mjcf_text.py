@@ -40,9 +40,9 @@ def is_from_file(part: ElementTree.Element) -> bool:
 
 def state_inertias(bodies: list[ElementTree.Element], path: Path) -> None:
     """Add the inertia that MuJoCo has computed to bodies with meshes and without one. It has vertices in float32."""
-    from ..mujoco.source import compiled
+    from ..mujoco.source import Source
 
-    model, _ = compiled(path)
+    model = Source(path).model
     if model.nbody != len(bodies) + 1:
         raise Unread("its bodies are not all in the text")
     for number, body in enumerate(bodies, start=1):

@@ -12,11 +12,11 @@ class OfUrdf(ReadModel):
 
     def __init__(self, file: File, precision: str):
         from ..mujoco.names import joint_places
-        from ..mujoco.source import compiled
+        from ..mujoco.source import Source
         from ..mujoco.urdf import urdf
 
         try:
-            model, _ = compiled(file.path)
+            model = Source(file.path).model
             text = urdf(model, self.has_free_bodies)
         except ValueError as error:
             raise Unread(str(error)) from None

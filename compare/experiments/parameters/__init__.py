@@ -1,155 +1,168 @@
-"""The compiled model compared with the stated numbers, or with those of a solution as MuJoCo compiled it."""
+"""The compiled model compared with the stated numbers, with those of a solution, or with those that its file states."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import Any, cast
 
 import numpy as np
 
 import tmt
 
-from ...core.check import Result
 from ...core.finding import Finding
+from ...engines.mujoco import Reading
+from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.inventory import LEFT_OUT, MODELLED
-from ...engines.mujoco.parameters import STATED_FLAGS, lengths, parameters
+from ...engines.mujoco.parameters import STATED_FLAGS, Stated, lengths, parameters, stated_numbers
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
-from ...robots.case import Coordinates
+from ...robots.coordinates import Coordinates
 from ...robots.joint_map import places_of
 from .. import Experiment
 from ..setup import Setup
-from . import file
-from .numbers import ABSENT, OF_BODIES, UNITS, cause, check_forces, compare_number, rows_of, unit_of
+from . import numbers
+from .numbers import ABSENT, OF_BODIES, UNITS, FeatureRow, NumberRow, ParametersResult
 
 EXPERIMENT = Experiment(order=10, serves_own=False)
+SHOWN = ["of", "quantity", "component", "stated", "compiled", "unit"]
 # numbers of the whole file; the others are of bodies and joints
 OF_WORLD = (*STATED_FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *ABSENT)
-WHOLE_NUMBERS = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")
-AT_TIMES = (
-    "limited",
-    "contact pairs",
-)  # these act at some states only: causes come after those that always act
-MAY_DIFFER = (
-    "contact",
-    "limit",
-    "clamp",
-    "actuator",
-)  # the equations of motion without them do not depend on these
+# these act at some states only: causes come after those that always act
+AT_TIMES = ("limited", "contact pairs")
+# the equations of motion without them do not depend on these
+MAY_DIFFER = ("contact", "limit", "clamp", "actuator")
 
 
-def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict:
+def rows(setup: Setup) -> ParametersResult:
+    """One row for each number; one check for each quantity of each joint or body; the causes that follow."""
+    robot, reading = setup.robot, cast(Reading, setup.reading)
+    is_of_file = not robot.is_stated
+    result = ParametersResult("parameters", shown=[*SHOWN, "asked_by"] if is_of_file else SHOWN)
+    dynamics = cast(MujocoDynamics, setup.compared()["mujoco"])
+    joints = dict(enumerate(("the world", *robot.joints), start=-1))
+    slides = {name for name, kind in zip(robot.joints, robot.tree.kind) if kind == "slide"}
+    for number in stated_numbers(reading.source) if is_of_file else beside_stated(setup, dynamics):
+        # the first part of a free joint is a slide
+        unit = numbers.unit_of(number.quantity, bool(slides & {number.place, f"{number.place} x"}))
+        result.rows += numbers.rows_of(number, unit, number.why if is_of_file else None)
+        if number.stated is not None and not number.why:
+            words = joints if number.quantity == "parent" else {}
+            result.causes += numbers.compare_number(result, number, unit, words)
+    if robot.stated_in:
+        result.causes += compare_features(result, robot)
+    forces = numbers.check_forces(result, setup.random, robot.tree, dynamics, result.causes)
+    if not robot.is_read:
+        result.causes += forces
+    if is_of_file:
+        for name, value, unit in (("integrator", reading.integrator, ""), ("timestep", reading.dt, "s")):
+            result.rows.append(NumberRow(of="file", quantity=name, compiled=value, unit=unit))
+    if robot.is_read:
+        result.tables["inventory"] = [FeatureRow.of(feature) for feature in robot.features]
+
+    def order(cause: dict[str, Any]) -> tuple[int, bool, float]:
+        return cause["rank"], cause["quantity"] in AT_TIMES, -cause["size"]
+
+    result.causes = sorted(result.causes, key=order)
+    return result
+
+
+def beside_stated(setup: Setup, dynamics: MujocoDynamics) -> Iterator[Stated]:
+    """The numbers of the robot, stated here or in a solution, beside those that MuJoCo compiled."""
+    tree, added = setup.robot.tree, lengths(dynamics)
+    if setup.robot.stated_in:  # a solution: its joints and bodies are looked up in the file
+        reading = cast(Reading, setup.reading)
+        joints = [reading.tree.joint_names.index(name) for name in tree.joint_names]
+        bodies = [reading.bodies.index(body) for body in dynamics.bodies]
+        stated = numbers_of(tree, range(len(joints)), range(len(bodies)))
+        compiled = numbers_of(reading.tree, joints, bodies)
+        reach = max(np.abs(stated[name]).max() for name in added)  # sums of lengths of the solution
+        added = {name: values + reach for name, values in added.items()}
+    else:
+        stated, compiled = stated_of_hinges(tree), parameters(dynamics)
+    for quantity in (name for name in UNITS if name in compiled):
+        values = np.asarray(compiled[quantity], dtype=float)
+        right = np.broadcast_to(np.asarray(stated.get(quantity, 0.0), dtype=float), values.shape)
+        names = owners(tree, quantity)
+        right, values = right.reshape(len(names), -1), values.reshape(len(names), -1)
+        sizes = added.get(quantity, np.abs(right).max(axis=1))
+        for owner, number, value, size in zip(names, right, values, sizes):
+            yield Stated(owner, quantity, number, value, tolerance=FACTOR * EPS * size)
+
+
+def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict[str, Any]:
     """The numbers of a Tree by quantity: arrays per joint, speed, position or body, or one. joints, bodies: in this order."""
-    (anchors, *_), places = places_of(tree), [tree.coordinates.joints[j] for j in joints]
-    positions = [i for place in places for i in range(place.q.start, place.q.stop)]
-    speeds = [i for place in places for i in range(place.qd.start, place.qd.stop)]
-    numbers = {-1: -1} | {j: i for i, j in enumerate(joints)}
-    is_sprung = np.repeat(
-        [tree.stiffness[j] > 0.0 for j in joints], [place.q.stop - place.q.start for place in places]
+    anchors, _, _ = places_of(tree)
+    places = [tree.coordinates.joints[j] for j in joints]
+    counts = [place.q.stop - place.q.start for place in places]
+    positions = np.concatenate([np.arange(place.q.start, place.q.stop) for place in places])
+    speeds = np.concatenate([np.arange(place.qd.start, place.qd.stop) for place in places])
+    indices = {-1: -1} | {j: i for i, j in enumerate(joints)}
+    of_joints = {name: np.array(getattr(tree, name))[joints] for name in ("reference", "stiffness")}
+    of_speeds = {name: np.array(getattr(tree, name))[speeds] for name in ("axis", "damping", "armature")}
+    of_bodies = {name: np.array(getattr(tree, name))[bodies] for name in ("mass", "com", "inertia")}
+    is_sprung = np.repeat(of_joints["stiffness"] > 0.0, counts)
+    return (
+        of_speeds
+        | of_bodies
+        | {
+            "parent": np.array([indices[tree.parent[j]] for j in joints]),
+            "anchor": anchors[joints],
+            "ref": of_joints["reference"],
+            "stiffness": of_joints["stiffness"],
+            "rest": np.array(tree.rest)[positions] * is_sprung,
+            "gravity": np.array(tree.gravity),
+        }
     )
-    return {
-        "parent": np.array([numbers[tree.parent[j]] for j in joints]),
-        "axis": np.array(tree.axis)[speeds],
-        "anchor": anchors[joints],
-        "ref": np.array(tree.reference)[joints],
-        "damping": np.array(tree.damping)[speeds],
-        "armature": np.array(tree.armature)[speeds],
-        "stiffness": np.array(tree.stiffness)[joints],
-        "rest": np.array(tree.rest)[positions] * is_sprung,
-        "mass": np.array(tree.mass)[bodies],
-        "com": np.array(tree.com)[bodies],
-        "inertia": np.array(tree.inertia)[bodies],
-        "gravity": np.array(tree.gravity),
-    }
 
 
-def stated(tree: tmt.Tree) -> dict:
+def stated_of_hinges(tree: tmt.Tree) -> dict[str, Any]:
     """The quantities of `parameters` by the stated numbers of hinges, arrays per hinge, per body, or one; the others are 0."""
-    numbers = numbers_of(tree, range(len(tree.joint_names)), range(len(tree.body_names)))
-    del numbers["rest"]
-    return dict.fromkeys(STATED_FLAGS, 1.0) | {"order": range(len(tree.joint_names))} | numbers
+    joints, bodies = range(len(tree.joint_names)), range(len(tree.body_names))
+    return dict.fromkeys(STATED_FLAGS, 1.0) | {"order": joints} | numbers_of(tree, joints, bodies)
 
 
 def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
     """The names of the bodies, joints, speeds or positions that have a quantity, or "world"."""
+    coordinates = Coordinates(tree.joint_names, tree.kind)
     if quantity in OF_WORLD:
         return ("world",)
-    if quantity in ("axis", "damping", "armature", "rest"):
-        coordinates = Coordinates(tree.joint_names, tree.kind)
-        return coordinates.positions if quantity == "rest" else coordinates.speeds
+    if quantity in ("axis", "damping", "armature"):
+        return coordinates.speeds
+    if quantity == "rest":
+        return coordinates.positions
     return tree.body_names if quantity in OF_BODIES else tree.joint_names
 
 
-def rows(setup: Setup) -> Result:
-    """One row for each number; one check for each quantity of each joint or body; the causes that follow."""
-    robot, reading = setup.robot, setup.reading
-    if not robot.is_stated:
-        return file.rows_of_file(setup)
-    result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit"])
-    tree, dynamics, causes = robot.tree, setup.compared()["mujoco"], []
-    added = lengths(dynamics)
-    if robot.stated_in:  # a solution: its joints and bodies are looked up in the file
-        joints = [reading.tree.joint_names.index(name) for name in tree.joint_names]
-        bodies = [reading.bodies.index(body) for body in setup.engines["mujoco"].bodies]
-        numbers_stated = numbers_of(tree, range(len(joints)), range(len(bodies)))
-        compiled = numbers_of(reading.tree, joints, bodies)
-        reach = max(np.abs(numbers_stated[name]).max() for name in added)  # sums of lengths of the solution
-        added = {name: values + reach for name, values in added.items()}
-    else:
-        numbers_stated, compiled = stated(tree), parameters(dynamics)
-    slides = {joint for joint, kind in zip(tree.joint_names, tree.kind) if kind == "slide"}
-    for quantity in (name for name in UNITS if name in compiled):
-        values = np.asarray(compiled[quantity], dtype=float)
-        numbers = np.broadcast_to(np.asarray(numbers_stated.get(quantity, 0.0), dtype=float), values.shape)
-        names = owners(tree, quantity)
-        is_whole = quantity in WHOLE_NUMBERS
-        numbers, values = (each.reshape(len(names), -1) for each in (numbers, values))
-        sizes = added.get(quantity, np.abs(numbers).max(axis=1))
-        for owner, a, b, size in zip(names, numbers, values, sizes):
-            unit, tolerance = unit_of(quantity, owner in slides), FACTOR * EPS * size
-            words = (
-                dict(enumerate(("the world", *tree.joint_names), start=-1)) if quantity == "parent" else {}
-            )
-            causes += compare_number(result, owner, quantity, a, b, unit, tolerance, is_whole, words)
-            result.rows += rows_of(owner, quantity, a, b, unit)
-    if robot.stated_in:
-        causes += compare_features(result, robot)
-        check_forces(result, setup)
-        file.add_inventory(result, robot.features)
-    else:
-        causes += check_forces(result, setup, causes)
-    result.curves["causes"] = sorted(causes, key=lambda c: (c["rank"], c["quantity"] in AT_TIMES, -c["size"]))
-    return result
-
-
-def compare_features(result: Result, robot: Robot) -> list[dict]:
+def compare_features(result: ParametersResult, robot: Robot) -> list[dict[str, Any]]:
     """Checks that features without a term in the equations are as many as in the solution; the causes where they are not."""
-    ours, theirs = ({f.feature: f for f in features} for features in (robot.features, robot.features_stated))
+    compiled, stated = (
+        {feature.feature: feature for feature in features}
+        for features in (robot.features, robot.features_stated)
+    )
     causes = []
-    for name, feature in (theirs | ours).items():
+    for name, feature in (stated | compiled).items():
         if feature.treatment in (MODELLED, LEFT_OUT) or name in MAY_DIFFER:
             continue
-        number, compiled = (
-            float(features[name].count if name in features else 0) for features in (theirs, ours)
-        )
-        if not result.check("file", f"{name}, how many", compiled, number, "", rule="equal").passed:
-            text = f"{name}: {number:g} in {robot.stated_in}, {compiled:g} in this file"
-            causes.append(cause(2, name, number, compiled, text, 1.0, name))
+        number = float(stated[name].count if name in stated else 0)
+        value = float(compiled[name].count if name in compiled else 0)
+        if not result.check("file", f"{name}, how many", value, number, "", rule="equal").passed:
+            text = f"{name}: {number:g} in {robot.stated_in}, {value:g} in this file"
+            causes.append(numbers.cause(2, name, number, value, text, 1.0, name))
     return causes
 
 
-def headline(result: Result) -> Finding | None:
+def headline(result: ParametersResult) -> Finding | None:
     """What is not as stated, and how many numbers are equal to the stated ones to the last bit."""
-    stated_rows = [row for row in result.rows if row.get("stated") is not None]
-    off = [row["difference"] != 0.0 for row in stated_rows if not row.get("asked_by")]
-    changed = sum(bool(row.get("asked_by")) and row["difference"] != 0.0 for row in stated_rows)
+    stated = [row for row in result.rows if row.stated is not None]
+    unchanged = [row for row in stated if not row.asked_by]
+    if not unchanged:
+        return None
+    off = sum(row.difference != 0.0 for row in unchanged)
+    changed = sum(row.difference != 0.0 for row in stated) - off
     failing = [f"{check.quantity} ({check.scene})" for check in result.checks if check.failed]
-    return (
-        result.finding("headline", numbers=len(off), off=sum(off), changed=changed, failing=failing)
-        if off
-        else None
-    )
+    return result.finding("headline", numbers=len(unchanged), off=off, changed=changed, failing=failing)
 
 
-def figures(result: Result, robot: Robot) -> Iterator[partial]:
+def figures(result: ParametersResult, robot: Robot) -> Iterator[partial[Any]]:
     from ..figures_sketch import draw_sketch  # matplotlib is for the process that draws
 
     yield partial(draw_sketch, robot)

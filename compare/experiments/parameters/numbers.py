@@ -1,42 +1,32 @@
 """A number of the model, stated and compiled: its rows, check and causes; and the check that no other forces act."""
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
+import tmt
 from tmt import literal
 
 from ...core.check import Result
-from ...engines.mujoco.parameters import STATED_FLAGS
+from ...core.rows import Row, column
+from ...engines.mujoco.dynamics import MujocoDynamics
+from ...engines.mujoco.parameters import ABSENT as FIELDS
+from ...engines.mujoco.parameters import STATED_FLAGS, Stated
 from ...judge.scale import EPS, FACTOR
-from ..setup import Setup
+from ...robots import Feature
+from ...robots.states import Sample
 
 # without a counterpart in the equations
-ABSENT = (
-    "contact pairs",
-    "damping beyond linear",
-    "stiffness beyond linear",
-    "actuator damping",
-    "actuator armature",
-)
-OF_FORCES = (
-    *ABSENT,
-    "stiffness",
-    "density",
-    "viscosity",
-    "gravcomp",
-    "limited",
-    "frictionloss",
-)  # explain a force
-OPTIONS = (
-    *STATED_FLAGS,
-    "order",
-    "parent",
-    "ref",
-    "density",
-    "viscosity",
-    "contact pairs",
-)  # causes of rank 1
+ABSENT = ("contact pairs", *(name for name in FIELDS if name != "tendon armature"))
+# these explain a force
+OF_FORCES = (*ABSENT, "stiffness", "density", "viscosity", "gravcomp", "limited", "frictionloss")
+# causes of rank 1
+OPTIONS = (*STATED_FLAGS, "order", "parent", "ref", "density", "viscosity", "contact pairs")
+WHOLE_NUMBERS = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")
 OF_BODIES = ("mass", "com", "inertia", "gravcomp")
 UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gravcomp", *ABSENT), "") | {
     "ref": "rad", "anchor": "m", "pos": "m", "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m",
@@ -45,97 +35,122 @@ UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gra
     "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
 OF_SLIDES = {"rad": "m", "N m s/rad": "N s/m", "kg m2": "kg", "N m/rad": "N/m", "N m": "N"}  # units
+COMPONENTS = {1: [""], 3: [*"xyz"], 9: [row + of_row for row in "xyz" for of_row in "xyz"]}  # by their number
+
+
+@dataclass(kw_only=True)
+class NumberRow(Row):
+    """A number of the model: parameters.csv."""
+
+    of: str
+    quantity: str
+    component: str = ""
+    stated: float | None = column(digits=7, default=None)  # None: the file leaves it to the compiler
+    compiled: float | str = column(digits=7)
+    difference: float | None = None
+    unit: str
+    asked_by: str | None = column(optional=True)  # the option of the file that changes it
+
+    @property
+    def urgency(self) -> tuple[bool, bool, float]:
+        return True, not self.difference, math.inf
+
+
+@dataclass(kw_only=True)
+class FeatureRow(Row):
+    """A feature of a file: inventory.csv."""
+
+    feature: str
+    count: int
+    names: str = column(names=True)
+    treatment: str
+    reason: str
+
+    @classmethod
+    def of(cls, feature: Feature) -> "FeatureRow":
+        names, why = ";".join(feature.names), feature.reason
+        return cls(
+            feature=feature.feature, count=feature.count, names=names, treatment=feature.treatment, reason=why
+        )
+
+
+@dataclass
+class ParametersResult(Result):
+    causes: list[dict[str, Any]] = field(default_factory=list)  # of the checks that fail
 
 
 def unit_of(quantity: str, slides: bool) -> str:
     """The unit of a number of a body, or of a joint that turns or slides."""
-    return (
-        OF_SLIDES.get(UNITS[quantity], UNITS[quantity])
-        if slides and quantity not in OF_BODIES
-        else UNITS[quantity]
-    )
+    unit = UNITS[quantity]
+    return OF_SLIDES.get(unit, unit) if slides and quantity not in OF_BODIES else unit
 
 
-def component(k: int, count: int) -> str:
-    """The k-th of 1, 3 or 9 components by name."""
-    return {1: ("",), 3: "xyz", 9: [a + b for a in "xyz" for b in "xyz"]}[count][k]
-
-
-def rows_of(owner: str, quantity: str, stated: Sequence, compiled: Sequence, unit: str, **more) -> list[dict]:
-    """Rows of the table, one for each component. stated: None for a component that is not stated."""
-    return [
-        {
-            "of": owner,
-            "quantity": quantity,
-            "component": component(k, len(compiled)),
-            "stated": a,
-            "compiled": b,
-        }
-        | {"difference": None if a is None else b - a, "unit": unit}
-        | more
-        for k, (a, b) in enumerate(zip(stated, compiled))
-    ]
+def rows_of(number: Stated, unit: str, asked_by: str | None = None) -> list[NumberRow]:
+    """Rows of the table, one for each component."""
+    compiled = np.ravel(number.compiled).astype(float).tolist()
+    stated: list[float | None] = [None] * len(compiled)
+    if number.stated is not None:
+        stated = np.ravel(number.stated).astype(float).tolist()
+    rows = []
+    for name, a, b in zip(COMPONENTS[len(compiled)], stated, compiled):
+        row = NumberRow(of=number.place, quantity=number.quantity, component=name, compiled=b, unit=unit)
+        rows.append(replace(row, stated=a, difference=None if a is None else b - a, asked_by=asked_by))
+    return rows
 
 
 def compare_number(
-    result: Result,
-    owner: str,
-    quantity: str,
-    stated: np.ndarray,
-    compiled: np.ndarray,
-    unit: str,
-    tolerance: float,
-    is_whole: bool = False,
-    words: Mapping[float, str] = {},
-) -> list[dict]:
-    """Adds the check of a quantity of a body or joint; returns a cause for each component that differs.
+    result: Result, number: Stated, unit: str, words: Mapping[int, str] = MappingProxyType({})
+) -> list[dict[str, Any]]:
+    """Add the check of a number of a body or joint; the causes, one for each component that differs.
 
-    is_whole: a count, an index or a flag. words: for such numbers. Rank 1: an option, or a convention of a joint (its
-    order, its sign, its zero); 2: one number.
+    words: for whole numbers. Rank 1: an option, or a convention of a joint (its order, its sign, its zero); 2: one number.
     """
+    quantity, tolerance = number.quantity, number.tolerance
+    stated, compiled = (np.array(values, float).ravel() for values in (number.stated, number.compiled))
     difference = np.abs(stated - compiled)
-    value, bound, rule = (
-        (compiled[0], stated[0], "equal") if is_whole else (difference.max(), tolerance, "at most")
-    )
-    result.check(owner, quantity, value, bound, unit, rounding=not is_whole, rule=rule)
+    is_whole = quantity in WHOLE_NUMBERS
+    value, bound = (compiled[0], stated[0]) if is_whole else (difference.max(), tolerance)
+    rule = "equal" if is_whole else "at most"
+    result.check(number.place, quantity, value, bound, unit, rounding=not is_whole, rule=rule)
     is_flipped = quantity == "axis" and bool(np.abs(stated + compiled).max() <= tolerance)
+    rank = 1 if is_flipped or quantity in OPTIONS else 2
+    owner = "" if number.place == "world" else f"of {number.place}"
     causes = []
-    for k, (a, b) in enumerate(zip(stated, compiled)):
+    for k, (name, a, b) in enumerate(zip(COMPONENTS[len(stated)], stated, compiled)):
         if not difference[k] <= tolerance:
-            of = "" if owner == "world" else f"of {owner}"
-            place = " ".join(filter(None, (quantity, component(k, len(stated)), of)))
-            values = [words.get(number, f"{number:.7g} {unit}".rstrip()) for number in (a, b)]
-            if values[0] == values[1]:
-                values = [f"{float(number)!r} {unit}".rstrip() for number in (a, b)]
-            text = f"{place}: stated {values[0]}, compiled {values[1]}" + " (the opposite sign)" * is_flipped
-            rank = 1 if is_flipped or quantity in OPTIONS else 2
-            causes.append(
-                cause(rank, place, a, b, text, difference[k] / tolerance if tolerance else np.inf, quantity)
-            )
+            place = " ".join(filter(None, (quantity, name, owner)))
+            texts = [words.get(value, f"{value:.7g} {unit}".rstrip()) for value in (a, b)]
+            if texts[0] == texts[1]:
+                texts = [f"{float(value)!r} {unit}".rstrip() for value in (a, b)]
+            text = f"{place}: stated {texts[0]}, compiled {texts[1]}" + " (the opposite sign)" * is_flipped
+            size = difference[k] / tolerance if tolerance else np.inf
+            causes.append(cause(rank, place, a, b, text, size, quantity))
     return causes
 
 
 def cause(
     rank: int, place: str, stated: float, compiled: float, text: str, size: float, quantity: str
-) -> dict:
+) -> dict[str, Any]:
     """A cause; size: its difference over its tolerance."""
-    compiled = float(compiled) if np.isfinite(compiled) else None
-    about = {"rank": rank, "place": place, "stated": float(stated), "found": compiled, "text": text}
+    number = float(compiled) if np.isfinite(compiled) else None
+    about = {"rank": rank, "place": place, "stated": float(stated), "found": number, "text": text}
     return about | {"size": float(size), "quantity": quantity}
 
 
-def check_forces(result: Result, setup: Setup, causes: Sequence[dict] = ()) -> list[dict]:
-    """Checks that no forces act that the equations do not have; these are causes unless `causes` explain them.
+def check_forces(
+    result: Result, sample: Sample, tree: tmt.Tree, dynamics: MujocoDynamics, causes: Sequence[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """Check that no forces act that the equations do not have; these are causes unless `causes` explain them.
 
     Fluid and tendons: MuJoCo adds their forces to those of springs and damping, of whose sum the rounding is allowed.
     """
-    tree, sample, unexplained, dynamics = setup.robot.tree, setup.random, [], setup.compared()["mujoco"]
+    unexplained = []
     largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(sample.q, tree)).max()
     for source, force in dynamics.other_forces(sample.q, sample.qd).items():
         allowed = FACTOR * EPS * float(largest) if source == "fluid and tendons" else 0.0
-        most = float(np.abs(force).max())
+        most, is_rounding = float(np.abs(force).max()), allowed > 0.0
         check = result.check(
-            sample.name, f"no forces of {source}", most, allowed, "N m", rounding=bool(allowed)
+            sample.name, f"no forces of {source}", most, allowed, "N m", rounding=is_rounding
         )
         if check.failed and not any(cause["quantity"] in OF_FORCES for cause in causes):
             place = f"forces of {source}"

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 from ...core import timing
 from ...core.finding import Finding
-from ...core.words import scene_begins
 from ...engines import GRID, IN_QUICK_RUNS, LABELS, RECORDS
 from ...judge.run import leaves_no_digits, movement_unit
 from ...judge.scale import EPS, FACTOR
@@ -134,7 +133,7 @@ def figures(result: SpeedResult, robot: Robot) -> Iterator[partial[Any]]:
     if "what_should_i_use" not in result.tables:  # nothing was timed
         return
     for scene in result.floors:
-        yield partial(figures_speed.draw_times, result, scene, beginning=scene_begins(scene, robot))
+        yield partial(figures_speed.draw_times, result, scene, beginning=robot.scene_begins(scene))
 
 
 def overview(results: Mapping[str, SpeedResult], robot: Robot) -> Iterator[partial[Any]]:

@@ -11,7 +11,6 @@ from matplotlib.ticker import MaxNLocator
 
 from ...core.check import largest_known
 from ...core.finding import Finding
-from ...core.words import scene_begins
 from ...engines import LABELS
 from ...judge.run import LEFT, moved_from, movement_unit, step_in_words
 from ...report.style import GREY, LINES, ORANGE, WIDTH, file_name, zero_at_the_end
@@ -114,7 +113,7 @@ def run_caption(result: TrajectoryResult, case: Case, runs: Sequence[Run], shown
     rows = [row for row in result.rows if row.scene == case.name and row.level == "open loop"]
     errors, coordinates = result.errors.get(case.name), case.coordinates
     values: dict[str, Any] = {
-        "scene": scene_begins(case.name, case.robot),
+        "scene": case.robot.scene_begins(case.name),
         "unit": movement_unit(coordinates),
     }
     values |= {"shown": shown, "positions": coordinates.nv, "balls": coordinates.has_balls}

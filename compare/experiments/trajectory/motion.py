@@ -30,7 +30,7 @@ def pictures_of(case: Case, runs: Sequence[Run]) -> Pictures | None:
     for engine, path in run.paths.items():
         times, q = frames(case, run.t, path)
         alive = np.isfinite(q).all(axis=1)
-        whole = case.whole_positions(np.where(alive[:, None], q, case.q))
+        whole = case.positions_of_all(np.where(alive[:, None], q, case.q))
         of_robot, links = stick_figure(case.robot, whole, crosses=True)
         points[engine] = np.where(alive[:, None, None], as_seen(of_robot), np.nan)
         positions.append(q)

@@ -7,7 +7,6 @@ import numpy as np
 
 from tmt.methods import METHODS
 
-from ...core.words import scene_begins
 from ...engines import LABELS, Engine, compared
 from ...judge.rounding import slope_rounding
 from ...judge.run import LEFT, deviation, moved_from, movement_unit, number_or_none
@@ -78,7 +77,7 @@ def find_departures(result: TrajectoryResult, robot: Robot, engines: Mapping[str
     for run in coarsest_runs(result, robot):
         case = run.case
         if case.is_held:
-            about = {"scene": scene_begins(case.name, robot), "claim": claims.get(case.name), "limit": LEFT}
+            about = {"scene": robot.scene_begins(case.name), "claim": claims.get(case.name), "limit": LEFT}
             unit, stated = movement_unit(case.coordinates), robot.compared[0] == "tmt"
             values = departures(run, engines)
             result.find("held", **about, duration=case.duration, unit=unit, stated=stated, **values)

@@ -76,7 +76,7 @@ def test_every_subset_agrees_and_a_wrong_lock_is_seen(mujoco):
         def of(self, case):
             return mujoco.of(case.changed(posture=()) if case.locked else case)
 
-    wrong = Deleted(mujoco.model, mujoco.joints, mujoco.bodies, mujoco.source)
+    wrong = Deleted(mujoco.source, mujoco.joints, mujoco.bodies)
     right, deleted = (blocks(Setup.small(ARM, engines(engine)), 2) for engine in (mujoco, wrong))
     assert len(right.checks) == 6 * 2 * 3 and failed(right) == []
     expected = {f"{' and '.join(locked)} locked" for locked in sub_blocks.subsets(ARM.joints, 4)}
@@ -92,7 +92,7 @@ def test_each_pair_has_its_own_models_and_the_bias_is_compared_in_motion(mujoco)
             bias = (lambda q, v: dynamics.bias(q, (1.0 + 1e-9) * v)) if case.locked else dynamics.bias
             return SimpleNamespace(mass_matrix=dynamics.mass_matrix, bias=bias)
 
-    wrong = Faster(mujoco.model, mujoco.joints, mujoco.bodies, mujoco.source)
+    wrong = Faster(mujoco.source, mujoco.joints, mujoco.bodies)
     off = [check for check in blocks(Setup.small(ARM, engines(wrong))).checks if not check.passed]
     assert {check.quantity for check in off} == {
         "bias, MuJoCo, reduced to whole",
@@ -142,7 +142,7 @@ def test_each_engine_is_compared_with_its_own_smaller_model(engines):
             return engines["mujoco"].of(case.changed(damping=1e-6) if case.locked else case)
 
     wrong, case = engines["mujoco"], ARM.cases[0]
-    wrong = Braked(wrong.model, wrong.joints, wrong.bodies, wrong.source)
+    wrong = Braked(wrong.source, wrong.joints, wrong.bodies)
     result = ReductionResult("reduction")
     needs.compare_smaller(result, case, reduced(case), Setup.small(ARM, {**engines, "mujoco": wrong}))
     assert [check.scene.split(", ")[2] for check in result.checks if not check.passed] == ["MuJoCo"]
@@ -161,7 +161,9 @@ def test_of_a_users_own_scene_nothing_is_expected_but_agreement(engines):
 def test_a_held_posture_with_springs_needs_nothing():
     held = next(case for case in of_file(PATHS["gripper"]).robot.cases if case.is_held)
     assert held.tree.has_springs and needed(held).stays == held.joints
-    gravity_alone = tuple(tmt.gravity_balance(held.posture, held.whole))  # without what the springs need
+    gravity_alone = tuple(
+        tmt.gravity_balance(held.posture, held.unlocked_tree)
+    )  # without what the springs need
     assert needed(held.changed(torque=gravity_alone)).stays == ()
 
 

@@ -25,7 +25,7 @@ EDITS = (
     Edit("joint_map", "put", "np.argsort(at)", "at", "an order is taken the other way"),
     Edit("joint_map", "JointMap.after", "stated.sign * inner.zero", "inner.zero", "of two maps the first zero keeps its sense"),
     Edit("joint_map", "within_a_turn", "zero if slides else _1", "_1", "the zero of a slide is turned back"),
-    Edit("joint_map", "same_names", "small.count(name) == right.count(name) == 1", "small.count(name) >= 1",
+    Edit("joint_map", "same_names", "lower.count(name) == right.count(name) == 1", "lower.count(name) >= 1",
          "either of two names in other capitals is taken"),
     Edit("joint_map", "costs_of", "np.abs(along)", "along", "joints of opposite axes are never matched"),
     Edit("joint_map", "costs_of", "OF_PLACE * apart", "0.0 * apart", "joints are matched wherever they are"),
