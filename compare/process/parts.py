@@ -45,8 +45,9 @@ def named_by(path: Path) -> tuple[Path, ...]:
             directories |= {element.get(name, "") for name in DIRECTORIES}
             models = existing(stated, folders, {""}) if element.tag in ("include", "model") else ()
             for part in models:
-                if parts.setdefault(os.path.abspath(part), part) is part:
-                    waiting.append(part)
+                place = os.path.abspath(part)
+                waiting += [] if place in parts else [part]
+                parts.setdefault(place, part)
         folders |= {part.parent for part in waiting}
     for part in existing(names, folders, directories):
         parts.setdefault(os.path.abspath(part), part)
