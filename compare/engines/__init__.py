@@ -13,17 +13,18 @@ order of the case; and Mbar a + bias = tau - D v.
 """
 
 import importlib
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.records import records_in
-from ..robots.case import Case, Coordinates
+from ..robots.case import Case
+from ..robots.coordinates import Coordinates
 
 GRID = 64  # number of equal intervals at whose ends a prepared run is read
 
@@ -108,9 +109,8 @@ class Motion(NamedTuple):
     q: np.ndarray  # (..., times, nq) rad
     v: np.ndarray  # (..., times, nv) rad/s
     evaluations: int | None = None  # of the dynamics in all; None where a method has no such thing
-    ended: str | np.ndarray | None = (
-        None  # when and why a run ended early, or None; of a batch an array of its shape
-    )
+    # when and why a run ended early, or None; of a batch an array of its shape
+    ended: str | np.ndarray | None = None
     steps: int | None = None  # that the method took; None: not known
     seconds: float | None = None  # of the run, where the engine measures it in a process of its own
 
@@ -120,7 +120,7 @@ class Motion(NamedTuple):
         return np.concatenate([self.q, self.v], axis=-1)
 
 
-Prepared = tuple[Callable, Callable[..., Motion]]  # run() and read(what it returned)
+Prepared = tuple[Callable[[], Any], Callable[[Any], Motion]]  # run() and read(what it returned)
 
 
 class Dynamics(Protocol):
@@ -137,10 +137,21 @@ class Dynamics(Protocol):
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """rad/s2, (..., nv), from Mbar a = tau - D v - h."""
 
-    def run(self, q, v, tau, dt: float, steps: int, method: str, tolerance: float | None = None) -> Motion:
+    def run(
+        self,
+        q: np.ndarray,
+        v: np.ndarray,
+        tau: np.ndarray,
+        dt: float,
+        steps: int,
+        method: str,
+        tolerance: float | None = None,
+    ) -> Motion:
         """Motion under constant torque from q, v, recorded at every multiple of dt."""
 
-    def prepare(self, q, v, tau, setting: Setting, method: str) -> Prepared:
+    def prepare(
+        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, setting: Setting, method: str
+    ) -> Prepared:
         """run() follows one motion once more; read(what it returned) is the motion at the start and at 64 equal times."""
 
 
@@ -148,7 +159,9 @@ class Engine(Protocol):
     """One engine with its methods of integration, by their names. Engines may be of this shape without this class."""
 
     name: str
-    methods: Mapping[str, Method]
+
+    @property
+    def methods(self) -> Mapping[str, Method]: ...
 
     def unavailable(self) -> str | None:
         """Why it cannot take part here, or None."""
@@ -179,9 +192,9 @@ def rows_of_states(*values: ArrayLike) -> tuple[tuple[int, ...], list[np.ndarray
 
     Each has an n of its own, as positions and speeds may; a number is a row of one.
     """
-    values = [np.atleast_1d(np.asarray(value, float)) for value in values]
-    batch = np.broadcast_shapes(*(value.shape[:-1] for value in values))
-    rows = [np.broadcast_to(value, (*batch, value.shape[-1])) for value in values]
+    arrays = [np.atleast_1d(np.asarray(value, float)) for value in values]
+    batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+    rows = [np.broadcast_to(array, (*batch, array.shape[-1])) for array in arrays]
     return batch, [np.array(row, order="C").reshape(-1, row.shape[-1]) for row in rows]
 
 
@@ -200,6 +213,21 @@ def as_far_as_it_goes(
     return path, ended
 
 
+def motion_of_states(t: np.ndarray, states: np.ndarray, start: np.ndarray, nq: int, why: str) -> Motion:
+    """One run as far as it goes; see as_far_as_it_goes."""
+    path, ended = as_far_as_it_goes(t, states, start, why)
+    return Motion(t, path[:, :nq], path[:, nq:], ended=ended)
+
+
+def batch_of(motions: Sequence[Motion], batch: tuple[int, ...]) -> Motion:
+    """Runs at the same times as those of a batch of this shape."""
+    q, v = (np.array(paths).reshape(*batch, *np.shape(paths[0])) for paths in zip(*(m[1:3] for m in motions)))
+    ended = np.array([motion.ended for motion in motions], dtype=object).reshape(batch)[()]
+    evaluations = [motion.evaluations for motion in motions if motion.evaluations is not None]
+    total = sum(evaluations) if len(evaluations) == len(motions) else None
+    return Motion(motions[0].t, q, v, total, ended)
+
+
 def same_scheme(engines: Mapping[str, Engine], method: Method, engine: str) -> Method:
     """The first method of an engine that is the same scheme as a given one."""
     return next(m for m in engines[engine].methods.values() if m.scheme == method.scheme)
@@ -207,4 +235,7 @@ def same_scheme(engines: Mapping[str, Engine], method: Method, engine: str) -> M
 
 def one_of_each_scheme(engine: Engine) -> tuple[Method, ...]:
     """Of methods of one engine that are the same scheme the first."""
-    return tuple({method.scheme: method for method in reversed(engine.methods.values())}.values())[::-1]
+    first: dict[str, Method] = {}
+    for method in engine.methods.values():
+        first.setdefault(method.scheme, method)
+    return tuple(first.values())

@@ -5,12 +5,17 @@ give (M + dt c) a = force - h - c v. A damper with c = armature / dt and the for
 a rotation vector, and its angular velocity in world axes.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tmt import Tree
+
 from . import EngineRecord
+from .outside.model import Body, File, Link, carried
 from .outside.of_urdf import OfUrdf
-from .outside.order import Order
+from .outside.order import order_of
 
 ENGINE = EngineRecord(
     order=75, label="DART", colour="#882255", marker="*", package="dartpy", extra="dart", reads_file=True
@@ -18,7 +23,7 @@ ENGINE = EngineRecord(
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
 
 
-def methods_for(tree):
+def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
     """Its step adds to the angular velocity of a free body in world axes."""
     return {"semi-implicit Euler": (1, "dart_semi_implicit_euler")} if tree.coordinates.balls else METHODS
 
@@ -28,7 +33,7 @@ class Model(OfUrdf):
 
     has_free_bodies = True
 
-    def load(self, text, file):
+    def load(self, text: str, file: File) -> np.ndarray:
         import dartpy
 
         loader, options = dartpy.utils.DartLoader(), dartpy.utils.DartLoaderOptions()
@@ -39,86 +44,76 @@ class Model(OfUrdf):
         never = self.world.getDeactivationOptions()
         never.mEnabled = False
         self.world.setDeactivationOptions(never)
-        q, v = np.zeros((2, file.coordinates.nv), int)  # the places in the Tree of DART's numbers
-        self.joints, self.free = (
-            {},
-            {},
-        )  # by their numbers in the Tree; quaternions by the first of DART's numbers
-        for k, (name, place) in enumerate(zip(file.names, file.coordinates.places.joints)):
-            joint = self.skeleton.getJoint(name.removesuffix(" turn") if place.kind == "ball" else name)
-            if joint is None:  # a part of a free joint
-                continue
-            self.joints[k], own = joint, joint.getIndexInSkeleton(0)
-            q[own], v[own] = place.q.start, place.qd.start
-            if place.kind == "ball":
-                self.free[own] = place.q
-                q[own : own + 6] = np.r_[place.q.start : place.q.start + 3, place.q.start - 3 : place.q.start]
-                v[own : own + 6] = np.r_[place.qd, place.qd.start - 3 : place.qd.start]
-        turned = tuple((slice(own, own + 3), at) for own, at in self.free.items())
-        self.order = Order(q, v, turned, in_world=True)
-        numbered = {joint.getIndexInSkeleton(0): joint for joint in self.joints.values()}
-        self.dampers = {own: joint for own, joint in numbered.items() if own not in self.free}
-        damping = np.zeros(len(v))
-        damping[v[list(self.dampers)]] = [joint.getDampingCoefficient(0) for joint in self.dampers.values()]
+        self.joints: dict[int, Any] = {}  # by their numbers in the Tree
+        for k, (name, kind) in enumerate(zip(file.names, file.kinds)):
+            joint = self.skeleton.getJoint(name.removesuffix(" turn") if kind == "ball" else name)
+            if joint is not None:  # else it is a part of a free joint
+                self.joints[k] = joint
+        places = {k: joint.getIndexInSkeleton(0) for k, joint in self.joints.items()}  # in q and in v
+        starts = {k: (place, place) for k, place in places.items()}
+        self.order = order_of(file, starts, (3, 4, 5, 0, 1, 2), (3, 4, 5, 0, 1, 2), in_world=True)
+        self.dampers = {places[k]: joint for k, joint in self.joints.items() if not file.is_free(k)}
+        damping = np.zeros(len(self.order.v))
+        for place, joint in self.dampers.items():
+            damping[self.order.v[place]] = joint.getDampingCoefficient(0)
         return damping
 
-    def bodies(self):
-        bodies, numbers = (
-            [[] for _ in self.file.names],
-            {joint.getName(): k for k, joint in self.joints.items()},
-        )
-        moved_by = {None: None}  # the joint that moves a body, by the body's name
-        for body in self.skeleton.getBodyNodes():
-            parent = body.getParentBodyNode()
-            k = numbers.get(body.getParentJoint().getName(), moved_by[parent and parent.getName()])
-            moved_by[body.getName()] = k
-            if k is not None:
-                R, inertia = body.getWorldTransform().rotation(), body.getInertia()
-                bodies[k].append((inertia.getMass(), body.getCOM(), R @ inertia.getMoment() @ R.T))
-        return bodies
+    def bodies(self) -> list[list[Body]]:
+        numbers = {joint.getName(): k for k, joint in self.joints.items()}
+        links = []
+        for node in self.skeleton.getBodyNodes():
+            R, inertia, parent = (
+                node.getWorldTransform().rotation(),
+                node.getInertia(),
+                node.getParentBodyNode(),
+            )
+            body = Body(inertia.getMass(), node.getCOM(), R @ inertia.getMoment() @ R.T)
+            joint = numbers.get(node.getParentJoint().getName())
+            links.append(Link(node.getName(), parent and parent.getName(), joint, body))
+        return carried(links, len(self.file.names))
 
-    def gravity(self):
-        return self.world.getGravity()
+    def gravity(self) -> np.ndarray:
+        return np.array(self.world.getGravity())
 
-    def set_gravity(self, gravity):
+    def set_gravity(self, gravity: np.ndarray) -> None:
         self.world.setGravity(gravity)
 
-    def set_state(self, q, v):
+    def set_state(self, q: np.ndarray, v: np.ndarray) -> None:
         self.q, (x, speeds) = q, self.order.engine(q, v)
-        for own, at in self.free.items():
-            x[own : own + 3] = Rotation.from_quat(np.roll(q[at], -1)).as_rotvec()
+        for at, place in self.order.turned:
+            x[at] = Rotation.from_quat(np.roll(q[place], -1)).as_rotvec()
         self.skeleton.setPositions(x)
         self.skeleton.setVelocities(speeds)
 
-    def start(self, q, v, dt, damping):
+    def start(self, q: np.ndarray, v: np.ndarray, dt: float, damping: np.ndarray) -> None:
         self.world.setTimeStep(dt)
         self.rotors = self.armature / dt  # coefficients of the dampers that are armature
-        for own, joint in self.dampers.items():
-            joint.setDampingCoefficient(0, (damping + self.rotors)[self.order.v[own]])
+        for place, joint in self.dampers.items():
+            joint.setDampingCoefficient(0, (damping + self.rotors)[self.order.v[place]])
         self.set_state(q, v)
 
-    def set_force(self, force, v):
+    def set_force(self, force: np.ndarray, v: np.ndarray) -> None:
         self.skeleton.setForces(self.order.engine(self.q, force + self.rotors * v)[1])
 
-    def step(self, force, v):
+    def step(self, force: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         self.set_force(force, v)
         self.world.step()
         x, self.q = self.skeleton.getPositions(), self.q.copy()
         self.q[self.order.q] = x
-        for own, at in self.free.items():
-            self.q[at] = np.roll(Rotation.from_rotvec(x[own : own + 3]).as_quat(), 1)
+        for at, place in self.order.turned:
+            self.q[place] = np.roll(Rotation.from_rotvec(x[at]).as_quat(), 1)
         return self.q, self.order.tree(self.q, self.skeleton.getVelocities())
 
-    def mass_matrix(self, q):
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         self.set_state(q, np.zeros(len(self.armature)))
         return self.order.tree_matrix(q, self.skeleton.getMassMatrix()) + np.diag(self.armature)
 
-    def bias(self, q, v):
+    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         self.set_state(q, v)
         return self.order.tree(q, self.skeleton.getCoriolisAndGravityForces())
 
-    def acceleration(self, q, v, force):
-        self.start(q, v, 1.0, 0.0)
+    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+        self.start(q, v, 1.0, np.zeros_like(v))
         self.set_force(force, v)
         self.skeleton.computeForwardDynamics()
         return self.order.tree(q, self.skeleton.getAccelerations())

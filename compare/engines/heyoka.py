@@ -1,8 +1,8 @@
 """heyoka's Taylor method on the same equations of motion; only where heyoka is installed (the extra `taylor`)."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from typing import ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from tmt.derivation.method import acceleration
 from tmt.derivation.vectors import arctan, cos, sin, sqrt
 
 from ..robots.case import Case
-from . import Engine, EngineRecord, Method, Motion, Prepared, as_far_as_it_goes
+from . import Engine, EngineRecord, Method, Motion, Prepared, motion_of_states
 from .scipy import ScipyDynamics, of_length_1
 
 ENGINE = EngineRecord(
@@ -27,7 +27,7 @@ MOST_JOINTS = 12  # for more the operations are not counted
 
 class Heyoka(Engine):
     name = "heyoka"
-    methods: ClassVar = {"Taylor": Method("heyoka", "Taylor", None, "Taylor", adaptive=True)}
+    methods: Mapping[str, Method] = {"Taylor": Method("heyoka", "Taylor", None, "Taylor", adaptive=True)}
 
     def too_long(self, tree: Tree) -> str | None:
         if len(tree.axis) <= MOST_JOINTS and evaluator(tree, "acceleration").operations <= MOST_OPERATIONS:
@@ -43,26 +43,33 @@ def engine(schemes: Iterable[str]) -> Heyoka:
 
 
 class HeyokaDynamics(ScipyDynamics):
-    def prepared(self, q, v, tau, t, method, tolerance) -> Prepared:
+    def prepared(
+        self,
+        q: np.ndarray,
+        v: np.ndarray,
+        tau: np.ndarray,
+        t: np.ndarray,
+        method: str,
+        tolerance: float | None,
+    ) -> Prepared:
         torque = tuple(np.asarray(tau, float).tolist())
         stepper = integrator(self.tree, torque, FULL if tolerance is None else tolerance)
         start = np.concatenate([q, v])
 
-        def run():
+        def run() -> Any:
             stepper.time, stepper.state[:] = 0.0, start
             return stepper.propagate_grid(t)
 
-        def read(outcome):
+        def read(outcome: Any) -> Motion:
             why, *_, steps, _, path = outcome
-            path, ended = as_far_as_it_goes(t, path, start, f"heyoka stops: {why}")
-            q, v = np.split(path, [self.coordinates.nq], axis=1)
-            return Motion(t, of_length_1(self.coordinates, q), v, None, ended, int(steps))
+            motion = motion_of_states(t, path, start, self.coordinates.nq, f"heyoka stops: {why}")
+            return motion._replace(q=of_length_1(self.coordinates, motion.q), steps=int(steps))
 
         return run, read
 
 
 @lru_cache(maxsize=32)
-def integrator(tree: Tree, tau: tuple[float, ...], tolerance: float):
+def integrator(tree: Tree, tau: tuple[float, ...], tolerance: float) -> Any:
     import heyoka
 
     q, qd = variables(tree, "q", "qd")
@@ -71,7 +78,7 @@ def integrator(tree: Tree, tau: tuple[float, ...], tolerance: float):
     return heyoka.taylor_adaptive([*zip(q, rates), *zip(qd, qdd)], [0.0] * (len(q) + len(qd)), tol=tolerance)
 
 
-def variables(tree: Tree, *names: str) -> list:
+def variables(tree: Tree, *names: str) -> list[list[Any]]:
     import heyoka
 
     for function, own in ((sin, heyoka.sin), (cos, heyoka.cos), (sqrt, heyoka.sqrt), (arctan, heyoka.atan)):

@@ -1,29 +1,34 @@
 """MJX: the model that MuJoCo compiles, computed by JAX."""
 
+from collections.abc import Callable
 from functools import cache, cached_property, partial
+from typing import Any
 
 import numpy as np
 
-from . import GRID, EngineRecord
-from .outside.model import ReadModel, Unread
+from tmt import Tree
+
+from . import EngineRecord
+from .outside.model import Course, File, Unread
+from .outside.of_compiled import METHODS as METHODS
+from .outside.of_compiled import STAGES, OfCompiled
 
 ENGINE = EngineRecord(
     order=60, label="MJX", colour="#332288", marker="<", package="mujoco.mjx", extra="mjx", reads_file=True, compiles=True,
     environment=(("JAX_ENABLE_X64", "1"), ("JAX_PLATFORMS", "cpu")),
 )  # fmt: skip
-METHODS = {"Euler": (1, "semi_implicit_euler"), "implicitfast": (1, "semi_implicit_euler"), "RK4": (4, "rk4")}
 # its fusions repeat what they share: an acceleration of an arm of seven hinges took 412 ms, 3 ms without them
 COMPILER = {"xla_cpu_use_fusion_emitters": False}
 STIFFNESS_AND_DAMPING = ("jnt_stiffness", "dof_damping")
 
 
-def methods_for(tree):
+def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
     """METHODS for a Tree: RK4 turns a ball by the mean of its speeds, as MuJoCo's did up to 3.17."""
     return METHODS | ({"RK4": (2, "rk4_mean_speed")} if tree.coordinates.balls else {})
 
 
-class Model(ReadModel):
-    def __init__(self, file, precision):
+class Model(OfCompiled):
+    def __init__(self, file: File, precision: str):
         from mujoco import mjx
 
         from .mujoco.bare import Bare
@@ -37,18 +42,19 @@ class Model(ReadModel):
         self.data = mjx.make_data(self.bare.model, impl="jax")
 
     @cached_property
-    def model(self):
+    def model(self) -> Any:
         """The model without damping and stiffness, which are part of the force."""
         model = self.models["RK4"]
         return model.replace(**{name: 0.0 * getattr(model, name) for name in STIFFNESS_AND_DAMPING})
 
-    def numbers(self):
-        model = self.models["Euler"]
-        held = self.bare.numbers(lambda name: np.array(getattr(model, name)))
-        return {"gravity": np.asarray(model.opt.gravity)} | held
+    def held(self, name: str) -> np.ndarray:
+        return np.array(getattr(self.models["Euler"], name))
 
-    def mend(self, name, values):
-        changes = {}
+    def gravity(self) -> np.ndarray:
+        return np.asarray(self.models["Euler"].opt.gravity)
+
+    def mend(self, name: str, values: np.ndarray) -> bool:
+        changes: dict[str, np.ndarray] = {}
         if name == "gravity":
             changes = {"opt.gravity": values}
         elif name in ("armature", "damping"):
@@ -61,7 +67,7 @@ class Model(ReadModel):
         self.models = {method: model.tree_replace(changes) for method, model in self.models.items()}
         return bool(changes)
 
-    def placed(self, q, *of_speeds):
+    def placed(self, q: np.ndarray, *of_speeds: np.ndarray) -> list[np.ndarray]:
         """The arguments in MuJoCo's order of joints."""
         placed = [np.zeros(np.shape(values), self.precision) for values in (q, *of_speeds)]
         placed[0][..., self.bare.qpos] = q
@@ -69,53 +75,48 @@ class Model(ReadModel):
             vector[..., self.bare.dofs] = values
         return placed
 
-    def values(self, q, v, force):
+    def values(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, ...]:
         M, h, a = functions()["values"](self.model, self.data, *self.placed(q, v, force))
         at = self.bare.dofs
         return np.asarray(M)[np.ix_(at, at)], np.asarray(h)[at], np.asarray(a)[at]
 
-    def mass_matrix(self, q):
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         zero = np.zeros(len(self.bare.dofs))
         return self.values(q, zero, zero)[0]
 
-    def bias(self, q, v):
+    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         return self.values(q, v, np.zeros_like(v))[1]
 
-    def acceleration(self, q, v, force):
+    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
         return self.values(q, v, force)[2]
 
-    def prepare(self, method, tau, dt, tolerance):
-        q = self.bare.model.qpos0[self.bare.qpos]
-        self.run(q, np.zeros_like(tau), tau, np.arange(GRID + 1.0), 0, method, tolerance)
-
-    def run(self, q, v, tau, times, steps, method, tolerance):
-        records = len(times) - 1
-        dt = np.asarray(times[-1] / max(steps, 1), self.precision)
-        model = self.models[method].tree_replace({"opt.timestep": dt})
-        path = functions()["path"](
-            model, self.data, *self.placed(q, v, tau), steps // records, records=records
+    def run(self, course: Course) -> tuple[np.ndarray, int]:
+        model = self.models[course.method].tree_replace(
+            {"opt.timestep": np.asarray(course.dt, self.precision)}
         )
+        start = self.placed(course.q, course.v, course.tau)
+        path = functions()["path"](model, self.data, *start, course.every, records=len(course.times) - 1)
         qpos, qvel = map(np.asarray, path)
-        path = np.hstack([qpos[:, self.bare.qpos], qvel[:, self.bare.dofs]])
-        return np.vstack([np.hstack([q, v]), path]), steps * (4 if method == "RK4" else 1)
+        states = np.hstack([qpos[:, self.bare.qpos], qvel[:, self.bare.dofs]])
+        return np.vstack([course.start, states]), course.steps * STAGES[course.method]
 
 
 @cache
-def functions() -> dict:
+def functions() -> dict[str, Callable[..., Any]]:
     """The compiled functions; models that differ only in their numbers have one compilation."""
     import jax
     from mujoco import mjx
 
-    def values(model, data, qpos, qvel, force):
+    def values(model: Any, data: Any, qpos: Any, qvel: Any, force: Any) -> Any:
         data = mjx.forward(model, data.replace(qpos=qpos, qvel=qvel, qfrc_applied=force))
         return mjx.full_m(model, data), data.qfrc_bias, data.qacc
 
-    def path(model, data, qpos, qvel, force, every, records):
-        def step(_, state):
+    def path(model: Any, data: Any, qpos: Any, qvel: Any, force: Any, every: Any, records: int) -> Any:
+        def step(_: Any, state: Any) -> Any:
             now = mjx.step(model, data.replace(qpos=state[0], qvel=state[1], qfrc_applied=force))
             return now.qpos, now.qvel
 
-        def record(state, _):
+        def record(state: Any, _: Any) -> Any:
             return (jax.lax.fori_loop(0, every, step, state),) * 2
 
         return jax.lax.scan(record, (qpos, qvel), None, records)[1]

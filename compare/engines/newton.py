@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
 from . import EngineRecord
-from .outside.model import File, ReadModel, Unread, together
+from .outside.model import Body, Course, File, Link, Numbers, ReadModel, Unread, carried
 
 ENGINE = EngineRecord(order=70, label="Newton", colour="#999933", marker="h", package="newton", extra="newton",
                       reads_file=True, precision="float32")  # fmt: skip
@@ -27,10 +27,10 @@ class Model(ReadModel):
         from .mujoco.source import Source
 
         builder, warp.config.enable_backward = newton.ModelBuilder(), False
-        is_urdf, mjcf = file.path.suffix == ".urdf", {"skip_equality_constraints": True}
-        builder.add_urdf(str(file.path), floating=False) if is_urdf else builder.add_mjcf(
-            str(file.path), **mjcf
-        )
+        if file.path.suffix == ".urdf":
+            builder.add_urdf(str(file.path), floating=False)
+        else:
+            builder.add_mjcf(str(file.path), skip_equality_constraints=True)
         self.newton, self.model = newton, builder.finalize(device="cpu")
         for name in OFF:
             getattr(self.model, f"joint_{name}").zero_()
@@ -39,15 +39,15 @@ class Model(ReadModel):
             raise Unread(f"it has read {self.model.joint_dof_count} speeds, the file has {own.nv}")
         firsts, children = self.model.joint_qd_start.numpy().tolist(), self.model.joint_child.numpy()
         coords, dofs, self.reference = {}, {}, np.zeros(own.nq)  # in Newton's vectors
-        self.turns, nq, nv = (
-            [],
-            0,
-            0,
-        )  # the first coordinate and dof of balls, and the centre of mass of a free body
-        places = sorted(
-            joint_places(own).items(), key=lambda i: (own.jnt_bodyid[i[1].joint], i[1].kind != "slide")
-        )
-        for name, place in places:
+        # the first coordinate and dof of balls, and the centre of mass of a free body
+        self.turns: list[tuple[int, int, np.ndarray | None]] = []
+        places, nq, nv = joint_places(own), 0, 0
+
+        def slides_first(name: str) -> tuple[int, bool]:
+            return own.jnt_bodyid[places[name].joint], places[name].kind != "slide"
+
+        for name in sorted(places, key=slides_first):
+            place = places[name]
             is_free = kind_of(own, place.joint) == "free"
             coords[name], dofs[name] = range(nq, nq + len(place.qpos)), range(nv, nv + len(place.dofs))
             if place.kind == "ball":
@@ -63,23 +63,24 @@ class Model(ReadModel):
         self.solver = newton.solvers.SolverFeatherstone(self.model, angular_damping=0.0)
         self.state, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
 
-    def numbers(self):
-        model, kinds, fixed = self.model, self.model.joint_type.numpy(), self.newton.JointType.FIXED
+    def fields(self) -> Numbers:
+        speeds = {name: values[self.dofs] for name, values in self.read.items()}
+        return {"gravity": np.ravel(self.model.gravity.numpy()), **speeds}
+
+    def bodies(self) -> list[list[Body]]:
+        model, fixed, links = self.model, self.newton.JointType.FIXED, []
         mass, com, inertia = (getattr(model, f"body_{name}").numpy() for name in ("mass", "com", "inertia"))
         self.newton.eval_fk(model, model.joint_q, model.joint_qd, self.state)
-        moved_by, bodies = {-1: None}, [[] for _ in self.joint_of]
-        parents, children, ends = model.joint_parent, model.joint_child, model.joint_qd_start.numpy()[1:]
-        for kind, parent, child, end in zip(kinds, parents.numpy(), children.numpy(), ends):
-            joint = moved_by[child] = moved_by[parent] if kind == fixed else self.joint_of[end - 1]
-            if joint is not None:
-                x = self.state.body_q.numpy()[child].astype(float)
-                R = Rotation.from_quat(x[3:]).as_matrix()
-                bodies[joint].append((float(mass[child]), x[:3] + R @ com[child], R @ inertia[child] @ R.T))
-        numbers = dict(zip(("mass", "moments"), map(np.array, zip(*map(together, bodies)))))
-        numbers["gravity"] = np.ravel(model.gravity.numpy())
-        return numbers | {name: values[self.dofs] for name, values in self.read.items()}
+        fields = model.joint_type, model.joint_parent, model.joint_child
+        kinds, parents, children = (field.numpy() for field in fields)
+        for kind, parent, child, end in zip(kinds, parents, children, model.joint_qd_start.numpy()[1:]):
+            x = self.state.body_q.numpy()[child].astype(float)
+            R = Rotation.from_quat(x[3:]).as_matrix()
+            body = Body(float(mass[child]), x[:3] + R @ com[child], R @ inertia[child] @ R.T)
+            links.append(Link(child, parent, None if kind == fixed else self.joint_of[end - 1], body))
+        return carried(links, len(self.joint_of))
 
-    def mend(self, name, values):
+    def mend(self, name: str, values: np.ndarray) -> bool:
         if name == "gravity":
             self.model.gravity.assign(np.reshape(values, (1, 3)))
         elif name in self.read:
@@ -87,7 +88,7 @@ class Model(ReadModel):
             getattr(self.model, f"joint_{name}").assign(self.read[name])
         return name not in ("mass", "moments")
 
-    def speeds(self, x, v):
+    def speeds(self, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """S at Newton's coordinates x, and c at the Tree's speeds v."""
         S, c = np.eye(len(v))[np.argsort(self.dofs)], np.zeros(len(v))
         for at, dof, centre in self.turns:
@@ -98,7 +99,7 @@ class Model(ReadModel):
                 c[dof - 3 : dof] = np.cross(S[own] @ v, np.cross(S[own] @ v, R @ centre))
         return S, c
 
-    def set_state(self, q, v):
+    def set_state(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         x = -self.reference
         x[self.coords] += q
         for at, _, _ in self.turns:
@@ -109,17 +110,17 @@ class Model(ReadModel):
         self.newton.eval_fk(self.model, self.state.joint_q, self.state.joint_qd, self.state)
         return S, c
 
-    def own_mass_matrix(self):
+    def own_mass_matrix(self) -> np.ndarray:
         """M in Newton's coordinates; each tree of the file is an articulation of its own."""
         sizes = np.diff(self.model.joint_qd_start.numpy()[self.model.articulation_start.numpy()])
         blocks = self.newton.eval_mass_matrix(self.model, self.state).numpy()
         return block_diag(*(block[:size, :size] for block, size in zip(blocks, sizes)))
 
-    def mass_matrix(self, q):
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         S, _ = self.set_state(q, np.zeros(len(self.dofs)))
         return S.T @ self.own_mass_matrix() @ S
 
-    def bias(self, q, v):
+    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         S, c = self.set_state(q, v)
         weight, rest = self.model.state().joint_qd, self.model.state().joint_qd
         self.newton.eval_inverse_dynamics_passive(
@@ -127,7 +128,7 @@ class Model(ReadModel):
         )
         return S.T @ (weight.numpy().astype(float) + rest.numpy() + self.own_mass_matrix() @ c)
 
-    def acceleration(self, q, v, force):
+    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
         S, c = self.set_state(q, v)
         self.model.joint_damping.zero_()
         self.model.joint_stiffness.zero_()
@@ -136,27 +137,27 @@ class Model(ReadModel):
         change = self.next.joint_qd.numpy().astype(float) - self.state.joint_qd.numpy()
         return np.linalg.solve(S, change - c)
 
-    def prepare(self, method, tau, dt, tolerance):
-        self.model.joint_damping.assign(self.read["damping"])
-        self.model.joint_stiffness.assign(self.read["stiffness"])
-        if any(
-            self.read["stiffness"][i] or (c is not None and self.read["damping"][i]) for _, i, c in self.turns
-        ):
+    def prepare(self, course: Course) -> None:
+        damping, stiffness = self.read["damping"], self.read["stiffness"]
+        self.model.joint_damping.assign(damping)
+        self.model.joint_stiffness.assign(stiffness)
+        damped = [damping[dof] for _, dof, centre in self.turns if centre is not None]
+        if any(damped) or any(stiffness[dof] for _, dof, _ in self.turns):
             raise Unread(
                 "the Featherstone solver has no springs of ball joints and no damping of free joints"
             )
 
-    def run(self, q, v, tau, times, steps, method, tolerance):
-        self.prepare(method, tau, times[-1] / steps, tolerance)
-        every, states, (S, _) = steps // (len(times) - 1), [np.concatenate([q, v])], self.set_state(q, v)
-        for step in range(1, steps + 1):
-            self.control.joint_f.assign(np.linalg.solve(S.T, tau))
-            self.solver.step(self.state, self.next, self.control, None, times[-1] / steps)
+    def run(self, course: Course) -> tuple[np.ndarray, int]:
+        self.prepare(course)
+        states, (S, _) = [course.start], self.set_state(course.q, course.v)
+        for step in range(1, course.steps + 1):
+            self.control.joint_f.assign(np.linalg.solve(S.T, course.tau))
+            self.solver.step(self.state, self.next, self.control, None, course.dt)
             self.state, self.next = self.next, self.state
             x, v = (values.numpy().astype(float) for values in (self.state.joint_q, self.state.joint_qd))
             S, _ = self.speeds(x, v)
             for at, _, _ in self.turns:
                 x[at : at + 4] = np.roll(x[at : at + 4], 1)
-            if step % every == 0:
+            if step % course.every == 0:
                 states.append(np.concatenate([(x + self.reference)[self.coords], np.linalg.solve(S, v)]))
-        return np.array(states), steps
+        return np.array(states), course.steps

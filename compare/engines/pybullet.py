@@ -10,7 +10,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tmt import Tree
+
 from . import EngineRecord
+from .outside.model import Body, File, Link, carried
 from .outside.of_urdf import OfUrdf
 
 ENGINE = EngineRecord(
@@ -25,7 +28,7 @@ ENGINE = EngineRecord(
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
 
 
-def methods_for(tree):
+def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
     """Its damping is explicit."""
     if any(tree.armature):
         return {}
@@ -33,7 +36,7 @@ def methods_for(tree):
 
 
 class Model(OfUrdf):
-    def load(self, text, file):
+    def load(self, text: str, file: File) -> np.ndarray:
         import pybullet
         from pybullet_utils.bullet_client import BulletClient
 
@@ -42,73 +45,68 @@ class Model(OfUrdf):
             (Path(folder) / "robot.urdf").write_text(text)
             flags = self.bullet.URDF_USE_INERTIA_FROM_FILE
             self.robot = self.bullet.loadURDF(f"{folder}/robot.urdf", useFixedBase=True, flags=flags)
-        self.infos = [
-            self.bullet.getJointInfo(self.robot, k) for k in range(self.bullet.getNumJoints(self.robot))
-        ]
+        numbers = range(
+            self.bullet.getNumJoints(self.robot)
+        )  # of the links, and of the joints that move them
+        self.infos = [self.bullet.getJointInfo(self.robot, link) for link in numbers]
         by_name = {info[1].decode(): info for info in self.infos}
         self.links = [by_name[name][0] for name in file.names]
         self.order = np.argsort(self.links)  # the Tree's joints in PyBullet's vectors
-        for link in range(len(self.infos)):
+        for link in numbers:
             self.bullet.changeDynamics(self.robot, link, linearDamping=0.0, angularDamping=0.0)
             self.bullet.changeDynamics(self.robot, link, maxJointVelocity=1e9)
         self.apply(pybullet.VELOCITY_CONTROL, np.zeros(len(file.names)))
         return np.array([by_name[name][6] for name in file.names])
 
-    def apply(self, mode, forces):
+    def apply(self, mode: int, forces: np.ndarray) -> None:
         """Set the torques of the joints, or the largest ones of the motors that they have by default."""
         self.bullet.setJointMotorControlArray(self.robot, self.links, mode, forces=forces.tolist())
 
-    def bodies(self):
-        moved_by, bodies, joints = (
-            {-1: None},
-            [[] for _ in self.links],
-            {link: k for k, link in enumerate(self.links)},
-        )
+    def bodies(self) -> list[list[Body]]:
+        joints, links = {link: k for k, link in enumerate(self.links)}, []
         for link, info in enumerate(self.infos):
-            joint = moved_by[link] = joints.get(link, moved_by[info[16]])
-            if joint is not None:
-                mass, _, moments, *_ = self.bullet.getDynamicsInfo(self.robot, link)
-                centre, turn, *_ = self.bullet.getLinkState(self.robot, link, computeForwardKinematics=True)
-                R = Rotation.from_quat(turn).as_matrix()
-                bodies[joint].append((mass, np.array(centre), R @ np.diag(moments) @ R.T))
-        return bodies
+            mass, _, moments, *_ = self.bullet.getDynamicsInfo(self.robot, link)
+            centre, turn, *_ = self.bullet.getLinkState(self.robot, link, computeForwardKinematics=True)
+            R = Rotation.from_quat(turn).as_matrix()
+            body = Body(mass, np.array(centre), R @ np.diag(moments) @ R.T)
+            links.append(Link(link, info[16], joints.get(link), body))
+        return carried(links, len(self.links))
 
-    def gravity(self):
+    def gravity(self) -> np.ndarray:
         engine = self.bullet.getPhysicsEngineParameters()
         return np.array([engine[f"gravityAcceleration{axis}"] for axis in "XYZ"])
 
-    def set_gravity(self, gravity):
+    def set_gravity(self, gravity: np.ndarray) -> None:
         self.bullet.setGravity(*gravity)
 
     @property
-    def lacks(self):
-        return ("acceleration",) * bool(self.armature.any())
+    def lacks(self) -> tuple[str, ...]:
+        return ("acceleration",) if self.armature.any() else ()
 
-    def mass_matrix(self, q):
-        M = np.empty((len(q), len(q)))
-        M[np.ix_(self.order, self.order)] = self.bullet.calculateMassMatrix(
-            self.robot, q[self.order].tolist()
-        )
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+        M, own = np.empty((len(q), len(q))), q[self.order].tolist()
+        M[np.ix_(self.order, self.order)] = self.bullet.calculateMassMatrix(self.robot, own)
         return M + np.diag(self.armature)
 
-    def bias(self, q, v):
+    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         h, zero = np.empty_like(q), [0.0] * len(q)
         state = q[self.order].tolist(), v[self.order].tolist()
         h[self.order] = self.bullet.calculateInverseDynamics(self.robot, *state, zero)
         return h
 
-    def start(self, q, v, dt, damping):
+    def start(self, q: np.ndarray, v: np.ndarray, dt: float, damping: np.ndarray) -> None:
         self.bullet.setTimeStep(dt)
         for link, coefficient, *state in zip(self.links, damping, q, v):
             self.bullet.changeDynamics(self.robot, link, jointDamping=coefficient)
             self.bullet.resetJointState(self.robot, link, *state)
 
-    def step(self, force, v):
+    def step(self, force: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         self.apply(self.bullet.TORQUE_CONTROL, force)
         self.bullet.stepSimulation()
         states = self.bullet.getJointStates(self.robot, self.links)
-        return np.array([state[:2] for state in states]).T
+        q, v = np.array([state[:2] for state in states]).T
+        return q, v
 
-    def acceleration(self, q, v, force):
+    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
         self.start(q, v, 1.0, np.zeros_like(v))
         return self.step(force, v)[1] - v

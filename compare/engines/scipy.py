@@ -1,27 +1,37 @@
 """SciPy's solve_ivp with tmt's compiled equations."""
 
-from collections.abc import Callable, Iterable
-from typing import ClassVar
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
 from tmt.compiled import evaluator
 
-from ..robots.case import Case, Coordinates
-from . import GRID, Engine, EngineRecord, Method, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
+from ..robots.case import Case
+from ..robots.coordinates import Coordinates
+from . import (
+    GRID,
+    Engine,
+    EngineRecord,
+    Method,
+    Motion,
+    Prepared,
+    Setting,
+    batch_of,
+    motion_of_states,
+    rows_of_states,
+)
 from .tmt import TmtDynamics
 
 ENGINE = EngineRecord(order=30, label="SciPy", colour="#009E73", marker="^")
 DEFAULT = 1e-9  # tolerance
 LEAST_RELATIVE = 2.3e-14  # that solve_ivp takes
+NAMES = "RK45", "DOP853", "Radau", "LSODA"
 
 
 class Scipy(Engine):
     name = "scipy"
-    methods: ClassVar = {
-        name: Method("scipy", name, None, name, adaptive=True)
-        for name in ("RK45", "DOP853", "Radau", "LSODA")
-    }
+    methods: Mapping[str, Method] = {name: Method("scipy", name, None, name, adaptive=True) for name in NAMES}
 
     def of(self, case: Case) -> "ScipyDynamics":
         return ScipyDynamics(case)
@@ -37,73 +47,93 @@ class ScipyDynamics(TmtDynamics):
     def rate(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         """rate(y, tau): dy/dt of y = (q, v), (nq + nv,)."""
         acceleration, tree, nq = evaluator(self.tree, "acceleration").of_one, self.tree, self.coordinates.nq
-        flat = not tree.coordinates.balls
+        has_balls = bool(tree.coordinates.balls)
 
-        def rate(y, tau):
+        def rate(y: np.ndarray, tau: np.ndarray) -> np.ndarray:
             q, v = y[:nq], y[nq:]
-            # between its steps a solver lets quaternions drift
-            a = acceleration(q if flat else of_length_1(self.coordinates, q[None])[0], v, tau)
+            if has_balls:  # between its steps a solver lets quaternions drift
+                q = of_length_1(self.coordinates, q[None])[0]
+            a = acceleration(q, v, tau)
             if a is None:  # the equations have no acceleration there
                 a = np.full(len(v), np.nan)
-            return np.concatenate((v if flat else tree.coordinates.component_rates(q, v), a))
+            q_rates = tree.coordinates.component_rates(y[:nq], v) if has_balls else v
+            return np.concatenate((q_rates, a))
 
         return rate
 
-    def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
+    def run(
+        self,
+        q: np.ndarray,
+        v: np.ndarray,
+        tau: np.ndarray,
+        dt: float,
+        steps: int,
+        method: str,
+        tolerance: float | None = None,
+    ) -> Motion:
         batch, states = rows_of_states(q, v, tau)
         t, motions = np.linspace(0.0, dt * steps, steps + 1), []
-        for state in zip(*states):
-            run, read = self.prepared(*state, t, method, tolerance)
+        for position, speed, torque in zip(*states):
+            run, read = self.prepared(position, speed, torque, t, method, tolerance)
             motions.append(read(run()))
-        q, v = (
-            np.array([getattr(m, name) for m in motions]).reshape(*batch, len(t), -1) for name in ("q", "v")
-        )
-        ended = np.array([m.ended for m in motions], dtype=object).reshape(batch)[()]
-        counts = [m.evaluations for m in motions]
-        return Motion(t, q, v, None if None in counts else sum(counts), ended)
+        return batch_of(motions, batch)
 
-    def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
-        return self.prepared(
-            q, v, tau, np.linspace(0.0, setting.duration, GRID + 1), method, setting.tolerance
-        )
+    def prepare(
+        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, setting: Setting, method: str
+    ) -> Prepared:
+        t = np.linspace(0.0, setting.duration, GRID + 1)
+        return self.prepared(q, v, tau, t, method, setting.tolerance)
 
-    def prepared(self, q, v, tau, t, method, tolerance) -> Prepared:
+    def prepared(
+        self,
+        q: np.ndarray,
+        v: np.ndarray,
+        tau: np.ndarray,
+        t: np.ndarray,
+        method: str,
+        tolerance: float | None,
+    ) -> Prepared:
+        """As in `prepare`, read at the times t."""
         from scipy.integrate import solve_ivp
 
         rate, tolerance = self.rate(), DEFAULT if tolerance is None else tolerance
-        start, torque, nothing = np.concatenate([q, v]), np.array(tau, float), np.zeros(len(q) + len(v))
+        start, torque = np.concatenate([q, v]), np.array(tau, float)
         options = {"rtol": max(tolerance, LEAST_RELATIVE), "atol": tolerance}
 
-        def slope(time, y):
-            result = rate(np.ascontiguousarray(y), torque)  # Radau gives columns of a matrix
-            if result @ nothing != 0.0:  # solve_ivp would try ever smaller steps without end
+        def slope(time: float, y: np.ndarray) -> np.ndarray:
+            rates = rate(np.ascontiguousarray(y), torque)  # Radau gives columns of a matrix
+            if not np.isfinite(rates).all():  # solve_ivp would try ever smaller steps without end
                 raise NotFinite(time)
-            return result
+            return rates
 
-        def run(times=t):
+        def run(times: np.ndarray = t) -> Any:  # SciPy's result, or NotFinite
             try:
                 return solve_ivp(slope, (0.0, times[-1]), start, method, t_eval=times, **options)
             except NotFinite as error:
                 return error
 
-        def read(solution):
+        def read(solution: Any) -> Motion:
             times = t
             while isinstance(solution, NotFinite) and len(times) > 2:  # once more, as far as it goes
-                times = t[: max(2, min(len(times) - 1, np.searchsorted(t, solution.args[0]) + 1))]
+                count = int(np.searchsorted(t, solution.time)) + 1
+                times = t[: max(2, min(len(times) - 1, count))]
                 solution = run(times)
             states, evaluations, why = start[None], 1, "its slope is not finite"
             if not isinstance(solution, NotFinite):
                 states, evaluations = solution.y.T, int(solution.nfev)
                 why = why if solution.success else solution.message
-            path, ended = as_far_as_it_goes(t, states, start, why)
-            q, v = np.split(path, [self.coordinates.nq], axis=1)
-            return Motion(t, of_length_1(self.coordinates, q), v, evaluations, ended)
+            motion = motion_of_states(t, states, start, self.coordinates.nq, why)
+            q = of_length_1(self.coordinates, motion.q)
+            return motion._replace(q=q, evaluations=evaluations)
 
         return run, read
 
 
 class NotFinite(ArithmeticError):
-    """A slope at a time, s, that is not finite."""
+    """A slope that is not finite."""
+
+    def __init__(self, time: float):
+        self.time = time  # s
 
 
 def of_length_1(coordinates: Coordinates, q: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -56,51 +57,65 @@ class TmtDynamics:
         self.tree, self.coordinates = case.tree, case.coordinates
         self.is_large = case.coordinates.nv > MOST_SPEEDS
 
-    def mass_matrix(self, q) -> np.ndarray:
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         if not self.is_large:
             return literal.mass_matrix(q, self.tree)
-        batch, (q,) = rows_of_states(q)
-        return mass_matrices(self.tree, q).reshape(*batch, *2 * [self.coordinates.nv])
+        batch, (states,) = rows_of_states(q)
+        nv = self.coordinates.nv
+        return mass_matrices(self.tree, states).reshape(*batch, nv, nv)
 
-    def acceleration(self, q, v, tau) -> np.ndarray:
+    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return literal.bias(q, v, self.tree)
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         if not self.is_large:
             return literal.acceleration(q, v, tau, self.tree)
         forces = tau - np.array(self.tree.damping) * v - literal.spring_torque(q, self.tree)
-        return np.linalg.solve(self.mass_matrix(q), (forces - literal.bias(q, v, self.tree))[..., None])[
-            ..., 0
-        ]
+        forces = forces - self.bias(q, v)
+        return np.linalg.solve(self.mass_matrix(q), forces[..., None])[..., 0]
 
-    def __getattr__(self, quantity: str) -> Callable:
+    def __getattr__(self, quantity: str) -> Callable[..., Any]:
         if quantity not in QUANTITIES:
             raise AttributeError(quantity)
         return partial(getattr(literal, quantity), model=self.tree)
 
-    def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance)
-        return Motion(
-            *motion, motion.evaluations, motion.ended, None if method_named(method).adaptive else steps
-        )
+    def run(
+        self,
+        q: np.ndarray,
+        v: np.ndarray,
+        tau: np.ndarray,
+        dt: float,
+        steps: int,
+        method: str,
+        tolerance: float | None = None,
+    ) -> Motion:
+        t, q, v = motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance)
+        taken = None if method_named(method).adaptive else steps
+        return Motion(t, q, v, motion.evaluations, motion.ended, taken)
 
-    def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
-        stepping = method_named(method)
+    def prepare(
+        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, setting: Setting, method: str
+    ) -> Prepared:
+        stepping, tolerance = method_named(method), setting.tolerance or 0.0
         if setting.tolerance is not None and not stepping.adaptive:
             raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
         if stepping.adaptive and not setting.steps:
             setting = setting._replace(steps=GRID)  # between which it takes its own
-        every, dt = setting.every, setting.duration / setting.steps
-        paths = [np.full((1, setting.steps + 1, len(start)), np.nan) for start in (q, v)]
-        paths[0][0, 0], paths[1][0, 0] = q, v
+        every, steps = setting.every, setting.every * GRID
+        dt = setting.duration / steps
+        positions, speeds = paths = [np.full((1, steps + 1, len(start)), np.nan) for start in (q, v)]
+        positions[0, 0], speeds[0, 0] = q, v
         runner, info = runner_of(self.tree, method), np.zeros((1, 3), np.int64)
-        torque, tolerance = np.array(tau, float)[None], setting.tolerance or 0.0
-        arrays = *paths, torque, info
+        arrays = positions, speeds, np.array(tau, float)[None], info
         call = runner.call(1, arrays, dt, tolerance)
         t = np.linspace(0.0, setting.duration, GRID + 1)
 
-        def read(_):
-            codes, evaluations = runner.outcome(*paths, info)
-            (ended,) = reasons(self.tree, *paths, codes, dt, tolerance)
-            taken = evaluations // stepping.stages if stepping.adaptive else setting.steps
-            return Motion(t, *(path[0, ::every].copy() for path in paths), evaluations, ended, taken)
+        def read(_: Any) -> Motion:
+            codes, evaluations = runner.outcome(positions, speeds, info)
+            (ended,) = reasons(self.tree, positions, speeds, codes, dt, tolerance)
+            taken = evaluations // stepping.stages if stepping.adaptive else steps
+            q, v = (path[0, ::every].copy() for path in paths)
+            return Motion(t, q, v, evaluations, ended, taken)
 
         return lambda _=arrays: call(), read  # the arrays live as long as it
 
@@ -111,6 +126,6 @@ class Compiled:
     def __init__(self, tree: tmt.Tree):
         self.tree = tree
 
-    def __getattr__(self, quantity: str) -> Callable:
+    def __getattr__(self, quantity: str) -> Callable[..., Any]:
         tmt.prepare(self.tree, quantity)
         return partial(getattr(tmt, quantity), model=self.tree)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..core.errors import ROOT, Refused
 from ..process import interrupt
-from ..report.folder import fcntl, lock, what_is_wrong
+from ..report.folder import fcntl, lock, what_is_wrong  # type: ignore[attr-defined]  # fcntl: None on Windows
 from ..report.provenance import installed
 from .models import unpacked
 
@@ -40,13 +40,11 @@ def locked(out: Path) -> Iterator[None]:
         (out / FILES).mkdir(parents=True, exist_ok=True)
         held = lock(out / FILES, wait=False)
     except OSError as error:
-        raise Refused(
-            f"cannot write to {out}: {what_is_wrong(out, error)}; expected a writable folder"
-        ) from None
+        why = what_is_wrong(out, error)
+        raise Refused(f"cannot write to {out}: {why}; expected a writable folder") from None
     if held is None and fcntl is not None:
-        raise Refused(
-            f"another fleet is writing to {out}; use another folder (--out), or wait until it has ended"
-        )
+        advice = "use another folder (--out), or wait until it has ended"
+        raise Refused(f"another fleet is writing to {out}; {advice}")
     interrupt.Now.line = f"interrupted; {RESUME}"
     try:
         yield
@@ -55,11 +53,11 @@ def locked(out: Path) -> Iterator[None]:
             os.close(held)
 
 
-def saved_row(place: Path, key: str) -> dict | None:
-    """The row in a folder of a report, if it depends on the same things."""
+def saved(place: Path, key: str) -> object:
+    """What was saved in a folder of a report as its row, if it depends on the same things, else None."""
     with suppress(Exception):  # whatever lies there, it is data
-        of_key, row = json.loads((place / MARK).read_bytes())
-        return row if of_key == key else None
+        saved_key, row = json.loads((place / MARK).read_bytes())
+        return row if saved_key == key else None
     return None
 
 

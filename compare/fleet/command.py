@@ -6,15 +6,21 @@ import shlex
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tmt.compiled.cores import cores
 
 from ..cli import command_line as cli
-from ..cli.command_line import FLEET, PROGRAM, Option
+from ..cli.command_line import FLEET, Option
 from ..core.errors import Refused
+from ..core.text import block
 from ..core.words import in_one_line
 from ..experiments import EXPERIMENTS, TIMED
+from ..process.streams import PROGRAM
 from ..report.terminal import Terminal
+
+if TYPE_CHECKING:
+    from .table import FileRow
 
 SENT = "reference of the fleet"  # folder of the solution in a bundle
 TIMING = "timing"  # resource of Dask's workers on which nothing else runs
@@ -83,7 +89,7 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     """Compare all files and write the table; the exit status."""
     started = time.perf_counter()
     from .cache import locked  # imports are slow
-    from .executors import Cluster, Pool
+    from .executors import Cluster, Executor, Pool
     from .models import found_models
     from .run import Run
     from .table import changes, earlier, write_table
@@ -95,6 +101,7 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     sent = solution_files(options.reference)
     file_options = FleetOptions(names, not options.full, options.reference, next(iter(sent), ""))
     with locked(out):
+        executor: Executor
         if options.dask:
             executor = Cluster(options.dask, options.limit, TIMING if options.timing else None)
         else:
@@ -107,13 +114,14 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
         finally:
             executor.close()
         changed = None if before is None else changes(before, run.rows)
-        summary = write_table(out, run, left_out, changed, command)
+        summary = write_table(out, run.rows, left_out, changed, command)
     terminal.say()
     terminal.say(summary[0], "bold green" if run.is_good else "bold red")
     for line in summary[1:]:
         terminal.say(line)
-    for line in ["no changes"] if changed == [] else changed or ():
-        terminal.say(f"since {in_one_line(options.since)}: {line}")
+    if changed is not None:
+        for line in changed or ["no changes"]:
+            terminal.say(f"since {in_one_line(options.since)}: {line}")
     page, seconds = in_one_line(os.path.join(options.out, "index.html")), time.perf_counter() - started
     terminal.say(f"Fleet: {page} ({seconds:.1f} s)")
     return 0 if run.is_good else 1
@@ -122,24 +130,20 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
 def solution_files(reference: str | None) -> dict[str, bytes]:
     """The files of a reference that is a solution, itself first, else {}. Refused if they cannot be read."""
     from ..engines.mujoco import ModelError, read  # imports are slow
+    from ..process.parts import needed_by
     from ..run.reference import is_solution
-    from .models import Model, bundle, needed_by
+    from .models import Model, bundle
 
-    if not is_solution(reference):
+    if not reference or not is_solution(reference):
         return {}
+    path = Path(reference)
     try:
-        read(Path(reference))
+        read(path)
     except ModelError as error:
         raise Refused(f"--reference: {error}") from None
-    files = bundle(Model(Path(reference), needed_by(Path(reference))))
-    return {f"{SENT}/{name}": content for name, content in files.items()}
+    return {f"{SENT}/{name}": content for name, content in bundle(Model(path, needed_by(path))).items()}
 
 
-def say_rows(terminal: Terminal, rows: Sequence[dict]) -> None:
-    from .table import BAD_VERDICTS, ITSELF
-
+def say_rows(terminal: Terminal, rows: Sequence["FileRow"]) -> None:
     for row in rows:
-        ratio = "" if row["worst_ratio"] is None else f"{100.0 * row['worst_ratio']:.2g} % of tolerance"
-        text = ": ".join(filter(None, (row["file"], row["reason"] or ratio)))
-        style = "red" if row["verdict"] in BAD_VERDICTS else ""
-        terminal.say(f"{row['verdict']:<{len(ITSELF)}} {text}  {row['seconds']:.1f} s", style)
+        terminal.say(block("fleet", "line", row=row), "red" if row.is_bad else "")

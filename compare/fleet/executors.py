@@ -1,6 +1,6 @@
-"""Who runs the calls of a fleet: threads of this machine, or the workers of a Dask cluster.
+"""Who makes the calls of a fleet: processes of this machine, or the workers of a Dask cluster.
 
-Each call runs in a process of its own: if that crashes, hangs, exits or needs too much memory, this is the outcome of the call.
+Each call has a process of its own: if that crashes, hangs, exits or needs too much memory, this is the outcome of the call.
 """
 
 import logging
@@ -11,28 +11,20 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future
 from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar, cast
 
-from pebble import ProcessExpired, ProcessPool
-
-from ..core.errors import Refused, described, how_ended
+from ..core.errors import Refused, described
 from ..process import interrupt
-from ..process.workers import end_with_parent
+from ..process.workers import Beginning, WorkerEnded, Workers, kill_children
 from .cache import RESUME, program
 
-try:
-    import resource
-except ImportError:  # Windows: no memory limit
-    resource = None
-
-KILLED, RETRIES = (
-    -9,
-    3,
-)  # exit code after SIGKILL, and how often the call is made again, as a Dask scheduler does
-LONGEST_PATH = 70  # bytes, of the folder of the forkserver's socket, whose whole path may have 107
+T = TypeVar("T")
+ENVIRONMENT = {"MUJOCO_GL": "disabled", "OPENBLAS_NUM_THREADS": "1"}
+RETRIES = 3  # of a call whose process is killed by SIGKILL, as a Dask scheduler does
 SHARE = 0.9  # of the machine's memory, for all its processes together
 CONNECTING = 10.0  # s, time limit for the scheduler and its first worker to answer
 ALONE = 60.0  # s without a worker or a connection after which a fleet ends
@@ -50,63 +42,35 @@ class OtherVersion(RuntimeError):
     """A worker runs a different version of compare or MuJoCo."""
 
 
+class Outcome(NamedTuple, Generic[T]):
+    """The value of a call and "", or None and why there is none."""
+
+    value: T | None
+    why: str
+
+
+class Executor(Protocol):
+    """Who makes calls. Refused where there is nobody who could."""
+
+    workers: int  # number of calls at the same time
+
+    def submit(self, function: Callable[..., T], *arguments: Any) -> "Future[Outcome[T]]": ...
+
+    def outcome(self, future: "Future[Outcome[T]]") -> Outcome[T]:
+        """That of a call that is done."""
+
+    def check(self) -> None:
+        """Refused if there is nobody left to answer."""
+
+    def close(self) -> None: ...
+
+
 @cache
 def own_folder() -> str:
     """A folder for the temporary files of this process and those that it starts; deleted when the command ends."""
     tempfile.tempdir = tempfile.mkdtemp(prefix="fleet-")  # of the forkserver's socket too
     interrupt.undo.append(partial(shutil.rmtree, tempfile.tempdir, ignore_errors=True))
     return tempfile.tempdir
-
-
-def guarded(
-    function: Callable, arguments: tuple, limit: float, memory: int, place: str
-) -> tuple[object, str]:
-    """The value of a call and "", or None and why there is none.
-
-    A process that is killed by SIGKILL (no memory, an operator) may have done nothing wrong: its call is made again.
-    limit: s; memory: bytes; place: folder for temporary files, deleted if this process is killed.
-    """
-    multiprocessing.current_process().daemon = False  # else a worker of Dask may not start a process
-    os.environ |= {"MUJOCO_GL": "disabled", "OPENBLAS_NUM_THREADS": "1"}
-    is_forked = hasattr(os, "fork") and len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PATH
-    context = multiprocessing.get_context("forkserver" if is_forked else "spawn")
-    if is_forked:
-        context.set_forkserver_preload([__name__, function.__module__])
-    for _ in range(1 + RETRIES):
-        with tempfile.TemporaryDirectory(dir=place, ignore_cleanup_errors=True) as folder:
-            pool = ProcessPool(1, context=context)
-            try:
-                with interrupt.postponed:  # a process that is just being started would complain
-                    future = pool.schedule(alone, (function, arguments, folder, memory, place), timeout=limit)
-                return future.result()
-            except TimeoutError:
-                return None, f"time limit of {limit:g} s exceeded"
-            except ProcessExpired as error:
-                if error.exitcode != KILLED:
-                    return None, how_ended(error.exitcode)
-            except Exception as error:  # the value cannot be sent
-                return None, described(error)
-            finally:
-                pool.stop()
-                pool.join()
-    return None, f"killed by SIGKILL, {1 + RETRIES} times"
-
-
-def alone(function: Callable, arguments: tuple, folder: str, memory: int, place: str) -> tuple[object, str]:
-    """Make a call in this process, in a folder of its own."""
-    end_with_parent(place)
-    os.chdir(folder)
-    for number in (1, 2):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), number)
-    if resource:
-        with suppress(OSError, ValueError):
-            resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
-    try:
-        return function(*arguments), ""
-    except MemoryError:
-        return None, f"out of memory: limit {memory / 1e9:.2g} GB"
-    except BaseException as error:  # SystemExit too
-        return None, described(error)
 
 
 def memory_of_machine() -> int:
@@ -119,29 +83,57 @@ def memory_of_machine() -> int:
 
 
 class Pool:
-    """This machine. limit: s for each call."""
+    """Processes of this machine.
 
-    def __init__(self, workers: int, limit: float):
-        self.workers, self.limit = workers, limit
-        self.memory = int(SHARE * memory_of_machine() / workers)
-        self.threads = ThreadPoolExecutor(workers)
+    limit: s for a call; memory: bytes, by default its share; folder: for temporary files, deleted if this process is killed.
+    """
 
-    def submit(self, function: Callable, *arguments: object):
-        return self.threads.submit(guarded, function, arguments, self.limit, self.memory, own_folder())
+    def __init__(self, workers: int, limit: float, memory: float | None = None, folder: str | None = None):
+        self.workers, self.limit, self.folder = workers, limit, folder or own_folder()
+        self.memory = int(SHARE * (memory or memory_of_machine() / workers))
+        os.environ |= ENVIRONMENT
+        beginning = Beginning(is_silent=True, memory=self.memory, folder=self.folder)
+        self.processes = Workers(workers, beginning, limit, RETRIES, is_fresh=True)
 
-    def outcome(self, future) -> tuple[object, str]:
-        """The value of a call that is done and "", or None and why there is none."""
-        return future.result()
+    def submit(self, function: Callable[..., T], *arguments: Any) -> "Future[Outcome[T]]":
+        if hasattr(os, "fork"):
+            multiprocessing.set_forkserver_preload([__name__, function.__module__])
+        return self.processes.submit(alone, function, arguments, self.folder, self.memory)
+
+    def outcome(self, future: "Future[Outcome[T]]") -> Outcome[T]:
+        try:
+            return future.result()
+        except TimeoutError:
+            return Outcome(None, f"time limit of {self.limit:g} s exceeded")
+        except WorkerEnded as error:
+            return Outcome(None, error.how)
+        except Exception as error:  # the value cannot be sent
+            return Outcome(None, described(error))
 
     def check(self) -> None:
-        """Refused if there is nobody left to answer."""
+        """It is there."""
 
     def close(self) -> None:
-        self.threads.shutdown(wait=False, cancel_futures=True)
+        self.processes.close(at_once=True)
+
+
+def alone(function: Callable[..., T], arguments: tuple[Any, ...], folder: str, memory: int) -> Outcome[T]:
+    """Make a call in this process, in a folder of its own. What it has started ends with it."""
+    with tempfile.TemporaryDirectory(dir=folder, ignore_cleanup_errors=True) as place:
+        os.chdir(place)
+        try:
+            return Outcome(function(*arguments), "")
+        except MemoryError:
+            return Outcome(None, f"out of memory: limit {memory / 1e9:.2g} GB")
+        except BaseException as error:  # SystemExit too
+            return Outcome(None, described(error))
+        finally:
+            os.chdir(folder)
+            kill_children()
 
 
 class Cluster:
-    """The workers of a Dask scheduler; the methods are those of Pool. Refused: no scheduler, or no worker.
+    """The workers of a Dask scheduler. Refused: no scheduler, or no worker.
 
     resource: of the workers, 1 of which a call needs; None: a thread.
     """
@@ -178,26 +170,24 @@ class Cluster:
                 return sum(worker["nthreads"] for worker in workers)
         return 0
 
-    def submit(self, function: Callable, *arguments: object):
+    def submit(self, function: Callable[..., T], *arguments: Any) -> "Future[Outcome[T]]":
         resources = {self.resource: 1} if self.resource else None
-        given = function, arguments, self.limit, program()
-        return self.client.submit(on_worker, *given, pure=False, resources=resources)
+        call = on_worker, function, arguments, self.limit, program()
+        return cast("Future[Outcome[T]]", self.client.submit(*call, pure=False, resources=resources))
 
-    def outcome(self, future) -> tuple[object, str]:
+    def outcome(self, future: Any) -> Outcome[Any]:
         if future.status == "finished":
             with suppress(Exception):  # if its worker is lost now, the call is made again
-                return future.result(timeout=self.limit)
+                return Outcome(*future.result(timeout=self.limit))
         if future.status != "error":
             raise Refused(f"lost the connection to the scheduler {self.address}; {RESUME}")
         error = future.exception(timeout=CONNECTING)
         if type(error).__name__ == "KilledWorker":
-            return (
-                None,
-                f"{1 + error.allowed_failures} workers lost, the last one {error.last_worker.address}",
-            )
+            lost = f"{1 + error.allowed_failures} workers lost"
+            return Outcome(None, f"{lost}, the last one {error.last_worker.address}")
         if isinstance(error, OtherVersion | ImportError | AttributeError):
             raise Refused(f"a worker runs a different version of compare or MuJoCo: {error}; {RESUME}")
-        return None, described(error)
+        return Outcome(None, described(error))
 
     def check(self) -> None:
         if self.threads_now():
@@ -210,13 +200,19 @@ class Cluster:
             self.client.close(timeout=1)
 
 
-def on_worker(function: Callable, arguments: tuple, limit: float, expected: str) -> tuple[object, str]:
+def on_worker(
+    function: Callable[..., T], arguments: tuple[Any, ...], limit: float, expected: str
+) -> Outcome[T]:
     from distributed import get_worker
 
     worker = get_worker()
     if program() != expected:
         raise OtherVersion(f"worker {worker.address}; all workers need the version of this machine")
-    memory = worker.memory_manager.memory_limit or memory_of_machine()
-    return guarded(
-        function, arguments, limit, int(SHARE * memory / worker.state.nthreads), worker.local_directory
-    )
+    multiprocessing.current_process().daemon = False  # else a worker of Dask may not start a process
+    memory = (worker.memory_manager.memory_limit or memory_of_machine()) / worker.state.nthreads
+    with tempfile.TemporaryDirectory(dir=worker.local_directory, ignore_cleanup_errors=True) as folder:
+        pool = Pool(1, limit, memory, folder)
+        try:
+            return pool.outcome(pool.submit(function, *arguments))
+        finally:
+            pool.processes.close()

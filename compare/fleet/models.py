@@ -44,21 +44,15 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
 
     A file that is named is a model. Refused: a path without files.
     """
-    files, left_out = {}, []
+    files: dict[str, tuple[Path, bool]] = {}  # by the real path: the same file may be found more than once
     for path, is_named in sorted(paths_of(words), key=lambda pair: (not pair[1], pair[0].is_symlink())):
-        files.setdefault(
-            os.path.realpath(path), (path, is_named)
-        )  # the same file may be found more than once
-    roots = {
-        file: None if is_named else next(elements_of(path), None) for file, (path, is_named) in files.items()
+        files.setdefault(os.path.realpath(path), (path, is_named))
+    kinds = {
+        file: MODEL_ELEMENTS[0] if is_named else kind_of(path) for file, (path, is_named) in files.items()
     }
-    # without a root it cannot be read and counts as a model: the table shows it with the reason
-    kinds = {file: MODEL_ELEMENTS[0] if root is None else root.tag for file, root in roots.items()}
-    models = {
-        file: Model(path, needed_by(path))
-        for file, (path, _) in files.items()
-        if kinds[file] in MODEL_ELEMENTS
-    }
+    is_model = {file: kind in MODEL_ELEMENTS for file, kind in kinds.items()}
+    models = {file: Model(path, needed_by(path)) for file, (path, _) in files.items() if is_model[file]}
+    left_out = []
     users = {os.path.realpath(part): model.shown for model in models.values() for part in model.parts[1:]}
     for file, (path, is_named) in files.items():
         if file in users and not is_named:
@@ -70,6 +64,12 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
     if not models:
         raise Refused(f"no MJCF or URDF file in {', '.join(map(in_one_line, words))}")
     return sorted(models.values(), key=lambda model: model.shown), sorted(left_out)
+
+
+def kind_of(path: Path) -> str:
+    """The name of the root element; of a file that cannot be read that of MJCF: the table shows it with the reason."""
+    root = next(elements_of(path), None)
+    return MODEL_ELEMENTS[0] if root is None else root.tag
 
 
 def paths_of(words: Iterable[str]) -> Iterator[tuple[Path, bool]]:
@@ -85,9 +85,8 @@ def paths_of(words: Iterable[str]) -> Iterator[tuple[Path, bool]]:
             matches = sorted(glob(word, recursive=True)) if is_pattern else [word] * os.path.isdir(word)
             if not matches:
                 problem = "not a regular file" if os.path.exists(word) else "no such file"
-                raise Refused(
-                    f"{problem}: {in_one_line(word)}; expected a file, a folder, a pattern or @LIST"
-                )
+                expected = "expected a file, a folder, a pattern or @LIST"
+                raise Refused(f"{problem}: {in_one_line(word)}; {expected}")
             for match in map(Path, matches):
                 files = files_in(match) if match.is_dir() else [match] * os.path.isfile(match)
                 yield from ((file, False) for file in files)
@@ -118,8 +117,7 @@ def place_of_report(shown: str) -> str:
     """The folder of a model's report, relative to that of the fleet; unique, and not inside that of another model."""
     path = Path(readable(shown))
     parts = [part for part in path.parts if part not in (path.anchor, os.pardir)]
-    if (
-        os.path.isabs(shown) or os.pardir in Path(shown).parts
-    ):  # the shortened path may be that of another file
+    if os.path.isabs(shown) or os.pardir in Path(shown).parts:
+        # the shortened path may be that of another file
         parts[-1] += f"-{hashlib.sha256(shown.encode()).hexdigest()[:8]}"
     return "/".join(["files", *parts])

@@ -1,20 +1,32 @@
 """Run a fleet: submit the files whose reports are missing or old, and write the report of each as it comes."""
 
+import dataclasses
 import hashlib
 import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from typing import NamedTuple
 
-from .cache import MARK, program, saved_row, write_whole
-from .executors import Cluster, Pool
+from ..core.text import block
+from .cache import MARK, program, saved, write_whole
+from .executors import Executor, Outcome
 from .models import Model, bundle, place_of_report
-from .table import BAD_VERDICTS, BROKE, EMPTY_ROW, REFUSED, is_row
-from .task import FleetOptions, compare_file
+from .table import BROKE, REFUSED, FileRow, row_of_data
+from .task import Compared, FleetOptions, compare_file
 
 AHEAD = 2  # files that are submitted for each worker; they are in memory
 POLLING = 0.3  # s between two lines of progress
+
+
+class Started(NamedTuple):
+    """A file that is compared now."""
+
+    model: Model
+    key: str  # of everything that its report depends on
+    future: "Future[Outcome[Compared]]"
 
 
 class Run:
@@ -27,48 +39,48 @@ class Run:
         self,
         models: Sequence[Model],
         options: FleetOptions,
-        executor: Pool | Cluster,
+        executor: Executor,
         out: Path,
-        sent: Mapping,
+        sent: Mapping[str, bytes],
     ):
         self.models, self.options, self.executor, self.out, self.sent = models, options, executor, out, sent
-        self.rows, self.first, self.copies = (
-            [],
-            {},
-            [],
-        )  # first: model of each content; copies: (model, first)
+        self.rows: list[FileRow] = []
+        self.first: dict[object, Model] = {}  # by the content of a model and its parts
+        self.copies: list[tuple[Model, Model]] = []  # and the first model of the same content
 
-    def carry_out(self, progress: Callable[[list[dict]], object]) -> None:
+    def carry_out(self, progress: Callable[[list[FileRow]], object]) -> None:
         """Run to the end, copies last. progress is called with the new rows, and every POLLING s."""
-        done, under_way, waiting = SimpleQueue(), {}, self.models[::-1]
+        done: SimpleQueue[Future[Outcome[Compared]]] = SimpleQueue()
+        under_way: dict[Future[Outcome[Compared]], Started] = {}
+        waiting = list(self.models[::-1])
         while waiting or under_way:
             before = len(self.rows)
             while waiting and len(under_way) < AHEAD * self.executor.workers and len(self.rows) == before:
-                if started := self.start(model := waiting.pop()):
-                    future, key = started
-                    under_way[future] = model, key
-                    future.add_done_callback(done.put)
+                if started := self.start(waiting.pop()):
+                    under_way[started.future] = started
+                    started.future.add_done_callback(done.put)
             if under_way and len(self.rows) == before:
                 try:
                     future = done.get(timeout=POLLING)
                 except Empty:
                     self.executor.check()
                 else:
-                    self.receive(*under_way.pop(future), *self.executor.outcome(future))
+                    self.receive(under_way.pop(future))
             progress(self.rows[before:])
-        before, rows = len(self.rows), {row["file"]: row for row in self.rows}
+        before, rows = len(self.rows), {row.file: row for row in self.rows}
         for model, first in self.copies:
-            row = rows[first.shown]
-            reason = ": ".join(filter(None, (f"copy of {first.shown}", row["reason"])))
-            self.end(model, row | {"same_as": first.shown, "reason": reason, "seconds": 0.0})
+            row = dataclasses.replace(rows[first.shown], file=model.shown, same_as=first.shown, seconds=0.0)
+            row.reason = block("fleet", "copy", file=first.shown, reason=row.reason)
+            self.rows.append(row)
         progress(self.rows[before:])
 
-    def start(self, model: Model) -> tuple | None:
-        """The future of a file and its key; None: it is not readable, a copy, or its report is up to date."""
+    def start(self, model: Model) -> Started | None:
+        """A file that is submitted; None: it is not readable, a copy, or its report is up to date."""
         try:
-            files = bundle(model) | self.sent
+            files = bundle(model) | dict(self.sent)
         except OSError as error:
-            self.end(model, {"verdict": REFUSED, "reason": f"not readable: {error.strerror}"})
+            reason = block("fleet", "unreadable", why=error.strerror)
+            self.rows.append(FileRow(file=model.shown, verdict=REFUSED, reason=reason))
             return None
         hashes = [(name, hashlib.sha256(content).hexdigest()) for name, content in files.items()]
         (own_name, own_hash), *others = hashes
@@ -78,34 +90,28 @@ class Run:
             return None
         inputs = repr((program(), hashes, model.shown, self.options))
         key = hashlib.sha256(inputs.encode("utf-8", "backslashreplace")).hexdigest()
-        row = saved_row(self.out / place_of_report(model.shown), key)
-        if is_row(row):
-            self.end(model, row)
+        if row := row_of_data(saved(self.out / place_of_report(model.shown), key)):
+            self.rows.append(row)
             return None
-        return self.executor.submit(compare_file, model.shown, self.options, files), key
+        return Started(model, key, self.executor.submit(compare_file, model.shown, self.options, files))
 
-    def receive(self, model: Model, key: str, value: tuple | None, why: str) -> None:
+    def receive(self, started: Started) -> None:
         """A file is done: write its report."""
-        row = {"verdict": BROKE, "reason": why}
-        if value is not None:
-            row, written = value
-            write_whole(
-                self.out / place_of_report(model.shown), written | {MARK: json.dumps((key, row)).encode()}
-            )
-        self.end(model, row)
-
-    def end(self, model: Model, row: dict) -> None:
-        self.rows.append(EMPTY_ROW | row | {"file": model.shown})
+        outcome, shown = self.executor.outcome(started.future), started.model.shown
+        compared = outcome.value
+        if compared is None:
+            self.rows.append(FileRow(file=shown, verdict=BROKE, reason=outcome.why))
+            return
+        mark = json.dumps((started.key, dataclasses.asdict(compared.row))).encode()
+        write_whole(self.out / place_of_report(shown), compared.report | {MARK: mark})
+        self.rows.append(compared.row)
 
     def progress(self) -> list[str]:
         """How far the fleet is: "3 of 12 files", "1 differ", "2 agree"."""
-        verdicts = [f"{many} {verdict}" for verdict, many in sorted(self.verdicts.items())]
-        return [f"{len(self.rows)} of {len(self.models)} files", *verdicts]
-
-    @property
-    def verdicts(self) -> Counter:
-        return Counter(row["verdict"] for row in self.rows)
+        verdicts = Counter(row.verdict for row in self.rows)
+        numbers = [f"{number} {verdict}" for verdict, number in sorted(verdicts.items())]
+        return [f"{len(self.rows)} of {len(self.models)} files", *numbers]
 
     @property
     def is_good(self) -> bool:
-        return not set(self.verdicts) & set(BAD_VERDICTS)
+        return not any(row.is_bad for row in self.rows)

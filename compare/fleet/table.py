@@ -1,10 +1,14 @@
 """The table of a fleet: rows, fleet.csv, index.html with its summary, changes since an earlier fleet."""
 
 import csv
+import dataclasses
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from io import StringIO
 from pathlib import Path
+from typing import Any, get_type_hints
 from urllib.parse import quote
 
 from markupsafe import Markup
@@ -12,12 +16,13 @@ from markupsafe import Markup
 from ..core.check import About
 from ..core.errors import Refused
 from ..core.finding import Finding
+from ..core.rows import Row, column
 from ..core.text import block, environment, say
 from ..core.words import in_one_line
 from ..report import files
 from ..report.provenance import OURS, commit, installed
 from ..report.verdict import Section, failures, worst
-from ..run.reference import SOLUTION, Reference
+from ..run.reference import Reference
 from .cache import write_whole
 from .models import place_of_report
 
@@ -25,109 +30,158 @@ AGREE, DIFFER, REFUSED, BROKE = "agree", "differ", "refused", "broke"
 NOT_JUDGED, UNCONFIRMED, ITSELF = "not judged", "unconfirmed", "self-consistent"
 VERDICTS = (DIFFER, BROKE, NOT_JUDGED, UNCONFIRMED, REFUSED, ITSELF, AGREE)  # in the order of the table
 BAD_VERDICTS = (DIFFER, BROKE, NOT_JUDGED, UNCONFIRMED)  # exit status 1
-HEADS = {  # columns of the page, after the file
-    "verdict": "verdict", "reason": "reason or cause", "reference": "compared with", "joints": "joints",
-    "worst_ratio": "share of tolerance", "file_integrator": "integrator", "file_dt_s": "step, ms",
-    "stable_at_file_dt": "stable", "limit_s": "limit, ms", "seconds": "processor, s",
-}  # fmt: skip
-NUMBERS = "joints", "worst_ratio", "file_dt_s", "stable_at_file_dt", "limit_s", "seconds", "has_report"
-FLEET_COLUMNS = ("file", "sha256", "same_as", *HEADS)
-EMPTY_ROW = dict.fromkeys(FLEET_COLUMNS) | {"reason": "", "seconds": 0.0, "has_report": False}
-REFERENCES = {"arm": "stated numbers", SOLUTION: "the solution", "model": "itself"}
-CHANGES = {
-    "verdict": "verdict",
-    "stable_at_file_dt": "stable",
-    "limit_s": "limit in s",
-}  # columns and their names
-MOVED = 0.01  # relative change of a step limit that is reported
+COMPARED = "verdict", "stable_at_file_dt", "limit_s"  # columns whose changes since an earlier fleet are told
+MOVED = 0.01  # relative change of a step limit that is told
 
 
-def row_of_file(
-    sections: Sequence[Section], causes: Sequence[dict], lost: Sequence[str], reference: Reference
-) -> dict:
-    """Verdict and reason, largest share of a tolerance, step. lost: parts of the report that broke off.
+@dataclass(kw_only=True)
+class FileRow(Row):
+    """A file of a fleet. What is not known of it is None."""
+
+    file: str
+    sha256: str | None = None
+    same_as: str | None = None  # the file of which it is a copy
+    verdict: str
+    reason: str = ""
+    reference: str | None = None  # the kind of a run.reference.Reference
+    joints: int | None = None
+    worst_ratio: float | None = None  # largest share of a tolerance
+    file_integrator: str | None = None
+    file_dt: float | None = column("s", default=None)
+    # in its runs and with its own servos
+    stable_at_file_dt: bool | None = None
+    limit: float | None = column("s", default=None)  # the smallest one
+    seconds: float = 0.0  # of the processor
+    has_report: bool = False
+
+    @property
+    def is_bad(self) -> bool:
+        return self.verdict in BAD_VERDICTS
+
+    @property
+    def kind(self) -> str:
+        """How the page marks it."""
+        if self.is_bad or self.stable_at_file_dt is False:
+            return "bad"
+        return "good" if self.verdict == AGREE else "none"
+
+    @property
+    def address(self) -> str:
+        """Of its report, from the page."""
+        return quote(f"{place_of_report(self.same_as or self.file)}/index.html")
+
+    @property
+    def order(self) -> tuple[int, bool, float, str]:
+        """Of the rows of a table: verdict, unstable steps first, largest share of a tolerance first."""
+        is_stable = self.stable_at_file_dt is not False
+        return VERDICTS.index(self.verdict), is_stable, -(self.worst_ratio or 0.0), self.file
+
+
+FIELDS = get_type_hints(FileRow)
+FLEET_COLUMNS = tuple(name for name in FileRow(file="", verdict="").columns() if name != "has_report")
+
+
+def row_of_data(data: object) -> FileRow | None:
+    """The row whose fields, by name, lay in the folder of a report; None if they are not those of a row."""
+    if not isinstance(data, dict) or data.keys() != FIELDS.keys() or data["verdict"] not in VERDICTS:
+        return None
+    are_right = all(isinstance(data[name], kind) for name, kind in FIELDS.items())
+    return FileRow(**data) if are_right else None
+
+
+def judged(
+    row: FileRow,
+    sections: Sequence[Section],
+    causes: Sequence[Mapping[str, Any]],
+    lost: Sequence[str],
+    reference: Reference,
+) -> FileRow:
+    """The row of a file with its verdict and reason, largest share of a tolerance, and step. lost: broken parts of the report.
 
     An unstable step of the file and joints that are matched by other names do not change the verdict; the reason names them.
     """
-    differing, broke, unstable, unconfirmed, _, not_judged = failures(sections)
-    unfinished = [*(f"{check.experiment}: {check.note}" for check in broke), *lost]
+    failed = failures(sections)
+    unfinished = [*(f"{check.experiment}: {check.note}" for check in failed.broke), *lost]
+    checks = [check for section in sections for check in section.result.checks]
+    reasons: list[str] = []
+    if failed.differing:
+        verdict = DIFFER
+        reasons.append(first_of([cause["text"] for cause in causes] or [str(failed.differing[0])]))
+    elif unfinished:
+        verdict = BROKE
+    elif not any(check.about == About.MODELS for check in checks):
+        verdict = REFUSED
+        reasons.append(block("fleet", "nothing_compared"))
+    else:
+        verdict = ITSELF if reference.kind == "model" else AGREE
+        verdict = UNCONFIRMED if failed.unconfirmed else verdict
+        verdict = NOT_JUDGED if failed.not_judged else verdict
+        named = {
+            "not_judged": failed.not_judged,
+            "unconfirmed": failed.unconfirmed,
+            "unstable": failed.unstable,
+        }
+        reasons += [
+            say(Finding("verdict", kind, {"checks": of_kind})) for kind, of_kind in named.items() if of_kind
+        ]
+    reasons += [block("fleet", "unfinished", first=first_of(unfinished))] if unfinished else []
     top = worst(sections)
     stable, limit = own_step(sections)
-    if differing:
-        outcome, reasons = DIFFER, [first_of([cause["text"] for cause in causes] or [str(differing[0])])]
-    elif unfinished:
-        outcome, reasons = BROKE, []
-    elif not any(check.about == About.MODELS for section in sections for check in section.result.checks):
-        outcome, reasons = REFUSED, ["no comparison was possible"]
-    else:
-        outcome = UNCONFIRMED if unconfirmed else ITSELF if reference.kind == "model" else AGREE
-        outcome = NOT_JUDGED if not_judged else outcome
-        said = {"not_judged": not_judged, "unconfirmed": unconfirmed, "unstable": unstable}
-        reasons = [
-            say(Finding("verdict", kind, {"checks": checks})) for kind, checks in said.items() if checks
-        ]
-    reasons += [f"not finished: {first_of(unfinished)}"] if unfinished else []
-    return {
-        "verdict": outcome, "reason": "; ".join(filter(None, (*reasons, reference.matched))),
-        "worst_ratio": None if top is None else top.over_tolerance, "stable_at_file_dt": stable, "limit_s": limit,
-    }  # fmt: skip
+    return dataclasses.replace(
+        row,
+        verdict=verdict,
+        reason="; ".join(filter(None, (*reasons, reference.matched))),
+        worst_ratio=None if top is None else top.over_tolerance,
+        stable_at_file_dt=stable,
+        limit=limit,
+    )
 
 
 def first_of(reasons: Sequence[str]) -> str:
-    return reasons[0] + (f", and {len(reasons) - 1} more" if len(reasons) > 1 else "")
+    return block("fleet", "first_of", reasons=reasons)
 
 
 def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
     """Whether the file's step is stable in its runs and with its own servos, None if unknown; the smallest limit, s."""
-    rows = [row for section in sections for row in section.result.tables.get("step_limits", ())]
-    own = [row for row in rows if row.integrator == row.file_integrator]
+    tables = [section.result.tables for section in sections]
+    limits = [row for of_section in tables for row in of_section.get("step_limits", ())]
+    own = [row for row in limits if row.integrator == row.file_integrator]
     stable = [row.stable_at_file_dt for row in own if row.stable_at_file_dt is not None]
-    runs = [row for section in sections for row in section.result.tables.get("own_run", ())]
+    runs = [row for of_section in tables for row in of_section.get("own_run", ())]
     stable += [row.outcome in ("calm", "alike") for row in runs]
-    limits = [row.predicted_dt for row in own if row.limit == "finite"]
-    return (all(stable) if stable else None), min(limits, default=None)
+    finite = [row.predicted_dt for row in own if row.limit == "finite"]
+    return (all(stable) if stable else None), min(finite, default=None)
 
 
-def order(row: dict) -> tuple:
-    """Sort key: verdict, unstable steps, largest share of a tolerance."""
-    rank = VERDICTS.index(row["verdict"])
-    return rank, row["stable_at_file_dt"] is not False, -(row["worst_ratio"] or 0.0), row["file"]
+def table_of(rows: Sequence[FileRow]) -> str:
+    """fleet.csv."""
+    return files.csv([row.record() for row in rows], FLEET_COLUMNS)
 
 
-def is_row(row: object) -> bool:
-    """Whether what lay in the folder of a report is a row of the table."""
-    if not isinstance(row, dict) or not EMPTY_ROW.keys() >= row.keys() or row.get("verdict") not in VERDICTS:
-        return False
-    kinds = {name: float | int | None if name in NUMBERS else str | None for name in row}
-    return all(isinstance(row[name], kind) for name, kind in kinds.items())
-
-
-def earlier(folder: str) -> dict[str, dict]:
-    """The columns of CHANGES of an earlier fleet, by file name. Refused if they cannot be read."""
+def earlier(folder: str) -> dict[str, dict[str, str]]:
+    """The columns COMPARED of an earlier fleet, by file name. Refused if they cannot be read."""
     path = Path(folder) / "fleet.csv"
     try:
         return by_file(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, KeyError, csv.Error):
-        raise Refused(
-            f"cannot read {in_one_line(str(path))}; expected the folder of an earlier fleet"
-        ) from None
+        shown = in_one_line(str(path))
+        raise Refused(f"cannot read {shown}; expected the folder of an earlier fleet") from None
 
 
-def by_file(table: str) -> dict[str, dict]:
-    """The columns of CHANGES by file name, as text."""
-    return {row["file"]: {name: row[name] for name in CHANGES} for row in csv.DictReader(StringIO(table))}
+def by_file(table: str) -> dict[str, dict[str, str]]:
+    """The columns COMPARED by file name, as text."""
+    return {row["file"]: {name: row[name] for name in COMPARED} for row in csv.DictReader(StringIO(table))}
 
 
-def changes(before: Mapping[str, dict], rows: Sequence[dict]) -> list[str]:
+def changes(before: Mapping[str, Mapping[str, str]], rows: Sequence[FileRow]) -> list[str]:
     """The changes since an earlier fleet, one line for each file: verdict, step, limit; new and removed files."""
-    now = by_file(files.csv(rows, FLEET_COLUMNS))
-    lines = [f"{file}: new, {row['verdict']}" for file, row in now.items() if file not in before]
-    lines += [f"{file}: removed, was {row['verdict']}" for file, row in before.items() if file not in now]
-    for file in now.keys() & before.keys():
-        pairs = {column: (before[file][column], now[file][column]) for column in CHANGES}
-        moved = [f"{CHANGES[column]} {' -> '.join(value or 'unknown' for value in pair)}"
-                 for column, pair in pairs.items() if is_change(*pair)]  # fmt: skip
-        lines += [f"{file}: {'; '.join(moved)}"] * bool(moved)
+    now, lines = by_file(table_of(rows)), []
+    for file in sorted(before.keys() | now.keys()):
+        old, new = before.get(file, {}), now.get(file, {})
+        pairs = {name: (old.get(name, ""), new.get(name, "")) for name in COMPARED}
+        moved = [(name, *pair) for name, pair in pairs.items() if is_change(*pair)]
+        if moved:
+            lines.append(block("fleet", "change", file=file, old=old, new=new, moved=moved))
     return sorted(lines)
 
 
@@ -139,55 +193,36 @@ def is_change(old: str, new: str) -> bool:
 
 
 def write_table(
-    out: Path, run: object, left_out: Sequence[tuple[str, str]], changed: Sequence[str] | None, command: str
+    out: Path,
+    rows: Sequence[FileRow],
+    left_out: Sequence[tuple[str, str]],
+    changed: Sequence[str] | None,
+    command: str,
 ) -> list[str]:
-    """Write fleet.csv and index.html; the lines of the summary. run: a run.Run; changed: lines of --since, None: without it."""
-    rows = sorted(run.rows, key=order)
-    numbers = run.verdicts
-    unstable = [row["file"] for row in rows if row["stable_at_file_dt"] is False]
-    copies = sum(row["same_as"] is not None for row in rows)
-    text = block("fleet", "summary", numbers={v: numbers[v] for v in VERDICTS if numbers[v]}, copies=copies,
-                 unstable=unstable, left_out=left_out)  # fmt: skip
+    """Write fleet.csv and index.html; the lines of the summary. changed: lines of --since, None: without it."""
+    rows = sorted(rows, key=lambda row: row.order)
+    numbers = Counter(row.verdict for row in rows)
+    text = block(
+        "fleet",
+        "summary",
+        numbers={verdict: numbers[verdict] for verdict in VERDICTS if numbers[verdict]},
+        copies=sum(row.same_as is not None for row in rows),
+        unstable=[row.file for row in rows if row.stable_at_file_dt is False],
+        left_out=left_out,
+    )
     summary = [line for line in text.split("\n") if line]
     origin = {"command": command, "date": datetime.now(UTC).isoformat(timespec="seconds"), "commit": commit()}
     origin |= {OURS: installed(OURS), "mujoco": installed("mujoco")}
     page = fleet_page(rows, summary=summary, left_out=left_out, changed=changed, origin=origin)
-    write_whole(out / "fleet.csv", files.csv(rows, FLEET_COLUMNS).encode("utf-8", "backslashreplace"))
-    write_whole(out / "index.html", page.encode("utf-8", "backslashreplace"))
+    for name, content in (("fleet.csv", table_of(rows)), ("index.html", page)):
+        write_whole(out / name, content.encode("utf-8", "backslashreplace"))
     return summary
 
 
-def fleet_page(rows: Sequence[dict], **values: object) -> str:
+def fleet_page(rows: Sequence[FileRow], **values: object) -> str:
     """The page as HTML. values: summary, left_out, changed and origin, as in write_table."""
-    title, good = "A fleet of models compared", not any(row["verdict"] in BAD_VERDICTS for row in rows)
+    title, good = block("fleet", "title"), not any(row.is_bad for row in rows)
     pages = environment()
-    values |= {"rows": list(map(shown_row, rows)), "heads": HEADS, "title": title, "good": good}
-    body = pages.get_template("fleet.html.jinja").render(values)
-    return pages.get_template("page.html.jinja").render(
-        title=title, links=(), good=good, script="", body=Markup(body)
-    )
-
-
-def shown_row(row: dict) -> dict:
-    """A row with the text of its cells, its class and the address of its report."""
-    is_bad = row["verdict"] in BAD_VERDICTS or row["stable_at_file_dt"] is False
-    return row | {
-        "cells": {name: cell(name, row[name]) for name in HEADS},
-        "kind": "bad" if is_bad else "good" if row["verdict"] == AGREE else "none",
-        "address": quote(f"{place_of_report(row['same_as'] or row['file'])}/index.html"),
-    }
-
-
-def cell(name: str, value: object) -> str:
-    """The text of a cell; steps are in ms."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return (
-            f"{value:.1f}"
-            if name == "seconds"
-            else f"{1e3 * value:.4g}"
-            if name.endswith("_s")
-            else f"{value:.2g}"
-        )
-    return "" if value is None else REFERENCES.get(value, str(value))
+    body = pages.get_template("fleet.html.jinja").render(rows=rows, title=title, good=good, **values)
+    page = pages.get_template("page.html.jinja")
+    return page.render(title=title, links=(), good=good, script="", body=Markup(body))

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
-from ..core.text import say
+from ..core.text import block, say
 from ..engines.mujoco import ModelError, read
 from ..experiments import TIMED, skipped
 from ..process.workers import Clock
@@ -20,7 +20,7 @@ from ..run import examine as experiment
 from ..run.command import write_report
 from ..run.reference import SOLUTION, JointsDiffer, compared_with
 from .models import unpacked
-from .table import DIFFER, REFUSED, row_of_file
+from .table import DIFFER, REFUSED, FileRow, judged
 
 
 class FleetOptions(NamedTuple):
@@ -31,54 +31,52 @@ class FleetOptions(NamedTuple):
 
     def command(self, shown: str) -> str:
         """The command that writes the same report for one file."""
-        words = [
-            "fleet",
-            shown,
-            *["--full"] * (not self.is_quick),
-            *["--timing"] * bool({*TIMED} & {*self.names}),
-        ]
+        words = ["fleet", shown]
+        words += [] if self.is_quick else ["--full"]
+        words += ["--timing"] if {*TIMED} & {*self.names} else []
         words += ["--only", ",".join(self.names)]
         words += ["--reference", self.reference] if self.reference else []
         return shlex.join(["python", "-m", "compare", *words])
 
 
-def compare_file(
-    shown: str, options: FleetOptions, bundle: dict[str, bytes]
-) -> tuple[dict, dict[str, bytes]]:
-    """The row of a file, and its report: {path: content}, empty if nothing can be compared."""
+class Compared(NamedTuple):
+    row: FileRow
+    report: dict[str, bytes]  # content by path; empty if nothing can be compared
+
+
+def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) -> Compared:
+    """Compare the file of a bundle in the current folder."""
     began, top, out = time.process_time(), Path.cwd() / "model", Path.cwd() / "report"
     path = unpacked(bundle, top)
     solution = str(top / options.solution) if options.solution else None
-    row = {"sha256": hashlib.sha256(next(iter(bundle.values()))).hexdigest()}
+    row = FileRow(file=shown, sha256=hashlib.sha256(next(iter(bundle.values()))).hexdigest(), verdict=REFUSED)
     try:
         compared = compared_with(options.reference, str(path), shown=shown, solution=solution)
         reading = compared.reading or read(compared.mujoco.source)
     except JointsDiffer as error:
-        reference = "arm" if options.reference == "arm" else SOLUTION
-        return row | {"verdict": DIFFER, "reason": error.why, "reference": reference}, {}
+        row.verdict, row.reason = DIFFER, error.why
+        row.reference = "arm" if options.reference == "arm" else SOLUTION
+        return Compared(row, {})
     except ModelError as error:
-        reason = str(error).replace(str(path), shown).replace(os.path.join(path.parent, ""), "")
-        return row | {"verdict": REFUSED, "reason": reason.removeprefix(f"{shown} cannot be compared: ")}, {}
+        why = str(error).replace(str(path), shown).replace(os.path.join(path.parent, ""), "")
+        row.reason = why.removeprefix(f"{shown} cannot be compared: ")
+        return Compared(row, {})
     reasons = {name: say(reason) for name in options.names if (reason := skipped(name, compared.robot))}
     names = [name for name in options.names if name not in reasons]
-    left_out = list(reasons.items())
-    row |= {
-        "joints": len(compared.robot.joints), "file_integrator": reading.integrator, "file_dt_s": reading.dt,
-        "reference": compared.reference.kind,
-    }  # fmt: skip
+    row.joints, row.reference = len(compared.robot.joints), compared.reference.kind
+    row.file_integrator, row.file_dt = reading.integrator, reading.dt
     if not names:
-        return row | {
-            "verdict": REFUSED,
-            "reason": f"no experiment applies: {'; '.join(map(': '.join, left_out))}",
-        }, {}
+        row.reason = block("fleet", "nothing_applies", reasons=reasons)
+        return Compared(row, {})
     out.mkdir()
     setup = experiment.setup_of(compared, options.is_quick)
     with ThreadPoolExecutor(1) as workers:
-        sections, *outcome = experiment.examine(names, setup, out, Terminal(), workers, Clock())
+        examined = experiment.examine(names, setup, out, Terminal(), workers, Clock())
     origin = provenance.provenance(options.command(shown), compared.robot.mjcf, shown, SEED)
     origin["seconds"] = round(time.process_time() - began, 1)
-    report, parts = write_report(out, sections, *outcome, left_out, origin, compared)
+    report, parts = write_report(out, *examined, list(reasons.items()), origin, compared)
     written = {name: (out / name).read_bytes() for name in folder.files(out)}
     shutil.rmtree(top)
-    row |= row_of_file(report.sections, report.causes, parts.lines, compared.reference)
-    return row | {"seconds": round(time.process_time() - began, 2), "has_report": True}, written
+    row = judged(row, report.sections, report.causes, parts.lines, compared.reference)
+    row.seconds, row.has_report = round(time.process_time() - began, 2), True
+    return Compared(row, written)

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing import resource_tracker
 from typing import NoReturn
@@ -18,7 +19,7 @@ from typing import NoReturn
 from ..core.errors import how_ended
 
 CAN_BLOCK = hasattr(signal, "pthread_sigmask")
-undo = []  # functions to call before the process ends, last first
+undo: list[Callable[[], object]] = []  # functions to call before the process ends, last first
 postponed = threading.RLock()  # held while an interrupt has to wait, and while the run ends
 PARENT = int(os.environ.pop("COMPARE_PARENT", 0))  # the process that waits for this one, see status_of_child
 FINISHED = 200  # added to the exit status of such a child: no status that a user's own code ends with
@@ -43,7 +44,7 @@ def listen() -> None:
     elif numbers:
         before = signal.signal(
             signal.SIGHUP, signal.SIG_IGN
-        )  # the tracker inherits this: it ends after the run
+        )  # the tracker inherits this: it outlives the run
         resource_tracker.ensure_running()  # unblocks signals where it starts
         signal.signal(signal.SIGHUP, before)
         signal.pthread_sigmask(signal.SIG_BLOCK, numbers)

@@ -36,14 +36,18 @@ def needed_by(path: Path) -> tuple[Path, ...]:
 def named_by(path: Path) -> tuple[Path, ...]:
     """As needed_by, with pipes and devices."""
     waiting, parts, folders = [path], {os.path.abspath(path): path}, {path.parent}
-    names, directories = set(), {""}  # a directory that one file states applies to all
+    names: set[str] = set()
+    directories = {""}  # one that a file states applies to all files
     while waiting:
         for element in elements_of(waiting.pop()):
-            named = {value for key, value in element.attrib.items() if key.startswith("file") and value}
-            names |= named | {PureWindowsPath(name).name for name in named}  # the last part: strippath
+            stated = {value for key, value in element.attrib.items() if key.startswith("file") and value}
+            names |= stated | {PureWindowsPath(name).name for name in stated}  # the last part: strippath
             directories |= {element.get(name, "") for name in DIRECTORIES}
-            models = existing(named, folders, {""}) if element.tag in ("include", "model") else ()
-            waiting += [part for part in models if parts.setdefault(os.path.abspath(part), part) is part]
+            models = existing(stated, folders, {""}) if element.tag in ("include", "model") else ()
+            for part in models:
+                place = os.path.abspath(part)
+                waiting += [] if place in parts else [part]
+                parts.setdefault(place, part)
         folders |= {part.parent for part in waiting}
     for part in existing(names, folders, directories):
         parts.setdefault(os.path.abspath(part), part)

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from typing import TextIO
 
 from ..core.words import in_one_line
 
@@ -13,17 +14,17 @@ class Stream:
 
     silent = False  # set for all streams before the process ends
 
-    def __init__(self, stream):
+    def __init__(self, stream: TextIO | None):
         self.stream = stream
 
-    def write(self, text):
+    def write(self, text: str) -> None:
         if not Stream.silent:
             self.act("write", text)
 
-    def flush(self):
+    def flush(self) -> None:
         self.act("flush")
 
-    def act(self, name, *arguments):
+    def act(self, name: str, *arguments: str) -> None:
         try:
             getattr(self.stream, name)(*arguments)
         except (OSError, ValueError, AttributeError):  # full, closed or missing
@@ -35,12 +36,12 @@ class Stream:
     def columns(self) -> int | None:
         """The width of the terminal; None if the stream is not a terminal."""
         try:
-            return os.get_terminal_size(self.stream.fileno()).columns or 80
+            return os.get_terminal_size(self.stream.fileno()).columns or 80 if self.stream else None
         except (OSError, ValueError, AttributeError):
             return None
 
     @property
-    def encoding(self):
+    def encoding(self) -> str:
         return getattr(self.stream, "encoding", None) or "utf-8"
 
 

@@ -1,30 +1,49 @@
-"""Two worker processes of a run, for figures and scenes, and the clock of its tasks."""
+"""Processes that make calls: the two workers of a run, the process of an engine, those of a fleet; and the clock of a run."""
 
 import importlib
 import logging
 import os
 import shutil
-import signal
+import sys
+import tempfile
 import threading
 import time
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, wait
-from contextlib import contextmanager
-from multiprocessing import active_children, get_context, parent_process
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from functools import partial
+from multiprocessing import active_children, parent_process
+from multiprocessing import context as contexts
+from multiprocessing.process import BaseProcess
+from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
-from ..core.errors import place
+from pebble import ProcessExpired, ProcessPool
+
+from ..core.errors import how_ended, place
 from . import interrupt
+
+try:
+    import resource
+except ImportError:  # Windows: no memory limit
+    resource = None  # type: ignore[assignment]  # a module, or none
+
+P = ParamSpec("P")
+T = TypeVar("T")
+KILLED, UNEXPECTED = -9, 256  # exit codes: after SIGKILL; of a lasting process that ends with the status 0
+LONGEST_PATH = 70  # bytes, of the folder of the forkserver's socket, whose whole path may have 107
 
 
 class Clock:
     """The processor time of each task, in this process and in workers, and when each ended."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.started = time.perf_counter()
         self.task = ""  # to which processor time is assigned
         self.under_way = ""
-        self.ended = {}  # s from the start, of each task that has ended
-        self.taken = []  # (task, processor time); threads append to it
+        self.ended: dict[str, float] = {}  # s from the start, of each task that has ended
+        self.taken: list[tuple[str, float]] = []  # task, processor time; threads append to it
 
     @contextmanager
     def of(self, task: str) -> Iterator[None]:
@@ -46,37 +65,178 @@ class Clock:
 
 
 class WorkerEnded(RuntimeError):
-    """A worker process was killed."""
+    """The process of a call ended before its answer."""
+
+    def __init__(self, how: str):
+        super().__init__("a worker process was killed; an earlier report is unchanged")
+        self.how = how  # killed by SIGKILL
 
 
-class Workers(ThreadPoolExecutor):
-    """At most two processes, started when the other is busy. Its clock records their processor times."""
+@dataclass(frozen=True)
+class Beginning:
+    """What a process does before its first call. It ends when its parent does, and then deletes the folder."""
 
-    def __init__(self):
-        super().__init__(2)
-        self.clock, self.futures = Clock(), []
-        self.processes = ProcessPoolExecutor(2, get_context("spawn"), initializer=begin)
+    environment: tuple[tuple[str, str], ...] = ()
+    is_silent: bool = False  # what it prints is lost, that of its libraries of C too
+    memory: int | None = None  # limit, bytes
+    folder: str | None = None
 
-    def submit(self, function, /, *arguments, **named):
-        self.futures.append(super().submit(self.ask, self.clock.task, function, arguments, named))
-        return self.futures[-1]
+    def begin(self) -> None:
+        logging.getLogger("tmt").setLevel(logging.ERROR)  # the main process has the same warnings
+        threading.Thread(target=self.end_with_parent, daemon=True).start()
+        os.environ.update(self.environment)
+        for stream in (1, 2) if self.is_silent else ():
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+        if resource and self.memory:
+            with suppress(OSError, ValueError):
+                resource.setrlimit(resource.RLIMIT_DATA, (self.memory, self.memory))
 
-    def ask(self, task, *call):
-        """The result or exception of a call in one of the processes."""
-        try:
-            with interrupt.postponed:  # a process that is half started would complain
-                future = self.processes.submit(timed, *call)
-            value, error, seconds = future.result()
-        except RuntimeError:  # a broken pool, or shut down
-            raise WorkerEnded("a worker process was killed; an earlier report is unchanged") from None
-        self.clock.taken.append((task, seconds))
-        if error:
-            raise error
-        return value
+    def end_with_parent(self) -> None:
+        parent = parent_process()
+        if parent is not None:
+            parent.join()
+        if self.folder:
+            shutil.rmtree(self.folder, ignore_errors=True)
+        os._exit(1)
 
-    def quiet(self):
+
+DEFAULT = Beginning()
+
+
+class Whole(BaseProcess):
+    """A process that complains if it is half started when its parent ends: an interrupt waits."""
+
+    def start(self) -> None:
+        with interrupt.postponed:
+            super().start()
+
+
+class Spawned(Whole, contexts.SpawnProcess):
+    """A process that makes one call."""
+
+
+class Lasting(Spawned):
+    """A process that makes calls as long as it is asked."""
+
+    @property
+    def exitcode(self) -> int | None:
+        """None, or how it ended, which is never as it should: Pebble does not notice the status 0."""
+        code = super().exitcode
+        return UNEXPECTED if code == 0 else code
+
+
+if sys.platform != "win32":
+
+    class Forked(Whole, contexts.ForkServerProcess):
+        """A process that makes one call, forked from one that has loaded what the call needs."""
+
+
+class Context(contexts.SpawnContext):
+    """How processes are started."""
+
+    def __init__(self, kind: type[BaseProcess]):
+        self.Process = kind  # type: ignore[assignment,misc]  # a class of processes, which Pebble starts
+
+
+class Answer(NamedTuple):
+    """What a call has returned or raised, and its processor time, s."""
+
+    value: Any
+    error: BaseException | None
+    seconds: float
+
+
+@dataclass
+class Call(Generic[T]):
+    """A call of workers. Its future has the answer, however often it is tried."""
+
+    function: Callable[[], T]
+    task: str  # of the clock
+    future: "Future[T]" = field(default_factory=Future)
+    tries: int = 0
+
+
+class Workers:
+    """Processes that make calls at the same time; one that ends, or takes too long, is replaced.
+
+    limit: s for a call. retries: how often a call is made again whose process is killed by SIGKILL (no memory, an operator), of
+    which it may not be the cause. is_fresh: each call has a process of its own. The clock has the processor times of the calls.
+    """
+
+    def __init__(
+        self,
+        count: int,
+        beginning: Beginning = DEFAULT,
+        limit: float | None = None,
+        retries: int = 0,
+        is_fresh: bool = False,
+    ):
+        self.count, self.beginning, self.limit, self.retries = count, beginning, limit, retries
+        self.is_fresh, self.clock, self.pending = is_fresh, Clock(), set[Future[Any]]()
+        self.pool = self.new_pool()
+        interrupt.undo.append(kill_children)
+
+    def new_pool(self) -> ProcessPool:
+        """A pool whose processes start with its first call."""
+        kind: type[BaseProcess] = Spawned if self.is_fresh else Lasting
+        if self.is_fresh and hasattr(os, "fork") and len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PATH:
+            kind = Forked
+        return ProcessPool(self.count, int(self.is_fresh), self.beginning.begin, context=Context(kind))
+
+    def submit(self, function: Callable[P, T], /, *arguments: P.args, **named: P.kwargs) -> "Future[T]":
+        """The future of a call, which raises what the function raises, TimeoutError after the time limit, or WorkerEnded."""
+        call = Call(partial(function, *arguments, **named), self.clock.task)
+        self.pending.add(call.future)
+        self.start(call)
+        return call.future
+
+    def map(self, function: Callable[..., T], *arguments: Iterable[Any]) -> Iterator[T]:
+        """The values of a function in their order; all calls are submitted at once."""
+        futures = [self.submit(function, *values) for values in zip(*arguments)]
+        return (future.result() for future in futures)
+
+    def quiet(self) -> None:
         """Wait until all calls are done, before times are measured."""
-        wait(self.futures)
+        wait(self.pending.copy())
+
+    def start(self, call: Call[T]) -> None:
+        if not self.pool.active:  # its processes have ended while they were idle
+            self.pool = self.new_pool()
+        call.tries += 1
+        scheduled = self.pool.schedule(timed, (call.function,), timeout=self.limit)
+        scheduled.add_done_callback(partial(self.finish, call))
+
+    def finish(self, call: Call[T], scheduled: "Future[Answer]") -> None:
+        """Hand on the answer to a call, or make the call again; in a thread of the pool."""
+        value, error = None, None
+        try:
+            value, error, seconds = scheduled.result()
+            self.clock.taken.append((call.task, seconds))
+        except ProcessExpired as expired:
+            is_killed = expired.exitcode == KILLED
+            if is_killed and call.tries <= self.retries:
+                self.start(call)
+                return
+            times = f", {call.tries} times" if is_killed and self.retries else ""
+            error = WorkerEnded(how_ended(expired.exitcode) + times)
+        except BrokenProcessPool:
+            error = WorkerEnded("its process ended")
+        except Exception as reason:  # TimeoutError; arguments or a value that cannot be sent
+            error = reason
+        self.pending.discard(call.future)
+        if error is None:
+            call.future.set_result(value)  # type: ignore[arg-type]  # without an error it is a T
+        else:
+            call.future.set_exception(error)
+
+    def close(self, at_once: bool = False) -> None:
+        """End the processes; at once: in the middle of their calls, and those of other workers too."""
+        self.retries = 0
+        self.pool.stop()
+        if at_once:
+            kill_children()
+        self.pool.join()
+        interrupt.undo.remove(kill_children)
 
 
 def kill_children() -> None:
@@ -86,34 +246,12 @@ def kill_children() -> None:
 
 @contextmanager
 def start_workers() -> Iterator[Workers]:
-    workers = Workers()
-    interrupt.undo.append(kill_children)
+    """The two workers of a run, for figures and scenes."""
+    workers = Workers(2)
     try:
         yield workers
     finally:
-        kill_children()
-        workers.processes.shutdown(cancel_futures=True)
-        workers.shutdown(cancel_futures=True)
-        interrupt.undo.remove(kill_children)
-
-
-def begin() -> None:  # in a worker
-    logging.getLogger("tmt").setLevel(logging.ERROR)  # the main process has the same warnings
-    end_with_parent()
-
-
-def end_with_parent(folder: str | None = None) -> None:
-    """From now on this process ends when its parent does, and deletes a folder."""
-    if not interrupt.CAN_BLOCK:  # else the parent has blocked it here too
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def watch():
-        parent_process().join()
-        if folder:
-            shutil.rmtree(folder, ignore_errors=True)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
+        workers.close(at_once=True)
 
 
 def load_modules(*modules: str) -> None:
@@ -121,11 +259,11 @@ def load_modules(*modules: str) -> None:
         importlib.import_module(name)
 
 
-def timed(function, arguments: tuple, named: dict) -> tuple:
-    """The value of a call, the exception, and the processor time in s."""
-    began, value, raised = time.process_time(), None, None
+def timed(function: Callable[[], Any]) -> Answer:
+    value, raised, began = None, None, time.process_time()
     try:
-        value = function(*arguments, **named)
-    except Exception as error:
-        error.place, raised = place(error), error  # it is sent without its traceback
-    return value, raised, time.process_time() - began
+        value = function()
+    except BaseException as error:
+        error.place = place(error)  # type: ignore[attr-defined]  # it is sent without its traceback
+        raised = error
+    return Answer(value, raised, time.process_time() - began)

@@ -7,10 +7,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from tmt.model.coordinates import Joint
 
 import tmt
 from tmt import literal
+from tmt.derivation.coordinates import Joint
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.tree import GAINS
 

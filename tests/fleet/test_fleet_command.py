@@ -15,7 +15,7 @@ from toy import soon
 
 from compare.__main__ import main
 from compare.core.errors import Refused
-from compare.fleet.table import FLEET_COLUMNS
+from compare.fleet.table import FLEET_COLUMNS, FileRow
 
 NAME = "a b#ü.xml" if sys.getfilesystemencoding() == "utf-8" else "a b#u.xml"  # of a file that agrees
 MODELS = runs.ROOT / "tests" / "models"
@@ -76,8 +76,9 @@ def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_
     said = []
 
     def carry_out(self, progress):
-        for model in self.models:
-            self.end(model, {"verdict": said[-1], "reason": "no reason"})
+        self.rows += [
+            FileRow(file=model.shown, verdict=said[-1], reason="no reason") for model in self.models
+        ]
 
     monkeypatch.setattr("compare.fleet.run.Run.carry_out", carry_out)
     statuses = {"agree": 0, "self-consistent": 0, "refused": 0, "unconfirmed": 1, "broke": 1, "differ": 1}

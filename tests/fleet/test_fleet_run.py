@@ -11,10 +11,11 @@ import pytest
 
 from compare.core.errors import described
 from compare.fleet.command import solution_files
+from compare.fleet.executors import Outcome
 from compare.fleet.models import found_models, place_of_report
 from compare.fleet.run import AHEAD, Run
-from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, REFUSED
-from compare.fleet.task import FleetOptions
+from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, REFUSED, FileRow
+from compare.fleet.task import Compared, FleetOptions
 
 PENDULUM = ("<mujoco><worldbody><body name='b'><joint name='j' axis='0 1 0'/><inertial pos='0 0 {}' mass='1' "
             "diaginertia='1 1 1'/></body></worldbody></mujoco>")  # fmt: skip
@@ -41,14 +42,14 @@ class Inside:
         self.under_way -= 1
         function, arguments = future.result()
         if self.answer:
-            return self.answer
+            return self.answer(*arguments)
         before, place = os.getcwd(), self.folder / f"{len(list(self.folder.iterdir()))}"
         place.mkdir()
         os.chdir(place)
         try:
-            return function(*arguments), ""
+            return Outcome(function(*arguments), "")
         except Exception as error:
-            return None, described(error)
+            return Outcome(None, described(error))
         finally:
             os.chdir(before)
 
@@ -73,7 +74,7 @@ def fleet(tmp_path, monkeypatch):
         of = Run(found_models(paths)[0], options, executor, tmp_path / "out", sent)
         of.carry_out(lambda rows: None)
         return SimpleNamespace(
-            of=of, executor=executor, rows={os.path.basename(row["file"]): row for row in of.rows}
+            of=of, executor=executor, rows={os.path.basename(row.file): row for row in of.rows}
         )
 
     return run
@@ -84,7 +85,7 @@ def report(tmp_path, name):
 
 
 def verdicts(found):
-    return {name: row["verdict"] for name, row in found.rows.items()}
+    return {name: row.verdict for name, row in found.rows.items()}
 
 
 def test_files_agree_or_are_refused_with_the_reason(fleet, tmp_path):
@@ -92,36 +93,34 @@ def test_files_agree_or_are_refused_with_the_reason(fleet, tmp_path):
         "good.xml": PENDULUM.format(0.1), "broken.xml": "<mujoco><worldbody>", "none.xml": "<mujoco/>",
     }, ["parameters"])  # fmt: skip
     assert verdicts(found) == {"good.xml": ITSELF, "broken.xml": REFUSED, "none.xml": REFUSED}
-    assert "joint" in found.rows["none.xml"]["reason"] and len(found.rows["broken.xml"]["sha256"]) == 64
-    assert (
-        found.rows["good.xml"]["joints"] == 1 and found.rows["good.xml"]["seconds"] > 0.0 and found.of.is_good
-    )
-    assert (report(tmp_path, "good.xml") / "index.html").is_file() and not found.rows["none.xml"][
-        "has_report"
-    ]
-    assert fleet(ONE, ["published"]).rows["a.xml"]["verdict"] == REFUSED  # which serves the arm alone
+    assert "joint" in found.rows["none.xml"].reason and len(found.rows["broken.xml"].sha256) == 64
+    assert found.rows["good.xml"].joints == 1 and found.rows["good.xml"].seconds > 0.0 and found.of.is_good
+    assert (report(tmp_path, "good.xml") / "index.html").is_file() and not found.rows["none.xml"].has_report
+    assert fleet(ONE, ["published"]).rows["a.xml"].verdict == REFUSED  # which serves the arm alone
 
 
-ANSWER = ({"verdict": AGREE, "reason": "", "seconds": 1.0, "has_report": True}, {"index.html": b"all"}), ""
+def agrees(shown, *_):
+    row = FileRow(file=shown, verdict=AGREE, seconds=1.0, has_report=True)
+    return Outcome(Compared(row, {"index.html": b"all"}), "")
 
 
 def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
-    first, second = fleet(TWO, answer=ANSWER), fleet(TWO, answer=ANSWER)
+    first, second = fleet(TWO, answer=agrees), fleet(TWO, answer=agrees)
     assert len(first.executor.calls) == 2 and second.executor.calls == []
     assert second.rows == first.rows
-    third = fleet({"b.xml": PENDULUM.format(0.3), "b/a.xml": PENDULUM.format(0.4)}, answer=ANSWER)
+    third = fleet({"b.xml": PENDULUM.format(0.3), "b/a.xml": PENDULUM.format(0.4)}, answer=agrees)
     assert set(third.executor.calls) == {"m/b.xml", "m/b/a.xml"}
     (report(tmp_path, "b.xml") / ".fleet").write_bytes(b"damaged")
-    assert fleet({}, answer=ANSWER).executor.calls == ["m/b.xml"]
+    assert fleet({}, answer=agrees).executor.calls == ["m/b.xml"]
     for more in ({"is_quick": False}, {"names": ("gravity",)}):
-        assert fleet({}, answer=ANSWER, paths=["m/a.xml"], **more).executor.calls == ["m/a.xml"]
+        assert fleet({}, answer=agrees, paths=["m/a.xml"], **more).executor.calls == ["m/a.xml"]
     for solution, computed in (
         (PENDULUM.format(0.1), 1),
         (PENDULUM.format(0.1), 0),
         (PENDULUM.format(0.2), 1),
     ):
         (tmp_path / "solution.xml").write_text(solution)
-        found = fleet({}, answer=ANSWER, paths=["m/a.xml"], reference="solution.xml")
+        found = fleet({}, answer=agrees, paths=["m/a.xml"], reference="solution.xml")
         assert len(found.executor.calls) == computed
 
 
@@ -133,10 +132,10 @@ class Touch:
 
 
 def test_what_lies_in_the_folder_of_a_report_is_data_and_a_row_or_computed_anew(fleet, tmp_path):
-    fleet(ONE, answer=ANSWER)
+    fleet(ONE, answer=agrees)
     mark = report(tmp_path, "a.xml") / ".fleet"
     key, row = json.loads(mark.read_text())
-    assert fleet({}, answer=ANSWER).executor.calls == []
+    assert fleet({}, answer=agrees).executor.calls == []
     others = [
         row | more for more in ({"verdict": "fine"}, {"worst_ratio": "1"}, {"reason": [1]}, {"other": 1})
     ]
@@ -145,7 +144,7 @@ def test_what_lies_in_the_folder_of_a_report_is_data_and_a_row_or_computed_anew(
     ]
     for poison in poisons:
         mark.write_bytes(poison)
-        assert fleet({}, answer=ANSWER).executor.calls == ["m/a.xml"], poison
+        assert fleet({}, answer=agrees).executor.calls == ["m/a.xml"], poison
     assert not Path("ran").exists()
 
 
@@ -155,29 +154,29 @@ def test_a_copy_has_the_row_of_the_first_file_and_is_not_computed(fleet):
     parts = {
         f"{name}/part.xml": PENDULUM.format(number) for name, number in (("x", 0.1), ("y", 0.1), ("z", 0.2))
     }
-    first = fleet(same | parts | {f"{name}/whole.xml": of_parts for name in "xyz"}, answer=ANSWER)
+    first = fleet(same | parts | {f"{name}/whole.xml": of_parts for name in "xyz"}, answer=agrees)
     assert first.executor.calls == ["m/a.xml", "m/c.mjcf", "m/x/whole.xml", "m/z/whole.xml"]
-    copies = {row["file"]: row["same_as"] for row in first.of.rows if row["same_as"]}
+    copies = {row.file: row.same_as for row in first.of.rows if row.same_as}
     assert copies == {"m/b.xml": "m/a.xml", "m/y/whole.xml": "m/x/whole.xml"} and len(first.of.rows) == 6
-    assert "m/a.xml" in first.rows["b.xml"]["reason"] and first.rows["b.xml"]["verdict"] == AGREE
-    assert fleet({}, answer=ANSWER).rows["b.xml"] == first.rows["b.xml"]
+    assert "m/a.xml" in first.rows["b.xml"].reason and first.rows["b.xml"].verdict == AGREE
+    assert fleet({}, answer=agrees).rows["b.xml"] == first.rows["b.xml"]
 
 
 def test_a_file_that_breaks_off_keeps_its_earlier_report_and_is_tried_again(fleet, tmp_path):
-    fleet(ONE, answer=ANSWER)
-    found = fleet({"a.xml": PENDULUM.format(0.2)}, answer=(None, "killed by SIGKILL"))
+    fleet(ONE, answer=agrees)
+    found = fleet({"a.xml": PENDULUM.format(0.2)}, answer=lambda *_: Outcome(None, "killed by SIGKILL"))
     row = found.rows["a.xml"]
-    assert (row["verdict"], row["has_report"], found.of.is_good) == (
+    assert (row.verdict, row.has_report, found.of.is_good) == (
         BROKE,
         False,
         False,
-    ) and "SIGKILL" in row["reason"]
+    ) and "SIGKILL" in row.reason
     assert (report(tmp_path, "a.xml") / "index.html").read_bytes() == b"all"
-    assert fleet({}, answer=ANSWER).executor.calls == ["m/a.xml"]
+    assert fleet({}, answer=agrees).executor.calls == ["m/a.xml"]
 
 
 def test_few_models_are_in_memory_at_a_time(fleet):
-    found = fleet({f"{k}.xml": PENDULUM.format(0.1 + k) for k in range(20)}, answer=ANSWER)
+    found = fleet({f"{k}.xml": PENDULUM.format(0.1 + k) for k in range(20)}, answer=agrees)
     assert found.executor.most == AHEAD * Inside.workers and len(found.rows) == 20
 
 
@@ -197,8 +196,8 @@ def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_ma
         "renamed.xml": (AGREE, "joint 0 as j"), "slide.xml": (DIFFER, "solution.xml"), "right.xml": (AGREE, ""),
     }  # fmt: skip
     assert verdicts(found) == {name: verdict for name, (verdict, _) in named.items()}
-    assert all(word in found.rows[name]["reason"] for name, (_, word) in named.items())
-    assert [name for name, row in found.rows.items() if not row["has_report"]] == ["slide.xml"]
+    assert all(word in found.rows[name].reason for name, (_, word) in named.items())
+    assert [name for name, row in found.rows.items() if not row.has_report] == ["slide.xml"]
     assert (
         "--only parameters --reference solution.xml"
         in (report(tmp_path, "renamed.xml") / "report.md").read_text()

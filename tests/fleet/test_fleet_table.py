@@ -1,10 +1,10 @@
 """The row of a file, the order of rows, the table as CSV and as a page, and what has changed since an earlier fleet."""
 
 import csv
+import dataclasses
 import html
 import random
 import re
-from collections import Counter
 from types import SimpleNamespace
 from urllib.parse import unquote
 
@@ -13,8 +13,17 @@ import pytest
 from compare.core.check import AT_OWN_STEP, ENDS, About, Result
 from compare.fleet import table
 from compare.fleet.models import place_of_report
-from compare.fleet.table import AGREE, BROKE, DIFFER, FLEET_COLUMNS, ITSELF, NOT_JUDGED, REFUSED, UNCONFIRMED
-from compare.report import files
+from compare.fleet.table import (
+    AGREE,
+    BROKE,
+    DIFFER,
+    FLEET_COLUMNS,
+    ITSELF,
+    NOT_JUDGED,
+    REFUSED,
+    UNCONFIRMED,
+    FileRow,
+)
 from compare.report.verdict import Section
 from compare.run.reference import Reference
 
@@ -29,7 +38,15 @@ def good(share=0.5):
     return "M", share, 1.0, "", "at most", About.MODELS
 
 
-def row_of(*checks, limits=(), runs=(), causes=(), lost=(), reference=("arm",)):
+ROW = FileRow(file="a b.xml", sha256="1", verdict=AGREE, joints=3, worst_ratio=0.123456, file_integrator="Euler", file_dt=0.002,
+              stable_at_file_dt=True, limit=0.01, seconds=1.26, has_report=True, reference="arm")  # fmt: skip
+
+
+def row(**fields):
+    return dataclasses.replace(ROW, **fields)
+
+
+def judged(*checks, limits=(), runs=(), causes=(), lost=(), reference=("arm",)):
     """The row of one section with checks: (quantity, value, tolerance, note, rule, about)."""
     result = Result("stability", tables={"step_limits": list(limits), "own_run": list(runs)})
     for quantity, value, tolerance, note, rule, about in checks:
@@ -39,7 +56,7 @@ def row_of(*checks, limits=(), runs=(), causes=(), lost=(), reference=("arm",)):
         result.check("home", quantity, value, tolerance, "s", note, about == About.MODELS, rule, about)
     kind, *renamed = reference
     section = Section("stability", "", "", "", result)
-    return table.row_of_file([section], causes, lost, Reference(kind, "a.xml", renamed=tuple(renamed)))
+    return table.judged(ROW, [section], causes, lost, Reference(kind, "a.xml", renamed=tuple(renamed)))
 
 
 @pytest.mark.parametrize("verdict, checks, more, named", [
@@ -56,14 +73,14 @@ def row_of(*checks, limits=(), runs=(), causes=(), lost=(), reference=("arm",)):
     (REFUSED, [], {}, "no comparison"),
 ])  # fmt: skip
 def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, named):
-    row = row_of(*checks, **more)
-    assert row["verdict"] == verdict and named in row["reason"] and bool(named) == bool(row["reason"])
+    row = judged(*checks, **more)
+    assert row.verdict == verdict and named in row.reason and bool(named) == bool(row.reason)
 
 
 def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
-    assert row_of(good(0.2), good(3.0), OWN)["worst_ratio"] == 3.0
-    diverged = row_of(good(0.2), ("M", None, 1.0, "", "at most", About.MODELS))
-    assert (diverged["verdict"], diverged["worst_ratio"]) == (DIFFER, 0.2)
+    assert judged(good(0.2), good(3.0), OWN).worst_ratio == 3.0
+    diverged = judged(good(0.2), ("M", None, 1.0, "", "at most", About.MODELS))
+    assert (diverged.verdict, diverged.worst_ratio) == (DIFFER, 0.2)
 
 
 def limit(dt, stable, integrator="Euler", kind="finite"):
@@ -80,11 +97,12 @@ def limit(dt, stable, integrator="Euler", kind="finite"):
     ([limit(None, True, kind="always stable"), limit(None, None, kind="saddle")], True, None),
 ])  # fmt: skip
 def test_the_own_step_is_that_of_the_own_integrator_at_all_postures(limits, stable, least):
-    row = row_of(good(), limits=limits)
-    assert (row["stable_at_file_dt"], row["limit_s"]) == (stable, least)
+    row = judged(good(), limits=limits)
+    assert (row.stable_at_file_dt, row.limit) == (stable, least)
     for outcome, is_stable in {"calm": True, "alike": True, "worse": False, "fails": False}.items():
-        row = row_of(good(), limits=limits, runs=[SimpleNamespace(outcome=one) for one in ("calm", outcome)])
-        assert row["stable_at_file_dt"] is (is_stable and stable is not False)
+        runs = [SimpleNamespace(outcome=run) for run in ("calm", outcome)]
+        row = judged(good(), limits=limits, runs=runs)
+        assert row.stable_at_file_dt is (is_stable and stable is not False)
 
 
 def test_what_needs_a_look_comes_first():
@@ -94,32 +112,27 @@ def test_what_needs_a_look_comes_first():
         (REFUSED, None, None, "a"), (ITSELF, False, 0.1, "a"), (ITSELF, True, 0.9, "a"), (AGREE, False, 0.1, "a"),
         (AGREE, None, 0.9, "a"), (AGREE, True, 0.9, "b"), (AGREE, True, 0.0, "c"), (AGREE, None, None, "d"),
     ]  # fmt: skip
-    rows = [dict(zip(("verdict", "stable_at_file_dt", "worst_ratio", "file"), row)) for row in right]
+    fields = "verdict", "stable_at_file_dt", "worst_ratio", "file"
+    rows = [row(**dict(zip(fields, values))) for values in right]
     for seed in range(20):
-        assert sorted(random.Random(seed).sample(rows, len(rows)), key=table.order) == rows
+        assert sorted(random.Random(seed).sample(rows, len(rows)), key=lambda row: row.order) == rows
 
 
 # what has changed since an earlier fleet
-
-ROW = {
-    "file": "a b.xml", "sha256": "1", "verdict": AGREE, "reason": "", "joints": 3, "worst_ratio": 0.123456,
-    "file_integrator": "Euler", "file_dt_s": 0.002, "stable_at_file_dt": True, "limit_s": 0.01, "seconds": 1.26,
-    "has_report": True, "reference": "arm", "same_as": None,
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("before, now, named", [
     ({}, {"seconds": 99.0, "worst_ratio": 0.9, "sha256": "2", "reason": "other"}, None),
     ({}, {"verdict": DIFFER, "reason": "mass of x"}, ["agree", "differ"]),
     ({"stable_at_file_dt": None}, {"stable_at_file_dt": False}, ["stable unknown", "false"]),
-    ({}, {"limit_s": 0.010099}, None),
-    ({}, {"limit_s": 0.010101}, ["0.01 ", "0.010101"]),
-    ({"limit_s": None}, {}, ["unknown", "0.01"]),
+    ({}, {"limit": 0.010099}, None),
+    ({}, {"limit": 0.010101}, ["0.01 ", "0.010101"]),
+    ({"limit": None}, {}, ["unknown", "0.01"]),
     ({}, {"file": "new.xml", "verdict": REFUSED}, ["a b.xml", "agree", "new.xml", "refused"]),  # and one is gone
 ])  # fmt: skip
 def test_a_verdict_a_step_or_a_limit_that_is_another_is_told(before, now, named, tmp_path):
-    (tmp_path / "fleet.csv").write_text(files.csv([ROW | before], FLEET_COLUMNS), encoding="utf-8")
-    found = table.changes(table.earlier(tmp_path), [ROW | now])
+    (tmp_path / "fleet.csv").write_text(table.table_of([row(**before)]), encoding="utf-8")
+    found = table.changes(table.earlier(tmp_path), [row(**now)])
     places = [" ".join(found).index(name) for name in named or ()]
     assert bool(found) == bool(named) and places == sorted(places)
 
@@ -132,7 +145,7 @@ def page_of(rows, **more):
 def test_every_name_leads_to_its_report():
     names = ["with space.xml", "ümlaut/x.xml", "a#b.xml", "a%41b.xml", "it's \"q\".xml", "<b>.xml", "q?x=1.xml",
              "new\\nline.xml", "c:d;e.xml", "../up.xml", "/far/away.xml", "$title.xml"]  # fmt: skip
-    text = page_of([ROW | {"file": name} for name in names])
+    text = page_of([row(file=name) for name in names])
     links = re.findall(r'<th scope="row"><a href="([^"]*)">(.*?)</a></th>', text)
     assert [html.unescape(name.replace("<wbr>", "")) for _, name in links] == names
     for (address, _), name in zip(links, names, strict=True):
@@ -142,33 +155,30 @@ def test_every_name_leads_to_its_report():
 
 
 def test_a_row_is_marked_by_its_verdict_and_nothing_that_is_said_is_taken_for_html():
-    empty = dict.fromkeys(("joints", "worst_ratio", "file_dt_s", "stable_at_file_dt", "limit_s"))
-    rows = [ROW, ROW | {"stable_at_file_dt": False}, ROW | empty | {"verdict": REFUSED, "has_report": False}]
-    text = page_of([*rows, ROW | {"verdict": ITSELF}])
+    rows = [ROW, row(stable_at_file_dt=False), FileRow(file="a b.xml", verdict=REFUSED), row(verdict=ITSELF)]
+    text = page_of(rows)
     assert re.findall(r'<td class="limit_s">(.*?)</td>', text) == ["10", "10", "", "10"]
     assert re.findall(r'<tr class="(\w+)">', text) == ["good", "bad", "none", "none"]
     assert '<th scope="row">a b.xml</th>' in text and '<div class="verdict good">' in text
-    text = page_of([ROW | {"verdict": UNCONFIRMED}])
+    text = page_of([row(verdict=UNCONFIRMED)])
     assert '<div class="verdict bad">' in text and '<tr class="bad">' in text
     said, name, value, why, reason, change = words = [f'<w{k}>&"' for k in range(6)]
     more = {"left_out": [("a", why)], "changed": [change], "origin": {name: value}}
-    text = page_of([ROW | {"reason": reason}], summary=[said], **more)
+    text = page_of([row(reason=reason)], summary=[said], **more)
     for k in range(len(words)):
         assert f"<w{k}>" not in text and f"&lt;w{k}&gt;&amp;" in text
 
 
 def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
-    rows = [ROW, ROW | {"file": "b.xml", "verdict": DIFFER}, ROW | {"file": "c.xml", "stable_at_file_dt": False},
-            ROW | {"file": "d.xml", "same_as": "c.xml", "verdict": REFUSED}]  # fmt: skip
-    run = SimpleNamespace(rows=rows, verdicts=Counter(row["verdict"] for row in rows))
-    summary = table.write_table(tmp_path, run, [("early.xml", "because")], None, "the command")
+    rows = [ROW, row(file="b.xml", verdict=DIFFER), row(file="c.xml", stable_at_file_dt=False),
+            row(file="d.xml", same_as="c.xml", verdict=REFUSED)]  # fmt: skip
+    summary = table.write_table(tmp_path, rows, [("early.xml", "because")], None, "the command")
     assert all(part in summary[0] for part in ("4 files", "1 copy", "1 was refused"))
     with (tmp_path / "fleet.csv").open(newline="") as file:
         found = list(csv.DictReader(file))
     assert [row["file"] for row in found] == ["b.xml", "d.xml", "c.xml", "a b.xml"]
     assert tuple(found[0]) == FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
     text = (tmp_path / "index.html").read_text()
-    assert all(
-        part in text for part in ("early.xml", "the command", '<a href="files/c.xml/index.html">d.xml</a>')
-    )
+    parts = "early.xml", "the command", '<a href="files/c.xml/index.html">d.xml</a>'
+    assert all(part in text for part in parts)
     assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")

@@ -2,15 +2,18 @@
 
 import logging
 import re
+from collections.abc import Mapping
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
 from ..outside.mjcf_text import whole_text
-from ..outside.model import File, Unread, combined
+from ..outside.model import Body, File, Numbers, Unread
+from ..outside.order import Order
 
 
-def parsed(file: File, dt: float):
+def parsed(file: File, dt: float) -> tuple[Any, dict[str, float]]:
     """A plant that is not final, without actuators and limits; and the reflected inertia of each joint that has one, by name."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
@@ -26,9 +29,8 @@ def parsed(file: File, dt: float):
             plant.WeldFrames(plant.world_frame(), plant.get_body(body).body_frame())
     rotors = {}
     for actuator in map(plant.get_joint_actuator, plant.GetJointActuatorIndices()):
-        rotors[actuator.joint().name()] = (
-            actuator.default_reflected_inertia()
-        )  # of several the last one counts in M
+        # of several the last one counts in M
+        rotors[actuator.joint().name()] = actuator.default_reflected_inertia()
         plant.RemoveJointActuator(actuator)
     for constraint in plant.GetConstraintIds():
         plant.RemoveConstraint(constraint)
@@ -42,16 +44,15 @@ def needs_text(file: File) -> bool:
     """Whether an MJCF file has no name of the model, which Drake needs, joints without a name, or meshes or includes."""
     if file.path.suffix == ".urdf":
         return False
-    unnamed, root = (
-        any(re.fullmatch(r"joint \d+", name) for name in file.names),
-        ElementTree.parse(file.path).getroot(),
-    )
-    return (
-        unnamed or "model" not in root.attrib or any(part.tag in ("mesh", "include") for part in root.iter())
-    )
+    root = ElementTree.parse(file.path).getroot()
+    has_unnamed = any(re.fullmatch(r"joint \d+", name) for name in file.names)
+    has_parts = any(part.tag in ("mesh", "include") for part in root.iter())
+    return has_unnamed or has_parts or "model" not in root.attrib
 
 
-def finished(file: File, dt: float, joints: dict, numbers: dict, rest):
+def finished(
+    file: File, dt: float, joints: Mapping[Any, int], numbers: Numbers, rest: np.ndarray | None
+) -> Any:
     """A final plant with the gravity and armature of `numbers`, and, unless `rest` is None, with its springs."""
     from pydrake.multibody.tree import PrismaticSpring, RevoluteSpring
 
@@ -69,11 +70,11 @@ def finished(file: File, dt: float, joints: dict, numbers: dict, rest):
     return plant
 
 
-def joints_of(plant) -> list:
+def joints_of(plant: Any) -> list[Any]:
     return [plant.get_joint(index) for index in plant.GetJointIndices()]
 
 
-def joint_numbers(plant, file: File) -> dict:
+def joint_numbers(plant: Any, file: File) -> dict[Any, int]:
     """The number in the Tree of each of Drake's joints that move, by its index; of a free body that of its ball."""
     joints = joints_of(plant)
     free = [joint.index() for joint in joints if joint.num_velocities() == 6]  # called as their bodies
@@ -90,12 +91,12 @@ def joint_numbers(plant, file: File) -> dict:
     return {index: expected[name] for index, name in names.items()}
 
 
-def bodies_of(plant, joints: dict) -> dict[int, list]:
+def bodies_of(plant: Any, joints: Mapping[Any, int]) -> dict[int, list[Any]]:
     """The bodies with mass that move with each joint of the Tree and not with the next one."""
     from pydrake.multibody.tree import BodyIndex
 
     inboard = {joint.child_body().index(): joint for joint in joints_of(plant)}
-    bodies = {k: [] for k in joints.values()}
+    bodies: dict[int, list[Any]] = {k: [] for k in joints.values()}
     for body in (plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())):
         joint = inboard.get(body.index())
         while joint is not None and joint.index() not in joints:
@@ -105,44 +106,41 @@ def bodies_of(plant, joints: dict) -> dict[int, list]:
     return bodies
 
 
-def masses(context, bodies: list) -> tuple[float, np.ndarray, np.ndarray]:
-    """The mass of bodies that move as one, their centre of mass, and the inertia about it, in the world."""
-    parts = []
-    for body in bodies:
-        inertia, pose = body.CalcSpatialInertiaInBodyFrame(context), body.EvalPoseInWorld(context)
-        mass, com, turn = inertia.get_mass(), inertia.get_com(), pose.rotation().matrix()
-        of_com = mass * (com @ com * np.eye(3) - np.outer(com, com))
-        about_com = inertia.CalcRotationalInertia().CopyToFullMatrix3() - of_com
-        parts.append((mass, pose.translation() + turn @ com, turn @ about_com @ turn.T))
-    return combined(parts)
+def in_world(context: Any, body: Any) -> Body:
+    """What Drake has of a body."""
+    inertia, pose = body.CalcSpatialInertiaInBodyFrame(context), body.EvalPoseInWorld(context)
+    mass, com, turn = inertia.get_mass(), inertia.get_com(), pose.rotation().matrix()
+    of_com = mass * (com @ com * np.eye(3) - np.outer(com, com))
+    about_com = inertia.CalcRotationalInertia().CopyToFullMatrix3() - of_com
+    return Body(mass, pose.translation() + turn @ com, turn @ about_com @ turn.T)
 
 
-def set_masses(context, bodies: list, mass: float, com: np.ndarray, inertia: np.ndarray) -> dict:
+def set_masses(context: Any, bodies: list[Any], stated: Body) -> dict[Any, Any]:
     """Spatial inertias of bodies that move as one, by their indices: all of it in the first of them."""
     from pydrake.multibody.tree import RotationalInertia, SpatialInertia
 
     pose = bodies[0].EvalPoseInWorld(context)
     turn = pose.rotation().matrix()
-    com, inertia = turn.T @ (com - pose.translation()), turn.T @ inertia @ turn
+    com, inertia = turn.T @ (stated.com - pose.translation()), turn.T @ stated.inertia @ turn
     tensor = RotationalInertia(*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2])
-    whole = SpatialInertia.MakeFromCentralInertia(mass, com, tensor)
-    return {body.index(): SpatialInertia.Zero() for body in bodies} | {bodies[0].index(): whole}
+    together = SpatialInertia.MakeFromCentralInertia(stated.mass, com, tensor)
+    return {body.index(): SpatialInertia.Zero() for body in bodies} | {bodies[0].index(): together}
 
 
-def fixed_force(plant, context):
+def fixed_force(plant: Any, context: Any) -> Any:
     """The vector of generalized forces in a context, in Drake's order and axes."""
     port = plant.get_applied_generalized_force_input_port()
     return port.FixValue(context, np.zeros(plant.num_velocities())).GetMutableData().get_mutable_value()
 
 
-def with_turned_force(plant, order, force: np.ndarray):
+def with_turned_force(plant: Any, order: Order, force: np.ndarray) -> Any:
     """A system of the plant and of forces that turn with its free bodies: (nv,), constant as the Tree has it.
 
     Drake's force on a free body is in world axes. These are computed in Python at each evaluation.
     """
     from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-    def turned(context, output):
+    def turned(context: Any, output: Any) -> None:
         q = order.tree_position(forces.get_input_port().Eval(context)[: len(order.q)])
         output.SetFromVector(order.engine(q, force)[1])
 

@@ -12,21 +12,33 @@ A process of its own keeps an engine's threads, its precision and a crash away f
 """
 
 import importlib
-import time
-from collections.abc import Mapping
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from collections.abc import Callable, Mapping
+from functools import cache, cached_property
 from pathlib import Path
 from types import ModuleType
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ...core.words import listed
+from ...process.workers import Beginning, WorkerEnded, Workers
 from ...robots.case import Case
-from .. import GRID, RECORDS, Engine, Method, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
-from .answers import LIMIT, answer, started
-from .model import EngineError, File, TooLong, passive
+from .. import (
+    GRID,
+    RECORDS,
+    Engine,
+    Method,
+    Motion,
+    Prepared,
+    Setting,
+    batch_of,
+    motion_of_states,
+    rows_of_states,
+)
+from . import answers
+from .model import Course, EngineError, File, Reading, TooLong, passive
+
+T = TypeVar("T")
 
 
 class Outside(Engine):
@@ -34,14 +46,20 @@ class Outside(Engine):
 
     def __init__(self, name: str):
         self.name, self.record = name, RECORDS[name]
-        self.methods = self.named(self.module.METHODS)
 
     @property
     def module(self) -> ModuleType:
         return importlib.import_module(f"..{self.record.module or self.name}", __package__)
 
-    def named(self, methods: Mapping) -> dict[str, Method]:
-        return {name: Method(self.name, name, *of, adaptive=of[0] is None) for name, of in methods.items()}
+    @cached_property
+    def methods(self) -> Mapping[str, Method]:
+        return self.named(self.module.METHODS)
+
+    def named(self, methods: Mapping[str, tuple[int | None, str]]) -> dict[str, Method]:
+        return {
+            name: Method(self.name, name, order, scheme, adaptive=order is None)
+            for name, (order, scheme) in methods.items()
+        }
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         """None where joints are locked or the robot's own actuators act."""
@@ -57,87 +75,90 @@ class Outside(Engine):
 class OutsideDynamics:
     """A case in an outside engine: a robot without locked joints and without servos."""
 
+    seconds_prepared: float | None = None  # of compilation, where it compiles
+
     def __init__(self, name: str, case: Case):
         self.name, self.case, self.tree, self.coordinates = name, case, case.tree, case.coordinates
         self.file = File(Path(case.robot.mjcf).resolve(), case.joints, case.coordinates.all_kinds)
-        self.key = hash((self.file, self.tree))
-        self.readings: dict[ProcessPoolExecutor, Mapping] = {}  # by the process; a new one has read nothing
 
-    @property
-    def reading(self) -> Mapping:
-        """Of the child: its numbers as read, which of them were mended, and seconds until the model was there."""
-        own = process(self.name)
-        if own not in self.readings:
-            self.readings[own] = self.ask("read", self.name, self.file, self.tree)
-        return self.readings[own]
+    @cached_property
+    def reading(self) -> Reading:
+        return self.ask(answers.reading)
 
-    def ask(self, act: str, *arguments):
-        """The value of a function of answers.py in the engine's process; EngineError if it fails or the process ends."""
-        if act != "read":
-            self.reading  # noqa: B018 - mends what it has read differently
-        begin = time.monotonic()
+    def ask(self, act: Callable[..., T], *arguments: Any) -> T:
+        """What a function of answers.py returns in the engine's process; EngineError if it fails or the process ends.
+
+        A process reads the file once, and again if it is a new one.
+        """
+        call = process(self.name).submit(answers.answer, act, self.name, self.file, self.tree, *arguments)
         try:
-            return process(self.name).submit(answer, self.key, act, arguments).result()
-        except BrokenProcessPool:
-            processes.pop(self.name, None)  # those of other engines go on
-            if time.monotonic() - begin > LIMIT:
-                raise TooLong(f"no answer within {LIMIT:g} s") from None
+            return call.result()
+        except TimeoutError:
+            raise TooLong(f"no answer within {answers.LIMIT:g} s") from None
+        except WorkerEnded:
             raise EngineError("its process was killed") from None
 
-    def rows(self, quantity: str, *values) -> np.ndarray:
+    def rows(self, quantity: str, *values: np.ndarray) -> np.ndarray:
         """A quantity at many states, (states, ...)."""
-        return self.ask("each", quantity, *(np.atleast_2d(np.asarray(value, float)) for value in values))
+        return self.ask(
+            answers.each, quantity, *(np.atleast_2d(np.asarray(value, float)) for value in values)
+        )
 
-    def mass_matrix(self, q):
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         return self.rows("mass_matrix", q)
 
-    def bias(self, q, v):
+    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         return self.rows("bias", q, v)
 
-    def acceleration(self, q, v, tau):
+    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         return self.rows("acceleration", q, v, tau - passive(self.tree, q, v))
 
     def has(self, quantity: str) -> bool:
         return quantity in self.reading["has"]
 
-    def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
+    def run(
+        self,
+        q: np.ndarray,
+        v: np.ndarray,
+        tau: np.ndarray,
+        dt: float,
+        steps: int,
+        method: str,
+        tolerance: float | None = None,
+    ) -> Motion:
         """Motions recorded at every multiple of dt."""
-        t, (batch, states), ended = np.linspace(0.0, dt * steps, steps + 1), rows_of_states(q, v, tau), []
-        paths = []
-        for state in zip(*states):
-            of, _, _, why = self.ask("ran", *state, t, None if tolerance else steps, method, tolerance)
-            path, end = as_far_as_it_goes(t, of, np.concatenate(state[:2]), why)
-            paths.append(path)
-            ended.append(end)
-        q, v = np.split(np.reshape(paths, (*batch, steps + 1, -1)), [self.coordinates.nq], axis=-1)
-        return Motion(t, q, v, None, np.reshape(np.array(ended, dtype=object), batch)[()], steps)
+        t, (batch, states) = np.linspace(0.0, dt * steps, steps + 1), rows_of_states(q, v, tau)
+        count = 0 if tolerance else steps
+        courses = [
+            Course(position, speed, torque, t, count, method, tolerance)
+            for position, speed, torque in zip(*states)
+        ]
+        motions = [self.motion(course, self.ask(answers.ran, course)) for course in courses]
+        return batch_of(motions, batch)._replace(evaluations=None, steps=steps)
 
-    def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
+    def motion(self, course: Course, run: answers.Run) -> Motion:
+        motion = motion_of_states(course.times, run.states, course.start, self.coordinates.nq, run.why)
+        return motion._replace(evaluations=run.evaluations, seconds=run.seconds)
+
+    def prepare(
+        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, setting: Setting, method: str
+    ) -> Prepared:
         if different := [number for number, is_set in self.reading["mended"].items() if not is_set]:
             raise EngineError(f"it has read another {listed(different)}, which cannot be set")
         t = np.linspace(0.0, setting.duration, GRID + 1)
-        arguments = q, v, tau, t, setting.steps, method, setting.tolerance
-        self.seconds_prepared = self.ask("prepared", *arguments)  # of compilation, where it compiles
+        course = Course(q, v, tau, t, setting.steps or 0, method, setting.tolerance)
+        self.seconds_prepared = self.ask(answers.prepared, course)
 
-        def run():
-            return self.ask("ran", *arguments)
+        def run() -> answers.Run:
+            return self.ask(answers.ran, course)
 
-        def read(outcome):
-            states, evaluations, seconds, why = outcome
-            path, ended = as_far_as_it_goes(t, states, np.concatenate([q, v]), why)
-            return Motion(
-                t, *np.split(path, [self.coordinates.nq], axis=1), evaluations, ended, setting.steps, seconds
-            )
+        def read(run: answers.Run) -> Motion:
+            return self.motion(course, run)._replace(steps=setting.steps)
 
         return run, read
 
 
-processes: dict[str, ProcessPoolExecutor] = {}  # by the engine
-
-
-def process(name: str) -> ProcessPoolExecutor:
-    """The process of an engine, begun where there is none."""
-    if name not in processes:
-        begin = (RECORDS[name].environment,)
-        processes[name] = ProcessPoolExecutor(1, get_context("spawn"), initializer=started, initargs=begin)
-    return processes[name]
+@cache
+def process(name: str) -> Workers:
+    """The process of an engine."""
+    return Workers(1, Beginning(RECORDS[name].environment, is_silent=True), answers.LIMIT)

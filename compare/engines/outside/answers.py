@@ -1,9 +1,10 @@
 """What an engine's own process does: read a file, give quantities at states, run."""
 
-import faulthandler
 import importlib
-import os
 import time
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -12,88 +13,84 @@ import tmt
 from ...core.errors import described
 from ...core.words import in_one_line
 from ...judge.scale import FACTOR
-from ...process.workers import begin
 from .. import RECORDS
-from .model import EngineError, File, ReadModel, Unread, numbers_of, size_of
+from .model import Course, EngineError, File, Reading, ReadModel, Unread, numbers_of, size_of
 
 LIMIT = 120.0  # s, of an answer: compiling a large model may take hours
 QUANTITIES = "mass_matrix", "bias", "acceleration"
+T = TypeVar("T")
 
 
-def started(environment: tuple[tuple[str, str], ...]) -> None:
-    begin()
-    os.environ.update(environment)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (1, 2):  # what engines print, their libraries of C++ too
-        os.dup2(nowhere, stream)
+class Run(NamedTuple):
+    states: np.ndarray  # (times, nq + nv)
+    evaluations: int | None
+    seconds: float  # of the run alone
+    why: str  # why it may have ended early
 
 
-models = {}  # by the key of the case: what this process has read
-
-
-def answer(key: int, act: str, arguments: tuple) -> object:
-    """What a function below returns for a case; EngineError with the reason, in one line, where it raises.
-
-    After the time limit the process ends, whatever its libraries do.
-    """
-    faulthandler.dump_traceback_later(LIMIT, exit=True)
+def answer(act: Callable[..., T], name: str, file: File, tree: tmt.Tree, *arguments: Any) -> T:
+    """What a function of an engine's model of a file returns; EngineError with the reason, in one line, where it raises."""
+    kind: type[EngineError] = Unread
     try:
-        return {"read": read, "each": each, "prepared": prepared, "ran": ran}[act](key, *arguments)
+        model = read(name, file, tree)
+        kind = EngineError
+        return act(model, *arguments)
     except EngineError:
         raise
     except Exception as error:
-        kind = Unread if act == "read" else EngineError
         raise kind(in_one_line(" ".join(described(error).split()))) from None
-    finally:
-        faulthandler.cancel_dump_traceback_later()
 
 
-def read(key: int, name: str, file: File, tree: tmt.Tree) -> dict:
-    """The numbers that the engine has read, those of the Tree, which that differ were mended, and the seconds that it took."""
+@cache
+def read(name: str, file: File, tree: tmt.Tree) -> ReadModel:
+    """The model of an engine, in which the numbers that differ from those of the Tree are mended; once in a process."""
     begin = time.perf_counter()
     record = RECORDS[name]
     module = importlib.import_module(f"..{record.module or name}", __package__)
-    model, stated = module.Model(file, record.precision), numbers_of(tree)
+    kind: type[ReadModel] = module.Model
+    model, stated = kind(file, record.precision), numbers_of(tree)
     model.stated = stated
-    found = {number: np.array(values, float) for number, values in model.numbers().items()}
+    numbers = {number: np.array(values, float) for number, values in model.numbers().items()}
     mended = {}
-    for number, values in found.items():
+    for number, values in numbers.items():
         if np.shape(values) != np.shape(stated[number]):
             raise Unread(f"{number}: {len(values)} values, {len(stated[number])} in the compared model")
-        if not np.abs(values - stated[number]).max(initial=0.0) <= FACTOR * record.eps * size_of(
-            stated, number
-        ):
+        tolerance = FACTOR * record.eps * size_of(stated, number)
+        if not np.abs(values - stated[number]).max(initial=0.0) <= tolerance:
             mended[number] = number in model.drops or model.mend(number, stated[number])
-    models[key] = model
-    has = {name for name in QUANTITIES if getattr(type(model), name) is not getattr(ReadModel, name)}
-    has -= set(model.lacks)
-    return {
-        "read": found,
-        "stated": stated,
-        "mended": mended,
-        "seconds": time.perf_counter() - begin,
-        "has": has,
-    }
+    has = {quantity for quantity in QUANTITIES if gives(model, quantity)}
+    seconds = time.perf_counter() - begin
+    model.reading = {"read": numbers, "stated": stated, "mended": mended, "seconds": seconds, "has": has}
+    return model
 
 
-def each(key: int, quantity: str, *values: np.ndarray) -> np.ndarray:
-    model = models[key]
+def gives(model: ReadModel, quantity: str) -> bool:
+    """Whether the class of a model computes a quantity, for this robot too."""
+    is_defined = getattr(type(model), quantity) is not getattr(ReadModel, quantity)
+    return is_defined and quantity not in model.lacks
+
+
+def reading(model: ReadModel) -> Reading:
+    return model.reading
+
+
+def each(model: ReadModel, quantity: str, *values: np.ndarray) -> np.ndarray:
+    """A quantity at many states, (states, ...)."""
     return np.array([getattr(model, quantity)(*state) for state in zip(*values)], dtype=float)
 
 
-def prepared(key: int, q, v, tau, t, steps, method, tolerance) -> float:
+def prepared(model: ReadModel, course: Course) -> float:
     """Seconds until a run could begin."""
     begin = time.perf_counter()
-    models[key].prepare(method, tau, t[-1] / steps if steps else None, tolerance)
+    model.prepare(course)
     return time.perf_counter() - begin
 
 
-def ran(key: int, q, v, tau, t, steps, method, tolerance) -> tuple[np.ndarray, int | None, float, str]:
-    """The states at the times t, evaluations, seconds of the run alone, and why it may have ended early."""
-    model = models[key]
+def ran(model: ReadModel, course: Course) -> Run:
     begin, why = time.perf_counter(), "a number is not finite"
+    states, evaluations = course.start[None], None
     try:
-        states, evaluations = model.run(q, v, tau, t, steps, method, tolerance)
+        states, evaluations = model.run(course)
     except ArithmeticError as error:  # it cannot go on
-        states, evaluations, why = np.concatenate([q, v])[None], None, str(error)
-    return np.asarray(states, float), evaluations, time.perf_counter() - begin, why
+        why = str(error)
+    return Run(np.asarray(states, float), evaluations, time.perf_counter() - begin, why)

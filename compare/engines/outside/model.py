@@ -1,26 +1,27 @@
 """What an engine has made of a robot's file: the class that its module derives, and the numbers of a Tree in the same shapes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple, TypedDict
 
 import numpy as np
 
 import tmt
 from tmt.methods import by_speed
 
-from ...robots.case import Coordinates
+from ...robots.coordinates import Coordinates
 from ...robots.joint_map import places_of
+
+Numbers = Mapping[str, np.ndarray]
 
 
 class File(NamedTuple):
     """A robot's file, and the joints of the Tree that is compared."""
 
     path: Path  # MJCF or URDF
-    names: tuple[
-        str, ...
-    ]  # of the joints; a free joint b is `b x`, `b y`, `b z` (slides) and `b turn` (a ball)
+    # of the joints; a free joint b is `b x`, `b y`, `b z` (slides) and `b turn` (a ball)
+    names: tuple[str, ...]
     kinds: tuple[str, ...]  # hinge, slide or ball
 
     @property
@@ -30,8 +31,56 @@ class File(NamedTuple):
     @property
     def free(self) -> tuple[str, ...]:
         """The names of the free joints, as the file has them."""
-        return tuple(name.removesuffix(" turn") for name, kind in zip(self.names, self.kinds)
-                     if kind == "ball" and f"{name.removesuffix(' turn')} x" in self.names)  # fmt: skip
+        balls = [name for name, kind in zip(self.names, self.kinds) if kind == "ball"]
+        names = [name.removesuffix(" turn") for name in balls]
+        return tuple(name for name in names if f"{name} x" in self.names)
+
+    def is_free(self, joint: int) -> bool:
+        """Whether a joint of the Tree is the ball of a free joint."""
+        return self.names[joint].removesuffix(" turn") in self.free
+
+
+class Body(NamedTuple):
+    """A body, or bodies that move as one; of those that are combined in common axes."""
+
+    mass: float  # kg
+    com: np.ndarray  # (3,) m
+    inertia: np.ndarray  # (3, 3) kg m2, about the centre of mass
+
+
+class Link(NamedTuple):
+    """A body as engines list it."""
+
+    name: object  # of the engine: text or a number
+    parent: object
+    joint: int | None  # of the Tree, by which it moves on its parent; None: it is fixed there
+    body: Body
+
+
+class Course(NamedTuple):
+    """A run that an engine is asked for."""
+
+    q: np.ndarray  # (nq,)
+    v: np.ndarray  # (nv,)
+    tau: np.ndarray  # (nv,) constant
+    times: np.ndarray  # s, equal, the first one 0, at which it is read
+    steps: int  # of equal length, a multiple of len(times) - 1; 0: within the tolerance
+    method: str
+    tolerance: float | None = None
+
+    @property
+    def dt(self) -> float:
+        return float(self.times[-1]) / max(self.steps, 1)
+
+    @property
+    def every(self) -> int:
+        """The number of steps from one time to the next."""
+        return self.steps // (len(self.times) - 1)
+
+    @property
+    def start(self) -> np.ndarray:
+        """q and v side by side."""
+        return np.concatenate([self.q, self.v])
 
 
 class EngineError(ValueError):
@@ -46,6 +95,16 @@ class TooLong(EngineError):
     """An engine does not answer within the time limit."""
 
 
+class Reading(TypedDict):
+    """What an engine has read, by the names of ReadModel.numbers."""
+
+    read: dict[str, np.ndarray]
+    stated: Numbers
+    mended: dict[str, bool]  # of the numbers that differ: whether they are set now
+    seconds: float  # until the model was there
+    has: set[str]  # the quantities that it gives
+
+
 class ReadModel:
     """What an engine has made of a file; a base class.
 
@@ -54,15 +113,22 @@ class ReadModel:
     m, N m, N. No contacts, limits, actuators or friction losses act. The quantities of one state; q (nq,), v, tau (nv,).
     """
 
-    drops = ()  # numbers of the Tree that its equations do not have at all: they act as part of the torque
-    lacks = ()  # quantities that it cannot give for this robot
-    stated: Mapping = MappingProxyType({})  # before its numbers are read: numbers_of the Tree
+    # numbers of the Tree that its equations do not have at all: they act as part of the torque
+    drops: ClassVar[tuple[str, ...]] = ()
+    has_places: ClassVar[bool] = False  # whether `bodies` are where `numbers` says for com and inertia
+    stated: Numbers = MappingProxyType({})  # before its numbers are read: numbers_of the Tree
+    reading: Reading
 
     def __init__(self, file: File, precision: str):
         """Read the file; Unread if that is not possible."""
         raise NotImplementedError
 
-    def numbers(self) -> Mapping[str, np.ndarray]:
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        """Quantities that it cannot give for this robot."""
+        return ()
+
+    def numbers(self) -> Numbers:
         """What it has read, by name; a name that is missing: it does not tell.
 
         gravity (3,) m/s2; mass (joints,) kg and moments (joints, 3) kg m2, ascending: of all bodies together that move with a
@@ -70,32 +136,41 @@ class ReadModel:
         (nv,); rest (nq,) rad, m and quaternions: where the springs are without force. Of the same bodies com (joints, 3) m, the
         centre of mass, and inertia (joints, 3, 3) kg m2 about it: in the world, at the positions `reference` of `stated`.
         """
+        mass, com, inertia = map(np.array, zip(*map(combined, self.bodies())))
+        places = {"com": com, "inertia": inertia} if self.has_places else {}
+        return {**self.fields(), "mass": mass, **places, "moments": np.linalg.eigvalsh(inertia)}
+
+    def fields(self) -> Numbers:
+        """What it has read that is not of bodies."""
+        raise NotImplementedError
+
+    def bodies(self) -> Sequence[Sequence[Body]]:
+        """Of each joint the bodies that move with it and not with the next one."""
         raise NotImplementedError
 
     def mend(self, name: str, values: np.ndarray) -> bool:
         """Set numbers that it has read differently, of the same shape as in `numbers`; False: that is not possible."""
         return False
 
-    def mass_matrix(self, q):
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         """M (nv, nv), with the armature."""
         raise NotImplementedError
 
-    def bias(self, q, v):
+    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """h (nv,): Coriolis, centrifugal and gravity terms, with the sign of MuJoCo's qfrc_bias; no springs, no damping."""
         raise NotImplementedError
 
-    def acceleration(self, q, v, force):
+    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
         """(nv,), from M a = force - h by the engine's own forward dynamics; damping and springs are part of the force."""
         raise NotImplementedError
 
-    def prepare(self, method: str, tau, dt: float | None, tolerance: float | None) -> None:
-        """What a run needs that does not depend on its length: objects, compiled code."""
+    def prepare(self, course: Course) -> None:
+        """What a run needs that does not depend on its start and length: objects, compiled code."""
 
-    def run(self, q, v, tau, times, steps: int | None, method: str, tolerance: float | None):
-        """States (nq + nv,) at equal times, s, the first at 0, as (times, nq + nv), fewer if it breaks off; and its evaluations.
+    def run(self, course: Course) -> tuple[np.ndarray, int | None]:
+        """States (nq + nv,) at the times as (times, nq + nv), fewer if it breaks off; and its evaluations.
 
-        steps: of equal length, a multiple of len(times) - 1; None: within a tolerance. tau constant; the damping and the
-        springs of the file act.
+        The damping and the springs of the file act.
         """
         raise NotImplementedError
 
@@ -104,50 +179,59 @@ def numbers_of(tree: tmt.Tree) -> dict[str, np.ndarray]:
     """The Tree's numbers in the shapes of ReadModel.numbers; and about_origin (joints,): mass x com^2 from the joint, kg m2."""
     nv = tree.coordinates.nv
     origins, *_ = places_of(tree)  # of the joints, at the reference positions
-    groups = [[] for _ in tree.kind]
+    groups: list[list[Body]] = [[] for _ in tree.kind]
     for body, joint in enumerate(tree.body_joint):
         if joint >= 0:
-            groups[joint].append(
-                (tree.mass[body], origins[joint] + tree.com[body], np.array(tree.inertia[body]))
-            )
+            com = origins[joint] + tree.com[body]
+            groups[joint].append(Body(tree.mass[body], com, np.array(tree.inertia[body])))
     mass, com, inertia = (np.array(values) for values in zip(*map(combined, groups)))
-    each = {"armature": tree.armature, "damping": tree.damping, "stiffness": by_speed(tree, tree.stiffness)}
-    each = {name: np.broadcast_to(np.array(values or 0.0, float), nv) for name, values in each.items()}
-    each["about_origin"] = mass * ((com - origins) ** 2).sum(axis=1)
-    each |= {
-        "gravity": np.array(tree.gravity, float),
-        "rest": np.array(tree.rest),
-        "reference": np.array(tree.zero),
-    }
-    return {"mass": mass, "com": com, "moments": np.linalg.eigvalsh(inertia), "inertia": inertia} | each
+    numbers = {"mass": mass, "com": com, "moments": np.linalg.eigvalsh(inertia), "inertia": inertia}
+    speeds = {"armature": tree.armature, "damping": tree.damping, "stiffness": by_speed(tree, tree.stiffness)}
+    for name, values in speeds.items():
+        numbers[name] = np.broadcast_to(np.array(values or 0.0, float), nv)
+    numbers["about_origin"] = mass * ((com - origins) ** 2).sum(axis=1)
+    others = {"gravity": tree.gravity, "rest": tree.rest, "reference": tree.zero}
+    return numbers | {name: np.array(values, float) for name, values in others.items()}
 
 
-def size_of(stated: Mapping[str, np.ndarray], number: str) -> float:
+def size_of(stated: Numbers, number: str) -> float:
     """The size of what is added where an engine reads a number: it may keep inertias about the origin of a joint."""
     size = np.abs(stated[number]).max(initial=0.0)
-    return size + (stated["about_origin"].max(initial=0.0) if number in ("moments", "inertia") else 0.0)
+    return float(
+        size + (stated["about_origin"].max(initial=0.0) if number in ("moments", "inertia") else 0.0)
+    )
 
 
-def together(bodies: list[tuple[float, np.ndarray, np.ndarray]]) -> tuple[float, np.ndarray]:
+def carried(links: Iterable[Link], joints: int) -> list[list[Body]]:
+    """The bodies that move with each of the Tree's joints and not with the next one. Parents come before their children."""
+    bodies: list[list[Body]] = [[] for _ in range(joints)]
+    moved_by: dict[object, int | None] = {}  # the joint that moves a link
+    for link in links:
+        joint = moved_by.get(link.parent) if link.joint is None else link.joint
+        moved_by[link.name] = joint
+        if joint is not None:
+            bodies[joint].append(link.body)
+    return bodies
+
+
+def together(bodies: Iterable[tuple[float, np.ndarray, np.ndarray]]) -> tuple[float, np.ndarray]:
     """The mass of bodies that move as one, and the moments of inertia about their centre of mass, ascending, (3,)."""
     mass, _, inertia = combined(bodies)
     return mass, np.linalg.eigvalsh(inertia)
 
 
-def combined(bodies: list[tuple[float, np.ndarray, np.ndarray]]) -> tuple[float, np.ndarray, np.ndarray]:
-    """The mass of bodies that move as one, their centre of mass, and the inertia about it; of no bodies: 0.
-
-    bodies: mass, kg, centre of mass, m, and inertia about it, kg m2 (3, 3), in common axes.
-    """
-    mass, tensor = sum(body[0] for body in bodies), np.zeros((3, 3))
-    centre = sum((m * c for m, c, _ in bodies), np.zeros(3)) / (mass or 1.0)
-    for m, c, inertia in bodies:
-        d = c - centre
+def combined(bodies: Iterable[tuple[float, np.ndarray, np.ndarray]]) -> Body:
+    """Bodies that move as one, with the inertia about their common centre of mass; of no bodies: 0."""
+    parts = [Body(*body) for body in bodies]
+    mass, tensor = sum((body.mass for body in parts), 0.0), np.zeros((3, 3))
+    centre = sum((body.mass * body.com for body in parts), np.zeros(3)) / (mass or 1.0)
+    for m, com, inertia in parts:
+        d = com - centre
         tensor += inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
-    return mass, centre, tensor
+    return Body(mass, centre, tensor)
 
 
-def passive(tree: tmt.Tree, q, v) -> np.ndarray:
+def passive(tree: tmt.Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """The forces of damping and springs of the joints, N m, (..., nv): D v + k (q - rest)."""
     drag = np.array(tree.damping) * v
     return drag + tmt.literal.spring_torque(q, tree) if tree.has_springs else drag

@@ -14,5 +14,6 @@ EDITS = (
     Edit("engines.integrators", "order_of", "max(CLEAR, EARLY / dt)", "CLEAR", "the rounding of each step is regular"),
     Edit("engines.outside", "read", "model.mend(number, stated[number])", "True", "nothing is set, and it is said to be"),
     Edit("engines.outside", "OutsideDynamics.acceleration", "tau - passive(self.tree, q, v)", "tau", "damping is forgotten"),
+    Edit("outside", "OutsideDynamics.ask", "WorkerEnded", "KeyError", "an engine whose process ends breaks the experiment"),
     Edit("engines.outside.model", "combined", "m * (d @ d * np.eye(3) - np.outer(d, d))", "0.0", "Steiner's part is forgotten"),
 )  # fmt: skip

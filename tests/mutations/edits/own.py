@@ -55,8 +55,6 @@ EDITS = (
     Edit("diagnosis.variants", "program_options", "with_bias(h + drag)", "with_bias(h - drag)", "both dampings have one sign"),
     Edit("diagnosis.variants", "program_options", "with_bias(h - drag)", "with_bias(h + drag)", "both dampings add"),
     Edit("experiments.diagnosis", "check", "result.notes.append(condition.finding)", "None", "what fails is not noted"),
-    Edit("outside", "OutsideDynamics.ask", "processes.pop(self.name, None)", "processes.clear()",
-         "a process that ends takes those of other engines with it"),
     Edit("own.functions", "in_shape", "given == expected", "array.size == np.prod(shape)", "an array in another order is taken"),
     Edit("own.equations", "OwnEquations.note", "hash(row.tobytes())", "object()", "a state counts each time that it is asked"),
     Edit("agreement.why", "beside", "(np.abs(acting) <= allowed).all()", "True", "a second error, in accelerations, is hidden"),

@@ -1,0 +1,84 @@
+"""Worker processes: what becomes of calls, and the processor time of the task for which a call is made."""
+
+import os
+import signal
+import time
+from contextlib import closing
+
+import pytest
+
+from compare.process.workers import Clock, WorkerEnded, Workers, start_workers
+
+LONG = 0.1  # s
+SOON = 60.0  # s, far more than anything here takes
+
+
+def busy(seconds):
+    """Use the processor for these seconds."""
+    began = time.process_time()
+    while time.process_time() - began < seconds:
+        pass
+    return seconds
+
+
+def break_off():
+    busy(LONG)
+    raise ValueError("broken")
+
+
+def test_waiting_is_nobodys_and_work_is_whose_it_is():
+    clock = Clock()
+    with clock.of("waits"):
+        time.sleep(5 * LONG)
+    with clock.of("works"):
+        busy(LONG)
+    clock.ends("works")
+    busy(LONG)  # for nobody
+    # the processor's time is that of all threads, and one of another test may be at its end
+    assert clock.seconds_of("waits") < 2 * LONG and LONG <= clock.seconds_of("works") < 3 * LONG
+    assert clock.ended["works"] >= 5 * LONG
+
+
+def test_what_a_worker_does_is_for_the_task_that_asked():
+    with start_workers() as workers:
+        with workers.clock.of("first"):
+            first = workers.submit(busy, 2 * LONG)
+            mapped = workers.map(busy, [LONG, LONG])
+        with workers.clock.of("second"):
+            assert first.result() == 2 * LONG and list(mapped) == [LONG, LONG]  # waits for the first's
+            broken = workers.submit(break_off)
+        with pytest.raises(ValueError, match="broken"):
+            broken.result()
+        assert workers.clock.task == ""
+        assert workers.clock.seconds_of("first") >= 4 * LONG
+        assert LONG <= workers.clock.seconds_of("second") < 4 * LONG
+
+
+ENDS = {"killed by SIGKILL": (signal.raise_signal, signal.SIGKILL), "exit status": (os._exit, 0)}
+
+
+@pytest.mark.parametrize("is_fresh", [False, True])
+def test_a_process_that_ends_or_takes_too_long_is_replaced(is_fresh):
+    with closing(Workers(1, limit=1.0, is_fresh=is_fresh)) as workers:
+        first = workers.submit(os.getpid)
+        assert (workers.submit(os.getpid).result(SOON) == first.result(SOON)) is not is_fresh
+        with pytest.raises(TimeoutError, match=r"1\.0"):
+            workers.submit(time.sleep, 600.0).result(SOON)
+        for how, call in list(ENDS.items())[: 1 if is_fresh else 2]:
+            with pytest.raises(WorkerEnded) as error:
+                workers.submit(*call).result(SOON)
+            assert error.value.how.startswith(how)
+        workers.quiet()
+        assert workers.submit(abs, -4).result(SOON) == 4
+
+
+def test_a_process_that_is_killed_while_it_is_idle_is_replaced():
+    with closing(Workers(1)) as workers:
+        os.kill(workers.submit(os.getpid).result(SOON), signal.SIGKILL)
+        time.sleep(5 * LONG)
+        assert workers.submit(abs, -4).result(SOON) == 4
+
+
+def test_what_cannot_be_sent_is_raised():
+    with closing(Workers(1)) as workers, pytest.raises((AttributeError, TypeError)):
+        workers.submit(lambda: 4).result(SOON)
