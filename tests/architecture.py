@@ -13,10 +13,6 @@ FILES = sorted((ROOT / "compare").rglob("*.py"))
 OF_TMT = sorted((ROOT / "tmt").rglob("*.py"))
 PAGE = ROOT / "ARCHITECTURE.md"
 DIAGRAM = re.compile(r"(?<=```mermaid\n).*?(?=```)", re.DOTALL)
-SHARED = {
-    "compare.core.text",
-    "compare.report.style",
-}  # for all: words from templates, the style of figures
 
 
 def dotted(path) -> str:
@@ -29,11 +25,14 @@ MODULES = {dotted(file) for file in [*FILES, *OF_TMT]}
 
 
 @cache
-def imports(path) -> frozenset[str]:
-    """Full names of what a file imports, wherever in it: a module, or a name in one."""
-    package = dotted(path) if path.name == "__init__.py" else dotted(path).rpartition(".")[0]
+def imports(path, for_types=True) -> frozenset[str]:
+    """Full names of what a file imports, wherever in it: a module, or a name in one. for_types: also if for annotations alone."""
+    package, tree = dotted(path if path.name == "__init__.py" else path.parent / "__init__.py"), parsed(path)
+    blocks = [node for node in ast.walk(tree) if isinstance(node, ast.If)]
+    of_types = [block for block in blocks if ast.unparse(block.test) == "TYPE_CHECKING" and not for_types]
+    left_out = {node for block in of_types for node in ast.walk(block)}
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in set(ast.walk(tree)) - left_out:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -44,11 +43,15 @@ def imports(path) -> frozenset[str]:
 
 
 @cache
-def modules_imported(path) -> set[str]:
+def parsed(path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def modules_imported(path, for_types=True) -> set[str]:
     """The modules of compare and tmt that a file imports."""
-    return {name if name in MODULES else name.rpartition(".")[0] for name in imports(path)} & MODULES - {
-        dotted(path)
-    }
+    names = imports(path, for_types)
+    return {name if name in MODULES else name.rpartition(".")[0] for name in names} & MODULES - {dotted(path)}
 
 
 def folder(module: str) -> str:
@@ -57,10 +60,10 @@ def folder(module: str) -> str:
 
 
 def folder_imports() -> dict[tuple[str, str], int]:
-    """How many imports there are from a folder to another, without SHARED."""
+    """How many imports there are from a folder to another."""
     counts = {}
     for path in [*FILES, *OF_TMT]:
-        for name in modules_imported(path) - SHARED:
+        for name in modules_imported(path):
             pair = folder(dotted(path)), folder(name)
             if pair[0] != pair[1]:
                 counts[pair] = counts.get(pair, 0) + 1

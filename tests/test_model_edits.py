@@ -151,8 +151,8 @@ def found(text):
     """What the experiment finds of a model in MJCF text."""
     result = parameters.rows(setup_of(text, make=Setup, states=20))
     failed = {check.quantity for check in result.checks if not check.passed}
-    assert bool(failed) == bool(result.curves["causes"])
-    return failed, result.curves["causes"]
+    assert bool(failed) == bool(result.causes)
+    return failed, result.causes
 
 
 def places(text):

@@ -67,8 +67,10 @@ class Row:
 
     @property
     def urgency(self) -> tuple[bool, bool, float]:
-        """Of a table that is shortened, rows with the smallest are shown: those that fail, that differ from a stated number,
-        that use most of a tolerance."""
+        """A key: of a long table, the rows with the smallest are shown.
+
+        They are False if the row fails; False if it differs from a stated number; minus its share of a tolerance.
+        """
         return True, True, math.inf
 
 

@@ -9,8 +9,9 @@ import hashlib
 import re
 from functools import cache
 from html.entities import codepoint2name
-from math import isfinite
+from math import degrees, isfinite
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_eval_context
 from jinja2.nodes import EvalContext
@@ -39,7 +40,7 @@ def escaped(value: object) -> Markup:
     return Markup(MARKUP.sub(reference, in_one_line(str(value))))
 
 
-def reference(sign: re.Match) -> str:
+def reference(sign: re.Match[str]) -> str:
     number = ord(sign[0])
     return f"&{codepoint2name.get(number, f'#{number}')};"
 
@@ -49,9 +50,9 @@ def cell(value: object) -> Markup:
     return Markup(str(escaped(value)).replace("|", "&#124;"))
 
 
-def count(number: int, one: str, many: str = "") -> str:
+def count(number: int, noun: str, plural: str = "") -> str:
     """A count with its noun: 1 check, 3 checks."""
-    return f"{number:,} {one if number == 1 else many or f'{one}s'}"
+    return f"{number:,} {noun if number == 1 else plural or f'{noun}s'}"
 
 
 def rounded(value: float) -> str:
@@ -61,8 +62,9 @@ def rounded(value: float) -> str:
 
 def apart(value: float, other: float, digits: int = 6) -> str:
     """A number with as many digits, at least these, as tell it from another one."""
-    enough = (n for n in range(digits, 17) if f"{value:.{n}g}" != f"{other:.{n}g}")
-    return f"{value:.{next(enough, digits if value == other else 17)}g}"
+    if value != other:
+        digits = next((n for n in range(digits, 17) if f"{value:.{n}g}" != f"{other:.{n}g}"), 17)
+    return f"{value:.{digits}g}"
 
 
 FILTERS = {
@@ -71,7 +73,7 @@ FILTERS = {
     "g": lambda value, digits=3: f"{value:.{digits}g}",
     "apart": apart,
     "percent": lambda share, digits=2: f"{100.0 * share:.{digits}g} %",
-    "degrees": lambda angle, digits=4: f"{angle * 57.29577951308232:.{digits}g} deg",
+    "degrees": lambda angle, digits=4: f"{degrees(angle):.{digits}g} deg",
     "count": count,
     "rounded": rounded,
     "share_of": lambda share: f"{rounded(share)} times" if share > 1.0 else f"{100.0 * share:.2g} % of",
@@ -106,6 +108,6 @@ def say(finding: Finding | str) -> str:
     return " ".join(block(finding.of, finding.kind, **finding.values).split())
 
 
-def block(of: str, kind: str, **values) -> str:
+def block(of: str, kind: str, /, **values: Any) -> str:
     """What the macro `kind` of a template gives, with its lines."""
     return str(getattr(environment().get_template(f"{of}.md.jinja").module, kind)(**values)).strip()

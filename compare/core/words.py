@@ -7,12 +7,6 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def scene_begins(name: str, robot) -> str:
-    """A scene's name at the beginning of a sentence; the name of a user's scene stays as it is."""
-    is_own = any(scene.name == name and "own" in scene.tags for scene in robot.scenes)
-    return f"Scene {name}" if is_own else capital(name)
-
-
 def readable(text: str) -> str:
     """Text without surrogates: bytes that the locale could not decode are read as UTF-8 or escaped."""
     return text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")

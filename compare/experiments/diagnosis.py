@@ -24,7 +24,7 @@ from ..robots.states import Sample
 from . import Experiment
 from .setup import Setup
 
-EXPERIMENT = Experiment(order=80, needs_file=True, options=("--joints",))
+EXPERIMENT = Experiment(order=80, needs_file=True, options=("--joints",), states_causes=True, compares=False)
 SECONDS = 8.0  # of a search
 SECONDS_OF_CONDITIONS = 3.0
 CALLS_OF_CONDITIONS, CALLS_FOR_A_JOINT = (
@@ -144,7 +144,7 @@ def rows(setup: Setup) -> Result:
     if not result.notes:
         result.find("nothing")
     result.curves["nearest"] = diagnosis.nearest
-    result.curves["causes"] = [record(cause, bool(setup.robot.own)) for cause in found.causes]
+    result.causes = [record(cause, bool(setup.robot.own)) for cause in found.causes]
     return result
 
 

@@ -74,10 +74,10 @@ def compare_file(
     out.mkdir()
     setup = experiment.setup_of(compared, options.is_quick)
     with ThreadPoolExecutor(1) as workers:
-        sections, *outcome = experiment.examine(names, setup, out, Terminal(), workers, Clock())
+        examined = experiment.examine(names, setup, out, Terminal(), workers, Clock())
     origin = provenance.provenance(options.command(shown), compared.robot.mjcf, shown, SEED)
     origin["seconds"] = round(time.process_time() - began, 1)
-    report, parts = write_report(out, sections, *outcome, left_out, origin, compared)
+    report, parts = write_report(out, examined, left_out, origin, compared)
     written = {name: (out / name).read_bytes() for name in folder.files(out)}
     shutil.rmtree(top)
     row |= row_of_file(report.sections, report.causes, parts.lines, compared.reference)

@@ -9,6 +9,7 @@ import numpy as np
 
 import tmt
 
+from ..core.words import capital
 from .actuators import Drive
 from .case import Case, Coordinates, Scene
 
@@ -138,6 +139,11 @@ class Robot:
     def cases_of_torque(self) -> tuple[Case, ...]:
         """The cases without its own actuators."""
         return tuple(case for case in self.cases if not case.controller)
+
+    def scene_begins(self, name: str) -> str:
+        """A scene's name at the beginning of a sentence; the name of a user's scene stays as it is."""
+        is_own = any(scene.name == name and "own" in scene.tags for scene in self.scenes)
+        return f"Scene {name}" if is_own else capital(name)
 
     def with_scenes(self, scenes: tuple[Scene, ...]) -> "Robot":
         return replace(self, scenes=self.scenes + scenes)

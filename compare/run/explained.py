@@ -13,7 +13,7 @@ from ..experiments import module
 from ..experiments.setup import Setup, engines
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
-from ..report.verdict import STATES_CAUSES, Section, failures
+from ..report.verdict import Section, failures
 
 AT_STATES = (
     "kinematics",
@@ -33,7 +33,7 @@ def explained(setup: Setup, section: Section) -> list[Check]:
     """
     failed = failures([section])
     checks = failed.differing + failed.unconfirmed
-    if section.name in STATES_CAUSES or not checks:
+    if section.states_causes or not checks:
         return []
     if setup.robot.own:
         follows = what_follows(setup)

@@ -39,7 +39,7 @@ def failing(result):
 @pytest.mark.parametrize("name", ["arm6", "gripper", "mixed"])
 def test_the_models_are_as_their_files_state_and_nothing_more_acts(name):
     result = result_of(PATHS[name])
-    assert result.checks and failing(result) == [] and result.curves["causes"] == []
+    assert result.checks and failing(result) == [] and result.causes == []
     features = [row["feature"] for row in result.tables["inventory"]]
     assert features == [feature.feature for feature in read(PATHS[name]).features]
     forces = [check.quantity for check in result.checks if check.scene == "random states"]
@@ -137,7 +137,7 @@ def beside_solution(tmp_path, text, solution=CART, experiment=parameters):
 ])  # fmt: skip
 def test_a_number_that_is_another_one_than_in_the_solution_is_the_cause(tmp_path, old, new, causes):
     result = beside_solution(tmp_path, CART.replace(old, new))
-    known = result.curves["causes"]
+    known = result.causes
     assert [(c["place"], c["stated"], pytest.approx(c["found"])) for c in known] == causes
     assert len(failing(result)) == len(causes) and len(result.checks) > 20
 

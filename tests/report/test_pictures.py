@@ -17,8 +17,8 @@ from sections import section
 
 from compare.core.check import About
 from compare.core.text import environment
-from compare.experiments.trajectory.motion import Drawn
 from compare.report import images, motion, style
+from compare.report.drawn import Drawn
 from compare.robots.arm import ARM
 
 
@@ -39,7 +39,7 @@ def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None)
 
 def page_of(*scenes, label="TMT") -> str:
     of = section("trajectory")
-    of.result.curves, of.result.label = {"drawn": list(scenes)}, label
+    of.scenes, of.result.label = scenes, label
     return motion.motion_in_html([section("mass"), of], ARM)
 
 
@@ -62,7 +62,7 @@ def test_it_opens_on_the_scene_that_differs():
     of = section("trajectory", ("open loop", 2.0, 1.0, "at most", True), drift)
     scenes = zip(of.result.checks, ("let go", "held"))
     of.result.checks = [replace(check, scene=f"{scene}, RK4") for check, scene in scenes]
-    of.result.curves = {"drawn": [drawn("held"), drawn("let"), drawn("let go")]}
+    of.scenes = drawn("held"), drawn("let"), drawn("let go")
     names = [scene["name"] for scene in data_of(motion.motion_in_html([of], ARM))["scenes"]]
     assert names == ["let go", "held", "let"]
 

@@ -14,12 +14,12 @@ from compare.core.text import say
 from compare.engines.mujoco.reading import read
 from compare.experiments import figures_overview, module, stability
 from compare.experiments.speed import first_screen as of_speed
-from compare.report.questions import answers, true_errors
+from compare.report.questions import answers
 from compare.report.style import BLUE, ORANGE, RED
 from compare.report.verdict import failures, headline, outcome, passed, standing, verdict
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
-from compare.run.examine import say_outcome, with_headline
+from compare.run.examine import say_outcome, section_with
 
 OWN_STEP = ("stable at its own step", 0.002, 0.00111, "at most", False, About.STEP)
 
@@ -174,7 +174,7 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
 
 def answer_of(*sections) -> dict:
     """The answers by their part."""
-    return answers(sections, ARM).set_index("part")["answer"].to_dict()
+    return {part: answer for part, _, _, answer in answers(sections, ARM).cells}
 
 
 def apart(scene, difference, quantity="Mbar"):
@@ -197,12 +197,18 @@ def test_the_largest_difference_is_the_answer_unless_a_run_diverged(rows, number
     assert number in found and scene in found
 
 
-def test_errors_are_those_of_the_coarsest_steps():
-    runs = {("a", "rk4", 128): {}, ("a", "rk4", 64): {}, ("b", "rk4", 64): {}, ("c", "rk4", 32): {}}
-    result = Result("trajectory", curves={"runs": runs, "errors": {"a": (1.0, 2.0), "b": (3.0, None)}})
-    assert true_errors(result) == (result.curves["errors"], 64)
-    result.curves["errors"]["c"] = (5.0, 6.0)
-    assert true_errors(result)[1] is None  # they are not the same in all scenes
+def test_an_answer_has_what_its_experiment_adds():
+    row = {
+        "quantity": "q",
+        "scene": "s",
+        "unit": "rad",
+        "largest_difference": 1e-9,
+        "level": "open loop",
+        "twin": "rk4",
+    }
+    of = section("trajectory", rows=[row])
+    of.result.answer = of.result.finding("answer", errors={"a": (1.0, 2.0), "b": (3.0, None)}, steps=64)
+    assert "with 64 steps: a: 1 rad and 2 rad; b: 3 rad and diverged" in answer_of(of)["i"]
 
 
 # the headline of each experiment
@@ -216,11 +222,6 @@ STEP = {"scene": "s", "engine": "tmt", "method": "rk4", "damping": 0.0, "limit":
 PRINTED = {"published": 1.0, "tmt": 1.1, "mujoco": 0.9, "tolerance": 0.11}
 
 
-def headline_of(name, of):
-    with_headline(module(name), of.result)
-    return headline(of)
-
-
 @pytest.mark.parametrize("name, rows, numbers, named", [
     ("parameters", [SAME, OFF], "1 2", "all as stated"),
     ("published", [PRINTED | {"mujoco": 0.8}], "0 1", ""),
@@ -230,7 +231,7 @@ def headline_of(name, of):
 ])  # fmt: skip
 def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, named):
     of = section(name, GOOD, rows=rows)
-    said = headline_of(name, of)
+    said = headline(section_with(name, of.result, ARM))
     found = re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]\d+)?", said.replace(" m2", ""))
     assert found == numbers.split() and named in said, said
 

@@ -20,7 +20,7 @@ from ..setup import Setup
 from . import file
 from .numbers import ABSENT, OF_BODIES, UNITS, cause, check_forces, compare_number, rows_of, unit_of
 
-EXPERIMENT = Experiment(order=10, serves_own=False)
+EXPERIMENT = Experiment(order=10, serves_own=False, states_causes=True)
 # numbers of the whole file; the others are of bodies and joints
 OF_WORLD = (*STATED_FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *ABSENT)
 WHOLE_NUMBERS = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")
@@ -116,7 +116,7 @@ def rows(setup: Setup) -> Result:
         file.add_inventory(result, robot.features)
     else:
         causes += check_forces(result, setup, causes)
-    result.curves["causes"] = sorted(causes, key=lambda c: (c["rank"], c["quantity"] in AT_TIMES, -c["size"]))
+    result.causes = sorted(causes, key=lambda c: (c["rank"], c["quantity"] in AT_TIMES, -c["size"]))
     return result
 
 

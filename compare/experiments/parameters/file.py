@@ -31,7 +31,7 @@ def rows_of_file(setup: Setup) -> Result:
     for name, value, unit in (("integrator", reading.integrator, ""), ("timestep", reading.dt, "s")):
         result.rows.append({"of": "file", "quantity": name, "component": "", "compiled": value, "unit": unit})
     add_inventory(result, setup.robot.features)
-    result.curves["causes"] = sorted(causes, key=lambda cause: -cause["size"])
+    result.causes = sorted(causes, key=lambda cause: -cause["size"])
     return result
 
 

@@ -7,7 +7,6 @@ from ...core import timing
 from ...core.check import Result
 from ...core.finding import Finding
 from ...core.units import renamed
-from ...core.words import scene_begins
 from ...engines import GRID, IN_QUICK_RUNS, LABELS, RECORDS, methods_in
 from ...judge.run import leaves_no_digits, movement_unit
 from ...judge.scale import EPS, FACTOR
@@ -134,7 +133,7 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     if "what_should_i_use" not in result.tables:  # nothing was timed
         return
     for scene in result.curves["floors"]:
-        yield partial(figures_speed.draw_times, result, scene, beginning=scene_begins(scene, robot))
+        yield partial(figures_speed.draw_times, result, scene, beginning=robot.scene_begins(scene))
 
 
 def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:

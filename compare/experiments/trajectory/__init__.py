@@ -11,6 +11,7 @@ from ...engines import LABELS, Engine
 from ...engines.mujoco.names import INTEGRATORS
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES, leaves_no_digits, movement_unit
+from ...report.drawn import Drawn
 from ...robots import Robot
 from ...robots.case import Case
 from ...truth.reference import RECORDS, reference
@@ -134,6 +135,10 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
         yield partial(figures_runs.draw_run, result, case)
     if result.curves["drawn"]:
         yield partial(figures_motion_gif.draw_motion, result)
+
+
+def scenes_drawn(result: Result) -> Sequence[Drawn]:
+    return result.curves.get("drawn", ())
 
 
 def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:

@@ -10,7 +10,6 @@ from matplotlib.ticker import MaxNLocator
 
 from ...core.check import Result, largest_known
 from ...core.finding import Finding
-from ...core.words import scene_begins
 from ...engines import LABELS
 from ...judge.run import LEFT, moved_from, movement_unit, step_in_words
 from ...report.style import GREY, LINES, ORANGE, WIDTH, file_name, zero_at_the_end
@@ -120,7 +119,7 @@ def run_caption(result: Result, case: Case, columns: Sequence[dict], shown: int)
     errors = result.curves["errors"].get(case.name)
     return result.finding(
         "figure_run",
-        scene=scene_begins(case.name, case.robot),
+        scene=case.robot.scene_begins(case.name),
         judged=[(c["integrator"], c["judged_until_s"]) for c in columns],
         share=largest_known([row["difference_over_band"] for row in rows]),
         errors=errors and dict(zip((result.label, "MuJoCo"), errors)),

@@ -1,13 +1,12 @@
 """Errors of both engines against the true motion, where that is known; and why a held robot leaves its posture."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
 from tmt.methods import METHODS
 
 from ...core.check import Result
-from ...core.words import scene_begins
 from ...engines import LABELS, Engine, compared
 from ...judge.rounding import slope_rounding
 from ...judge.run import LEFT, deviation, moved_from, movement_unit, number_or_none
@@ -55,10 +54,19 @@ def find_errors(result: Result, robot: Robot, references: Mapping[str, Reference
         about = {"scene": case.name, "first": first, "second": second, "difference": difference, "unit": unit}
         scenes.append(about | {"far": is_far(errors[case.name], difference)})
     result.curves["errors"] = errors
+    if errors:
+        result.answer = result.finding("answer", errors=errors, steps=coarsest_steps(result, errors))
     if any(name in references for name in errors):  # held scenes have their own findings
         result.find(
             "errors", labels=[LABELS[name] for name in robot.compared], scenes=scenes, times=SAYS_NOTHING
         )
+
+
+def coarsest_steps(result: Result, scenes: Iterable[str]) -> int | None:
+    """The number of the coarsest steps of scenes, if they all have as many."""
+    runs = result.curves["runs"]
+    counts = {min(steps for name, _, steps in runs if name == scene) for scene in scenes}
+    return counts.pop() if len(counts) == 1 else None
 
 
 def is_far(errors: tuple, difference: float) -> bool:
@@ -81,7 +89,7 @@ def find_departures(result: Result, robot: Robot, engines: Mapping[str, Engine])
     for case, curve in coarsest_runs(result, robot):
         if case.is_held:
             values = departures(case, engines, curve["left"], deviations(case, curve))
-            about = {"scene": scene_begins(case.name, robot), "claim": claims.get(case.name), "limit": LEFT}
+            about = {"scene": robot.scene_begins(case.name), "claim": claims.get(case.name), "limit": LEFT}
             unit, stated = movement_unit(case.coordinates), robot.compared[0] == "tmt"
             result.find("held", **about, duration=case.duration, unit=unit, stated=stated, **values)
 

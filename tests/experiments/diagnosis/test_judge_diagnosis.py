@@ -21,7 +21,7 @@ def failed(result):
 def test_the_arm_has_nothing_to_explain(monkeypatch):
     setup = setup_of()
     result = diagnosis.rows(setup)
-    assert failed(result) == [] and result.rows == [] and result.curves["causes"] == []
+    assert failed(result) == [] and result.rows == [] and result.causes == []
     found = diagnosis.diagnosed(setup)  # a ratio of 1 is allowed
     for k, field in enumerate(("ratio", "force_ratio")):
         for ratio, passes in ((1.0, True), (1.001, False)):
@@ -36,7 +36,7 @@ def test_the_arm_has_nothing_to_explain(monkeypatch):
 
 def test_a_cause_is_a_row_and_a_note_of_the_check_that_fails():
     result = diagnosis.rows(setup_of(HEAVY))
-    (row,), (check,), (cause,) = result.rows, failed(result), result.curves["causes"]
+    (row,), (check,), (cause,) = result.rows, failed(result), result.causes
     assert row["explains"] == pytest.approx(1.51, rel=1e-12) and row["left_over"] < 1e-9
     named = {"rank": 2, "kind": "number", "place": "mass of forearm", "stated": 1.5, "unit": "kg", "tied": 0}
     assert row.items() >= named.items() and (cause["place"], cause["found"]) == (
@@ -64,7 +64,7 @@ def test_damping_is_seen_in_accelerations_alone():
 ])  # fmt: skip
 def test_beside_others_it_is_made_where_one_fails(names, text, made, found, tmp_path, monkeypatch):
     # not by parameters, but in the values
-    monkeypatch.setattr(parameters, "rows", lambda setup: Result("parameters", curves={"causes": []}))
+    monkeypatch.setattr(parameters, "rows", lambda setup: Result("parameters"))
     setup = setup_of(text, make=experiment.Setup, states=20, exact_states=1, size="small")
     sections, causes, reasons = experiment.examine(names, setup, tmp_path, Lines(), InProcess())
     assert [section.name for section in sections] == made and list(reasons) == [

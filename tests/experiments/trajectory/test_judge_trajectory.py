@@ -132,7 +132,7 @@ def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_
     result = Result("trajectory", curves={"runs": runs})
     true_motion.find_errors(result, ARM, {FREE.name: reference(FREE)})
     assert list(result.curves["errors"]) == [HELD.name, FREE.name]
-    assert result.curves["errors"][HELD.name] == (0.25, None)
+    assert result.curves["errors"][HELD.name] == (0.25, None) and result.answer.values["steps"] == 64
     assert [scene["far"] for scene in result.notes[0].values["scenes"]] == [False, False]
     ours, theirs = result.curves["errors"][FREE.name]
     assert ours == pytest.approx(0.27, rel=0.03) and theirs > 90.0
