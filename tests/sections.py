@@ -10,9 +10,8 @@ def section(name="mass", *checks, rows=(), figures=(), **tables):
     result, record = Result(name, rows=list(rows), tables=tables), EXPERIMENTS.get(name, Experiment(0))
     for quantity, value, tolerance, rule, rounding, *about in checks:
         result.check("zero", quantity, value, tolerance, "kg m2", "", rounding, rule, *about)
-    of_experiment = {name: getattr(record, name) for name in ("overview", "states_causes", "compares")}
     drawn = [Figure(file, f"Caption of {file}.") for file in figures]
-    return Section(name, name.capitalize(), "They agree.", "64 eps.", result, drawn, **of_experiment)
+    return Section(name, name.capitalize(), "They agree.", "64 eps.", result, drawn, record=record)
 
 
 GOOD, BAD = ("Mbar", 0.5, 1.0, "at most", True), ("Mbar", 2.0, 1.0, "at most", True)

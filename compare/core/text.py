@@ -47,7 +47,8 @@ def reference(sign: re.Match[str]) -> str:
 
 def cell(value: object) -> Markup:
     """A value in a cell of a table in Markdown."""
-    return Markup(str(escaped(value)).replace("|", "&#124;"))
+    text = value if isinstance(value, Markup) else escaped(value)
+    return Markup(str(text).replace("|", "&#124;"))
 
 
 def count(number: int, noun: str, plural: str = "") -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from ..core.experiment import Experiment
 from ..core.finding import Finding
 from ..core.records import records_in
 
@@ -21,23 +22,6 @@ if TYPE_CHECKING:  # for --help, the names are enough
     from .setup import Setup
 
 Drawing = Callable[[], tuple[str, Any, Finding | str]]  # draws: the name of the file, the figure, the caption
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """What the program has to know of an experiment before it imports it."""
-
-    order: int  # of `all` and of the report
-    serves_own: bool = True  # a user's own equations; if not, the macro not_of_own says why
-    asks_of_own: tuple[str, ...] | None = None  # which of a user's own functions it calls; None: all
-    needs_file: bool = False  # or equations of a user's own: there is nothing to say of the arm's
-    options: tuple[str, ...] = ()  # of the command line, in addition to those of every experiment
-    in_quick: bool = True  # whether a quick run of several experiments has it
-    timed: bool = False  # it measures times: it runs last, while nothing else does
-    diagnosed: bool = False  # where it fails, `diagnosis` looks for the cause
-    states_causes: bool = False  # its failing checks are the causes of the others
-    compares: bool = True  # if not, it only says why others fail
-    overview: str = ""  # the picture of the first screen that its result is part of
 
 
 @dataclass(frozen=True)

@@ -24,22 +24,18 @@ from .tables import Table
 from .verdict import Figure, Parts, Report, Section, failures, headline, outcome, passed, standing
 
 MOST_ROWS, MOST_IN_MARKDOWN = 40, 6  # of a table; its file has all
-FIRST_NOTES, MOST_NOTES = 3, 12  # of a section: of the page, which folds the others; of report.md
+FIRST_NOTES = 3  # of a section of the page, which folds the others
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
-LINKED = (
-    "_distances",
-    "_limits",
-)  # how the files of the figures end to which a picture of the first screen leads
 MAIN_TABLES = {"what_should_i_use": "What should I use?"}  # further tables of report.md, with their titles
-ON_FIRST_SCREEN = [
+ON_FIRST_SCREEN = (
     "experiment",
     "scene",
     "quantity",
     "value",
     "tolerance",
     "note",
-]  # columns of failing checks
+)  # columns of failing checks
 JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
 
 
@@ -70,7 +66,12 @@ class Document:
         self.report, self.parts, self.folder = report, parts, folder
         self.page, self.motion = folder is not None, ""
         self.file = "index.html" if self.page else "report.md"
-        data = {"page": self.page, "embedded": self.embedded}
+        data = {
+            "page": self.page,
+            "embedded": self.embedded,
+            "first_notes": FIRST_NOTES if self.page else None,
+        }
+        data |= {"outcome": outcome, "standing": standing, "headline": headline}
         # its attributes are the macros
         self.template: Any = environment().get_template("document.md.jinja").make_module(data)
         self.answers = parts.attempt("the questions", None, answers, report.sections, report.robot)
@@ -124,20 +125,15 @@ class Document:
     def first_screen(self) -> str:
         """A line for each experiment, the pictures; on the page also what explains that checks fail."""
         report = self.report
-        attempt, lines = self.parts.attempt, []
-        for section in report.sections:
-            lines += attempt(f"the line of {section.name}", [], lines_of, section)
-        pictures = attempt("the pictures of the first screen", [], self.pictures)
+        pictures = self.parts.attempt("the pictures of the first screen", [], self.pictures)
         failed = [check for kind in failures(report.sections) for check in kind]
-        failing = Listing(
-            len(failed), tables.of_checks(failed[:FIRST_CAUSES], ON_FIRST_SCREEN), title="Failing checks"
-        )
+        failing = listing(failed, FIRST_CAUSES, ON_FIRST_SCREEN)._replace(title="Failing checks")
         if report.causes:
             columns, cells = tables.of_causes(report.causes[:FIRST_CAUSES])
             table = Table(columns[1:], [row[1:] for row in cells])  # without the rank
             title = "Cause" if len(report.causes) == 1 else "Causes"
             failing = Listing(len(report.causes), table, name="causes", title=title)
-        return self.template.first_screen(lines, report.skipped, pictures, failing, FIRST_CAUSES)
+        return self.template.first_screen(report.sections, report.skipped, pictures, failing)
 
     def pictures(self) -> list[Picture]:
         """The pictures, those in which something fails first, each with the anchor of its figure.
@@ -147,7 +143,7 @@ class Document:
         sections, pictures = self.report.sections, []
         wrong = [section for section in sections if any(failures([section]))]
         for section in sections:
-            group = [other for other in sections if other.overview == section.overview]
+            group = [other for other in sections if other.record.overview == section.record.overview]
             fails = any(other in wrong for other in group)
             title, alternative = "overview_title", "overview_alternative"
             for figure in section.figures:
@@ -167,29 +163,17 @@ class Document:
 
     def section(self, section: Section) -> str:
         """One experiment: what was found, figures, tolerance, and the details."""
-        result, (good, _) = section.result, standing(section)
+        checks, few = section.result.checks, MOST_ROWS if self.page else MOST_IN_MARKDOWN
         failed = [check for check in section.failed if check not in section.explained]
-        not_judged = [check for check in result.checks if not check.judged]
-        few, most = (MOST_ROWS, FIRST_NOTES) if self.page else (MOST_IN_MARKDOWN, MOST_NOTES)
+        not_judged = [check for check in checks if not check.judged]
         figures = still_figures([section]) if self.page else section.own_figures
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
-        first = [figure for figure in figures if figure in first or figure.file.endswith(LINKED)]
-        closest_checks = tables.of_checks(tables.closest(result.checks, MOST_ROWS), tables.CHECK[1:])
-        return self.template.section(
-            section,
-            good=good,
-            outcome=outcome(section),
-            headline=headline(section) if result.headline else "",
-            failing=listing(failed, few),
-            not_judged=listing(not_judged, few),
-            explained=listing(section.explained, MOST_ROWS),
-            notes=section.notes[:most],
-            further=section.notes[most:],
-            tables=[self.table(section, name, rows) for name, rows in section.tables.items()],
-            checks=Listing(len(result.checks), closest_checks),
-            open_figures=first,
-            folded_figures=[figure for figure in figures if figure not in first],
-        )
+        first = [figure for figure in figures if figure in first or figure.is_main]
+        lists = {"failing": listing(failed, few), "not_judged": listing(not_judged, few)}
+        lists |= {"explained": listing(section.explained, MOST_ROWS), "all": closest(checks)}
+        of_section = [self.table(section, name, rows) for name, rows in section.tables.items()]
+        folded = [figure for figure in figures if figure not in first]
+        return self.template.section(section, lists, of_section, first, folded)
 
     def table(self, section: Section, name: str, rows: Sequence[Row]) -> Listing:
         """A table with the rows that a reader needs; its rows are None where only its file has them."""
@@ -202,24 +186,13 @@ class Document:
         return Listing(len(rows), tables.of_rows(few, columns), name, title, which)
 
 
-class Line(NamedTuple):
-    """An experiment on the first screen."""
-
-    name: str
-    title: str
-    good: bool | None
-    outcome: str
-    headline: str
+def listing(checks: Sequence[Check], most: int, columns: Sequence[str] = tables.CHECK) -> Listing:
+    return Listing(len(checks), tables.of_checks(checks[:most], columns))
 
 
-def lines_of(section: Section) -> list[Line]:
-    is_explained = bool(section.explained) and len(section.failed) == len(section.explained)
-    number = block("verdict", "consequence") if is_explained else headline(section)
-    return [Line(section.name, section.title, *standing(section), number)]
-
-
-def listing(checks: Sequence[Check], most: int) -> Listing:
-    return Listing(len(checks), tables.of_checks(checks[:most]))
+def closest(checks: Sequence[Check]) -> Listing:
+    """All checks, with those that fail or come closest to their tolerances."""
+    return Listing(len(checks), tables.of_checks(tables.closest(checks, MOST_ROWS), tables.CHECK[1:]))
 
 
 def still_figures(sections: Sequence[Section]) -> list[Figure]:
@@ -228,9 +201,8 @@ def still_figures(sections: Sequence[Section]) -> list[Figure]:
 
 def linked(sections: Sequence[Section]) -> Figure | None:
     """The figure behind a picture: of distances or limits, else the first."""
-    figures = still_figures(sections)
-    of_distances = (figure for figure in figures if figure.file.endswith(LINKED))
-    return next(of_distances, next(iter(figures), None))
+    figures = sorted(still_figures(sections), key=lambda figure: not figure.is_main)
+    return figures[0] if figures else None
 
 
 def picture_of_failure(section: Section) -> list[Picture]:

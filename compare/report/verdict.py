@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from ..core.check import About, Check, Result
 from ..core.errors import described
+from ..core.experiment import Experiment
 from ..core.finding import Finding
 from ..core.rows import Row
 from ..core.text import block, say
@@ -14,7 +15,7 @@ from ..robots import Robot
 from .drawn import Drawn
 from .plain_rows import in_rows
 
-Value = TypeVar("Value")
+Value, UNKNOWN = TypeVar("Value"), Experiment()
 OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
 
 
@@ -33,7 +34,13 @@ class Figure(NamedTuple):
 
     @property
     def is_overview(self) -> bool:
+        """Whether it is a picture of the first screen."""
         return self.file.startswith(OVERVIEW)
+
+    @property
+    def is_main(self) -> bool:
+        """Whether a picture of the first screen leads to it."""
+        return self.file.endswith(("_distances", "_limits"))
 
 
 @dataclass
@@ -47,9 +54,7 @@ class Section:
     result: Result
     figures: list[Figure] = field(default_factory=list)
     explained: list[Check] = field(default_factory=list)  # failing checks that are gone without the causes
-    overview: str = ""  # the picture of the first screen that its result is part of
-    states_causes: bool = False  # its failing checks are the causes
-    compares: bool = True  # if not, it only says why others fail
+    record: Experiment = UNKNOWN  # what the program knows of it
     scenes: Sequence[Drawn] = ()  # the motion
 
     @property
@@ -153,35 +158,19 @@ def verdict(
     checked = [section for section in sections if section.result.checks]
     checks = [check for section in checked for check in section.judged]
     explained = [check for section in sections for check in section.explained]
-    stating = [check for section in checked if section.states_causes for check in section.failed]
+    stating = [check for section in checked if section.record.states_causes for check in section.failed]
     unexplained = [check for check in checks if stands(check, explained, stating)]
     failing = failures(checked)
     unconfirmed = [check for check in failing.unconfirmed if check not in explained]
     failing = failing._replace(unconfirmed=unconfirmed)
-    differing = [section for section in checked if section.compares and failures([section]).differing]
+    differing = [section for section in checked if section.record.compares and failures([section]).differing]
     top = worst(checked)
-    lines = block(
-        "verdict",
-        "verdict",
-        compared=compared,
-        robot=robot,
-        names=[section.name for section in differing or checked],
-        differ=bool(differing),
-        checked=len(checked),
-        experiments=experiments,
-        alone=len(sections) == 1,
-        models=sum(check.about == About.MODELS for check in checks),
-        engines=sum(check.about == About.ENGINE for check in checks),
-        failed=sum(check.failed for check in checks),
-        checks=len(checks),
-        empty=[section.name for section in sections if not section.result.checks],
-        failing=failing,
-        top=top if top and top.value and not any(failing) else None,
-        causes=causes,
-        explained=len(explained),
-        stating=len(stating),
-        unexplained=unexplained,
-    )
+    values = {"compared": compared, "robot": robot, "experiments": experiments, "sections": sections}
+    values |= {"names": [section.name for section in differing or checked], "differ": bool(differing)}
+    values |= {"checked": checked, "checks": checks, "failing": failing, "causes": causes}
+    values |= {"explained": explained, "stating": stating, "unexplained": unexplained}
+    values["top"] = top if top and top.value and not any(failing) else None
+    lines = block("verdict", "verdict", **values)
     return "\n".join(filter(None, map(str.strip, lines.split("\n"))))
 
 

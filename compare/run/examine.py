@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -25,18 +26,8 @@ Value, Cause = TypeVar("Value"), dict[str, Any]
 START, END = "start", "figures"  # tasks of the clock: before the first experiment, and after the last
 DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers on which Mbar and h depend, by their names in `parameters`
-IN_EQUATIONS = [
-    "order",
-    "parent",
-    "ref",
-    "axis",
-    "anchor",
-    "com",
-    "mass",
-    "inertia",
-    "gravity",
-    "armature",
-] + ["flag gravity"]
+IN_EQUATIONS = ("order", "parent", "ref", "axis", "anchor", "com", "mass", "inertia", "gravity", "armature")
+IN_EQUATIONS += ("flag gravity",)
 SHOWN = 5  # lines on the terminal about an experiment that fails
 
 
@@ -53,49 +44,44 @@ def setup_of(compared: Compared, is_quick: bool, **more: Any) -> Setup:
     return make(compared.robot, of_run, reading=compared.reading, **more)
 
 
-def examine(
-    names: Sequence[str],
-    setup: Setup,
-    folder: Path,
-    terminal: Terminal,
-    workers: Executor,
-    clock: Clock | None = None,
-) -> Examined:
-    """The section of each experiment with its figures, the causes of failing checks, and the skipped experiments with reasons.
+def examine(names: Sequence[str], setup: Setup, *place: Any) -> Examined:
+    """The experiments of a run, see Run, one after the other."""
+    return Run(names, setup, *place).examined()
+
+
+@dataclass
+class Run:
+    """The experiments of one run. clock: of the workers, it measures each experiment.
 
     An experiment that raises is one failed check; the others go on. Among other experiments the diagnosis runs only if one of
-    them fails. clock: of the workers, it measures each experiment.
+    them fails.
     """
-    return Run(names, setup, folder, terminal, workers, clock or Clock()).examined()
 
+    names: Sequence[str]
+    setup: Setup
+    folder: Path  # for the folder of figures
+    terminal: Terminal
+    workers: Executor
+    clock: Clock = field(default_factory=Clock)
+    sections: list[Section] = field(default_factory=list)
+    causes: list[Cause] = field(default_factory=list)
+    work: dict[str, Any] = field(default_factory=dict)  # that was begun, of each experiment
+    crashed: dict[str, Result] = field(default_factory=dict)
+    told: set[int] = field(default_factory=set)  # problems of the user's own equations, by their numbers
+    drawings: list[tuple[Section, Future[list[Figure]]]] = field(default_factory=list)
 
-class Run:
-    """The experiments of one run, in their order: first those that are not timed."""
+    @property
+    def is_large(self) -> bool:
+        """Whether the first answers come before any long work."""
+        return self.setup.robot.coordinates.nv > MOST_SPEEDS
 
-    def __init__(
-        self,
-        names: Sequence[str],
-        setup: Setup,
-        folder: Path,
-        terminal: Terminal,
-        workers: Executor,
-        clock: Clock,
-    ):
-        self.setup, self.folder, self.terminal = setup, folder / "figures", terminal
-        self.workers, self.clock = workers, clock
-        # the first answers about a large robot come before any long work
-        self.is_large = setup.robot.coordinates.nv > MOST_SPEEDS
+    @property
+    def order(self) -> list[str]:
         last = ("kinematics", *TIMED) if self.is_large else TIMED
-        self.names, self.order = names, sorted(names, key=last.__contains__)
-        self.sections: list[Section] = []
-        self.causes: list[Cause] = []
-        self.work: dict[str, Any] = {}
-        self.crashed: dict[str, Result] = {}
-        self.told: set[int] = set()  # problems of the user's own equations, by their numbers
-        self.drawings: list[tuple[Section, Future[list[Figure]]]] = []
+        return sorted(self.names, key=last.__contains__)
 
     def examined(self) -> Examined:
-        self.folder.mkdir()
+        (self.folder / "figures").mkdir()
         self.begin()
         needless = {}
         for name in self.order:
@@ -139,37 +125,41 @@ class Run:
         self.clock.under_way = name
         with self.clock.of(name):
             self.setup.progress(block(name, "summary"))
-            section = None
-            if name not in self.crashed:
-                section = self.attempt(name, section_of, name, self.setup, self.work.get(name))
-            is_complete = section is not None
-            section = section or Section(name, name, "", "", self.crashed[name])
+            section = self.section_of(name)
             self.sections.append(section)
             if self.setup.own:
                 add_problems(section.result, self.setup.own.equations.problems, self.told)
-            new = [
-                {"experiment": name, **cause} for cause in new_causes(self.setup, self.sections, self.causes)
-            ]
+            found = new_causes(self.setup, self.sections, self.causes)
+            new = [{"experiment": name, **cause} for cause in found]
             self.causes = new + self.causes
             if self.causes:
                 section.explained = self.attempt("explained", explained, self.setup, section) or []
         self.clock.ends(name)
-        if is_complete and name not in TIMED:  # no drawing delays a timing
+        if name not in TIMED:  # no drawing delays a timing
             self.draw(section)
         say_outcome(self.terminal, section, self.clock.seconds_of(name), new, bool(self.causes))
         for text in section.result.top if len(self.names) > 1 else ():  # else it is the last line of the run
             self.terminal.say(f"  {say(text)}")
 
+    def section_of(self, name: str) -> Section:
+        """The section of an experiment, which is run for it; of one that raises with the error alone."""
+        rows, work = functions(name).rows, [self.work[name]] if name in self.work else []
+        result = None if name in self.crashed else self.attempt(name, rows, self.setup, *work)
+        section = self.attempt(name, section_with, name, result, self.setup.robot) if result else None
+        return section or Section(name, name, "", "", self.crashed[name])
+
     def draw(self, section: Section) -> None:
+        if section.name in self.crashed:
+            return
         few = self.setup.is_quick and not self.setup.alone and not any(failures([section]))
         others = results_needed(section.name, self.order, self.sections)
         with self.clock.of(END):
-            arguments = section.name, section.result, self.setup.robot, self.folder, others, few
+            arguments = section.name, section.result, self.setup.robot, self.folder / "figures", others, few
             self.drawings.append((section, self.workers.submit(draw, *arguments)))
 
     def finish_drawings(self) -> None:
         for section in self.sections:
-            if section.name in TIMED and section.name not in self.crashed:
+            if section.name in TIMED:
                 self.draw(section)
         with self.clock.of(END):
             self.setup.progress("figures")
@@ -185,29 +175,14 @@ class Run:
         self.clock.ends(END)
 
 
-def section_of(name: str, setup: Setup, work: Any = None) -> Section:
-    """The section of an experiment, which is run for it."""
-    rows = functions(name).rows
-    return section_with(name, rows(setup) if work is None else rows(setup, work), setup.robot)
-
-
 def section_with(name: str, result: Result, robot: Robot) -> Section:
     """The section of an experiment with this result."""
-    experiment, record = functions(name), EXPERIMENTS[name]
+    experiment = functions(name)
     result.headline = result.headline or experiment.headline(result)
     of_robot = {"robot": robot, "values": experiment.claim_values(robot)}
     claim, tolerance = (say(Finding(name, kind, of_robot)) for kind in ("claim", "tolerance"))
-    return Section(
-        name,
-        block(name, "title", robot=robot),
-        claim,
-        tolerance,
-        result,
-        overview=record.overview,
-        states_causes=record.states_causes,
-        compares=record.compares,
-        scenes=experiment.scenes_drawn(result),
-    )
+    title, scenes = block(name, "title", robot=robot), experiment.scenes_drawn(result)
+    return Section(name, title, claim, tolerance, result, record=EXPERIMENTS[name], scenes=scenes)
 
 
 def add_problems(result: Result, problems: Sequence[Problem], told: set[int]) -> None:
@@ -293,25 +268,14 @@ def say_outcome(
 
     seconds: of the processor, for the experiment itself; known: whether there are causes, new ones or others.
     """
-    checks, failed = section.result.checks, section.failed
-    not_judged = [check for check in checks if not check.judged]
-    used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
-    line = block(
-        "run",
-        "outcome",
-        name=section.name,
-        checks=len(checks),
-        failed=len(failed),
-        not_judged=len(not_judged),
-        explained=len(section.explained),
-        share=max(used, default=0.0),
-        states_causes=section.states_causes,
-        seconds=seconds,
-    )
-    terminal.say(line, "red" if failed else "yellow" if not_judged else "")
+    used = [check.over_tolerance or 0.0 for check in section.result.checks]
+    not_judged = failures([section]).not_judged
+    about = {"is_open": bool(not_judged), "share": max(used, default=0.0), "seconds": seconds}
+    style = "red" if section.failed else "yellow" if not_judged else ""
+    terminal.say(block("run", "outcome", section=section, **about), style)
     lines = [f"CAUSE {cause['text']}" for cause in new]
-    if not (known and section.states_causes):  # there the causes are the checks
-        lines += [f"FAIL {check}" for check in failed if check not in section.explained]
+    if not (known and section.record.states_causes):  # there the causes are the checks
+        lines += [f"FAIL {check}" for check in section.failed if check not in section.explained]
     lines += map(str, not_judged)
     if len(lines) > SHOWN:
         lines[SHOWN:] = [block("run", "more", count=len(lines) - SHOWN)]

@@ -33,7 +33,7 @@ def explained(setup: Setup, section: Section) -> list[Check]:
     """
     failed = failures([section])
     checks = failed.differing + failed.unconfirmed
-    if section.states_causes or not checks:
+    if section.record.states_causes or not checks:
         return []
     if setup.robot.own:
         follows = what_follows(setup)
