@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from ..core.experiment import Experiment
+from ..core.experiment import Experiment as Experiment
 from ..core.finding import Finding
 from ..core.records import records_in
 

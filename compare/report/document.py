@@ -125,7 +125,8 @@ class Document:
     def first_screen(self) -> str:
         """A line for each experiment, the pictures; on the page also what explains that checks fail."""
         report = self.report
-        pictures = self.parts.attempt("the pictures of the first screen", [], self.pictures)
+        none: list[Picture] = []
+        pictures = self.parts.attempt("the pictures of the first screen", none, self.pictures)
         failed = [check for kind in failures(report.sections) for check in kind]
         failing = listing(failed, FIRST_CAUSES, ON_FIRST_SCREEN)._replace(title="Failing checks")
         if report.causes:
@@ -140,7 +141,7 @@ class Document:
 
         If none of them shows a failure, a figure of the first failing experiment comes first.
         """
-        sections, pictures = self.report.sections, []
+        sections, pictures = self.report.sections, list[Picture]()
         wrong = [section for section in sections if any(failures([section]))]
         for section in sections:
             group = [other for other in sections if other.record.overview == section.record.overview]

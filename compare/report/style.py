@@ -5,6 +5,7 @@ A function that draws returns (file name, figure, caption), and computes nothing
 
 import re
 import warnings
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -13,11 +14,21 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from ..robots import Robot
+
+Line = tuple[str, Any]  # colour, dash
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#666666"
 PINK, SKY = "#CC79A7", "#56B4E9"
 # of joints
-LINES = (BLUE, "-"), (RED, "--"), (GREEN, "-."), (ORANGE, ":"), (PINK, (0, (5, 1))), (SKY, (0, (3, 1, 1, 1)))
-STYLE = {
+LINES: tuple[Line, ...] = (
+    (BLUE, "-"),
+    (RED, "--"),
+    (GREEN, "-."),
+    (ORANGE, ":"),
+    (PINK, (0, (5, 1))),
+    (SKY, (0, (3, 1, 1, 1))),
+)
+STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.titlesize": 9,
     "axes.grid": True,
@@ -29,12 +40,11 @@ STYLE = {
 WIDTH = 7.5  # inches, a page
 NUMBER = re.compile(r"\$(\\mathdefault\{)?[-0-9.^{}]*(\\times10)?[-0-9.^{}]*\$")  # of an axis, as a formula
 matplotlib.rcParams.update(STYLE)
-warnings.filterwarnings(
-    "ignore", "constrained_layout not applied"
-)  # names that leave no room for what is drawn
+# names that leave no room for what is drawn
+warnings.filterwarnings("ignore", "constrained_layout not applied")
 
 
-def joint_lines(robot) -> dict[str, tuple]:
+def joint_lines(robot: Robot) -> dict[str, Line]:
     """Colour and dash of each joint's line, by its name."""
     return {name: LINES[k % len(LINES)] for k, name in enumerate(robot.joints)}
 

@@ -15,7 +15,8 @@ from ..robots import Robot
 from .drawn import Drawn
 from .plain_rows import in_rows
 
-Value, UNKNOWN = TypeVar("Value"), Experiment()
+Value = TypeVar("Value")
+UNKNOWN = Experiment()
 OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
 
 
@@ -128,8 +129,8 @@ def failures(sections: Sequence[Section]) -> Failures:
     """
     checks = [check for section in sections for check in section.result.checks]
     kinds = About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION, About.ENGINE
-    failed = ([check for check in checks if check.failed and check.about == kind] for kind in kinds)
-    return Failures(*failed, [check for check in checks if not check.judged])
+    failed = [[check for check in checks if check.failed and check.about == kind] for kind in kinds]
+    return Failures._make([*failed, [check for check in checks if not check.judged]])
 
 
 def passed(sections: Sequence[Section]) -> bool:

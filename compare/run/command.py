@@ -83,8 +83,8 @@ def compute(
         origin = provenance(command, robot.mjcf, compared.reference.file, SEED)  # of the model as it was read
         more = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
         setup = examine.setup_of(compared, options.quick, alone=is_alone, step=step, **more)
-        for name, reason in reasons.items():
-            terminal.say(block("run", "skipped", name=name, reason=reason))
+        for name, said in reasons.items():
+            terminal.say(block("run", "skipped", name=name, reason=said))
         terminal.tell(partial(examine.progress, workers.clock, names))
         examined = examine.examine(names, setup, folder, terminal, workers, workers.clock)
     origin |= {"seconds": round(time.perf_counter() - started, 1)} | durations(workers.clock)

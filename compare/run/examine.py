@@ -22,12 +22,13 @@ from .drawing import draw, quiet, results_needed
 from .explained import explained
 from .reference import Compared
 
-Value, Cause = TypeVar("Value"), dict[str, Any]
+Value = TypeVar("Value")
+Cause = dict[str, Any]
 START, END = "start", "figures"  # tasks of the clock: before the first experiment, and after the last
 DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers on which Mbar and h depend, by their names in `parameters`
-IN_EQUATIONS = ("order", "parent", "ref", "axis", "anchor", "com", "mass", "inertia", "gravity", "armature")
-IN_EQUATIONS += ("flag gravity",)
+OF_JOINTS, OF_BODIES = ("order", "parent", "ref", "axis", "anchor"), ("com", "mass", "inertia")
+IN_EQUATIONS = (*OF_JOINTS, *OF_BODIES, "gravity", "armature", "flag gravity")
 SHOWN = 5  # lines on the terminal about an experiment that fails
 
 

@@ -15,12 +15,7 @@ from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..report.verdict import Section, failures
 
-AT_STATES = (
-    "kinematics",
-    "mass",
-    "gravity",
-    "acceleration",
-)  # what compares models directly, with little work
+AT_STATES = ("kinematics", "mass", "gravity", "acceleration")  # what compares models with little work
 NODES = 24  # of the integral of a force at rest, which is smooth
 
 
@@ -42,11 +37,8 @@ def explained(setup: Setup, section: Section) -> list[Check]:
     if mended is None:
         return []
     if section.name in (*AT_STATES, "trajectory"):
-        still = {
-            (check.scene, check.quantity)
-            for check in compared_again(mended, section.name).checks
-            if check.failed
-        }
+        again = compared_again(mended, section.name).checks
+        still = {(check.scene, check.quantity) for check in again if check.failed}
         return [check for check in checks if (check.scene, check.quantity) not in still]
     if any(check.failed for name in AT_STATES for check in compared_again(mended, name).checks):
         return []
@@ -89,20 +81,16 @@ def what_follows(setup: Setup) -> dict[str, bool]:
     Accelerations follow where no other force is in them at any random state, or the diagnosis explains it; own gravity and
     energy where they are those of the own M and h, at some of these states.
     """
-    found, given = module("diagnosis").diagnosed(setup), setup.engines["own"].of(setup.robot.case())
+    assert setup.own is not None
+    diagnosis, given = module("diagnosis"), setup.own.of(setup.robot.case())
+    found = diagnosis.diagnosed(setup)
     equations = found.ratio <= 1.0 or bool(found.diagnosis.causes)
     motion = equations and (found.force_ratio <= 1.0 or bool(found.of_forces))
-    if (
-        motion and not found.of_forces and given.has("acceleration")
-    ):  # the diagnosis has asked at a few states
-        motion = module("diagnosis").is_solved(given, setup.robot.tree, setup.random)
-    follows = {
-        "geometry": False,
-        "equations": equations,
-        "motion": motion,
-        "gravity": equations,
-        "energy": equations,
-    }
+    if motion and not found.of_forces and given.has("acceleration"):  # it has asked at a few states
+        motion = diagnosis.is_solved(given, setup.robot.tree, setup.random)
+    follows = {"geometry": False, "motion": motion} | dict.fromkeys(
+        ("equations", "gravity", "energy"), equations
+    )
     sample = setup.random.first(found.states)
     scale = Entries(setup.robot.tree, sample.q, sample.qd)
     at_rest = np.zeros_like(sample.qd)
