@@ -16,18 +16,8 @@ RULES = {  # which values pass
 }
 ENDS = "runs to its end"  # names of checks
 AT_OWN_STEP, AT_REQUESTED_STEP = "stable at its own step", "stable at the requested step"
-RECORDED = [
-    "experiment",
-    "scene",
-    "quantity",
-    "rule",
-    "value",
-    "tolerance",
-    "unit",
-    "judged",
-    "passed",
-    "note",
-]  # in results.json
+# in results.json
+RECORDED = "experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "judged", "passed", "note"
 
 
 class About(Enum):
@@ -103,9 +93,7 @@ class Result:
     rows: list[Any] = field(default_factory=list)  # each a Row
     checks: list[Check] = field(default_factory=list)
     curves: dict[Any, Any] = field(default_factory=dict)
-    causes: list[dict[str, Any]] = field(
-        default_factory=list
-    )  # of failing checks: place, stated, found, text
+    causes: list[dict[str, Any]] = field(default_factory=list)  # of failing checks: place, stated, text ...
     notes: list[Finding] = field(default_factory=list)  # for the report
     shown: Sequence[str] | None = None  # columns of the table in the report; None: all; []: it is only a file
     tables: dict[str, Any] = field(default_factory=dict)  # further tables by name: lists of rows
@@ -113,9 +101,7 @@ class Result:
     top: list[Finding] = field(default_factory=list)  # for the top of the report and for the terminal
     label: str = "TMT"  # of the engine that is compared with MuJoCo
     headline: Finding | None = None  # for the first screen; None: the number of checks that pass
-    answer: Finding | None = (
-        None  # added to an answer to the assignment's question that names this experiment
-    )
+    answer: Finding | None = None  # added to the answers to the assignment's questions that name it
 
     def finding(self, kind: str, of: str = "", **values: Any) -> Finding:
         """A finding of this experiment's template, or of the template `of`."""
@@ -138,11 +124,9 @@ class Result:
     ) -> Check:
         """Add a check; a value that is None or not finite fails."""
         number = None if value is None or not np.isfinite(value) else float(value)
-        check = Check(
-            self.experiment, scene, quantity, number, float(tolerance), unit, note, rounding, rule, about
-        )
-        self.checks.append(check)
-        return check
+        numbers = number, float(tolerance), unit
+        self.checks.append(Check(self.experiment, scene, quantity, *numbers, note, rounding, rule, about))
+        return self.checks[-1]
 
     def not_judged(
         self, scene: str, quantity: str, reason: str, unit: str = "", about: About = About.MODELS

@@ -89,14 +89,8 @@ FILTERS = {
 def environment() -> Environment:
     """Jinja2 with the folders of all templates; no value that a document is given can be markup."""
     folders = sorted({str(file.parent) for file in ROOT.rglob("*.jinja")})
-    made = Environment(
-        loader=FileSystemLoader(folders),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        autoescape=lambda name: str(name).endswith(DOCUMENTS),
-        finalize=markup,
-    )
+    made = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=markup)
+    made.loader, made.autoescape = FileSystemLoader(folders), lambda name: str(name).endswith(DOCUMENTS)
     made.filters |= FILTERS
     made.tests["finite"] = isfinite
     return made

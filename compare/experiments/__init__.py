@@ -28,9 +28,7 @@ Drawing = Callable[[], tuple[str, Any, Finding | str]]  # draws: the name of the
 class Functions:
     """The functions of an experiment's module; those that have a default here may be missing there."""
 
-    rows: Callable[
-        ..., "Result"
-    ]  # of a Setup, and of the work that begin has started: tables, checks, findings
+    rows: Callable[..., "Result"]  # of a Setup, and of the work that begin has started: what was computed
     begin: Callable[["Setup"], Any] | None = None  # starts long work
     figures: Callable[["Result", "Robot"], Iterable[Drawing]] = lambda result, robot: ()
     headline: Callable[["Result"], Finding | None] = lambda result: None  # its one number on the first screen

@@ -28,14 +28,8 @@ FIRST_NOTES = 3  # of a section of the page, which folds the others
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
 MAIN_TABLES = {"what_should_i_use": "What should I use?"}  # further tables of report.md, with their titles
-ON_FIRST_SCREEN = (
-    "experiment",
-    "scene",
-    "quantity",
-    "value",
-    "tolerance",
-    "note",
-)  # columns of failing checks
+# columns of failing checks
+ON_FIRST_SCREEN = "experiment", "scene", "quantity", "value", "tolerance", "note"
 JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
 
 
@@ -66,11 +60,7 @@ class Document:
         self.report, self.parts, self.folder = report, parts, folder
         self.page, self.motion = folder is not None, ""
         self.file = "index.html" if self.page else "report.md"
-        data = {
-            "page": self.page,
-            "embedded": self.embedded,
-            "first_notes": FIRST_NOTES if self.page else None,
-        }
+        data = {"page": self.page, "embedded": self.embedded, "first_notes": FIRST_NOTES}
         data |= {"outcome": outcome, "standing": standing, "headline": headline}
         # its attributes are the macros
         self.template: Any = environment().get_template("document.md.jinja").make_module(data)

@@ -15,9 +15,8 @@ class Drawn(NamedTuple):
     # of each engine (frames, points, 2): to the right and up, m; NaN from where it has diverged on
     points: dict[str, np.ndarray]
     links: list[tuple[int, int]]  # pairs of points that a stick joins
-    apart: (
-        np.ndarray
-    )  # (frames,): the largest difference of the engines in any joint; NaN if one has diverged
+    # (frames,): the largest difference of the engines in any joint; NaN if one has diverged
+    apart: np.ndarray
     unit: str  # of that
     ended: dict[str, float | None]  # of each engine: time of divergence, s
     left: dict[str, float | None]  # of each engine: time when a held robot left its posture, s

@@ -15,22 +15,10 @@ from ..process.workers import Clock
 
 OURS = "arm-tmt-mujoco"
 PACKAGES = ["mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka"]
-OF_ENGINES = [
-    "drake",
-    "pin",
-    "mujoco-mjx",
-    "jax",
-    "mujoco-warp",
-    "newton",
-    "dartpy",
-    "pybullet",
-]  # if installed
-PROGRAM_FILES = [
-    ":/compare",
-    ":/mjcf",
-    ":/tmt",
-    ":/pyproject.toml",
-]  # changes elsewhere do not change the program
+# if installed
+OF_ENGINES = ["drake", "pin", "mujoco-mjx", "jax", "mujoco-warp", "newton", "dartpy", "pybullet"]
+# changes elsewhere do not change the program
+PROGRAM_FILES = [":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml"]
 
 
 def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict[str, Any]:
@@ -71,19 +59,16 @@ def commit() -> str | None:
     if not (root / ".git").exists():
         return None
     try:
-        head, changed = (
-            git(root, "rev-parse", "HEAD"),
-            git(root, "status", "--porcelain", "--", *PROGRAM_FILES),
-        )
+        head = git(root, "rev-parse", "HEAD")
+        changed = git(root, "status", "--porcelain", "--", *PROGRAM_FILES)
     except (OSError, ValueError, subprocess.CalledProcessError):
         return None
     return head + (" with uncommitted changes" if changed else "")
 
 
 def git(root: Path, *words: str) -> str:
-    return (
-        subprocess.run(["git", "-C", root, *words], capture_output=True, check=True).stdout.decode().strip()
-    )
+    run = subprocess.run(["git", "-C", root, *words], capture_output=True, check=True)
+    return run.stdout.decode().strip()
 
 
 def installed(package: str) -> str | None:

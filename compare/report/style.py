@@ -20,14 +20,8 @@ Line = tuple[str, Any]  # colour, dash
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#666666"
 PINK, SKY = "#CC79A7", "#56B4E9"
 # of joints
-LINES: tuple[Line, ...] = (
-    (BLUE, "-"),
-    (RED, "--"),
-    (GREEN, "-."),
-    (ORANGE, ":"),
-    (PINK, (0, (5, 1))),
-    (SKY, (0, (3, 1, 1, 1))),
-)
+DASHES: tuple[Any, ...] = "-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1))
+LINES = tuple(zip((BLUE, RED, GREEN, ORANGE, PINK, SKY), DASHES))
 STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.titlesize": 9,

@@ -81,8 +81,6 @@ class Terminal:
         self.screen.width = max(self.err.columns() or 80, 20)
         room = self.screen.width - 6  # the spinner, and what a terminal shows of Ctrl-C
         parts, text = self.how_far(), in_one_line(self.text)
-        if len(parts) > 2 and len(", ".join(parts)) > room:
-            parts = [parts[0], *parts[2:]]
         for part in parts:
             text = text.removeprefix(f"{part}: ")
         line = joined(parts, text)

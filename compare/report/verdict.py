@@ -227,10 +227,7 @@ class Parts:
 
     @property
     def lines(self) -> list[str]:
-        findings = (
-            Finding("verdict", "incomplete", {"name": name, "why": why}) for name, why in self.broken.items()
-        )
-        return list(map(say, findings))
+        return [block("verdict", "incomplete", name=name, why=why) for name, why in self.broken.items()]
 
     @property
     def checks(self) -> list[Check]:

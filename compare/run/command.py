@@ -104,19 +104,11 @@ def write_report(
     """
     from ..report import files, verdict
 
-    parts, reference, robot = verdict.Parts(), compared.reference, compared.robot
+    parts, (reference, robot, *_) = verdict.Parts(), compared
     sections, causes, needless = examined
     count, subject = len(EXPERIMENTS) - len(needless), block("run", "subject", kind=reference.kind)
     about = sections, count, causes, subject, robot.name
     words = parts.attempt("the verdict", "No verdict.", verdict.verdict, *about)
-    report = verdict.Report(
-        sections,
-        robot,
-        origin,
-        words,
-        causes,
-        [*skipped, *needless.items()],
-        {"kind": reference.kind, "name": reference.name},
-        reference.lines,
-    )
+    left_out, named = [*skipped, *needless.items()], {"kind": reference.kind, "name": reference.name}
+    report = verdict.Report(sections, robot, origin, words, causes, left_out, named, reference.lines)
     return report, files.write(folder, report, parts)

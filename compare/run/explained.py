@@ -88,9 +88,8 @@ def what_follows(setup: Setup) -> dict[str, bool]:
     motion = equations and (found.force_ratio <= 1.0 or bool(found.of_forces))
     if motion and not found.of_forces and given.has("acceleration"):  # it has asked at a few states
         motion = diagnosis.is_solved(given, setup.robot.tree, setup.random)
-    follows = {"geometry": False, "motion": motion} | dict.fromkeys(
-        ("equations", "gravity", "energy"), equations
-    )
+    follows = dict.fromkeys(("equations", "gravity", "energy"), equations)
+    follows |= {"geometry": False, "motion": motion}
     sample = setup.random.first(found.states)
     scale = Entries(setup.robot.tree, sample.q, sample.qd)
     at_rest = np.zeros_like(sample.qd)

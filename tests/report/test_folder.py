@@ -190,6 +190,5 @@ def test_a_full_disk_while_a_figure_is_drawn_is_said_with_the_name_of_the_file(t
             draw("plain", None, ARM, work, {})
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert (
-        f"{tmp_path / 'out' / 'plot.png'}: File too large" in str(error.value) and names_in(tmp_path) == set()
-    )
+    assert f"{tmp_path / 'out' / 'plot.png'}: File too large" in str(error.value)
+    assert names_in(tmp_path) == set()

@@ -16,14 +16,7 @@ from compare.report.verdict import OVERVIEW, Figure, Parts, Report, verdict
 from compare.robots import Question
 from compare.robots.arm import ARM
 
-CAUSE = {
-    "rank": 2,
-    "place": "mass of forearm",
-    "stated": 1.5,
-    "found": 1.6,
-    "text": "forearm: 1.6 kg",
-    "size": 9.0,
-}
+CAUSE = {"rank": 2, "place": "mass of forearm", "stated": 1.5, "found": 1.6, "text": "forearm: 1.6 kg"}
 
 
 @pytest.fixture
@@ -35,9 +28,8 @@ def folder(tmp_path):
 def report_of(folder, sections, causes=(), skipped=(), robot=ARM):
     for file in (figure.file for one in sections for figure in one.figures):
         images.save_figure(Drawing(figsize=(1, 1)), folder / "figures" / f"{file}.png")
-    return Report(
-        sections, robot, {"command": "c"}, verdict(sections, len(sections), causes), causes, skipped
-    )
+    words = verdict(sections, len(sections), causes)
+    return Report(sections, robot, {"command": "c"}, words, causes, skipped)
 
 
 def page_of(folder, sections, causes=(), skipped=()):
@@ -83,18 +75,14 @@ def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_s
         ("bad", "trajectory"), ("good", "figure-mass_distances"),
     ]  # fmt: skip
     for name, kind in (("mass", "good"), ("trajectory", "bad"), ("speed", "none")):
-        assert (
-            re.search(f'<li class="{kind}">[^\n]*?<a href="#{name}">', top)
-            and f'<p class="outcome {kind}">' in rest
-        )
+        assert re.search(f'<li class="{kind}">[^\n]*?<a href="#{name}">', top)
+        assert f'<p class="outcome {kind}">' in rest
     top, rest = page_of(folder, [section("kinematics", *[BAD] * 5, figures=["kinematics_distances"])])
     assert rest.count("<tr><td>kinematics</td><td>zero</td><td>Mbar</td>") == 5
-    assert (
-        '<div class="pictures"><figure class="bad"><a href="#figure-kinematics_distances">' in top
-    )  # not a picture
-    assert (
-        top.count("<td>kinematics</td><td>zero</td><td>Mbar</td><td>2</td><td>1</td>") == 4
-    )  # no cause is known
+    # not a picture
+    assert '<div class="pictures"><figure class="bad"><a href="#figure-kinematics_distances">' in top
+    # no cause is known
+    assert top.count("<td>kinematics</td><td>zero</td><td>Mbar</td><td>2</td><td>1</td>") == 4
 
 
 def test_a_section_folds_its_details_and_all_but_the_first_figures(folder):
@@ -106,11 +94,8 @@ def test_a_section_folds_its_details_and_all_but_the_first_figures(folder):
     fold = text.index("<details>")
     assert text.index("Note 2 &lt; 9.") < fold < text.index("Note 3")
     assert "<table" not in text[:fold] and text.count("<tr><td>other</td>") == 40
-    assert (
-        '<a href="tables/mass.csv">' in text
-        and '<a href="tables/extra.csv">' in text
-        and "<td>1.5</td>" not in text
-    )
+    assert '<a href="tables/mass.csv">' in text and '<a href="tables/extra.csv">' in text
+    assert "<td>1.5</td>" not in text
     assert [text.index(f'id="figure-{name}"') < fold for name in names] == [True, True, False, False, True]
 
 
@@ -128,7 +113,7 @@ def test_results_have_every_check_cause_and_digit(folder):
     results = json.loads(text_of(folder / "results.json"))
     assert set(results) == {"passed", "reference", "checks", "causes", "skipped", "provenance"}
     assert results["passed"] is False and [check["passed"] for check in results["checks"]] == [True, False]
-    assert [cause | {"size": 9.0} for cause in results["causes"]] == [CAUSE]
+    assert results["causes"] == [CAUSE]
     lines = text_of(folder / "tables" / "mass.csv").splitlines()
     assert lines == ["a,b,engine,ok", *(f"{row['a']!r},{row['b']},tmt,true" for row in rows)]
     assert pd.read_csv(folder / "tables" / "extra.csv")["names"].tolist() == [names]  # cut in the report

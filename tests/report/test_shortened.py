@@ -57,7 +57,8 @@ def test_a_table_has_the_digits_of_its_columns_and_lists_are_cut():
     rows = [Compared(at=2, share=1.23456789), Compared(at=3, share=math.inf, unknown=2.0)]
     columns, (first, second) = tables.of_rows(rows)
     assert columns == ["at", "share", "passed", "difference", "printed", "names", "unknown"]
-    assert first == ["2", "1.23", "True", "0", "1.234568", f"{76 * 'x'} ...", ""] and second[1::5] == [
+    assert first == ["2", "1.23", "True", "0", "1.234568", f"{76 * 'x'} ...", ""]
+    assert second[1::5] == [
         "",
         "2",
     ]

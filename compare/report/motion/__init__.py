@@ -46,21 +46,10 @@ def motion_in_html(sections: Sequence[Section], robot: Robot) -> str:
     data, stride, shown = inlined(scenes, engines)
     links, still = shown[0]["links"], stride * shown[0]["still"]
     ours, theirs = (outline(path[still], links) for path in on_page(scenes[0]))
-    text = (
-        environment()
-        .get_template("motion.html.jinja")
-        .render(
-            engines=engines,
-            scenes=shown,
-            data=Markup(data),
-            noun=robot.noun,
-            size=(WIDE, HIGH),
-            is_simple=len(links) <= FEW_STICKS,
-            outlines=(ours, theirs),
-            stride=stride,
-            left_out=[drawn.scene for drawn in scenes[len(shown) :]],
-        )
-    )
+    values = {"engines": engines, "scenes": shown, "data": Markup(data), "noun": robot.noun, "stride": stride}
+    values |= {"size": (WIDE, HIGH), "outlines": (ours, theirs), "is_simple": len(links) <= FEW_STICKS}
+    values["left_out"] = [drawn.scene for drawn in scenes[len(shown) :]]
+    text = environment().get_template("motion.html.jinja").render(values)
     return re.sub(r"\n\s*\n", "\n", text)  # an empty line would end the HTML inside of Markdown
 
 
