@@ -34,8 +34,8 @@ class About(Enum):
 class Check:
     """One verdict: the value is at most, at least or equal to the tolerance, or it was not judged.
 
-    value: None where a run diverged or a value is not finite; that never passes. judged: False where the comparison could not
-    have failed, or could not be made; the note says why. Such a check is neither passed nor failed.
+    value: None where a run diverged or a value is not finite; that never passes.
+    judged: False where the comparison could not have failed, or not be made; the note says why.
     """
 
     experiment: str
@@ -87,7 +87,7 @@ class Check:
 
 @dataclass
 class Result:
-    """The result of an experiment: rows of its tables, checks and findings. A subclass has what its figures need, too."""
+    """The result of an experiment; a subclass has what its figures need, too."""
 
     experiment: str
     rows: list[Any] = field(default_factory=list)  # each a Row
@@ -131,7 +131,7 @@ class Result:
     def not_judged(
         self, scene: str, quantity: str, reason: str, unit: str = "", about: About = About.MODELS
     ) -> Check:
-        """Add a check that was not judged: it neither passes nor fails, and no verdict says that the models agree."""
+        """Add a check that was not judged: it neither passes nor fails, and nothing is said to agree."""
         check = Check(self.experiment, scene, quantity, None, 0.0, unit, reason, about=about, judged=False)
         self.checks.append(check)
         return check

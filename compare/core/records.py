@@ -14,7 +14,7 @@ Record = TypeVar("Record", bound=Ordered)
 
 
 def records_in(folder: Path, name: str, kind: type[Record]) -> dict[str, Record]:
-    """The records `name = kind(field=literal, ...)` by the names of their modules, sorted by their field `order`."""
+    """The records `name = kind(field=literal, ...)` by the names of their modules, in their order."""
     records = {}
     for file in (*folder.glob("*.py"), *folder.glob("*/__init__.py")):
         _, begins, rest = file.read_text(encoding="utf-8").partition(f"\n{name} = {kind.__name__}(")

@@ -1,7 +1,7 @@
 """Sentences from templates: `say(finding)` is the text of a finding.
 
-Templates are found by name, NAME.md.jinja, in the folders of compare. Each is a set of macros; numbers are formatted there, with
-the filters below or Python's `format`.
+Templates are found by name, NAME.md.jinja, in the folders of compare. Each is a set of macros; numbers are
+formatted there, with the filters below or Python's `format`.
 """
 
 import base64
@@ -20,7 +20,7 @@ from markupsafe import Markup
 from .finding import Finding
 from .words import capital, in_one_line, listed, milliseconds, some_of
 
-# what Markdown, GitHub's kind of it or HTML take for markup: anywhere, at the edge of a word, at the beginning of a text
+# markup of Markdown and HTML: anywhere, at the edge of a word, at the beginning of a text
 MARKUP = re.compile(
     r"[`*<>&\"$~@]|\\(?![^\W_])|(?<![^\W_])_|_(?![^\W_])|\](?=\()|:(?=//)|(?<=www)\."
     r"|(?<!\S)#|\A[\[ ]|\A[-+=](?=[-=\s]*\Z|\s)|\A\d(?=\d*[.)](?:\s|\Z))"
@@ -31,12 +31,12 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @pass_eval_context
 def markup(context: EvalContext, value: object) -> object:
-    """A value as it stands in a template: in a document, whatever is not a piece of the document is escaped."""
+    """A value in a template: in a document, whatever is not a piece of it is escaped."""
     return escaped(value) if context.autoescape and not isinstance(value, Markup) else value
 
 
 def escaped(value: object) -> Markup:
-    """A value in one line of Markdown or HTML in which nothing is markup: signs that might be become character references."""
+    """A value in one line, whose signs that might be markup are character references."""
     return Markup(MARKUP.sub(reference, in_one_line(str(value))))
 
 

@@ -1,4 +1,4 @@
-"""Timing in turns, so that whatever slows the machine down slows all functions alike; and the processor's name."""
+"""Timing in turns, so that what slows the machine slows all functions alike; the processor's name."""
 
 import platform
 import time

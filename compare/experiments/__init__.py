@@ -1,7 +1,8 @@
-"""The experiments, one file or folder for each word of the command line; this module finds them by looking into its folder.
+"""The experiments: one file or folder for each word of the command line, found by looking into this folder.
 
-An experiment is a module with a record, `EXPERIMENT = Experiment(order=..., ...)`, whose fields are literals, and functions: see
-Functions. Its text is NAME.md.jinja: a macro for its help, title, claim, tolerance, and for each kind of finding and caption.
+An experiment is a module with a record, `EXPERIMENT = Experiment(order=..., ...)`, whose fields are literals,
+and functions: see Functions. Its text is NAME.md.jinja: a macro for its help, title, claim and tolerance, and
+for each kind of finding and caption.
 """
 
 import importlib

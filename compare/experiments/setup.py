@@ -18,7 +18,7 @@ Value = TypeVar("Value")
 
 
 def engines(mujoco: Engine, own: Engine | None = None) -> dict[str, Engine]:
-    """All engines by name; some may be unavailable. own: the engine of a user's own equations, if there are any."""
+    """All engines by name; some may be unavailable. own: of a user's own equations."""
     schemes = [method.scheme for method in mujoco.methods.values()]
     return made(schemes, {"mujoco": mujoco} | ({"own": own} if own else {}))
 
@@ -69,7 +69,7 @@ class Setup:
         return cls(robot, engines, states=50, exact_states=2, finer=(1, 2), size="small", **more)
 
     def compared(self, case: Case | None = None) -> dict[str, Dynamics]:
-        """The dynamics of a case (default: the robot unchanged) in the two engines that are compared, mujoco last."""
+        """The dynamics of a case (default: the robot unchanged) in the two engines, mujoco last."""
         return compared(self.engines, case or self.robot.case())
 
     @cached_property

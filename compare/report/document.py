@@ -1,4 +1,4 @@
-"""A report as one document in two media: report.md, which is short, and index.html, which has all and folds it.
+"""A report as one document in two media: report.md, which is short, and index.html, which folds what is long.
 
 Both are rendered from document.md.jinja; here is chosen how much of each part is shown.
 """
@@ -212,7 +212,7 @@ def link_to(sections: Sequence[Section]) -> str:
 
 
 def joints_of(robot: Robot) -> list[str]:
-    """The joints of a robot by their kinds with their counts: of a file as it has them, a free joint as one."""
+    """The joints of a robot by their kinds, counted; a free joint of a file is one."""
     counts = {feature.feature: feature.count for feature in robot.features}
     counts = counts or {name: robot.tree.kind.count(name) for name in robot.tree.kind}
     return [count(counts[kind], name) for kind, name in JOINTS.items() if counts.get(kind)]

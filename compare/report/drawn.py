@@ -24,7 +24,7 @@ class Drawn(NamedTuple):
     fixed: bool  # whether the first point does not move, as the first joint only turns
 
     def placed(self, room: Sequence[float], middle: Sequence[float]) -> list[np.ndarray]:
-        """The points of each engine in a drawing, whose y goes down: all in a room, (2,), about a middle, (2,)."""
+        """The points of each engine in a drawing, whose y goes down: in a room about a middle, (2,) each."""
         points = np.concatenate([path.reshape(-1, 2) for path in self.points.values()])
         points = points[np.isfinite(points).all(axis=1)]
         low, high = points.min(axis=0), points.max(axis=0)

@@ -22,7 +22,7 @@ OF_CAUSES = "rank", "place", "stated", "found", "text"
 
 
 def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
-    """All files of a report, the figures excepted, into a folder that has those; what could not be made of it.
+    """Write all files of a report, beside its figures; what could not be made of it.
 
     A part that breaks is left out and named in all files; the others are written.
     """
@@ -70,7 +70,7 @@ def csv_of_rows(rows: Sequence[Row]) -> str:
 
 
 def csv(records: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> str:
-    """A table with these or all columns: true and false in lower case, nothing for what is unknown or not a number."""
+    """A table with these or all columns: true and false in lower case, nothing for what is no number."""
     text, names = StringIO(), dict.fromkeys(name for record in records for name in record)
     table = DictWriter(text, columns or list(names), extrasaction="ignore", lineterminator="\n")
     table.writeheader()
@@ -80,7 +80,7 @@ def csv(records: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> st
 
 
 def cell(value: Any) -> Any:
-    """What stands in a file for a value; a text that a spreadsheet would compute begins with an apostrophe."""
+    """What stands for a value; a text that a spreadsheet would compute begins with an apostrophe."""
     if isinstance(value, bool | np.bool_):
         return str(value).lower()
     if isinstance(value, float) and math.isnan(value):

@@ -1,8 +1,9 @@
 """The output folder: a new report replaces the old one only when it is complete, however the run ends.
 
-A run writes to a folder `.new-XXXXXXXX` inside the output folder, and locks it; an unlocked one is left from a run that was
-killed. The report is written to `new` in that folder. The exchange moves the old report to `old`, renames `new` to `moving`,
-moves the new report out, and renames `moving` to `done`. From these names the old report can be restored at any moment.
+A run writes to a folder `.new-XXXXXXXX` inside the output folder, and locks it; an unlocked one is left from
+a run that was killed. The report is written to `new` in that folder. The exchange moves the old report to
+`old`, renames `new` to `moving`, moves the new report out, and renames `moving` to `done`. From these names
+the old report can be restored at any moment.
 """
 
 import json
@@ -171,7 +172,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def lock(folder: Path, wait: bool = True) -> int | None:
-    """A file descriptor with the folder's lock, which ends with the process; None: it is locked, or there are no locks."""
+    """A file descriptor with the lock, which ends with the process; None: locked, or there are no locks."""
     if fcntl is None:
         return None
     number = os.open(folder, os.O_RDONLY)

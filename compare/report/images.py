@@ -12,7 +12,7 @@ PALETTE = 255  # colours, and white: a chart has fewer that the eye tells apart
 
 
 def save_figure(figure: Any, path: Path) -> None:
-    """A figure of matplotlib as a PNG in which white paper stays white; any other figure writes its own file."""
+    """A figure of matplotlib as a PNG whose paper stays white; any other figure writes its own file."""
     if path.suffix != ".png":
         figure.savefig(path)
         return
@@ -28,7 +28,7 @@ def save_figure(figure: Any, path: Path) -> None:
 
 
 def embedded(path: Path) -> tuple[Markup, int, int]:
-    """A figure inside a page: the address with all its data, its width and height in pixels. OSError if there is none."""
+    """The address of a figure inside a page, with its data; its width and height, or OSError."""
     with Image.open(path) as image:
         width, height = image.size
     return Markup(f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"), width, height

@@ -13,7 +13,7 @@ COLUMNS = ["part", "question", "answered in", "answer"]
 
 
 def answers(sections: Sequence[Section], robot: Robot) -> Table | None:
-    """For each part that a run has answered its letter, the question, where it is answered, the answer; None: there is none."""
+    """For each part that a run has answered: its letter, question, place and answer; None: there is none."""
     ran = {section.name: section for section in sections}
     asked = [q for q in robot.questions if ran.keys() & set(q.answered_in.split(", "))]
     cells = [[q.part, q.question, q.answered_in, say(answer(ran, *q.answer))] for q in asked]
@@ -21,7 +21,7 @@ def answers(sections: Sequence[Section], robot: Robot) -> Table | None:
 
 
 def answer(ran: Mapping[str, Section], kind: str, *about: Any) -> Finding:
-    """One answer: ("figure", name), ("printed", items ...) or ("largest", experiment, quantity, {column: value}, ...)."""
+    """One answer; kind, about: see robots.Question."""
     if kind == "figure":
         return Finding("questions", "figure", {"name": about[0]})
     if kind == "printed":
@@ -39,7 +39,7 @@ def answer(ran: Mapping[str, Section], kind: str, *about: Any) -> Finding:
 def largest(
     ran: Mapping[str, Section], experiment: str, quantity: str, where: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """The largest difference of the engines in an experiment: of the rows with these values, or of this quantity."""
+    """The largest difference in an experiment: of the rows with these values, or of this quantity."""
     about = {"experiment": experiment, "quantity": quantity}
     if experiment not in ran:
         return about | {"state": "absent"}

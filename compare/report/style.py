@@ -1,4 +1,4 @@
-"""How figures look. Colours are Okabe and Ito's, which the colour-blind can tell apart; lines differ in dash and markers too.
+"""How figures look. Colours are Okabe and Ito's, for the colour-blind; lines differ in dash and marker too.
 
 A function that draws returns (file name, figure, caption), and computes nothing but positions on paper.
 """
@@ -44,7 +44,7 @@ def joint_lines(robot: Robot) -> dict[str, Line]:
 
 
 def file_name(*parts: str) -> str:
-    """The name of a figure: letters, digits, minus signs and underscores, no more than a file's name may have."""
+    """The name of a figure: letters, digits, minus signs and underscores, not too many."""
     return "_".join(re.sub(r"[^\w-]+", "_", part) for part in parts)[:60]
 
 
@@ -57,7 +57,7 @@ def zero_at_the_end(axis: Axis, end: float, far: float, most: int) -> None:
 
 
 def pixels(figure: Figure) -> np.ndarray:
-    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more to find its places.
+    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more.
 
     A text with a $ is no formula, unless it is a number of an axis.
     """

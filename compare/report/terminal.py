@@ -22,7 +22,7 @@ EMPTY_LINE, SHOW_CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the c
 
 
 class Terminal:
-    """Prints lines on stdout. If stderr is a terminal, it shows the progress there, else in a line now and then."""
+    """Prints lines on stdout, and the progress on stderr if that is a terminal, else now and then a line."""
 
     def __init__(self) -> None:
         self.out, self.err = Stream(sys.stdout), Stream(sys.stderr)
@@ -32,7 +32,7 @@ class Terminal:
         self.how_far: Callable[[], list[str]] = list
 
     def say(self, text: str = "", style: str = "") -> None:
-        """Print a line; on a narrower terminal without wide gaps if it fits then, else wrapped between words."""
+        """Print a line; on a narrower terminal without wide gaps if it fits then, else wrapped."""
         text, columns = in_one_line(text), self.out.columns()
         if columns and len(text) > columns:
             indent = " " * (len(text) - len(text.lstrip()))

@@ -1,4 +1,4 @@
-"""The outcome of a report: its sections, which checks fail, what explains that, and which parts could not be made."""
+"""The outcome of a report: its sections, which checks fail, what explains that, what could not be made."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -123,10 +123,7 @@ class Failures(NamedTuple):
 
 
 def failures(sections: Sequence[Section]) -> Failures:
-    """The failed checks: of the models, of broken experiments, the step, predictions that no run confirms, other engines.
-
-    And the checks that were not judged.
-    """
+    """The checks that fail, by their kinds, and those that were not judged."""
     checks = [check for section in sections for check in section.result.checks]
     kinds = About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION, About.ENGINE
     failed = [[check for check in checks if check.failed and check.about == kind] for kind in kinds]
@@ -193,7 +190,7 @@ def outcome(section: Section) -> str:
 
 
 def standing(section: Section) -> tuple[bool | None, str]:
-    """Whether a section passes, and that in two or three words; None where something was not judged, or nothing compared."""
+    """Whether a section passes, also in words; None: not all was judged, or nothing compared."""
     *failing, not_judged = failures([section])
     is_open = bool(not_judged) or not section.judged
     return (False if any(failing) else None if is_open else True), in_words(section, "standing")

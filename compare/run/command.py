@@ -32,7 +32,7 @@ DRAWING = "compare.report.style", *COMPUTING
 
 
 def carry_out(options: argparse.Namespace, command: str) -> int:
-    """Compare the models and write the report; the exit status. Refused: the request cannot be carried out."""
+    """Compare the models and write the report; the exit status. Refused: that is not possible."""
     started, terminal, is_alone = time.perf_counter(), Terminal(), options.experiment != "all"
     try:
         compared = compared_with(options.reference, options.mjcf, options.joints)

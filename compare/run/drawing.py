@@ -25,8 +25,8 @@ def draw(
 ) -> list[Figure]:
     """The figures of an experiment on disk.
 
-    others: the results for the picture of the first screen, see `results_needed`. few: this picture alone; the first figure of
-    an experiment that has none.
+    others: the results for the picture of the first screen, see `results_needed`.
+    few: this picture alone; the first figure of an experiment that has none.
     """
     most = None
     if few:
@@ -64,5 +64,5 @@ def picture_of(experiment: str) -> str:
 
 
 def quiet(robot: Robot) -> np.errstate:
-    """A block in which NumPy does not warn of NaN where a user's own equations may give it: checks report that."""
+    """A block in which NumPy does not warn of NaN of a user's own equations: checks report that."""
     return np.errstate(all="ignore" if robot.own else None)

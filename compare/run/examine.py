@@ -54,8 +54,8 @@ def examine(names: Sequence[str], setup: Setup, *place: Any) -> Examined:
 class Run:
     """The experiments of one run. clock: of the workers, it measures each experiment.
 
-    An experiment that raises is one failed check; the others go on. Among other experiments the diagnosis runs only if one of
-    them fails.
+    An experiment that raises is one failed check; the others go on. The diagnosis runs, among others, only if
+    one of them fails.
     """
 
     names: Sequence[str]
@@ -187,7 +187,7 @@ def section_with(name: str, result: Result, robot: Robot) -> Section:
 
 
 def add_problems(result: Result, problems: Sequence[Problem], told: set[int]) -> None:
-    """Add a failed check for each problem of the user's own equations that an experiment calls, before its other checks.
+    """Add a failed check for each problem of the user's own equations, before the other checks.
 
     told: the numbers of problems that need not be told again.
     """
@@ -202,10 +202,10 @@ def add_problems(result: Result, problems: Sequence[Problem], told: set[int]) ->
 
 
 def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[Cause]) -> list[Cause]:
-    """The causes of the failures in the last section, if it is the first that fails, or the first of DIAGNOSED that does.
+    """The causes of the failures in the last section, if it is the first that fails, or of DIAGNOSED.
 
-    Where numbers are stated, the causes are the numbers that differ, or what explains several of them at once. Else they are
-    also what the diagnosis finds at other places than the causes that are known.
+    Where numbers are stated, they are the numbers that differ, or what explains several of them at once. Else
+    they are also what the diagnosis finds at other places than the known ones.
     """
     failed = [section.name for section in sections if failures([section]).differing]
     if not failed or failed[-1] != sections[-1].name:
@@ -226,7 +226,7 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[Cause]
 
 
 def in_one(setup: Setup, of_numbers: Sequence[Cause]) -> list[Cause]:
-    """The causes; one option, convention, number or error of two replaces several numbers of Mbar and h if it explains them."""
+    """The causes; one option, convention, number or error of two replaces the numbers that it explains."""
     replaced = [cause["quantity"] for cause in of_numbers if cause["quantity"] in IN_EQUATIONS]
     if len(replaced) < 2:
         return list(of_numbers)
@@ -265,7 +265,7 @@ def say_outcome(
     new: Sequence[Mapping[str, Any]],
     known: bool = False,
 ) -> None:
-    """One line for an experiment, then the causes that are new, and the first failing checks that no cause explains.
+    """One line for an experiment, then the new causes, and the first failing checks that none explains.
 
     seconds: of the processor, for the experiment itself; known: whether there are causes, new ones or others.
     """

@@ -1,4 +1,4 @@
-"""The motion in the page: stick figures of both engines over each other, with a slider; it fetches nothing."""
+"""The motion in the page: stick figures of both engines, with a slider; it fetches nothing."""
 
 import json
 import math
@@ -33,8 +33,8 @@ Picture = list[int] | None  # x and y of each point; None from where the run has
 def motion_in_html(sections: Sequence[Section], robot: Robot) -> str:
     """A <figure> with its style and data, for SCRIPT, at most 300 kB; "" where no scene is drawn.
 
-    It opens on a scene in which the engines differ, if there is one. To stay small, it leaves out every second, fourth ...
-    picture, then the last scenes, with a note.
+    It opens on a scene in which the engines differ, if there is one. To stay small, it leaves out every
+    second, fourth ... picture, then the last scenes, with a note.
     """
     section = next((section for section in sections if section.scenes), None)
     if section is None:
