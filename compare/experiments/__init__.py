@@ -18,7 +18,7 @@ from ..core.records import records_in
 
 if TYPE_CHECKING:  # for --help, the names are enough
     from ..core.check import Result
-    from ..report.drawn import Drawn
+    from ..core.pictures import Pictures
     from ..robots import Robot
     from .setup import Setup
 
@@ -34,7 +34,7 @@ class Functions:
     figures: Callable[["Result", "Robot"], Iterable[Drawing]] = lambda result, robot: ()
     headline: Callable[["Result"], Finding | None] = lambda result: None  # its one number on the first screen
     overview: Callable[[Mapping[str, "Result"], "Robot"], Iterable[Drawing]] = lambda results, robot: ()
-    scenes_drawn: Callable[["Result"], Sequence["Drawn"]] = lambda result: ()  # the motion in the page
+    scenes_drawn: Callable[["Result"], Sequence["Pictures"]] = lambda result: ()  # the motion in the page
     claim_values: Callable[["Robot"], dict[str, Any]] = lambda robot: {}  # for the macros claim and tolerance
     skipped: Callable[["Robot"], Finding | None] = lambda robot: None  # why it does not apply to a robot
 

@@ -76,7 +76,7 @@ class Document:
         texts = [self.made("the first screen", self.first_screen)]
         if self.page:
             what = "the motion in index.html"
-            self.motion = self.parts.attempt(what, "", motion_in_html, report.sections, report.robot)
+            self.motion = self.parts.attempt(what, "", motion_in_html, report.sections, report.robot.noun)
             texts.append(self.motion)
         texts.append(self.made("the introduction", self.introduction))
         if report.causes:

@@ -8,11 +8,11 @@ from ..core.check import About, Check, Result
 from ..core.errors import described
 from ..core.experiment import Experiment
 from ..core.finding import Finding
+from ..core.pictures import Pictures
 from ..core.rows import Row
 from ..core.text import block, say
 from ..core.words import capital
 from ..robots import Robot
-from .drawn import Drawn
 from .plain_rows import in_rows
 
 Value = TypeVar("Value")
@@ -56,7 +56,7 @@ class Section:
     figures: list[Figure] = field(default_factory=list)
     explained: list[Check] = field(default_factory=list)  # failing checks that are gone without the causes
     record: Experiment = UNKNOWN  # what the program knows of it
-    scenes: Sequence[Drawn] = ()  # the motion
+    scenes: Sequence[Pictures] = ()  # the motion
 
     @property
     def notes(self) -> list[str]:

@@ -16,13 +16,13 @@ from PIL import Image
 from sections import section
 
 from compare.core.check import About
+from compare.core.pictures import Pictures
 from compare.core.text import environment
 from compare.report import images, motion, style
-from compare.report.drawn import Drawn
 from compare.robots.arm import ARM
 
 
-def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None) -> Drawn:
+def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None) -> Pictures:
     """A scene in which the points of the first engine go round, those of MuJoCo beside them; or any way that rng chooses."""
     turn = np.linspace(0.0, 1.0, pictures)[:, None] * 3.0 + np.arange(points)
     path = np.stack([np.cos(turn), np.sin(turn)], axis=-1) * np.arange(1, points + 1)[None, :, None]
@@ -33,14 +33,14 @@ def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None)
             np.where((t >= ended).reshape(-1, *[1] * (v.ndim - 1)), np.nan, v) for v in (ways[1], off)
         )
     links = [(k, k + 1) for k in range(points - 1)]
-    return Drawn(scene, "RK4, dt = 5/128 s", t, dict(zip(("tmt", "mujoco"), ways)), links, off, "rad",
-                 {"tmt": None, "mujoco": ended}, dict.fromkeys(("tmt", "mujoco")), "What is seen.", True)  # fmt: skip
+    paths, left = dict(zip(("tmt", "mujoco"), ways)), dict.fromkeys(("tmt", "mujoco"))
+    return Pictures(scene, "RK4, dt = 5/128 s", t, paths, links, off, "rad", left, "What is seen.", True)
 
 
 def page_of(*scenes, label="TMT") -> str:
     of = section("trajectory")
     of.scenes, of.result.label = scenes, label
-    return motion.motion_in_html([section("mass"), of], ARM)
+    return motion.motion_in_html([section("mass"), of], ARM.noun)
 
 
 def data_of(text) -> dict:
@@ -63,7 +63,7 @@ def test_it_opens_on_the_scene_that_differs():
     scenes = zip(of.result.checks, ("let go", "held"))
     of.result.checks = [replace(check, scene=f"{scene}, RK4") for check, scene in scenes]
     of.scenes = drawn("held"), drawn("let"), drawn("let go")
-    names = [scene["name"] for scene in data_of(motion.motion_in_html([of], ARM))["scenes"]]
+    names = [scene["name"] for scene in data_of(motion.motion_in_html([of], ARM.noun))["scenes"]]
     assert names == ["let go", "held", "let"]
 
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from ...core.check import Result, largest_known
 from ...core.finding import Finding
+from ...core.pictures import Pictures
 from ...engines import LABELS, Engine
 from ...engines.mujoco.names import INTEGRATORS
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES, leaves_no_digits, movement_unit
-from ...report.drawn import Drawn
 from ...robots import Robot
 from ...robots.case import Case
 from ...truth.reference import RECORDS, reference
@@ -137,7 +137,7 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
         yield partial(figures_motion_gif.draw_motion, result)
 
 
-def scenes_drawn(result: Result) -> Sequence[Drawn]:
+def scenes_drawn(result: Result) -> Sequence[Pictures]:
     return result.curves.get("drawn", ())
 
 

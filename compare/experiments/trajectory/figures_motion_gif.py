@@ -1,6 +1,6 @@
 """The motion as a GIF: the stick figures of both engines over each other, held and let go.
 
-Drawn without matplotlib, which takes seconds for a hundred pictures. The first engine's sticks are wide with
+Pictures without matplotlib, which takes seconds for a hundred pictures. The first engine's sticks are wide with
 discs, MuJoCo's narrow with rings.
 """
 
@@ -14,10 +14,10 @@ from PIL import Image, ImageDraw, ImageFont
 
 from ...core.check import Result
 from ...core.finding import Finding
+from ...core.pictures import Pictures
 from ...core.words import capital
 from ...engines import LABELS
 from ...report.style import BLUE, ORANGE
-from .motion import Drawn
 
 PIXELS, TOP, BOTTOM = (640, 420), 78, 34  # pixels; and the margins for text above and below
 ROOM = PIXELS[0] - 36, PIXELS[1] - TOP - BOTTOM - 36
@@ -35,7 +35,7 @@ class Animation:
 
     suffix = ".gif"
 
-    def __init__(self, scenes: Sequence[Drawn], label: str):
+    def __init__(self, scenes: Sequence[Pictures], label: str):
         self.scenes, self.label = scenes, label
 
     def savefig(self, path: Path) -> None:
@@ -63,7 +63,7 @@ def draw_motion(result: Result) -> tuple[str, Animation, Finding]:
     )
 
 
-def one_picture(scene: Drawn, k: int, still: Image.Image, paths: Sequence[np.ndarray]) -> Image.Image:
+def one_picture(scene: Pictures, k: int, still: Image.Image, paths: Sequence[np.ndarray]) -> Image.Image:
     """The k-th picture of a scene; still: the text in all of them; paths: of each engine, in pixels."""
     image = still.copy()
     pen = ImageDraw.Draw(image)
@@ -77,7 +77,7 @@ def one_picture(scene: Drawn, k: int, still: Image.Image, paths: Sequence[np.nda
     return image.reduce(FINE)
 
 
-def words_of_picture(scene: Drawn, k: int) -> tuple[str, str, str]:
+def words_of_picture(scene: Pictures, k: int) -> tuple[str, str, str]:
     """The text of the k-th picture: its time; the engines' difference, or which has diverged; which has left by then."""
     lost = [name for name, path in scene.points.items() if not np.isfinite(path[k]).all()]
     apart = "; ".join(f"{capital(LABELS[name])} has diverged" for name in lost)
@@ -103,7 +103,7 @@ def draw_sticks(pen: ImageDraw.ImageDraw, points: np.ndarray, links: Sequence[tu
             pen.circle(place, disc - 3 * FINE / 2, fill="white")
 
 
-def text_of_scene(scene: Drawn, label: str, base: np.ndarray) -> Image.Image:
+def text_of_scene(scene: Pictures, label: str, base: np.ndarray) -> Image.Image:
     """What is in all pictures of a scene: its name, run, the engines, a frame where the robot is fixed."""
     image = Image.new("RGB", (FINE * PIXELS[0], FINE * PIXELS[1]), "white")
     pen = ImageDraw.Draw(image)
@@ -121,7 +121,7 @@ def write(pen: ImageDraw.ImageDraw, place: tuple, text: str, size: int, anchor: 
     pen.text((FINE * place[0], FINE * place[1]), text, fill=BLACK, font=font(FINE * size), anchor=anchor)
 
 
-def slower(scene: Drawn) -> str:
+def slower(scene: Pictures) -> str:
     """By what factor a scene is shown slower, in words; nothing where that is hardly seen."""
     times = CENTISECONDS / 100.0 / float(scene.t[1] - scene.t[0])
     if 0.9 < times < 1.1:

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...core.finding import Finding
+from ...core.pictures import Pictures
 from ...engines import LABELS
 from ...judge.run import LEFT, movement_unit, step_in_words
-from ...report.drawn import Drawn
 from ...robots import Robot
 from ...robots.case import Case
 from ...robots.stick import as_seen, stick_figure
@@ -16,7 +16,7 @@ from .true_motion import SCHEMES_OF_RK4
 FRAMES = 128  # of a scene, about, without its start
 
 
-def drawn_motion(case: Case, runs: Mapping[tuple, dict]) -> Drawn | None:
+def drawn_motion(case: Case, runs: Mapping[tuple, dict]) -> Pictures | None:
     """The motion of a case by RK4; None if there is no such run.
 
     A held scene is drawn with its own step, as the departure depends on the step; others with the finest one.
@@ -43,7 +43,7 @@ def drawn_motion(case: Case, runs: Mapping[tuple, dict]) -> Drawn | None:
         "diverged": [{"label": LABELS[name], "time": end} for name, end in curve["ended"].items() if end is not None],
     })  # fmt: skip
     run, fixed = f"{curve['integrator']}, {step_in_words(case, steps)}", case.robot.tree.kind[0] != "slide"
-    return Drawn(case.name, run, times, points, links, apart, unit, curve["ended"], left, seen, fixed)
+    return Pictures(case.name, run, times, points, links, apart, unit, left, seen, fixed)
 
 
 def frames(
@@ -67,7 +67,7 @@ def frames(
     return times, np.where((times <= t[alive][-1])[:, None], between, np.nan)
 
 
-def in_order(drawn: Sequence[Drawn], robot: Robot) -> list[Drawn]:
+def in_order(drawn: Sequence[Pictures], robot: Robot) -> list[Pictures]:
     """Scenes in the order of the page: a held one, if possible with a departure; a free one, if possible from there; the rest."""
     cases = {case.name: case for case in robot.cases}
     held = [each for each in drawn if cases[each.scene].is_held]

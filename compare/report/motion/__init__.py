@@ -11,10 +11,9 @@ import numpy as np
 from markupsafe import Markup
 
 from ...core.finding import Finding
+from ...core.pictures import Pictures
 from ...core.text import environment, say
 from ...core.words import capital, scene_of
-from ...robots import Robot
-from ..drawn import Drawn
 from ..verdict import Section, failures
 
 MOST_BYTES = 280_000  # of the motion in the page
@@ -22,15 +21,13 @@ STICK_BYTES = 48  # of a stick in the picture without script
 LARGEST_STRIDE = 8  # every eighth picture of each scene is shown before scenes are left out
 WIDE, HIGH, BORDER = 1000, 480, 45  # of the drawing, in its own units
 ROOM, MIDDLE = (WIDE - 2 * BORDER, HIGH - 2 * BORDER), (WIDE / 2, HIGH / 2)
-FEW_STICKS = 6  # up to which they are drawn wide
 SHOWN_FOR = 5.0  # s, at least about: a shorter scene is shown slower
-UNDER = 0.9  # of motion shown at its own speed
 # the only script that the page may run
 SCRIPT = Markup((Path(__file__).parent / "motion.js").read_text(encoding="utf-8"))
-Picture = list[int] | None  # x and y of each point; None from where the run has diverged
+Outline = list[int] | None  # x and y of each point; None from where the run has diverged
 
 
-def motion_in_html(sections: Sequence[Section], robot: Robot) -> str:
+def motion_in_html(sections: Sequence[Section], noun: str) -> str:
     """A <figure> with its style and data, for SCRIPT, at most 300 kB; "" where no scene is drawn.
 
     It opens on a scene in which the engines differ, if there is one. To stay small, it leaves out every
@@ -39,25 +36,25 @@ def motion_in_html(sections: Sequence[Section], robot: Robot) -> str:
     section = next((section for section in sections if section.scenes), None)
     if section is None:
         return ""
-    names = [drawn.scene for drawn in section.scenes]
+    names = [pictures.scene for pictures in section.scenes]
     differing = {scene_of(check.scene, names) for check in failures([section]).differing}
-    scenes = sorted(section.scenes, key=lambda drawn: drawn.scene not in differing)
+    scenes = sorted(section.scenes, key=lambda pictures: pictures.scene not in differing)
     engines = [capital(section.result.label), "MuJoCo"]
     data, stride, shown = inlined(scenes, engines)
-    links, still = shown[0]["links"], stride * shown[0]["still"]
-    ours, theirs = (outline(path[still], links) for path in on_page(scenes[0]))
-    values = {"engines": engines, "scenes": shown, "data": Markup(data), "noun": robot.noun, "stride": stride}
-    values |= {"size": (WIDE, HIGH), "outlines": (ours, theirs), "is_simple": len(links) <= FEW_STICKS}
-    values["left_out"] = [drawn.scene for drawn in scenes[len(shown) :]]
+    still = stride * shown[0]["still"]
+    ours, theirs = (outline(path[still], scenes[0].links) for path in on_page(scenes[0]))
+    values = {"engines": engines, "scenes": shown, "data": Markup(data), "noun": noun, "stride": stride}
+    values |= {"size": (WIDE, HIGH), "outlines": (ours, theirs), "is_simple": scenes[0].few_sticks}
+    values["left_out"] = [pictures.scene for pictures in scenes[len(shown) :]]
     text = environment().get_template("motion.html.jinja").render(values)
     return re.sub(r"\n\s*\n", "\n", text)  # an empty line would end the HTML inside of Markdown
 
 
-def inlined(scenes: Sequence[Drawn], engines: Sequence[str]) -> tuple[str, int, list[dict[str, Any]]]:
+def inlined(scenes: Sequence[Pictures], engines: Sequence[str]) -> tuple[str, int, list[dict[str, Any]]]:
     """The scenes as JSON for a page, the stride over their pictures, and the scenes that are in it."""
     stride, count = 1, len(scenes)
     while True:
-        shown = [inlined_scene(drawn, stride) for drawn in scenes[:count]]
+        shown = [inlined_scene(pictures, stride) for pictures in scenes[:count]]
         text = json.dumps({"engines": engines, "scenes": shown}, separators=(",", ":"), allow_nan=False)
         text = text.replace("<", "\\u003c")
         if len(text.encode()) + STICK_BYTES * len(shown[0]["links"]) <= MOST_BYTES:
@@ -68,43 +65,41 @@ def inlined(scenes: Sequence[Drawn], engines: Sequence[str]) -> tuple[str, int, 
             count -= 1
 
 
-def inlined_scene(drawn: Drawn, stride: int) -> dict[str, Any]:
+def inlined_scene(pictures: Pictures, stride: int) -> dict[str, Any]:
     """One scene as the script has it: of each engine a list of pictures.
 
     A picture is 0 where it is the one before, 1 where it is that of the first engine.
     """
-    ours, theirs = (path[::stride] for path in on_page(drawn))
-    dt = stride * float(drawn.t[1] - drawn.t[0])
-    slower = SHOWN_FOR / float(drawn.t[-1])
-    slower = slower if slower > 1.0 / UNDER else 1.0
-    alive = [k for k, pictures in enumerate(zip(ours, theirs)) if None not in pictures]
-    values = {"scene": drawn.scene, "run": drawn.run, "seen": say(drawn.seen), "slower": slower}
+    ours, theirs = (path[::stride] for path in on_page(pictures))
+    dt = stride * float(pictures.t[1] - pictures.t[0])
+    slower = max(1.0, pictures.slower(SHOWN_FOR / (len(pictures.t) - 1)))
+    values = {"scene": pictures.scene, "run": pictures.run, "seen": say(pictures.seen), "slower": slower}
     return {
-        "name": drawn.scene,
-        "seen": say(Finding("motion", "seen", values)),
+        "name": pictures.scene,
+        "seen": say(Finding("trajectory", "picture_in_page", values)),
         "dt": dt,
         "pause": max(1, round(1000.0 * dt * slower)),
-        "unit": drawn.unit,
-        "still": alive[-1],
-        "base": "M{} {}m-18-18h36v36h-36z".format(*(ours[0] or ())[:2]) if drawn.fixed else "",
-        "links": [list(link) for link in drawn.links],
-        "apart": [float(f"{off:.1e}") if math.isfinite(off) else None for off in drawn.apart[::stride]],
+        "unit": pictures.unit,
+        "still": max(k for k, both in enumerate(zip(ours, theirs)) if None not in both),
+        "base": "M{} {}m-18-18h36v36h-36z".format(*(ours[0] or ())[:2]) if pictures.fixed else "",
+        "links": pictures.links,
+        "apart": [float(f"{off:.1e}") if math.isfinite(off) else None for off in pictures.apart[::stride]],
         "paths": [shorter(ours), shorter(theirs, ours)],
     }
 
 
-def on_page(drawn: Drawn) -> list[list[Picture]]:
+def on_page(pictures: Pictures) -> list[list[Outline]]:
     """The pictures of each engine, in the units of the drawing."""
-    return [[whole_numbers(points) for points in path] for path in drawn.placed(ROOM, MIDDLE)]
+    return [[whole_numbers(points) for points in path] for path in pictures.placed(ROOM, MIDDLE)]
 
 
-def whole_numbers(points: np.ndarray) -> Picture:
+def whole_numbers(points: np.ndarray) -> Outline:
     return points.round().astype(int).ravel().tolist() if np.isfinite(points).all() else None
 
 
-def shorter(pictures: Sequence[Picture], others: Sequence[Picture] = ()) -> list[Picture | int]:
+def shorter(pictures: Sequence[Outline], others: Sequence[Outline] = ()) -> list[Outline | int]:
     """Pictures with 0 for one that equals the one before, and 1 for one that equals the other engine's."""
-    short: list[Picture | int] = list(pictures)
+    short: list[Outline | int] = list(pictures)
     for k, picture in enumerate(pictures):
         if k > 0 and picture == pictures[k - 1]:
             short[k] = 0
@@ -113,7 +108,7 @@ def shorter(pictures: Sequence[Picture], others: Sequence[Picture] = ()) -> list
     return short
 
 
-def outline(picture: Picture, links: Sequence[Sequence[int]]) -> str:
+def outline(picture: Outline, links: Sequence[Sequence[int]]) -> str:
     """The sticks of a picture as a path of SVG."""
     points = np.reshape(picture or [], (-1, 2)).tolist()
     return "".join("M{} {}L{} {}".format(*points[i], *points[j]) for i, j in links)
