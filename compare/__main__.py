@@ -12,7 +12,7 @@ if __name__ == "__main__":
     os.environ.setdefault(
         "MUJOCO_GL", "disabled"
     )  # nothing is rendered: no further process looks for a display
-    # the matrices are small, and other processes compute too: threads of a product would only wait for each other
+    # the matrices are small, and other processes compute too: threads of a product would wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     interrupt.listen()  # before anything that takes its time
     if not interrupt.PARENT and any(":" in word for word in sys.argv[1:]):  # perhaps a user's own equations
@@ -30,7 +30,7 @@ from .core.errors import Refused, described
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit status. SystemExit after help or a wrong word: see command_line.request."""
+    """Run the command line; the exit status. SystemExit: see command_line.request."""
     try:
         return status_of(sys.argv[1:] if arguments is None else arguments)
     except BaseException as error:

@@ -13,8 +13,6 @@ FILES = sorted((ROOT / "compare").rglob("*.py"))
 OF_TMT = sorted((ROOT / "tmt").rglob("*.py"))
 PAGE = ROOT / "ARCHITECTURE.md"
 DIAGRAM = re.compile(r"(?<=```mermaid\n).*?(?=```)", re.DOTALL)
-# for all: words from templates, the style of figures, the name of any number type
-SHARED = {"compare.core.text", "compare.report.style", "tmt.scalar"}
 
 
 def dotted(path) -> str:
@@ -27,18 +25,17 @@ MODULES = {dotted(file) for file in [*FILES, *OF_TMT]}
 
 
 @cache
-def imports(path) -> frozenset[str]:
-    """Full names of what a file imports, wherever in it: a module, or a name in one; types of its own folder do not count."""
-    package = dotted(path) if path.name == "__init__.py" else dotted(path).rpartition(".")[0]
-    found, nodes = set(), list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
-    of_types = [
-        node for node in nodes if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-    ]
-    for_types = [inner for node in of_types for inner in node.body if getattr(inner, "level", 0) == 1]
-    for node in nodes:
+def imports(path, for_types=True) -> frozenset[str]:
+    """Full names of what a file imports, wherever in it: a module, or a name in one. for_types: also if for annotations alone."""
+    package, tree = dotted(path if path.name == "__init__.py" else path.parent / "__init__.py"), parsed(path)
+    blocks = [node for node in ast.walk(tree) if isinstance(node, ast.If)]
+    of_types = [block for block in blocks if ast.unparse(block.test) == "TYPE_CHECKING" and not for_types]
+    left_out = {node for block in of_types for node in ast.walk(block)}
+    found = set()
+    for node in set(ast.walk(tree)) - left_out:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node not in for_types:
+        elif isinstance(node, ast.ImportFrom):
             base = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
             start = ".".join([*base, *filter(None, [node.module])])
             found |= {f"{start}.{alias.name}" for alias in node.names}
@@ -46,11 +43,15 @@ def imports(path) -> frozenset[str]:
 
 
 @cache
-def modules_imported(path) -> set[str]:
+def parsed(path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def modules_imported(path, for_types=True) -> set[str]:
     """The modules of compare and tmt that a file imports."""
-    return {name if name in MODULES else name.rpartition(".")[0] for name in imports(path)} & MODULES - {
-        dotted(path)
-    }
+    names = imports(path, for_types)
+    return {name if name in MODULES else name.rpartition(".")[0] for name in names} & MODULES - {dotted(path)}
 
 
 def folder(module: str) -> str:
@@ -59,10 +60,10 @@ def folder(module: str) -> str:
 
 
 def folder_imports() -> dict[tuple[str, str], int]:
-    """How many imports there are from a folder to another, without SHARED."""
+    """How many imports there are from a folder to another."""
     counts = {}
     for path in [*FILES, *OF_TMT]:
-        for name in modules_imported(path) - SHARED:
+        for name in modules_imported(path) - {"tmt.scalar"}:  # a name for any number type
             pair = folder(dotted(path)), folder(name)
             if pair[0] != pair[1]:
                 counts[pair] = counts.get(pair, 0) + 1

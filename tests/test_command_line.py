@@ -230,9 +230,8 @@ def test_a_bad_request_gets_one_line_and_status_2(arguments, capsys, monkeypatch
         status = stop.code
     out, err = capsys.readouterr()
     assert (status, out, len(err.splitlines())) == (2, "", 1) and WRONG[arguments] in err, err
-    assert (
-        err.startswith("python -m compare: ") and {path.name for path in tmp_path.iterdir()} == FILES.keys()
-    )
+    assert err.startswith("python -m compare: ")
+    assert {path.name for path in tmp_path.iterdir()} == FILES.keys()
 
 
 def test_values_at_the_edge_are_accepted_and_those_beyond_are_not():

@@ -164,14 +164,14 @@ def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, m
 
     for name in names:
         made(monkeypatch, name, rows=partial(rows, name), figures=partial(figures, name))
-    setup = SimpleNamespace(engines={}, robot=ARM, progress=lambda text: None, is_quick=False, alone=True)
+    setup = SimpleNamespace(own=None, robot=ARM, progress=lambda text: None, is_quick=False, alone=True)
     sections, causes, skipped = experiment.examine(names, setup, tmp_path, Terminal(), Writing(log))
     assert log == [
         ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"), ("rows", "speed"),
         ("rows", "reduction"), ("figures", "speed"), ("figures", "reduction"),
     ]  # fmt: skip
     assert [section.name for section in sections] == names and (causes, skipped) == ([], {})
-    of_each = [sorted(file for file, _ in one.figures) for one in sections]
+    of_each = [sorted(figure.file for figure in one.figures) for one in sections]
     assert of_each == [[f"{name}_first", f"{name}_other", f"{name}_second"] for name in names]
 
 
@@ -181,5 +181,5 @@ def test_figures_whose_names_differ_in_capitals_are_two_files(tmp_path, monkeypa
         "two",
         figures=lambda result, robot: [partial(plot, None, name) for name in ("first", "First")],
     )
-    assert [name for name, _ in drawing.draw("two", None, None, tmp_path)] == ["first", "First_"]
+    assert drawing.draw("two", None, ARM, tmp_path, {}) == [("first", "A caption."), ("First_", "A caption.")]
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["First_.png", "first.png"]

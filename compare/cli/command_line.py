@@ -5,7 +5,7 @@ import shlex
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from textwrap import fill
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from ..core.text import block
 from ..core.words import in_one_line
@@ -19,28 +19,26 @@ EXAMPLES = block(TEXT, "examples")
 
 
 class Parser(argparse.ArgumentParser):
-    def __init__(self, **more):
+    """A parser whose errors are one line, and whose help has no line too wide."""
+
+    def __init__(self, **more: Any):
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False, **more)
 
-    def error(self, message):
+    def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {in_one_line(' '.join(message.split()))}\n")
+        raise AssertionError  # exit ends the process
 
     def add_option(self, name: str, option: "Option", template: str) -> None:
         """Add an option; its help is the macro of its name."""
-        text = " ".join(block(template, name.strip("-")).split())
-        if option.type is None:
-            self.add_argument(name, action="store_true", help=text)
-        else:
-            self.add_argument(
-                name, type=option.type, metavar=option.metavar, default=option.default, help=text
-            )
+        values: dict[str, Any] = {"action": "store_true"}
+        if option.type:
+            values = {"type": option.type, "metavar": option.metavar, "default": option.default}
+        self.add_argument(name, help=" ".join(block(template, name.strip("-")).split()), **values)
 
     def refuse_option(self, word: str, options: Sequence[str]) -> NoReturn:
         """End with an unknown option, and the nearest known one."""
-        names = {name.strip("-"): name for name in options}
-        self.error(
-            f"{word!r} is not an option; {expected(word.strip('-').split('=')[0], names, ' '.join(options))}"
-        )
+        names, name = {name.strip("-"): name for name in options}, word.strip("-").split("=")[0]
+        self.error(f"{word!r} is not an option; {expected(name, names, ' '.join(options))}")
 
 
 def not_empty(text: str) -> str:
@@ -53,11 +51,10 @@ def seconds(most: float) -> Callable[[str], float]:
     """A type of options: a time, s."""
 
     def time(text: str) -> float:
-        if not 1e-6 <= float(text) <= most:
-            raise argparse.ArgumentTypeError(
-                f"{text!r} is not a time: expected seconds, from 1e-6 to {most:g}"
-            )
-        return float(text)
+        if 1e-6 <= float(text) <= most:
+            return float(text)
+        wrong = f"{text!r} is not a time: expected seconds, from 1e-6 to {most:g}"
+        raise argparse.ArgumentTypeError(wrong)
 
     return time
 
@@ -72,22 +69,19 @@ def stated_reference(text: str) -> str:
     """What a model is compared with; a text with a colon is read later."""
     if text in ("arm", "model") or ":" in text or text.lower().endswith((".xml", ".mjcf")):
         return text
+    choices = "arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT"
+    hint = expected(text, {"arm": "arm", "model": "model"}, choices)
     if text.endswith(".py"):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a reference; expected {text}: (all of it), or FILE.py:OBJECT"
-        )
-    hint = expected(
-        text, {"arm": "arm", "model": "model"}, "arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT"
-    )
+        hint = f"expected {text}: (all of it), or FILE.py:OBJECT"
     raise argparse.ArgumentTypeError(f"{text!r} is not a reference; {hint}")
 
 
 class Option(NamedTuple):
     """An option of the command line; its help is a macro of the template."""
 
-    type: Callable[[str], object] | None = not_empty  # None: it takes no value
+    type: Callable[[str], Any] | None = not_empty  # None: it takes no value
     metavar: str | None = None
-    default: object = None
+    default: str | None = None
     of_every: bool = False  # whether every experiment takes it; else `all`, and those whose record has it
     example: str = ""  # of its use, in the help of those
 
@@ -106,16 +100,14 @@ OPTIONS = {
 
 def parser(experiment: str | None = None) -> Parser:
     """The parser of one experiment with the options that it takes, or of all."""
-    lines = [f"  {name:<13} {block(name, 'summary')}" for name in EXPERIMENTS]
-    lines = [fill(line, LINE_WIDTH, subsequent_indent=" " * 16) for line in lines]
-    of_all = [block(TEXT, "description"), "", "experiments (`all`: every one of them):", *lines]
-    made = Parser(
-        prog=PROGRAM,
-        usage=f"{PROGRAM} {experiment or 'EXPERIMENT|all'} [options]",
-        description=help_of(experiment) if experiment else "\n".join(of_all),
-        epilog=None if experiment else EXAMPLES,
-    )
-    if experiment is None:
+    usage = f"{PROGRAM} {experiment or 'EXPERIMENT|all'} [options]"
+    if experiment:
+        made = Parser(prog=PROGRAM, usage=usage, description=help_of(experiment))
+    else:
+        lines = [f"  {name:<13} {block(name, 'summary')}" for name in EXPERIMENTS]
+        lines = [fill(line, LINE_WIDTH, subsequent_indent=" " * 16) for line in lines]
+        of_all = [block(TEXT, "description"), "", "experiments (`all`: every one of them):", *lines]
+        made = Parser(prog=PROGRAM, usage=usage, description="\n".join(of_all), epilog=EXAMPLES)
         made.add_argument("experiment", nargs="?", help=argparse.SUPPRESS)
         made.add_argument("--version", action="store_true", help=block(TEXT, "version"))
     made.add_argument("-h", "--help", action="store_true", help=block(TEXT, "help"))
@@ -127,12 +119,8 @@ def parser(experiment: str | None = None) -> Parser:
 
 def command_parser(name: str, usage: str, template: str, options: dict[str, Option]) -> Parser:
     """The parser of a command that is no experiment; its texts are macros of its template."""
-    made = Parser(
-        prog=f"{PROGRAM} {name}",
-        usage=f"{PROGRAM} {name} {usage} [options]",
-        description=block(template, "help"),
-        epilog=block(template, "examples") + "\n",
-    )
+    texts = {"description": block(template, "help"), "epilog": block(template, "examples") + "\n"}
+    made = Parser(prog=f"{PROGRAM} {name}", usage=f"{PROGRAM} {name} {usage} [options]", **texts)
     for option in options:
         made.add_option(option, options[option], template)
     made.add_argument("-h", "--help", action="store_true", help="this text")
@@ -156,39 +144,39 @@ def expected(word: str, known: dict[str, str], choices: str) -> str:
 
 def request(arguments: Sequence[str]) -> argparse.Namespace:
     """The parsed request. SystemExit: with 0 after help, with 2 and one line for what is mistyped."""
-    whole, words = parser(), list(arguments) or ["--help"]
+    of_all, words = parser(), list(arguments) or ["--help"]
     if "--joints" in words[:-1]:  # its value may begin with a minus
         at = words.index("--joints")
         words[at : at + 2] = [f"--joints={words[at + 1]}"]
-    options, unknown = whole.parse_known_args(words)
-    refuse_words(whole, options, unknown, shlex.join(arguments))
+    options, unknown = of_all.parse_known_args(words)
+    name = options.experiment
+    refuse_words(of_all, options, unknown, shlex.join(arguments))
     if options.help:
-        (whole if options.experiment in (None, "all") else parser(options.experiment)).print_help()
+        (of_all if name in (None, "all") else parser(name)).print_help()
         raise SystemExit(0)
-    name, given = options.experiment, vars(options)
     for option in OPTIONS if name != "all" else ():
         takers = [other for other, record in EXPERIMENTS.items() if option in record.options]
-        if given[option.strip("-")] and not OPTIONS[option].of_every and name not in takers:
-            whole.error(f"{option} is an option of {', '.join(takers)}; {name} does not take it")
+        if vars(options)[option.strip("-")] and not OPTIONS[option].of_every and name not in takers:
+            of_all.error(f"{option} is an option of {', '.join(takers)}; {name} does not take it")
     if options.joints and ":" not in (options.reference or ""):
-        whole.error("--joints needs equations of your own: --reference FILE.py:OBJECT or MODULE:OBJECT")
+        of_all.error("--joints needs equations of your own: --reference FILE.py:OBJECT or MODULE:OBJECT")
     needs_file = name in EXPERIMENTS and EXPERIMENTS[name].needs_file
     if needs_file and not (options.mjcf or options.reference or options.version):
-        whole.error(f"{name} needs a robot's file or equations of your own (--mjcf, --reference)")
+        of_all.error(f"{name} needs a robot's file or equations of your own (--mjcf, --reference)")
     return options
 
 
-def refuse_words(whole: Parser, options: argparse.Namespace, unknown: Sequence[str], given: str) -> None:
+def refuse_words(of_all: Parser, options: argparse.Namespace, unknown: Sequence[str], line: str) -> None:
     name, choices = options.experiment, f"{', '.join(EXPERIMENTS)} or all"
     for word in unknown:
         if word.startswith("-"):
-            whole.refuse_option(word, list(OPTIONS))
+            of_all.refuse_option(word, list(OPTIONS))
     if name is None and not (options.help or options.version):
-        whole.error(f"expected an experiment: {choices}, as in {PROGRAM} all {given}")
+        of_all.error(f"expected an experiment: {choices}, as in {PROGRAM} all {line}")
     if name in (FLEET, EQUATIONS):
-        whole.error(f"{name} must come first, before its options, as in {PROGRAM} {name} --help")
+        of_all.error(f"{name} must come first, before its options, as in {PROGRAM} {name} --help")
     if name not in (None, "all", *EXPERIMENTS):
         words = {word: word for word in (*EXPERIMENTS, "all", FLEET, EQUATIONS)} | {"help": "--help"}
-        whole.error(f"{name!r} is not an experiment; {expected(name, words, choices)}")
+        of_all.error(f"{name!r} is not an experiment; {expected(name, words, choices)}")
     if unknown:
-        whole.error(f"unexpected argument {unknown[0]!r}: expected one experiment, or all")
+        of_all.error(f"unexpected argument {unknown[0]!r}: expected one experiment, or all")

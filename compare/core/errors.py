@@ -26,8 +26,9 @@ def how_ended(code: int) -> str:
 
 def place(error: BaseException) -> str:
     """The last line of this project in the traceback, "compare/mass.py:12"; "" if there is none."""
-    if getattr(error, "place", ""):  # set by the process that raised it
-        return error.place
+    place_elsewhere: str = getattr(error, "place", "")  # set by the process that raised it
+    if place_elsewhere:
+        return place_elsewhere
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         path = Path(frame.filename)
         if any(path.is_relative_to(ROOT / name) for name in ("compare", "tmt")):

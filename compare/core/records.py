@@ -2,18 +2,25 @@
 
 import ast
 from pathlib import Path
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
-Record = TypeVar("Record")
+
+class Ordered(Protocol):
+    @property
+    def order(self) -> int: ...
+
+
+Record = TypeVar("Record", bound=Ordered)
 
 
 def records_in(folder: Path, name: str, kind: type[Record]) -> dict[str, Record]:
-    """The records `name = kind(field=literal, ...)` by the names of their modules, sorted by their field `order`."""
+    """The records `name = kind(field=literal, ...)` by the names of their modules, in their order."""
     records = {}
     for file in (*folder.glob("*.py"), *folder.glob("*/__init__.py")):
-        text = file.read_text(encoding="utf-8")
-        for node in ast.parse(text).body if f"\n{name} = {kind.__name__}(" in text else ():
-            if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", None) == name:
-                fields = {field.arg: ast.literal_eval(field.value) for field in node.value.keywords}
-                records[file.parent.name if file.stem == "__init__" else file.stem] = kind(**fields)
+        _, begins, rest = file.read_text(encoding="utf-8").partition(f"\n{name} = {kind.__name__}(")
+        if begins:
+            call = ast.parse(f"kind({rest}").body[0]
+            assert isinstance(call, ast.Expr) and isinstance(call.value, ast.Call)
+            fields = {str(field.arg): ast.literal_eval(field.value) for field in call.value.keywords}
+            records[file.parent.name if file.stem == "__init__" else file.stem] = kind(**fields)
     return dict(sorted(records.items(), key=lambda item: item[1].order))

@@ -4,7 +4,7 @@
     class Limit(MovementRow):
         scene: str
         predicted_dt: float | None = column("s", digits=5)  # the column predicted_dt_s
-        deviation: float = column(MOVEMENT)  # deviation_rad; of a robot with slides deviation, and unit is a column
+        deviation: float = column(MOVEMENT)  # deviation_rad; with slides deviation, and unit is a column
 
 Tables, CSV files and figures read the fields; no unit is known by a name.
 """
@@ -24,8 +24,8 @@ DIGITS = 3  # of a number in a report
 class Column:
     """What a field says of its column.
 
-    unit: ends the name of the column; "": none. digits: of its numbers in a report. optional: left out of a table in which no
-    row has a value. names: it lists names, and is shortened in a report.
+    unit: ends the name of the column; "": none. digits: of its numbers in a report.
+    optional: left out of a table in which no row has a value. names: it lists names, to be shortened.
     """
 
     unit: str = ""
@@ -37,7 +37,7 @@ class Column:
 def column(
     unit: str = "", digits: int = DIGITS, optional: bool = False, names: bool = False, **field: Any
 ) -> Any:
-    """A field of a Row, with its Column; an optional one is None by default. field: default or default_factory."""
+    """A field of a Row, with its Column. field: default (None, if optional) or default_factory."""
     if optional:
         field.setdefault("default", None)
     return dataclasses.field(metadata={"column": Column(unit, digits, optional, names)}, **field)
@@ -67,14 +67,16 @@ class Row:
 
     @property
     def urgency(self) -> tuple[bool, bool, float]:
-        """Of a table that is shortened, rows with the smallest are shown: those that fail, that differ from a stated number,
-        that use most of a tolerance."""
+        """A key: of a long table, the rows with the smallest are shown.
+
+        False if the row fails; False if it differs from a stated number; minus its share of a tolerance.
+        """
         return True, True, math.inf
 
 
 @dataclass(kw_only=True)
 class MovementRow(Row):
-    """A row with columns in the unit of a robot's movements: rad, or another one, which then is the last column."""
+    """A row with columns in the unit of a robot's movements: rad, or another one, in the last column."""
 
     unit: str = RAD
 

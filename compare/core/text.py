@@ -1,7 +1,7 @@
 """Sentences from templates: `say(finding)` is the text of a finding.
 
-Templates are found by name, NAME.md.jinja, in the folders of compare. Each is a set of macros; numbers are formatted there, with
-the filters below or Python's `format`.
+Templates are found by name, NAME.md.jinja, in the folders of compare. Each is a set of macros; numbers are
+formatted there, with the filters below or Python's `format`.
 """
 
 import base64
@@ -9,8 +9,9 @@ import hashlib
 import re
 from functools import cache
 from html.entities import codepoint2name
-from math import isfinite
+from math import degrees, isfinite
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_eval_context
 from jinja2.nodes import EvalContext
@@ -19,7 +20,7 @@ from markupsafe import Markup
 from .finding import Finding
 from .words import capital, in_one_line, listed, milliseconds, some_of
 
-# what Markdown, GitHub's kind of it or HTML take for markup: anywhere, at the edge of a word, at the beginning of a text
+# markup of Markdown and HTML: anywhere, at the edge of a word, at the beginning of a text
 MARKUP = re.compile(
     r"[`*<>&\"$~@]|\\(?![^\W_])|(?<![^\W_])_|_(?![^\W_])|\](?=\()|:(?=//)|(?<=www)\."
     r"|(?<!\S)#|\A[\[ ]|\A[-+=](?=[-=\s]*\Z|\s)|\A\d(?=\d*[.)](?:\s|\Z))"
@@ -30,28 +31,29 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @pass_eval_context
 def markup(context: EvalContext, value: object) -> object:
-    """A value as it stands in a template: in a document, whatever is not a piece of the document is escaped."""
+    """A value in a template: in a document, whatever is not a piece of it is escaped."""
     return escaped(value) if context.autoescape and not isinstance(value, Markup) else value
 
 
 def escaped(value: object) -> Markup:
-    """A value in one line of Markdown or HTML in which nothing is markup: signs that might be become character references."""
+    """A value in one line, whose signs that might be markup are character references."""
     return Markup(MARKUP.sub(reference, in_one_line(str(value))))
 
 
-def reference(sign: re.Match) -> str:
+def reference(sign: re.Match[str]) -> str:
     number = ord(sign[0])
     return f"&{codepoint2name.get(number, f'#{number}')};"
 
 
 def cell(value: object) -> Markup:
     """A value in a cell of a table in Markdown."""
-    return Markup(str(escaped(value)).replace("|", "&#124;"))
+    text = value if isinstance(value, Markup) else escaped(value)
+    return Markup(str(text).replace("|", "&#124;"))
 
 
-def count(number: int, one: str, many: str = "") -> str:
+def count(number: int, noun: str, plural: str = "") -> str:
     """A count with its noun: 1 check, 3 checks."""
-    return f"{number:,} {one if number == 1 else many or f'{one}s'}"
+    return f"{number:,} {noun if number == 1 else plural or f'{noun}s'}"
 
 
 def rounded(value: float) -> str:
@@ -61,8 +63,9 @@ def rounded(value: float) -> str:
 
 def apart(value: float, other: float, digits: int = 6) -> str:
     """A number with as many digits, at least these, as tell it from another one."""
-    enough = (n for n in range(digits, 17) if f"{value:.{n}g}" != f"{other:.{n}g}")
-    return f"{value:.{next(enough, digits if value == other else 17)}g}"
+    if value != other:
+        digits = next((n for n in range(digits, 17) if f"{value:.{n}g}" != f"{other:.{n}g}"), 17)
+    return f"{value:.{digits}g}"
 
 
 FILTERS = {
@@ -71,7 +74,7 @@ FILTERS = {
     "g": lambda value, digits=3: f"{value:.{digits}g}",
     "apart": apart,
     "percent": lambda share, digits=2: f"{100.0 * share:.{digits}g} %",
-    "degrees": lambda angle, digits=4: f"{angle * 57.29577951308232:.{digits}g} deg",
+    "degrees": lambda angle, digits=4: f"{degrees(angle):.{digits}g} deg",
     "count": count,
     "rounded": rounded,
     "share_of": lambda share: f"{rounded(share)} times" if share > 1.0 else f"{100.0 * share:.2g} % of",
@@ -86,14 +89,8 @@ FILTERS = {
 def environment() -> Environment:
     """Jinja2 with the folders of all templates; no value that a document is given can be markup."""
     folders = sorted({str(file.parent) for file in ROOT.rglob("*.jinja")})
-    made = Environment(
-        loader=FileSystemLoader(folders),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        autoescape=lambda name: str(name).endswith(DOCUMENTS),
-        finalize=markup,
-    )
+    made = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=markup)
+    made.loader, made.autoescape = FileSystemLoader(folders), lambda name: str(name).endswith(DOCUMENTS)
     made.filters |= FILTERS
     made.tests["finite"] = isfinite
     return made
@@ -106,6 +103,6 @@ def say(finding: Finding | str) -> str:
     return " ".join(block(finding.of, finding.kind, **finding.values).split())
 
 
-def block(of: str, kind: str, **values) -> str:
+def block(of: str, kind: str, /, **values: Any) -> str:
     """What the macro `kind` of a template gives, with its lines."""
     return str(getattr(environment().get_template(f"{of}.md.jinja").module, kind)(**values)).strip()

@@ -1,18 +1,21 @@
-"""Timing in turns, so that whatever slows the machine down slows all functions alike; and the processor's name."""
+"""Timing in turns, so that what slows the machine slows all functions alike; the processor's name."""
 
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any, TypeVar
 
+Call = Callable[[], Any]
+Name = TypeVar("Name")
 TIMED_ENOUGH = 0.015  # s: a function is called until as many calls as fast as its fastest take this long
 WARM = 0.004  # s: a longer call needs no call before it to warm up
 WIDTHS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("asimd", "NEON"), ("sse2", "SSE2"))
 
 
-def in_turns(runs: list[Callable], rounds: int) -> list[list[float]]:
+def in_turns(runs: Sequence[Call], rounds: int) -> list[list[float]]:
     """Seconds of each call of each function, at most `rounds` calls, after one to warm up short functions."""
-    times = [[] for _ in runs]
+    times: list[list[float]] = [[] for _ in runs]
     for k in range(rounds + 1):
         for run, taken in zip(runs, times):
             if not taken or len(taken) * min(taken) < TIMED_ENOUGH:
@@ -24,7 +27,7 @@ def in_turns(runs: list[Callable], rounds: int) -> list[list[float]]:
     return times
 
 
-def fastest(runs: dict[object, Callable], rounds: int) -> dict[object, float]:
+def fastest(runs: Mapping[Name, Call], rounds: int) -> dict[Name, float]:
     """Seconds of the fastest call of each function, by its name."""
     return {name: min(taken) for name, taken in zip(runs, in_turns(list(runs.values()), rounds))}
 

@@ -1,45 +1,42 @@
-"""The experiments, one file or folder for each word of the command line; this module finds them by looking into its folder.
+"""The experiments: one file or folder for each word of the command line, found by looking into this folder.
 
-An experiment is a module with a record, `EXPERIMENT = Experiment(order=..., ...)`, whose fields are literals, and a text,
-NAME.md.jinja: a macro for its help, title, claim, tolerance, and for each kind of finding and caption. The module has
-
-    rows(setup) -> Result                    numbers: tables, checks, findings
-    figures(result, robot)                   yields calls that draw: (file name, figure, caption) (optional)
-    headline(result) -> Finding | None       its one number on the first screen
-    overview(results, robot)                 draws its picture of the first screen (of a record with `overview`)
-    claim_values(robot) -> dict              what the macros claim and tolerance take in addition to the robot (optional)
-    skipped(robot) -> Finding | None         why it does not apply to a robot (optional)
-    begin(setup) -> Work                     starts long work (optional), which rows(setup, work) takes up
+An experiment is a module with a record, `EXPERIMENT = Experiment(order=..., ...)`, whose fields are literals,
+and functions: see Functions. Its text is NAME.md.jinja: a macro for its help, title, claim and tolerance, and
+for each kind of finding and caption.
 """
 
 import importlib
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from ..core.experiment import Experiment as Experiment
 from ..core.finding import Finding
 from ..core.records import records_in
 
 if TYPE_CHECKING:  # for --help, the names are enough
+    from ..core.check import Result
+    from ..core.pictures import Pictures
     from ..robots import Robot
+    from .setup import Setup
+
+Drawing = Callable[[], tuple[str, Any, Finding | str]]  # draws: the name of the file, the figure, the caption
 
 
 @dataclass(frozen=True)
-class Experiment:
-    """What the program has to know of an experiment before it imports it."""
+class Functions:
+    """The functions of an experiment's module; those that have a default here may be missing there."""
 
-    order: int  # of `all` and of the report
-    serves_own: bool = (
-        True  # whether it applies to a user's own equations; if not, the macro not_of_own says why
-    )
-    asks_of_own: tuple[str, ...] | None = None  # which of a user's own functions it calls; None: all
-    needs_file: bool = False  # or equations of a user's own: there is nothing to say of the arm's
-    options: tuple[str, ...] = ()  # of the command line, in addition to those of every experiment
-    in_quick: bool = True  # whether a quick run of several experiments has it
-    timed: bool = False  # it measures times: it runs last, while nothing else does
-    diagnosed: bool = False  # where it fails, `diagnosis` looks for the cause
-    overview: str = ""  # the picture of the first screen that its result is part of
+    rows: Callable[..., "Result"]  # of a Setup, and of the work that begin has started: what was computed
+    begin: Callable[["Setup"], Any] | None = None  # starts long work
+    figures: Callable[["Result", "Robot"], Iterable[Drawing]] = lambda result, robot: ()
+    headline: Callable[["Result"], Finding | None] = lambda result: None  # its one number on the first screen
+    overview: Callable[[Mapping[str, "Result"], "Robot"], Iterable[Drawing]] = lambda results, robot: ()
+    scenes_drawn: Callable[["Result"], Sequence["Pictures"]] = lambda result: ()  # the motion in the page
+    claim_values: Callable[["Robot"], dict[str, Any]] = lambda robot: {}  # for the macros claim and tolerance
+    skipped: Callable[["Robot"], Finding | None] = lambda robot: None  # why it does not apply to a robot
 
 
 EXPERIMENTS = records_in(Path(__file__).parent, "EXPERIMENT", Experiment)
@@ -50,8 +47,13 @@ def module(name: str) -> ModuleType:
     return importlib.import_module(f".{name}", __package__)
 
 
+def functions(name: str) -> Functions:
+    names = [field.name for field in fields(Functions) if hasattr(module(name), field.name)]
+    return Functions(**{function: getattr(module(name), function) for function in names})
+
+
 def skipped(name: str, robot: "Robot") -> Finding | None:
     """Why an experiment does not apply to a robot, or None."""
     if robot.own and not EXPERIMENTS[name].serves_own:
         return Finding(name, "not_of_own")
-    return getattr(module(name), "skipped", lambda robot: None)(robot)
+    return functions(name).skipped(robot)

@@ -28,7 +28,7 @@ from .setup import Setup
 if TYPE_CHECKING:
     from .quantities import Drawing
 
-EXPERIMENT = Experiment(order=80, needs_file=True, options=("--joints",))
+EXPERIMENT = Experiment(order=80, needs_file=True, options=("--joints",), states_causes=True, compares=False)
 SECONDS = 8.0  # of a search
 SECONDS_OF_CONDITIONS = 3.0
 # of Mbar and h at each state, that the conditions take, about: in all, and for each joint

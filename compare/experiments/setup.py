@@ -1,63 +1,75 @@
 """The setup of an experiment: the robot, the engines, and the size of the run."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, TypeVar, cast
 
 from ..core.finding import Finding
 from ..engines import Dynamics, Engine, compared, made
+from ..engines.mujoco.reading import Reading
+from ..engines.own import Own
 from ..robots import Robot
 from ..robots import states as samples
 from ..robots.case import Case
 
 SECONDS_OF_OWN = 5.0  # of a user's own equations at all random states together
+Value = TypeVar("Value")
 
 
 def engines(mujoco: Engine, own: Engine | None = None) -> dict[str, Engine]:
-    """All engines by name; some may be unavailable. own: the engine of a user's own equations, if there are any."""
+    """All engines by name; some may be unavailable. own: of a user's own equations."""
     schemes = [method.scheme for method in mujoco.methods.values()]
     return made(schemes, {"mujoco": mujoco} | ({"own": own} if own else {}))
 
 
-def nothing(*_: object) -> None:
+def nothing(*_: Any) -> None:
     """Do nothing."""
 
 
 @dataclass(frozen=True, eq=False)
 class Setup:
+    """What an experiment has.
+
+    size: "full"; "quick": some parts, in seconds; "small": all parts, with few states and steps, for tests.
+    """
+
     robot: Robot
     engines: Mapping[str, Engine]
     states: int = 10_000  # random states
     exact_states: int = 200  # the first of these are compared with the exact values too
-    map: Callable = map  # for the scenes of an experiment: parallel where possible
-    reading: object | None = None  # of a robot's file, see engines.mujoco.reading
-    quiet: Callable = nothing  # waits until nothing else runs: for timings
-    progress: Callable = nothing  # reports the progress of long work
+    map: Callable[..., Iterable[Any]] = map  # for the scenes of an experiment: parallel where possible
+    reading: Reading | None = None  # of a robot's file
+    quiet: Callable[[], Any] = nothing  # waits until nothing else runs: for timings
+    progress: Callable[[str], Any] = nothing  # reports the progress of long work
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
     alone: bool = False  # whether the experiment runs by itself, and may take longer than in `all`
     step: tuple[float, str] | None = None  # stability: step, s, and integrator of MuJoCo to be checked
-    size: str = (
-        "full"  # "quick": some parts, in seconds; "small": all parts with few states and steps, for tests
-    )
+    size: str = "full"
 
     @property
     def is_quick(self) -> bool:
         return self.size == "quick"
 
-    def of(self, full, quick, small):
+    @property
+    def own(self) -> Own | None:
+        """The engine of a user's own equations, if there are any."""
+        return cast("Own | None", self.engines.get("own"))
+
+    def of(self, full: Value, quick: Value, small: Value) -> Value:
         """The value for this size of the run."""
         return {"full": full, "quick": quick, "small": small}[self.size]
 
     @classmethod
-    def quick(cls, robot: Robot, engines: Mapping[str, Engine], **more) -> "Setup":
+    def quick(cls, robot: Robot, engines: Mapping[str, Engine], **more: Any) -> "Setup":
         return cls(robot, engines, states=1000, exact_states=20, finer=(1,), size="quick", **more)
 
     @classmethod
-    def small(cls, robot: Robot, engines: Mapping[str, Engine], **more) -> "Setup":
+    def small(cls, robot: Robot, engines: Mapping[str, Engine], **more: Any) -> "Setup":
         return cls(robot, engines, states=50, exact_states=2, finer=(1, 2), size="small", **more)
 
     def compared(self, case: Case | None = None) -> dict[str, Dynamics]:
-        """The dynamics of a case (default: the robot unchanged) in the two engines that are compared, mujoco last."""
+        """The dynamics of a case (default: the robot unchanged) in the two engines, mujoco last."""
         return compared(self.engines, case or self.robot.case())
 
     @cached_property
@@ -66,10 +78,12 @@ class Setup:
 
     @cached_property
     def random(self) -> samples.Sample:
-        own = self.engines.get("own")
-        count = own.equations.affordable(self.states, SECONDS_OF_OWN) if own else self.states
+        if not self.own:
+            return samples.random(self.robot, self.states, self.exact_states)
+        equations = self.own.equations
+        count = equations.affordable(self.states, SECONDS_OF_OWN)
         sample = samples.random(self.robot, count, self.exact_states)
         if count < self.states:
-            values = {"count": count, "states": self.states, "seconds": own.equations.seconds}
+            values = {"count": count, "states": self.states, "seconds": equations.seconds}
             sample.notes = (Finding("shared", "fewer_states", values), *sample.notes)
         return sample

@@ -1,4 +1,4 @@
-"""A report as one document in two media: report.md, which is short, and index.html, which has all and folds it.
+"""A report as one document in two media: report.md, which is short, and index.html, which folds what is long.
 
 Both are rendered from document.md.jinja; here is chosen how much of each part is shown.
 """
@@ -6,28 +6,51 @@ Both are rendered from document.md.jinja; here is chosen how much of each part i
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 
-import pandas as pd
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 from ..core.check import Check
+from ..core.rows import Row
 from ..core.text import block, count, environment
 from ..core.words import capital
-from ..experiments import EXPERIMENTS, Experiment
+from ..robots import Robot
+from . import tables
 from .images import embedded
 from .motion import SCRIPT, motion_in_html
 from .questions import answers
-from .tables import TITLES, closest_checks, of_causes, origins, records, shortened, shown
-from .verdict import Parts, Report, Section, failures, headline, outcome, passed, standing
+from .tables import Table
+from .verdict import Figure, Parts, Report, Section, failures, headline, outcome, passed, standing
 
 MOST_ROWS, MOST_IN_MARKDOWN = 40, 6  # of a table; its file has all
-FIRST_NOTES, MOST_NOTES = 3, 12  # of a section: of the page, which folds the others; of report.md
+FIRST_NOTES = 3  # of a section of the page, which folds the others
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
-OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
-LINKED = ("_distances", "_limits")  # how the files of the figures to which they lead end
-MAIN_TABLES = ("what_should_i_use",)  # further tables of report.md, in addition to a section's own
+MAIN_TABLES = {"what_should_i_use": "What should I use?"}  # further tables of report.md, with their titles
+# columns of failing checks
+ON_FIRST_SCREEN = "experiment", "scene", "quantity", "value", "tolerance", "note"
+JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
+
+
+class Picture(NamedTuple):
+    """A picture of the first screen."""
+
+    figure: Figure
+    link: str  # to a figure, or to a section
+    title: str
+    alternative: str
+    fails: bool  # whether something fails in what it shows
+
+
+class Listing(NamedTuple):
+    """The first rows of a table, and how many it has."""
+
+    total: int
+    rows: Table | None  # None: its file alone has them
+    name: str = ""  # of its file
+    title: str = ""
+    which: str = ""  # how many of how many are shown, if not all
 
 
 class Document:
@@ -37,11 +60,14 @@ class Document:
         self.report, self.parts, self.folder = report, parts, folder
         self.page, self.motion = folder is not None, ""
         self.file = "index.html" if self.page else "report.md"
-        data = {"page": self.page, "embedded": self.embedded}
-        self.template = environment().get_template("document.md.jinja").make_module(data)
+        data = {"page": self.page, "embedded": self.embedded, "first_notes": FIRST_NOTES}
+        data |= {"outcome": outcome, "standing": standing, "headline": headline}
+        # its attributes are the macros
+        self.template: Any = environment().get_template("document.md.jinja").make_module(data)
         self.answers = parts.attempt("the questions", None, answers, report.sections, report.robot)
 
-    def embedded(self, file: str) -> tuple[str, int, int]:
+    def embedded(self, file: str) -> tuple[Markup, int, int]:
+        assert self.folder is not None
         return embedded(self.folder / "figures" / f"{file}.png")
 
     def body(self) -> list[str]:
@@ -54,195 +80,142 @@ class Document:
             texts.append(self.motion)
         texts.append(self.made("the introduction", self.introduction))
         if report.causes:
-            texts.append(self.template.causes(table_of(of_causes(report.causes))))
-        if self.answers is not None and len(self.answers):
-            texts.append(self.template.questions(table_of(self.answers)))
+            texts.append(self.template.causes(tables.of_causes(report.causes)))
+        if self.answers:
+            texts.append(self.template.questions(self.answers))
         for section in report.sections:
-            text = self.parts.attempt(f"{section.name} in {self.file}", None, self.section, section)
-            texts.append(self.template.missing(section.name, section.title) if text is None else text)
+            missing = self.template.missing(section.name, section.title)
+            what = f"{section.name} in {self.file}"
+            texts.append(self.parts.attempt(what, missing, self.section, section))
         texts.append(self.template.skipped(report.skipped) if report.skipped else "")
-        return [*texts, self.template.provenance(table_of(origins(report.origin)))]
+        return [*texts, self.template.provenance(tables.of_origin(report.origin))]
 
     def made(self, name: str, make: Callable[[], str]) -> str:
         return self.parts.attempt(f"{name} in {self.file}", "", make)
 
     def text(self, body: Sequence[str]) -> str:
         """The whole document, with what could not be made of it."""
-        report, good = self.report, passed(self.report.sections) and not self.parts.broken
-        reference = () if report.reference is None else report.reference.lines
-        lines, robot = report.verdict.split("\n"), report.robot
+        report, robot = self.report, self.report.robot
+        good = passed(report.sections) and not self.parts.broken
+        lines = report.verdict.split("\n")
         title = block("verdict", "title", own=bool(robot.own), robot=robot.described or robot.name)
-        head = self.template.head(title, reference, lines, self.parts.lines, report.top, good)
+        head = self.template.head(title, report.first_lines, lines, self.parts.lines, report.top, good)
         if not self.page:
             return joined([head, *body])
         html = Markup(MarkdownIt("commonmark", {"html": True}).render(joined([head, *body])))
-        values = {
-            "title": title,
-            "good": good,
-            "links": self.links(),
-            "script": SCRIPT if self.motion else "",
-        }
-        return environment().get_template("page.html.jinja").render(values, body=html)
+        script = SCRIPT if self.motion else ""
+        values = {"title": title, "good": good, "links": self.links(), "script": script, "body": html}
+        return environment().get_template("page.html.jinja").render(values)
 
     def links(self) -> list[tuple[str, bool]]:
-        names = [("questions", False)] if self.answers is not None and len(self.answers) else []
+        names = [("questions", False)] if self.answers else []
         names += [(section.name, standing(section)[0] is False) for section in self.report.sections]
         return [*names, ("provenance", False)]
 
     def first_screen(self) -> str:
         """A line for each experiment, the pictures; on the page also what explains that checks fail."""
-        report, failing, more = self.report, None, 0
-        lines = [
-            self.parts.attempt(f"the line of {one.name}", None, self.line, one) for one in report.sections
-        ]
+        report = self.report
+        none: list[Picture] = []
+        pictures = self.parts.attempt("the pictures of the first screen", none, self.pictures)
         failed = [check for kind in failures(report.sections) for check in kind]
+        failing = listing(failed, FIRST_CAUSES, ON_FIRST_SCREEN)._replace(title="Failing checks")
         if report.causes:
-            failing = table_of(of_causes(report.causes[:FIRST_CAUSES]).drop(columns="rank"))
-            failing["label"] = "Cause" if len(report.causes) == 1 else "Causes"
-            more = len(report.causes) - FIRST_CAUSES
-        elif failed:
-            columns = ["experiment", "scene", "quantity", "value", "tolerance", "note"]
-            failing = table_of(records(failed[:FIRST_CAUSES])[columns]) | {"label": "Failing checks"}
-            more = len(failed) - FIRST_CAUSES
-        if failing:
-            failing["known"] = bool(report.causes)
-        pictures = self.parts.attempt("the pictures of the first screen", [], self.pictures)
-        lines = [line for line in lines if line]
-        return self.template.first_screen(lines, report.skipped, pictures, failing, max(more, 0))
+            columns, cells = tables.of_causes(report.causes[:FIRST_CAUSES])
+            table = Table(columns[1:], [row[1:] for row in cells])  # without the rank
+            title = "Cause" if len(report.causes) == 1 else "Causes"
+            failing = Listing(len(report.causes), table, name="causes", title=title)
+        return self.template.first_screen(report.sections, report.skipped, pictures, failing)
 
-    def line(self, section: Section) -> dict:
-        """The line of one experiment: what it asks, whether it passes, its headline."""
-        good, words = standing(section)
-        named = {
-            "name": section.name,
-            "title": section.title,
-            "outcome": words,
-            "headline": headline(section),
-        }
-        if 0 < sum(check.failed for check in section.result.checks) == len(section.explained):
-            named["headline"] = block("verdict", "consequence")
-        return named | {"good": good, "kind": kind(good)}
-
-    def pictures(self) -> list[dict]:
+    def pictures(self) -> list[Picture]:
         """The pictures, those in which something fails first, each with the anchor of its figure.
 
         If none of them shows a failure, a figure of the first failing experiment comes first.
         """
-        wrong = [section for section in self.report.sections if any(failures([section]))]
-        pictures, shown = [], []
-        for section in self.report.sections:
-            for file, caption in section.figures:
-                if file.startswith(OVERVIEW):
-                    of = [one for one in self.report.sections if picture_of(one) == picture_of(section)]
-                    shown += [one for one in of if one in wrong]
-                    about = {
-                        "file": file,
-                        "path": f"{file}.png",
-                        "caption": caption,
-                        "link": linked_figure(of),
-                    }
-                    words = {"title": block(section.name, "overview_title")}
-                    words["alternative"] = block(section.name, "overview_alternative")
-                    pictures.append(about | words | {"fails": any(one in wrong for one in of)})
-        still = [(section, [one for one in figures_of(section) if not one["moves"]]) for section in wrong]
-        own = [(section, figures) for section, figures in still if figures]
-        if own and not shown and self.page:
-            section, figures = own[0]
-            figure = next((one for one in figures if one["file"].endswith("_distances")), figures[0])
-            about = {"alternative": figure["caption"], "caption": "", "link": f"figure-{figure['file']}"}
-            pictures.insert(0, figure | about | {"title": section.title, "fails": True})
-        return sorted(pictures, key=lambda picture: not picture["fails"]) if self.page else pictures
+        sections, pictures = self.report.sections, list[Picture]()
+        wrong = [section for section in sections if any(failures([section]))]
+        for section in sections:
+            group = [other for other in sections if other.record.overview == section.record.overview]
+            fails = any(other in wrong for other in group)
+            title, alternative = "overview_title", "overview_alternative"
+            for figure in section.figures:
+                if figure.is_overview:
+                    words = block(section.name, title), block(section.name, alternative)
+                    pictures.append(Picture(figure, link_to(group), *words, fails))
+        if not self.page:
+            return pictures
+        if not any(picture.fails for picture in pictures):
+            pictures += [picture for section in wrong for picture in picture_of_failure(section)][:1]
+        return sorted(pictures, key=lambda picture: not picture.fails)
 
     def introduction(self) -> str:
         robot = self.report.robot
-        joints = joints_of(robot)
-        return " ".join(self.template.introduction(robot, robot.described or robot.name, joints).split())
+        text = self.template.introduction(robot, robot.described or robot.name, joints_of(robot))
+        return " ".join(text.split())
 
     def section(self, section: Section) -> str:
         """One experiment: what was found, figures, tolerance, and the details."""
-        result, (good, _) = section.result, standing(section)
-        consequences = section.explained
-        failed = [check for check in result.checks if check.failed and check not in consequences]
-        not_judged = [check for check in result.checks if not check.judged]
-        few, most = (MOST_ROWS, FIRST_NOTES) if self.page else (MOST_IN_MARKDOWN, MOST_NOTES)
-        notes, figures = (
-            section.notes,
-            [one for one in figures_of(section) if not (self.page and one["moves"])],
-        )
+        checks, few = section.result.checks, MOST_ROWS if self.page else MOST_IN_MARKDOWN
+        failed = [check for check in section.failed if check not in section.explained]
+        not_judged = [check for check in checks if not check.judged]
+        figures = still_figures([section]) if self.page else section.own_figures
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
-        first = [one for one in figures if one in first or one["file"].endswith(LINKED)]
-        return self.template.section(
-            name=section.name,
-            title=section.title,
-            good=good,
-            kind=kind(good),
-            outcome=outcome(section),
-            headline=headline(section) if result.headline else "",
-            claim=section.claim,
-            tolerance=section.tolerance,
-            failing=listing(failed, few),
-            not_judged=listing(not_judged, few),
-            explained=listing(consequences, MOST_ROWS),
-            notes=notes[:most],
-            further=notes[most:],
-            tables=[self.table(section, name, rows) for name, rows in section.tables.items()],
-            checks={"count": len(result.checks), "rows": table_of(closest_checks(section, MOST_ROWS))},
-            open_figures=first,
-            folded_figures=[one for one in figures if one not in first],
-        )
+        first = [figure for figure in figures if figure in first or figure.is_main]
+        lists = {"failing": listing(failed, few), "not_judged": listing(not_judged, few)}
+        lists |= {"explained": listing(section.explained, MOST_ROWS), "all": closest(checks)}
+        of_section = [self.table(section, name, rows) for name, rows in section.tables.items()]
+        folded = [figure for figure in figures if figure not in first]
+        return self.template.section(section, lists, of_section, first, folded)
 
-    def table(self, section: Section, name: str, rows: Sequence[dict]) -> dict:
+    def table(self, section: Section, name: str, rows: Sequence[Row]) -> Listing:
         """A table with the rows that a reader needs; its rows are None where only its file has them."""
-        title = TITLES.get(name, capital(name.replace("_", " ")))
-        about = {"name": name, "title": title, "count": len(rows), "which": "", "rows": None}
+        title = MAIN_TABLES.get(name, capital(name.replace("_", " ")))
         columns = section.result.shown if name == section.name else None
         is_main = self.page or name == section.name or name in MAIN_TABLES
         if columns == [] or name in section.result.filed or not is_main:
-            return about
-        few, about["which"] = shortened(rows, MOST_ROWS if self.page else MOST_IN_MARKDOWN)
-        about["rows"] = table_of(shown(pd.DataFrame(few), columns if few else None))
-        return about
+            return Listing(len(rows), None, name, title)
+        few, which = tables.shortened(rows, MOST_ROWS if self.page else MOST_IN_MARKDOWN)
+        return Listing(len(rows), tables.of_rows(few, columns), name, title, which)
 
 
-def picture_of(section: Section) -> str:
-    return EXPERIMENTS.get(section.name, Experiment(0)).overview
+def listing(checks: Sequence[Check], most: int, columns: Sequence[str] = tables.CHECK) -> Listing:
+    return Listing(len(checks), tables.of_checks(checks[:most], columns))
 
 
-def kind(good: bool | None) -> str:
-    return "none" if good is None else "good" if good else "bad"
+def closest(checks: Sequence[Check]) -> Listing:
+    """All checks, with those that fail or come closest to their tolerances."""
+    return Listing(len(checks), tables.of_checks(tables.closest(checks, MOST_ROWS), tables.CHECK[1:]))
 
 
-def table_of(table: pd.DataFrame) -> dict:
-    return {"columns": list(table.columns), "cells": table.astype(str).to_numpy().tolist()}
+def still_figures(sections: Sequence[Section]) -> list[Figure]:
+    return [figure for section in sections for figure in section.own_figures if not figure.moves]
 
 
-def listing(checks: Sequence[Check], most: int) -> dict:
-    """How many checks there are, and the first of them as a table."""
-    return {"count": len(checks), "rows": table_of(records(checks[:most]))}
+def linked(sections: Sequence[Section]) -> Figure | None:
+    """The figure behind a picture: of distances or limits, else the first."""
+    figures = sorted(still_figures(sections), key=lambda figure: not figure.is_main)
+    return figures[0] if figures else None
 
 
-def figures_of(section: Section) -> list[dict]:
-    return [
-        {"file": file, "path": file if moves else f"{file}.png", "caption": caption, "moves": moves}
-        for file, caption in section.figures
-        for moves in [file.endswith(".gif")]  # the page has another form of it
-        if not file.startswith(OVERVIEW)
-    ]
+def picture_of_failure(section: Section) -> list[Picture]:
+    """A figure of a failing section as a picture of the first screen; none if it has no figure."""
+    figure = linked([section])
+    if figure is None:
+        return []
+    without_caption = figure._replace(caption="")
+    return [Picture(without_caption, link_to([section]), section.title, figure.caption, True)]
 
 
-def linked_figure(sections: Sequence[Section]) -> str:
-    """The anchor of the figure behind a picture: of distances or limits, else the first of the last section."""
-    files = [one["file"] for section in sections for one in figures_of(section) if not one["moves"]]
-    best = [file for file in files if file.endswith(LINKED)] or files
-    return f"figure-{best[0]}" if best else sections[-1].name
+def link_to(sections: Sequence[Section]) -> str:
+    """The anchor of the figure behind a picture, or of the last section."""
+    figure = linked(sections)
+    return f"figure-{figure.file}" if figure else sections[-1].name
 
 
-def joints_of(robot) -> list[str]:
-    """The joints of a robot by their kinds with their counts: of a file as it has them, a free joint as one."""
+def joints_of(robot: Robot) -> list[str]:
+    """The joints of a robot by their kinds, counted; a free joint of a file is one."""
     counts = {feature.feature: feature.count for feature in robot.features}
     counts = counts or {name: robot.tree.kind.count(name) for name in robot.tree.kind}
-    names = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
-    return [count(counts[key], name) for key, name in names.items() if counts.get(key)]
+    return [count(counts[kind], name) for kind, name in JOINTS.items() if counts.get(kind)]
 
 
 def joined(paragraphs: Sequence[str]) -> str:

@@ -1,8 +1,9 @@
 """The output folder: a new report replaces the old one only when it is complete, however the run ends.
 
-A run writes to a folder `.new-XXXXXXXX` inside the output folder, and locks it; an unlocked one is left from a run that was
-killed. The report is written to `new` in that folder. The exchange moves the old report to `old`, renames `new` to `moving`,
-moves the new report out, and renames `moving` to `done`. From these names the old report can be restored at any moment.
+A run writes to a folder `.new-XXXXXXXX` inside the output folder, and locks it; an unlocked one is left from
+a run that was killed. The report is written to `new` in that folder. The exchange moves the old report to
+`old`, renames `new` to `moving`, moves the new report out, and renames `moving` to `done`. From these names
+the old report can be restored at any moment.
 """
 
 import json
@@ -12,11 +13,14 @@ import shutil
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 from ..process import interrupt
 
+fcntl: ModuleType | None
 try:
     import fcntl
 except ImportError:  # Windows: what a killed run leaves stays there
@@ -42,15 +46,13 @@ def new_report(out: str | Path) -> Iterator[Path]:
     interrupt.undo.append(work.remove)
     try:
         work.make()
-        yield work.path / "new"
+        yield work.new
         work.exchange()
     except OSError as error:
-        if work.path is None or not isinstance(error.filename, str | Path):
+        path = Path(str(error.filename))
+        if not path.is_relative_to(work.new):
             raise
-        path = Path(error.filename)
-        if not path.is_relative_to(work.path / "new"):
-            raise
-        path = work.out / path.relative_to(work.path / "new")  # as the reader knows it
+        path = work.out / path.relative_to(work.new)  # as the reader knows it
         raise FolderError(f"cannot write {path}: {error.strerror}; an earlier report is unchanged") from None
     finally:
         work.remove()
@@ -60,11 +62,17 @@ def new_report(out: str | Path) -> Iterator[Path]:
 class Work:
     """The folder of one run inside `out`."""
 
-    def __init__(self, out):
-        self.out, self.path, self.lock = out, None, None
+    def __init__(self, out: Path):
+        self.out, self.path = out, out / ".new-"  # the path of the folder as soon as it is made
+        self.lock: int | None = None
         self.made = [path for path in (out, *out.parents) if not os.path.lexists(path)]  # the innermost first
 
-    def make(self):
+    @property
+    def new(self) -> Path:
+        """The folder of the new report."""
+        return self.path / "new"
+
+    def make(self) -> None:
         """Make and lock the folder; restore and delete what killed runs have left."""
         try:
             self.out.mkdir(parents=True, exist_ok=True)
@@ -72,25 +80,24 @@ class Work:
                 with interrupt.postponed:
                     self.path = Path(tempfile.mkdtemp(prefix=".new-", dir=self.out))
                     self.lock = lock(self.path)
-                (self.path / "new").mkdir()
+                self.new.mkdir()
                 clear_away(self.out)
                 refuse_foreign(self.out)
         except OSError as error:
-            text = f"cannot write to {self.out}: {what_is_wrong(self.out, error)}"
-            raise FolderError(f"{text}; expected a writable folder") from None
+            why = f"{what_is_wrong(self.out, error)}; expected a writable folder"
+            raise FolderError(f"cannot write to {self.out}: {why}") from None
 
-    def exchange(self):
+    def exchange(self) -> None:
         """Move the old report away and the new one in; on an error put everything back."""
         with locked(self.out), interrupt.postponed:
             clear_away(self.out)
             refuse_foreign(self.out)
-            new, old, moving = (self.path / name for name in ("new", "old", "moving"))
             try:
-                old.mkdir()
-                move(self.out, old)
-                new.rename(moving)
-                move(moving, self.out)
-                moving.rename(self.path / "done")
+                (self.path / "old").mkdir()
+                move(self.out, self.path / "old")
+                self.new.rename(self.path / "moving")
+                move(self.path / "moving", self.out)
+                (self.path / "moving").rename(self.path / "done")
             except BaseException as error:
                 put_back(self.path, self.out)
                 if not isinstance(error, OSError):
@@ -99,18 +106,15 @@ class Work:
                 raise FolderError(text) from None
             interrupt.settle()
 
-    def remove(self):
-        """Delete the files of this run, except the report."""
-        if self.path is not None:
+    def remove(self) -> None:
+        """Delete the files of this run, except the report, and the folders that it made and left empty."""
+        if is_of_a_run(self.path):
             delete(self.path)
-        if self.lock is not None:
-            os.close(self.lock)
-            self.lock = None
-        for path in self.made:
-            try:
+        unlock(self.lock)
+        self.lock = None
+        with suppress(OSError):  # not empty
+            for path in self.made:
                 path.rmdir()
-            except OSError:  # not empty
-                return
 
 
 def move(source: Path, target: Path) -> None:
@@ -137,7 +141,7 @@ def clear_away(out: Path) -> None:
             if number is not None:
                 put_back(work, out)
                 delete(work)
-                os.close(number)
+                unlock(number)
 
 
 def is_of_a_run(path: Path) -> bool:
@@ -164,12 +168,11 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        if number is not None:
-            os.close(number)
+        unlock(number)
 
 
 def lock(folder: Path, wait: bool = True) -> int | None:
-    """A file descriptor with the folder's lock, which ends with the process; None: it is locked, or there are no locks."""
+    """A file descriptor with the lock, which ends with the process; None: locked, or there are no locks."""
     if fcntl is None:
         return None
     number = os.open(folder, os.O_RDONLY)
@@ -181,6 +184,11 @@ def lock(folder: Path, wait: bool = True) -> int | None:
         return None
 
 
+def unlock(number: int | None) -> None:
+    if number is not None:
+        os.close(number)
+
+
 def what_is_wrong(out: Path, error: OSError) -> str:
     """Why a folder cannot be made."""
     for path in (*reversed(out.parents), out):
@@ -189,7 +197,7 @@ def what_is_wrong(out: Path, error: OSError) -> str:
             return f"{name} is a symbolic link to {os.readlink(path)}, which does not exist"
         if os.path.exists(path) and not os.path.isdir(path):
             return f"{name} is a file"
-    return error.strerror
+    return error.strerror or str(error)
 
 
 @contextmanager
@@ -209,22 +217,21 @@ def save(path: Path, text: str) -> None:
 
 def files(folder: Path) -> list[str]:
     """The files of a report in a folder, as relative paths."""
-    found = [path for name in OWN for path in [folder / name, *(folder / name).rglob("*")]]
-    return sorted(
-        path.relative_to(folder).as_posix() for path in found if path.is_file() or path.is_symlink()
-    )
+    paths = [path for name in OWN for path in [folder / name, *(folder / name).rglob("*")]]
+    of_files = [path for path in paths if path.is_file() or path.is_symlink()]
+    return sorted(path.relative_to(folder).as_posix() for path in of_files)
 
 
 def refuse_foreign(out: Path) -> None:
     """FolderError for a file under a report's names that the report in `out` does not list as its own."""
     own = provenance_of(out).get("files", ())
-    if foreign := [name for name in files(out) if name not in own]:
-        raise FolderError(
-            f"{out} has {foreign[0]}, which no earlier report has written; use another folder (--out)"
-        )
+    for name in files(out):
+        if name not in own:
+            why = "which no earlier report has written; use another folder (--out)"
+            raise FolderError(f"{out} has {name}, {why}")
 
 
-def provenance_of(out: Path) -> dict:
+def provenance_of(out: Path) -> dict[str, Any]:
     try:
         return dict(json.loads((out / "results.json").read_text(encoding="utf-8"))["provenance"])
     except (OSError, ValueError, KeyError, TypeError):

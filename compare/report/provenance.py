@@ -7,28 +7,26 @@ import subprocess
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from ..core.timing import vectors
 from ..core.words import readable
 from ..process.workers import Clock
 
 OURS = "arm-tmt-mujoco"
-PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka")
+PACKAGES = ["mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka"]
 # if installed
-OF_ENGINES = ("drake", "pin", "mujoco-mjx", "jax", "mujoco-warp", "newton", "dartpy", "pybullet")
-PROGRAM_FILES = (
-    ":/compare",
-    ":/mjcf",
-    ":/tmt",
-    ":/pyproject.toml",
-)  # changes elsewhere do not change the program
+OF_ENGINES = ["drake", "pin", "mujoco-mjx", "jax", "mujoco-warp", "newton", "dartpy", "pybullet"]
+# changes elsewhere do not change the program
+PROGRAM_FILES = [":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml"]
 
 
-def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict:
+def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict[str, Any]:
     """Command, model, versions, machine, commit and seed of a run; `seconds` follow at its end.
 
     model: the file; shown: its name in the report.
     """
+    versions = {package: installed(package) for package in (*PACKAGES, *OF_ENGINES)}
     return {
         "command": readable(command),
         "model": readable(shown),
@@ -42,34 +40,35 @@ def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict:
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         OURS: installed(OURS),
-    } | {
-        package: found
-        for package in (*PACKAGES, *OF_ENGINES)
-        if (found := installed(package)) or package in PACKAGES
+        **{package: number for package, number in versions.items() if number or package in PACKAGES},
     }
 
 
-def durations(clock: Clock) -> dict:
+def durations(clock: Clock) -> dict[str, dict[str, float]]:
     """CPU seconds of each task, and when it ended, wall-clock seconds from the start."""
+    seconds = {task: clock.seconds_of(task) for task in clock.ended}
     return {
-        "seconds_of": {
-            task: round(clock.seconds_of(task), 2) for task in clock.ended if clock.seconds_of(task)
-        },
+        "seconds_of": {task: round(time, 2) for task, time in seconds.items() if time},
         "ended_after_s": {task: round(at, 2) for task, at in clock.ended.items()},
     }
 
 
 def commit() -> str | None:
+    """The commit of the program, and whether it was changed since; None outside of a repository."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return None
     try:
-        asks = ["rev-parse", "HEAD"], ["status", "--porcelain", "--", *PROGRAM_FILES]
-        ran = [subprocess.run(["git", "-C", root, *words], capture_output=True, check=True) for words in asks]
-        head, changed = (one.stdout.decode().strip() for one in ran)
+        head = git(root, "rev-parse", "HEAD")
+        changed = git(root, "status", "--porcelain", "--", *PROGRAM_FILES)
     except (OSError, ValueError, subprocess.CalledProcessError):
         return None
     return head + (" with uncommitted changes" if changed else "")
+
+
+def git(root: Path, *words: str) -> str:
+    run = subprocess.run(["git", "-C", root, *words], capture_output=True, check=True)
+    return run.stdout.decode().strip()
 
 
 def installed(package: str) -> str | None:

@@ -1,52 +1,51 @@
 """The answers to the questions of a robot's assignment."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
-import pandas as pd
-
-from ..core.check import Result
 from ..core.finding import Finding
 from ..core.text import say
-from .verdict import Section, as_records
+from ..robots import Robot
+from .tables import Table
+from .verdict import Section
+
+COLUMNS = ["part", "question", "answered in", "answer"]
 
 
-def answers(sections: Sequence[Section], robot) -> pd.DataFrame:
-    """For each part that a run has answered: its letter, the question, where it is answered, the answer."""
-    results = {section.name: section.result for section in sections}
-    asked = [q for q in robot.questions if results.keys() & set(q.answered_in.split(", "))]
-    rows = [(q.part, q.question, q.answered_in, say(answer(results, *q.answer))) for q in asked]
-    return pd.DataFrame(rows, columns=["part", "question", "answered in", "answer"])
+def answers(sections: Sequence[Section], robot: Robot) -> Table | None:
+    """For each part that a run has answered: its letter, question, place and answer; None: there is none."""
+    ran = {section.name: section for section in sections}
+    asked = [q for q in robot.questions if ran.keys() & set(q.answered_in.split(", "))]
+    cells = [[q.part, q.question, q.answered_in, say(answer(ran, *q.answer))] for q in asked]
+    return Table(COLUMNS, cells) if cells else None
 
 
-def answer(results: Mapping[str, Result], kind: str, *about) -> Finding:
-    """One answer: ("figure", name), ("printed", items ...) or ("largest", experiment, quantity, {column: value}, ...)."""
+def answer(ran: Mapping[str, Section], kind: str, *about: Any) -> Finding:
+    """One answer; kind, about: see robots.Question."""
     if kind == "figure":
         return Finding("questions", "figure", {"name": about[0]})
     if kind == "printed":
-        if "published" not in results:
+        if "published" not in ran:
             return Finding("questions", "not_run")
-        return Finding(
-            "questions", "printed", {"items": [printed(results["published"], item) for item in about]}
-        )
-    found = [largest(results, *about[k : k + 3]) for k in range(0, len(about), 3)]
-    is_of_runs = "trajectory" in about and "trajectory" in results
-    errors, steps = true_errors(results["trajectory"]) if is_of_runs else ({}, None)
-    return Finding("questions", "largest", {"answers": found, "errors": errors, "steps": steps})
+        items = [printed(ran["published"], item) for item in about]
+        return Finding("questions", "printed", {"items": items})
+    places = range(0, len(about), 3)
+    found = [largest(ran, *about[place : place + 3]) for place in places]
+    more = [ran[about[place]].result.answer for place in places if about[place] in ran]
+    values = {"answers": found, "more": [say(finding) for finding in more if finding]}
+    return Finding("questions", "largest", values)
 
 
 def largest(
-    results: Mapping[str, Result], experiment: str, quantity: str, where: Mapping[str, object]
-) -> dict:
-    """The largest difference of the engines in an experiment: of the rows with these values, or of this quantity."""
+    ran: Mapping[str, Section], experiment: str, quantity: str, where: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The largest difference in an experiment: of the rows with these values, or of this quantity."""
     about = {"experiment": experiment, "quantity": quantity}
-    if experiment not in results:
+    if experiment not in ran:
         return about | {"state": "absent"}
     where = where or {"quantity": quantity}
-    rows = [
-        row
-        for row in as_records(results[experiment].rows)
-        if all(row.get(key) == value for key, value in where.items())
-    ]
+    records = [row.record() for row in ran[experiment].rows]
+    rows = [record for record in records if all(record.get(key) == value for key, value in where.items())]
     if not rows or any(row["largest_difference"] is None for row in rows):
         return about | {"state": "diverged" if rows else "empty"}
     top = max(rows, key=lambda row: row["largest_difference"])
@@ -54,15 +53,8 @@ def largest(
     return about | numbers | {"state": "known"}
 
 
-def printed(result: Result, item: str) -> dict:
+def printed(section: Section, item: str) -> dict[str, Any]:
     """A printed item, with the numbers of both engines; its unit is None where there is no result."""
-    rows = [row for row in as_records(result.rows) if row["item"] == item]
+    rows = [record for record in (row.record() for row in section.rows) if record["item"] == item]
     values = {name: [row[name] for row in rows] for name in ("published", "tmt", "mujoco")}
     return {"item": item, "unit": rows[0]["unit"] if rows else None, **values}
-
-
-def true_errors(result: Result) -> tuple[dict, int | None]:
-    """Errors of both engines against the true motion with the coarsest steps of each scene, and their number if it is one."""
-    errors = getattr(result, "errors", {})
-    counts = {min(run.steps for run in result.runs if run.case.name == scene) for scene in errors}
-    return errors, min(counts) if len(counts) == 1 else None

@@ -1,10 +1,11 @@
-"""How figures look. Colours are Okabe and Ito's, which the colour-blind can tell apart; lines differ in dash and markers too.
+"""How figures look. Colours are Okabe and Ito's, for the colour-blind; lines differ in dash and marker too.
 
 A function that draws returns (file name, figure, caption), and computes nothing but positions on paper.
 """
 
 import re
 import warnings
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -13,11 +14,15 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from ..robots import Robot
+
+Line = tuple[str, Any]  # colour, dash
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#666666"
 PINK, SKY = "#CC79A7", "#56B4E9"
 # of joints
-LINES = (BLUE, "-"), (RED, "--"), (GREEN, "-."), (ORANGE, ":"), (PINK, (0, (5, 1))), (SKY, (0, (3, 1, 1, 1)))
-STYLE = {
+DASHES: tuple[Any, ...] = "-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1))
+LINES = tuple(zip((BLUE, RED, GREEN, ORANGE, PINK, SKY), DASHES))
+STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.titlesize": 9,
     "axes.grid": True,
@@ -29,18 +34,17 @@ STYLE = {
 WIDTH = 7.5  # inches, a page
 NUMBER = re.compile(r"\$(\\mathdefault\{)?[-0-9.^{}]*(\\times10)?[-0-9.^{}]*\$")  # of an axis, as a formula
 matplotlib.rcParams.update(STYLE)
-warnings.filterwarnings(
-    "ignore", "constrained_layout not applied"
-)  # names that leave no room for what is drawn
+# names that leave no room for what is drawn
+warnings.filterwarnings("ignore", "constrained_layout not applied")
 
 
-def joint_lines(robot) -> dict[str, tuple]:
+def joint_lines(robot: Robot) -> dict[str, Line]:
     """Colour and dash of each joint's line, by its name."""
     return {name: LINES[k % len(LINES)] for k, name in enumerate(robot.joints)}
 
 
 def file_name(*parts: str) -> str:
-    """The name of a figure: letters, digits, minus signs and underscores, no more than a file's name may have."""
+    """The name of a figure: letters, digits, minus signs and underscores, not too many."""
     return "_".join(re.sub(r"[^\w-]+", "_", part) for part in parts)[:60]
 
 
@@ -53,7 +57,7 @@ def zero_at_the_end(axis: Axis, end: float, far: float, most: int) -> None:
 
 
 def pixels(figure: Figure) -> np.ndarray:
-    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more to find its places.
+    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more.
 
     A text with a $ is no formula, unless it is a number of an axis.
     """

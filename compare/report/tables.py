@@ -1,86 +1,87 @@
 """Tables of a report as text, and the rows of a long table that a reader needs."""
 
 import math
-from collections.abc import Mapping, Sequence
-
-import pandas as pd
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 from ..core.check import Check
-from .verdict import Section
+from ..core.rows import Column, Row, columns_of
 
-DIGITS = dict.fromkeys(
-    ("published", "exact", "tmt", "mujoco", "stated", "compiled", "found"), 7
-)  # of a column; else 3
-STEPS = "predicted_dt_s", "observed_dt_s", "dt_s", "mujoco_dt_s", "tmt_dt_s", "from_dt_s", "to_dt_s"
-DIGITS |= dict.fromkeys(STEPS, 5)
-TITLES = {"what_should_i_use": "What should I use?"}  # of tables whose name is not their title
-IN_WORDS = {"seconds_of": "CPU seconds", "ended_after_s": "seconds from the start to the end"}
-LISTS = ("names", "hinges", "locked")  # columns with many names of joints
+Item = TypeVar("Item")
 LONGEST_LIST = 80  # characters of a list in a report; its file has all
+EVERY_DIGIT = Column(digits=7)
+CAUSE = {"rank": Column(), "place": Column(), "stated": EVERY_DIGIT, "found": EVERY_DIGIT, "text": Column()}
+CHECK = ["experiment", "scene", "quantity", "value", "tolerance", "unit", "note", "rule"]  # columns
+IN_WORDS = {"seconds_of": "CPU seconds", "ended_after_s": "seconds from the start to the end"}
 
 
-def shown(table: pd.DataFrame, columns: Sequence[str] | None = None) -> pd.DataFrame:
-    """A table as text, with the digits that a reader needs."""
-    table = table if columns is None else table[columns]
+class Table(NamedTuple):
+    """A table as text."""
 
-    def text(value, digits, is_list):
-        if isinstance(value, float):
-            if not math.isfinite(value):
-                return ""
-            return f"{value:.0f}" if value.is_integer() and 1.0 <= abs(value) < 1e7 else f"{value:.{digits}g}"
-        whole = "" if value is None else str(value)
-        return f"{whole[: LONGEST_LIST - 4]} ..." if is_list and len(whole) > LONGEST_LIST else whole
-
-    columns = {
-        c: [text(v, DIGITS.get(c, 3), c in LISTS) for v in table[c].astype(object)] for c in table.columns
-    }
-    return pd.DataFrame(columns).rename(columns=lambda c: c.replace("_", " "))
+    columns: Sequence[str]
+    cells: list[list[str]]  # of each row
 
 
-def of_causes(causes: Sequence[dict]) -> pd.DataFrame:
-    columns = ["rank", "place", "stated", "found", "text"]
-    return shown(pd.DataFrame(causes)[columns].rename(columns={"text": "cause"}))
+def of_records(records: Iterable[Mapping[str, Any]], columns: Mapping[str, Column]) -> Table:
+    """These columns of records, with the digits that a reader needs."""
+    cells = [[text_of(record.get(name), column) for name, column in columns.items()] for record in records]
+    return Table([name.replace("_", " ") for name in columns], cells)
 
 
-def records(checks: Sequence[Check]) -> pd.DataFrame:
-    names = [field for field in Check.__annotations__ if field not in ("rounding", "about", "judged")]
-    found = [check.record() if check.judged else check.record() | {"value": "not judged"} for check in checks]
-    return shown(pd.DataFrame(found, columns=names))
+def text_of(value: Any, column: Column) -> str:
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            return ""
+        is_count = value.is_integer() and 1.0 <= abs(value) < 1e7
+        return f"{value:.0f}" if is_count else f"{value:.{column.digits}g}"
+    text = "" if value is None else str(value)
+    is_long = column.names and len(text) > LONGEST_LIST
+    return f"{text[: LONGEST_LIST - 4]} ..." if is_long else text
 
 
-def closest_checks(section: Section, most: int) -> pd.DataFrame:
-    """At most `most` checks of a section as text: those that do not pass, then the largest shares of a rounding tolerance."""
-    checks = section.result.checks
-    order = sorted(range(len(checks)), key=lambda k: (checks[k].passed, -(checks[k].over_tolerance or 0.0)))
-    kept = [checks[k] for k in sorted(order[:most])]
-    return records(kept).drop(columns="experiment")
+def of_rows(rows: Sequence[Row], shown: Sequence[str] | None = None) -> Table:
+    """The rows of a table. shown: the names of its columns, if not all."""
+    columns = columns_of(rows)
+    if shown is not None and rows:
+        columns = {name: columns[name] for name in shown}
+    return of_records([row.record() for row in rows], columns)
 
 
-def origins(origin: dict) -> pd.DataFrame:
-    def in_one_cell(value) -> str:
-        return (
-            ", ".join(f"{name} {part}" for name, part in value.items())
-            if isinstance(value, dict)
-            else str(value)
-        )
-
-    rows = [(IN_WORDS.get(name, name), in_one_cell(value)) for name, value in origin.items()]
-    return pd.DataFrame(rows, columns=["what", "value"])
+def of_causes(causes: Sequence[Mapping[str, Any]]) -> Table:
+    table = of_records(causes, CAUSE)
+    return table._replace(columns=[*table.columns[:-1], "cause"])
 
 
-def shortened(rows: Sequence[dict], most: int) -> tuple[list[dict], str]:
-    """The rows to show, in their order, at most `most`, and how many of how many these are ('' if all of them).
-
-    Those that fail or differ come first, then those with the largest share of a tolerance.
-    """
-    rows = list(rows)
-    if len(rows) <= most:
-        return rows, ""
-    nearest = sorted(range(len(rows)), key=lambda k: distance_from_failure(rows[k]))
-    return [rows[k] for k in sorted(nearest[:most])], f"{most} of {len(rows):,} rows"
+def of_checks(checks: Sequence[Check], columns: Sequence[str] = CHECK) -> Table:
+    records = [check.record() for check in checks]
+    records = [record if record["judged"] else record | {"value": "not judged"} for record in records]
+    return of_records(records, dict.fromkeys(columns, Column()))
 
 
-def distance_from_failure(row: Mapping) -> tuple[bool, bool, float]:
-    """A key to sort rows: those that fail, that differ from a stated number, that use most of a tolerance."""
-    share = row.get("difference_over_band", row.get("difference_over_bar"))
-    return row.get("passed") is not False, not row.get("difference"), math.inf if share is None else -share
+def closest(checks: Sequence[Check], most: int) -> list[Check]:
+    """At most `most` checks: those that do not pass, then the largest shares of a rounding tolerance."""
+    return first(checks, most, lambda check: (check.passed, -(check.over_tolerance or 0.0)))
+
+
+def shortened(rows: Sequence[Row], most: int) -> tuple[list[Row], str]:
+    """The most urgent rows, at most `most`, and how many of how many these are ('' if all of them)."""
+    which = f"{most} of {len(rows):,} rows" if len(rows) > most else ""
+    return first(rows, most, lambda row: row.urgency), which
+
+
+def first(items: Sequence[Item], most: int, key: Callable[[Item], Any]) -> list[Item]:
+    """The items with the smallest keys, at most `most`, in their order."""
+    numbers = sorted(range(len(items)), key=lambda number: key(items[number]))
+    return [items[number] for number in sorted(numbers[:most])]
+
+
+def of_origin(origin: Mapping[str, Any]) -> Table:
+    """The provenance: what, and its value."""
+    rows = [[IN_WORDS.get(name, name), in_one_cell(value)] for name, value in origin.items()]
+    return Table(["what", "value"], rows)
+
+
+def in_one_cell(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {part}" for name, part in value.items())
+    return str(value)

@@ -5,11 +5,13 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from textwrap import fill
+from textwrap import TextWrapper
+from typing import IO, cast
 
 from rich.console import Console
+from rich.status import Status
 from rich.text import Text
 
 from ..core.words import in_one_line
@@ -20,28 +22,24 @@ EMPTY_LINE, SHOW_CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the c
 
 
 class Terminal:
-    """Prints lines on stdout. If stderr is a terminal, it shows the progress there, else in a line now and then."""
+    """Prints lines on stdout, and the progress on stderr if that is a terminal, else now and then a line."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.out, self.err = Stream(sys.stdout), Stream(sys.stderr)
-        both = [Console(file=s, force_terminal=s.isatty(), width=80, height=25) for s in (self.out, self.err)]
-        self.lines, self.screen = both
-        self.status, self.text, self.how_far = None, "", list
+        self.lines, self.screen = console(self.out), console(self.err)
+        self.status: Status | None = None
+        self.text = ""
+        self.how_far: Callable[[], list[str]] = list
 
-    def say(self, text="", style="") -> None:
-        """Print a line; on a narrower terminal without wide gaps if it fits then, else wrapped between words."""
+    def say(self, text: str = "", style: str = "") -> None:
+        """Print a line; on a narrower terminal without wide gaps if it fits then, else wrapped."""
         text, columns = in_one_line(text), self.out.columns()
         if columns and len(text) > columns:
             indent = " " * (len(text) - len(text.lstrip()))
             narrow = indent + re.sub(" {2,}", "  ", text.strip())
-            text = narrow if len(narrow) <= columns else text
-            text = fill(
-                text,
-                max(columns, 20),
-                subsequent_indent=indent + "  ",
-                break_long_words=False,
-                break_on_hyphens=False,
-            )
+            wrapped = TextWrapper(max(columns, 20), break_long_words=False, break_on_hyphens=False)
+            wrapped.subsequent_indent = f"{indent}  "
+            text = narrow if len(narrow) <= columns else wrapped.fill(text)
         with self.paused():
             self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
 
@@ -53,7 +51,7 @@ class Terminal:
         self.how_far = how_far
 
     @contextmanager
-    def progress(self, text: str, period: float = 25.0):
+    def progress(self, text: str, period: float = 25.0) -> Iterator[None]:
         """Show the progress during this block, if that is possible; else print it every period (s)."""
         self.show(text)
         if not self.screen.is_terminal or self.screen.is_dumb_terminal:
@@ -76,25 +74,23 @@ class Terminal:
 
     def speak_until(self, ended: threading.Event, period: float) -> None:
         while not ended.wait(period):
-            self.say("  " + ": ".join(filter(None, (", ".join(self.how_far()), self.text))))
+            self.say(f"  {joined(self.how_far(), self.text)}")
 
     def line(self) -> str:
         """The progress, as far as there is room, no name twice."""
         self.screen.width = max(self.err.columns() or 80, 20)
-        space = self.screen.width - 6  # the spinner, and what a terminal shows of Ctrl-C
+        room = self.screen.width - 6  # the spinner, and what a terminal shows of Ctrl-C
         parts, text = self.how_far(), in_one_line(self.text)
-        if len(parts) > 2 and len(", ".join(parts)) > space:
-            parts = [parts[0], *parts[2:]]
         for part in parts:
             text = text.removeprefix(f"{part}: ")
-        whole = ": ".join(filter(None, (", ".join(parts), text)))
-        return whole if len(whole) <= space else whole[: space - 3] + "..."
+        line = joined(parts, text)
+        return line if len(line) <= room else line[: room - 3] + "..."
 
     def __rich__(self) -> Text:
         return Text(self.line(), no_wrap=True)
 
     @contextmanager
-    def paused(self):
+    def paused(self) -> Iterator[None]:
         if self.status:
             self.status.stop()
         try:
@@ -102,6 +98,14 @@ class Terminal:
         finally:
             if self.status:
                 self.status.start()
+
+
+def console(stream: Stream) -> Console:
+    return Console(file=cast("IO[str]", stream), force_terminal=stream.isatty(), width=80, height=25)
+
+
+def joined(parts: Sequence[str], text: str) -> str:
+    return ": ".join(filter(None, (", ".join(parts), text)))
 
 
 def wipe() -> None:

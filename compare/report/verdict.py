@@ -1,56 +1,103 @@
-"""The outcome of a report: its sections, which checks fail, what explains that, and which parts could not be made."""
+"""The outcome of a report: its sections, which checks fail, what explains that, what could not be made."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
-from ..core.check import ENDS, About, Check, Result
+from ..core.check import About, Check, Result
 from ..core.errors import described
+from ..core.experiment import Experiment
 from ..core.finding import Finding
+from ..core.pictures import Pictures
 from ..core.rows import Row
 from ..core.text import block, say
 from ..core.words import capital
+from ..robots import Robot
+from .plain_rows import in_rows
 
 Value = TypeVar("Value")
+UNKNOWN = Experiment()
+OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
 
-SEEKS_CAUSES = "diagnosis"  # it compares nothing of its own: it says why others fail
-STATES_CAUSES = "parameters", SEEKS_CAUSES  # experiments whose failing checks are the causes
+
+class Figure(NamedTuple):
+    file: str  # its name, without .png
+    caption: str
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is an animation, of which the page has another form."""
+        return self.file.endswith(".gif")
+
+    @property
+    def path(self) -> str:
+        return self.file if self.moves else f"{self.file}.png"
+
+    @property
+    def is_overview(self) -> bool:
+        """Whether it is a picture of the first screen."""
+        return self.file.startswith(OVERVIEW)
+
+    @property
+    def is_main(self) -> bool:
+        """Whether a picture of the first screen leads to it."""
+        return self.file.endswith(("_distances", "_limits"))
 
 
 @dataclass
 class Section:
+    """An experiment in a report, with what the report has to know of it."""
+
     name: str
     title: str
     claim: str
     tolerance: str
     result: Result
-    figures: list = field(default_factory=list)  # (file name, caption)
-    explained: list = field(default_factory=list)  # failing checks that are gone when the causes are mended
+    figures: list[Figure] = field(default_factory=list)
+    explained: list[Check] = field(default_factory=list)  # failing checks that are gone without the causes
+    record: Experiment = UNKNOWN  # what the program knows of it
+    scenes: Sequence[Pictures] = ()  # the motion
 
     @property
     def notes(self) -> list[str]:
         return [say(note) for note in self.result.notes]
 
     @property
-    def tables(self) -> dict:
+    def rows(self) -> list[Row]:
+        return in_rows(self.result.rows)
+
+    @property
+    def tables(self) -> dict[str, list[Row]]:
         """Its tables that have rows, by their names; its own first."""
         tables = {self.name: self.result.rows} | self.result.tables
-        return {name: as_records(rows) for name, rows in tables.items() if rows}
+        return {name: in_rows(rows) for name, rows in tables.items() if rows}
 
+    @property
+    def judged(self) -> list[Check]:
+        return [check for check in self.result.checks if check.judged]
 
-def as_records(rows: list) -> list[dict]:
-    is_typed = isinstance(rows, list) and rows and isinstance(rows[0], Row)
-    return [row.record() for row in rows] if is_typed else rows
+    @property
+    def failed(self) -> list[Check]:
+        return [check for check in self.result.checks if check.failed]
+
+    @property
+    def own_figures(self) -> list[Figure]:
+        return [figure for figure in self.figures if not figure.is_overview]
 
 
 class Report(NamedTuple):
     sections: Sequence[Section]
-    robot: object  # a robots.Robot
-    origin: dict  # see provenance
+    robot: Robot
+    origin: dict[str, Any]  # see provenance
     verdict: str  # in words, a sentence in each line
-    causes: Sequence[dict] = ()  # of the failures, lowest rank first
+    causes: Sequence[Mapping[str, Any]] = ()  # of the failures, lowest rank first
     skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
-    reference: object | None = None  # a reference.Reference
+    reference: Mapping[str, str] | None = None  # kind and name of what MuJoCo is compared with
+    first_lines: Sequence[str] = ()  # what is said of it
+
+    @property
+    def passed(self) -> bool:
+        return passed(self.sections)
 
     @property
     def top(self) -> list[str]:
@@ -60,9 +107,8 @@ class Report(NamedTuple):
     @property
     def answer(self) -> list[str]:
         """The last lines of a run of one experiment: what is said of the robot, else its number."""
-        return self.top or [
-            f"{capital(headline(section))}." for section in self.sections if section.result.checks
-        ]
+        numbers = [headline(section) for section in self.sections if section.result.checks]
+        return self.top or [f"{capital(number)}." for number in numbers]
 
 
 class Failures(NamedTuple):
@@ -77,34 +123,29 @@ class Failures(NamedTuple):
 
 
 def failures(sections: Sequence[Section]) -> Failures:
-    """The failed checks: of the models, of broken experiments, the step, predictions that no run confirms, other engines.
-
-    And the checks that were not judged.
-    """
+    """The checks that fail, by their kinds, and those that were not judged."""
     checks = [check for section in sections for check in section.result.checks]
     kinds = About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION, About.ENGINE
-    failed = ([check for check in checks if check.failed and check.about == kind] for kind in kinds)
-    return Failures(*failed, [check for check in checks if not check.judged])
+    failed = [[check for check in checks if check.failed and check.about == kind] for kind in kinds]
+    return Failures._make([*failed, [check for check in checks if not check.judged]])
 
 
 def passed(sections: Sequence[Section]) -> bool:
     """Whether something was compared, no check fails, and all were judged."""
-    is_compared = any(check.judged for section in sections for check in section.result.checks)
-    return is_compared and not any(failures(sections))
+    return any(section.judged for section in sections) and not any(failures(sections))
 
 
 def worst(sections: Sequence[Section]) -> Check | None:
     """The check that uses most of a tolerance of rounding, or None."""
-    checks = [
-        check for section in sections for check in section.result.checks if check.over_tolerance is not None
-    ]
-    return max(checks, key=lambda check: check.over_tolerance, default=None)
+    checks = [check for section in sections for check in section.result.checks]
+    of_rounding = [check for check in checks if check.over_tolerance is not None]
+    return max(of_rounding, key=lambda check: check.over_tolerance or 0.0, default=None)
 
 
 def verdict(
     sections: Sequence[Section],
     experiments: int,
-    causes: Sequence[dict] = (),
+    causes: Sequence[Mapping[str, Any]] = (),
     compared: str = "The two models",
     robot: str = "the robot",
 ) -> str:
@@ -113,83 +154,58 @@ def verdict(
     experiments: how many there are in all; compared: what agrees or differs; robot: its name.
     """
     checked = [section for section in sections if section.result.checks]
-    consequences = [check for section in sections for check in section.explained]
-    also = failures(checked)
-    checks = [check for section in checked for check in section.result.checks if check.judged]
-    failed = sum(check.failed for check in checks)
-    also = also._replace(unconfirmed=[check for check in also.unconfirmed if check not in consequences])
+    checks = [check for section in checked for check in section.judged]
+    explained = [check for section in sections for check in section.explained]
+    stating = [check for section in checked if section.record.states_causes for check in section.failed]
+    unexplained = [check for check in checks if stands(check, explained, stating)]
+    failing = failures(checked)
+    unconfirmed = [check for check in failing.unconfirmed if check not in explained]
+    failing = failing._replace(unconfirmed=unconfirmed)
+    differing = [section for section in checked if section.record.compares and failures([section]).differing]
     top = worst(checked)
-    named = {check.experiment for check in also.differing} - {SEEKS_CAUSES}
-    names = [section.name for section in checked if not named or section.name in named]
-    lines = block(
-        "verdict",
-        "verdict",
-        compared=compared,
-        robot=robot,
-        ran={"names": names, "differ": bool(named), "checked": len(checked), "all": experiments},
-        alone=len(sections) == 1,
-        models=sum(check.about == About.MODELS for check in checks),
-        engines=sum(check.about == About.ENGINE for check in checks),
-        failed=failed,
-        checks=len(checks),
-        empty=[section.name for section in sections if not section.result.checks],
-        also=also,
-        top=top if top and top.value and not any(also) else None,
-        causes=causes,
-        consequences={
-            "explained": len(consequences),
-            "stating": sum(check.experiment in STATES_CAUSES for check in checks if check.failed),
-            "first": next((check for check in checks if stands(check, consequences)), None),
-        },
-        first=also.differing[0] if also.differing else None,
-    )
+    values = {"compared": compared, "robot": robot, "experiments": experiments, "sections": sections}
+    values |= {"names": [section.name for section in differing or checked], "differ": bool(differing)}
+    values |= {"checked": checked, "checks": checks, "failing": failing, "causes": causes}
+    values |= {"explained": explained, "stating": stating, "unexplained": unexplained}
+    values["top"] = top if top and top.value and not any(failing) else None
+    lines = block("verdict", "verdict", **values)
     return "\n".join(filter(None, map(str.strip, lines.split("\n"))))
 
 
-def stands(check: Check, consequences: Sequence[Check]) -> bool:
+def stands(check: Check, explained: Sequence[Check], stating: Sequence[Check]) -> bool:
     """Whether a check fails, states no cause, and no cause explains it."""
-    return check.failed and check.experiment not in STATES_CAUSES and check not in consequences
+    return check.failed and check not in stating and check not in explained
+
+
+def in_words(section: Section, kind: str) -> str:
+    """The macro `outcome` or `standing` for a section."""
+    numbers = {"checks": section.judged, "failed": section.failed, "explained": section.explained}
+    counts = {name: len(checks) for name, checks in numbers.items()}
+    return say(Finding("verdict", kind, {**counts, "failing": failures([section])}))
 
 
 def outcome(section: Section) -> str:
     """Whether a section passes, in a sentence."""
-    checks = [check for check in section.result.checks if check.judged]
-    numbers = {"checks": len(checks), "failed": sum(check.failed for check in checks)}
-    numbers["explained"] = len(section.explained)
-    return say(Finding("verdict", "outcome", {**numbers, "also": failures([section])}))
+    return in_words(section, "outcome")
 
 
 def standing(section: Section) -> tuple[bool | None, str]:
-    """Whether a section passes, and that in two or three words; None where something was not judged."""
-    checks = [check for check in section.result.checks if check.judged]
-    differing, broke, unstable, unconfirmed, of_engines, not_judged = failures([section])
-    if differing:
-        return False, f"{sum(check.failed for check in checks)} of {len(checks)} fail"
-    if broke:
-        return False, "broke off" if any(check.quantity == ENDS for check in broke) else "incomplete"
-    if of_engines:
-        return False, f"{len(of_engines)} of {len(checks)} fail"
-    if unconfirmed:
-        return False, f"{len(unconfirmed)} not confirmed"
-    if unstable:
-        return False, "unstable step"
-    if not_judged:
-        return None, f"{len(not_judged)} not judged"
-    return (True, "pass") if checks else (None, "nothing compared")
+    """Whether a section passes, also in words; None: not all was judged, or nothing compared."""
+    *failing, not_judged = failures([section])
+    is_open = bool(not_judged) or not section.judged
+    return (False if any(failing) else None if is_open else True), in_words(section, "standing")
 
 
 def headline(section: Section) -> str:
     """The number of a section for the first screen; how many checks pass where it has none."""
     if section.result.headline:
         return say(section.result.headline)
-    checks = [check for check in section.result.checks if check.judged]
-    shares = [check.over_tolerance for check in checks if check.over_tolerance is not None and check.passed]
-    numbers = {"passed": sum(check.passed for check in checks), "checks": len(checks)}
-    return (
-        say(Finding("verdict", "checks_passed", {**numbers, "share": max(shares, default=None)}))
-        if checks
-        else ""
-    )
+    if not section.judged:
+        return ""
+    passing = [check for check in section.judged if check.passed]
+    shares = [check.over_tolerance for check in passing if check.over_tolerance is not None]
+    numbers = {"passed": len(passing), "checks": len(section.judged), "share": max(shares, default=None)}
+    return say(Finding("verdict", "checks_passed", numbers))
 
 
 class Parts:
@@ -198,7 +214,7 @@ class Parts:
     def __init__(self) -> None:
         self.broken: dict[str, str] = {}
 
-    def attempt(self, name: str, otherwise: Value, make: Callable[..., Value], *arguments: object) -> Value:
+    def attempt(self, name: str, otherwise: Value, make: Callable[..., Value], *arguments: Any) -> Value:
         """make(*arguments); if it raises, `otherwise`, and the part is listed as broken."""
         try:
             return make(*arguments)
@@ -208,14 +224,11 @@ class Parts:
 
     @property
     def lines(self) -> list[str]:
-        return [
-            say(Finding("verdict", "incomplete", {"name": name, "why": why}))
-            for name, why in self.broken.items()
-        ]
+        return [block("verdict", "incomplete", name=name, why=why) for name, why in self.broken.items()]
 
     @property
     def checks(self) -> list[Check]:
-        return [
-            Check("report", "", f"{name} is complete", None, 0.0, "", why, rule="equal", about=About.PROGRAM)
-            for name, why in self.broken.items()
-        ]
+        result = Result("report")
+        for name, why in self.broken.items():
+            result.check("", f"{name} is complete", None, 0.0, "", why, rule="equal", about=About.PROGRAM)
+        return result.checks

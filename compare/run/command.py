@@ -3,12 +3,14 @@
 import argparse
 import os
 import time
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from ..core.errors import Refused
 from ..core.finding import Finding
-from ..core.text import say
+from ..core.text import block, say
 from ..engines.mujoco import ModelError
 from ..engines.own.own_file import OwnFileError
 from ..experiments import EXPERIMENTS, skipped
@@ -21,40 +23,47 @@ from ..robots.scene_file import SceneError, read_scenes
 from ..robots.states import MOST_SPEEDS
 from .reference import Compared, compared_with
 
-COMPUTING = ("compare.run.examine", "tmt.compiled.machine")  # modules that take long to load
-DRAWING = ("compare.report.style", *COMPUTING)
+if TYPE_CHECKING:  # they take long to load
+    from ..report.verdict import Parts, Report
+    from .examine import Examined
+
+COMPUTING = "compare.run.examine", "tmt.compiled.machine"  # modules that take long to load
+DRAWING = "compare.report.style", *COMPUTING
 
 
 def carry_out(options: argparse.Namespace, command: str) -> int:
-    """Compare the models and write the report; the exit status. Refused: the request cannot be carried out."""
-    started, terminal = time.perf_counter(), Terminal()
+    """Compare the models and write the report; the exit status. Refused: that is not possible."""
+    started, terminal, is_alone = time.perf_counter(), Terminal(), options.experiment != "all"
     try:
         compared = compared_with(options.reference, options.mjcf, options.joints)
         if options.scenes:
-            compared = compared._replace(
-                robot=compared.robot.with_scenes(read_scenes(options.scenes, compared.robot))
-            )
-        if options.experiment != "all" and (reason := skipped(options.experiment, compared.robot)):
-            raise Refused(f"{options.experiment} does not apply to {compared.robot.name}: {say(reason)}")
+            scenes = read_scenes(options.scenes, compared.robot)
+            compared = compared._replace(robot=compared.robot.with_scenes(scenes))
+        if is_alone and (reason := skipped(options.experiment, compared.robot)):
+            about = {"experiment": options.experiment, "robot": compared.robot.name, "reason": say(reason)}
+            raise Refused(block("run", "does_not_apply", **about))
         with new_report(options.out) as folder:
             report, parts = compute(options, command, compared, folder, terminal)
     except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
-    from ..report.verdict import passed
-
-    good = passed(report.sections) and not parts.broken
+    good = report.passed and not parts.broken
     terminal.say()
-    for number, line in enumerate(report.verdict.split("\n")):
-        terminal.say(line, "" if number else "bold green" if good else "bold red")
+    first, *more = report.verdict.split("\n")
+    terminal.say(first, "bold green" if good else "bold red")
+    for line in more:
+        terminal.say(line)
     for line in parts.lines:
         say_error(line)
-    terminal.say(f"Report: {os.path.join(options.out, 'index.html')} ({time.perf_counter() - started:.1f} s)")
-    for line in report.answer if options.experiment != "all" else ():
+    path, seconds = os.path.join(options.out, "index.html"), time.perf_counter() - started
+    terminal.say(block("run", "report", path=path, seconds=seconds))
+    for line in report.answer if is_alone else ():
         terminal.say(line)
     return 0 if good else 1
 
 
-def compute(options, command: str, compared: Compared, folder: Path, terminal: Terminal) -> tuple:
+def compute(
+    options: argparse.Namespace, command: str, compared: Compared, folder: Path, terminal: Terminal
+) -> tuple["Report", "Parts"]:
     """Run the experiments and write the report to a folder; see write_report."""
     is_alone, robot, started = options.experiment != "all", compared.robot, time.perf_counter()
     step = compared.integrator_step(options.dt, options.integrator)
@@ -74,27 +83,32 @@ def compute(options, command: str, compared: Compared, folder: Path, terminal: T
         origin = provenance(command, robot.mjcf, compared.reference.file, SEED)  # of the model as it was read
         more = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
         setup = examine.setup_of(compared, options.quick, alone=is_alone, step=step, **more)
-        for name, reason in reasons.items():
-            terminal.say(f"{name:<13} skipped: {reason}")
+        for name, said in reasons.items():
+            terminal.say(block("run", "skipped", name=name, reason=said))
         terminal.tell(partial(examine.progress, workers.clock, names))
-        outcome = examine.examine(names, setup, folder, terminal, workers, workers.clock)
+        examined = examine.examine(names, setup, folder, terminal, workers, workers.clock)
     origin |= {"seconds": round(time.perf_counter() - started, 1)} | durations(workers.clock)
-    return write_report(folder, *outcome, list(reasons.items()), origin, compared)
+    return write_report(folder, examined, list(reasons.items()), origin, compared)
 
 
 def write_report(
-    folder: Path, sections, causes, needless, skipped, origin: dict, compared: Compared
-) -> tuple:
-    """Write a report with its verdict to a folder that has its figures: the verdict.Report and its Parts.
+    folder: Path,
+    examined: "Examined",
+    skipped: Sequence[tuple[str, str]],
+    origin: dict[str, Any],
+    compared: Compared,
+) -> tuple["Report", "Parts"]:
+    """Write a report with its verdict to a folder that has its figures; what could not be made of it.
 
-    sections, causes, needless: see examine; skipped, origin: see Report.
+    skipped, origin: see Report.
     """
     from ..report import files, verdict
 
-    parts, count = verdict.Parts(), len(EXPERIMENTS) - len(needless)
-    subjects = {"model": "TMT and MuJoCo", "own": "Your equations and MuJoCo"}
-    of = subjects.get(compared.reference.kind, "The two models"), compared.robot.name
-    words = parts.attempt("the verdict", "No verdict.", verdict.verdict, sections, count, causes, *of)
-    skipped = [*skipped, *needless.items()]
-    report = verdict.Report(sections, compared.robot, origin, words, causes, skipped, compared.reference)
+    parts, (reference, robot, *_) = verdict.Parts(), compared
+    sections, causes, needless = examined
+    count, subject = len(EXPERIMENTS) - len(needless), block("run", "subject", kind=reference.kind)
+    about = sections, count, causes, subject, robot.name
+    words = parts.attempt("the verdict", "No verdict.", verdict.verdict, *about)
+    left_out, named = [*skipped, *needless.items()], {"kind": reference.kind, "name": reference.name}
+    report = verdict.Report(sections, robot, origin, words, causes, left_out, named, reference.lines)
     return report, files.write(folder, report, parts)

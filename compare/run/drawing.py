@@ -8,10 +8,10 @@ import numpy as np
 
 from ..core.check import Result
 from ..core.text import say
-from ..experiments import EXPERIMENTS, module
+from ..experiments import EXPERIMENTS, functions
 from ..report import images
 from ..report.folder import writing
-from ..report.verdict import Section
+from ..report.verdict import Figure, Section
 from ..robots import Robot
 
 
@@ -20,28 +20,29 @@ def draw(
     result: Result,
     robot: Robot,
     folder: Path,
-    others: Mapping | None = None,
+    others: Mapping[str, Result],
     few: bool = False,
-) -> list[tuple[str, str]]:
-    """The figures of an experiment on disk: names (without .png) and captions.
+) -> list[Figure]:
+    """The figures of an experiment on disk.
 
-    others: the results for the picture of the first screen, see `results_needed`. few: this picture alone; the first figure of
-    an experiment that has none.
+    others: the results for the picture of the first screen, see `results_needed`.
+    few: this picture alone; the first figure of an experiment that has none.
     """
-    many = (0 if EXPERIMENTS[experiment].overview else 1) if few else None
-    own = getattr(module(experiment), "figures", lambda *_: ())
-    drawn, calls = [], islice(own(result, robot), many)
-    if others and hasattr(module(experiment), "overview"):
-        calls = chain(calls, module(experiment).overview({**others, experiment: result}, robot))
+    most = None
+    if few:
+        most = 0 if picture_of(experiment) else 1
+    of_experiment = functions(experiment)
+    overview = of_experiment.overview({**others, experiment: result}, robot) if others else ()
+    drawn: list[Figure] = []
     with quiet(robot):
-        for call in calls:
+        for call in chain(islice(of_experiment.figures(result, robot), most), overview):
             file, figure, caption = call()
-            while file.casefold() in {other.casefold() for other, _ in drawn}:
+            while file.casefold() in {other.file.casefold() for other in drawn}:
                 file += "_"  # names that differ in signs alone may give one file
             path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
             with writing(path):
                 images.save_figure(figure, path)
-            drawn.append((path.name.removesuffix(".png"), say(caption)))
+            drawn.append(Figure(path.name.removesuffix(".png"), say(caption)))
     return drawn
 
 
@@ -50,14 +51,18 @@ def results_needed(experiment: str, names: Sequence[str], sections: Sequence[Sec
 
     names: of the experiments that run, in their order; sections: of those that are done.
     """
-    picture = EXPERIMENTS[experiment].overview if experiment in EXPERIMENTS else ""
-    needed = [name for name in names if picture and EXPERIMENTS[name].overview == picture]
+    picture = picture_of(experiment)
+    needed = [name for name in names if picture and picture_of(name) == picture]
     if needed[-1:] != [experiment]:
         return {}
     results = [section.result for section in sections if section.name in needed]
     return {of.experiment: Result(of.experiment, rows=of.rows, label=of.label) for of in results}
 
 
+def picture_of(experiment: str) -> str:
+    return EXPERIMENTS[experiment].overview if experiment in EXPERIMENTS else ""
+
+
 def quiet(robot: Robot) -> np.errstate:
-    """A block in which NumPy does not warn of NaN where a user's own equations may give it: checks report that."""
-    return np.errstate(all="ignore" if getattr(robot, "own", ()) else None)
+    """A block in which NumPy does not warn of NaN of a user's own equations: checks report that."""
+    return np.errstate(all="ignore" if robot.own else None)

@@ -1,171 +1,218 @@
 """Runs the experiments one after the other; long work and drawing go to other processes."""
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType
+from typing import Any, NamedTuple, TypeVar
 
 from ..core.check import ENDS, About, Result
 from ..core.errors import described
 from ..core.finding import Finding
 from ..core.text import block, say
-from ..experiments import EXPERIMENTS, TIMED, Experiment, module
+from ..engines.own import Problem
+from ..experiments import EXPERIMENTS, TIMED, Experiment, functions, module
 from ..experiments.setup import Setup, engines
-from ..process.workers import Clock, WorkerEnded, Workers, load_modules
+from ..process.workers import Clock, WorkerEnded, load_modules
 from ..report.terminal import Terminal
-from ..report.verdict import STATES_CAUSES, Section, failures
+from ..report.verdict import Figure, Section, failures
+from ..robots import Robot
 from ..robots.states import MOST_SPEEDS
 from .drawing import draw, quiet, results_needed
 from .explained import explained
 from .reference import Compared
 
-START, END = (
-    "start",
-    "figures",
-)  # tasks of the clock: what comes before the first experiment and after the last
+Value = TypeVar("Value")
+Cause = dict[str, Any]
+START, END = "start", "figures"  # tasks of the clock: before the first experiment, and after the last
 DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers on which Mbar and h depend, by their names in `parameters`
-IN_EQUATIONS = (
-    "order", "parent", "ref", "axis", "anchor", "com", "mass", "inertia", "gravity", "armature", "flag gravity",
-)  # fmt: skip
+OF_JOINTS, OF_BODIES = ("order", "parent", "ref", "axis", "anchor"), ("com", "mass", "inertia")
+IN_EQUATIONS = (*OF_JOINTS, *OF_BODIES, "gravity", "armature", "flag gravity")
 SHOWN = 5  # lines on the terminal about an experiment that fails
 
 
-def setup_of(compared: Compared, is_quick: bool, **more: object) -> Setup:
+class Examined(NamedTuple):
+    sections: list[Section]  # of each experiment, in the order of their names
+    causes: list[Cause]  # of failing checks
+    needless: dict[str, str]  # experiments that were skipped, and why
+
+
+def setup_of(compared: Compared, is_quick: bool, **more: Any) -> Setup:
     """What the experiments need. more: further fields of Setup."""
     make = Setup.quick if is_quick else Setup
-    return make(
-        compared.robot, engines(compared.mujoco, compared.reference.own), reading=compared.reading, **more
-    )
+    of_run = engines(compared.mujoco, compared.reference.own)
+    return make(compared.robot, of_run, reading=compared.reading, **more)
 
 
-def examine(
-    names: Sequence[str],
-    setup: Setup,
-    folder: Path,
-    terminal: Terminal,
-    workers: Workers,
-    clock: Clock | None = None,
-) -> tuple[list[Section], list[dict], dict[str, str]]:
-    """The section of each experiment with its figures, the causes of failing checks, and the skipped experiments with reasons.
+def examine(names: Sequence[str], setup: Setup, *place: Any) -> Examined:
+    """The experiments of a run, see Run, one after the other."""
+    return Run(names, setup, *place).examined()
 
-    An experiment that raises is one failed check; the others go on. Among other experiments the diagnosis runs only if one of
-    them fails. clock: of the workers, it measures each experiment.
+
+@dataclass
+class Run:
+    """The experiments of one run. clock: of the workers, it measures each experiment.
+
+    An experiment that raises is one failed check; the others go on. The diagnosis runs, among others, only if
+    one of them fails.
     """
-    clock = clock or Clock()
-    (folder / "figures").mkdir()
-    sections, drawings, waiting, causes, reasons = [], [], [], [], {}
-    own, reported, crashed, work = setup.engines.get("own"), set(), {}, {}
-    is_large = setup.robot.coordinates.nv > MOST_SPEEDS  # its first answers come before any long work begins
-    for name in names:
-        if hasattr(module(name), "begin") and not is_large:
-            with clock.of(name):
-                work[name], crashed[name] = attempt(name, module(name).begin, setup)
-    clock.ends(START)
-    last = ("kinematics", *TIMED) if is_large else TIMED
-    order = sorted(names, key=last.__contains__)
-    for name in order:
-        is_needed = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
-        needless = {"diagnosis": "nothing failed"} if len(names) > 1 and not is_needed else {}
-        if setup.is_quick and not setup.alone and not EXPERIMENTS[name].in_quick:
-            needless[name] = "not in a quick run"
-        if name in needless:
-            reasons[name] = needless[name]
-            terminal.say(f"{name:<13} skipped: {reasons[name]}")
-            clock.ends(name)
-            continue
-        clock.under_way = name
-        with clock.of(name):
-            setup.progress(block(name, "summary"))
-            section, crash = None, crashed.get(name)
-            if not crash:
-                section, crash = attempt(name, partial(section_of, name, work=work.get(name)), setup)
-            sections.append(section or Section(name, name, "", "", crash))
-            if own:
-                add_problems(sections[-1].result, own.equations.problems, reported)
-            new = [{"experiment": name, **cause} for cause in new_causes(setup, sections, causes)]
-            causes = new + causes
-            if causes:
-                sections[-1].explained = (
-                    attempt("explained", partial(explained, section=sections[-1]), setup)[0] or []
-                )
-        clock.ends(name)
-        if section:
-            few = setup.is_quick and not setup.alone and not any(failures([section]))
-            others = results_needed(name, order, sections)
-            drawing = draw, name, section.result, setup.robot, folder / "figures", others, few
-            with clock.of(END):
-                if name in TIMED:  # no drawing delays a timing
-                    waiting.append((section, drawing))
-                else:
-                    drawings.append((section, workers.submit(*drawing)))
-        say_outcome(terminal, sections[-1], clock.seconds_of(name), new, bool(causes))
-        for text in sections[-1].result.top if len(names) > 1 else ():  # else it is the last line of the run
-            terminal.say(f"  {say(text)}")
-    with clock.of(END):
-        setup.progress("figures")
-        drawings += [(section, workers.submit(*drawing)) for section, drawing in waiting]
-        load_modules("compare.report.files")  # it takes long; meanwhile workers draw
-        for section, drawing in drawings:
-            try:
-                section.figures = drawing.result()
-            except OSError:  # of the disk
-                raise
-            except Exception as error:
-                add_crash(section.result, "figures are drawn", error)
-                terminal.say(f"  FAIL {section.result.checks[-1]}", "red")
-    clock.ends(END)
-    return sorted(sections, key=lambda section: names.index(section.name)), causes, reasons
+
+    names: Sequence[str]
+    setup: Setup
+    folder: Path  # for the folder of figures
+    terminal: Terminal
+    workers: Executor
+    clock: Clock = field(default_factory=Clock)
+    sections: list[Section] = field(default_factory=list)
+    causes: list[Cause] = field(default_factory=list)
+    work: dict[str, Any] = field(default_factory=dict)  # that was begun, of each experiment
+    crashed: dict[str, Result] = field(default_factory=dict)
+    told: set[int] = field(default_factory=set)  # problems of the user's own equations, by their numbers
+    drawings: list[tuple[Section, Future[list[Figure]]]] = field(default_factory=list)
+
+    @property
+    def is_large(self) -> bool:
+        """Whether the first answers come before any long work."""
+        return self.setup.robot.coordinates.nv > MOST_SPEEDS
+
+    @property
+    def order(self) -> list[str]:
+        last = ("kinematics", *TIMED) if self.is_large else TIMED
+        return sorted(self.names, key=last.__contains__)
+
+    def examined(self) -> Examined:
+        (self.folder / "figures").mkdir()
+        self.begin()
+        needless = {}
+        for name in self.order:
+            reason = self.needless(name)
+            if reason:
+                needless[name] = reason
+                self.terminal.say(block("run", "skipped", name=name, reason=reason))
+                self.clock.ends(name)
+            else:
+                self.examine(name)
+        self.finish_drawings()
+        sections = sorted(self.sections, key=lambda section: self.names.index(section.name))
+        return Examined(sections, self.causes, needless)
+
+    def begin(self) -> None:
+        """Start the long work of the experiments."""
+        for name in self.names:
+            begin = functions(name).begin
+            if begin and not self.is_large:
+                with self.clock.of(name):
+                    self.work[name] = self.attempt(name, begin, self.setup)
+        self.clock.ends(START)
+
+    def attempt(self, name: str, act: Callable[..., Value], *arguments: Any) -> Value | None:
+        """act(*arguments); if it raises, None, and the experiment has crashed."""
+        value, crash = attempt(name, self.setup.robot, act, *arguments)
+        if crash:
+            self.crashed.setdefault(name, crash)
+        return value
+
+    def needless(self, name: str) -> str:
+        """Why an experiment is left out of a run of several; "" if it is not."""
+        differing = (section for section in self.sections if failures([section]).differing)
+        is_needed = any(section.name in DIAGNOSED for section in differing)
+        if len(self.names) > 1 and not EXPERIMENTS[name].compares and not is_needed:
+            return block("run", "nothing_failed")
+        is_short = self.setup.is_quick and not self.setup.alone
+        return block("run", "not_quick") if is_short and not EXPERIMENTS[name].in_quick else ""
+
+    def examine(self, name: str) -> None:
+        self.clock.under_way = name
+        with self.clock.of(name):
+            self.setup.progress(block(name, "summary"))
+            section = self.section_of(name)
+            self.sections.append(section)
+            if self.setup.own:
+                add_problems(section.result, self.setup.own.equations.problems, self.told)
+            found = new_causes(self.setup, self.sections, self.causes)
+            new = [{"experiment": name, **cause} for cause in found]
+            self.causes = new + self.causes
+            if self.causes:
+                section.explained = self.attempt("explained", explained, self.setup, section) or []
+        self.clock.ends(name)
+        if name not in TIMED:  # no drawing delays a timing
+            self.draw(section)
+        say_outcome(self.terminal, section, self.clock.seconds_of(name), new, bool(self.causes))
+        for text in section.result.top if len(self.names) > 1 else ():  # else it is the last line of the run
+            self.terminal.say(f"  {say(text)}")
+
+    def section_of(self, name: str) -> Section:
+        """The section of an experiment, which is run for it; of one that raises with the error alone."""
+        rows, work = functions(name).rows, [self.work[name]] if name in self.work else []
+        result = None if name in self.crashed else self.attempt(name, rows, self.setup, *work)
+        section = self.attempt(name, section_with, name, result, self.setup.robot) if result else None
+        return section or Section(name, name, "", "", self.crashed[name])
+
+    def draw(self, section: Section) -> None:
+        if section.name in self.crashed:
+            return
+        few = self.setup.is_quick and not self.setup.alone and not any(failures([section]))
+        others = results_needed(section.name, self.order, self.sections)
+        with self.clock.of(END):
+            arguments = section.name, section.result, self.setup.robot, self.folder / "figures", others, few
+            self.drawings.append((section, self.workers.submit(draw, *arguments)))
+
+    def finish_drawings(self) -> None:
+        for section in self.sections:
+            if section.name in TIMED:
+                self.draw(section)
+        with self.clock.of(END):
+            self.setup.progress("figures")
+            load_modules("compare.report.files")  # it takes long; meanwhile workers draw
+            for section, drawing in self.drawings:
+                try:
+                    section.figures = drawing.result()
+                except OSError:  # of the disk
+                    raise
+                except Exception as error:
+                    add_crash(section.result, "figures are drawn", error)
+                    self.terminal.say(f"  FAIL {section.result.checks[-1]}", "red")
+        self.clock.ends(END)
 
 
-def section_of(name: str, setup: Setup, work: object = None) -> Section:
-    experiment = module(name)
-    result = experiment.rows(setup) if work is None else experiment.rows(setup, work)
-    return Section(name, *texts(name, experiment, setup), with_headline(experiment, result))
+def section_with(name: str, result: Result, robot: Robot) -> Section:
+    """The section of an experiment with this result."""
+    experiment = functions(name)
+    result.headline = result.headline or experiment.headline(result)
+    of_robot = {"robot": robot, "values": experiment.claim_values(robot)}
+    claim, tolerance = (say(Finding(name, kind, of_robot)) for kind in ("claim", "tolerance"))
+    title, scenes = block(name, "title", robot=robot), experiment.scenes_drawn(result)
+    return Section(name, title, claim, tolerance, result, record=EXPERIMENTS[name], scenes=scenes)
 
 
-def with_headline(experiment: ModuleType, result: Result) -> Result:
-    if result.headline is None and hasattr(experiment, "headline"):
-        result.headline = experiment.headline(result)
-    return result
+def add_problems(result: Result, problems: Sequence[Problem], told: set[int]) -> None:
+    """Add a failed check for each problem of the user's own equations, before the other checks.
 
-
-def add_problems(result: Result, problems: Sequence, reported: set) -> None:
-    """Add a failed check for each problem of the user's own equations that an experiment calls, before its other checks.
-
-    problems: with quantity and text, see engines.own; reported: their numbers, so that each is reported once.
+    told: the numbers of problems that need not be told again.
     """
     others, result.checks = result.checks, []
     asked = EXPERIMENTS.get(result.experiment, Experiment(0)).asks_of_own
-    for k, problem in enumerate(problems):
-        if k not in reported and (asked is None or problem.quantity in asked):
-            reported.add(k)
-            result.check(
-                "", f"{problem.quantity} returns valid values", None, 0.0, "", problem.text, rule="equal"
-            )
+    for number, problem in enumerate(problems):
+        if number not in told and (asked is None or problem.quantity in asked):
+            told.add(number)
+            what = f"{problem.quantity} returns valid values"
+            result.check("", what, None, 0.0, "", problem.text, rule="equal")
     result.checks += others
 
 
-def texts(name: str, experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
-    """The title, the claim and the tolerance of an experiment."""
-    values = getattr(experiment, "claim_values", lambda robot: {})(setup.robot)
-    of_robot = {"robot": setup.robot, "values": values}
-    claim, tolerance = (say(Finding(name, kind, of_robot)) for kind in ("claim", "tolerance"))
-    return block(name, "title", robot=setup.robot), claim, tolerance
+def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[Cause]) -> list[Cause]:
+    """The causes of the failures in the last section, if it is the first that fails, or of DIAGNOSED.
 
-
-def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict]) -> list[dict]:
-    """The causes of the failures in the last section, if it is the first that fails, or the first of DIAGNOSED that does.
-
-    Where numbers are stated, the causes are the numbers that differ, or what explains several of them at once. Else they are
-    also what the diagnosis finds at other places than the causes that are known.
+    Where numbers are stated, they are the numbers that differ, or what explains several of them at once. Else
+    they are also what the diagnosis finds at other places than the known ones.
     """
-    failed = [section.name for section in sections if failures([section])[0]]
+    failed = [section.name for section in sections if failures([section]).differing]
     if not failed or failed[-1] != sections[-1].name:
         return []
-    of_numbers = []
+    of_numbers: list[Cause] = []
     if len(failed) == 1 and not setup.robot.own:
-        result, _ = attempt("parameters", module("parameters").rows, setup)
+        result, _ = attempt("parameters", setup.robot, functions("parameters").rows, setup)
         of_numbers = result.causes if result else []
     if (known or of_numbers) and setup.robot.is_stated:
         return in_one(setup, of_numbers)
@@ -173,16 +220,18 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict])
     if not (not known if failed[-1] == "diagnosis" else is_first):
         return of_numbers
     diagnosis, places = module("diagnosis"), [cause["place"] for cause in known]
-    found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)
+    found, _ = attempt("diagnosis", setup.robot, diagnosis.diagnosed, setup)
     causes = [cause for cause in found.causes if cause.place not in places] if found else []
     return [diagnosis.record(cause, bool(setup.robot.own)) for cause in causes] + of_numbers
 
 
-def in_one(setup: Setup, of_numbers: Sequence[dict]) -> list[dict]:
-    """The causes; one option, convention, number or error of two replaces several numbers of Mbar and h if it explains them."""
+def in_one(setup: Setup, of_numbers: Sequence[Cause]) -> list[Cause]:
+    """The causes; one option, convention, number or error of two replaces the numbers that it explains."""
     replaced = [cause["quantity"] for cause in of_numbers if cause["quantity"] in IN_EQUATIONS]
+    if len(replaced) < 2:
+        return list(of_numbers)
     diagnosis = module("diagnosis")
-    found = attempt("diagnosis", diagnosis.diagnosed, setup)[0] if len(replaced) > 1 else None
+    found, _ = attempt("diagnosis", setup.robot, diagnosis.diagnosed, setup)
     explaining = [cause for cause in found.diagnosis.causes if cause.rank < 3] if found else []
     if not explaining:
         return list(of_numbers)
@@ -190,11 +239,13 @@ def in_one(setup: Setup, of_numbers: Sequence[dict]) -> list[dict]:
     return [first, *(cause for cause in of_numbers if cause["quantity"] not in IN_EQUATIONS)]
 
 
-def attempt(name: str, act: Callable, setup: Setup) -> tuple:
-    """The return value of act(setup), and None; if it raises, None and a Result with one failed check."""
+def attempt(
+    name: str, robot: Robot, act: Callable[..., Value], *arguments: Any
+) -> tuple[Value | None, Result | None]:
+    """act(*arguments), and None; if it raises, None and a Result with one failed check."""
     try:
-        with quiet(setup.robot):
-            return act(setup), None
+        with quiet(robot):
+            return act(*arguments), None
     except WorkerEnded:
         raise
     except Exception as error:
@@ -208,35 +259,29 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
 
 
 def say_outcome(
-    terminal: Terminal, section: Section, seconds: float, new: Sequence, known: bool = False
+    terminal: Terminal,
+    section: Section,
+    seconds: float,
+    new: Sequence[Mapping[str, Any]],
+    known: bool = False,
 ) -> None:
-    """One line for an experiment, then the causes that are new, and the first failing checks that no cause explains.
+    """One line for an experiment, then the new causes, and the first failing checks that none explains.
 
     seconds: of the processor, for the experiment itself; known: whether there are causes, new ones or others.
     """
-    checks, of_cause = section.result.checks, section.explained
-    failed, open_checks = (
-        [check for check in checks if check.failed],
-        [check for check in checks if not check.judged],
-    )
-    used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
-    most = f"{len(of_cause)} explained by the cause" if of_cause else ""
-    if any(used) and not failed:
-        most = f"at most {100.0 * max(used):.2g} % of tolerance"
-    many = f"{len(checks):>3} check{' ' if len(checks) == 1 else 's'}"
-    fails = "DIFFER" if section.name in STATES_CAUSES else "FAILED"
-    word = "ok" if checks else "nothing"
-    if failed or open_checks:
-        word = f"{len(failed)} {fails}" if failed else "NOT JUDGED"
-    style = "red" if failed else "yellow" if open_checks else ""
-    terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<27} {seconds:5.1f} s CPU", style)
-    lines = [f"  CAUSE {cause['text']}" for cause in new]
-    if not (known and section.name in STATES_CAUSES):  # there the causes are the checks
-        lines += [f"  FAIL {check}" for check in failed if check not in of_cause]
-    lines += [f"  {check}" for check in open_checks]
-    lines[SHOWN:] = [f"  and {len(lines) - SHOWN} more: in the report"] * (len(lines) > SHOWN)
+    used = [check.over_tolerance or 0.0 for check in section.result.checks]
+    not_judged = failures([section]).not_judged
+    about = {"is_open": bool(not_judged), "share": max(used, default=0.0), "seconds": seconds}
+    style = "red" if section.failed else "yellow" if not_judged else ""
+    terminal.say(block("run", "outcome", section=section, **about), style)
+    lines = [f"CAUSE {cause['text']}" for cause in new]
+    if not (known and section.record.states_causes):  # there the causes are the checks
+        lines += [f"FAIL {check}" for check in section.failed if check not in section.explained]
+    lines += map(str, not_judged)
+    if len(lines) > SHOWN:
+        lines[SHOWN:] = [block("run", "more", count=len(lines) - SHOWN)]
     for line in lines:
-        terminal.say(line, "red")
+        terminal.say(f"  {line}", "red")
 
 
 def progress(clock: Clock, names: Sequence[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Which failing checks are gone when the causes are mended; a second, independent error is not hidden behind the first."""
+"""Which failing checks are gone without the causes; a second error is not hidden behind the first."""
 
 import dataclasses
 from functools import lru_cache
@@ -13,27 +13,22 @@ from ..experiments import module
 from ..experiments.setup import Setup, engines
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
-from ..report.verdict import STATES_CAUSES, Section, failures
+from ..report.verdict import Section, failures
 
-AT_STATES = (
-    "kinematics",
-    "mass",
-    "gravity",
-    "acceleration",
-)  # what compares models directly, with little work
+AT_STATES = ("kinematics", "mass", "gravity", "acceleration")  # what compares models with little work
 NODES = 24  # of the integral of a force at rest, which is smooth
 
 
 def explained(setup: Setup, section: Section) -> list[Check]:
-    """The failing checks of a section that are gone when the causes are mended: comparisons of the models, and predictions.
+    """The failing comparisons and predictions of a section that are gone when the causes are mended.
 
-    A user's own M and h are explained where the diagnosis reproduces them; what else is the user's must then follow from M and h.
-    Of a file, `parameters` lists all numbers that differ: it is compared once more with tmt's equations for its own numbers.
+    A user's own M and h are explained where the diagnosis reproduces them; what else is the user's must
+    follow from M and h. A file is compared once more with tmt's equations for its own numbers.
     Nothing explains a part that broke off, an unstable step, or a value of a user's own that is no number.
     """
     failed = failures([section])
     checks = failed.differing + failed.unconfirmed
-    if section.name in STATES_CAUSES or not checks:
+    if section.record.states_causes or not checks:
         return []
     if setup.robot.own:
         follows = what_follows(setup)
@@ -42,11 +37,8 @@ def explained(setup: Setup, section: Section) -> list[Check]:
     if mended is None:
         return []
     if section.name in (*AT_STATES, "trajectory"):
-        still = {
-            (check.scene, check.quantity)
-            for check in compared_again(mended, section.name).checks
-            if check.failed
-        }
+        again = compared_again(mended, section.name).checks
+        still = {(check.scene, check.quantity) for check in again if check.failed}
         return [check for check in checks if (check.scene, check.quantity) not in still]
     if any(check.failed for name in AT_STATES for check in compared_again(mended, name).checks):
         return []
@@ -56,7 +48,7 @@ def explained(setup: Setup, section: Section) -> list[Check]:
 
 @lru_cache(maxsize=2)
 def of_own_numbers(setup: Setup) -> Setup | None:
-    """The same with the file's own numbers in tmt's equations, without the forces that these do not have; None: not possible."""
+    """The same with the file's own numbers in tmt's equations, without other forces; None: not possible."""
     reading = setup.reading or read(Path(setup.robot.mjcf))
     stated, tree = setup.robot.tree, reading.tree
     if (tree.joint_names, tree.kind, tree.parent) != (stated.joint_names, stated.kind, stated.parent):
@@ -72,7 +64,7 @@ def compared_again(mended: Setup, name: str) -> Result:
 
 
 def kind_of(check: Check) -> str:
-    """What a check of a user's own equations depends on: their geometry, M and h, or what is computed from these."""
+    """What a check of a user's own equations depends on: geometry, M and h, or what follows from these."""
     if check.experiment == "kinematics":
         return "geometry"
     if check.quantity.startswith(("energy", "potential energy")):
@@ -86,23 +78,18 @@ def kind_of(check: Check) -> str:
 def what_follows(setup: Setup) -> dict[str, bool]:
     """What of a user's own equations is explained by the causes of M and h, by the kinds of `kind_of`.
 
-    Accelerations follow where no other force is in them at any random state, or the diagnosis explains it; own gravity and
-    energy where they are those of the own M and h, at some of these states.
+    Accelerations follow where no other force is in them at any random state, or the diagnosis explains it;
+    own gravity and energy where they are those of the own M and h, at some of these states.
     """
-    found, given = module("diagnosis").diagnosed(setup), setup.engines["own"].of(setup.robot.case())
+    assert setup.own is not None
+    diagnosis, given = module("diagnosis"), setup.own.of(setup.robot.case())
+    found = diagnosis.diagnosed(setup)
     equations = found.ratio <= 1.0 or bool(found.diagnosis.causes)
     motion = equations and (found.force_ratio <= 1.0 or bool(found.of_forces))
-    if (
-        motion and not found.of_forces and given.has("acceleration")
-    ):  # the diagnosis has asked at a few states
-        motion = module("diagnosis").is_solved(given, setup.robot.tree, setup.random)
-    follows = {
-        "geometry": False,
-        "equations": equations,
-        "motion": motion,
-        "gravity": equations,
-        "energy": equations,
-    }
+    if motion and not found.of_forces and given.has("acceleration"):  # it has asked at a few states
+        motion = diagnosis.is_solved(given, setup.robot.tree, setup.random)
+    follows = dict.fromkeys(("equations", "gravity", "energy"), equations)
+    follows |= {"geometry": False, "motion": motion}
     sample = setup.random.first(found.states)
     scale = Entries(setup.robot.tree, sample.q, sample.qd)
     at_rest = np.zeros_like(sample.qd)
@@ -118,7 +105,7 @@ def what_follows(setup: Setup) -> dict[str, bool]:
 
 
 def lifted_less_work(given: OwnDynamics, q: np.ndarray) -> np.ndarray:
-    """Energy at rest above that at q = 0 minus the integral of the bias at rest along a line, J, (states,); NaN for balls."""
+    """Energy at rest above that at q = 0, less the work of the bias at rest on a line, J; NaN for balls."""
     if given.coordinates.has_balls:
         return np.full(len(q), np.nan)
     nodes, weights = np.polynomial.legendre.leggauss(NODES)

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from runs import ENVIRONMENT, posix
 
 from compare.report.folder import FolderError, new_report
+from compare.robots.arm import ARM
 from compare.run.drawing import draw
 
 OLD = {"tables/mass.csv": "old", "results.json": "old"}
@@ -177,7 +178,7 @@ def test_what_stands_in_a_folders_place_is_named_and_stays(tmp_path, name, word)
 
 
 def test_a_full_disk_while_a_figure_is_drawn_is_said_with_the_name_of_the_file(tmp_path, monkeypatch):
-    module = SimpleNamespace(figures=lambda result, robot: iter([lambda: ("plot", Figure(), "")]))
+    module = SimpleNamespace(rows=None, figures=lambda result, robot: iter([lambda: ("plot", Figure(), "")]))
     monkeypatch.setitem(sys.modules, "compare.experiments.plain", module)
     resource = pytest.importorskip("resource")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -186,9 +187,8 @@ def test_a_full_disk_while_a_figure_is_drawn_is_said_with_the_name_of_the_file(t
     )  # no file may be longer, as on a disk that is full
     try:
         with pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
-            draw("plain", None, None, work)
+            draw("plain", None, ARM, work, {})
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert (
-        f"{tmp_path / 'out' / 'plot.png'}: File too large" in str(error.value) and names_in(tmp_path) == set()
-    )
+    assert f"{tmp_path / 'out' / 'plot.png'}: File too large" in str(error.value)
+    assert names_in(tmp_path) == set()

@@ -7,9 +7,8 @@ names of scenes, quantities and coordinates ~: which of them comes out worst dep
 import os
 import re
 from pathlib import Path
-from types import SimpleNamespace
 
-from compare.experiments import EXPERIMENTS, module
+from compare.experiments import EXPERIMENTS
 from compare.report import images, verdict
 from compare.report.document import Document
 from compare.robots.arm import ARM
@@ -39,10 +38,7 @@ def report_of_arm(small, folder) -> str:
     """report.md of all experiments on the arm, its figures not rendered: what is wrong with these, test_drawn_figures sees."""
     sections = []
     for name in NAMES:
-        result = examine.with_headline(module(name), small(name))
-        section = verdict.Section(
-            name, *examine.texts(name, module(name), SimpleNamespace(robot=ARM)), result
-        )
+        section = examine.section_with(name, small(name), ARM)
         sections.append(section)
         others = drawing.results_needed(name, NAMES, sections)
         section.figures = drawing.draw(name, section.result, ARM, folder, others)

@@ -6,24 +6,17 @@ from dataclasses import replace
 
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Drawing
 from sections import BAD, GOOD, section
 
 from compare.report import images
-from compare.report.document import OVERVIEW, Document
+from compare.report.document import Document
 from compare.report.files import write
-from compare.report.verdict import Parts, Report, verdict
+from compare.report.verdict import OVERVIEW, Figure, Parts, Report, verdict
 from compare.robots import Question
 from compare.robots.arm import ARM
 
-CAUSE = {
-    "rank": 2,
-    "place": "mass of forearm",
-    "stated": 1.5,
-    "found": 1.6,
-    "text": "forearm: 1.6 kg",
-    "size": 9.0,
-}
+CAUSE = {"rank": 2, "place": "mass of forearm", "stated": 1.5, "found": 1.6, "text": "forearm: 1.6 kg"}
 
 
 @pytest.fixture
@@ -32,17 +25,11 @@ def folder(tmp_path):
     return tmp_path
 
 
-def with_figures(of, *files):
-    of.figures = [(file, f"Caption of {file}.") for file in files]
-    return of
-
-
 def report_of(folder, sections, causes=(), skipped=(), robot=ARM):
-    for file in (file for one in sections for file, _ in one.figures):
-        images.save_figure(Figure(figsize=(1, 1)), folder / "figures" / f"{file}.png")
-    return Report(
-        sections, robot, {"command": "c"}, verdict(sections, len(sections), causes), causes, skipped
-    )
+    for file in (figure.file for one in sections for figure in one.figures):
+        images.save_figure(Drawing(figsize=(1, 1)), folder / "figures" / f"{file}.png")
+    words = verdict(sections, len(sections), causes)
+    return Report(sections, robot, {"command": "c"}, words, causes, skipped)
 
 
 def page_of(folder, sections, causes=(), skipped=()):
@@ -56,10 +43,13 @@ def page_of(folder, sections, causes=(), skipped=()):
 
 def test_the_verdict_a_line_for_each_experiment_and_the_pictures_come_before_all_sections(folder):
     names = ("parameters", "mass", "acceleration", "trajectory")
-    sections = [section(name, GOOD) for name in names]
-    with_figures(sections[1], "mass_distances")
-    with_figures(sections[2], "acceleration_distances", f"{OVERVIEW}agreement")
-    with_figures(sections[3], "trajectory_a", f"{OVERVIEW}scenes")
+    figures = (
+        (),
+        ("mass_distances",),
+        ("acceleration_distances", f"{OVERVIEW}agreement"),
+        ("trajectory_a", f"{OVERVIEW}scenes"),
+    )
+    sections = [section(name, GOOD, figures=drawn) for name, drawn in zip(names, figures)]
     top, rest = page_of(folder, sections, skipped=[("speed", "<too slow>")])
     assert (
         top.index('class="verdict good"') < top.index('class="experiments"') < top.index('class="pictures"')
@@ -74,10 +64,10 @@ def test_the_verdict_a_line_for_each_experiment_and_the_pictures_come_before_all
 
 
 def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_shows_it(folder):
-    checks = {"mass": [GOOD], "acceleration": [GOOD], "trajectory": [GOOD, BAD], "speed": []}
-    sections = [section(name, *of) for name, of in checks.items()]
-    for of, figure in zip(sections, ("mass_distances", f"{OVERVIEW}agreement", f"{OVERVIEW}scenes")):
-        with_figures(of, figure)
+    sections = [
+        section("mass", GOOD, figures=["mass_distances"]), section("acceleration", GOOD, figures=[f"{OVERVIEW}agreement"]),
+        section("trajectory", GOOD, BAD, figures=[f"{OVERVIEW}scenes"]), section("speed"),
+    ]  # fmt: skip
     top, rest = page_of(folder, sections, causes=[CAUSE])
     assert re.search(r"<td>mass of forearm</td><td>1\.5</td><td>1\.6</td>", top)
     assert 'class="verdict bad"' in top and '<main id="main" class="bad">' in top
@@ -85,33 +75,27 @@ def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_s
         ("bad", "trajectory"), ("good", "figure-mass_distances"),
     ]  # fmt: skip
     for name, kind in (("mass", "good"), ("trajectory", "bad"), ("speed", "none")):
-        assert (
-            re.search(f'<li class="{kind}">[^\n]*?<a href="#{name}">', top)
-            and f'<p class="outcome {kind}">' in rest
-        )
-    top, rest = page_of(folder, [with_figures(section("kinematics", *[BAD] * 5), "kinematics_distances")])
+        assert re.search(f'<li class="{kind}">[^\n]*?<a href="#{name}">', top)
+        assert f'<p class="outcome {kind}">' in rest
+    top, rest = page_of(folder, [section("kinematics", *[BAD] * 5, figures=["kinematics_distances"])])
     assert rest.count("<tr><td>kinematics</td><td>zero</td><td>Mbar</td>") == 5
-    assert (
-        '<div class="pictures"><figure class="bad"><a href="#figure-kinematics_distances">' in top
-    )  # not a picture
-    assert (
-        top.count("<td>kinematics</td><td>zero</td><td>Mbar</td><td>2</td><td>1</td>") == 4
-    )  # no cause is known
+    # not a picture
+    assert '<div class="pictures"><figure class="bad"><a href="#figure-kinematics_distances">' in top
+    # no cause is known
+    assert top.count("<td>kinematics</td><td>zero</td><td>Mbar</td><td>2</td><td>1</td>") == 4
 
 
 def test_a_section_folds_its_details_and_all_but_the_first_figures(folder):
-    of = section("mass", GOOD, rows=[{"quantity": "other", "a": k} for k in range(50)], extra=[{"b": 1.5}])
-    of.result.notes, of.result.filed = [f"Note {k} < 9." for k in range(5)], ("extra",)
     names = [f"mass_{k}" for k in range(4)] + ["mass_distances"]  # to the last one the first screen leads
-    text = page_of(folder, [with_figures(of, *names)])[1].partition('<section id="mass"')[2]
+    rows = [{"quantity": "other", "a": k} for k in range(50)]
+    of = section("mass", GOOD, rows=rows, figures=names, extra=[{"b": 1.5}])
+    of.result.notes, of.result.filed = [f"Note {k} < 9." for k in range(5)], ("extra",)
+    text = page_of(folder, [of])[1].partition('<section id="mass"')[2]
     fold = text.index("<details>")
     assert text.index("Note 2 &lt; 9.") < fold < text.index("Note 3")
     assert "<table" not in text[:fold] and text.count("<tr><td>other</td>") == 40
-    assert (
-        '<a href="tables/mass.csv">' in text
-        and '<a href="tables/extra.csv">' in text
-        and "<td>1.5</td>" not in text
-    )
+    assert '<a href="tables/mass.csv">' in text and '<a href="tables/extra.csv">' in text
+    assert "<td>1.5</td>" not in text
     assert [text.index(f'id="figure-{name}"') < fold for name in names] == [True, True, False, False, True]
 
 
@@ -122,13 +106,14 @@ def text_of(path):
 def test_results_have_every_check_cause_and_digit(folder):
     rows = [{"a": 0.12345678901234568, "b": k, "engine": "tmt", "ok": True} for k in range(3)]
     names = ("joint;" * 20)[:81]
-    of = section("mass", GOOD, BAD, rows=rows, extra=[{"b": 1 / 3, "names": names}])
+    extra = [{"b": 1 / 3, "names": names}]
+    of = section("mass", GOOD, BAD, rows=rows, figures=["mass_distances"], extra=extra)
     of.explained = of.result.checks[1:]
-    write(folder, report_of(folder, [with_figures(of, "mass_distances")], [CAUSE]))
+    write(folder, report_of(folder, [of], [CAUSE]))
     results = json.loads(text_of(folder / "results.json"))
     assert set(results) == {"passed", "reference", "checks", "causes", "skipped", "provenance"}
     assert results["passed"] is False and [check["passed"] for check in results["checks"]] == [True, False]
-    assert [cause | {"size": 9.0} for cause in results["causes"]] == [CAUSE]
+    assert results["causes"] == [CAUSE]
     lines = text_of(folder / "tables" / "mass.csv").splitlines()
     assert lines == ["a,b,engine,ok", *(f"{row['a']!r},{row['b']},tmt,true" for row in rows)]
     assert pd.read_csv(folder / "tables" / "extra.csv")["names"].tolist() == [names]  # cut in the report
@@ -147,12 +132,13 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
     rows = {"mass": other, "gravity": {"a": 1.5}, "speed": {}}
     sections = [section(name, GOOD, rows=[row]) for name, row in rows.items()]
     report = report_of(folder, sections, [CAUSE | {"found": float("nan")}, CAUSE], robot=asks)
-    sections[1].figures = [("nowhere", "A caption.")]
-    sections[2].result.rows = 3
+    sections[1].figures = [Figure("nowhere", "A caption.")]
+    sections[2].result.rows = [3]
     parts = write(folder, report)
     whys = {
         "tables/speed.csv": "TypeError", "cause 1 in results.json": "ValueError", "the questions": "ValueError",
-        "speed in report.md": "TypeError", "gravity in index.html": "FileNotFoundError", "speed in index.html": "TypeError",
+        "speed in report.md": "AttributeError", "gravity in index.html": "FileNotFoundError",
+        "speed in index.html": "AttributeError",
     }  # fmt: skip
     assert {name: why.split(":")[0] for name, why in parts.broken.items()} == whys
     text, html = text_of(folder / "report.md"), text_of(folder / "index.html")

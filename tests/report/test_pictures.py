@@ -18,7 +18,6 @@ from sections import section
 from compare.core.check import About
 from compare.core.pictures import Pictures
 from compare.core.text import environment
-from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.report import images, motion, style
 from compare.robots.arm import ARM
 
@@ -40,7 +39,7 @@ def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None)
 
 def page_of(*scenes, label="TMT") -> str:
     of = section("trajectory")
-    of.result = TrajectoryResult("trajectory", pictures=list(scenes), label=label)
+    of.scenes, of.result.label = scenes, label
     return motion.motion_in_html([section("mass"), of], ARM.noun)
 
 
@@ -62,9 +61,8 @@ def test_it_opens_on_the_scene_that_differs():
     drift = "drift", 2.0, 1.0, "at most", False, About.PREDICTION
     of = section("trajectory", ("open loop", 2.0, 1.0, "at most", True), drift)
     scenes = zip(of.result.checks, ("let go", "held"))
-    checks = [replace(check, scene=f"{scene}, RK4") for check, scene in scenes]
-    pictures = [drawn("held"), drawn("let"), drawn("let go")]
-    of.result = TrajectoryResult("trajectory", checks=checks, pictures=pictures)
+    of.result.checks = [replace(check, scene=f"{scene}, RK4") for check, scene in scenes]
+    of.scenes = drawn("held"), drawn("let"), drawn("let go")
     names = [scene["name"] for scene in data_of(motion.motion_in_html([of], ARM.noun))["scenes"]]
     assert names == ["let go", "held", "let"]
 

@@ -23,6 +23,5 @@ def test_the_commit_is_said_and_whether_the_program_was_changed_since(tmp_path, 
     (tmp_path / "notes.md").touch()
     assert provenance.commit() == git("rev-parse", "HEAD")
     (tmp_path / "tmt" / "b").touch()
-    assert provenance.commit() != git("rev-parse", "HEAD") and provenance.commit().startswith(
-        git("rev-parse", "HEAD")
-    )
+    assert provenance.commit() != git("rev-parse", "HEAD")
+    assert provenance.commit().startswith(git("rev-parse", "HEAD"))

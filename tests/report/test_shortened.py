@@ -1,46 +1,68 @@
 """Which rows of a long table are shown, and how long report.md becomes."""
 
-import pandas as pd
+import math
+from dataclasses import dataclass
+
 from sections import BAD, GOOD, section
 
+from compare.core.rows import Row, column
 from compare.experiments import EXPERIMENTS
+from compare.report import tables
 from compare.report.document import Document
-from compare.report.tables import closest_checks, shortened, shown
 from compare.report.verdict import Parts, Report
 from compare.robots.arm import ARM
 
 
+@dataclass(kw_only=True)
+class Compared(Row):
+    """A row of a table whose rows may fail, differ from a stated number, or use a share of a tolerance."""
+
+    at: int
+    share: float = 0.0
+    passed: bool = True
+    difference: float = 0.0
+    printed: float = column(digits=7, default=1.23456789)
+    names: str = column(names=True, default="x" * 99)
+    unknown: float | None = column(optional=True)
+
+    @property
+    def urgency(self):
+        return self.passed, not self.difference, -self.share
+
+
 def runs(count):
-    return [{"at": k, "difference_over_band": 0.01 * k, "passed": True} for k in range(count)]
+    return [Compared(at=k, share=0.01 * k) for k in range(count)]
+
+
+def kept(rows, most):
+    return [row.at for row in tables.shortened(rows, most)[0]]
 
 
 def test_rows_that_fail_or_differ_are_shown_then_the_largest_shares_of_a_tolerance_in_their_order():
     rows = runs(12)
-    assert shortened(rows, 12) == (rows, "")
-    rows[3]["passed"], rows[5]["difference_over_band"] = False, None
-    kept, which = shortened(rows, 3)
-    assert [row["at"] for row in kept] == [3, 10, 11] and which == "3 of 12 rows"
-    rows = [{"at": k, "stated": 1.0, "difference": 1e-9 * (k == 7)} for k in range(20)]
-    assert [row["at"] for row in shortened(rows, 3)[0]] == [0, 1, 7]
-    rows = [{"at": k, "difference_over_bar": share} for k, share in enumerate((0.1, None, 0.9, 0.5))]
-    assert [row["at"] for row in shortened(rows, 2)[0]] == [2, 3]
+    assert tables.shortened(rows, 12) == (rows, "") and tables.shortened(rows, 3)[1] == "3 of 12 rows"
+    assert kept(rows, 3) == [9, 10, 11]
+    rows[3].passed, rows[5].difference = False, 1e-9
+    assert kept(rows, 3) == [3, 5, 11] and kept(rows, 1) == [3]
 
 
 def test_the_checks_that_fail_are_listed_first_then_those_closest_to_their_tolerance():
     checks = [(f"n{k}", 0.01 * k, 1.0, "at most", True) for k in range(9)]
     checks[2] = ("n2", 2.0, 1.0, "at most", True)
-    assert closest_checks(section("mass", *checks), 3)["quantity"].tolist() == ["n2", "n7", "n8"]
+    closest = tables.closest(section("mass", *checks).result.checks, 3)
+    assert [check.quantity for check in closest] == ["n2", "n7", "n8"]
 
 
-def test_printed_numbers_have_seven_digits_and_others_three():
-    table = shown(
-        pd.DataFrame([{"published": 1.23456789, "other": 1.23456789, "names": "x" * 99, "no": None}])
-    )
-    assert (
-        table.iloc[0].tolist()[:2] == ["1.234568", "1.23"]
-        and len(table["names"][0]) == 80
-        and table["no"][0] == ""
-    )
+def test_a_table_has_the_digits_of_its_columns_and_lists_are_cut():
+    rows = [Compared(at=2, share=1.23456789), Compared(at=3, share=math.inf, unknown=2.0)]
+    columns, (first, second) = tables.of_rows(rows)
+    assert columns == ["at", "share", "passed", "difference", "printed", "names", "unknown"]
+    assert first == ["2", "1.23", "True", "0", "1.234568", f"{76 * 'x'} ...", ""]
+    assert second[1::5] == [
+        "",
+        "2",
+    ]
+    assert tables.of_rows(rows, ["share"]) == (["share"], [["1.23"], [""]])
 
 
 def text_of(*sections):
@@ -52,20 +74,14 @@ def text_of(*sections):
 def test_report_md_is_short_whatever_there_is_to_say():
     sections = []
     for name in EXPERIMENTS:
-        of = section(name, GOOD, *[BAD] * 50, rows=runs(405))
-        of.result.notes = [f"Note {k} of {name}." for k in range(40)]
-        of.figures = [(f"{name}_{k}", "A caption.") for k in range(10)]
+        of = section(name, GOOD, *[BAD] * 50, rows=runs(405), figures=[f"{name}_{k}" for k in range(10)])
+        of.result.notes = [f"Note {k} of {name}." for k in range(12)]
         sections.append(of)
     text = text_of(*sections)
     assert len(text.splitlines()) <= 600
     for name in EXPERIMENTS:
-        parts = (
-            f"Note 0 of {name}.",
-            f"(tables/{name}.csv)",
-            f"(figures/{name}_9.png)",
-            f"(index.html#{name})",
-        )
-        assert all(part in text for part in parts) and f"Note 39 of {name}." not in text
+        parts = f"Note 11 of {name}.", f"(tables/{name}.csv)", f"(figures/{name}_9.png)"
+        assert all(part in text for part in parts)
 
 
 def test_a_small_report_md_is_whole_and_names_are_no_markup_in_it():

@@ -31,20 +31,13 @@ def test_any_name_of_a_file_in_any_locale_and_any_reader(tmp_path, line, model, 
     assert all(model in (report / file).read_text(encoding="utf-8") for file in ("report.md", "index.html"))
 
 
-PARTS = ["4 of 11", "acceleration", "about 35 s left"]
-
-
-@pytest.mark.parametrize("columns, how_far, text, line", [
-    (80, ["9 of 11", "speed"], "speed: timing", "9 of 11, speed: timing"),
-    (49, PARTS, "bias", "4 of 11, acceleration, about 35 s left: ..."),
-    (40, PARTS, "bias", "4 of 11, about 35 s left: bias"),
-])  # fmt: skip
-def test_the_line_of_progress_fits(columns, how_far, text, line):
+@pytest.mark.parametrize("columns, line", [(80, "9 of 11, speed: timing"), (26, "9 of 11, speed: t...")])
+def test_the_line_of_progress_fits(columns, line):
     terminal = Terminal()
     terminal.err.columns = lambda: columns
-    terminal.tell(lambda: how_far)
-    terminal.show(text)
-    assert terminal.line() == line and len(line) <= max(columns, 20) - 6
+    terminal.tell(lambda: ["9 of 11", "speed"])
+    terminal.show("speed: timing")
+    assert terminal.line() == line and len(line) <= columns - 6
 
 
 @pytest.mark.parametrize("line, status", [
@@ -59,7 +52,6 @@ def test_what_nobody_foresaw_is_one_line(tmp_path):
     (tmp_path / "rich.py").write_text("raise RuntimeError('two\\nlines')")  # found first: the current folder
     run = compare("mass", cwd=tmp_path)
     (line,) = run.stderr.splitlines()
-    assert run.returncode == 2 and re.search(
-        r"RuntimeError: two lines \(compare/report/terminal.py:\d+\)$", line
-    )
+    assert run.returncode == 2
+    assert re.search(r"RuntimeError: two lines \(compare/report/terminal.py:\d+\)$", line)
     assert ROOT.as_posix() not in run.stderr

@@ -22,7 +22,7 @@ from ..setup import Setup
 from . import numbers
 from .numbers import ABSENT, OF_BODIES, UNITS, FeatureRow, NumberRow, ParametersResult
 
-EXPERIMENT = Experiment(order=10, serves_own=False)
+EXPERIMENT = Experiment(order=10, serves_own=False, states_causes=True)
 SHOWN = ["of", "quantity", "component", "stated", "compiled", "unit"]
 # numbers of the whole file; the others are of bodies and joints
 OF_WORLD = (*STATED_FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *ABSENT)

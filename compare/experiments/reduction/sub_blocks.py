@@ -96,7 +96,8 @@ def sub_block_differences(
     """
     q, v = q.copy(), v.copy()
     for name, position in case.locked.items():
-        q[:, case.places[name].q], v[:, case.places[name].qd] = position, 0.0
+        joint = case.robot.coordinates.by_name[name]
+        q[:, joint.q], v[:, joint.qd] = position, 0.0
     positions, speeds = columns_of(case, setup.robot.case())
     scale = Entries(setup.robot.tree, q, v)
     reduced, whole = setup.compared(case).values(), setup.compared().values()

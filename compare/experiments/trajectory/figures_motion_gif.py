@@ -1,6 +1,6 @@
 """The motion as a GIF: the stick figures of both engines over each other, held and let go.
 
-Drawn without matplotlib, which takes seconds for a hundred pictures. The first engine's sticks are wide with
+Pictures without matplotlib, which takes seconds for a hundred pictures. The first engine's sticks are wide with
 discs, MuJoCo's narrow with rings.
 """
 

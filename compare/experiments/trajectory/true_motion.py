@@ -53,9 +53,17 @@ def find_errors(result: TrajectoryResult, robot: Robot, references: Mapping[str,
         about = {"scene": name, "first": first, "second": second, "difference": difference}
         far, unit = is_far((first, second), difference), movement_unit(run.case.coordinates)
         scenes.append(about | {"unit": unit, "far": far})
+    if result.errors:
+        result.answer = result.finding("answer", errors=result.errors, steps=coarsest_steps(result))
     if any(name in references for name in result.errors):  # held scenes have their own findings
         labels = [LABELS[engine] for engine in robot.compared]
         result.find("errors", labels=labels, scenes=scenes, times=SAYS_NOTHING)
+
+
+def coarsest_steps(result: TrajectoryResult) -> int | None:
+    """The number of the coarsest steps of the scenes with errors, if they all have as many."""
+    counts = {min(run.steps for run in result.runs if run.case.name == scene) for scene in result.errors}
+    return counts.pop() if len(counts) == 1 else None
 
 
 def is_far(errors: Sequence[float | None], difference: float) -> bool:

@@ -1,4 +1,4 @@
-"""The motion in the page: stick figures of both engines over each other, with a slider; it fetches nothing."""
+"""The motion in the page: stick figures of both engines, with a slider; it fetches nothing."""
 
 import json
 import math
@@ -20,47 +20,45 @@ MOST_BYTES = 280_000  # of the motion in the page
 STICK_BYTES = 48  # of a stick in the picture without script
 LARGEST_STRIDE = 8  # every eighth picture of each scene is shown before scenes are left out
 WIDE, HIGH, BORDER = 1000, 480, 45  # of the drawing, in its own units
+ROOM, MIDDLE = (WIDE - 2 * BORDER, HIGH - 2 * BORDER), (WIDE / 2, HIGH / 2)
 SHOWN_FOR = 5.0  # s, at least about: a shorter scene is shown slower
-SCRIPT = Markup(
-    (Path(__file__).parent / "motion.js").read_text(encoding="utf-8")
-)  # the only one that the page may run
-Outline = list[int] | None  # x and y of each point of a picture in the drawing; None: the run has diverged
+# the only script that the page may run
+SCRIPT = Markup((Path(__file__).parent / "motion.js").read_text(encoding="utf-8"))
+Outline = list[int] | None  # x and y of each point; None from where the run has diverged
 
 
 def motion_in_html(sections: Sequence[Section], noun: str) -> str:
     """A <figure> with its style and data, for SCRIPT, at most 300 kB; "" where no scene is drawn.
 
-    It opens on a scene in which the engines differ, if there is one. To stay small, it leaves out every second, fourth ...
-    picture, then the last scenes, with a note.
+    It opens on a scene in which the engines differ, if there is one. To stay small, it leaves out every
+    second, fourth ... picture, then the last scenes, with a note.
     """
-    section = next((section for section in sections if getattr(section.result, "pictures", None)), None)
+    section = next((section for section in sections if section.scenes), None)
     if section is None:
         return ""
-    drawn: list[Pictures] = section.result.pictures
-    names = [pictures.scene for pictures in drawn]
+    names = [pictures.scene for pictures in section.scenes]
     differing = {scene_of(check.scene, names) for check in failures([section]).differing}
-    drawn = sorted(drawn, key=lambda pictures: pictures.scene not in differing)
+    scenes = sorted(section.scenes, key=lambda pictures: pictures.scene not in differing)
     engines = [capital(section.result.label), "MuJoCo"]
-    data, stride, scenes = inlined(drawn, engines)
-    still = stride * scenes[0]["still"]
-    first, second = (outline(path[still], drawn[0].links) for path in on_page(drawn[0]))
-    wide, ring = (20, 16) if drawn[0].few_sticks else (9, 7)
-    values = {"ours": engines[0], "theirs": engines[1], "scenes": scenes, "data": Markup(data), "noun": noun}
-    values |= {"width": WIDE, "height": HIGH, "wide": wide, "ring": ring, "first": first, "second": second}
-    values |= {"stride": stride, "left_out": [pictures.scene for pictures in drawn[len(scenes) :]]}
+    data, stride, shown = inlined(scenes, engines)
+    still = stride * shown[0]["still"]
+    ours, theirs = (outline(path[still], scenes[0].links) for path in on_page(scenes[0]))
+    values = {"engines": engines, "scenes": shown, "data": Markup(data), "noun": noun, "stride": stride}
+    values |= {"size": (WIDE, HIGH), "outlines": (ours, theirs), "is_simple": scenes[0].few_sticks}
+    values["left_out"] = [pictures.scene for pictures in scenes[len(shown) :]]
     text = environment().get_template("motion.html.jinja").render(values)
     return re.sub(r"\n\s*\n", "\n", text)  # an empty line would end the HTML inside of Markdown
 
 
-def inlined(drawn: Sequence[Pictures], engines: Sequence[str]) -> tuple[str, int, list[dict[str, Any]]]:
+def inlined(scenes: Sequence[Pictures], engines: Sequence[str]) -> tuple[str, int, list[dict[str, Any]]]:
     """The scenes as JSON for a page, the stride over their pictures, and the scenes that are in it."""
-    stride, count = 1, len(drawn)
+    stride, count = 1, len(scenes)
     while True:
-        scenes = [inlined_scene(pictures, stride) for pictures in drawn[:count]]
-        text = json.dumps({"engines": engines, "scenes": scenes}, separators=(",", ":"), allow_nan=False)
+        shown = [inlined_scene(pictures, stride) for pictures in scenes[:count]]
+        text = json.dumps({"engines": engines, "scenes": shown}, separators=(",", ":"), allow_nan=False)
         text = text.replace("<", "\\u003c")
-        if len(text.encode()) + STICK_BYTES * len(scenes[0]["links"]) <= MOST_BYTES:
-            return text, stride, scenes
+        if len(text.encode()) + STICK_BYTES * len(shown[0]["links"]) <= MOST_BYTES:
+            return text, stride, shown
         if stride < LARGEST_STRIDE or count == 1:
             stride *= 2
         else:
@@ -68,49 +66,49 @@ def inlined(drawn: Sequence[Pictures], engines: Sequence[str]) -> tuple[str, int
 
 
 def inlined_scene(pictures: Pictures, stride: int) -> dict[str, Any]:
-    """One scene as the script has it: of each engine a list of pictures, x and y of each point.
+    """One scene as the script has it: of each engine a list of pictures.
 
-    A picture is 0 where it is the one before, 1 where it is that of the first engine, None where the run has diverged.
+    A picture is 0 where it is the one before, 1 where it is that of the first engine.
     """
-    slower = max(1.0, pictures.slower(SHOWN_FOR / (len(pictures.t) - 1)))
     ours, theirs = (path[::stride] for path in on_page(pictures))
     dt = stride * float(pictures.t[1] - pictures.t[0])
-    about = {"scene": pictures.scene, "run": pictures.run, "seen": say(pictures.seen), "slower": slower}
+    slower = max(1.0, pictures.slower(SHOWN_FOR / (len(pictures.t) - 1)))
+    values = {"scene": pictures.scene, "run": pictures.run, "seen": say(pictures.seen), "slower": slower}
     return {
         "name": pictures.scene,
-        "seen": say(Finding("trajectory", "picture_in_page", about)),
+        "seen": say(Finding("trajectory", "picture_in_page", values)),
         "dt": dt,
         "pause": max(1, round(1000.0 * dt * slower)),
         "unit": pictures.unit,
         "still": max(k for k, both in enumerate(zip(ours, theirs)) if None not in both),
-        "base": "M{} {}m-18-18h36v36h-36z".format(*ours[0][:2]) if pictures.fixed else "",
+        "base": "M{} {}m-18-18h36v36h-36z".format(*(ours[0] or ())[:2]) if pictures.fixed else "",
         "links": pictures.links,
         "apart": [float(f"{off:.1e}") if math.isfinite(off) else None for off in pictures.apart[::stride]],
-        "paths": [shorter(ours, [[]] * len(ours)), shorter(theirs, ours)],
+        "paths": [shorter(ours), shorter(theirs, ours)],
     }
 
 
 def on_page(pictures: Pictures) -> list[list[Outline]]:
-    """For each engine and picture the integers that are drawn."""
-    paths = pictures.placed((WIDE - 2 * BORDER, HIGH - 2 * BORDER), (WIDE / 2, HIGH / 2))
-    return [[whole_numbers(picture) for picture in path] for path in paths]
+    """The pictures of each engine, in the units of the drawing."""
+    return [[whole_numbers(points) for points in path] for path in pictures.placed(ROOM, MIDDLE)]
 
 
-def whole_numbers(picture: np.ndarray) -> Outline:
-    return picture.round().astype(int).ravel().tolist() if np.isfinite(picture).all() else None
+def whole_numbers(points: np.ndarray) -> Outline:
+    return points.round().astype(int).ravel().tolist() if np.isfinite(points).all() else None
 
 
-def shorter(pictures: Sequence[Outline], others: Sequence[Outline]) -> list[Outline | int]:
+def shorter(pictures: Sequence[Outline], others: Sequence[Outline] = ()) -> list[Outline | int]:
     """Pictures with 0 for one that equals the one before, and 1 for one that equals the other engine's."""
-    short: list[Outline | int] = []
+    short: list[Outline | int] = list(pictures)
     for k, picture in enumerate(pictures):
         if k > 0 and picture == pictures[k - 1]:
-            short.append(0)
-        else:
-            short.append(1 if picture is not None and picture == others[k] else picture)
+            short[k] = 0
+        elif others and picture is not None and picture == others[k]:
+            short[k] = 1
     return short
 
 
-def outline(picture: Sequence[int], links: Sequence[tuple[int, int]]) -> str:
-    points = [f"{x} {y}" for x, y in zip(picture[::2], picture[1::2])]
-    return "".join(f"M{points[start]}L{points[end]}" for start, end in links)
+def outline(picture: Outline, links: Sequence[Sequence[int]]) -> str:
+    """The sticks of a picture as a path of SVG."""
+    points = np.reshape(picture or [], (-1, 2)).tolist()
+    return "".join("M{} {}L{} {}".format(*points[i], *points[j]) for i, j in links)

@@ -20,7 +20,7 @@ def failed(result):
 def test_the_arm_has_nothing_to_explain(monkeypatch):
     setup = setup_of()
     result = diagnosis.rows(setup)
-    assert failed(result) == [] and result.rows == []
+    assert failed(result) == [] and result.rows == [] and result.causes == []
     found = diagnosis.diagnosed(setup)  # a ratio of 1 is allowed
     for k, field in enumerate(("ratio", "force_ratio")):
         for ratio, passes in ((1.0, True), (1.001, False)):
