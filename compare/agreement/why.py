@@ -9,10 +9,10 @@ from tmt import literal
 
 from ..core.finding import Finding
 from ..core.text import say
-from ..diagnosis import STATES_ASKED, Values, diagnose_stated
+from ..diagnosis import STATES_ASKED, Stated, Values, diagnose
 from ..diagnosis.cause import LEAST_STATES
 from ..diagnosis.consistency import conditions, symmetric
-from ..diagnosis.forces import causes_of_forces, force_left_over
+from ..diagnosis.forces import LeftOver
 from ..engines.own import QUICK
 from .given import Given
 
@@ -31,20 +31,22 @@ def cause_of(given: Given) -> Why:
     which = some_states(given)
     if len(which) < min(LEAST_STATES, len(given.q)):
         return Why("", False)  # too few of them are numbers
-    q, qd = given.q[which], given.qd[which]
+    q, qd, tau = given.q[which], given.qd[which], given.tau[which]
     own = {name: values[which] for name, values in given.values.items()}
     failing = [name for name, comparison in given.compared.items() if (comparison.ratio > 1.0).any()]
+    unknown_M, unknown_h = np.full((*qd.shape, qd.shape[1]), np.nan), np.full(qd.shape, np.nan)
     if failing == ["acceleration"]:
-        return of_accelerations(given, q, qd, given.tau[which], own)
+        return of_accelerations(given, q, qd, tau, own)
     if "gravity" in own and ("bias" not in own or ("gravity" in failing and "bias" not in failing)):
         h, speeds = own["gravity"], np.zeros_like(qd)
     else:
-        h, speeds = own.get("bias", np.nan * qd), qd
-    M = own.get("mass_matrix", np.full((*qd.shape, qd.shape[1]), np.nan))
-    why = of_equations(given, Values.of(given.tree, q, speeds, M, h, given.rounding))
+        h, speeds = own.get("bias", unknown_h), qd
+    values = Values.of(given.tree, q, speeds, own.get("mass_matrix", unknown_M), h, given.rounding)
+    why = of_equations(given, values)
     if "acceleration" not in failing or not why.is_found or not {"mass_matrix", "bias"} <= own.keys():
         return why
-    return why._replace(text=f"{why.text} {beside(given, q, qd, given.tau[which], own)}".rstrip())
+    values = Values.of(given.tree, q, qd, own["mass_matrix"], own["bias"], given.rounding)
+    return why._replace(text=f"{why.text} {beside(given, values, tau, own['acceleration'])}".rstrip())
 
 
 def some_states(given: Given) -> np.ndarray:
@@ -65,7 +67,7 @@ def of_equations(given: Given, values: Values) -> Why:
         return Why(mirrored.text)
     is_quick = own is not None and own.seconds <= QUICK and own.has("bias")
     of_speeds = partial(own.bias, values.q) if own is not None and is_quick else None
-    diagnosis = diagnose_stated(given.tree, given.joints, values, SECONDS_OF_CAUSE, of_speeds)
+    diagnosis = diagnose(given.tree, values, SECONDS_OF_CAUSE, of_speeds, Stated(given.joints))
     if not diagnosis.differs:
         return Why("", False)
     text = diagnosis.sentence()
@@ -75,31 +77,29 @@ def of_equations(given: Given, values: Values) -> Why:
     return Why(text, bool(diagnosis.causes))
 
 
-def beside(given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, own: dict[str, np.ndarray]) -> str:
+def beside(given: Given, values: Values, tau: np.ndarray, qdd: np.ndarray) -> str:
     """What else is wrong with accelerations than the user's Mbar and h; "" where they follow from these."""
-    h = own["bias"]
-    state = given.tree, q, qd, tau
-    acting, allowed = force_left_over(*state, own["mass_matrix"], h, own["acceleration"], given.rounding)
-    if (np.abs(acting) <= allowed).all():
+    left_over = LeftOver(given.tree, values, tau, qdd, given.rounding)
+    if left_over.ratio <= 1.0:
         return ""
-    causes = causes_of_forces(*state, h, acting, allowed)
-    return say(
-        Finding("agreement", "forces", {"causes": causes}) if causes else Finding("agreement", "another")
-    )
+    if left_over.causes:
+        return say(Finding("agreement", "forces", {"causes": left_over.causes}))
+    return say(Finding("agreement", "another"))
 
 
 def of_accelerations(
     given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, own: dict[str, np.ndarray]
 ) -> Why:
     """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right."""
-    tree, qdd, h = given.tree, own["acceleration"], literal.bias(q, qd, given.tree)
-    acting, allowed = force_left_over(tree, q, qd, tau, literal.mass_matrix(q, tree), h, qdd, given.rounding)
-    if causes := causes_of_forces(tree, q, qd, tau, h, acting, allowed):
-        return Why(say(Finding("agreement", "forces", {"causes": causes})))
+    tree = given.tree
+    right = Values.of(tree, q, qd, literal.mass_matrix(q, tree), literal.bias(q, qd, tree), given.rounding)
+    left_over = LeftOver(tree, right, tau, own["acceleration"], given.rounding)
+    if left_over.causes:
+        return Why(say(Finding("agreement", "forces", {"causes": left_over.causes})))
     if {"mass_matrix", "bias"} <= own.keys():
         return Why(say(Finding("agreement", "solved")), False)
     unknown = np.full((*qd.shape, qd.shape[1]), np.nan)
-    values = Values(q, qd, unknown, h + acting, (unknown, allowed))
-    diagnosis = diagnose_stated(tree, given.joints, values, SECONDS_OF_CAUSE)
+    values = Values(q, qd, unknown, right.bias + left_over.force, (unknown, left_over.tolerance))
+    diagnosis = diagnose(tree, values, SECONDS_OF_CAUSE, stated=Stated(given.joints))
     text = diagnosis.sentence() if diagnosis.causes else say(Finding("agreement", "accelerations_alone"))
     return Why(text, bool(diagnosis.causes))

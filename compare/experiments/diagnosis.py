@@ -9,13 +9,13 @@ import numpy as np
 import tmt
 from tmt import literal
 
+from ..core.cause import Cause
 from ..core.check import Result
 from ..core.finding import Finding
 from ..core.text import say
-from ..diagnosis import STATES_ASKED, Diagnosis, Values, diagnose_stated, packed
-from ..diagnosis.cause import Cause
+from ..diagnosis import STATES_ASKED, Diagnosis, Stated, Values, diagnose
 from ..diagnosis.consistency import Condition, conditions
-from ..diagnosis.forces import causes_of_forces, force_left_over
+from ..diagnosis.forces import LeftOver
 from ..engines.own import QUICK, OwnDynamics
 from ..judge.agree import over
 from ..judge.scale import EPS, FACTOR
@@ -58,10 +58,6 @@ class Found(NamedTuple):
         """Of the largest difference of Mbar or h in the scale of its entry."""
         return self.ratio * FACTOR * EPS
 
-    @property
-    def stated_by(self) -> str:
-        return "option" if self.engine == "own" else ""
-
 
 @lru_cache(maxsize=2)
 def diagnosed(setup: Setup) -> Found:
@@ -79,12 +75,12 @@ def diagnosed(setup: Setup) -> Found:
 
     met, too_slow = conditions_of(given, values) if is_own else ([], False)
     of_speeds = None if is_own and given.equations.seconds > QUICK else bias
-    diagnosis = diagnose_stated(tree, given.equations.joints if is_own else None, values, SECONDS, of_speeds)
-    off = packed(M, h) - packed(literal.mass_matrix(q, tree), literal.bias(q, qd, tree))
-    acting, allowed = force_left_over(tree, q, qd, tau, M, h, qdd)
-    of_forces = causes_of_forces(tree, q, qd, tau, h, acting, allowed)
-    ratios = largest_ratio(off, packed(*values.tolerances)), largest_ratio(acting, allowed)
-    return Found(name, len(q), met, too_slow, diagnosis, ratios[0], of_forces, ratios[1])
+    stated = Stated(given.equations.joints, "option") if is_own else None
+    diagnosis = diagnose(tree, values, SECONDS, of_speeds, stated)
+    right = values._replace(mass_matrix=literal.mass_matrix(q, tree), bias=literal.bias(q, qd, tree))
+    ratio = largest_ratio(values.packed - right.packed, values.packed_tolerance)
+    left_over = LeftOver(tree, values, tau, qdd)
+    return Found(name, len(q), met, too_slow, diagnosis, ratio, left_over.causes, left_over.ratio)
 
 
 def conditions_of(given: OwnDynamics, values: Values) -> tuple[list[Condition], bool]:
@@ -103,8 +99,8 @@ def conditions_of(given: OwnDynamics, values: Values) -> tuple[list[Condition], 
 def is_solved(given: OwnDynamics, tree: tmt.Tree, sample: Sample) -> bool:
     """Whether a user's accelerations are those of the own Mbar and h at all states of a sample."""
     q, qd, tau = sample.q, sample.qd, sample.tau
-    values = given.mass_matrix(q), given.bias(q, qd), given.acceleration(q, qd, tau)
-    return largest_ratio(*force_left_over(tree, q, qd, tau, *values)) <= 1.0
+    values = Values.of(tree, q, qd, given.mass_matrix(q), given.bias(q, qd))
+    return LeftOver(tree, values, tau, given.acceleration(q, qd, tau)).ratio <= 1.0
 
 
 def largest_ratio(off: np.ndarray, tolerance: np.ndarray) -> float:
@@ -144,19 +140,8 @@ def rows(setup: Setup) -> Result:
     if not result.notes:
         result.find("nothing")
     result.curves["nearest"] = diagnosis.nearest
-    result.curves["causes"] = [record(cause, bool(setup.robot.own)) for cause in found.causes]
+    result.curves["causes"] = [cause.record() for cause in found.causes]
     return result
-
-
-def record(cause: Cause, is_own: bool = False) -> dict:
-    text = cause.text("option" if is_own else "")
-    return {
-        "rank": cause.rank,
-        "place": cause.place,
-        "stated": cause.stated,
-        "found": cause.explains,
-        "text": text,
-    }
 
 
 def headline(result: Result) -> Finding | None:

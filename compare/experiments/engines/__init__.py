@@ -8,7 +8,7 @@ import numpy as np
 from ...core.check import ENDS, About, Result
 from ...core.finding import Finding
 from ...core.words import some_of
-from ...diagnosis import Values, diagnose_stated
+from ...diagnosis import Values, diagnose
 from ...engines import LABELS, RECORDS, Engine, EngineRecord
 from ...engines.outside import Outside, OutsideDynamics
 from ...engines.outside.model import EngineError, TooLong, Unread, size_of
@@ -196,7 +196,7 @@ def compare_quantities(
     ):
         values = Values.of(sample.tree, sample.q, sample.qd, found["Mbar"], found["bias"], FACTOR * eps)
         result.find(
-            "cause", engine=label, text=diagnose_stated(sample.tree, None, values, SECONDS).sentence()
+            "cause", engine=label, text=diagnose(sample.tree, values, SECONDS).sentence()
         )
 
 

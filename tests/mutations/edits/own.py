@@ -48,7 +48,7 @@ EDITS = (
     Edit("judge.entries", "Entries.mass_matrix", "root[:, :, None] * root[:, None, :]", "0.0",
          "a structural zero has no tolerance"),
     # the diagnosis
-    Edit("diagnosis.forces", "force_left_over", "SHARPER * rounding * _1", "10 * SHARPER * rounding * _1",
+    Edit("diagnosis.forces", "LeftOver.__init__", "SHARPER * rounding * _1", "10 * SHARPER * rounding * _1",
          "the tolerance of what forces leave over x 10"),
     Edit("diagnosis.consistency", "power_balance", "SAFETY * error + _1", "10 * (SAFETY * error + _1)",
          "the tolerance of the power x 10"),
@@ -59,7 +59,7 @@ EDITS = (
          "a process that ends takes those of other engines with it"),
     Edit("own.functions", "in_shape", "given == expected", "array.size == np.prod(shape)", "an array in another order is taken"),
     Edit("own.equations", "OwnEquations.note", "hash(row.tobytes())", "object()", "a state counts each time that it is asked"),
-    Edit("agreement.why", "beside", "(np.abs(acting) <= allowed).all()", "True", "a second error, in accelerations, is hidden"),
+    Edit("agreement.why", "beside", "left_over.ratio <= 1.0", "True", "a second error, in accelerations, is hidden"),
     Edit("agreement.why", "cause_of", "'bias' not in failing", "False", "a wrong gravity is hidden behind a right bias"),
     Edit("agreement.why", "some_states", "np.flatnonzero(np.isfinite(worst))", "np.arange(len(worst))",
          "a cause is sought where there are no values"),
