@@ -15,8 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.text import block, say
-from ..engines.own import QUANTITIES
-from ..engines.own.functions import state_in_words
 from ..judge.agree import over
 from .comparison import Comparison, State
 from .why import Why, cause_of
@@ -180,24 +178,6 @@ def rows(comparison: Comparison, cause: str) -> list[Difference]:
     return sorted(found, key=lambda row: -row.ratio)
 
 
-class Mismatch(NamedTuple):
-    """One quantity that differs."""
-
-    worst: Difference
-    failing: int  # entries
-    entries: int  # in all
-    states: int  # at which one differs
-    at: str  # the state of the worst
-
-
-def mismatch(comparison: Comparison, failing: list[Difference]) -> Mismatch:
-    """failing: the entries of one quantity that differ, the worst first."""
-    worst, states = failing[0], {row.state.number for row in failing}
-    state = worst.state[1 : 1 + QUANTITIES[worst.quantity].arguments]
-    entries = comparison.compared[worst.quantity].yours.size
-    return Mismatch(worst, len(failing), entries, len(states), state_in_words(list(map(np.array, state))))
-
-
 def message(comparison: Comparison) -> str:
     """Which entries of which quantity are off, the worst of them, the probable cause, and what can be stated."""
     from ..engines.mujoco.remarks import remarks  # here, so that `import compare` need not wait for it
@@ -207,14 +187,13 @@ def message(comparison: Comparison) -> str:
     for row in rows(comparison, why.text):
         if row.ratio > 1.0:
             failing.setdefault(row.quantity, []).append(row)
-    kinds = zip(comparison.tree.joint_names, comparison.tree.kind)
-    text = block(
-        "agreement", "message", comparison=comparison, why=why,
-        mismatches=[mismatch(comparison, of_quantity) for of_quantity in failing.values()],
-        remarks=[say(remark) for remark in remarks(comparison.reading, has_scenes=False)],
-        rounded=None if why.is_found or comparison.rtol else rounded(comparison),
-        hinge=next((name for name, kind in kinds if kind == "hinge"), ""),
-    )  # fmt: skip
+    hinges = [
+        name for name, kind in zip(comparison.tree.joint_names, comparison.tree.kind) if kind == "hinge"
+    ]
+    advice = None if why.is_found or comparison.rtol else rounded(comparison)
+    said = [say(remark) for remark in remarks(comparison.reading, has_scenes=False)]
+    values = {"comparison": comparison, "failing": failing, "why": why, "rounded": advice, "remarks": said}
+    text = block("agreement", "message", **values, hinge=hinges[0] if hinges else "")
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())
 
 

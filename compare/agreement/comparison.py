@@ -14,7 +14,7 @@ from tmt.model.values import shown
 
 from ..core.text import say
 from ..engines.own import METHOD_NAMES, QUANTITIES, OwnEquations
-from ..engines.own.functions import converted, in_shape, in_words, is_function, numbers_of
+from ..engines.own.functions import converted, in_shape, in_words, is_function, numbers_of, state_in_words
 from ..judge.agree import over
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
@@ -35,6 +35,10 @@ class State(NamedTuple):
     q: tuple[float, ...]
     qd: tuple[float, ...]
     tau: tuple[float, ...]
+
+    def said(self, quantity: str) -> str:
+        """What of the state a quantity depends on, as it can be typed."""
+        return state_in_words((self.q, self.qd, self.tau)[: QUANTITIES[quantity].arguments])
 
 
 class Compared(NamedTuple):

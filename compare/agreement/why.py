@@ -32,21 +32,20 @@ def cause_of(comparison: Comparison) -> Why:
     if len(which) < min(LEAST_STATES, len(comparison.q)):
         return Why("", False)  # too few of them are numbers
     q, qd, tau = comparison.q[which], comparison.qd[which], comparison.tau[which]
-    own = {name: values[which] for name, values in comparison.values.items()}
+    yours = {name: values[which] for name, values in comparison.values.items()}
+    tree, M, h, rounding = comparison.tree, yours.get("mass_matrix"), yours.get("bias"), comparison.rounding
     failing = [name for name, compared in comparison.compared.items() if compared.fails]
-    unknown_M, unknown_h = np.full((*qd.shape, qd.shape[1]), np.nan), np.full(qd.shape, np.nan)
+    values = Values.of(tree, q, qd, M, h, rounding)
     if failing == ["acceleration"]:
-        return of_accelerations(comparison, q, qd, tau, own)
-    if "gravity" in own and ("bias" not in own or ("gravity" in failing and "bias" not in failing)):
-        h, speeds = own["gravity"], np.zeros_like(qd)
+        return of_accelerations(comparison, values, tau, yours["acceleration"])
+    if "gravity" in yours and ("bias" not in yours or ("gravity" in failing and "bias" not in failing)):
+        at_rest = Values.of(tree, q, np.zeros_like(qd), M, yours["gravity"], rounding)
+        why = of_equations(comparison, at_rest)
     else:
-        h, speeds = own.get("bias", unknown_h), qd
-    values = Values.of(comparison.tree, q, speeds, own.get("mass_matrix", unknown_M), h, comparison.rounding)
-    why = of_equations(comparison, values)
-    if "acceleration" not in failing or not why.is_found or not {"mass_matrix", "bias"} <= own.keys():
+        why = of_equations(comparison, values)
+    if "acceleration" not in failing or not why.is_found or M is None or h is None:
         return why
-    values = Values.of(comparison.tree, q, qd, own["mass_matrix"], own["bias"], comparison.rounding)
-    return why._replace(text=f"{why.text} {beside(comparison, values, tau, own['acceleration'])}".rstrip())
+    return why._replace(text=f"{why.text} {beside(comparison, values, tau, yours['acceleration'])}".rstrip())
 
 
 def some_states(comparison: Comparison) -> np.ndarray:
@@ -61,20 +60,22 @@ def some_states(comparison: Comparison) -> np.ndarray:
 
 def of_equations(comparison: Comparison, values: Values) -> Why:
     """What a diagnosis finds in values of Mbar and h."""
-    own, M = comparison.equations, values.mass_matrix
-    mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), comparison.coordinates.speeds)
+    equations, coordinates, M = comparison.equations, comparison.coordinates, values.mass_matrix
+    mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), coordinates.speeds)
     if np.isfinite(M).all() and not mirrored.is_met:
         return Why(mirrored.text)
-    is_quick = own is not None and own.seconds <= QUICK and own.has("bias")
-    of_speeds = partial(own.bias, values.q) if own is not None and is_quick else None
-    diagnosis = diagnose(comparison.tree, values, SECONDS_OF_CAUSE, of_speeds, Stated(comparison.joints))
+    if equations is not None and (equations.seconds > QUICK or not equations.has("bias")):
+        equations = None  # they cannot be called some hundred times more
+    bias = partial(equations.bias, values.q) if equations is not None else None
+    diagnosis = diagnose(comparison.tree, values, SECONDS_OF_CAUSE, bias, Stated(comparison.joints))
     if not diagnosis.differs:
         return Why("", False)
-    text = diagnosis.sentence()
-    if not diagnosis.causes and own is not None and is_quick and own.has("mass_matrix") and values.are_finite:
-        every = conditions(own.mass_matrix, own.bias, comparison.coordinates, values.q, values.qd)
-        text = " ".join([*[one.text for one in every if not one.is_met][:1], text])
-    return Why(text, bool(diagnosis.causes))
+    broken = []
+    is_known = equations is not None and equations.has("mass_matrix") and values.are_finite
+    if equations is not None and is_known and not diagnosis.causes:
+        tested = conditions(equations.mass_matrix, equations.bias, coordinates, values.q, values.qd)
+        broken = [condition.text for condition in tested if not condition.is_met]
+    return Why(" ".join([*broken[:1], diagnosis.sentence()]), bool(diagnosis.causes))
 
 
 def beside(comparison: Comparison, values: Values, tau: np.ndarray, qdd: np.ndarray) -> str:
@@ -82,26 +83,23 @@ def beside(comparison: Comparison, values: Values, tau: np.ndarray, qdd: np.ndar
     left_over = LeftOver(comparison.tree, values, tau, qdd, comparison.rounding)
     if left_over.ratio <= 1.0:
         return ""
-    if left_over.causes:
-        return say(Finding("agreement", "forces", {"causes": left_over.causes}))
-    return say(Finding("agreement", "another"))
+    return left_over.sentence() or say(Finding("agreement", "another"))
 
 
-def of_accelerations(
-    comparison: Comparison, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, own: dict[str, np.ndarray]
-) -> Why:
-    """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right."""
-    tree = comparison.tree
-    right = Values.of(
-        tree, q, qd, literal.mass_matrix(q, tree), literal.bias(q, qd, tree), comparison.rounding
-    )
-    left_over = LeftOver(tree, right, tau, own["acceleration"], comparison.rounding)
+def of_accelerations(comparison: Comparison, values: Values, tau: np.ndarray, qdd: np.ndarray) -> Why:
+    """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right.
+
+    values: the user's Mbar and h, as far as they are given; these are right.
+    """
+    tree, q, qd, rounding = comparison.tree, values.q, values.qd, comparison.rounding
+    right = Values.of(tree, q, qd, literal.mass_matrix(q, tree), literal.bias(q, qd, tree), rounding)
+    left_over = LeftOver(tree, right, tau, qdd, rounding)
     if left_over.causes:
-        return Why(say(Finding("agreement", "forces", {"causes": left_over.causes})))
-    if {"mass_matrix", "bias"} <= own.keys():
+        return Why(left_over.sentence())
+    if values.are_finite:
         return Why(say(Finding("agreement", "solved")), False)
-    unknown = np.full((*qd.shape, qd.shape[1]), np.nan)
-    values = Values(q, qd, unknown, right.bias + left_over.force, (unknown, left_over.tolerance))
-    diagnosis = diagnose(tree, values, SECONDS_OF_CAUSE, stated=Stated(comparison.joints))
+    alone = Values.of(tree, q, qd, None, right.bias + left_over.force, rounding)
+    alone = alone._replace(tolerances=(alone.tolerances[0], left_over.tolerance))
+    diagnosis = diagnose(tree, alone, SECONDS_OF_CAUSE, stated=Stated(comparison.joints))
     text = diagnosis.sentence() if diagnosis.causes else say(Finding("agreement", "accelerations_alone"))
     return Why(text, bool(diagnosis.causes))

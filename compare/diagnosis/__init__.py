@@ -7,8 +7,8 @@ does: M and h cannot distinguish them.
 """
 
 from .cause import Diagnosis
+from .model import Values
 from .search import Stated, diagnose
-from .values import Values
 
 __all__ = ["STATES_ASKED", "Diagnosis", "Stated", "Values", "diagnose"]
 

@@ -13,13 +13,15 @@ import tmt
 from tmt import literal
 
 from ..core.cause import Cause
+from ..core.finding import Finding
+from ..core.text import say
 from ..judge.agree import over
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
-from .cause import ranked
+from .cause import TEMPLATE, ranked
 from .fit import Search
+from .model import Values
 from .places import forces
-from .values import Values
 
 SHARPER = 4.0  # times the tolerance: accelerations are rounded before Mbar is multiplied by them
 
@@ -62,6 +64,10 @@ class LeftOver:
         if not causes:
             causes = [fit.cause for fit in search.pairs(("number",)) if fit.explains]
         return ranked(causes)
+
+    def sentence(self) -> str:
+        """The causes in words; "" if there is none."""
+        return say(Finding(TEMPLATE, "forces", {"list": self.causes})) if self.causes else ""
 
     def options(self) -> Iterator[tuple[Cause, np.ndarray]]:
         """Each option, and the force that is left over with it."""

@@ -5,7 +5,7 @@ positions (states,), real or complex; the derivative by a number is the imaginar
 to rounding.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -14,8 +14,10 @@ import numpy as np
 
 import tmt
 from tmt.derivation import method
-from tmt.derivation.vectors import ZERO, Vector
+from tmt.derivation.vectors import ZERO, Matrix
 
+from ..judge.entries import Entries
+from ..judge.scale import EPS, FACTOR
 from ..robots.coordinates import Coordinates
 
 FIELDS = ("offset", "axis", "com", "inertia", "mass", "gravity", "reference", "armature")
@@ -26,6 +28,17 @@ OF_TERM = {  # of each body; the first two of Mbar
 }  # fmt: skip
 BODY_TERMS = tuple(OF_TERM)
 VELOCITY_TERMS = BODY_TERMS[3:]
+NOTHING: dict[str, Any] = {
+    "mass": 0.0,
+    "inertia": Matrix([ZERO] * 3),
+    "v_conv": ZERO,
+    "w_conv": ZERO,
+    "omega": ZERO,
+}
+FIELDS_OF_TERMS = {  # of a body, on which a term depends
+    "translation": ("mass",), "rotation": ("inertia",), "gravity": ("mass",), "convective": ("mass", "v_conv"),
+    "Euler": ("inertia", "w_conv"), "gyroscopic": ("inertia", "omega"),
+}  # fmt: skip
 MOST_SPEEDS = 8  # with more, coefficients of products of speeds are not compared: there are nv^2 (nv + 1) / 2
 TINY = 1e-100  # an imaginary change, whose square vanishes
 
@@ -85,7 +98,13 @@ class Equations:
     @cached_property
     def terms(self) -> dict[str, np.ndarray]:
         """What each term of all bodies adds, (bodies, states, entries)."""
-        return {term: np.stack([self.of_body(body, [term]) for body in self.bodies]) for term in BODY_TERMS}
+        terms = {}
+        for term, fields in FIELDS_OF_TERMS.items():
+            absent = {name: nothing for name, nothing in NOTHING.items() if name not in fields}
+            gravity = self.tree.gravity if term == "gravity" else ZERO
+            terms[term] = np.stack([self.summed([b._replace(**absent)], gravity)[0] for b in self.bodies])
+            terms[term][..., self.in_h if term in BODY_TERMS[:2] else self.in_M] = 0.0
+        return terms
 
     @cached_property
     def right(self) -> np.ndarray:
@@ -118,40 +137,19 @@ class Equations:
         }
         changed = SimpleNamespace(**numbers, **structure)
         bodies = method.bodies(changed, list(self.q.T), list(self.qd.T))
-        return self.summed(bodies, changed.gravity, changed.armature, BODY_TERMS)
+        return self.summed(bodies, changed.gravity, changed.armature)
 
     def with_bias(self, h: np.ndarray) -> np.ndarray:
         """The right values with another h (states, nv)."""
         return np.concatenate([self.right[:, self.in_M], h], axis=1)
 
-    def of_body(self, body: method.Body, terms: Collection[str] = BODY_TERMS) -> np.ndarray:
-        """The terms of a body in Mbar and h, (states, entries)."""
-        return self.summed([body], self.tree.gravity, [0.0] * self.nv, terms)[0]
-
     def summed(
-        self,
-        bodies: Sequence[method.Body],
-        gravity: Sequence[Any],
-        armature: Sequence[Any],
-        terms: Collection[str],
+        self, bodies: Sequence[method.Body], gravity: Iterable[Any], armature: Sequence[Any] = ()
     ) -> np.ndarray:
         """Mbar and h of some bodies, (changes, states, entries)."""
-        translation, rotation, weight, convective, Euler, gyroscopic = (
-            float(term in terms) for term in BODY_TERMS
-        )
-        g = Vector(*gravity)
-        M = [[0.0] * i + [rotor] for i, rotor in enumerate(armature)]
-        h = [0.0] * self.nv
-        for b in bodies:
-            force = (b.v_conv * convective - g * weight) * b.mass
-            moment = (b.inertia @ b.w_conv) * Euler + b.omega.cross(b.inertia @ b.omega) * gyroscopic
-            turned = [b.inertia @ column for column in b.B]
-            moving = [i for i in range(self.nv) if b.T[i] is not ZERO]
-            for i in moving:
-                h[i] = h[i] + b.T[i].dot(force) + b.B[i].dot(moment)
-                for j in moving[: moving.index(i) + 1]:
-                    of_mass = b.mass * translation * b.T[i].dot(b.T[j])
-                    M[i][j] = M[i][j] + of_mass + rotation * b.B[i].dot(turned[j])
+        M, h = method.mass_matrix(bodies), method.bias(bodies, gravity)
+        for i, rotor in enumerate(armature):
+            M[i][i] = M[i][i] + rotor
         flat = [*(M[i][j] for i, j in zip(*self.triangle)), *h]
         count = max([np.shape(value)[0] for value in flat if np.ndim(value) == 2], default=1)
         return np.stack([np.broadcast_to(value, (count, len(self.q))) for value in flat], axis=-1)
@@ -168,6 +166,40 @@ def packed(mass_matrix: np.ndarray, bias: np.ndarray) -> np.ndarray:
     """Mbar (..., nv, nv) and h (..., nv) as `Equations` has them, (..., entries)."""
     i, j = np.tril_indices(np.shape(bias)[-1])
     return np.concatenate([np.asarray(mass_matrix)[..., i, j], bias], axis=-1)
+
+
+class Values(NamedTuple):
+    """Mbar and h with their tolerances, at states in the model's joints; NaN where a quantity is not given."""
+
+    q: np.ndarray  # (states, nq)
+    qd: np.ndarray  # (states, nv)
+    mass_matrix: np.ndarray  # (states, nv, nv)
+    bias: np.ndarray  # (states, nv)
+    tolerances: tuple[np.ndarray, np.ndarray]  # of both
+
+    @classmethod
+    def of(
+        cls, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, mass_matrix: np.ndarray | None, bias: np.ndarray | None,
+        rounding: float = FACTOR * EPS,
+    ) -> "Values":  # fmt: skip
+        """With the tolerances of judge.entries. None: not given; rounding: of the scale of an entry."""
+        scale, shape = Entries(tree, q, qd), (*qd.shape, qd.shape[1])
+        M = np.full(shape, np.nan) if mass_matrix is None else mass_matrix
+        h = np.full(qd.shape, np.nan) if bias is None else bias
+        return cls(q, qd, M, h, (rounding * np.broadcast_to(scale.mass_matrix, shape), rounding * scale.bias))
+
+    @property
+    def packed(self) -> np.ndarray:
+        """As `Equations` has them, (states, entries)."""
+        return packed(self.mass_matrix, self.bias)
+
+    @property
+    def packed_tolerance(self) -> np.ndarray:
+        return packed(*self.tolerances)
+
+    @property
+    def are_finite(self) -> bool:
+        return bool(np.isfinite(self.packed).all())
 
 
 def coefficients_of(bias: Callable[[np.ndarray], np.ndarray], nv: int) -> dict[Entry, np.ndarray]:

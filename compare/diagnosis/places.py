@@ -36,7 +36,6 @@ OF_SLIDES = {"N m s/rad": "N s/m", "N m/rad": "N/m", "N m": "N", "kg m2": "kg", 
 class Place(NamedTuple):
     """One number that can be wrong."""
 
-    rank: int
     kind: str  # "number", "force", "term", "part" of a term, "coefficient" or OF_ZERO
     name: str
     stated: float
@@ -46,6 +45,10 @@ class Place(NamedTuple):
     column: np.ndarray | None = None  # what a change of 1 adds to `entry` instead, (states, ...)
     entry: int | slice = ALL  # of the values of a state
     least: float = -np.inf  # possible value
+
+    @property
+    def rank(self) -> int:
+        return 1 if self.kind == OF_ZERO else 2
 
     @property
     def is_quadratic(self) -> bool:
@@ -71,7 +74,7 @@ class Place(NamedTuple):
 
 def factor(kind: str, name: str, column: np.ndarray, entry: int | slice, stated: float = 1.0) -> Place:
     """The factor of something in entries of a state; 1 is right."""
-    return Place(2, kind, name, stated, "times", 1.0, column=column, entry=entry)
+    return Place(kind, name, stated, "times", 1.0, column=column, entry=entry)
 
 
 def unit_of(unit: str, kind: str) -> str:
@@ -85,8 +88,10 @@ def is_common(factor: float) -> bool:
 
 
 def all_places(equations: Equations) -> list[Place]:
+    """The places that have an influence at some state, as far as that is known beforehand."""
     kinds = numbers, terms, coefficients, forces_in_bias, parts_of_terms
-    return [place for places_of in kinds for place in places_of(equations)]
+    places = [place for places_of in kinds for place in places_of(equations)]
+    return [place for place in places if place.column is None or place.column.any()]
 
 
 def forces_in_bias(equations: Equations) -> Iterator[Place]:
@@ -101,7 +106,7 @@ def forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Place]:
     names = Coordinates(tree.joint_names, tree.kind).speeds
 
     def place(name: str, unit: str, stated: float, force: np.ndarray, least: float = 0.0) -> Place:
-        return Place(2, "number", name, stated, unit, 1.0, column=force, least=least)
+        return Place("number", name, stated, unit, 1.0, column=force, least=least)
 
     for i, joint in enumerate(tree.coordinates.joints):
         of_damping, of_stiffness, of_force = (
@@ -129,7 +134,7 @@ def numbers(equations: Equations) -> Iterator[Place]:
 
     def number(name: str, unit: str, size: float, path: Path, least: float = -np.inf) -> Place:
         now = float(stated[path.field][path.at])
-        return Place(2, "number", name, now, unit, float(size), ((path, 1.0),), least=least)
+        return Place("number", name, now, unit, float(size), ((path, 1.0),), least=least)
 
     def triple(name: str, unit: str, size: float, field: str, *index: int) -> list[Place]:
         return [number(name.format(axis), unit, size, Path(field, (*index, k))) for k, axis in enumerate(XYZ)]
@@ -155,7 +160,7 @@ def numbers(equations: Equations) -> Iterator[Place]:
         if joint.kind != "ball":
             size = length if joint.kind == "slide" else 1.0
             zero = number(f"zero of {name}", unit_of("rad", joint.kind), size, Path("reference", (i,)))
-            yield zero._replace(rank=1, kind=OF_ZERO)
+            yield zero._replace(kind=OF_ZERO)
             yield from triple(f"axis {{}} of {name}", "", 0.5, "axis", joint.qd.start)
         for speed in range(joint.qd.start, joint.qd.stop):
             size = heaviest * (1.0 if joint.kind == "slide" else length**2)
@@ -229,13 +234,6 @@ def groups(tree: tmt.Tree) -> dict[str, list[int]]:
 
 def coefficients(equations: Equations) -> Iterator[Place]:
     """Entries of Mbar, entries of gravity, and the coefficients of products of rates in h; 1 is right."""
-    for place in factors(equations):
-        if place.column is not None and np.abs(place.column).max() > 0.0:
-            yield place
-
-
-def factors(equations: Equations) -> Iterator[Place]:
-    """All that `coefficients` has, also of what is zero."""
     nv, speeds, right, first_h = equations.nv, equations.speeds, equations.right, equations.in_M.stop
     for k, entry in enumerate(equations.entries):
         yield factor("coefficient", entry.named(speeds), right[:, k], k)

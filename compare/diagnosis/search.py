@@ -16,10 +16,9 @@ from ..robots.joint_map import Joint, JointMap, within_a_turn
 from .cause import LEAST_STATES, Diagnosis, ranked
 from .coefficients import Bias, Compared
 from .fit import Fitted, Search
-from .model import Equations
+from .model import Equations, Values
 from .places import ALL, OF_ZERO, all_places, is_common
 from .slips import slips
-from .values import Values
 from .variants import conventions, program_options, values_in
 
 FEW = 2  # states at which conventions are tried first

@@ -17,9 +17,9 @@ from .variants import Variant
 def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
     """For each slip: of single bodies; of all; these in M alone. The first of these lists that explains is meant."""
     right, in_h, bodies = equations.right, equations.in_h, groups(equations.tree)
-    parts = [equations.of_body(b) for b in equations.bodies]
+    gravity, parts = equations.tree.gravity, np.sum(list(equations.terms.values()), axis=0)
     for name, changed in changed_bodies(equations, equations.bodies):
-        added = np.stack([equations.of_body(b) - part for b, part in zip(changed, parts)])
+        added = np.stack([equations.summed([b], gravity)[0] for b in changed]) - parts
         variants, in_M_alone = [], []
         for body, numbers in bodies.items():
             values = right + added[numbers].sum(axis=0)

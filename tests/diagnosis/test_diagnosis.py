@@ -247,5 +247,5 @@ def test_slides_have_powers():
 
 @pytest.mark.parametrize("unit, explains", [("rad", 0.5 - np.pi / 2), ("m", 0.5 + 1.5 * np.pi)])
 def test_the_zero_of_a_hinge_is_at_most_half_a_turn_from_the_stated_one(unit, explains):
-    place = Place(1, OF_ZERO, "zero of knee", 0.5, unit, 1.0)
+    place = Place(OF_ZERO, "zero of knee", 0.5, unit, 1.0)
     assert place.cause(1.5 * np.pi).explains == pytest.approx(explains)

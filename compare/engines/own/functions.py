@@ -243,12 +243,12 @@ def same(together: np.ndarray, singles: np.ndarray) -> bool:
     return together.shape == singles.shape and bool(is_close(together, singles))
 
 
-def state_in_words(state: Sequence[np.ndarray]) -> str:
+def state_in_words(state: Sequence[Sequence[float] | np.ndarray]) -> str:
     """q, qd and tau, those that are given, as they can be typed."""
     return ", ".join(f"{symbol} = {typed(part)}" for symbol, part in zip(STATE, state))
 
 
-def typed(values: np.ndarray) -> str:
+def typed(values: Sequence[float] | np.ndarray) -> str:
     more = ", ..." if len(values) > MOST_SHOWN else ""
     return f"[{', '.join(f'{value:.6g}' for value in values[:MOST_SHOWN])}{more}]"
 
