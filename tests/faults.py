@@ -17,11 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from compare.diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
+from compare.diagnosis import STATES_ASKED, Diagnosis, Values, diagnose
 from compare.diagnosis.model import OF_TERM
 from compare.engines.mujoco import reading
-from compare.judge.entries import Entries
-from compare.judge.scale import EPS, FACTOR
 from tmt import literal
 from tmt.derivation import method
 from tmt.derivation.composite import mass_matrix_and_bias
@@ -182,9 +180,7 @@ def all_faults() -> list[Fault]:
 def diagnosis_of(fault: Fault, seed: int) -> Diagnosis:
     tree = fault.tree
     q, qd = np.random.default_rng(seed).uniform(-3.0, 3.0, (2, STATES_ASKED, len(tree.axis)))
-    scale = Entries(tree, q, qd)
-    allowed = FACTOR * EPS * packed(scale.mass_matrix + np.zeros((len(q), 1, 1)), scale.bias)
-    return diagnose(tree, q, qd, packed(*fault.make(tree, q, qd)), allowed, SECONDS)
+    return diagnose(tree, Values.of(tree, q, qd, *fault.make(tree, q, qd)), SECONDS)
 
 
 def outcome(fault: Fault) -> tuple[str, list[str]]:

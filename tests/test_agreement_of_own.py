@@ -305,7 +305,7 @@ def test_states_that_are_not_compared_are_warned_of(monkeypatch):
         time.sleep(0.02)
         return mass_matrix(q)
 
-    monkeypatch.setattr("compare.agreement.given.OWN_SECONDS", 0.2)
+    monkeypatch.setattr("compare.agreement.comparison.OWN_SECONDS", 0.2)
     with pytest.warns(UserWarning, match="100"):
         assert 4 <= len(compare.differences(PENDULUM, mass_matrix=slow)) <= 40
     monkeypatch.setattr("compare.robots.states.MOST_NUMBERS", 120)

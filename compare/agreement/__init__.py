@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.text import block, say
-from ..engines.own import ARGUMENTS, state_in_words
 from ..judge.agree import over
-from .given import Given, State
+from .comparison import Comparison, State
 from .why import Why, cause_of
 
 __all__ = ["Difference", "State", "assert_agrees", "differences"]
@@ -121,9 +120,10 @@ def assert_agrees(
     AssertionError: Not equal to MuJoCo to tolerance (64 eps) x the scale of each entry...
     """
     __tracebackhide__ = True  # pytest shows the line of the test
-    given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
-    if given.fails or given.problems:
-        raise AssertionError(message(given))
+    quantities = {"mass_matrix": mass_matrix, "bias": bias, "gravity": gravity, "acceleration": acceleration}
+    comparison = Comparison(mjcf, quantities, q, qd, tau, joints, rtol, states, seed)
+    if comparison.fails or comparison.problems:
+        raise AssertionError(message(comparison))
 
 
 def differences(
@@ -160,65 +160,54 @@ def differences(
     >>> print(worst.entry, worst.yours, round(worst.mujoco, 9), worst.ratio > 1.0)
     M[hip][hip] 0.5 0.6 True
     """
-    given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
-    return rows(given, cause_of(given).text if given.fails else "")
+    quantities = {"mass_matrix": mass_matrix, "bias": bias, "gravity": gravity, "acceleration": acceleration}
+    comparison = Comparison(mjcf, quantities, q, qd, tau, joints, rtol, states, seed)
+    return rows(comparison, cause_of(comparison).text if comparison.fails else "")
 
 
-def rows(given: Given, cause: str) -> list[Difference]:
+def rows(comparison: Comparison, cause: str) -> list[Difference]:
     """Every entry of every quantity at every state, the largest ratio first."""
     found = []
-    for name, comparison in given.compared.items():
-        entries = given.entries(name)
-        columns = comparison.own, comparison.right, comparison.tolerance, comparison.ratio
-        places = np.ndindex(comparison.own.shape)
-        for at, own, right, tolerance, ratio in zip(places, *(part.ravel().tolist() for part in columns)):
-            where, why = (name, entries[at[1:]], given.states[at[0]]), cause if ratio > 1.0 else ""
-            found.append(Difference(*where, own, right, own - right, tolerance, ratio, why))
+    for name, compared in comparison.compared.items():
+        entries = comparison.entries(name)
+        columns = compared.yours, compared.right, compared.tolerance, compared.ratio
+        places = np.ndindex(compared.yours.shape)
+        for at, yours, right, tolerance, ratio in zip(places, *(part.ravel().tolist() for part in columns)):
+            where, why = (name, entries[at[1:]], comparison.states[at[0]]), cause if ratio > 1.0 else ""
+            found.append(Difference(*where, yours, right, yours - right, tolerance, ratio, why))
     return sorted(found, key=lambda row: -row.ratio)
 
 
-def message(given: Given) -> str:
+def message(comparison: Comparison) -> str:
     """Which entries of which quantity are off, the worst of them, the probable cause, and what can be stated."""
     from ..engines.mujoco.remarks import remarks  # here, so that `import compare` need not wait for it
 
-    why = cause_of(given) if given.fails else Why()
-    quantities: dict[str, list[Difference]] = {}
-    for row in rows(given, why.text):
+    why = cause_of(comparison) if comparison.fails else Why()
+    failing: dict[str, list[Difference]] = {}
+    for row in rows(comparison, why.text):
         if row.ratio > 1.0:
-            quantities.setdefault(row.quantity, []).append(row)
-    worst = [
-        {
-            "worst": failing[0],
-            "count": len(failing),
-            "of": given.compared[name].own.size,
-            "states": len({row.state.number for row in failing}),
-            "at": state_in_words(list(map(np.array, failing[0].state[1 : 1 + ARGUMENTS[name]]))),
-        }
-        for name, failing in quantities.items()
+            failing.setdefault(row.quantity, []).append(row)
+    hinges = [
+        name for name, kind in zip(comparison.tree.joint_names, comparison.tree.kind) if kind == "hinge"
     ]
-    values = {
-        "given": given,
-        "quantities": worst,
-        "why": why,
-        "remarks": [say(remark) for remark in remarks(given.reading, has_scenes=False)],
-        "rounded": None if why.is_found or given.rtol else rounded(given),
-        "hinge": next(
-            (name for name, kind in zip(given.tree.joint_names, given.tree.kind) if kind == "hinge"), ""
-        ),
-    }
-    text = block("agreement", "message", **values)
+    advice = None if why.is_found or comparison.rtol else rounded(comparison)
+    said = [say(remark) for remark in remarks(comparison.reading, has_scenes=False)]
+    values = {"comparison": comparison, "failing": failing, "why": why, "rounded": advice, "remarks": said}
+    text = block("agreement", "message", **values, hinge=hinges[0] if hinges else "")
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())
 
 
-def rounded(given: Given) -> float | None:
+def rounded(comparison: Comparison) -> float | None:
     """The rtol to state if the constants are rounded; None if an entry is off by more than that, or is not finite.
 
     Nor may a quantity be off by more than that of its own largest entry: terms far from the origin are large, and a slip is
     small compared with them.
     """
-    off = [(np.abs(of.own - of.right), of) for of in given.compared.values()]
-    worst = float(np.max([over(difference, of.scale).max() for difference, of in off]))
-    of_largest = np.max([over(difference.max(), np.abs(of.right).max()) for difference, of in off])
+    worst = of_largest = 0.0
+    for compared in comparison.compared.values():
+        off = np.abs(compared.yours - compared.right)
+        worst = np.maximum(worst, over(off, compared.scale).max())  # NaN stays
+        of_largest = np.maximum(of_largest, over(off.max(), np.abs(compared.right).max()))
     if not (worst <= ROUNDED and of_largest <= ROUNDED):
         return None
     exponent = int(np.floor(np.log10(worst)))

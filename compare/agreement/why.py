@@ -9,12 +9,12 @@ from tmt import literal
 
 from ..core.finding import Finding
 from ..core.text import say
-from ..diagnosis import STATES_ASKED, Values, diagnose_stated
+from ..diagnosis import STATES_ASKED, Stated, Values, diagnose
 from ..diagnosis.cause import LEAST_STATES
 from ..diagnosis.consistency import conditions, symmetric
-from ..diagnosis.forces import causes_of_forces, force_left_over
+from ..diagnosis.forces import LeftOver
 from ..engines.own import QUICK
-from .given import Given
+from .comparison import Comparison
 
 SECONDS_OF_CAUSE = 10.0  # of a search
 
@@ -26,80 +26,80 @@ class Why(NamedTuple):
     is_found: bool = True  # whether that is a cause
 
 
-def cause_of(given: Given) -> Why:
+def cause_of(comparison: Comparison) -> Why:
     """The probable cause of what differs."""
-    which = some_states(given)
-    if len(which) < min(LEAST_STATES, len(given.q)):
+    which = some_states(comparison)
+    if len(which) < min(LEAST_STATES, len(comparison.q)):
         return Why("", False)  # too few of them are numbers
-    q, qd = given.q[which], given.qd[which]
-    own = {name: values[which] for name, values in given.values.items()}
-    failing = [name for name, comparison in given.compared.items() if (comparison.ratio > 1.0).any()]
+    q, qd, tau = comparison.q[which], comparison.qd[which], comparison.tau[which]
+    yours = {name: values[which] for name, values in comparison.values.items()}
+    tree, M, h, rounding = comparison.tree, yours.get("mass_matrix"), yours.get("bias"), comparison.rounding
+    failing = [name for name, compared in comparison.compared.items() if compared.fails]
+    values = Values.of(tree, q, qd, M, h, rounding)
     if failing == ["acceleration"]:
-        return of_accelerations(given, q, qd, given.tau[which], own)
-    if "gravity" in own and ("bias" not in own or ("gravity" in failing and "bias" not in failing)):
-        h, speeds = own["gravity"], np.zeros_like(qd)
+        return of_accelerations(comparison, values, tau, yours["acceleration"])
+    if "gravity" in yours and ("bias" not in yours or ("gravity" in failing and "bias" not in failing)):
+        at_rest = Values.of(tree, q, np.zeros_like(qd), M, yours["gravity"], rounding)
+        why = of_equations(comparison, at_rest)
     else:
-        h, speeds = own.get("bias", np.nan * qd), qd
-    M = own.get("mass_matrix", np.full((*qd.shape, qd.shape[1]), np.nan))
-    why = of_equations(given, Values.of(given.tree, q, speeds, M, h, given.rounding))
-    if "acceleration" not in failing or not why.is_found or not {"mass_matrix", "bias"} <= own.keys():
+        why = of_equations(comparison, values)
+    if "acceleration" not in failing or not why.is_found or M is None or h is None:
         return why
-    return why._replace(text=f"{why.text} {beside(given, q, qd, given.tau[which], own)}".rstrip())
+    return why._replace(text=f"{why.text} {beside(comparison, values, tau, yours['acceleration'])}".rstrip())
 
 
-def some_states(given: Given) -> np.ndarray:
+def some_states(comparison: Comparison) -> np.ndarray:
     """The numbers of as many states as a diagnosis takes: of those with finite values the first, and the worst."""
     ratios = [
-        comparison.ratio.reshape(len(given.q), -1).max(axis=1) for comparison in given.compared.values()
+        compared.ratio.reshape(len(comparison.q), -1).max(axis=1) for compared in comparison.compared.values()
     ]
     worst = np.max(ratios, axis=0)
     finite = np.flatnonzero(np.isfinite(worst))
     return np.unique([*finite[np.argsort(-worst[finite])[:1]], *finite[: STATES_ASKED - 1]]).astype(int)
 
 
-def of_equations(given: Given, values: Values) -> Why:
+def of_equations(comparison: Comparison, values: Values) -> Why:
     """What a diagnosis finds in values of Mbar and h."""
-    own, M = given.own, values.mass_matrix
-    mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), given.coordinates.speeds)
+    equations, coordinates, M = comparison.equations, comparison.coordinates, values.mass_matrix
+    mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), coordinates.speeds)
     if np.isfinite(M).all() and not mirrored.is_met:
         return Why(mirrored.text)
-    is_quick = own is not None and own.seconds <= QUICK and own.has("bias")
-    of_speeds = partial(own.bias, values.q) if own is not None and is_quick else None
-    diagnosis = diagnose_stated(given.tree, given.joints, values, SECONDS_OF_CAUSE, of_speeds)
+    if equations is not None and (equations.seconds > QUICK or not equations.has("bias")):
+        equations = None  # they cannot be called some hundred times more
+    bias = partial(equations.bias, values.q) if equations is not None else None
+    diagnosis = diagnose(comparison.tree, values, SECONDS_OF_CAUSE, bias, Stated(comparison.joints))
     if not diagnosis.differs:
         return Why("", False)
-    text = diagnosis.sentence()
-    if not diagnosis.causes and own is not None and is_quick and own.has("mass_matrix") and values.are_finite:
-        every = conditions(own.mass_matrix, own.bias, given.coordinates, values.q, values.qd)
-        text = " ".join([*[one.text for one in every if not one.is_met][:1], text])
-    return Why(text, bool(diagnosis.causes))
+    broken = []
+    is_known = equations is not None and equations.has("mass_matrix") and values.are_finite
+    if equations is not None and is_known and not diagnosis.causes:
+        tested = conditions(equations.mass_matrix, equations.bias, coordinates, values.q, values.qd)
+        broken = [condition.text for condition in tested if not condition.is_met]
+    return Why(" ".join([*broken[:1], diagnosis.sentence()]), bool(diagnosis.causes))
 
 
-def beside(given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, own: dict[str, np.ndarray]) -> str:
+def beside(comparison: Comparison, values: Values, tau: np.ndarray, qdd: np.ndarray) -> str:
     """What else is wrong with accelerations than the user's Mbar and h; "" where they follow from these."""
-    h = own["bias"]
-    state = given.tree, q, qd, tau
-    acting, allowed = force_left_over(*state, own["mass_matrix"], h, own["acceleration"], given.rounding)
-    if (np.abs(acting) <= allowed).all():
+    left_over = LeftOver(comparison.tree, values, tau, qdd, comparison.rounding)
+    if left_over.ratio <= 1.0:
         return ""
-    causes = causes_of_forces(*state, h, acting, allowed)
-    return say(
-        Finding("agreement", "forces", {"causes": causes}) if causes else Finding("agreement", "another")
-    )
+    return left_over.sentence() or say(Finding("agreement", "another"))
 
 
-def of_accelerations(
-    given: Given, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, own: dict[str, np.ndarray]
-) -> Why:
-    """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right."""
-    tree, qdd, h = given.tree, own["acceleration"], literal.bias(q, qd, given.tree)
-    acting, allowed = force_left_over(tree, q, qd, tau, literal.mass_matrix(q, tree), h, qdd, given.rounding)
-    if causes := causes_of_forces(tree, q, qd, tau, h, acting, allowed):
-        return Why(say(Finding("agreement", "forces", {"causes": causes})))
-    if {"mass_matrix", "bias"} <= own.keys():
+def of_accelerations(comparison: Comparison, values: Values, tau: np.ndarray, qdd: np.ndarray) -> Why:
+    """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right.
+
+    values: the user's Mbar and h, as far as they are given; these are right.
+    """
+    tree, q, qd, rounding = comparison.tree, values.q, values.qd, comparison.rounding
+    right = Values.of(tree, q, qd, literal.mass_matrix(q, tree), literal.bias(q, qd, tree), rounding)
+    left_over = LeftOver(tree, right, tau, qdd, rounding)
+    if left_over.causes:
+        return Why(left_over.sentence())
+    if values.are_finite:
         return Why(say(Finding("agreement", "solved")), False)
-    unknown = np.full((*qd.shape, qd.shape[1]), np.nan)
-    values = Values(q, qd, unknown, h + acting, (unknown, allowed))
-    diagnosis = diagnose_stated(tree, given.joints, values, SECONDS_OF_CAUSE)
+    alone = Values.of(tree, q, qd, None, right.bias + left_over.force, rounding)
+    alone = alone._replace(tolerances=(alone.tolerances[0], left_over.tolerance))
+    diagnosis = diagnose(tree, alone, SECONDS_OF_CAUSE, stated=Stated(comparison.joints))
     text = diagnosis.sentence() if diagnosis.causes else say(Finding("agreement", "accelerations_alone"))
     return Why(text, bool(diagnosis.causes))

@@ -23,6 +23,13 @@ STEP = 2e-3  # rad or m, or s along a motion of about one rad/s
 SAFETY = 8.0  # times the error or the noise that is estimated
 CLOSE_BY = 1e-4  # rad or m, between the points at which noise is measured
 ORDER = 6
+ROUNDED = FACTOR * EPS
+
+Values = dict[str, object]  # of a finding
+OfPositions = Callable[[np.ndarray], np.ndarray]  # of q (states, nq) -> (states, ...)
+OfStates = Callable[
+    [np.ndarray, np.ndarray], np.ndarray
+]  # of q (states, nq), qd (states, nv) -> (states, nv)
 
 
 class Condition(NamedTuple):
@@ -45,53 +52,48 @@ class Condition(NamedTuple):
 
 
 def conditions(
-    mass_matrix: Callable, bias: Callable, coordinates: Coordinates, q: np.ndarray, qd: np.ndarray
+    mass_matrix: OfPositions, bias: OfStates, coordinates: Coordinates, q: np.ndarray, qd: np.ndarray
 ) -> list[Condition]:
     """The conditions on mass_matrix(q) (states, nv, nv) and bias(q, qd) (states, nv), at states q (states, nq), qd (states, nv).
 
     The power is evaluated only for a symmetric M, and without the part of h that is linear in the speeds.
     """
     M, names = np.asarray(mass_matrix(q)), coordinates.speeds
-    of_M = FACTOR * EPS * np.abs(M).max(axis=(1, 2)) + SAFETY * noise(mass_matrix, coordinates, q)
+    of_M = ROUNDED * np.abs(M).max(axis=(1, 2)) + SAFETY * noise(mass_matrix, coordinates, q)
     of_h = SAFETY * noise(lambda q: bias(q, qd), coordinates, q)
-    rest, ahead, behind, fast, back = (
-        np.asarray(bias(q, factor * qd)) for factor in (0.0, 1.0, -1.0, 2.0, -2.0)
-    )
-    velocity, doubled = (ahead + behind) / 2.0 - rest, (fast + back) / 2.0 - rest
-    rounding = of_h + FACTOR * EPS * np.max(
-        [np.abs(h) for h in (rest, ahead, behind, fast, back)], axis=(0, 2)
-    )
+    h = {factor: np.asarray(bias(q, factor * qd)) for factor in (0.0, 1.0, -1.0, 2.0, -2.0)}
+    velocity, doubled = ((h[speed] + h[-speed]) / 2.0 - h[0.0] for speed in (1.0, 2.0))
+    rounding = of_h + ROUNDED * np.abs(list(h.values())).max(axis=(0, 2))
+    odd, allowed = np.abs(h[1.0] - h[-1.0]) / 2.0, rounding[:, None]
 
-    def of_even(s, i) -> dict:
+    def of_even(s: int, i: int) -> Values:
         return {"name": names[i], "value": odd[s, i], "unit": "N" if coordinates.units[i] == "m" else "N m"}
 
-    def of_quadratic(s, i) -> dict:
+    def of_quadratic(s: int, i: int) -> Values:
         return {"name": names[i], "factor": doubled[s, i] / velocity[s, i] if velocity[s, i] else np.inf}
 
-    odd, off, allowed = np.abs(ahead - behind) / 2.0, np.abs(doubled - 4.0 * velocity), rounding[:, None]
-    tested = [
-        symmetric(M, of_M, names),
-        definite(M, of_M),
-        *gradient_at_rest(lambda q: bias(q, 0.0 * qd), coordinates, q, of_h),
-        closest_to_breaking("h is even in the rates", odd, allowed, "N m", "even", of_even),
-        closest_to_breaking(
-            "h is quadratic in the rates", off, 4.0 * allowed, "N m", "quadratic", of_quadratic
-        ),
-    ]
+    off = np.abs(doubled - 4.0 * velocity)
+    even = nearest("h is even in the rates", odd, allowed, "N m", "even", of_even)
+    quadratic = nearest("h is quadratic in the rates", off, 4.0 * allowed, "N m", "quadratic", of_quadratic)
+    of_weight = gradient_at_rest(lambda q: bias(q, 0.0 * qd), coordinates, q, of_h)
+    tested = [symmetric(M, of_M, names), definite(M, of_M), *of_weight, even, quadratic]
     if tested[0].is_met:
         tested.append(power_balance(mass_matrix, coordinates, q, qd, velocity, of_M, rounding))
     return tested
 
 
-def closest_to_breaking(
-    name: str, off, allowed, unit: str, kind: str, values: Callable[..., dict]
+def nearest(
+    name: str, off: np.ndarray, allowed: np.ndarray, unit: str, kind: str, values: Callable[..., Values]
 ) -> Condition:
-    """A condition on differences, off (states, ...). values: of an index, for the macro `kind`."""
+    """A condition on differences, off (states, ...), where it is nearest to being broken.
+
+    values: of an index, for the macro `kind`.
+    """
     at, allowed = closest(off, allowed), np.broadcast_to(allowed, off.shape)
     return Condition(name, float(off[at]), float(allowed[at]), unit, Finding(TEMPLATE, kind, values(*at)))
 
 
-def noise(function: Callable, coordinates: Coordinates, q: np.ndarray) -> float:
+def noise(function: OfPositions, coordinates: Coordinates, q: np.ndarray) -> float:
     """The noise in function(q) (states, ...), the largest of all states and entries, as a standard deviation.
 
     Differences of sixth order of values close by; a smooth function leaves nothing of size there.
@@ -105,11 +107,11 @@ def noise(function: Callable, coordinates: Coordinates, q: np.ndarray) -> float:
 def symmetric(M: np.ndarray, allowed: np.ndarray, names: Sequence[str]) -> Condition:
     """allowed: (states,)."""
 
-    def values(s, i, j) -> dict:
+    def values(s: int, i: int, j: int) -> Values:
         return {"names": (names[i], names[j]), "values": (M[s, i, j], M[s, j, i])}
 
     off = np.abs(M - np.swapaxes(M, 1, 2))
-    return closest_to_breaking("M is symmetric", off, allowed[:, None, None], "kg m2", "symmetric", values)
+    return nearest("M is symmetric", off, allowed[:, None, None], "kg m2", "symmetric", values)
 
 
 def definite(M: np.ndarray, allowed: np.ndarray) -> Condition:
@@ -125,56 +127,54 @@ def definite(M: np.ndarray, allowed: np.ndarray) -> Condition:
 
 
 def gradient_at_rest(
-    weight: Callable, coordinates: Coordinates, q: np.ndarray, floor: float
+    weight: OfPositions, coordinates: Coordinates, q: np.ndarray, floor: float
 ) -> list[Condition]:
     """dh_i/dq_j at rest is symmetric, in hinges and slides; [] where there is one of them at most."""
-    joints = zip(coordinates.all_kinds, coordinates.places.joints)
-    straight = [joint.qd.start for kind, joint in joints if kind != "ball"]
+    straight = [joint.qd.start for joint in coordinates.places.joints if joint.kind != "ball"]
     if len(straight) < 2:
         return []
-    steps = np.eye(coordinates.nv)[straight]
-    of_each = [derivative(lambda t, e=e: weight(coordinates.move(q, t * e))[:, straight]) for e in steps]
+
+    def along(direction: np.ndarray) -> tuple[np.ndarray, ...]:
+        return derivative(lambda t: weight(coordinates.move(q, t * direction))[:, straight])
+
+    of_each = map(along, np.eye(coordinates.nv)[straight])
     slopes, errors, sizes = (np.stack(part, axis=2) for part in zip(*of_each))  # (states, i, j)
-    curl, rounding = (
-        np.abs(slopes - np.swapaxes(slopes, 1, 2)),
-        (FACTOR * EPS * sizes.max(axis=(1, 2)) + floor) / STEP,
-    )
+    rounding = (ROUNDED * sizes.max(axis=(1, 2)) + floor) / STEP
     allowed = SAFETY * (errors + np.swapaxes(errors, 1, 2)) + rounding[:, None, None]
 
-    def values(s, a, b) -> dict:
-        names = coordinates.speeds[straight[a]], coordinates.speeds[straight[b]]
-        return {"names": names, "values": (slopes[s, a, b], slopes[s, b, a])}
+    def values(s: int, i: int, j: int) -> Values:
+        names = coordinates.speeds[straight[i]], coordinates.speeds[straight[j]]
+        return {"names": names, "values": (slopes[s, i, j], slopes[s, j, i])}
 
-    return [closest_to_breaking("h at rest is a gradient", curl, allowed, "N m/rad", "gradient", values)]
+    curl = np.abs(slopes - np.swapaxes(slopes, 1, 2))
+    return [nearest("h at rest is a gradient", curl, allowed, "N m/rad", "gradient", values)]
 
 
-def power_balance(mass_matrix: Callable, coordinates: Coordinates, q, qd, velocity, of_M, of_h) -> Condition:
+def power_balance(
+    mass_matrix: OfPositions, coordinates: Coordinates, q: np.ndarray, qd: np.ndarray, velocity: np.ndarray,
+    of_M: np.ndarray, of_h: np.ndarray,
+) -> Condition:  # fmt: skip
     """qd' (h - h at rest) = qd' Mdot qd / 2, Mdot along the motion. of_M, of_h: rounding and noise of both, (states,)."""
     largest = np.abs(qd).max(axis=1).clip(min=1e-100)
     rates = qd / largest[:, None]  # of about 1, so that the step is one of positions
 
-    def kinetic(t):
-        return (
-            np.einsum("si,sij,sj->s", rates, np.asarray(mass_matrix(coordinates.move(q, t * rates))), rates)
-            / 2.0
-        )
+    def kinetic(t: float) -> np.ndarray:
+        M = np.asarray(mass_matrix(coordinates.move(q, t * rates)))
+        return np.einsum("si,sij,sj->s", rates, M, rates) / 2.0
 
     slope, error, _ = derivative(kinetic)
-    given, total, watts = (
-        np.einsum("si,si->s", rates, velocity) / largest**2,
-        np.abs(rates).sum(axis=1),
-        largest**3,
-    )
+    power, total = np.einsum("si,si->s", rates, velocity) / largest**2, np.abs(rates).sum(axis=1)
     allowed = SAFETY * error + total**2 * of_M / STEP + 2.0 * total * of_h / largest**2
+    watts = largest**3
 
-    def values(s) -> dict:
-        return {"yours": given[s] * watts[s], "right": slope[s] * watts[s], "balls": coordinates.has_balls}
+    def values(s: int) -> Values:
+        return {"yours": power[s] * watts[s], "right": slope[s] * watts[s], "balls": coordinates.has_balls}
 
     name = "h belongs to M: qd'(h - h at rest) = qd' Mdot qd / 2"
-    return closest_to_breaking(name, np.abs(given - slope) * watts, allowed * watts, "W", "power", values)
+    return nearest(name, np.abs(power - slope) * watts, allowed * watts, "W", "power", values)
 
 
-def derivative(function: Callable) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def derivative(function: Callable[[float], np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """df/dt at 0 to fourth order, its error estimated from two step sizes, and the size of f, all of the shape of f(t)."""
     values = {k: np.asarray(function(k * STEP)) for k in (-4, -2, -1, 1, 2, 4)}
     slope = (8.0 * (values[1] - values[-1]) - (values[2] - values[-2])) / (12.0 * STEP)

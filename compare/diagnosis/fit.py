@@ -1,14 +1,17 @@
 """Fits: which change of one place, or of two, explains given values; least squares over the states, many places at once."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from .model import TINY, Equations
+from ..core.cause import Cause
+from .cause import together
+from .model import TINY, Changes, Path
 from .places import OF_ZERO, Place
 
 ROUNDS = 25  # of a search from one start
@@ -19,9 +22,7 @@ LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
 POLISHED = 24  # places with a quadratic influence that are fitted
 CANDIDATES = 64  # pairs that are fitted, the most promising of all
 ROWS = 256  # of changes in one evaluation
-TURNED = np.pi * np.array(
-    [-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0]
-)  # further starts for the zero of a hinge
+TURNED = np.pi * np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # more starts for the zero of a hinge
 
 
 class Fitted(NamedTuple):
@@ -30,15 +31,20 @@ class Fitted(NamedTuple):
     places: tuple[Place, ...]
     changes: tuple[float, ...]
     ratio: float  # of what is left to its tolerance, the largest; explained if at most 1
-    left: float  # of the difference, a share: root of the sum of the squares
+    left_over: float  # of the difference, a share: root of the sum of the squares
 
     @property
     def is_possible(self) -> bool:
-        return all(of.is_possible(change) for of, change in zip(self.places, self.changes))
+        return all(place.is_possible(change) for place, change in zip(self.places, self.changes))
 
     @property
     def explains(self) -> bool:
         return self.ratio <= 1.0 and self.is_possible
+
+    @property
+    def cause(self) -> Cause:
+        changes = [place.cause(change) for place, change in zip(self.places, self.changes)]
+        return together(changes, self.left_over)
 
 
 class OutOfTime(Exception):
@@ -46,19 +52,22 @@ class OutOfTime(Exception):
 
 
 class Search:
-    """Changes of places of the right equations that come closest to given values.
+    """Changes of places that bring computed values closest to given ones.
 
-    given: (states, entries) as `Equations.values`; NaN where nothing is given. tolerance: of each entry, (states, entries).
-    end: the time.monotonic() at which OutOfTime is raised.
+    computed: the values with changes of numbers of the model, (changes, states, entries). given: (states, entries); NaN where
+    nothing is given. tolerance: of each entry, (states, entries). end: the time.monotonic() at which OutOfTime is raised.
     """
 
-    def __init__(self, equations: Equations, places: Sequence[Place], given, tolerance, end: float = np.inf):
-        self.equations, self.places, self.end = equations, list(places), end
+    def __init__(
+        self, computed: Callable[[Changes], np.ndarray], places: Sequence[Place], given: np.ndarray,
+        tolerance: np.ndarray, end: float = np.inf,
+    ):  # fmt: skip
+        self.computed, self.places, self.given, self.end = computed, list(places), given, end
         least = tolerance[tolerance > 0.0].min(initial=1.0)  # what is always 0 has no scale
+        self.tolerance = np.where(tolerance > 0.0, tolerance, least)
         self.known = np.isfinite(given)
-        self.given = np.where(self.known, given, 0.0)
-        self.weight = np.where(self.known, 1.0 / np.where(tolerance > 0.0, tolerance, least), 0.0)
-        self.right = equations.values()[0]
+        self.weight = np.where(self.known, 1.0 / self.tolerance, 0.0)
+        self.right = computed({})[0]
         self.off = self.weighted(self.right)
         self.size = float(np.linalg.norm(self.off))
         self.sizes = np.array([place.size for place in self.places])
@@ -73,39 +82,51 @@ class Search:
             return []
 
     def weighted(self, values: np.ndarray) -> np.ndarray:
-        """Given values minus others, in tolerances, (..., states, entries); 0 where nothing is given."""
-        return np.where(self.known, self.given - values, 0.0) * self.weight
+        """Given values minus others at the first or all states, (..., states, entries), in tolerances; 0 where none is given."""
+        first = slice(values.shape[-2])
+        return np.where(self.known[first], self.given[first] - values, 0.0) * self.weight[first]
 
-    def values(self, which: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Values for each row of changes, (rows, states, entries): x (rows, k), of the places which (rows, k)."""
-        if len(which) > ROWS:
-            starts = range(0, len(which), ROWS)
-            return np.concatenate([self.values(which[k : k + ROWS], x[k : k + ROWS]) for k in starts])
+    def explained(self, variants: Iterable[tuple[Cause, np.ndarray]]) -> list[Cause]:
+        """The causes whose values leave nothing; each with its values at the first or all states, (states, entries)."""
+        causes = []
+        for cause, values in variants:
+            left = self.weighted(values)
+            if np.abs(left).max() <= 1.0:
+                causes.append(replace(cause, left_over=float(np.linalg.norm(left)) / self.size))
+        return causes
+
+    def values(self, numbers: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Values for each row of changes, (rows, states, entries): x (rows, k), of the places with these numbers (rows, k)."""
+        if len(numbers) > ROWS:
+            starts = range(0, len(numbers), ROWS)
+            return np.concatenate([self.values(numbers[k : k + ROWS], x[k : k + ROWS]) for k in starts])
         if time.monotonic() > self.end:
             raise OutOfTime
-        changes, columns = {}, []
-        for row in range(len(which)):
-            for place, change in zip(which[row], x[row]):
-                for path, coefficient in self.places[place].moves:
-                    changes.setdefault(path, np.zeros(len(which), x.dtype))[row] += coefficient * change
-                if self.places[place].column is not None:
-                    columns.append((row, self.places[place], change))
-        values = self.equations.values(changes)
-        values = np.array(np.broadcast_to(values, (len(which), *values.shape[1:])), dtype=x.dtype)
-        for row, place, change in columns:
-            values[row, :, place.entry] += change * place.column
+        changes: dict[Path, np.ndarray] = {}
+        columns = []
+        for row in range(len(numbers)):
+            for place, change in zip([self.places[k] for k in numbers[row]], x[row]):
+                for path, coefficient in place.moves:
+                    changes.setdefault(path, np.zeros(len(numbers), x.dtype))[row] += coefficient * change
+                if place.column is not None:
+                    columns.append((row, place.entry, change * place.column))
+        values = self.computed(changes)
+        values = np.array(np.broadcast_to(values, (len(numbers), *values.shape[1:])), dtype=x.dtype)
+        for row, entry, added in columns:
+            values[row, :, entry] += added
         return values
 
-    def fitted(self, which: np.ndarray, x: np.ndarray, rounds: int = ROUNDS) -> tuple[np.ndarray, np.ndarray]:
+    def fitted(
+        self, numbers: np.ndarray, x: np.ndarray, rounds: int = ROUNDS
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The best changes from the starts x (rows, k), and what they leave, (rows, states, entries)."""
-        size, steps = self.sizes[which], np.eye(x.shape[1]) * (1j * TINY)
-        left = self.weighted(self.values(which, x))
+        size, steps = self.sizes[numbers], np.eye(x.shape[1]) * (1j * TINY)
+        left = self.weighted(self.values(numbers, x))
         best, damping, moving = (left**2).sum(axis=(1, 2)), np.full(len(x), 1e-3), np.arange(len(x))
         for _ in range(rounds):
-            slopes = [
-                self.values(which[moving], x[moving] + step).imag / TINY * self.weight for step in steps
-            ]
-            J = np.stack(slopes, axis=1).reshape(len(moving), x.shape[1], -1) * size[moving][:, :, None]
+            slopes = [self.values(numbers[moving], x[moving] + step).imag / TINY for step in steps]
+            J = (np.stack(slopes, axis=1) * self.weight).reshape(len(moving), x.shape[1], -1)
+            J = J * size[moving][:, :, None]
             normal = np.einsum("rim,rjm->rij", J, J)
             diagonal = np.einsum("rii->ri", normal)
             diagonal = np.where(diagonal > SEEN, diagonal, 1.0)  # a place without influence stays
@@ -114,33 +135,29 @@ class Search:
             down = np.einsum("rim,rm->ri", J, left[moving].reshape(len(moving), -1)) / np.sqrt(diagonal)
             step = np.linalg.solve(scaled, down[:, :, None])[:, :, 0] / np.sqrt(diagonal)
             tried = x[moving] + step * size[moving]
-            after = self.weighted(self.values(which[moving], tried))
+            after = self.weighted(self.values(numbers[moving], tried))
             sums = np.nan_to_num((after**2).sum(axis=(1, 2)), nan=np.inf)
             better = sums < best[moving]
             now = moving[better]
             x[now], left[now], best[now] = tried[better], after[better], sums[better]
-            damping[moving] = np.clip(
-                np.where(better, damping[moving] * 0.05, damping[moving] * 10.0), LEAST, 1e8
-            )
+            damping[moving] = (damping[moving] * np.where(better, 0.05, 10.0)).clip(LEAST, 1e8)
             moving = moving[(np.abs(step).max(axis=1) > CONVERGED) & (damping[moving] < 1e6)]
             if not len(moving):
                 break
         return x, left
 
-    def outcome(self, which: np.ndarray, starts: np.ndarray) -> list[Fitted]:
+    def outcome(self, numbers: np.ndarray, starts: np.ndarray) -> list[Fitted]:
         """The fit of each set of places, from the best of its starts, the smallest remainder first."""
-        x, left = self.fitted(which, starts, FIRST_ROUNDS)
+        x, left = self.fitted(numbers, starts, FIRST_ROUNDS)
         near = np.argsort(np.nan_to_num((left**2).sum(axis=(1, 2)), nan=np.inf))[:FINALISTS]
-        x[near], left[near] = self.fitted(which[near], x[near])
-        found = {}
-        for places, changes, rest in zip(which, x, left):
+        x[near], left[near] = self.fitted(numbers[near], x[near])
+        fits: dict[tuple[int, ...], Fitted] = {}
+        for key, changes, rest in zip(map(tuple, numbers.tolist()), x.tolist(), left):
             ratio = float(np.nan_to_num(np.abs(rest).max(), nan=np.inf))
             share = float(np.linalg.norm(rest)) / self.size
-            one = Fitted(tuple(self.places[k] for k in places), tuple(map(float, changes)), ratio, share)
-            key = tuple(places.tolist())
-            if key not in found or one.ratio < found[key].ratio:
-                found[key] = one
-        return sorted(found.values(), key=lambda one: one.ratio)
+            if key not in fits or ratio < fits[key].ratio:
+                fits[key] = Fitted(tuple(self.places[k] for k in key), tuple(changes), ratio, share)
+        return sorted(fits.values(), key=lambda fit: fit.ratio)
 
     def singles(self) -> list[Fitted]:
         """Each place alone, the smallest remainder first.
@@ -148,21 +165,17 @@ class Search:
         Where the values are quadratic in its change, the best one is the root of a cubic. The few best of these are fitted; all
         directions and zeros are fitted from several starts.
         """
-        which, starts, promising = [], [], []
-        for k, (place, (left, best)) in enumerate(
-            zip(self.places, nearest_changes(*self.expansion, self.off))
-        ):
-            best *= place.size
+        nearest, promising, starts = nearest_changes(*self.expansion, self.off), [], []
+        for k, place in enumerate(self.places):
+            left, best = nearest[k]
             if place.is_quadratic:
-                promising.append((left, k, best))
+                promising.append((left, k, best * place.size))
             else:
-                near = [0.0, best, *(TURNED if place.kind == OF_ZERO else (-1.0, 1.0))]
-                which += [[k]] * len(near)
-                starts += [[x] for x in near]
-        for _, k, x in sorted(promising)[:POLISHED]:
-            which.append([k])
-            starts.append([x])
-        return self.outcome(np.array(which), np.array(starts))
+                turned = TURNED if place.kind == OF_ZERO else (-1.0, 1.0)
+                starts += [(k, start) for start in (0.0, best * place.size, *turned)]
+        starts += [(k, start) for _, k, start in sorted(promising)[:POLISHED]]
+        numbers, x = zip(*starts)
+        return self.outcome(np.array(numbers)[:, None], np.array(x)[:, None])
 
     @cached_property
     def expansion(self) -> tuple[np.ndarray, np.ndarray]:
@@ -170,17 +183,15 @@ class Search:
 
         (places, states, entries) each; exact where the values are quadratic: for all except directions and zeros.
         """
-        which, size = np.arange(len(self.places))[:, None], self.sizes[:, None]
-        up, down = (self.values(which, sign * size) for sign in (1.0, -1.0))
+        numbers, size = np.arange(len(self.places))[:, None], self.sizes[:, None]
+        up, down = (self.values(numbers, sign * size) for sign in (1.0, -1.0))
         return (up - down) / 2.0 * self.weight, ((up + down) / 2.0 - self.right) * self.weight
 
     def pairs(self, kinds: Sequence[str]) -> list[Fitted]:
         """Two places of some kinds together: the most promising, where each change is taken to act alone, are fitted."""
         columns = np.concatenate([part.reshape(len(self.places), -1) for part in self.expansion])
         lengths = np.linalg.norm(columns, axis=1)
-        columns = np.divide(
-            columns, lengths[:, None], out=np.zeros_like(columns), where=lengths[:, None] > 0.0
-        )
+        columns = columns / np.where(lengths > 0.0, lengths, 1.0)[:, None]
         inner, down, count = columns @ columns.T, columns @ self.off.ravel(), len(self.places)
         active = [k for k, place in enumerate(self.places) if lengths[k] > 0.0 and place.kind in kinds]
         pairs = np.array(list(combinations(active, 2)))
@@ -201,16 +212,11 @@ def nearest_changes(first: np.ndarray, second: np.ndarray, off: np.ndarray) -> l
     """
     nearest = []
     for a, b in zip(first, second):
-        cubic = [
-            2.0 * (b * b).sum(),
-            3.0 * (a * b).sum(),
-            (a * a).sum() - 2.0 * (off * b).sum(),
-            -(off * a).sum(),
-        ]
+        aa, ab, bb = (a * a).sum(), (a * b).sum(), (b * b).sum()
+        cubic = [2.0 * bb, 3.0 * ab, aa - 2.0 * (off * b).sum(), -(off * a).sum()]
         roots = np.roots(cubic) if np.isfinite(cubic).all() else np.zeros(0)
         real = [float(x.real) for x in roots if abs(x.imag) <= 1e-9 * (1.0 + abs(x))]
         left = [(float(np.linalg.norm(off - x * a - x * x * b)), x) for x in [*real, 0.0]]
-        nearest.append(
-            min(left, key=lambda one: (np.round(one[0]), abs(one[1])))
-        )  # of two that do the same the nearer
+        # of two that do the same the nearer
+        nearest.append(min(left, key=lambda left_by: (np.round(left_by[0]), abs(left_by[1]))))
     return nearest

@@ -5,69 +5,79 @@ zero if nothing else acts.
 """
 
 from collections.abc import Iterator
-from types import SimpleNamespace
+from functools import cached_property
 
 import numpy as np
 
 import tmt
 from tmt import literal
 
+from ..core.cause import Cause
+from ..core.finding import Finding
+from ..core.text import say
+from ..judge.agree import over
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
-from .cause import Cause, Change, cause_of, tied
+from .cause import TEMPLATE, ranked
 from .fit import Search
+from .model import Values
 from .places import forces
 
 SHARPER = 4.0  # times the tolerance: accelerations are rounded before Mbar is multiplied by them
 
 
-def force_left_over(
-    tree: tmt.Tree, q, qd, tau, M, h, qdd, rounding: float = FACTOR * EPS
-) -> tuple[np.ndarray, np.ndarray]:
-    """r and its tolerance, (states, nv). rounding: of the scale of an entry."""
-    scale, drag = Entries(tree, q, qd), np.array(tree.damping) * qd
-    left_over = tau - drag - spring_force(tree, q) - h - np.einsum("sij,sj->si", M, qdd)
-    return left_over, SHARPER * rounding * scale.residual(scale.force(tau), qdd)
+class LeftOver:
+    """The force r that is left over by accelerations qdd (states, nv) under torques tau (states, nv).
 
-
-def spring_force(tree: tmt.Tree, q: np.ndarray) -> np.ndarray | float:
-    return literal.spring_torque(q, tree) if tree.has_springs else 0.0
-
-
-def causes_of_forces(tree: tmt.Tree, q, qd, tau, h, left_over, tolerance) -> tuple[Cause, ...]:
-    """What explains the forces left over, r (states, nv): all causes of the first rank that has one.
-
-    q: (states, nq), qd, tau, h: (states, nv). tolerance: of r, (states, nv) or what broadcasts to it.
+    force, tolerance: (states, nv). rounding: of the scale of an entry.
     """
-    if not (np.isfinite(left_over).all() and np.isfinite(tolerance).all()):
-        return ()
-    nothing = SimpleNamespace(values=lambda changes=None: np.zeros((1, *left_over.shape)))
-    search = Search(
-        nothing, list(forces(tree, q, qd)), left_over, np.broadcast_to(tolerance, left_over.shape)
-    )
-    if np.abs(search.off).max() <= 1.0:
-        return ()
-    causes = []
-    for change, force in options_of_forces(tree, q, qd, tau, h):
-        rest = search.weighted(force)
-        if np.abs(rest).max() <= 1.0:
-            causes.append(cause_of(1, [change], float(np.linalg.norm(rest)) / search.size))
-    for fits in (search.singles, lambda: search.pairs(("number",))):
-        for fit in fits() if not causes else ():
-            changes = [place.changed(change) for place, change in zip(fit.places, fit.changes)]
-            if fit.explains:
-                causes.append(cause_of(1 + len(changes), changes, fit.left))
-    return tied(causes)
 
-
-def options_of_forces(tree: tmt.Tree, q, qd, tau, h) -> Iterator[tuple[Change, np.ndarray]]:
-    """Each option and the force that is left over with it."""
-    for place, stated, term in (
-        ("torque in the acceleration", "tau", -tau),
-        ("bias in the acceleration", "- h", h),
-        ("damping in the acceleration", "- D qd", np.array(tree.damping) * qd),
-        ("springs in the acceleration", "- k (q - rest)", np.zeros_like(qd) + spring_force(tree, q)),
+    def __init__(
+        self, tree: tmt.Tree, values: Values, tau: np.ndarray, qdd: np.ndarray, rounding: float = FACTOR * EPS
     ):
-        for explains, factor in (("left out", -1.0), ("of the other sign", -2.0), ("twice", 1.0)):
-            if term.any():
-                yield Change("option", place, stated, explains), factor * term
+        self.tree, self.values, self.tau = tree, values, tau
+        q, qd, M, h, _ = values
+        self.damping, self.springs = np.array(tree.damping) * qd, literal.spring_torque(q, tree)
+        self.force = tau - self.damping - self.springs - h - np.einsum("sij,sj->si", M, qdd)
+        scale = Entries(tree, q, qd)
+        self.tolerance = SHARPER * rounding * scale.residual(scale.force(tau), qdd)
+
+    @property
+    def ratio(self) -> float:
+        """Of the force to its tolerance, the largest; inf if one is not a number."""
+        force = np.abs(np.where(np.isfinite(self.force), self.force, np.inf))
+        return float(over(force, self.tolerance).max())
+
+    @cached_property
+    def causes(self) -> tuple[Cause, ...]:
+        """What explains the force: all causes of the first rank that has one."""
+        if not (np.isfinite(self.force).all() and np.isfinite(self.tolerance).all()):
+            return ()
+        places = list(forces(self.tree, self.values.q, self.values.qd))
+        nothing = np.zeros((1, *self.force.shape))
+        search = Search(lambda changes: nothing, places, self.force, self.tolerance)
+        if np.abs(search.off).max() <= 1.0:
+            return ()
+        causes = search.explained(self.options())
+        if not causes:
+            causes = [fit.cause for fit in search.singles() if fit.explains]
+        if not causes:
+            causes = [fit.cause for fit in search.pairs(("number",)) if fit.explains]
+        return ranked(causes)
+
+    def sentence(self) -> str:
+        """The causes in words; "" if there is none."""
+        return say(Finding(TEMPLATE, "forces", {"list": self.causes})) if self.causes else ""
+
+    def options(self) -> Iterator[tuple[Cause, np.ndarray]]:
+        """Each option, and the force that is left over with it."""
+        for place, stated, term in (
+            ("torque in the acceleration", "tau", -self.tau),
+            ("bias in the acceleration", "- h", self.values.bias),
+            ("damping in the acceleration", "- D qd", self.damping),
+            ("springs in the acceleration", "- k (q - rest)", self.springs),
+        ):
+            for explains, factor in (("left out", -1.0), ("of the other sign", -2.0), ("twice", 1.0)):
+                cause = Cause(rank=1, kind="option", place=place, stated=stated, explains=explains)
+                if term.any():
+                    yield cause, factor * term

@@ -2,19 +2,22 @@
 
 Mbar and h are TMT's sum over the bodies, by the functions of tmt. The numbers may be arrays (changes, 1) that broadcast with
 positions (states,), real or complex; the derivative by a number is the imaginary part after an imaginary change of 1e-100, exact
-to rounding. Each term of each body has a factor, 1 in the right equations.
+to rounding.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import tmt
 from tmt.derivation import method
-from tmt.derivation.vectors import ZERO, Vector
+from tmt.derivation.vectors import ZERO, Matrix
 
+from ..judge.entries import Entries
+from ..judge.scale import EPS, FACTOR
 from ..robots.coordinates import Coordinates
 
 FIELDS = ("offset", "axis", "com", "inertia", "mass", "gravity", "reference", "armature")
@@ -24,15 +27,47 @@ OF_TERM = {  # of each body; the first two of Mbar
     "gyroscopic": "gyroscopic term B' (omega x I omega) of {}",
 }  # fmt: skip
 BODY_TERMS = tuple(OF_TERM)
+VELOCITY_TERMS = BODY_TERMS[3:]
+NOTHING: dict[str, Any] = {
+    "mass": 0.0,
+    "inertia": Matrix([ZERO] * 3),
+    "v_conv": ZERO,
+    "w_conv": ZERO,
+    "omega": ZERO,
+}
+FIELDS_OF_TERMS = {  # of a body, on which a term depends
+    "translation": ("mass",), "rotation": ("inertia",), "gravity": ("mass",), "convective": ("mass", "v_conv"),
+    "Euler": ("inertia", "w_conv"), "gyroscopic": ("inertia", "omega"),
+}  # fmt: skip
 MOST_SPEEDS = 8  # with more, coefficients of products of speeds are not compared: there are nv^2 (nv + 1) / 2
 TINY = 1e-100  # an imaginary change, whose square vanishes
 
 
 class Path(NamedTuple):
-    """One entry of a field of a Tree, or the factor of a term ("factor", (body, term))."""
+    """One entry of a field of a Tree."""
 
     field: str
-    index: tuple[int, ...]
+    at: tuple[int, ...]
+
+
+class Entry(NamedTuple):
+    """An entry of Mbar or h, or a coefficient of h, see `coefficients_of`."""
+
+    kind: str  # "M", "h", "gravity" or "velocity"
+    at: tuple[int, ...]  # the numbers of the speeds
+
+    def named(self, speeds: Sequence[str]) -> str:
+        """Its name: "M[hip][knee]", "h[hip]", "h[hip], gravity", "h[hip], coefficient of hip' knee'"."""
+        first, *others = names = [speeds[i] for i in self.at]
+        if self.kind == "gravity":
+            return f"h[{first}], gravity"
+        if self.kind == "velocity":
+            rates = f"{others[0]}'^2" if others[0] == others[1] else f"{others[0]}' {others[1]}'"
+            return f"h[{first}], coefficient of {rates}"
+        return self.kind + "".join(f"[{name}]" for name in names)
+
+
+Changes = Mapping[Path, np.ndarray]  # what is added to a number, (changes,)
 
 
 class Equations:
@@ -44,63 +79,77 @@ class Equations:
     def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray):
         self.tree, self.q, self.qd = tree, q, qd
         self.nv = len(tree.axis)
+        self.coordinates = Coordinates(tree.joint_names, tree.kind)
+        self.speeds = self.coordinates.speeds
         self.stated = {name: np.array(getattr(tree, name), float) for name in FIELDS}
-        self.stated["factor"] = np.ones((len(tree.mass), len(BODY_TERMS)))
         self.triangle = np.tril_indices(self.nv)
+        self.in_M, self.in_h = slice(len(self.triangle[0])), slice(len(self.triangle[0]), None)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        return Coordinates(self.tree.joint_names, self.tree.kind).speeds
+    @cached_property
+    def entries(self) -> list[Entry]:
+        """The entries of a state, those of Mbar first."""
+        of_M = [Entry("M", (j, i)) for i in range(self.nv) for j in range(i + 1)]
+        return of_M + [Entry("h", (i,)) for i in range(self.nv)]
 
-    @property
-    def entries(self) -> list[tuple]:
-        """The entries of a state: ("M", i, j) or ("h", i)."""
-        return [*(("M", int(i), int(j)) for i, j in zip(*self.triangle)), *(("h", i) for i in range(self.nv))]
+    @cached_property
+    def bodies(self) -> list[method.Body]:
+        return method.bodies(self.tree, list(self.q.T), list(self.qd.T))
 
-    def values(self, changes: dict | None = None) -> np.ndarray:
-        """Mbar and h, (changes, states, entries), with entries of the tree changed; (1, states, entries) without changes.
+    @cached_property
+    def terms(self) -> dict[str, np.ndarray]:
+        """What each term of all bodies adds, (bodies, states, entries)."""
+        terms = {}
+        for term, fields in FIELDS_OF_TERMS.items():
+            absent = {name: nothing for name, nothing in NOTHING.items() if name not in fields}
+            gravity = self.tree.gravity if term == "gravity" else ZERO
+            terms[term] = np.stack([self.summed([b._replace(**absent)], gravity)[0] for b in self.bodies])
+            terms[term][..., self.in_h if term in BODY_TERMS[:2] else self.in_M] = 0.0
+        return terms
 
-        changes: {Path: what is added, (changes,)}. Changed axes are normalized.
-        """
+    @cached_property
+    def right(self) -> np.ndarray:
+        """The values without changes, (states, entries)."""
+        return self.values({})[0]
+
+    @cached_property
+    def coefficients(self) -> dict[Entry, np.ndarray]:
+        """The entries of Mbar, and the coefficients of h, (states,) each."""
+
+        def bias(speeds: np.ndarray) -> np.ndarray:
+            at_speeds = Equations(self.tree, self.q, np.broadcast_to(speeds, self.qd.shape))
+            return at_speeds.right[:, self.in_h]
+
+        of_M = dict(zip(self.entries[self.in_M], self.right.T))
+        return of_M | coefficients_of(bias, self.nv)
+
+    def values(self, changes: Changes) -> np.ndarray:
+        """Mbar and h with entries of the tree changed, (changes, states, entries). Changed axes are normalized."""
         numbers = {name: value.tolist() for name, value in self.stated.items()}
-        for path, added in (changes or {}).items():
-            row, (*places, last) = numbers[path.field], path.index
+        for path, added in changes.items():
+            row, (*places, last) = numbers[path.field], path.at
             for place in places:
                 row = row[place]
             row[last] = row[last] + np.asarray(added)[:, None]
-        for k in {path.index[0] for path in changes or {} if path.field == "axis"}:
+        for k in {path.at[0] for path in changes if path.field == "axis"}:
             numbers["axis"][k] = unit_direction(*numbers["axis"][k])
-        kept = {name: getattr(self.tree, name) for name in ("parent", "coordinates", "body_joint", "moves")}
-        changed = SimpleNamespace(**numbers, **kept)
-        return self.summed(changed, method.bodies(changed, list(self.q.T), list(self.qd.T)))
+        structure = {
+            name: getattr(self.tree, name) for name in ("parent", "coordinates", "body_joint", "moves")
+        }
+        changed = SimpleNamespace(**numbers, **structure)
+        bodies = method.bodies(changed, list(self.q.T), list(self.qd.T))
+        return self.summed(bodies, changed.gravity, changed.armature)
 
-    def coefficients(self) -> dict[tuple, np.ndarray]:
-        """See `coefficients_of`."""
+    def with_bias(self, h: np.ndarray) -> np.ndarray:
+        """The right values with another h (states, nv)."""
+        return np.concatenate([self.right[:, self.in_M], h], axis=1)
 
-        def h(speeds: np.ndarray) -> np.ndarray:
-            return Equations(self.tree, self.q, np.broadcast_to(speeds, self.qd.shape)).values()[0][
-                :, -self.nv :
-            ]
-
-        return coefficients_of(h, self.nv)
-
-    def summed(self, tree: tmt.Tree | SimpleNamespace, bodies: Sequence) -> np.ndarray:
-        """Mbar and h of some bodies, (changes, states, entries). tree: with the factor of each term of these bodies."""
-        g = Vector(*tree.gravity)
-        M = [[0.0] * i + [rotor] for i, rotor in enumerate(tree.armature)]
-        h = [0.0] * self.nv
-        for b, factor in zip(bodies, tree.factor):
-            translation, rotation, weight, convective, Euler, gyroscopic = factor
-            force = (b.v_conv * convective - g * weight) * b.mass
-            moment = (b.inertia @ b.w_conv) * Euler + b.omega.cross(b.inertia @ b.omega) * gyroscopic
-            turned = [b.inertia @ column for column in b.B]
-            moving = [i for i in range(self.nv) if b.T[i] is not ZERO]
-            for i in moving:
-                h[i] = h[i] + b.T[i].dot(force) + b.B[i].dot(moment)
-                for j in moving[: moving.index(i) + 1]:
-                    M[i][j] = (
-                        M[i][j] + b.mass * translation * b.T[i].dot(b.T[j]) + rotation * b.B[i].dot(turned[j])
-                    )
+    def summed(
+        self, bodies: Sequence[method.Body], gravity: Iterable[Any], armature: Sequence[Any] = ()
+    ) -> np.ndarray:
+        """Mbar and h of some bodies, (changes, states, entries)."""
+        M, h = method.mass_matrix(bodies), method.bias(bodies, gravity)
+        for i, rotor in enumerate(armature):
+            M[i][i] = M[i][i] + rotor
         flat = [*(M[i][j] for i, j in zip(*self.triangle)), *h]
         count = max([np.shape(value)[0] for value in flat if np.ndim(value) == 2], default=1)
         return np.stack([np.broadcast_to(value, (count, len(self.q))) for value in flat], axis=-1)
@@ -109,7 +158,7 @@ class Equations:
         """Mbar (..., nv, nv) of values (..., entries)."""
         i, j = self.triangle
         M = np.zeros((*values.shape[:-1], self.nv, self.nv), values.dtype)
-        M[..., i, j] = M[..., j, i] = values[..., : len(i)]
+        M[..., i, j] = M[..., j, i] = values[..., self.in_M]
         return M
 
 
@@ -119,22 +168,58 @@ def packed(mass_matrix: np.ndarray, bias: np.ndarray) -> np.ndarray:
     return np.concatenate([np.asarray(mass_matrix)[..., i, j], bias], axis=-1)
 
 
-def coefficients_of(bias: Callable, nv: int) -> dict[tuple, np.ndarray]:
-    """Coefficients of h, (states,) each: ("gravity", i), and ("velocity", i, j, k) of qd_j qd_k, j <= k, in h_i.
+class Values(NamedTuple):
+    """Mbar and h with their tolerances, at states in the model's joints; NaN where a quantity is not given."""
+
+    q: np.ndarray  # (states, nq)
+    qd: np.ndarray  # (states, nv)
+    mass_matrix: np.ndarray  # (states, nv, nv)
+    bias: np.ndarray  # (states, nv)
+    tolerances: tuple[np.ndarray, np.ndarray]  # of both
+
+    @classmethod
+    def of(
+        cls, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, mass_matrix: np.ndarray | None, bias: np.ndarray | None,
+        rounding: float = FACTOR * EPS,
+    ) -> "Values":  # fmt: skip
+        """With the tolerances of judge.entries. None: not given; rounding: of the scale of an entry."""
+        scale, shape = Entries(tree, q, qd), (*qd.shape, qd.shape[1])
+        M = np.full(shape, np.nan) if mass_matrix is None else mass_matrix
+        h = np.full(qd.shape, np.nan) if bias is None else bias
+        return cls(q, qd, M, h, (rounding * np.broadcast_to(scale.mass_matrix, shape), rounding * scale.bias))
+
+    @property
+    def packed(self) -> np.ndarray:
+        """As `Equations` has them, (states, entries)."""
+        return packed(self.mass_matrix, self.bias)
+
+    @property
+    def packed_tolerance(self) -> np.ndarray:
+        return packed(*self.tolerances)
+
+    @property
+    def are_finite(self) -> bool:
+        return bool(np.isfinite(self.packed).all())
+
+
+def coefficients_of(bias: Callable[[np.ndarray], np.ndarray], nv: int) -> dict[Entry, np.ndarray]:
+    """Coefficients of h, (states,) each: "gravity" (i,), and "velocity" (i, j, k) of qd_j qd_k, j <= k, in h_i.
 
     bias: speeds (nv,) -> h (states, nv), of which the part that is even in the speeds is taken.
     """
     unit, even, rest = np.eye(nv), {}, bias(np.zeros(nv))
-    pairs = zip(*map(np.ndarray.tolist, np.triu_indices(nv)))
-    for j, k in pairs if nv <= MOST_SPEEDS else ():
+    pairs = [(j, k) for j in range(nv) for k in range(j, nv)] if nv <= MOST_SPEEDS else []
+    for j, k in pairs:
         speeds = unit[j] + (j != k) * unit[k]
         even[j, k] = (bias(speeds) + bias(-speeds)) / 2.0 - rest
     mixed = {(j, k): values - even[j, j] - even[k, k] for (j, k), values in even.items() if j != k}
-    rows = {("gravity", i): rest[:, i] for i in range(nv)}
-    return rows | {("velocity", i, *pair): c[:, i] for pair, c in (even | mixed).items() for i in range(nv)}
+    found = {Entry("gravity", (i,)): rest[:, i] for i in range(nv)}
+    for pair, values in (even | mixed).items():
+        found |= {Entry("velocity", (i, *pair)): values[:, i] for i in range(nv)}
+    return found
 
 
-def unit_direction(x, y, z) -> list:
+def unit_direction(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> list[np.ndarray]:
     """A direction at length 1."""
     length = np.sqrt(x * x + y * y + z * z)
     length = np.where(length == 0.0, 1.0, length)  # of a change that leaves no direction

@@ -1,54 +1,55 @@
 """Common slips in a derivation: Mbar and h with each of them, made in the Jacobians and convective terms of one body or all."""
 
-from collections.abc import Iterator
-from types import SimpleNamespace
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
 from tmt.derivation import method
-from tmt.derivation.vectors import Matrix, total_vector
+from tmt.derivation.vectors import IDENTITY, Matrix, total_vector
 
-from .cause import Change
-from .model import BODY_TERMS, TINY, Equations
+from ..core.cause import Cause
+from .model import TINY, Equations
 from .places import groups
 from .variants import Variant
 
 
 def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
     """For each slip: of single bodies; of all; these in M alone. The first of these lists that explains is meant."""
-    tree, right, count = equations.tree, equations.values()[0], len(equations.triangle[0])
-    of_one = SimpleNamespace(
-        gravity=tree.gravity, armature=[0.0] * equations.nv, factor=np.ones((1, len(BODY_TERMS)))
-    )
-    bodies = method.bodies(tree, list(equations.q.T), list(equations.qd.T))
-    parts = [equations.summed(of_one, [b])[0] for b in bodies]
-    for name, changed in changed_bodies(equations, bodies):
-        added = [equations.summed(of_one, [b])[0] - part for b, part in zip(changed, parts)]
-        sums = {body: right + sum(added[b] for b in which) for body, which in groups(tree).items()}
-        variants = [
-            Variant(Change("slip", name.format(body), "no", ""), values, 2) for body, values in sums.items()
-        ]
-        alone = [change._replace(place=f"{change.place} in M alone") for change, *_ in variants]
-        of_M = [np.hstack([values[:, :count], right[:, count:]]) for _, values, *_ in variants]
-        in_mass = [Variant(change, values, 2) for change, values in zip(alone, of_M)]
-        yield [variants[: len(added)], variants[len(added) :], in_mass[: len(added)], in_mass[len(added) :]]
-    if "ball" not in tree.kind:
+    right, in_h, bodies = equations.right, equations.in_h, groups(equations.tree)
+    gravity, parts = equations.tree.gravity, np.sum(list(equations.terms.values()), axis=0)
+    for name, changed in changed_bodies(equations, equations.bodies):
+        added = np.stack([equations.summed([b], gravity)[0] for b in changed]) - parts
+        variants, in_M_alone = [], []
+        for body, numbers in bodies.items():
+            values = right + added[numbers].sum(axis=0)
+            variants.append(slip(name.format(body), "no", "", values))
+            values = np.hstack([values[:, equations.in_M], right[:, in_h]])
+            in_M_alone.append(slip(f"{name.format(body)} in M alone", "no", "", values))
+        count = len(parts)  # of single bodies
+        yield [variants[:count], variants[count:], in_M_alone[:count], in_M_alone[count:]]
+    if "ball" not in equations.tree.kind:
         yield [list(lagrange(equations))]
 
 
+def slip(place: str, stated: str, explains: str, values: np.ndarray) -> Variant:
+    return Cause(rank=2, kind="slip", place=place, stated=stated, explains=explains), values
+
+
 def changed_bodies(
-    equations: Equations, bodies: list[method.Body]
+    equations: Equations, bodies: Sequence[method.Body]
 ) -> Iterator[tuple[str, list[method.Body]]]:
     """Each slip by its name, made in every body."""
     tree, q, qd = equations.tree, list(equations.q.T), equations.qd
     frames = method.joint_frames(tree, q)
-    turns = [frames[joint].turn if joint >= 0 else method.IDENTITY for joint in tree.body_joint]
+    turns = [frames[joint].turn if joint >= 0 else IDENTITY for joint in tree.body_joint]
     world = [turned(b, R) for b, R in zip(bodies, turns)]
     moved = [Matrix(m * (np.dot(c, c) * np.eye(3) - np.outer(c, c))) for m, c in zip(tree.mass, tree.com)]
-    alone = zip(*(method.bodies(tree, q, list((qd * unit).T)) for unit in np.eye(equations.nv)))
-    v, w = zip(*((total_vector(b.v_conv for b in of), total_vector(b.w_conv for b in of)) for of in alone))
+    alone = [method.bodies(tree, q, list((qd * unit).T)) for unit in np.eye(equations.nv)]
+    v = [total_vector(b.v_conv for b in of_rates) for of_rates in zip(*alone)]  # of the squares of rates
+    w = [total_vector(b.w_conv for b in of_rates) for of_rates in zip(*alone)]
 
-    def with_field(field: str, values) -> list[method.Body]:
+    def with_field(field: str, values: Sequence[Any]) -> list[method.Body]:
         return [b._replace(**{field: value}) for b, value in zip(bodies, values)]
 
     yield "R for R' in the angular velocity of {}", [turned(b, R) for b, R in zip(world, turns)]
@@ -61,13 +62,13 @@ def changed_bodies(
     yield "parallel-axis term m (c'c 1 - c c') of {} left out", less
     products = "products of different rates in {} of {{}} {}"
     yield products.format("v_conv", "left out"), with_field("v_conv", v)
-    half = with_field("v_conv", [(own + b.v_conv) * 0.5 for b, own in zip(bodies, v)])
+    half = with_field("v_conv", [(squares + b.v_conv) * 0.5 for b, squares in zip(bodies, v)])
     yield products.format("v_conv", "once for twice"), half
     yield products.format("w_conv", "left out"), with_field("w_conv", w)
     both = [b._replace(v_conv=of_v, w_conv=of_w) for b, of_v, of_w in zip(bodies, v, w)]
     yield products.format("v_conv and w_conv", "left out"), both
-    squares = with_field("v_conv", [b.v_conv - own for b, own in zip(bodies, v)])
-    yield "squares of rates in v_conv of {} left out", squares
+    squares_left_out = with_field("v_conv", [b.v_conv - squares for b, squares in zip(bodies, v)])
+    yield "squares of rates in v_conv of {} left out", squares_left_out
 
 
 def turned(body: method.Body, R: Matrix) -> method.Body:
@@ -77,11 +78,11 @@ def turned(body: method.Body, R: Matrix) -> method.Body:
 
 def lagrange(equations: Equations) -> Iterator[Variant]:
     """Slips in h = Mdot qd - d(kinetic energy)/dq + dV/dq, of hinges and slides."""
-    tree, q, qd, nv = equations.tree, equations.q, equations.qd, equations.nv
-    right, rest = (Equations(tree, q, speeds).values()[0] for speeds in (qd, 0.0 * qd))
-    slopes = Equations(tree, q + 1j * TINY * qd, qd).values()[0].imag / TINY  # along the motion
+    tree, q, qd, in_h = equations.tree, equations.q, equations.qd, equations.in_h
+    rest = Equations(tree, q, 0.0 * qd).right[:, in_h]
+    slopes = Equations(tree, q + 1j * TINY * qd, qd).right.imag / TINY  # along the motion
     Mdot_qd = np.einsum("sij,sj->si", equations.full_mass_matrix(slopes), qd)
-    gradient = Mdot_qd - (right - rest)[:, -nv:]
+    gradient = Mdot_qd - (equations.right[:, in_h] - rest)
     for name, explains, of_Mdot, of_gradient in (
         ("gradient of the kinetic energy in h", "left out", 1.0, 0.0),
         ("gradient of the kinetic energy in h", "of the other sign", 1.0, -1.0),
@@ -89,6 +90,5 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
         ("Mdot qd in h", "halved", 0.5, 1.0),
         ("Mdot qd in h", "halved, and no gradient of the kinetic energy", 0.5, 0.0),
     ):
-        h = of_Mdot * Mdot_qd - of_gradient * gradient + rest[:, -nv:]
-        change = Change("slip", name, "Mdot qd - d(qd' Mbar qd / 2)/dq", explains)
-        yield Variant(change, np.hstack([right[:, :-nv], h]), 2)
+        values = equations.with_bias(of_Mdot * Mdot_qd - of_gradient * gradient + rest)
+        yield slip(name, "Mdot qd - d(qd' Mbar qd / 2)/dq", explains, values)

@@ -1,6 +1,6 @@
 """Explanations without a number to fit: options and conventions of joints, rank 1; slips.py has those of the derivation.
 
-Each gives Mbar and h as they would be, as `Equations.values` does.
+A variant is a cause with Mbar and h as they would be, as `Equations.values` has them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,67 +12,53 @@ import numpy as np
 import tmt
 from tmt import literal
 
+from ..core.cause import Cause
 from ..core.words import listed
-from ..robots.coordinates import Coordinates
 from ..robots.joint_map import PER_UNIT, Joint, JointMap
-from .cause import Change
-from .model import BODY_TERMS, Equations, Path, packed
+from .model import VELOCITY_TERMS, Equations, Path, packed
 
 PARALLEL = 1e-9  # of a cosine from 1
 MOST_PERMUTED = 6  # joints: with more, only the sense and the unit of one are tried
 MOST_TURNED = 4  # joints whose order and senses are tried together
 
-
-class Variant(NamedTuple):
-    """An explanation that applies or does not."""
-
-    change: Change
-    values: np.ndarray | None  # (states, entries); None: not yet evaluated in its joints
-    rank: int = 1
-    joints: JointMap | None = None  # of a convention of the joints
+Variant = tuple[Cause, np.ndarray]  # the values: (states, entries)
 
 
 def program_options(equations: Equations) -> Iterator[Variant]:
     """What an option or a convention of the whole file or program changes."""
-    tree, q, qd, count = equations.tree, equations.q, equations.qd, len(equations.triangle[0])
-    right = equations.values()[0]
-    h = right[:, count:]
+    tree, q, qd, h = equations.tree, equations.q, equations.qd, equations.right[:, equations.in_h]
+    with_bias, terms = equations.with_bias, equations.terms
 
-    def option(name: str, stated: str, explains: str, values: np.ndarray) -> Variant:
-        return Variant(Change("option", name, stated, explains), values)
+    def option(place: str, stated: str, explains: str, values: np.ndarray) -> Variant:
+        return Cause(rank=1, kind="option", place=place, stated=stated, explains=explains), values
 
-    def with_factor(factor: float, *terms: str) -> np.ndarray:
-        paths = [Path("factor", (b, BODY_TERMS.index(term))) for b in range(len(tree.mass)) for term in terms]
-        return equations.values(dict.fromkeys(paths, np.array([factor - 1.0])))[0]
-
-    def with_bias(h: np.ndarray) -> np.ndarray:
-        return np.concatenate([right[:, :count], h], axis=1)
-
-    yield option("gravity", "on", "off", with_factor(0.0, "gravity"))
-    yield option("sign of gravity", "+", "-", with_factor(-1.0, "gravity"))
-    yield option(
-        "velocity terms in h", "there", "left out", with_factor(0.0, "convective", "Euler", "gyroscopic")
+    weight, of_speeds = (
+        terms["gravity"].sum(axis=0),
+        np.sum([terms[name] for name in VELOCITY_TERMS], axis=(0, 1)),
     )
+    yield option("gravity", "on", "off", equations.right - weight)
+    yield option("sign of gravity", "+", "-", equations.right - 2.0 * weight)
+    yield option("velocity terms in h", "there", "left out", equations.right - of_speeds)
     yield option("bias", "there", "left out", with_bias(0.0 * h))
     yield option("sign of the bias", "Mbar qdd + h = tau", "Mbar qdd = tau + h", with_bias(-h))
     if q.shape == qd.shape:
-        exchanged = with_bias(Equations(tree, qd, q).values()[0][:, count:])
+        exchanged = with_bias(Equations(tree, qd, q).right[:, equations.in_h])
         yield option("arguments of bias", "bias(q, qd)", "exchanged, bias(qd, q)", exchanged)
     if any(tree.damping):
         drag = np.array(tree.damping) * qd
         yield option("damping D qd", "not in h", "in h", with_bias(h + drag))
         yield option("damping D qd", "not in h", "in h, of the other sign", with_bias(h - drag))
     if tree.has_springs:
-        yield option(
-            "springs k (q - rest)", "not in h", "in h", with_bias(h + literal.spring_torque(q, tree))
-        )
+        sprung = with_bias(h + literal.spring_torque(q, tree))
+        yield option("springs k (q - rest)", "not in h", "in h", sprung)
     if any(tree.armature):
         rotors = {Path("armature", (i,)): np.array([-rotor]) for i, rotor in enumerate(tree.armature)}
         yield option("armature", "on the diagonal of Mbar", "left out", equations.values(rotors)[0])
-    if (turns := absolute_angles(tree)) is not None:
+    turns = absolute_angles(tree)
+    if turns is not None:
         inner = Equations(tree, q @ turns.T, qd @ turns.T)
-        values = inner.values()[0]
-        absolute = packed(turns.T @ inner.full_mass_matrix(values) @ turns, values[:, count:] @ turns)
+        M = turns.T @ inner.full_mass_matrix(inner.right) @ turns
+        absolute = packed(M, inner.right[:, inner.in_h] @ turns)
         yield option("angles", "between a body and the one before", "between a body and the world", absolute)
 
 
@@ -88,40 +74,55 @@ def absolute_angles(tree: tmt.Tree) -> np.ndarray | None:
     return turns if (turns != np.eye(len(turns))).any() else None
 
 
-def conventions(tree: tmt.Tree) -> Iterator[Variant]:
-    """Order, senses and units of the joints; the order and the senses of a few together, rank 3."""
-    names, kinds = tree.joint_names, dict(zip(tree.joint_names, tree.kind))
-    coordinates, straight = Coordinates(names, tree.kind), [name for name in names if kinds[name] != "ball"]
+class Convention(NamedTuple):
+    """A convention of the joints, and the joints of equations that have it."""
 
-    def convention(rank, kind, name, stated, explains, order=names, turned=(), units=None) -> Variant:
-        joints = [
-            Joint(one, -1.0 if one in turned else 1.0, 0.0, (units or {}).get(one, ""), kinds[one] == "slide")
-            for one in order
-        ]
-        explains = explains or ", ".join(map(str, joints))
-        return Variant(Change(kind, name, stated, explains), None, rank, JointMap(coordinates, joints))
+    cause: Cause
+    joints: JointMap
+
+
+def conventions(equations: Equations) -> Iterator[Convention]:
+    """Order, senses and units of the joints; the order and the senses of a few together, rank 3."""
+    coordinates = equations.coordinates
+    names, kinds = coordinates.names, dict(zip(coordinates.names, coordinates.all_kinds))
+    in_order = ", ".join(names)
+
+    def joints(
+        order: Sequence[str] = names, turned: Sequence[str] = (), of_unit: Sequence[str] = (), unit: str = ""
+    ) -> list[Joint]:
+        senses, units = dict.fromkeys(turned, -1.0), dict.fromkeys(of_unit, unit)
+        slides = {name: kind == "slide" for name, kind in kinds.items()}
+        return [Joint(name, senses.get(name, 1.0), 0.0, units.get(name, ""), slides[name]) for name in order]
+
+    def convention(
+        kind: str, place: str, stated: str, explains: str, joints: Sequence[Joint], rank: int = 1
+    ) -> Convention:
+        cause = Cause(rank=rank, kind=kind, place=place, stated=stated, explains=explains)
+        return Convention(cause, JointMap(coordinates, joints))
 
     orders = list(permutations(names))[1:] if len(names) <= MOST_PERMUTED else []
     for order in orders:
-        yield convention(1, "order", "order of the joints", ", ".join(names), "", order)
+        yield convention("order", "order of the joints", in_order, ", ".join(order), joints(order))
+    straight = [name for name in names if kinds[name] != "ball"]
     most = len(straight) if len(straight) <= MOST_PERMUTED else 1
     senses = [turned for count in range(1, most + 1) for turned in combinations(straight, count)]
     for turned in senses:
-        yield convention(1, "sign", f"sense of {listed(turned)}", "+", "-", turned=turned)
-    hinges = [name for name in straight if kinds[name] == "hinge"]
-    for which in dict.fromkeys((*((name,) for name in hinges), tuple(hinges))):
-        for unit in filter(None, PER_UNIT) if which else ():
-            name = f"unit of {which[0] if len(which) == 1 else 'all hinges'}"
-            yield convention(1, "unit", name, "rad", unit, units=dict.fromkeys(which, unit))
+        yield convention("sign", f"sense of {listed(turned)}", "+", "-", joints(turned=turned))
+    hinges = tuple(name for name in straight if kinds[name] == "hinge")
+    for some in filter(None, dict.fromkeys((*((name,) for name in hinges), hinges))):
+        place = f"unit of {some[0] if len(some) == 1 else 'all hinges'}"
+        for unit in filter(None, PER_UNIT):
+            yield convention("unit", place, "rad", unit, joints(of_unit=some, unit=unit))
     for order, turned in product(orders, senses) if len(names) <= MOST_TURNED else ():
-        yield convention(3, "order", "order and senses of the joints", ", ".join(names), "", order, turned)
+        both, place = joints(order, turned), "order and senses of the joints"
+        yield convention("order", place, in_order, ", ".join(map(str, both)), both, rank=3)
 
 
 def values_in(equations: Equations, maps: Sequence[JointMap], states: int) -> Iterator[np.ndarray]:
     """The values at the first states with each map of the joints, (states, entries), evaluated together."""
     q, qd = equations.q[:states], equations.qd[:states]
-    positions, speeds = [one.positions(q) for one in maps], [one.speeds(qd) for one in maps]
+    positions, speeds = [joints.positions(q) for joints in maps], [joints.speeds(qd) for joints in maps]
     inner = Equations(equations.tree, np.concatenate(positions), np.concatenate(speeds))
-    values = inner.values()[0].reshape(len(maps), len(q), -1)
-    for one, M, h in zip(maps, inner.full_mass_matrix(values), values[..., -inner.nv :]):
-        yield packed(one.own_mass_matrix(M), one.own_forces(h))
+    values = inner.right.reshape(len(maps), len(q), -1)
+    for joints, M, h in zip(maps, inner.full_mass_matrix(values), values[..., inner.in_h]):
+        yield packed(joints.own_mass_matrix(M), joints.own_forces(h))

@@ -10,13 +10,13 @@ import numpy as np
 import tmt
 from tmt import literal
 
+from ..core.cause import Cause
 from ..core.check import Result
 from ..core.finding import Finding
 from ..core.rows import Row, column
-from ..diagnosis import STATES_ASKED, Diagnosis, Values, diagnose_stated, packed
-from ..diagnosis.cause import Cause
+from ..diagnosis import STATES_ASKED, Diagnosis, Stated, Values, diagnose
 from ..diagnosis.consistency import Condition, conditions
-from ..diagnosis.forces import causes_of_forces, force_left_over
+from ..diagnosis.forces import LeftOver
 from ..engines.own import QUICK, OwnDynamics
 from ..judge.agree import share_of
 from ..judge.scale import EPS, FACTOR
@@ -78,10 +78,6 @@ class Found(NamedTuple):
         """Of the largest difference of Mbar or h in the scale of its entry."""
         return self.ratio * FACTOR * EPS
 
-    @property
-    def stated_by(self) -> str:
-        return "option" if self.engine == "own" else ""
-
 
 @lru_cache(maxsize=2)
 def diagnosed(setup: Setup) -> Found:
@@ -98,15 +94,14 @@ def diagnosed(setup: Setup) -> Found:
 
     if isinstance(dynamics, OwnDynamics):
         broken, too_slow = conditions_of(dynamics, values)
-        joints, is_slow = dynamics.equations.joints, dynamics.equations.seconds > QUICK
+        stated, is_slow = Stated(dynamics.equations.joints, "option"), dynamics.equations.seconds > QUICK
     else:
-        broken, too_slow, joints, is_slow = [], False, None, False
-    diagnosis = diagnose_stated(tree, joints, values, SECONDS, None if is_slow else bias)
-    difference = packed(M, h) - packed(literal.mass_matrix(q, tree), literal.bias(q, qd, tree))
-    acting, allowed = force_left_over(tree, q, qd, tau, M, h, qdd)
-    of_forces = causes_of_forces(tree, q, qd, tau, h, acting, allowed)
-    ratio, force_ratio = largest_ratio(difference, packed(*values.tolerances)), largest_ratio(acting, allowed)
-    return Found(engine, len(q), broken, too_slow, diagnosis, ratio, of_forces, force_ratio)
+        broken, too_slow, stated, is_slow = [], False, None, False
+    diagnosis = diagnose(tree, values, SECONDS, None if is_slow else bias, stated)
+    right = values._replace(mass_matrix=literal.mass_matrix(q, tree), bias=literal.bias(q, qd, tree))
+    ratio = largest_ratio(values.packed - right.packed, values.packed_tolerance)
+    left_over = LeftOver(tree, values, tau, qdd)
+    return Found(engine, len(q), broken, too_slow, diagnosis, ratio, left_over.causes, left_over.ratio)
 
 
 def conditions_of(dynamics: OwnDynamics, values: Values) -> tuple[list[Condition], bool]:
@@ -125,8 +120,8 @@ def conditions_of(dynamics: OwnDynamics, values: Values) -> tuple[list[Condition
 def is_solved(dynamics: OwnDynamics, tree: tmt.Tree, sample: Sample) -> bool:
     """Whether a user's accelerations are those of the own Mbar and h at all states of a sample."""
     q, qd, tau = sample.q, sample.qd, sample.tau
-    values = dynamics.mass_matrix(q), dynamics.bias(q, qd), dynamics.acceleration(q, qd, tau)
-    return largest_ratio(*force_left_over(tree, q, qd, tau, *values)) <= 1.0
+    values = Values.of(tree, q, qd, dynamics.mass_matrix(q), dynamics.bias(q, qd))
+    return LeftOver(tree, values, tau, dynamics.acceleration(q, qd, tau)).ratio <= 1.0
 
 
 def largest_ratio(difference: np.ndarray, tolerance: np.ndarray) -> float:
@@ -152,6 +147,7 @@ def rows(setup: Setup) -> DiagnosisResult:
         result.find("too_slow")
     if not result.notes:
         result.find("nothing")
+    result.causes = [cause.record() for cause in found.causes]
     return result
 
 
@@ -163,12 +159,6 @@ def check(result: Result, found: Found, condition: Condition) -> None:
         note = condition.text
     scene, value, least_or_most = f"{found.states} random states", condition.value, condition.tolerance
     result.check(scene, name, value, least_or_most, condition.unit, note, rule=condition.rule)
-
-
-def record(cause: Cause, is_own: bool = False) -> dict[str, object]:
-    """A cause as reports list it, in words."""
-    values = {"rank": cause.rank, "place": cause.place, "stated": cause.stated, "found": cause.explains}
-    return values | {"text": cause.text("option" if is_own else "")}
 
 
 def headline(result: DiagnosisResult) -> Finding | None:

@@ -222,7 +222,7 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[Cause]
     diagnosis, places = module("diagnosis"), [cause["place"] for cause in known]
     found, _ = attempt("diagnosis", setup.robot, diagnosis.diagnosed, setup)
     causes = [cause for cause in found.causes if cause.place not in places] if found else []
-    return [diagnosis.record(cause, bool(setup.robot.own)) for cause in causes] + of_numbers
+    return [cause.record() for cause in causes] + of_numbers
 
 
 def in_one(setup: Setup, of_numbers: Sequence[Cause]) -> list[Cause]:
@@ -235,7 +235,7 @@ def in_one(setup: Setup, of_numbers: Sequence[Cause]) -> list[Cause]:
     explaining = [cause for cause in found.diagnosis.causes if cause.rank < 3] if found else []
     if not explaining:
         return list(of_numbers)
-    first = diagnosis.record(explaining[0]) | {"quantity": min(replaced, key=IN_EQUATIONS.index)}
+    first = explaining[0].record() | {"quantity": min(replaced, key=IN_EQUATIONS.index)}
     return [first, *(cause for cause in of_numbers if cause["quantity"] not in IN_EQUATIONS)]
 
 

@@ -4,18 +4,22 @@ import numpy as np
 import pytest
 
 import tmt
-from compare.diagnosis.forces import causes_of_forces, force_left_over
+from compare.diagnosis import Values
+from compare.diagnosis.forces import LeftOver
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 
 Q, QD, TAU = np.random.default_rng(0).uniform(-3.0, 3.0, (3, 24, 3))
-H = tmt.bias(Q, QD)
+VALUES = Values.of(tmt.ARM, Q, QD, tmt.mass_matrix(Q), tmt.bias(Q, QD))
+H, QDD = VALUES.bias, tmt.acceleration(Q, QD, TAU)
 TOLERANCE = 1e-12
 
 
-def causes(acting, tree=tmt.ARM):
+def causes(acting):
     """Of what acts besides tau - D qd - h."""
-    return causes_of_forces(tree, Q, QD, TAU, H, acting, np.full_like(QD, TOLERANCE))
+    left_over = LeftOver(tmt.ARM, VALUES, TAU, QDD)
+    left_over.force, left_over.tolerance = acting, np.full_like(QD, TOLERANCE)
+    return left_over.causes
 
 
 FORCES = {  # what acts besides: rank, place, and what explains it
@@ -55,10 +59,8 @@ def test_a_cause_leaves_no_more_than_the_tolerance(share, found):
 @pytest.mark.parametrize("share, differs", [(0.95, False), (1.05, True)])
 def test_accelerations_are_off_by_four_times_the_scale_of_a_force(share, differs):
     """They are rounded before Mbar is multiplied by them."""
-    M, qdd, scale = tmt.mass_matrix(Q), tmt.acceleration(Q, QD, TAU), Entries(tmt.ARM, Q, QD)
-    off = np.zeros_like(QD)
-    off[5, 1] = share * 4.0 * FACTOR * EPS * scale.residual(scale.force(TAU), qdd)[5, 1]
-    wrong = qdd + np.linalg.solve(M, off[..., None])[..., 0]
-    for given, is_over in ((qdd, False), (wrong, differs)):
-        acting, allowed = force_left_over(tmt.ARM, Q, QD, TAU, M, H, given)
-        assert (np.abs(acting) > allowed).any() == is_over
+    off, scale = np.zeros_like(QD), Entries(tmt.ARM, Q, QD)
+    off[5, 1] = share * 4.0 * FACTOR * EPS * scale.residual(scale.force(TAU), QDD)[5, 1]
+    wrong = QDD + np.linalg.solve(VALUES.mass_matrix, off[..., None])[..., 0]
+    assert LeftOver(tmt.ARM, VALUES, TAU, QDD).ratio <= 1.0
+    assert (LeftOver(tmt.ARM, VALUES, TAU, wrong).ratio > 1.0) == differs

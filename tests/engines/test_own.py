@@ -12,7 +12,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 import tmt
 from compare.engines.mujoco import read
-from compare.engines.own import ARGUMENTS, Own, OwnEquations, OwnError
+from compare.engines.own import METHOD_NAMES, QUANTITIES, Own, OwnEquations, OwnError
 from compare.engines.own.functions import same
 from compare.engines.tmt import Tmt
 from compare.process.interrupt import Now
@@ -22,8 +22,7 @@ from compare.robots.file import robot_of
 
 COORDINATES = ARM.coordinates
 TWO = Coordinates(("hip", "knee"))
-NAMES = {"gravity": "gravity_balance"}
-OF_TMT = {name: getattr(tmt, NAMES.get(name, name)) for name in ARGUMENTS}
+OF_TMT = {name: getattr(tmt, method) for name, method in METHOD_NAMES.items()}
 
 
 def single(function):
@@ -41,7 +40,7 @@ def states(rng, count=6, n=3):
 
 
 def asked(own, name, state):
-    return getattr(own, NAMES.get(name, name))(*state[: ARGUMENTS[name]])
+    return getattr(own, METHOD_NAMES[name])(*state[: QUANTITIES[name].arguments])
 
 
 def of_one(name, function, coordinates=COORDINATES):
@@ -60,8 +59,8 @@ def test_every_form_gives_the_same_in_any_batch(source, is_batched, rng):
     for batch in ((), (1,), (7,), (2, 3)):
         own = OwnEquations(source, COORDINATES, tree=ARM.tree)
         state = rng.uniform(-2.0, 2.0, (3, *batch, 3))
-        for name in filter(own.has, ARGUMENTS):
-            found, right = asked(own, name, state), OF_TMT[name](*state[: ARGUMENTS[name]])
+        for name in filter(own.has, QUANTITIES):
+            found, right = asked(own, name, state), OF_TMT[name](*state[: QUANTITIES[name].arguments])
             assert np.array_equal(found, right), name
         assert own.problems == [] and (np.prod(batch) <= 1 or set(own.takes_batches.values()) == {is_batched})
 

@@ -2,29 +2,44 @@
 
 import time
 import warnings
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import tmt
-from tmt import literal
+from tmt.derivation import method
 from tmt.model.values import shown
 
 from ...process.interrupt import is_interrupt
-from ...robots.case import Coordinates
+from ...robots.coordinates import Coordinates
 from ...robots.joint_map import JointMap, JointsError, joint_map
 from .. import rows_of_states
 from . import functions
-from .functions import ARGUMENTS, SHAPES, STATE, OwnError, Problem, and_more, call, state_in_words
+from .functions import QUANTITIES, STATE, OwnError, Problem, Shape, call, state_in_words
 
 SKEW = 1e-9  # of the largest entry: a mass matrix with a larger asymmetry is reported as not symmetric
 DIVERGED = 2.0**49  # rad etc.: beyond it a run has diverged, and errors are not those of the equations
+
+States = Sequence[
+    np.ndarray
+]  # q (states, nq), and qd and tau (states, nv) where they are needed; or of one state (nq,) ...
+
+
+class Noted(NamedTuple):
+    """An error at some states."""
+
+    state: str  # the first
+    text: str
+    states: set[int]  # hashes of all
 
 
 class OwnEquations:
     """A user's equations; quantities at any states of the model's joints, q (..., nq), v and tau (..., nv).
 
     source: an object or module with mass_matrix(q) and bias(q, qd), or a mapping of such names to functions; further functions
-    see ARGUMENTS; `joint_names` if it has them. Or a tmt.Tree. Or the same names with SymPy matrices, and `symbols`.
+    see QUANTITIES; `joint_names` if it has them. Or a tmt.Tree. Or the same names with SymPy matrices, and `symbols`.
     joints: the map from its joints to the model's; None: by its own names if it has them, else the model's.
     tree: the model's equations; their damping and springs are used if the source has no acceleration. required: functions that
     the source must have. OwnError for a source that cannot be used.
@@ -36,7 +51,7 @@ class OwnEquations:
         coordinates: Coordinates,
         joints: JointMap | None = None,
         tree: tmt.Tree | None = None,
-        required: tuple[str, ...] = ("mass_matrix", "bias"),
+        required: Sequence[str] = ("mass_matrix", "bias"),
     ):
         self.source, self.coordinates, self.tree = source, coordinates, tree
         self.functions = functions.functions_of(source, coordinates, required)
@@ -44,12 +59,13 @@ class OwnEquations:
             self.joints = joints or joint_map(coordinates, functions.names_of(source))
         except JointsError as error:
             raise OwnError(f"joint_names: {error}") from None
-        # of each function that was called: whether it takes batches; the time of one state, alone and in a batch, s; its shape
+        self.shapes: dict[str, Shape] = {
+            name: quantity.shape_for(coordinates.nv) for name, quantity in QUANTITIES.items()
+        }
+        # of each function that was called
         self.takes_batches: dict[str, bool] = {}
-        self.times, self.shapes = {}, {}
-        self.errors: dict[
-            tuple[str, str], list
-        ] = {}  # (quantity, error): [first state, text, all states, hashed]
+        self.times: dict[str, tuple[float, float]] = {}  # of one state, alone and in a batch, s
+        self.errors: dict[tuple[str, str], Noted] = {}  # by the quantity and what is wrong
 
     def has(self, name: str) -> bool:
         return name in self.functions
@@ -57,11 +73,12 @@ class OwnEquations:
     @property
     def problems(self) -> list[Problem]:
         """The errors so far, each once."""
-        errors = [(quantity, *error) for (quantity, _), error in self.errors.items()]
-        return [
-            Problem(name, at, f"{text} at {at}{and_more(len(all_of) - 1)}")
-            for name, at, text, all_of in errors
-        ]
+        problems = []
+        for (quantity, _), (state, text, states) in self.errors.items():
+            more = len(states) - 1
+            others = f", and at {more} more state{'s' * (more > 1)}" if more else ""
+            problems.append(Problem(quantity, state, f"{text} at {state}{others}"))
+        return problems
 
     @property
     def seconds(self) -> float:
@@ -70,33 +87,38 @@ class OwnEquations:
 
     def affordable(self, states: int, seconds: float) -> int:
         """The number of states, at least 1, at which each function can be called once within a time, s."""
-        each = sum(more for _, more in self.times.values())
-        return int(np.clip(seconds / each, 1, states)) if each else states
+        in_batches = sum(in_batch for _, in_batch in self.times.values())
+        return int(np.clip(seconds / in_batches, 1, states)) if in_batches else states
 
     # quantities at states
 
-    def mass_matrix(self, q) -> np.ndarray:
+    def mass_matrix(self, q: ArrayLike) -> np.ndarray:
         """Mbar, kg m2, (..., nv, nv)."""
         M = self.values_of("mass_matrix", q)
-        self.check_symmetry(M.reshape(-1, *M.shape[-2:]), *self.own_states(rows_of_states(q)[1]))
+        rows, own_q = M.reshape(-1, *M.shape[-2:]), self.own_states(rows_of_states(q)[1])
+        with np.errstate(invalid="ignore"):  # inf - inf
+            skew = np.abs(rows - np.swapaxes(rows, 1, 2)).max(axis=(1, 2))
+        self.note("mass_matrix", "is not symmetric", own_q, skew > SKEW * np.abs(rows).max(axis=(1, 2)))
         return self.joints.mass_matrix(M)
 
-    def bias(self, q, v) -> np.ndarray:
+    def bias(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
         """h, N m, (..., nv)."""
         return self.joints.forces(self.values_of("bias", q, v))
 
-    def gravity_balance(self, q) -> np.ndarray:
+    def gravity_balance(self, q: ArrayLike) -> np.ndarray:
         """Its gravity, or its bias at rest, N m, (..., nv)."""
         if self.has("gravity"):
             return self.joints.forces(self.values_of("gravity", q))
         return self.bias(q, np.zeros(self.coordinates.nv))
 
-    def acceleration(self, q, v, tau) -> np.ndarray:
+    def acceleration(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> np.ndarray:
         """rad/s2, (..., nv): its own, or from Mbar a = tau - D v - k (q - rest) - h with the model's damping and springs."""
         if self.has("acceleration"):
             return self.joints.forces(self.values_of("acceleration", q, v, tau))
         batch, (q, v, tau) = rows_of_states(q, v, tau)
-        M, forces = self.mass_matrix(q), tau - self.bias(q, v) - self.passive(q, v)
+        M, forces = self.mass_matrix(q), tau - self.bias(q, v)
+        if self.tree is not None:
+            forces = forces - passive(self.tree, q, v)
         solved = np.full(forces.shape, np.nan)
         for i in np.flatnonzero(np.isfinite(M).all(axis=(1, 2))):
             try:
@@ -105,81 +127,74 @@ class OwnEquations:
                 self.note("mass_matrix", "is singular", self.own_states([q]), np.arange(len(q)) == i)
         return solved.reshape(*batch, -1)
 
-    def passive(self, q, v) -> np.ndarray:
-        """The torque of the model's damping and springs, N m, (states, nv)."""
-        if self.tree is None:
-            return np.zeros(np.shape(v))
-        drag = np.array(self.tree.damping) * v
-        return drag + literal.spring_torque(q, self.tree) if self.tree.has_springs else drag
-
-    def energy(self, q, v) -> np.ndarray:
+    def energy(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
         """J, (...); its zero is its own."""
         return self.values_of("energy", q, v)
 
-    def com_positions(self, q) -> np.ndarray:
+    def com_positions(self, q: ArrayLike) -> np.ndarray:
         """m, (..., m, 3)."""
         return self.values_of("com_positions", q)
 
-    def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
+    def jacobians(self, q: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """T_b and B_b, (..., m, 3, nv)."""
-        both = np.moveaxis(self.values_of("jacobians", q), -4, 0)
-        return tuple(self.joints.forces(part) for part in both)
+        T, B = np.moveaxis(self.values_of("jacobians", q), -4, 0)
+        return self.joints.forces(T), self.joints.forces(B)
 
-    def try_at(self, q, v, tau) -> None:
+    def try_at(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> None:
         """Call every function at the first of some states until its time is known; OwnError if one cannot be used."""
-        given = self.own_states(rows_of_states(q, v, tau)[1])
+        states = self.own_states(rows_of_states(q, v, tau)[1])
         for name in self.functions:
             if name not in self.takes_batches:
-                self.first(name, given[: ARGUMENTS[name]])
+                self.first(name, states[: QUANTITIES[name].arguments])
 
     # how functions are called
 
-    def values_of(self, name: str, *states) -> np.ndarray:
+    def values_of(self, name: str, *states: ArrayLike) -> np.ndarray:
         """The values of a function at states of the model's joints, in its own joints; NaN where it raised."""
         if not self.has(name):
             raise OwnError(f"the equations have no {call(name)}")
         batch, rows = rows_of_states(*states)
         finite = np.isfinite(np.concatenate(rows, axis=1)).all(axis=1)  # not where a run has diverged
-        given = self.own_states([part[finite] for part in rows])
-        if not finite.any():
-            return np.full((*batch, *self.shapes.get(name, SHAPES[name](self.coordinates.nv))), np.nan)
-        if name not in self.takes_batches:
-            self.first(name, given)
-        computed, raised = self.each(name, given)
-        bad = ~np.isfinite(computed).reshape(len(computed), -1).all(axis=1) & ~raised
-        self.note(name, "is not finite", given, bad)
-        values = np.full((len(rows[0]), *computed.shape[1:]), np.nan)
+        own = self.own_states([part[finite] for part in rows])
+        if finite.any() and name not in self.takes_batches:
+            self.first(name, own)
+        computed, raised = self.each(name, own)
+        bad = ~np.isfinite(computed).all(axis=tuple(range(1, computed.ndim))) & ~raised
+        self.note(name, "is not finite", own, bad)
+        values = np.full((len(finite), *computed.shape[1:]), np.nan)
         values[finite] = computed
         return values.reshape((*batch, *values.shape[1:]))
 
-    def own_states(self, rows: list[np.ndarray]) -> list[np.ndarray]:
+    def own_states(self, rows: States) -> list[np.ndarray]:
         """q, qd and tau, those that are given, in the user's joints."""
         ways = (self.joints.own_positions, self.joints.own_speeds, self.joints.own_forces)
         return [way(part) for way, part in zip(ways, rows)]
 
-    def each(self, name: str, given: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def each(self, name: str, states: States) -> tuple[np.ndarray, np.ndarray]:
         """Values (states, ...) at states in the user's joints, NaN where it raised; and where it raised."""
-        raised = np.zeros(len(given[0]), bool)
-        if self.takes_batches.get(name):
+        raised = np.zeros(len(states[0]), bool)
+        if self.takes_batches.get(name) and len(raised):
             try:
-                return self.called(name, given, len(raised)), raised
+                return self.called(name, states, len(raised)), raised
             except OwnError:  # it is located state by state
                 pass
-        values = np.full((len(raised), *self.shapes[name]), np.nan)
+        shape = [axis if isinstance(axis, int) else 0 for axis in self.shapes[name]]
+        values = np.full((len(raised), *shape), np.nan)
         for i in range(len(raised)):
             try:
-                values[i] = self.called(name, [part[i] for part in given])
+                values[i] = self.called(name, [part[i] for part in states])
             except OwnError as error:
                 raised[i] = True
-                self.note(name, str(error), given, np.arange(len(raised)) == i)
+                self.note(name, str(error), states, np.arange(len(raised)) == i)
         return values, raised
 
-    def first(self, name: str, given: list[np.ndarray]) -> None:
+    def first(self, name: str, states: States) -> None:
         """Call a function at one state (OwnError if it fails), then find out whether it takes batches."""
         count = 3 if self.coordinates.nv == 2 else 2  # not as many as there are joints
-        singles, times = [], []
-        for i in range(min(count, len(given[0]))):
-            state = [part[i] for part in given]
+        singles: list[np.ndarray] = []
+        times = []
+        for i in range(min(count, len(states[0]))):
+            state = [part[i] for part in states]
             started = time.perf_counter()
             try:
                 singles.append(self.called(name, state))
@@ -192,66 +207,67 @@ class OwnEquations:
         self.times[name] = min(times), min(times)
         if len(singles) == count:
             started = time.perf_counter()
-            together = self.tried_together(name, [part[:count] for part in given])
+            together = self.tried_together(name, [part[:count] for part in states])
             if together is not None and functions.same(together, np.array(singles)):
                 self.takes_batches[name] = True
                 self.times[name] = min(times), (time.perf_counter() - started) / count
-        if len(given[0]) > 1:  # else another time
+        if len(states[0]) > 1:  # else another time
             self.takes_batches.setdefault(name, False)
 
-    def tried_together(self, name: str, given: list[np.ndarray]) -> np.ndarray | None:
-        """Values of several states at once; None if it does not take batches."""
-        before = {key: [*value[:2], set(value[2])] for key, value in self.errors.items()}
+    def tried_together(self, name: str, states: States) -> np.ndarray | None:
+        """Values of several states at once; None if it does not take batches. No error is noted: it need not take them."""
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore")
-                return self.called(name, given, len(given[0]))
+                return self.called(name, states, len(states[0]), is_trial=True)
         except OwnError:
             return None
-        finally:
-            self.errors = before  # it need not take batches
 
-    def called(self, name: str, given: list[np.ndarray], count: int | None = None) -> np.ndarray:
+    def called(
+        self, name: str, states: States, count: int | None = None, is_trial: bool = False
+    ) -> np.ndarray:
         """The value of a function at one state, or at count of them; OwnError if it raised or returned anything else."""
-        copies = [np.array(part) for part in given]
+        copies = [np.array(part) for part in states]
         try:
             value = self.functions[name](*copies)
         except BaseException as error:  # whatever a user's own function does
             if is_interrupt(error):
                 raise
-            hint = ""
-            if isinstance(self.source, type) and isinstance(error, TypeError) and "missing" in str(error):
-                hint = f"; expected an object, such as {self.source.__name__}(), not the class"
-            elif isinstance(error, TypeError) and "positional argument" in str(error):
-                hint = f"; expected {call(name)}"
-            raise OwnError(f"{name} raised {functions.as_raised(error)}{hint}") from error
-        for symbol, before, after in zip(STATE, given, copies):
-            changed = np.atleast_2d(before != after).any(axis=1)
-            self.note(
-                name, f"changes its argument {symbol}", [np.atleast_2d(part) for part in given], changed
-            )
-        expected = self.shapes.get(name, SHAPES[name](self.coordinates.nv))
+            raised = functions.as_raised(error)
+            raise OwnError(f"{name} raised {raised}{self.hint(name, error)}") from error
+        for symbol, before, after in zip(STATE, states, copies):
+            if not is_trial:
+                changed = np.any(np.atleast_2d(before != after), axis=1)
+                self.note(name, f"changes its argument {symbol}", list(map(np.atleast_2d, states)), changed)
+        shape = self.shapes[name] if count is None else (count, *self.shapes[name])
         if name != "jacobians":
-            return functions.converted(name, value, expected, count)
+            return functions.converted(name, value, shape)
+        of_part = (*shape[:-4], *shape[-3:])
         if not isinstance(value, tuple | list | np.ndarray) or len(value) != 2:
-            wanted = f"two arrays, T and B, of shape (bodies, 3, {expected[-1]})"
+            wanted = f"two arrays, T and B, of shape (bodies, 3, {shape[-1]})"
             raise OwnError(f"jacobians is {shown(value)}; expected {wanted}")
-        return np.stack([functions.converted(name, part, expected[1:], count) for part in value], axis=-4)
+        return np.stack([functions.converted(name, part, of_part) for part in value], axis=-4)
 
-    def check_symmetry(self, M: np.ndarray, q: np.ndarray) -> None:
-        with np.errstate(invalid="ignore"):  # inf - inf
-            skew = np.abs(M - M.transpose(0, 2, 1)).max(axis=(1, 2))
-        self.note("mass_matrix", "is not symmetric", [q], skew > SKEW * np.abs(M).max(axis=(1, 2)))
+    def hint(self, name: str, error: BaseException) -> str:
+        """What a user may have meant who calls a function with other arguments; "" for any other error."""
+        if isinstance(self.source, type) and isinstance(error, TypeError) and "missing" in str(error):
+            return f"; expected an object, such as {self.source.__name__}(), not the class"
+        if isinstance(error, TypeError) and "positional argument" in str(error):
+            return f"; expected {call(name)}"
+        return ""
 
-    def note(self, name: str, what: str, given: list[np.ndarray], where) -> None:
+    def note(self, name: str, what: str, states: States, where: np.ndarray) -> None:
         """Add an error at those of the states (states, n), in the user's joints, where it occurred."""
-        where = np.logical_and.reduce([where, *((np.abs(part) <= DIVERGED).all(axis=1) for part in given)])
-        if not where.any():
-            return
-        first = int(np.argmax(where))
-        text = what if what.startswith(name) else f"{name} {what}"
-        state = state_in_words([part[first] for part in given])
-        rows = np.concatenate([part[where] for part in given], axis=1)
-        self.errors.setdefault((name, what), [state, text, set()])[2].update(
-            hash(row.tobytes()) for row in rows
-        )
+        where = np.logical_and.reduce([where, *((np.abs(part) <= DIVERGED).all(axis=1) for part in states)])
+        if where.any():
+            first = state_in_words([part[np.argmax(where)] for part in states])
+            text = what if what.startswith(name) else f"{name} {what}"
+            noted = self.errors.setdefault((name, what), Noted(first, text, set()))
+            rows = np.concatenate([part[where] for part in states], axis=1)
+            noted.states.update(hash(row.tobytes()) for row in rows)
+
+
+def passive(tree: tmt.Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """The torque of damping and springs, N m, (..., nv); NaN where q is."""
+    springs = method.spring_torque(tree, list(np.moveaxis(q, -1, 0)))
+    return np.array(tree.damping) * v + np.stack(np.broadcast_arrays(*springs), axis=-1)

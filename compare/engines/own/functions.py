@@ -3,62 +3,84 @@
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from math import prod
 from pathlib import Path
 from types import ModuleType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import tmt
 from tmt.model.values import real_numbers, shown
 
-from ...robots.case import Coordinates
+from ...robots.coordinates import Coordinates
 
-# the number of arguments of each, of q, qd, tau
-ARGUMENTS = {
-    "mass_matrix": 1,
-    "bias": 2,
-    "gravity": 1,
-    "acceleration": 3,
-    "energy": 2,
-    "com_positions": 1,
-    "jacobians": 1,
-}
 STATE = ("q", "qd", "tau")
+Function = Callable[..., Any]  # a user's own
+Shape = tuple[int | str, ...]  # the lengths of axes; a word for any length
+
+
+class Quantity(NamedTuple):
+    """What a user's function of this name takes and returns."""
+
+    arguments: int  # how many of q, qd, tau
+    shape: Shape  # of one state
+
+    def shape_for(self, nv: int) -> Shape:
+        return tuple(nv if axis == "nv" else axis for axis in self.shape)
+
+    @property
+    def state(self) -> Sequence[str]:
+        return STATE[: self.arguments]
+
+
+QUANTITIES = {
+    "mass_matrix": Quantity(1, ("nv", "nv")),
+    "bias": Quantity(2, ("nv",)),
+    "gravity": Quantity(1, ("nv",)),
+    "acceleration": Quantity(3, ("nv",)),
+    "energy": Quantity(2, ()),
+    "com_positions": Quantity(1, ("bodies", 3)),
+    "jacobians": Quantity(1, (2, "bodies", 3, "nv")),
+}
+METHOD_NAMES = {
+    name: "gravity_balance" if name == "gravity" else name for name in QUANTITIES
+}  # of engines and tmt
 QUICK = 1e-3  # s per state: functions that are as fast as this are called some hundred times more
 SAME = 1e-12  # of the largest value: values of a batch and of single states are equal except for rounding
 MOST_SHOWN = 8  # numbers of a state in a message
-OF_A_TREE = {"gravity": "gravity_balance"}  # where tmt has another name
 
 
 class OwnError(ValueError):
     """A user's equations that cannot be used at all; the message is one line."""
 
-    def __str__(self):
+    def __str__(self) -> str:
         return " ".join(super().__str__().split())
 
 
-def functions_of(source: object, coordinates: Coordinates, required: Sequence[str]) -> dict[str, Callable]:
-    """The functions of ARGUMENTS that a source has, by name; OwnError if a required one is missing."""
+def functions_of(source: object, coordinates: Coordinates, required: Sequence[str]) -> dict[str, Function]:
+    """The functions of QUANTITIES that a source has, by name; OwnError if a required one is missing."""
     if isinstance(source, tmt.Tree):
         return of_tree(source, coordinates)
-    functions, symbols = {}, attribute(source, "symbols")
-    for name in ARGUMENTS:
-        value = attribute(source, name)
-        if value is not None:
-            functions[name] = function_of(name, value, symbols, coordinates)
+    symbols = attribute(source, "symbols")
+    values = {name: attribute(source, name) for name in QUANTITIES}
+    functions = {
+        name: function_of(name, value, symbols, coordinates)
+        for name, value in values.items()
+        if value is not None
+    }
     if missing := [name for name in required if name not in functions]:
         raise OwnError(
             f"{source_name(source)} has no {missing[0]}; expected {' and '.join(map(call, required))}"
         )
     if not functions:
-        raise OwnError(f"{source_name(source)} has none of {', '.join(map(call, ARGUMENTS))}")
+        raise OwnError(f"{source_name(source)} has none of {', '.join(map(call, QUANTITIES))}")
     return functions
 
 
 def call(name: str) -> str:
     """The signature of a function."""
-    return f"{name}({', '.join(STATE[: ARGUMENTS[name]])})"
+    return f"{name}({', '.join(QUANTITIES[name].state)})"
 
 
 def attribute(source: object, name: str) -> object:
@@ -78,21 +100,21 @@ def source_name(source: object) -> str:
 
 def names_of(source: object) -> Sequence[str] | None:
     """The joints that the source states, in its own order; None if it states none."""
-    names = source.joint_names if isinstance(source, tmt.Tree) else attribute(source, "joint_names")
+    names: Any = source.joint_names if isinstance(source, tmt.Tree) else attribute(source, "joint_names")
     try:
         return names if names is None or isinstance(names, str) else list(names)
     except TypeError:
         raise OwnError(f"joint_names is {shown(names)}; expected a list of names") from None
 
 
-def of_tree(tree: tmt.Tree, coordinates: Coordinates) -> dict[str, Callable]:
+def of_tree(tree: tmt.Tree, coordinates: Coordinates) -> dict[str, Function]:
     own = tree.coordinates
     if (own.nq, own.nv) != (coordinates.nq, coordinates.nv):
         raise OwnError(
             f"the Tree has {own.nq} positions and {own.nv} speeds ({', '.join(tree.joint_names)}); "
             f"expected {coordinates.nq} and {coordinates.nv} ({', '.join(coordinates.names)})"
         )
-    return {name: partial(getattr(tmt, OF_A_TREE.get(name, name)), model=tree) for name in ARGUMENTS}
+    return {name: partial(getattr(tmt, method), model=tree) for name, method in METHOD_NAMES.items()}
 
 
 def is_function(value: object) -> bool:
@@ -107,55 +129,54 @@ def is_pair(value: object) -> bool:
     return isinstance(value[1], tuple | list) or hasattr(value[1], "shape")
 
 
-def function_of(name: str, value: object, symbols: object, coordinates: Coordinates) -> Callable:
+def function_of(name: str, value: Any, symbols: object, coordinates: Coordinates) -> Function:
+    """A user's function, or that of a SymPy matrix; symbols: of all matrices that do not bring their own."""
     if callable(value) and not hasattr(value, "free_symbols"):
         return value
-    if is_pair(value):
-        value, symbols = value
+    matrix, symbols = value if is_pair(value) else (value, symbols)
     if symbols is None:
         wanted = f"a function {call(name)}, or a SymPy matrix with the list of its symbols"
         raise OwnError(f"{name} is {shown(value)}; expected {wanted}")
-    return of_symbols(name, value, symbols, coordinates)
+    return of_symbols(name, matrix, symbols, coordinates)
 
 
-def of_symbols(name: str, matrix: object, symbols: object, coordinates: Coordinates) -> Callable:
-    """The function of a SymPy matrix or expression. symbols: of q, or of q and qd, or of q, qd and tau, in order."""
+def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Coordinates) -> Function:
+    """The function of a SymPy matrix or expression. given_symbols: of q, or of q and qd, or of q, qd and tau, in order."""
     import sympy
 
+    def flat(value: Any) -> list[Any]:
+        return sympy.flatten([value.tolist() if hasattr(value, "tolist") else value])
+
     try:
-        nested = [value.tolist() if hasattr(value, "tolist") else value for value in (symbols, matrix)]
-        symbols, entries = (
-            sympy.flatten([nested[0]]),
-            [sympy.sympify(entry) for entry in sympy.flatten([nested[1]])],
-        )
+        symbols, entries = flat(given_symbols), [sympy.sympify(entry) for entry in flat(matrix)]
     except Exception as error:  # whatever SymPy makes of what is given
         raise OwnError(f"{name} is {shown(matrix)}; expected a SymPy matrix ({shown(str(error))})") from None
     nq, nv = coordinates.nq, coordinates.nv
     counts = [nq, nq + nv, nq + 2 * nv]
     if len(symbols) not in counts or len(set(symbols)) < len(symbols):
-        raise OwnError(
-            f"{name} has the symbols {', '.join(map(str, symbols))}; expected {nq} of q, or {counts[1]} of q and qd in order, "
-            "each once"
-        )
+        listed = ", ".join(map(str, symbols))
+        wanted = f"{nq} of q, or {counts[1]} of q and qd in order, each once"
+        raise OwnError(f"{name} has the symbols {listed}; expected {wanted}")
     # symbols may be functions of time, and qd their derivatives
     plain = [sympy.Dummy() for _ in symbols]
     entries = [entry.xreplace(dict(zip(symbols, plain))) for entry in entries]
-    taken = counts[ARGUMENTS[name] - 1]
-    if left := sorted({str(s) for entry in entries for s in entry.free_symbols - set(plain)}):
-        why = f"has the symbol {left[0]}, which is not in the list of symbols"
+    used = {symbol for entry in entries for symbol in entry.free_symbols}
+    if unknown := sorted(map(str, used - set(plain))):
+        why = f"has the symbol {unknown[0]}, which is not in the list of symbols"
         raise OwnError(f"{name} {why}; list it, or insert a number")
-    used = {symbols[plain.index(s)] for entry in entries for s in entry.free_symbols & set(plain)}
-    if more := [str(s) for s in symbols[taken:] if s in used]:
+    taken = counts[QUANTITIES[name].arguments - 1]
+    if more := [symbol for symbol, dummy in zip(symbols[taken:], plain[taken:]) if dummy in used]:
         raise OwnError(f"{name} depends on {more[0]}; expected {call(name)}")
-    shape = {"mass_matrix": (nv, nv), "energy": (), "com_positions": (-1, 3)}.get(name, (nv,))
-    if name == "jacobians" or (-1 not in shape and len(entries) != int(np.prod(shape))):
-        raise OwnError(f"{name} is a SymPy object of {len(entries)} entries; expected shape {shape}")
+    axes = QUANTITIES[name].shape_for(nv)
+    shape = tuple(axis if isinstance(axis, int) else -1 for axis in axes)
+    if name == "jacobians" or (-1 not in shape and len(entries) != prod(shape)):
+        expected = in_words(axes)
+        raise OwnError(f"{name} is a SymPy object of {len(entries)} entries; expected shape {expected}")
     try:
         evaluated = sympy.lambdify(plain, entries, "numpy", cse=True)
     except Exception as error:  # of expressions that have no numbers, such as zoo
-        raise OwnError(
-            f"{name} cannot be evaluated as a function of {', '.join(map(str, plain))}: {error!r}"
-        ) from None
+        listed = ", ".join(map(str, plain))
+        raise OwnError(f"{name} cannot be evaluated as a function of {listed}: {error!r}") from None
 
     def function(*states: np.ndarray) -> np.ndarray:
         columns = [column for state in states for column in np.moveaxis(state, -1, 0)][: len(plain)]
@@ -178,29 +199,23 @@ class Problem(NamedTuple):
     text: str  # one line
 
 
-SHAPES: dict[str, Callable] = {  # of one state; None: the number of bodies, that of the first value
-    "mass_matrix": lambda nv: (nv, nv),
-    "bias": lambda nv: (nv,),
-    "gravity": lambda nv: (nv,),
-    "acceleration": lambda nv: (nv,),
-    "energy": lambda nv: (),
-    "com_positions": lambda nv: (None, 3),
-    "jacobians": lambda nv: (2, None, 3, nv),
-}
+def in_words(shape: Shape) -> str:
+    """A shape, such as (bodies, 3) or (4,)."""
+    return f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})"
 
 
-def converted(name: str, value: object, expected: tuple, count: int | None) -> np.ndarray:
-    """The value of a function as an array of float; OwnError if its type or shape is wrong."""
-    expected = expected if count is None else (count, *expected)
-    shape = f"({', '.join('bodies' if n is None else str(n) for n in expected)}{',' * (len(expected) == 1)})"
+def converted(name: str, value: object, shape: Shape, or_else: str = "", at_which: str = "") -> np.ndarray:
+    """The value called `name` as an array of float of a shape; OwnError if its type or shape is wrong.
+
+    or_else, at_which: the end of the message about the type, about the shape.
+    """
     array = numbers_of(value)
     if array is None:
-        raise OwnError(f"{name} is {shown(value)}; expected real numbers of shape {shape}")
-    if None in expected and array.ndim == len(expected):
-        expected = tuple(m if n is None else n for n, m in zip(expected, array.shape))
-    fitted = in_shape(array, expected) if None not in expected else None
+        raise OwnError(f"{name} is {shown(value)}; expected real numbers of shape {in_words(shape)}{or_else}")
+    lengths = array.shape if array.ndim == len(shape) else (-1,) * len(shape)
+    fitted = in_shape(array, tuple(n if isinstance(n, int) else m for n, m in zip(shape, lengths)))
     if fitted is None:
-        raise OwnError(f"{name} has shape {array.shape}; expected {shape}")
+        raise OwnError(f"{name} has shape {array.shape}; expected {in_words(shape)}{at_which}")
     return fitted
 
 
@@ -224,20 +239,16 @@ def in_shape(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray | None:
 def same(together: np.ndarray, singles: np.ndarray) -> bool:
     """Whether a batch has the values of single states."""
     size = np.abs(singles[np.isfinite(singles)]).max(initial=0.0)
-    within = {"rtol": 0.0, "atol": SAME * size, "equal_nan": True}
-    return together.shape == singles.shape and np.allclose(together, singles, **within)
+    is_close = partial(np.allclose, rtol=0.0, atol=SAME * size, equal_nan=True)
+    return together.shape == singles.shape and bool(is_close(together, singles))
 
 
-def state_in_words(state: list[np.ndarray]) -> str:
+def state_in_words(state: Sequence[Sequence[float] | np.ndarray]) -> str:
     """q, qd and tau, those that are given, as they can be typed."""
     return ", ".join(f"{symbol} = {typed(part)}" for symbol, part in zip(STATE, state))
 
 
-def and_more(count: int) -> str:
-    return f", and at {count} more state{'s' * (count > 1)}" if count else ""
-
-
-def typed(values: np.ndarray) -> str:
+def typed(values: Sequence[float] | np.ndarray) -> str:
     more = ", ..." if len(values) > MOST_SHOWN else ""
     return f"[{', '.join(f'{value:.6g}' for value in values[:MOST_SHOWN])}{more}]"
 

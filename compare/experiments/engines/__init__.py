@@ -11,7 +11,7 @@ from ...core.check import ENDS, About, Result
 from ...core.finding import Finding
 from ...core.rows import Row, column
 from ...core.words import some_of
-from ...diagnosis import Values, diagnose_stated
+from ...diagnosis import Values, diagnose
 from ...engines import LABELS, RECORDS, EngineRecord
 from ...engines.outside import Outside, OutsideDynamics
 from ...engines.outside.model import EngineError, TooLong, Unread, size_of
@@ -194,7 +194,7 @@ def compare_quantities(
     if differs and {"Mbar", "bias"} <= computed.keys():
         tree, tolerance = sample.tree, FACTOR * record.eps
         values = Values.of(tree, sample.q, sample.qd, computed["Mbar"], computed["bias"], tolerance)
-        text = diagnose_stated(tree, None, values, SECONDS).sentence()
+        text = diagnose(tree, values, SECONDS).sentence()
         result.find("cause", engine=record.label, text=text)
 
 

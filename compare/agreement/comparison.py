@@ -1,0 +1,220 @@
+"""The arguments of assert_agrees, validated: the model, the states, each quantity of the user and of MuJoCo."""
+
+import warnings
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from tmt.model.lock import CLOSE_TO_ONE
+from tmt.model.values import shown
+
+from ..core.text import say
+from ..engines.own import METHOD_NAMES, QUANTITIES, OwnEquations
+from ..engines.own.functions import converted, in_shape, in_words, is_function, numbers_of, state_in_words
+from ..judge.agree import over
+from ..judge.entries import Entries
+from ..judge.scale import EPS, FACTOR
+from ..robots.file import robot_of
+from ..robots.joint_map import joint_map
+from ..robots.states import random
+from ..robots.validation import is_number
+
+SYMBOLS = {"mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd"}  # of entries of quantities
+DEFAULT_STATES = 100
+OWN_SECONDS = 20.0  # s for the user's functions at random states
+
+
+class State(NamedTuple):
+    """A state in the user's joints."""
+
+    number: int
+    q: tuple[float, ...]
+    qd: tuple[float, ...]
+    tau: tuple[float, ...]
+
+    def said(self, quantity: str) -> str:
+        """What of the state a quantity depends on, as it can be typed."""
+        return state_in_words((self.q, self.qd, self.tau)[: QUANTITIES[quantity].arguments])
+
+
+class Compared(NamedTuple):
+    """One quantity at all states, (states, ...), in the user's joints."""
+
+    yours: np.ndarray
+    right: np.ndarray  # MuJoCo's
+    scale: np.ndarray
+    tolerance: np.ndarray
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Of the difference to the tolerance; 0 where both are 0, inf where the user's value is not finite."""
+        off = np.abs(self.yours - self.right)
+        return over(np.where(np.isfinite(off), off, np.inf), self.tolerance)
+
+    @property
+    def fails(self) -> bool:
+        return bool((self.ratio > 1.0).any())
+
+
+class Comparison:
+    """A user's quantities and MuJoCo's at the same states; the arguments are those of `assert_agrees`."""
+
+    def __init__(
+        self, mjcf: Any, quantities: Mapping[str, Any], q: Any, qd: Any, tau: Any, joints: Sequence[str] | None,
+        rtol: float, states: int, seed: int,
+    ) -> None:  # fmt: skip
+        self.brought = {name: value for name, value in quantities.items() if value is not None}
+        if not self.brought:
+            raise ValueError(f"nothing to compare: expected {', '.join(SYMBOLS)} or some of them")
+        if not is_number(rtol) or rtol < 0.0:
+            raise ValueError(f"rtol is {shown(rtol)}; expected a number of at least 0")
+        self.rtol, self.rounding = float(rtol), FACTOR * EPS + float(rtol)
+        self.problems: list[str] = []  # other errors of the user's functions at the states, a line each
+        self.read(mjcf)
+        self.joints = joint_map(self.coordinates, joints)
+        functions = {name: value for name, value in self.brought.items() if is_function(value)}
+        self.equations: OwnEquations | None = None  # of the user's functions, if there are any
+        if functions:
+            self.equations = OwnEquations(functions, self.coordinates, self.joints, self.tree, ())
+        if q is not None:
+            self.take_states(q, qd, tau)
+            if states != DEFAULT_STATES:
+                text = f"states={shown(states)} is not used: the {len(self.q)} states of q are compared"
+                warnings.warn(text, stacklevel=3)
+            return
+        for name, value in (self.brought | {"qd": qd, "tau": tau}).items():
+            if value is not None and name not in functions:
+                expected = f"a function, or q of shape (states, {self.coordinates.nq})"
+                raise ValueError(f"{name} is {shown(value)}, but not q is given; expected {expected}")
+        self.take_random(states, seed)
+
+    def read(self, mjcf: Any) -> None:
+        from ..engines.mujoco import engine, read  # here, so that `import compare` need not wait for it
+
+        if isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<"):
+            mjcf = Path(mjcf)
+        self.reading = cast(Any, read(mjcf))  # its source may be a model
+        self.robot = robot_of(self.reading, "the model")
+        self.mujoco = engine(self.reading).of(self.robot.case())
+        self.tree, self.coordinates = self.reading.tree, self.robot.coordinates
+
+    def take_random(self, states: int, seed: int) -> None:
+        """Random states, fewer if the user's functions are slow."""
+        for name, value, least in (("states", states, 1), ("seed", seed, 0)):
+            if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
+                raise ValueError(f"{name} is {shown(value)}; expected a whole number of at least {least}")
+        sample = random(self.robot, states, 0, seed)
+        for note in sample.notes:
+            warnings.warn(say(note), stacklevel=4)
+        assert self.equations is not None  # all that was brought are functions
+        self.equations.try_at(sample.q, sample.qd, sample.tau)
+        count = self.equations.affordable(len(sample.q), OWN_SECONDS)
+        if count < len(sample.q):
+            seconds = self.equations.seconds
+            text = f"{count} states instead of {states}: your functions take {seconds:.2g} s per state"
+            warnings.warn(text, stacklevel=4)
+        self.q, self.qd, self.tau = sample.q[:count], sample.qd[:count], sample.tau[:count]
+
+    def take_states(self, q: Any, qd: Any, tau: Any) -> None:
+        """The given states, in the user's joints."""
+        nv = self.coordinates.nv
+        self.q = self.joints.positions(rows_given("q", q, ("states", self.coordinates.nq)))
+        shape, others = (len(self.q), nv), {"qd": qd, "tau": tau}
+        for name, value in others.items():
+            needed = [quantity for quantity in self.brought if name in QUANTITIES[quantity].state]
+            if value is None and needed:
+                raise ValueError(f"{needed[0]} depends on {name}; expected {name} of shape {shape}, or 0.0")
+        rows = {name: rows_given(name, 0.0 if x is None else x, shape) for name, x in others.items()}
+        self.qd, self.tau = self.joints.speeds(rows["qd"]), self.joints.forces(rows["tau"])
+        for joint, name in zip(self.coordinates.places.joints, self.coordinates.names):
+            if joint.kind == "ball":
+                lengths = np.linalg.norm(self.q[:, joint.q], axis=1)
+                if np.abs(lengths - 1.0).max() > CLOSE_TO_ONE:
+                    wanted = "a quaternion of length 1 at every state; expected w, x, y, z"
+                    raise ValueError(f"q of {name} is not {wanted}")
+
+    @cached_property
+    def states(self) -> list[State]:
+        """The states, in the user's joints."""
+        joints = self.joints
+        own = joints.own_positions(self.q), joints.own_speeds(self.qd), joints.own_forces(self.tau)
+        return [State(i, *map(tuple, state)) for i, state in enumerate(zip(*(part.tolist() for part in own)))]
+
+    @cached_property
+    def values(self) -> dict[str, np.ndarray]:
+        """The user's values of each quantity, in the model's joints, (states, ...)."""
+        values, equations = {}, self.equations
+        for name, brought in self.brought.items():
+            is_table = equations is None or not equations.has(name)
+            values[name] = self.table(name, brought) if is_table else self.asked(equations, name)
+        self.problems = [problem.text for problem in equations.problems] if equations is not None else []
+        return values
+
+    def asked(self, source: object, name: str) -> np.ndarray:
+        """A quantity of an engine at the states."""
+        state = (self.q, self.qd, self.tau)[: QUANTITIES[name].arguments]
+        return np.asarray(getattr(source, METHOD_NAMES[name])(*state))
+
+    def table(self, name: str, brought: object) -> np.ndarray:
+        """An array of values in the user's joints, in the model's, (states, ...); a row may hold Mbar flattened by rows."""
+        count, nv = len(self.q), self.coordinates.nv
+        array, shape = numbers_of(brought), (count, *QUANTITIES[name].shape_for(nv))
+        if name == "mass_matrix" and array is not None:
+            flat = in_shape(array, (count, nv * nv))
+            brought = brought if flat is None else flat.reshape(count, nv, nv)
+        values = converted(name, brought, shape, ", or a function", ", its values at the given q")
+        return self.joints.mass_matrix(values) if name == "mass_matrix" else self.joints.forces(values)
+
+    @cached_property
+    def compared(self) -> dict[str, Compared]:
+        """Each quantity of the user and of MuJoCo."""
+        compared = {}
+        for name, yours in self.values.items():
+            right = self.asked(self.mujoco, name)
+            own = self.joints.own_mass_matrix if name == "mass_matrix" else self.joints.own_forces
+            scale = np.abs(own(np.broadcast_to(self.scale(name, right), right.shape)))
+            compared[name] = Compared(own(yours), own(right), scale, self.rounding * scale)
+        return compared
+
+    def scale(self, name: str, right: np.ndarray) -> np.ndarray:
+        """The scale of each entry of a quantity, in the model's joints. right: MuJoCo's values."""
+        scale = Entries(self.tree, self.q, self.qd)
+        try:
+            if name == "acceleration":
+                return scale.acceleration(scale.force(self.tau), right)
+        except np.linalg.LinAlgError:
+            text = "Mbar of the model is singular at a state: there is no acceleration to compare"
+            raise ValueError(text) from None
+        return {"mass_matrix": scale.mass_matrix, "bias": scale.bias, "gravity": scale.weight}[name]
+
+    def entries(self, name: str) -> dict[tuple[int, ...], str]:
+        """The names of the entries of a quantity, by their place."""
+        names = [self.coordinates.speeds[i] for i in self.joints.v]
+        symbol = SYMBOLS[name]
+        if name == "mass_matrix":
+            return {(i, j): f"{symbol}[{a}][{b}]" for i, a in enumerate(names) for j, b in enumerate(names)}
+        return {(i,): f"{symbol}[{a}]" for i, a in enumerate(names)}
+
+    @property
+    def fails(self) -> bool:
+        return any(compared.fails for compared in self.compared.values())
+
+
+def rows_given(name: str, values: Any, shape: tuple[int | str, int]) -> np.ndarray:
+    """States as rows, (states, n), in this shape; a number is used for all. ValueError for anything else."""
+    count, size = shape
+    array = numbers_of(values)
+    if array is not None and isinstance(count, int) and array.ndim == 0:
+        return rows_given(name, np.full((count, size), float(array)), shape)
+    if array is not None and array.ndim == 1 and size in (1, len(array)):
+        array = array.reshape(-1, size)
+    rows = converted(name, values if array is None else array, shape)
+    if not len(rows):
+        raise ValueError(f"{name} has shape {np.shape(values)}; expected {in_words(shape)}")
+    if not np.isfinite(rows).all():
+        raise ValueError(f"{name} has values that are not finite; expected finite numbers")
+    return rows
