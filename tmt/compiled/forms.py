@@ -10,11 +10,11 @@ from tmt.derivation import articulated, composite
 from tmt.derivation.dual import seeded
 from tmt.derivation.method import reduced_force
 from tmt.derivation.quantities import QUANTITIES, State
+from tmt.derivation.scalar import Scalar
 from tmt.methods.dynamics import Dynamics, Implicit, Rows, Terms, Values, minus, plus
 from tmt.methods.stepping import Method
 from tmt.model.tree import Tree
 from tmt.model.values import shown
-from tmt.scalar import Scalar
 
 from .straight import Traced, trace
 from .trace import Expression

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from tmt.scalar import Scalar
+from tmt.derivation.scalar import Scalar
 
 from .ir import DOUBLE, POINTER, Code, Value, wide
 from .sine import sincos

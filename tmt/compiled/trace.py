@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable
 from numbers import Real
 from typing import Any
 
+from tmt.derivation.scalar import Scalar
 from tmt.derivation.vectors import arctan, cos, sin, sqrt
-from tmt.scalar import Scalar
 
 
 def folded(

@@ -16,7 +16,7 @@ The number of operations of the accelerations grows with n, that of Mbar with n 
 
 from typing import NamedTuple
 
-from tmt.scalar import Scalar
+from tmt.derivation.scalar import Scalar
 
 from .composite import Distribution, rounded_once, turning
 from .mechanism import AnyTree, turn_in_parent

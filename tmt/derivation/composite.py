@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import mpmath
 
-from tmt.scalar import Scalar
+from tmt.derivation.scalar import Scalar
 
 from .mechanism import AnyTree, origin_in_parent, turn_in_parent
 from .vectors import ZERO, Matrix, Scalars, Vector, outer, total_vector

@@ -12,7 +12,7 @@ with the body: omega + u x omega / 2 + c u x (u x omega), c = (1 - (s / 2) cot(s
 from functools import lru_cache
 from typing import NamedTuple
 
-from tmt.scalar import Scalar
+from tmt.derivation.scalar import Scalar
 
 from .vectors import Scalars, Vector, arctan, cos, sin, sqrt
 

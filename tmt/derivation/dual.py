@@ -8,7 +8,7 @@ a number of another level is a constant to it.
 from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 
-from tmt.scalar import Scalar
+from tmt.derivation.scalar import Scalar
 
 from .vectors import Scalars, arctan, cos, sin, sqrt
 

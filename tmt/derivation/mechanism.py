@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from tmt.scalar import Scalar
+from tmt.derivation.scalar import Scalar
 
 from .coordinates import Coordinates, coordinates_of
 from .vectors import IDENTITY, Matrix, Scalars, Vector, rotation, turn_of

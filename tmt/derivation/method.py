@@ -22,7 +22,7 @@ of them, qd and tau of nv. Vectors are in the inertial frame unless they are sai
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from tmt.scalar import Scalar
+from tmt.derivation.scalar import Scalar
 
 from .dual import jacobian
 from .mechanism import AnyTree, origin_in_parent, turn_in_parent

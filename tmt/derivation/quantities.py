@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from tmt.scalar import Scalar
+from tmt.derivation.scalar import Scalar
 
 from . import method
 from .mechanism import AnyTree

@@ -12,7 +12,7 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from tmt.scalar import Scalar
+from tmt.derivation.scalar import Scalar
 
 Scalars = Sequence[Scalar] | NDArray[Any]
 

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tmt.derivation.mechanism import AnyTree, Mechanism
+from tmt.derivation.scalar import Scalar
 from tmt.model.tree import Tree
-from tmt.scalar import Scalar
 
 from .trigonometry import Expression
 

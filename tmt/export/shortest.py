@@ -5,7 +5,7 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import reduce
 
-from tmt.scalar import Scalar
+from tmt.derivation.scalar import Scalar
 
 from .names import Names
 from .trigonometry import NOISE, Expression, Polynomial, Ring

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from tmt.arm import ARM
 from tmt.derivation.quantities import State
+from tmt.derivation.scalar import Scalar
 from tmt.model.tree import Tree
-from tmt.scalar import Scalar
 
 from .names import EPS, Names, Parameter, number
 from .shortest import Forms

@@ -4,8 +4,8 @@ import time
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from tmt.derivation.scalar import Scalar
 from tmt.derivation.vectors import Vector, cos, sin
-from tmt.scalar import Scalar
 
 # bits of coefficients that are not rational: the rounding of a sum is far below that of its doubles
 PRECISION = 120

@@ -7,6 +7,7 @@ code, see tmt.compiled). METHODS may be given further ones, and objects of a use
 from dataclasses import dataclass
 
 from tmt.derivation.coordinates import FLAT
+from tmt.derivation.scalar import Scalar
 from tmt.methods import dop853
 from tmt.methods.derivatives import amplification as amplification
 from tmt.methods.derivatives import one_step as one_step
@@ -18,7 +19,6 @@ from tmt.methods.semi_implicit import lone_speeds as lone_speeds
 from tmt.methods.stepping import Joints, Method, Slope, State, advance, completed, increments
 from tmt.methods.tableau import Numbers, Tableau
 from tmt.model.values import shown
-from tmt.scalar import Scalar
 
 Slopes = tuple[list[Values], list[Values]]  # of all stages: rates of the movement, and accelerations
 

@@ -11,10 +11,10 @@ import numpy as np
 from tmt.derivation import composite
 from tmt.derivation.dual import Dual, seeded
 from tmt.derivation.method import reduced_force
+from tmt.derivation.scalar import Scalar
 from tmt.methods.dynamics import Dynamics, Implicit, Rows, Terms, Values, minus, plus
 from tmt.methods.stepping import Method, State, stepped
 from tmt.model.tree import Tree
-from tmt.scalar import Scalar
 
 FEW_SPEEDS = 4  # up to which dual numbers go through the solution of the linear system too
 PART = 4096  # states times speeds that are taken at once: more do not stay in the processor's cache

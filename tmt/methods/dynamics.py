@@ -8,9 +8,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from tmt.derivation import method
+from tmt.derivation.scalar import Scalar
 from tmt.derivation.vectors import solve, solve_any
 from tmt.model.tree import Tree
-from tmt.scalar import Scalar
 
 Values = list[Scalar]
 Rows = list[Values]

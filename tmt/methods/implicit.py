@@ -17,11 +17,11 @@ import numpy as np
 
 from tmt.derivation.coordinates import FLAT, Flat, normalized, product
 from tmt.derivation.dual import Dual, jacobian, seeded, unit_vectors
+from tmt.derivation.scalar import Scalar
 from tmt.derivation.vectors import solve_any
 from tmt.methods.dynamics import Values
 from tmt.methods.stepping import Joints, Slope, State
 from tmt.methods.tableau import Numbers, Tableau
-from tmt.scalar import Scalar
 
 ITERATIONS = (
     50  # Newton's method doubles the correct digits each time: a stage that needs more is not being found

@@ -6,10 +6,10 @@ from functools import lru_cache
 from typing import TypeVar
 
 from tmt.derivation.coordinates import FLAT
+from tmt.derivation.scalar import Scalar
 from tmt.methods.dynamics import LITERAL, Implicit, Terms, Values, dynamics_of
 from tmt.methods.stepping import Joints, Method, Slope, State, advance, increments
 from tmt.model.tree import Tree
-from tmt.scalar import Scalar
 
 T = TypeVar("T")
 Gains = Sequence[Sequence[float]]

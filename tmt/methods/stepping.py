@@ -8,10 +8,10 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 from tmt.derivation.coordinates import FLAT, Coordinates, Flat
+from tmt.derivation.scalar import Scalar
 from tmt.methods.dynamics import LITERAL, Terms, Values, dynamics_of
 from tmt.model.tree import Tree
 from tmt.model.values import shown
-from tmt.scalar import Scalar
 
 Slope = Callable[[Values, Values], Values]
 State = tuple[Values, Values]
