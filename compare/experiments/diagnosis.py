@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,11 +22,8 @@ from ..judge.agree import share_of
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
 from ..robots.states import Sample
-from . import Experiment
+from . import Drawing, Experiment
 from .setup import Setup
-
-if TYPE_CHECKING:
-    from .quantities import Drawing
 
 EXPERIMENT = Experiment(order=80, needs_file=True, options=("--joints",), states_causes=True, compares=False)
 SECONDS = 8.0  # of a search
@@ -167,7 +164,7 @@ def headline(result: DiagnosisResult) -> Finding | None:
     return result.finding("headline", place=result.rows[0].place, more=len(result.rows) - 1)
 
 
-def figures(result: DiagnosisResult, robot: Robot) -> Iterator["Drawing"]:
+def figures(result: DiagnosisResult, robot: Robot) -> Iterator[Drawing]:
     if result.nearest:
         from .figures import draw_nearest  # matplotlib is for the process that draws
 
