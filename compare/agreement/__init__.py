@@ -187,9 +187,8 @@ def message(comparison: Comparison) -> str:
     for row in rows(comparison, why.text):
         if row.ratio > 1.0:
             failing.setdefault(row.quantity, []).append(row)
-    hinges = [
-        name for name, kind in zip(comparison.tree.joint_names, comparison.tree.kind) if kind == "hinge"
-    ]
+    joints = zip(comparison.tree.joint_names, comparison.tree.kind)
+    hinges = [name for name, kind in joints if kind == "hinge"]
     advice = None if why.is_found or comparison.rtol else rounded(comparison)
     said = [say(remark) for remark in remarks(comparison.reading, has_scenes=False)]
     values = {"comparison": comparison, "failing": failing, "why": why, "rounded": advice, "remarks": said}

@@ -11,6 +11,7 @@ from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
+from numpy import ndarray
 
 from ..core.cause import Cause
 from ..core.finding import Finding
@@ -31,10 +32,8 @@ AS_NEAR = 1.0 - 1e-6  # of the largest part of a target along one term
 # numbers of terms of the right expression and of other terms, and whether these replace those
 COMBINATIONS = ((1, 0, False), (1, 1, True), (0, 1, False), (1, 1, False), (2, 0, False), (2, 1, False))
 
-Bias = Callable[
-    [np.ndarray], np.ndarray
-]  # speeds (states, nv) -> h (states, nv) at the positions of the states
-Terms = dict[str, np.ndarray]  # values of terms at states, (states,), by their names
+Bias = Callable[[ndarray], ndarray]  # speeds (states, nv) -> h (states, nv) at the positions of the states
+Terms = dict[str, ndarray]  # values of terms at states, (states,), by their names
 
 
 class Coefficient(NamedTuple):
@@ -42,12 +41,12 @@ class Coefficient(NamedTuple):
 
     entry: Entry
     name: str
-    yours: np.ndarray
-    right: np.ndarray
-    tolerance: np.ndarray
+    yours: ndarray
+    right: ndarray
+    tolerance: ndarray
 
     @property
-    def off(self) -> np.ndarray:
+    def off(self) -> ndarray:
         return self.yours - self.right
 
 
@@ -88,7 +87,7 @@ class Compared:
         return [entry for entry in compared if (np.abs(entry.off) > entry.tolerance).any()]
 
     @property
-    def of_h(self) -> dict[Entry, np.ndarray]:
+    def of_h(self) -> dict[Entry, ndarray]:
         """Your coefficients of h, as far as they are known."""
         nv, states = self.equations.nv, len(self.given)
         if not self.equations.qd.any():
@@ -155,7 +154,7 @@ class Compared:
         return [Cause(rank=rank, kind="term", place=names, stated="right", explains=explains)]
 
 
-def products(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> Terms:
+def products(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
     """Products of one function of each joint, the simplest first, (states,) each."""
     functions = []  # of each joint: degree, name, values
     for name, kind, p in zip(names, kinds, x.T):
@@ -174,7 +173,7 @@ def products(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> Terms
     return terms
 
 
-def sums(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> Terms:
+def sums(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
     """Sines and cosines of sums of the angles, each up to twice, times powers of the slides, (states,) each."""
     slides = [k for k, kind in enumerate(kinds) if kind == "slide"]
     hinges = [k for k, kind in enumerate(kinds) if kind != "slide"]
@@ -194,7 +193,7 @@ def sums(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> Terms:
     return terms
 
 
-def right_terms(forms: Sequence[Terms], right: np.ndarray, size: float) -> dict[str, float]:
+def right_terms(forms: Sequence[Terms], right: ndarray, size: float) -> dict[str, float]:
     """An expression (states,) as a sum of terms, in the form that has fewer. size: of yours; less than its rounding is 0."""
     fits = []
     for form in forms:
@@ -221,7 +220,7 @@ def few_terms(tried: Terms, right: Mapping[str, float], coefficient: Coefficient
     return {}
 
 
-def completed(columns: np.ndarray, target: np.ndarray, chosen: list[int]) -> list[list[int]]:
+def completed(columns: ndarray, target: ndarray, chosen: list[int]) -> list[list[int]]:
     """The chosen terms with the one that comes closest to a target with them, or all that come as close."""
     basis = np.linalg.qr(columns[chosen].T)[0] if chosen else np.zeros((len(target), 0))
     rest = columns - columns @ basis @ basis.T

@@ -109,9 +109,8 @@ def forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Place]:
         return Place("number", name, stated, unit, 1.0, column=force, least=least)
 
     for i, joint in enumerate(tree.coordinates.joints):
-        of_damping, of_stiffness, of_force = (
-            unit_of(unit, joint.kind) for unit in ("N m s/rad", "N m/rad", "N m")
-        )
+        units = [unit_of(unit, joint.kind) for unit in ("N m s/rad", "N m/rad", "N m")]
+        of_damping, of_stiffness, of_force = units
         for v in range(joint.qd.start, joint.qd.stop):
             speed, at_joint = qd[:, v : v + 1], np.eye(qd.shape[1])[v]
             yield place(f"damping of {names[v]}", of_damping, tree.damping[v], speed * at_joint)
@@ -209,9 +208,8 @@ def parts_of_bodies(equations: Equations) -> dict[str, np.ndarray]:
         absent = [(path, x) for path, x in all_numbers if (path.field, path.at[0]) not in present]
         return equations.values({path: np.array([-x]) for path, x in absent})[0]
 
-    lengths = {
-        f"offset of {name}": ("offset", i) for i, name in enumerate(tree.joint_names) if tree.parent[i] >= 0
-    }
+    carried = [i for i, parent in enumerate(tree.parent) if parent >= 0]
+    lengths = {f"offset of {tree.joint_names[i]}": ("offset", i) for i in carried}
     for b, body in enumerate(tree.body_names):
         mass = ("mass", b)
         parts[f"B' I B of {body}"] = alone(("inertia", b))

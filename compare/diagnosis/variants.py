@@ -32,10 +32,8 @@ def program_options(equations: Equations) -> Iterator[Variant]:
     def option(place: str, stated: str, explains: str, values: np.ndarray) -> Variant:
         return Cause(rank=1, kind="option", place=place, stated=stated, explains=explains), values
 
-    weight, of_speeds = (
-        terms["gravity"].sum(axis=0),
-        np.sum([terms[name] for name in VELOCITY_TERMS], axis=(0, 1)),
-    )
+    weight = terms["gravity"].sum(axis=0)
+    of_speeds = np.sum([terms[name] for name in VELOCITY_TERMS], axis=(0, 1))
     yield option("gravity", "on", "off", equations.right - weight)
     yield option("sign of gravity", "+", "-", equations.right - 2.0 * weight)
     yield option("velocity terms in h", "there", "left out", equations.right - of_speeds)
