@@ -1,4 +1,4 @@
-"""The probable cause of a difference: what the diagnosis finds in Mbar and h, and what can only be in the accelerations."""
+"""The probable cause of a difference: in Mbar and h, or in the accelerations alone."""
 
 from functools import partial
 from typing import NamedTuple
@@ -50,7 +50,7 @@ def cause_of(comparison: Comparison) -> Why:
 
 
 def some_states(comparison: Comparison) -> ndarray:
-    """The numbers of as many states as a diagnosis takes: of those with finite values the first, and the worst."""
+    """As many states as a diagnosis takes: of those with finite values the first, and the worst."""
     ratios = [compared.ratio for compared in comparison.compared.values()]
     worst = np.max([ratio.reshape(len(ratio), -1).max(axis=1) for ratio in ratios], axis=0)
     finite = np.flatnonzero(np.isfinite(worst))

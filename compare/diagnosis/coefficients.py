@@ -1,8 +1,9 @@
-"""Where equations differ: entries of Mbar, gravity, and coefficients of products of speeds in h, and which of their terms.
+"""Where equations differ: entries of Mbar, gravity, and coefficients of products of speeds in h, and which of
+their terms.
 
-These are polynomials in the sines and cosines of hinges and in the positions of slides, of second degree in each. A common error
-is one term with another factor, or replaced by another. Terms have two forms: products such as sin(hip) cos(knee) and sums such
-as sin(hip + knee).
+These are polynomials in the sines and cosines of hinges and in the positions of slides, of second degree in
+each. A common error is one term with another factor, or replaced by another. Terms have two forms: products
+such as sin(hip) cos(knee) and sums such as sin(hip + knee).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -37,7 +38,7 @@ Terms = dict[str, ndarray]  # values of terms at states, (states,), by their nam
 
 
 class Coefficient(NamedTuple):
-    """One entry of Mbar or gravity, or the coefficient of a product of speeds in h, at some positions, (states,) each."""
+    """One entry of Mbar or gravity, or the coefficient of a product of speeds in h, (states,) each."""
 
     entry: Entry
     name: str
@@ -100,7 +101,7 @@ class Compared:
 
     @property
     def is_complete(self) -> bool:
-        """Whether the coefficients that differ make up all that differs in h: nothing is linear or cubic in the speeds."""
+        """Whether these make up all that differs in h: nothing is linear or cubic in the speeds."""
         qd, in_h = self.equations.qd, self.equations.in_h
         h = self.equations.right[:, in_h].copy()
         for coefficient in self.differing:
@@ -113,7 +114,7 @@ class Compared:
 
     @cached_property
     def terms(self) -> list[list[tuple[str, str]]]:
-        """Of each coefficient that differs, your terms and the right ones in their places, "" for none; [] if not found."""
+        """See Detail, of each coefficient that differs; [] if the terms are not found."""
         tree, names, kinds = self.equations.tree, self.equations.speeds, self.equations.tree.kind
         if "ball" in kinds or len(kinds) > MOST_JOINTS or len(self.differing) > SHOWN:
             return [[] for _ in self.differing]
@@ -141,7 +142,7 @@ class Compared:
         return tuple(details)
 
     def causes(self, most: int) -> list[Cause]:
-        """The cause if all that differs is at most this number of wrong terms; the same in several coefficients is one."""
+        """The cause, if all that differs is at most this number of wrong terms, else none."""
         if not self.differing or not self.is_complete or not all(self.terms):
             return []
         kinds = {pair for terms in self.terms for pair in terms}
@@ -174,7 +175,7 @@ def products(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
 
 
 def sums(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
-    """Sines and cosines of sums of the angles, each up to twice, times powers of the slides, (states,) each."""
+    """Sines and cosines of sums of the angles, each up to twice, times powers of the slides."""
     slides = [k for k, kind in enumerate(kinds) if kind == "slide"]
     hinges = [k for k, kind in enumerate(kinds) if kind != "slide"]
     powers = {"1": np.ones(len(x))}
@@ -194,7 +195,10 @@ def sums(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
 
 
 def right_terms(forms: Sequence[Terms], right: ndarray, size: float) -> dict[str, float]:
-    """An expression (states,) as a sum of terms, in the form that has fewer. size: of yours; less than its rounding is 0."""
+    """An expression (states,) as a sum of terms, in the form that has fewer.
+
+    size: of yours; less than its rounding is 0.
+    """
     fits = []
     for form in forms:
         x = np.linalg.lstsq(np.array(list(form.values())).T, right, rcond=None)[0]
@@ -204,7 +208,7 @@ def right_terms(forms: Sequence[Terms], right: ndarray, size: float) -> dict[str
 
 
 def few_terms(tried: Terms, right: Mapping[str, float], coefficient: Coefficient) -> dict[str, float]:
-    """The terms that make up the difference of a coefficient, with their factors; {}: a few do not suffice."""
+    """The terms that make up a coefficient's difference, with their factors; {}: a few do not suffice."""
     names, columns = list(tried), np.array(list(tried.values())) / coefficient.tolerance
     target = coefficient.off / coefficient.tolerance
     of_right = [names.index(name) for name in right]
@@ -231,7 +235,7 @@ def completed(columns: ndarray, target: ndarray, chosen: list[int]) -> list[list
 
 
 def pairs_of_terms(right: Mapping[str, float], off: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-    """What yours has and the right expression in its place, "" for nothing: replaced, with another factor, missing, added."""
+    """What yours has, and what the right expression has in its place; "" for nothing."""
     least = SAME_FACTOR * max(map(abs, (*off.values(), *right.values())), default=1.0)
     added = [term for term in off if term not in right]
     for term in (term for term in off if term in right):

@@ -1,9 +1,9 @@
 """Whether Mbar and h can belong together, whatever the model is; no reference is needed.
 
-Mbar must be symmetric and positive definite; h at rest must be the gradient of an energy; h - h(q, 0) must be quadratic in the
-speeds, and its power must be qd' Mdot qd / 2. Derivatives are central differences of fourth order; their error is estimated
-with a step twice as long. Noise in the values (single precision, interpolated tables) is measured first, by differences of sixth
-order over short steps, and added to every tolerance.
+Mbar must be symmetric and positive definite; h at rest must be the gradient of an energy; h - h(q, 0) must be
+quadratic in the speeds, and its power must be qd' Mdot qd / 2. Derivatives are central differences of fourth
+order; their error is estimated with a step twice as long. Noise in the values (single precision, interpolated
+tables) is measured first, by differences of sixth order over short steps, and added to every tolerance.
 """
 
 from collections.abc import Callable, Sequence
@@ -52,7 +52,8 @@ class Condition(NamedTuple):
 def conditions(
     mass_matrix: OfPositions, bias: OfStates, coordinates: Coordinates, q: ndarray, qd: ndarray
 ) -> list[Condition]:
-    """The conditions on mass_matrix(q) (states, nv, nv) and bias(q, qd) (states, nv), at states q (states, nq), qd (states, nv).
+    """The conditions on mass_matrix(q) (states, nv, nv) and bias(q, qd) (states, nv), at states q (states,
+    nq), qd (states, nv).
 
     The power is evaluated only for a symmetric M, and without the part of h that is linear in the speeds.
     """
@@ -148,7 +149,10 @@ def power_balance(
     mass_matrix: OfPositions, coordinates: Coordinates, q: ndarray, qd: ndarray, velocity: ndarray,
     of_M: ndarray, of_h: ndarray,
 ) -> Condition:  # fmt: skip
-    """qd' (h - h at rest) = qd' Mdot qd / 2, Mdot along the motion. of_M, of_h: rounding and noise of both, (states,)."""
+    """qd' (h - h at rest) = qd' Mdot qd / 2, Mdot along the motion.
+
+    of_M, of_h: rounding and noise of both, (states,).
+    """
     largest = np.abs(qd).max(axis=1).clip(min=1e-100)
     rates = qd / largest[:, None]  # of about 1, so that the step is one of positions
 
@@ -168,7 +172,7 @@ def power_balance(
 
 
 def derivative(function: Callable[[float], ndarray]) -> tuple[ndarray, ndarray, ndarray]:
-    """df/dt at 0 to fourth order, its error estimated from two step sizes, and the size of f, all of the shape of f(t)."""
+    """df/dt at 0 to fourth order, its error from two step sizes, and the size of f, of the shape of f."""
     values = {k: np.asarray(function(k * STEP)) for k in (-4, -2, -1, 1, 2, 4)}
     slope = (8.0 * (values[1] - values[-1]) - (values[2] - values[-2])) / (12.0 * STEP)
     coarse = (8.0 * (values[2] - values[-2]) - (values[4] - values[-4])) / (24.0 * STEP)

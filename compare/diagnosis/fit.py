@@ -1,4 +1,4 @@
-"""Fits: which change of one place, or of two, explains given values; least squares over the states, many places at once."""
+"""Which change of one place, or of two, explains given values, by least squares over the states."""
 
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -55,8 +55,9 @@ class OutOfTime(Exception):
 class Search:
     """Changes of places that bring computed values closest to given ones.
 
-    computed: the values with changes of numbers of the model, (changes, states, entries). given: (states, entries); NaN where
-    nothing is given. tolerance: of each entry, (states, entries). end: the time.monotonic() at which OutOfTime is raised.
+    computed: the values with changes of numbers of the model, (changes, states, entries). given: (states,
+    entries); NaN where nothing is given. tolerance: of each entry, (states, entries). end: the
+    time.monotonic() at which OutOfTime is raised.
     """
 
     def __init__(
@@ -83,12 +84,12 @@ class Search:
             return []
 
     def weighted(self, values: ndarray) -> ndarray:
-        """Given values minus others at the first or all states, (..., states, entries), in tolerances; 0 where none is given."""
+        """Given values minus others, at the first or all states, in tolerances; 0 where none is given."""
         first = slice(values.shape[-2])
         return np.where(self.known[first], self.given[first] - values, 0.0) * self.weight[first]
 
     def explained(self, variants: Iterable[tuple[Cause, ndarray]]) -> list[Cause]:
-        """The causes whose values leave nothing; each with its values at the first or all states, (states, entries)."""
+        """The causes whose values, at the first or all states, leave nothing."""
         causes = []
         for cause, values in variants:
             left = self.weighted(values)
@@ -97,7 +98,7 @@ class Search:
         return causes
 
     def values(self, numbers: ndarray, x: ndarray) -> ndarray:
-        """Values for each row of changes, (rows, states, entries): x (rows, k), of the places with these numbers (rows, k)."""
+        """Values for each row of changes x of the places `numbers`, (rows, k): (rows, states, entries)."""
         if len(numbers) > ROWS:
             starts = range(0, len(numbers), ROWS)
             return np.concatenate([self.values(numbers[k : k + ROWS], x[k : k + ROWS]) for k in starts])
@@ -161,8 +162,8 @@ class Search:
     def singles(self) -> list[Fitted]:
         """Each place alone, the smallest remainder first.
 
-        Where the values are quadratic in its change, the best one is the root of a cubic. The few best of these are fitted; all
-        directions and zeros are fitted from several starts.
+        Where the values are quadratic in its change, the best one is the root of a cubic. The few best of
+        these are fitted; all directions and zeros are fitted from several starts.
         """
         nearest, promising, starts = nearest_changes(*self.expansion, self.off), [], []
         for k, place in enumerate(self.places):
@@ -180,14 +181,15 @@ class Search:
     def expansion(self) -> tuple[ndarray, ndarray]:
         """First and second coefficients of the values in each place's change over its size, in tolerances.
 
-        (places, states, entries) each; exact where the values are quadratic: for all except directions and zeros.
+        (places, states, entries) each; exact where the values are quadratic: for all except directions and
+        zeros.
         """
         numbers, size = np.arange(len(self.places))[:, None], self.sizes[:, None]
         up, down = (self.values(numbers, sign * size) for sign in (1.0, -1.0))
         return (up - down) / 2.0 * self.weight, ((up + down) / 2.0 - self.right) * self.weight
 
     def pairs(self, kinds: Sequence[str]) -> list[Fitted]:
-        """Two places of some kinds together: the most promising, where each change is taken to act alone, are fitted."""
+        """Two places of some kinds together; the most promising pairs are fitted."""
         columns = np.concatenate([part.reshape(len(self.places), -1) for part in self.expansion])
         lengths = np.linalg.norm(columns, axis=1)
         columns = columns / np.where(lengths > 0.0, lengths, 1.0)[:, None]

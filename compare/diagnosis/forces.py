@@ -1,7 +1,7 @@
 """What else acts in accelerations than Mbar and h: a torque of the opposite sign, damping, springs, friction.
 
-For given accelerations the force  r = tau - D qd - k (q - rest) - h - Mbar qdd  is left over, with Mbar and h of the same source:
-zero if nothing else acts.
+For given accelerations the force  r = tau - D qd - k (q - rest) - h - Mbar qdd  is left over, with Mbar and h
+of the same source: zero if nothing else acts.
 """
 
 from collections.abc import Iterator

@@ -1,8 +1,8 @@
 """The equations of motion as functions of a tree's numbers, for many changes of the numbers at once.
 
-Mbar and h are TMT's sum over the bodies, by the functions of tmt. The numbers may be arrays (changes, 1) that broadcast with
-positions (states,), real or complex; the derivative by a number is the imaginary part after an imaginary change of 1e-100, exact
-to rounding.
+Mbar and h are TMT's sum over the bodies, by the functions of tmt. The numbers may be arrays (changes, 1) that
+broadcast with positions (states,), real or complex; the derivative by a number is the imaginary part after an
+imaginary change of 1e-100, exact to rounding.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -119,7 +119,10 @@ class Equations:
         return of_M | coefficients_of(bias, self.nv)
 
     def values(self, changes: Changes) -> ndarray:
-        """Mbar and h with entries of the tree changed, (changes, states, entries). Changed axes are normalized."""
+        """Mbar and h with entries of the tree changed, (changes, states, entries).
+
+        Changed axes are normalized.
+        """
         numbers = {name: value.tolist() for name, value in self.stated.items()}
         for path, added in changes.items():
             row, (*places, last) = numbers[path.field], path.at
@@ -165,7 +168,7 @@ def packed(mass_matrix: ndarray, bias: ndarray) -> ndarray:
 
 
 class Values(NamedTuple):
-    """Mbar and h with their tolerances, at states in the model's joints; NaN where a quantity is not given."""
+    """Mbar and h with their tolerances, in the model's joints; NaN where a quantity is not given."""
 
     q: ndarray  # (states, nq)
     qd: ndarray  # (states, nv)
@@ -199,7 +202,8 @@ class Values(NamedTuple):
 
 
 def coefficients_of(bias: Callable[[ndarray], ndarray], nv: int) -> dict[Entry, ndarray]:
-    """Coefficients of h, (states,) each: "gravity" (i,), and "velocity" (i, j, k) of qd_j qd_k, j <= k, in h_i.
+    """Coefficients of h, (states,) each: "gravity" (i,), and "velocity" (i, j, k) of qd_j qd_k, j <= k, in
+    h_i.
 
     bias: speeds (nv,) -> h (states, nv), of which the part that is even in the speeds is taken.
     """

@@ -1,7 +1,7 @@
 """The places where equations can be wrong by one number: of the model, of a term, of a coefficient.
 
-A change x of a place adds x times a coefficient to numbers of the tree, or x times a column of values to entries of Mbar or h.
-The zero of a joint is a convention and has rank 1; the other numbers have rank 2.
+A change x of a place adds x times a coefficient to numbers of the tree, or x times a column of values to
+entries of Mbar or h. The zero of a joint is a convention and has rank 1; the other numbers have rank 2.
 """
 
 from collections.abc import Iterator
@@ -56,12 +56,12 @@ class Place(NamedTuple):
         return not any(path.field in ("axis", "reference") for path, _ in self.moves)
 
     def value(self, change: float) -> float:
-        """The value after a change; 0 where only the digits of a fit remain. A hinge's zero moves by half a turn at most."""
+        """The value after a change (of a zero, half a turn at most); 0 if only digits of a fit remain."""
         value = self.stated + (within_a_turn(change, self.unit == "m") if self.kind == OF_ZERO else change)
         return 0.0 if abs(value) < FIT_ROUNDING * self.size else float(value)
 
     def is_possible(self, change: float) -> bool:
-        """Whether no mass, moment of inertia, damping or stiffness is below zero, and a part has a common factor."""
+        """Whether no mass, inertia, damping or stiffness is below zero, and a part has a common factor."""
         return self.value(change) >= self.least and (self.kind != "part" or is_common(self.value(change)))
 
     def cause(self, change: float) -> Cause:
@@ -180,7 +180,8 @@ def terms(equations: Equations) -> Iterator[Place]:
 def parts_of_terms(equations: Equations) -> Iterator[Place]:
     """The factor of each part of a term of a body in an entry of M, in M, and in M and h, for a few hinges.
 
-    T is a sum over the offsets of the joints that carry the body and its CoM, T' m T over pairs of these lengths.
+    T is a sum over the offsets of the joints that carry the body and its CoM, T' m T over pairs of these
+    lengths.
     """
     tree, in_M = equations.tree, equations.in_M
     if set(tree.kind) != {"hinge"} or equations.nv > MOST_HINGES:

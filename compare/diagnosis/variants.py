@@ -1,4 +1,5 @@
-"""Explanations without a number to fit: options and conventions of joints, rank 1; slips.py has those of the derivation.
+"""Explanations without a number to fit: options and conventions of joints, rank 1; slips.py has those of the
+derivation.
 
 A variant is a cause with Mbar and h as they would be, as `Equations.values` has them.
 """
@@ -61,7 +62,7 @@ def program_options(equations: Equations) -> Iterator[Variant]:
 
 
 def absolute_angles(tree: tmt.Tree) -> np.ndarray | None:
-    """Joint angles from the angles of bodies to the world, (nv, nv), in a row of parallel hinges; None: there is none."""
+    """Joint angles from angles to the world, (nv, nv), in a row of parallel hinges; None: there is none."""
     if set(tree.kind) != {"hinge"}:
         return None
     turns = np.eye(len(tree.axis))

@@ -47,8 +47,8 @@ class Own:
 class OwnDynamics:
     """A case in a user's equations.
 
-    A case without gravity subtracts the gravity of the equations, or their bias at rest. Added damping acts as a torque. Locked
-    joints have no rows and columns.
+    A case without gravity subtracts the gravity of the equations, or their bias at rest. Added damping acts
+    as a torque. Locked joints have no rows and columns.
     """
 
     def __init__(self, equations: OwnEquations, case: Case):

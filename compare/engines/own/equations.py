@@ -39,11 +39,12 @@ class Noted(NamedTuple):
 class OwnEquations:
     """A user's equations; quantities at any states of the model's joints, q (..., nq), v and tau (..., nv).
 
-    source: an object or module with mass_matrix(q) and bias(q, qd), or a mapping of such names to functions; further functions
-    see QUANTITIES; `joint_names` if it has them. Or a tmt.Tree. Or the same names with SymPy matrices, and `symbols`.
-    joints: the map from its joints to the model's; None: by its own names if it has them, else the model's.
-    tree: the model's equations; their damping and springs are used if the source has no acceleration. required: functions that
-    the source must have. OwnError for a source that cannot be used.
+    source: an object or module with mass_matrix(q) and bias(q, qd), or a mapping of such names to functions;
+    further functions see QUANTITIES; `joint_names` if it has them. Or a tmt.Tree. Or the same names with
+    SymPy matrices, and `symbols`. joints: the map from its joints to the model's; None: by its own names if
+    it has them, else the model's. tree: the model's equations; their damping and springs are used if the
+    source has no acceleration. required: functions that the source must have. OwnError for a source that
+    cannot be used.
     """
 
     def __init__(
@@ -112,7 +113,7 @@ class OwnEquations:
         return self.bias(q, np.zeros(self.coordinates.nv))
 
     def acceleration(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> ndarray:
-        """rad/s2, (..., nv): its own, or from Mbar a = tau - D v - k (q - rest) - h with the model's damping and springs."""
+        """rad/s2, (..., nv): its own, or from Mbar a = tau - D v - k (q - rest) - h, D and k of the model."""
         if self.has("acceleration"):
             return self.joints.forces(self.values_of("acceleration", q, v, tau))
         batch, (q, v, tau) = rows_of_states(q, v, tau)
@@ -141,7 +142,7 @@ class OwnEquations:
         return self.joints.forces(T), self.joints.forces(B)
 
     def try_at(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> None:
-        """Call every function at the first of some states until its time is known; OwnError if one cannot be used."""
+        """Call every function at the first of some states; OwnError if one cannot be used."""
         states = self.own_states(rows_of_states(q, v, tau)[1])
         for name in self.functions:
             if name not in self.takes_batches:
@@ -150,7 +151,7 @@ class OwnEquations:
     # how functions are called
 
     def values_of(self, name: str, *states: ArrayLike) -> ndarray:
-        """The values of a function at states of the model's joints, in its own joints; NaN where it raised."""
+        """The values of a function at states of the model, in its own joints; NaN where it raised."""
         if not self.has(name):
             raise OwnError(f"the equations have no {call(name)}")
         batch, rows = rows_of_states(*states)
@@ -215,7 +216,7 @@ class OwnEquations:
             self.takes_batches.setdefault(name, False)
 
     def tried_together(self, name: str, states: States) -> ndarray | None:
-        """Values of several states at once; None if it does not take batches. No error is noted: it need not take them."""
+        """Values of several states at once; None if it does not take batches, which is no error."""
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore")
@@ -224,7 +225,7 @@ class OwnEquations:
             return None
 
     def called(self, name: str, states: States, count: int | None = None, is_trial: bool = False) -> ndarray:
-        """The value of a function at one state, or at count of them; OwnError if it raised or returned anything else."""
+        """The value of a function at one state, or at count of them; OwnError if it is none."""
         copies = [np.array(part) for part in states]
         try:
             value = self.functions[name](*copies)

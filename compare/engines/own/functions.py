@@ -1,4 +1,4 @@
-"""A user's equations as functions, from an object, a module, a mapping, a Tree or SymPy matrices; and their values as arrays."""
+"""A user's equations as functions, in whatever form they are given, and their values as arrays."""
 
 import traceback
 from collections.abc import Callable, Mapping, Sequence
@@ -136,7 +136,10 @@ def function_of(name: str, value: Any, symbols: object, coordinates: Coordinates
 
 
 def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Coordinates) -> Function:
-    """The function of a SymPy matrix or expression. given_symbols: of q, or of q and qd, or of q, qd and tau, in order."""
+    """The function of a SymPy matrix or expression.
+
+    given_symbols: of q, or of q and qd, or of q, qd and tau, in order.
+    """
     import sympy
 
     def flat(value: Any) -> list[Any]:

@@ -1,7 +1,8 @@
 """A user's equations from a Python file or a module: FILE.py:OBJECT or MODULE:OBJECT.
 
-The last colon separates them, so that FILE may start with a Windows drive. OBJECT may be dotted; without it the object is the
-module itself. While it is imported, print writes to stderr, and no compiled files are written.
+The last colon separates them, so that FILE may start with a Windows drive. OBJECT may be dotted; without it
+the object is the module itself. While it is imported, print writes to stderr, and no compiled files are
+written.
 """
 
 import difflib
@@ -30,7 +31,7 @@ class OwnFileError(ValueError):
 
 
 def own_object(stated: str) -> object:
-    """The object that FILE.py:OBJECT or MODULE:OBJECT names; a class is instantiated. OwnFileError, in one line."""
+    """The object that FILE.py:OBJECT or MODULE:OBJECT names; a class is instantiated. OwnFileError."""
     place, _, name = stated.rpartition(":")
     if not place:
         raise OwnFileError(f"{stated!r} names neither a file nor a module; expected {FORMS_OF_REFERENCE}")
@@ -100,7 +101,7 @@ def close_names(name: str, known: Sequence[str]) -> str:
 
 @contextmanager
 def raised_in(place: str) -> Iterator[None]:
-    """An error of a user's code in this block becomes an OwnFileError of one line, with its line in the user's file."""
+    """Make an error of a user's code an OwnFileError of one line, with its line in the user's file."""
     try:
         yield
     except (OwnFileError, OwnError):
