@@ -18,7 +18,7 @@ from ..core.cause import Cause
 from ..core.finding import Finding
 from ..core.text import apart, say
 from ..core.words import listed
-from .cause import TEMPLATE
+from .cause import TEMPLATE, Detail
 from .fit import Search
 from .model import MOST_SPEEDS, Entry, Equations, coefficients_of
 
@@ -49,16 +49,6 @@ class Coefficient(NamedTuple):
     @property
     def off(self) -> ndarray:
         return self.yours - self.right
-
-
-class Detail(NamedTuple):
-    """A coefficient that differs: in terms, or both numbers where they are furthest apart."""
-
-    name: str
-    terms: list[tuple[str, str]]  # yours and the right ones in their places, "" for none
-    yours: float = 0.0
-    right: float = 0.0
-    at: tuple[str, ...] = ()  # "knee = 0.3"
 
 
 class Compared:
