@@ -105,7 +105,7 @@ class Equations:
     @cached_property
     def right(self) -> ndarray:
         """The values without changes, (states, entries)."""
-        return self.values({})[0]
+        return self.summed(self.bodies, self.tree.gravity, self.tree.armature)[0]
 
     @cached_property
     def coefficients(self) -> dict[Entry, ndarray]:
@@ -119,10 +119,7 @@ class Equations:
         return of_M | coefficients_of(bias, self.nv)
 
     def values(self, changes: Changes) -> ndarray:
-        """Mbar and h with entries of the tree changed, (changes, states, entries).
-
-        Changed axes are normalized.
-        """
+        """Mbar and h with numbers of the tree changed, (changes, states, entries); axes are normalized."""
         numbers = {name: value.tolist() for name, value in self.stated.items()}
         for path, added in changes.items():
             row, (*places, last) = numbers[path.field], path.at
@@ -131,10 +128,8 @@ class Equations:
             row[last] = row[last] + np.asarray(added)[:, None]
         for k in {path.at[0] for path in changes if path.field == "axis"}:
             numbers["axis"][k] = unit_direction(*numbers["axis"][k])
-        structure = {
-            name: getattr(self.tree, name) for name in ("parent", "coordinates", "body_joint", "moves")
-        }
-        changed = SimpleNamespace(**numbers, **structure)
+        structure = ("parent", "coordinates", "body_joint", "moves")
+        changed = SimpleNamespace(**numbers, **{name: getattr(self.tree, name) for name in structure})
         bodies = method.bodies(changed, list(self.q.T), list(self.qd.T))
         return self.summed(bodies, changed.gravity, changed.armature)
 
