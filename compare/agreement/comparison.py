@@ -209,10 +209,10 @@ def rows_given(name: str, values: Any, shape: tuple[int | str, int]) -> np.ndarr
     count, size = shape
     array = numbers_of(values)
     if array is not None and isinstance(count, int) and array.ndim == 0:
-        return rows_given(name, np.full((count, size), float(array)), shape)
-    if array is not None and array.ndim == 1 and size in (1, len(array)):
-        array = array.reshape(-1, size)
-    rows = converted(name, values if array is None else array, shape)
+        values = np.full((count, size), float(array))
+    elif array is not None and not isinstance(count, int) and array.ndim == 1 and size in (1, len(array)):
+        values = array.reshape(-1, size)
+    rows = converted(name, values, shape)
     if not len(rows):
         raise ValueError(f"{name} has shape {np.shape(values)}; expected {in_words(shape)}")
     if not np.isfinite(rows).all():

@@ -219,6 +219,7 @@ def test_what_is_missing_is_made_of_what_is_there(rng):
     assert not own.has("acceleration") and not own.has("gravity")
     assert np.allclose(own.acceleration(q, v, tau), tmt.acceleration(q, v, tau, tree), atol=1e-11)
     assert np.allclose(own.gravity_balance(q), tmt.gravity_balance(q, tree), atol=1e-14)
+    assert np.isnan(own.acceleration(q * [np.nan, 1.0, 1.0], v, tau)).all()  # where a run has diverged
     with pytest.raises(OwnError, match="energy"):
         own.energy(q, v)
     singular = OwnEquations(source | {"mass_matrix": lambda q: np.zeros((3, 3))}, COORDINATES)
