@@ -195,9 +195,7 @@ def compare_quantities(
         and {"Mbar", "bias"} <= found.keys()
     ):
         values = Values.of(sample.tree, sample.q, sample.qd, found["Mbar"], found["bias"], FACTOR * eps)
-        result.find(
-            "cause", engine=label, text=diagnose(sample.tree, values, SECONDS).sentence()
-        )
+        result.find("cause", engine=label, text=diagnose(sample.tree, values, SECONDS).sentence())
 
 
 def asked_at(setup: Setup, precision: str) -> Sample:
