@@ -79,10 +79,8 @@ nan = changed(bias=lambda q, qd: bias(q, qd) * (np.nan if abs(q[0]) > 2.0 else 1
 late = changed(bias=late_bias)
 infinite = changed(bias=lambda q, qd: bias(q, qd) + np.inf)
 doubled = changed(gravity=lambda q: 2.0 * gravity(q))
-SWAPPED = {
-    "mass_matrix": lambda q: mass_matrix(q[::-1])[::-1, ::-1],
-    "bias": lambda q, v: bias(q[::-1], v[::-1])[::-1],
-}
+SWAPPED = {"mass_matrix": lambda q: mass_matrix(q[::-1])[::-1, ::-1]}
+SWAPPED["bias"] = lambda q, v: bias(q[::-1], v[::-1])[::-1]
 swapped, named = changed(**SWAPPED), changed(**SWAPPED, joint_names=["knee", "hip"])
 
 

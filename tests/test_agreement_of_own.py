@@ -2,6 +2,7 @@
 
 import os
 import time
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -23,6 +24,7 @@ READING = read(PENDULUM)
 TREE, ROBOT = READING.tree, robot_of(READING, "a pendulum")
 SIGN = "h[hip], coefficient of knee'^2: yours is -1 times"
 RIGHT = {"mass_matrix": mass_matrix, "bias": bias, "gravity": gravity, "acceleration": acceleration}
+agrees, differences = partial(compare.assert_agrees, PENDULUM), partial(compare.differences, PENDULUM)
 
 
 @pytest.fixture(name="given")
@@ -30,18 +32,14 @@ def given_states():
     """States, and MuJoCo's values of every quantity."""
     q, qd, tau = np.random.default_rng(2019).uniform(-2.0, 2.0, (3, 12, 2))
     theirs = engine(READING).of(ROBOT.case())
-    values = (
-        theirs.mass_matrix(q),
-        theirs.bias(q, qd),
-        theirs.gravity_balance(q),
-        theirs.acceleration(q, qd, tau),
-    )
+    values = [theirs.mass_matrix(q), theirs.bias(q, qd), theirs.gravity_balance(q)]
+    values.append(theirs.acceleration(q, qd, tau))
     return {"q": q, "qd": qd, "tau": tau}, dict(zip(RIGHT, values))
 
 
 def message_of(**brought):
     with pytest.raises(AssertionError) as error:
-        compare.assert_agrees(PENDULUM, **brought)
+        agrees(**brought)
     return str(error.value)
 
 
@@ -55,38 +53,24 @@ def test_a_path_text_and_a_compiled_model_are_compared_at_the_same_states(tmp_pa
     before = model.opt.disableflags, model.opt.integrator, model.dof_damping.tolist()
     models = PENDULUM, Path("pendulum.xml"), "pendulum.xml", model
     found, *same = [compare.differences(one, bias=bias, seed=3, states=5) for one in models]
-    assert all(one == found for one in same) and len({one.state for one in found}) == 5
-    assert {one.state for one in found}.isdisjoint(
-        one.state for one in compare.differences(model, bias=bias, states=5)
-    )
+    assert all(one == found for one in same)
+    asked, others = ({one.state for one in of} for of in (found, differences(bias=bias, states=5)))
+    assert len(asked) == 5 and asked.isdisjoint(others)
     assert (model.opt.disableflags, model.opt.integrator, model.dof_damping.tolist()) == before
     assert os.listdir() == ["pendulum.xml"]  # no log, no cache
 
 
 def test_values_as_arrays_at_the_given_states(given):
     states, values = given
-    compare.assert_agrees(PENDULUM, **values, **states)
-    assert all(
-        one.ratio <= 1.0 and one.cause == "" for one in compare.differences(PENDULUM, **values, **states)
-    )
-    M, q = values["mass_matrix"].tolist(), states["q"].tolist()
-    compare.assert_agrees(PENDULUM, mass_matrix=M, bias=bias, q=q, qd=0.0)
-    first = {name: part[0] for name, part in states.items()}
-    compare.assert_agrees(
-        PENDULUM, **{name: value[0] for name, value in values.items()}, **first
-    )  # without a batch
-    column = {
-        "mass_matrix": values["mass_matrix"][..., None],
-        "bias": values["bias"][..., None].astype(object),
-    }
-    compare.assert_agrees(PENDULUM, **column, **states)
-    numbers = {name: sympy.Matrix(values[name][0]) for name in ("mass_matrix", "bias")}
-    compare.assert_agrees(PENDULUM, **numbers, **first)
-    flat = {
-        "mass_matrix": values["mass_matrix"].reshape(12, 4),
-        "bias": values["bias"],
-    }  # as in the rows of a file
-    compare.assert_agrees(PENDULUM, **flat, **states)
+    M, h, q = values["mass_matrix"], values["bias"], states["q"]
+    first, alone = ({name: part[0] for name, part in arrays.items()} for arrays in given)
+    agrees(**values, **states)
+    assert all(one.ratio <= 1.0 and one.cause == "" for one in differences(**values, **states))
+    agrees(mass_matrix=M.tolist(), bias=bias, q=q.tolist(), qd=0.0)
+    agrees(**alone, **first)  # without a batch
+    agrees(mass_matrix=M[..., None], bias=h[..., None].astype(object), **states)
+    agrees(mass_matrix=sympy.Matrix(M[0]), bias=sympy.Matrix(h[0]), **first)
+    agrees(mass_matrix=M.reshape(12, 4), bias=h, **states)  # as in the rows of a file
 
 
 # the tolerance
@@ -107,11 +91,11 @@ def test_just_inside_and_just_outside_of_the_tolerance(name, rtol, given, monkey
     for share in (0.99, 1.01):
         changed = values[name].copy()
         changed[at] += share * allowed
-        worst = compare.differences(PENDULUM, **{name: changed}, **states, rtol=rtol)[0]
+        worst = differences(**{name: changed}, **states, rtol=rtol)[0]
         assert (worst.ratio <= 1.0) is (share < 1.0) and worst.ratio == pytest.approx(share, rel=1e-2)
         assert worst.tolerance == pytest.approx(allowed, rel=1e-9)
         if share < 1.0:
-            compare.assert_agrees(PENDULUM, **{name: changed}, **states, rtol=rtol)
+            agrees(**{name: changed}, **states, rtol=rtol)
     assert f"{name}: mismatched entries 1 / " in message_of(**{name: changed}, **states, rtol=rtol)
 
 
@@ -120,20 +104,16 @@ def test_differences_are_every_entry_with_the_largest_ratio_first(given):
     changed = values["bias"].copy()
     changed[5, 1] += 1e-3
     changed[2, 0] -= 1e-2
-    found = compare.differences(PENDULUM, bias=changed, **states)
-    assert len(found) == 24 and [one.ratio for one in found] == sorted(
-        (one.ratio for one in found), reverse=True
-    )
+    found = differences(bias=changed, **states)
+    ratios = [one.ratio for one in found]
+    assert len(found) == 24 and ratios == sorted(ratios, reverse=True)
     first, second, third = found[:3]
     assert {(one.entry, one.state.number) for one in (first, second)} == {("h[hip]", 2), ("h[knee]", 5)}
     assert third.ratio <= 1.0 and third.cause == "" and first.cause == second.cause != ""
     for one in found:
         at = one.state.number, ["h[hip]", "h[knee]"].index(one.entry)
-        assert (one.yours, one.mujoco, one.difference) == (
-            changed[at],
-            values["bias"][at],
-            one.yours - one.mujoco,
-        )
+        right = changed[at], values["bias"][at], one.yours - one.mujoco
+        assert (one.yours, one.mujoco, one.difference) == right
         assert all(np.allclose(getattr(one.state, name), part[at[0]]) for name, part in states.items())
 
 
@@ -146,16 +126,16 @@ def advised(mjcf=PENDULUM, **brought):
 
 
 @pytest.mark.parametrize(
-    "height, share, is_rounded", [(0, 0.98e-6, True), (0, 1.02e-6, False), (20, 1e-3, False)]
+    "height, share, rounds", [(0, 0.98e-6, True), (0, 1.02e-6, False), (20, 1e-3, False)]
 )
-def test_constants_rounded_to_six_digits_get_an_rtol_however_far_away(height, share, is_rounded, monkeypatch):
+def test_constants_rounded_to_six_digits_get_an_rtol_however_far_away(height, share, rounds, monkeypatch):
     """Far away the terms of each entry are large, and a slip is small compared with them."""
     monkeypatch.setattr("compare.agreement.why.SECONDS_OF_CAUSE", 0.0)
     aloft = PENDULUM.replace("<worldbody>", f'<worldbody><body pos="0 0 {height}">')
     scaled = {"mass_matrix": lambda q: mass_matrix(q) * (1.0 + share)}
     aloft = aloft.replace("</worldbody>", "</body></worldbody>")
-    assert (advised(aloft, **scaled) is not None) is is_rounded
-    if is_rounded:
+    assert (advised(aloft, **scaled) is not None) is rounds
+    if rounds:
         compare.assert_agrees(aloft, **scaled, rtol=advised(aloft, **scaled))
 
 
@@ -164,15 +144,14 @@ def test_no_rtol_is_advised_beside_a_cause_or_another_rtol_or_without_numbers(gi
     noise = 1.0 + 1e-7 * np.random.default_rng(0).normal(size=(12, 2, 2))
     noisy = {"mass_matrix": values["mass_matrix"] * (noise + np.swapaxes(noise, 1, 2)) / 2.0} | states
     assert 1e-8 < advised(**noisy) < 1e-6 and advised(**noisy, rtol=1e-9) is None
-    assert (
-        advised(mass_matrix=values["mass_matrix"] * (1.0 + 1e-7), **states) is None
-    )  # a factor of all is a cause
+    scaled = values["mass_matrix"] * (1.0 + 1e-7)  # a factor of all is a cause
+    assert advised(mass_matrix=scaled, **states) is None
     bad = np.where(states["q"] > 1.0, np.nan, values["bias"])
     assert advised(mass_matrix=values["mass_matrix"], bias=bad, **states) is None
 
 
-@pytest.mark.parametrize("share, agrees", [(0.99, True), (1.01, False), (1e12, False)])
-def test_a_structural_zero_has_the_scale_of_its_diagonal(share, agrees):
+@pytest.mark.parametrize("share, within", [(0.99, True), (1.01, False), (1e12, False)])
+def test_a_structural_zero_has_the_scale_of_its_diagonal(share, within):
     """Of two rods side by side, sqrt(M00 M11) by terms; where it is no zero, its cause is sought."""
     inertial = '<inertial pos="0 0 -0.5" mass="{}" diaginertia="0.1 0.1 0.1"/>'
     of_rod = f'<body><joint name="{{}}" axis="0 1 0"/>{inertial}</body>'
@@ -180,15 +159,17 @@ def test_a_structural_zero_has_the_scale_of_its_diagonal(share, agrees):
     scale = Entries(read(rods).tree, np.zeros((1, 2))).mass_matrix[0]
     between = share * FACTOR * EPS * np.sqrt(scale[0, 0] * scale[1, 1])
     worst, *_ = compare.differences(rods, mass_matrix=lambda q: [[0.35, between], [between, 0.6]])
-    assert worst.entry in ("M[left][right]", "M[right][left]") and worst.ratio == pytest.approx(
-        share, rel=1e-2
-    )
-    assert (worst.cause == "") is agrees
+    assert worst.entry in ("M[left][right]", "M[right][left]")
+    assert worst.ratio == pytest.approx(share, rel=1e-2) and (worst.cause == "") is within
 
 
 # joints
 
 STATED = ["-knee+90deg in deg", "hip"]
+
+
+def in_model(of, q, v, tau):
+    return of.positions(q), of.speeds(v), of.forces(tau)
 
 
 def in_joints(stated):
@@ -197,9 +178,7 @@ def in_joints(stated):
     return {
         "mass_matrix": lambda q: of.own_mass_matrix(mass_matrix(of.positions(q))),
         "bias": lambda q, v: of.own_forces(bias(of.positions(q), of.speeds(v))),
-        "acceleration": lambda q, v, t: of.own_forces(
-            acceleration(of.positions(q), of.speeds(v), of.forces(t))
-        ),
+        "acceleration": lambda *state: of.own_forces(acceleration(*in_model(of, *state))),
     }, of
 
 
@@ -209,11 +188,10 @@ def test_functions_and_arrays_in_stated_joints(given):
     states = {"q": of.own_positions(q), "qd": of.own_speeds(qd), "tau": of.own_forces(tau)}
     arrays = {name: of.own_forces(value) for name, value in values.items()}
     arrays["mass_matrix"] = of.own_mass_matrix(values["mass_matrix"])
-    compare.assert_agrees(PENDULUM, **functions, joints=STATED)
-    compare.assert_agrees(PENDULUM, **arrays, **states, joints=STATED)
-    compare.assert_agrees(PENDULUM, **functions, **states, joints=STATED)
+    for brought in (functions, arrays | states, functions | states):
+        agrees(**brought, joints=STATED)
     arrays["mass_matrix"][4, 0, 1] += 1.0
-    worst = compare.differences(PENDULUM, **arrays, **states, joints=STATED)[0]
+    worst = differences(**arrays, **states, joints=STATED)[0]
     assert worst.entry == "M[knee][hip]" and np.allclose(worst.state.q, states["q"][4])
 
 
@@ -226,7 +204,7 @@ def test_the_message_says_how_to_state_the_joints(stated, right):
     del functions["acceleration"]
     text = message_of(**functions, joints=stated)
     told = text.partition("state it as joints=")[2].partition(")")[0].partition("]")[0] + "]"
-    compare.assert_agrees(PENDULUM, **functions, joints=eval(told))
+    agrees(**functions, joints=eval(told))
 
 
 # the cause
@@ -265,7 +243,7 @@ def test_the_cause_is_sought_where_there_are_values():
     values = np.array([wrong_bias(*state) for state in zip(q, qd)])
     values[:30] = np.nan
     assert SIGN in message_of(mass_matrix=mass_matrix, bias=values, q=q, qd=qd)
-    worst = compare.differences(PENDULUM, bias=values, q=q, qd=qd)[0]
+    worst = differences(bias=values, q=q, qd=qd)[0]
     assert worst.ratio == np.inf and worst.state.number < 30
     assert "cause" not in message_of(mass_matrix=lambda q: np.full((2, 2), np.nan))
     values = np.array([1.1 * acceleration(*state) for state in zip(q, qd, tau)])
@@ -307,9 +285,9 @@ def test_states_that_are_not_compared_are_warned_of(monkeypatch):
 
     monkeypatch.setattr("compare.agreement.comparison.OWN_SECONDS", 0.2)
     with pytest.warns(UserWarning, match="100"):
-        assert 4 <= len(compare.differences(PENDULUM, mass_matrix=slow)) <= 40
+        assert 4 <= len(differences(mass_matrix=slow)) <= 40
     monkeypatch.setattr("compare.robots.states.MOST_NUMBERS", 120)
     for more, word in (({"q": THREE, "states": 500}, "500"), ({"states": 10**6}, "1,000,000")):
         with pytest.warns(UserWarning, match=word) as caught:
-            compare.assert_agrees(PENDULUM, mass_matrix=mass_matrix, **more)
+            agrees(mass_matrix=mass_matrix, **more)
         assert caught[0].filename == __file__

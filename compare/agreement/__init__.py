@@ -1,8 +1,8 @@
 """Comparison of your equations with MuJoCo, entry by entry, for use in your tests.
 
-The tolerance of an entry is (64 eps + rtol) x its scale. The scale is the sum of the absolute values of its terms, see
-judge/entries.py, not the entry itself: that may be a small difference of large terms, and a rounded constant changes it by
-as much as the terms.
+The tolerance of an entry is (64 eps + rtol) x its scale. The scale is the sum of the absolute values of its
+terms, see judge/entries.py, not the entry itself: that may be a small difference of large terms, and a
+rounded constant changes it by as much as the terms.
 """
 
 from __future__ import annotations  # so that help() shows the short names of types
@@ -77,22 +77,22 @@ def assert_agrees(
     states: int = 100,
     seed: int = 0,
 ) -> None:
-    """Compare equations of your own with MuJoCo; raise AssertionError with the worst entry and the probable cause if they differ.
+    """Compare equations of your own with MuJoCo; raise AssertionError if they differ.
 
-    The signs: Mbar qdd + h = tau - D qd - k (q - rest); damping D and springs k of the joints are in acceleration alone.
-    Units: rad and N m, for slides m and N.
+    The error has the worst entry and the probable cause. The signs: Mbar qdd + h = tau - D qd - k (q - rest);
+    damping D and springs k of the joints are in acceleration alone. Units: rad and N m, for slides m and N.
 
     Parameters
     ----------
     mjcf : path, MJCF text or MjModel
         Its contacts, limits, actuators and equalities are switched off.
     mass_matrix, bias, gravity, acceleration : optional, at least one
-        mass_matrix(q), bias(q, qd), gravity(q), acceleration(q, qd, tau): a function of one state or a batch, or the array of
-        its values at the given q, qd, tau, or a pair of a SymPy matrix and the list of its symbols.
+        mass_matrix(q), bias(q, qd), gravity(q), acceleration(q, qd, tau): a function of one state or a batch, or
+        the array of its values at the given q, qd, tau, or a pair of a SymPy matrix and the list of its symbols.
     q, qd, tau : (N, nq), (N, nv), (N, nv), optional
         The states, in your joints; None: `states` random states from `seed`, within the joints' ranges.
     joints : sequence of str, optional
-        The joints as your equations take them, such as ["knee", "-hip", "ankle+90deg"]; None: those of the model.
+        The joints as your equations take them: ["knee", "-hip", "ankle+90deg"]; None: those of the model.
     rtol : float, default 0
         Added to the tolerance, relative to the scale of each entry, for equations with rounded constants.
     states, seed : int, default 100 and 0
@@ -141,7 +141,7 @@ def differences(
     states: int = 100,
     seed: int = 0,
 ) -> list[Difference]:
-    """Every entry of every quantity at every state, the largest ratio first; they agree if all ratios are at most 1.
+    """Every entry of every quantity at every state, the largest ratio first; at most 1 if they agree.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def rows(comparison: Comparison, cause: str) -> list[Difference]:
 
 
 def message(comparison: Comparison) -> str:
-    """Which entries of which quantity are off, the worst of them, the probable cause, and what can be stated."""
+    """Which entries are off, the worst of each quantity, the probable cause, and what can be stated."""
     from ..engines.mujoco.remarks import remarks  # here, so that `import compare` need not wait for it
 
     why = cause_of(comparison) if comparison.fails else Why()
@@ -187,9 +187,8 @@ def message(comparison: Comparison) -> str:
     for row in rows(comparison, why.text):
         if row.ratio > 1.0:
             failing.setdefault(row.quantity, []).append(row)
-    hinges = [
-        name for name, kind in zip(comparison.tree.joint_names, comparison.tree.kind) if kind == "hinge"
-    ]
+    joints = zip(comparison.tree.joint_names, comparison.tree.kind)
+    hinges = [name for name, kind in joints if kind == "hinge"]
     advice = None if why.is_found or comparison.rtol else rounded(comparison)
     said = [say(remark) for remark in remarks(comparison.reading, has_scenes=False)]
     values = {"comparison": comparison, "failing": failing, "why": why, "rounded": advice, "remarks": said}
@@ -198,10 +197,11 @@ def message(comparison: Comparison) -> str:
 
 
 def rounded(comparison: Comparison) -> float | None:
-    """The rtol to state if the constants are rounded; None if an entry is off by more than that, or is not finite.
+    """The rtol to state if the constants are rounded; None if an entry is off by more than that, or is not
+    finite.
 
-    Nor may a quantity be off by more than that of its own largest entry: terms far from the origin are large, and a slip is
-    small compared with them.
+    Nor may a quantity be off by more than that of its own largest entry: terms far from the origin are large,
+    and a slip is small compared with them.
     """
     worst = of_largest = 0.0
     for compared in comparison.compared.values():

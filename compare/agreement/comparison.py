@@ -1,4 +1,4 @@
-"""The arguments of assert_agrees, validated: the model, the states, each quantity of the user and of MuJoCo."""
+"""The arguments of assert_agrees, validated, and each quantity of the user and of MuJoCo."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -51,7 +51,7 @@ class Compared(NamedTuple):
 
     @property
     def ratio(self) -> np.ndarray:
-        """Of the difference to the tolerance; 0 where both are 0, inf where the user's value is not finite."""
+        """Of the difference to the tolerance; 0 if both are 0, inf if the user's value is not finite."""
         off = np.abs(self.yours - self.right)
         return over(np.where(np.isfinite(off), off, np.inf), self.tolerance)
 
@@ -160,7 +160,7 @@ class Comparison:
         return np.asarray(getattr(source, METHOD_NAMES[name])(*state))
 
     def table(self, name: str, brought: object) -> np.ndarray:
-        """An array of values in the user's joints, in the model's, (states, ...); a row may hold Mbar flattened by rows."""
+        """An array of the user's values in the model's joints; a row may hold Mbar flattened by rows."""
         count, nv = len(self.q), self.coordinates.nv
         array, shape = numbers_of(brought), (count, *QUANTITIES[name].shape_for(nv))
         if name == "mass_matrix" and array is not None:
@@ -209,10 +209,10 @@ def rows_given(name: str, values: Any, shape: tuple[int | str, int]) -> np.ndarr
     count, size = shape
     array = numbers_of(values)
     if array is not None and isinstance(count, int) and array.ndim == 0:
-        return rows_given(name, np.full((count, size), float(array)), shape)
-    if array is not None and array.ndim == 1 and size in (1, len(array)):
-        array = array.reshape(-1, size)
-    rows = converted(name, values if array is None else array, shape)
+        values = np.full((count, size), float(array))
+    elif array is not None and not isinstance(count, int) and array.ndim == 1 and size in (1, len(array)):
+        values = array.reshape(-1, size)
+    rows = converted(name, values, shape)
     if not len(rows):
         raise ValueError(f"{name} has shape {np.shape(values)}; expected {in_words(shape)}")
     if not np.isfinite(rows).all():

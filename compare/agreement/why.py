@@ -1,9 +1,10 @@
-"""The probable cause of a difference: what the diagnosis finds in Mbar and h, and what can only be in the accelerations."""
+"""The probable cause of a difference: in Mbar and h, or in the accelerations alone."""
 
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from numpy import ndarray
 
 from tmt import literal
 
@@ -48,12 +49,10 @@ def cause_of(comparison: Comparison) -> Why:
     return why._replace(text=f"{why.text} {beside(comparison, values, tau, yours['acceleration'])}".rstrip())
 
 
-def some_states(comparison: Comparison) -> np.ndarray:
-    """The numbers of as many states as a diagnosis takes: of those with finite values the first, and the worst."""
-    ratios = [
-        compared.ratio.reshape(len(comparison.q), -1).max(axis=1) for compared in comparison.compared.values()
-    ]
-    worst = np.max(ratios, axis=0)
+def some_states(comparison: Comparison) -> ndarray:
+    """As many states as a diagnosis takes: of those with finite values the first, and the worst."""
+    ratios = [compared.ratio for compared in comparison.compared.values()]
+    worst = np.max([ratio.reshape(len(ratio), -1).max(axis=1) for ratio in ratios], axis=0)
     finite = np.flatnonzero(np.isfinite(worst))
     return np.unique([*finite[np.argsort(-worst[finite])[:1]], *finite[: STATES_ASKED - 1]]).astype(int)
 
@@ -78,7 +77,7 @@ def of_equations(comparison: Comparison, values: Values) -> Why:
     return Why(" ".join([*broken[:1], diagnosis.sentence()]), bool(diagnosis.causes))
 
 
-def beside(comparison: Comparison, values: Values, tau: np.ndarray, qdd: np.ndarray) -> str:
+def beside(comparison: Comparison, values: Values, tau: ndarray, qdd: ndarray) -> str:
     """What else is wrong with accelerations than the user's Mbar and h; "" where they follow from these."""
     left_over = LeftOver(comparison.tree, values, tau, qdd, comparison.rounding)
     if left_over.ratio <= 1.0:
@@ -86,7 +85,7 @@ def beside(comparison: Comparison, values: Values, tau: np.ndarray, qdd: np.ndar
     return left_over.sentence() or say(Finding("agreement", "another"))
 
 
-def of_accelerations(comparison: Comparison, values: Values, tau: np.ndarray, qdd: np.ndarray) -> Why:
+def of_accelerations(comparison: Comparison, values: Values, tau: ndarray, qdd: ndarray) -> Why:
     """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right.
 
     values: the user's Mbar and h, as far as they are given; these are right.

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from math import inf
 
+COLUMNS = ("rank", "place", "stated", "found", "text")  # of results.json and of a report
+
 
 @dataclass(frozen=True, kw_only=True)
 class Cause:
@@ -20,18 +22,11 @@ class Cause:
     left_over: float = 0.0  # of the difference, a share
     tied: int = 0  # other causes of the same rank that explain as much
     parts: tuple["Cause", ...] = ()  # that are said instead of this one: the two of rank 3
-    joints: str = (
-        ""  # how the joints are to be stated, "joints=['-knee']"; "": no convention, or they cannot be
-    )
+    joints: str = ""  # how joints are to be stated, joints=[...]; "": no convention, or they cannot be
     quantity: str = ""  # of a number of the file: its name in `parameters`
     size: float = inf  # of such a number: its difference over its tolerance
 
     def record(self) -> dict[str, float | str | None]:
-        """The columns of the cause in results.json and in a report."""
-        return {
-            "rank": self.rank,
-            "place": self.place,
-            "stated": self.stated,
-            "found": self.explains,
-            "text": self.text,
-        }
+        """The values of COLUMNS."""
+        values = self.rank, self.place, self.stated, self.explains, self.text
+        return dict(zip(COLUMNS, values))

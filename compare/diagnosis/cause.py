@@ -2,17 +2,24 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..core.cause import Cause
 from ..core.finding import Finding
 from ..core.text import say
 
-if TYPE_CHECKING:
-    from .coefficients import Detail
-
 TEMPLATE = "causes"
 LEAST_STATES = 4  # different positions: with fewer, wrong numbers explain by luck
+
+
+class Detail(NamedTuple):
+    """A coefficient that differs: in terms, or both numbers where they are furthest apart."""
+
+    name: str
+    terms: list[tuple[str, str]]  # yours and the right ones in their places, "" for none
+    yours: float = 0.0
+    right: float = 0.0
+    at: tuple[str, ...] = ()  # "knee = 0.3"
 
 
 class Diagnosis(NamedTuple):
@@ -21,7 +28,7 @@ class Diagnosis(NamedTuple):
     differs: bool
     causes: tuple[Cause, ...] = ()  # of one rank, each explains everything; (): nothing does
     closest: Cause | None = None  # where nothing explains everything: the single change that leaves least
-    details: tuple["Detail", ...] = ()  # coefficients that differ, with both numbers or in terms
+    details: tuple[Detail, ...] = ()  # coefficients that differ, with both numbers or in terms
     entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[hip][knee]"
     compared: int = 0  # entries in all
     # single changes that leave least: what they leave, a share, and whether it is within the tolerance

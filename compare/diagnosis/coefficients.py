@@ -1,8 +1,9 @@
-"""Where equations differ: entries of Mbar, gravity, and coefficients of products of speeds in h, and which of their terms.
+"""Where equations differ: entries of Mbar, gravity, and coefficients of products of speeds in h, and which of
+their terms.
 
-These are polynomials in the sines and cosines of hinges and in the positions of slides, of second degree in each. A common error
-is one term with another factor, or replaced by another. Terms have two forms: products such as sin(hip) cos(knee) and sums such
-as sin(hip + knee).
+These are polynomials in the sines and cosines of hinges and in the positions of slides, of second degree in
+each. A common error is one term with another factor, or replaced by another. Terms have two forms: products
+such as sin(hip) cos(knee) and sums such as sin(hip + knee).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,12 +12,13 @@ from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
+from numpy import ndarray
 
 from ..core.cause import Cause
 from ..core.finding import Finding
 from ..core.text import apart, say
 from ..core.words import listed
-from .cause import TEMPLATE
+from .cause import TEMPLATE, Detail
 from .fit import Search
 from .model import MOST_SPEEDS, Entry, Equations, coefficients_of
 
@@ -31,34 +33,22 @@ AS_NEAR = 1.0 - 1e-6  # of the largest part of a target along one term
 # numbers of terms of the right expression and of other terms, and whether these replace those
 COMBINATIONS = ((1, 0, False), (1, 1, True), (0, 1, False), (1, 1, False), (2, 0, False), (2, 1, False))
 
-Bias = Callable[
-    [np.ndarray], np.ndarray
-]  # speeds (states, nv) -> h (states, nv) at the positions of the states
-Terms = dict[str, np.ndarray]  # values of terms at states, (states,), by their names
+Bias = Callable[[ndarray], ndarray]  # speeds (states, nv) -> h (states, nv) at the positions of the states
+Terms = dict[str, ndarray]  # values of terms at states, (states,), by their names
 
 
 class Coefficient(NamedTuple):
-    """One entry of Mbar or gravity, or the coefficient of a product of speeds in h, at some positions, (states,) each."""
+    """One entry of Mbar or gravity, or the coefficient of a product of speeds in h, (states,) each."""
 
     entry: Entry
     name: str
-    yours: np.ndarray
-    right: np.ndarray
-    tolerance: np.ndarray
+    yours: ndarray
+    right: ndarray
+    tolerance: ndarray
 
     @property
-    def off(self) -> np.ndarray:
+    def off(self) -> ndarray:
         return self.yours - self.right
-
-
-class Detail(NamedTuple):
-    """A coefficient that differs: in terms, or both numbers where they are furthest apart."""
-
-    name: str
-    terms: list[tuple[str, str]]  # yours and the right ones in their places, "" for none
-    yours: float = 0.0
-    right: float = 0.0
-    at: tuple[str, ...] = ()  # "knee = 0.3"
 
 
 class Compared:
@@ -88,7 +78,7 @@ class Compared:
         return [entry for entry in compared if (np.abs(entry.off) > entry.tolerance).any()]
 
     @property
-    def of_h(self) -> dict[Entry, np.ndarray]:
+    def of_h(self) -> dict[Entry, ndarray]:
         """Your coefficients of h, as far as they are known."""
         nv, states = self.equations.nv, len(self.given)
         if not self.equations.qd.any():
@@ -101,7 +91,7 @@ class Compared:
 
     @property
     def is_complete(self) -> bool:
-        """Whether the coefficients that differ make up all that differs in h: nothing is linear or cubic in the speeds."""
+        """Whether these make up all that differs in h: nothing is linear or cubic in the speeds."""
         qd, in_h = self.equations.qd, self.equations.in_h
         h = self.equations.right[:, in_h].copy()
         for coefficient in self.differing:
@@ -114,7 +104,7 @@ class Compared:
 
     @cached_property
     def terms(self) -> list[list[tuple[str, str]]]:
-        """Of each coefficient that differs, your terms and the right ones in their places, "" for none; [] if not found."""
+        """See Detail, of each coefficient that differs; [] if the terms are not found."""
         tree, names, kinds = self.equations.tree, self.equations.speeds, self.equations.tree.kind
         if "ball" in kinds or len(kinds) > MOST_JOINTS or len(self.differing) > SHOWN:
             return [[] for _ in self.differing]
@@ -142,7 +132,7 @@ class Compared:
         return tuple(details)
 
     def causes(self, most: int) -> list[Cause]:
-        """The cause if all that differs is at most this number of wrong terms; the same in several coefficients is one."""
+        """The cause, if all that differs is at most this number of wrong terms, else none."""
         if not self.differing or not self.is_complete or not all(self.terms):
             return []
         kinds = {pair for terms in self.terms for pair in terms}
@@ -155,7 +145,7 @@ class Compared:
         return [Cause(rank=rank, kind="term", place=names, stated="right", explains=explains)]
 
 
-def products(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> Terms:
+def products(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
     """Products of one function of each joint, the simplest first, (states,) each."""
     functions = []  # of each joint: degree, name, values
     for name, kind, p in zip(names, kinds, x.T):
@@ -174,8 +164,8 @@ def products(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> Terms
     return terms
 
 
-def sums(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> Terms:
-    """Sines and cosines of sums of the angles, each up to twice, times powers of the slides, (states,) each."""
+def sums(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
+    """Sines and cosines of sums of the angles, each up to twice, times powers of the slides."""
     slides = [k for k, kind in enumerate(kinds) if kind == "slide"]
     hinges = [k for k, kind in enumerate(kinds) if kind != "slide"]
     powers = {"1": np.ones(len(x))}
@@ -194,8 +184,11 @@ def sums(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> Terms:
     return terms
 
 
-def right_terms(forms: Sequence[Terms], right: np.ndarray, size: float) -> dict[str, float]:
-    """An expression (states,) as a sum of terms, in the form that has fewer. size: of yours; less than its rounding is 0."""
+def right_terms(forms: Sequence[Terms], right: ndarray, size: float) -> dict[str, float]:
+    """An expression (states,) as a sum of terms, in the form that has fewer.
+
+    size: of yours; less than its rounding is 0.
+    """
     fits = []
     for form in forms:
         x = np.linalg.lstsq(np.array(list(form.values())).T, right, rcond=None)[0]
@@ -205,7 +198,7 @@ def right_terms(forms: Sequence[Terms], right: np.ndarray, size: float) -> dict[
 
 
 def few_terms(tried: Terms, right: Mapping[str, float], coefficient: Coefficient) -> dict[str, float]:
-    """The terms that make up the difference of a coefficient, with their factors; {}: a few do not suffice."""
+    """The terms that make up a coefficient's difference, with their factors; {}: a few do not suffice."""
     names, columns = list(tried), np.array(list(tried.values())) / coefficient.tolerance
     target = coefficient.off / coefficient.tolerance
     of_right = [names.index(name) for name in right]
@@ -221,7 +214,7 @@ def few_terms(tried: Terms, right: Mapping[str, float], coefficient: Coefficient
     return {}
 
 
-def completed(columns: np.ndarray, target: np.ndarray, chosen: list[int]) -> list[list[int]]:
+def completed(columns: ndarray, target: ndarray, chosen: list[int]) -> list[list[int]]:
     """The chosen terms with the one that comes closest to a target with them, or all that come as close."""
     basis = np.linalg.qr(columns[chosen].T)[0] if chosen else np.zeros((len(target), 0))
     rest = columns - columns @ basis @ basis.T
@@ -232,7 +225,7 @@ def completed(columns: np.ndarray, target: np.ndarray, chosen: list[int]) -> lis
 
 
 def pairs_of_terms(right: Mapping[str, float], off: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-    """What yours has and the right expression in its place, "" for nothing: replaced, with another factor, missing, added."""
+    """What yours has, and what the right expression has in its place; "" for nothing."""
     least = SAME_FACTOR * max(map(abs, (*off.values(), *right.values())), default=1.0)
     added = [term for term in off if term not in right]
     for term in (term for term in off if term in right):

@@ -1,9 +1,9 @@
 """Whether Mbar and h can belong together, whatever the model is; no reference is needed.
 
-Mbar must be symmetric and positive definite; h at rest must be the gradient of an energy; h - h(q, 0) must be quadratic in the
-speeds, and its power must be qd' Mdot qd / 2. Derivatives are central differences of fourth order; their error is estimated
-with a step twice as long. Noise in the values (single precision, interpolated tables) is measured first, by differences of sixth
-order over short steps, and added to every tolerance.
+Mbar must be symmetric and positive definite; h at rest must be the gradient of an energy; h - h(q, 0) must be
+quadratic in the speeds, and its power must be qd' Mdot qd / 2. Derivatives are central differences of fourth
+order; their error is estimated with a step twice as long. Noise in the values (single precision, interpolated
+tables) is measured first, by differences of sixth order over short steps, and added to every tolerance.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,6 +11,7 @@ from math import comb
 from typing import NamedTuple
 
 import numpy as np
+from numpy import ndarray
 
 from ..core.finding import Finding
 from ..core.text import say
@@ -25,11 +26,8 @@ CLOSE_BY = 1e-4  # rad or m, between the points at which noise is measured
 ORDER = 6
 ROUNDED = FACTOR * EPS
 
-Values = dict[str, object]  # of a finding
-OfPositions = Callable[[np.ndarray], np.ndarray]  # of q (states, nq) -> (states, ...)
-OfStates = Callable[
-    [np.ndarray, np.ndarray], np.ndarray
-]  # of q (states, nq), qd (states, nv) -> (states, nv)
+OfPositions = Callable[[ndarray], ndarray]  # of q (states, nq) -> (states, ...)
+OfStates = Callable[[ndarray, ndarray], ndarray]  # of q (states, nq), qd (states, nv) -> (states, nv)
 
 
 class Condition(NamedTuple):
@@ -52,9 +50,10 @@ class Condition(NamedTuple):
 
 
 def conditions(
-    mass_matrix: OfPositions, bias: OfStates, coordinates: Coordinates, q: np.ndarray, qd: np.ndarray
+    mass_matrix: OfPositions, bias: OfStates, coordinates: Coordinates, q: ndarray, qd: ndarray
 ) -> list[Condition]:
-    """The conditions on mass_matrix(q) (states, nv, nv) and bias(q, qd) (states, nv), at states q (states, nq), qd (states, nv).
+    """The conditions on mass_matrix(q) (states, nv, nv) and bias(q, qd) (states, nv), at states q (states,
+    nq), qd (states, nv).
 
     The power is evaluated only for a symmetric M, and without the part of h that is linear in the speeds.
     """
@@ -65,16 +64,11 @@ def conditions(
     velocity, doubled = ((h[speed] + h[-speed]) / 2.0 - h[0.0] for speed in (1.0, 2.0))
     rounding = of_h + ROUNDED * np.abs(list(h.values())).max(axis=(0, 2))
     odd, allowed = np.abs(h[1.0] - h[-1.0]) / 2.0, rounding[:, None]
-
-    def of_even(s: int, i: int) -> Values:
-        return {"name": names[i], "value": odd[s, i], "unit": "N" if coordinates.units[i] == "m" else "N m"}
-
-    def of_quadratic(s: int, i: int) -> Values:
-        return {"name": names[i], "factor": doubled[s, i] / velocity[s, i] if velocity[s, i] else np.inf}
-
-    off = np.abs(doubled - 4.0 * velocity)
-    even = nearest("h is even in the rates", odd, allowed, "N m", "even", of_even)
-    quadratic = nearest("h is quadratic in the rates", off, 4.0 * allowed, "N m", "quadratic", of_quadratic)
+    units = np.broadcast_to(np.where(np.array(coordinates.units) == "m", "N", "N m"), odd.shape)
+    factors = np.divide(doubled, velocity, out=np.full(odd.shape, np.inf), where=velocity != 0.0)
+    even = nearest("h is even in the rates", odd, allowed, "N m", "even", names, value=odd, unit=units)
+    name, off = "h is quadratic in the rates", np.abs(doubled - 4.0 * velocity)
+    quadratic = nearest(name, off, 4.0 * allowed, "N m", "quadratic", names, factor=factors)
     of_weight = gradient_at_rest(lambda q: bias(q, 0.0 * qd), coordinates, q, of_h)
     tested = [symmetric(M, of_M, names), definite(M, of_M), *of_weight, even, quadratic]
     if tested[0].is_met:
@@ -83,17 +77,24 @@ def conditions(
 
 
 def nearest(
-    name: str, off: np.ndarray, allowed: np.ndarray, unit: str, kind: str, values: Callable[..., Values]
+    name: str,
+    off: ndarray,
+    allowed: ndarray,
+    units: str,
+    kind: str,
+    names: Sequence[str] = (),
+    **values: ndarray,
 ) -> Condition:
     """A condition on differences, off (states, ...), where it is nearest to being broken.
 
-    values: of an index, for the macro `kind`.
+    kind: the macro that says it, with the values there and the names of the entry.
     """
     at, allowed = closest(off, allowed), np.broadcast_to(allowed, off.shape)
-    return Condition(name, float(off[at]), float(allowed[at]), unit, Finding(TEMPLATE, kind, values(*at)))
+    there = {"names": [names[i] for i in at[1:]], **{key: array[at] for key, array in values.items()}}
+    return Condition(name, float(off[at]), float(allowed[at]), units, Finding(TEMPLATE, kind, there))
 
 
-def noise(function: OfPositions, coordinates: Coordinates, q: np.ndarray) -> float:
+def noise(function: OfPositions, coordinates: Coordinates, q: ndarray) -> float:
     """The noise in function(q) (states, ...), the largest of all states and entries, as a standard deviation.
 
     Differences of sixth order of values close by; a smooth function leaves nothing of size there.
@@ -104,17 +105,14 @@ def noise(function: OfPositions, coordinates: Coordinates, q: np.ndarray) -> flo
     return float(np.abs(difference).max()) / np.sqrt(comb(2 * ORDER, ORDER))
 
 
-def symmetric(M: np.ndarray, allowed: np.ndarray, names: Sequence[str]) -> Condition:
+def symmetric(M: ndarray, allowed: ndarray, names: Sequence[str]) -> Condition:
     """allowed: (states,)."""
-
-    def values(s: int, i: int, j: int) -> Values:
-        return {"names": (names[i], names[j]), "values": (M[s, i, j], M[s, j, i])}
-
-    off = np.abs(M - np.swapaxes(M, 1, 2))
-    return nearest("M is symmetric", off, allowed[:, None, None], "kg m2", "symmetric", values)
+    mirrored = np.swapaxes(M, 1, 2)
+    off, allowed = np.abs(M - mirrored), allowed[:, None, None]
+    return nearest("M is symmetric", off, allowed, "kg m2", "symmetric", names, value=M, mirrored=mirrored)
 
 
-def definite(M: np.ndarray, allowed: np.ndarray) -> Condition:
+def definite(M: ndarray, allowed: ndarray) -> Condition:
     """In units of its diagonal, where entries may be kg and kg m2."""
     M = (M + np.swapaxes(M, 1, 2)) / 2.0
     diagonal = np.einsum("sii->si", M)
@@ -127,14 +125,14 @@ def definite(M: np.ndarray, allowed: np.ndarray) -> Condition:
 
 
 def gradient_at_rest(
-    weight: OfPositions, coordinates: Coordinates, q: np.ndarray, floor: float
+    weight: OfPositions, coordinates: Coordinates, q: ndarray, floor: float
 ) -> list[Condition]:
     """dh_i/dq_j at rest is symmetric, in hinges and slides; [] where there is one of them at most."""
     straight = [joint.qd.start for joint in coordinates.places.joints if joint.kind != "ball"]
     if len(straight) < 2:
         return []
 
-    def along(direction: np.ndarray) -> tuple[np.ndarray, ...]:
+    def along(direction: ndarray) -> tuple[ndarray, ...]:
         return derivative(lambda t: weight(coordinates.move(q, t * direction))[:, straight])
 
     of_each = map(along, np.eye(coordinates.nv)[straight])
@@ -142,23 +140,23 @@ def gradient_at_rest(
     rounding = (ROUNDED * sizes.max(axis=(1, 2)) + floor) / STEP
     allowed = SAFETY * (errors + np.swapaxes(errors, 1, 2)) + rounding[:, None, None]
 
-    def values(s: int, i: int, j: int) -> Values:
-        names = coordinates.speeds[straight[i]], coordinates.speeds[straight[j]]
-        return {"names": names, "values": (slopes[s, i, j], slopes[s, j, i])}
-
-    curl = np.abs(slopes - np.swapaxes(slopes, 1, 2))
-    return [nearest("h at rest is a gradient", curl, allowed, "N m/rad", "gradient", values)]
+    names, mirrored = [coordinates.speeds[k] for k in straight], np.swapaxes(slopes, 1, 2)
+    curl, values = np.abs(slopes - mirrored), {"value": slopes, "mirrored": mirrored}
+    return [nearest("h at rest is a gradient", curl, allowed, "N m/rad", "gradient", names, **values)]
 
 
 def power_balance(
-    mass_matrix: OfPositions, coordinates: Coordinates, q: np.ndarray, qd: np.ndarray, velocity: np.ndarray,
-    of_M: np.ndarray, of_h: np.ndarray,
+    mass_matrix: OfPositions, coordinates: Coordinates, q: ndarray, qd: ndarray, velocity: ndarray,
+    of_M: ndarray, of_h: ndarray,
 ) -> Condition:  # fmt: skip
-    """qd' (h - h at rest) = qd' Mdot qd / 2, Mdot along the motion. of_M, of_h: rounding and noise of both, (states,)."""
+    """qd' (h - h at rest) = qd' Mdot qd / 2, Mdot along the motion.
+
+    of_M, of_h: rounding and noise of both, (states,).
+    """
     largest = np.abs(qd).max(axis=1).clip(min=1e-100)
     rates = qd / largest[:, None]  # of about 1, so that the step is one of positions
 
-    def kinetic(t: float) -> np.ndarray:
+    def kinetic(t: float) -> ndarray:
         M = np.asarray(mass_matrix(coordinates.move(q, t * rates)))
         return np.einsum("si,sij,sj->s", rates, M, rates) / 2.0
 
@@ -167,15 +165,14 @@ def power_balance(
     allowed = SAFETY * error + total**2 * of_M / STEP + 2.0 * total * of_h / largest**2
     watts = largest**3
 
-    def values(s: int) -> Values:
-        return {"yours": power[s] * watts[s], "right": slope[s] * watts[s], "balls": coordinates.has_balls}
-
     name = "h belongs to M: qd'(h - h at rest) = qd' Mdot qd / 2"
-    return nearest(name, np.abs(power - slope) * watts, allowed * watts, "W", "power", values)
+    values = {"yours": power * watts, "right": slope * watts}
+    values["balls"] = np.broadcast_to(coordinates.has_balls, watts.shape)
+    return nearest(name, np.abs(power - slope) * watts, allowed * watts, "W", "power", **values)
 
 
-def derivative(function: Callable[[float], np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """df/dt at 0 to fourth order, its error estimated from two step sizes, and the size of f, all of the shape of f(t)."""
+def derivative(function: Callable[[float], ndarray]) -> tuple[ndarray, ndarray, ndarray]:
+    """df/dt at 0 to fourth order, its error from two step sizes, and the size of f, of the shape of f."""
     values = {k: np.asarray(function(k * STEP)) for k in (-4, -2, -1, 1, 2, 4)}
     slope = (8.0 * (values[1] - values[-1]) - (values[2] - values[-2])) / (12.0 * STEP)
     coarse = (8.0 * (values[2] - values[-2]) - (values[4] - values[-4])) / (24.0 * STEP)

@@ -1,4 +1,4 @@
-"""Fits: which change of one place, or of two, explains given values; least squares over the states, many places at once."""
+"""Which change of one place, or of two, explains given values, by least squares over the states."""
 
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -8,6 +8,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
+from numpy import ndarray
 
 from ..core.cause import Cause
 from .cause import together
@@ -54,13 +55,14 @@ class OutOfTime(Exception):
 class Search:
     """Changes of places that bring computed values closest to given ones.
 
-    computed: the values with changes of numbers of the model, (changes, states, entries). given: (states, entries); NaN where
-    nothing is given. tolerance: of each entry, (states, entries). end: the time.monotonic() at which OutOfTime is raised.
+    computed: the values with changes of numbers of the model, (changes, states, entries). given: (states,
+    entries); NaN where nothing is given. tolerance: of each entry, (states, entries). end: the
+    time.monotonic() at which OutOfTime is raised.
     """
 
     def __init__(
-        self, computed: Callable[[Changes], np.ndarray], places: Sequence[Place], given: np.ndarray,
-        tolerance: np.ndarray, end: float = np.inf,
+        self, computed: Callable[[Changes], ndarray], places: Sequence[Place], given: ndarray,
+        tolerance: ndarray, end: float = np.inf,
     ):  # fmt: skip
         self.computed, self.places, self.given, self.end = computed, list(places), given, end
         least = tolerance[tolerance > 0.0].min(initial=1.0)  # what is always 0 has no scale
@@ -81,13 +83,13 @@ class Search:
             self.is_finished = False
             return []
 
-    def weighted(self, values: np.ndarray) -> np.ndarray:
-        """Given values minus others at the first or all states, (..., states, entries), in tolerances; 0 where none is given."""
+    def weighted(self, values: ndarray) -> ndarray:
+        """Given values minus others, at the first or all states, in tolerances; 0 where none is given."""
         first = slice(values.shape[-2])
         return np.where(self.known[first], self.given[first] - values, 0.0) * self.weight[first]
 
-    def explained(self, variants: Iterable[tuple[Cause, np.ndarray]]) -> list[Cause]:
-        """The causes whose values leave nothing; each with its values at the first or all states, (states, entries)."""
+    def explained(self, variants: Iterable[tuple[Cause, ndarray]]) -> list[Cause]:
+        """The causes whose values, at the first or all states, leave nothing."""
         causes = []
         for cause, values in variants:
             left = self.weighted(values)
@@ -95,14 +97,14 @@ class Search:
                 causes.append(replace(cause, left_over=float(np.linalg.norm(left)) / self.size))
         return causes
 
-    def values(self, numbers: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Values for each row of changes, (rows, states, entries): x (rows, k), of the places with these numbers (rows, k)."""
+    def values(self, numbers: ndarray, x: ndarray) -> ndarray:
+        """Values for each row of changes x of the places `numbers`, (rows, k): (rows, states, entries)."""
         if len(numbers) > ROWS:
             starts = range(0, len(numbers), ROWS)
             return np.concatenate([self.values(numbers[k : k + ROWS], x[k : k + ROWS]) for k in starts])
         if time.monotonic() > self.end:
             raise OutOfTime
-        changes: dict[Path, np.ndarray] = {}
+        changes: dict[Path, ndarray] = {}
         columns = []
         for row in range(len(numbers)):
             for place, change in zip([self.places[k] for k in numbers[row]], x[row]):
@@ -116,9 +118,7 @@ class Search:
             values[row, :, entry] += added
         return values
 
-    def fitted(
-        self, numbers: np.ndarray, x: np.ndarray, rounds: int = ROUNDS
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def fitted(self, numbers: ndarray, x: ndarray, rounds: int = ROUNDS) -> tuple[ndarray, ndarray]:
         """The best changes from the starts x (rows, k), and what they leave, (rows, states, entries)."""
         size, steps = self.sizes[numbers], np.eye(x.shape[1]) * (1j * TINY)
         left = self.weighted(self.values(numbers, x))
@@ -146,7 +146,7 @@ class Search:
                 break
         return x, left
 
-    def outcome(self, numbers: np.ndarray, starts: np.ndarray) -> list[Fitted]:
+    def outcome(self, numbers: ndarray, starts: ndarray) -> list[Fitted]:
         """The fit of each set of places, from the best of its starts, the smallest remainder first."""
         x, left = self.fitted(numbers, starts, FIRST_ROUNDS)
         near = np.argsort(np.nan_to_num((left**2).sum(axis=(1, 2)), nan=np.inf))[:FINALISTS]
@@ -162,8 +162,8 @@ class Search:
     def singles(self) -> list[Fitted]:
         """Each place alone, the smallest remainder first.
 
-        Where the values are quadratic in its change, the best one is the root of a cubic. The few best of these are fitted; all
-        directions and zeros are fitted from several starts.
+        Where the values are quadratic in its change, the best one is the root of a cubic. The few best of
+        these are fitted; all directions and zeros are fitted from several starts.
         """
         nearest, promising, starts = nearest_changes(*self.expansion, self.off), [], []
         for k, place in enumerate(self.places):
@@ -178,17 +178,18 @@ class Search:
         return self.outcome(np.array(numbers)[:, None], np.array(x)[:, None])
 
     @cached_property
-    def expansion(self) -> tuple[np.ndarray, np.ndarray]:
+    def expansion(self) -> tuple[ndarray, ndarray]:
         """First and second coefficients of the values in each place's change over its size, in tolerances.
 
-        (places, states, entries) each; exact where the values are quadratic: for all except directions and zeros.
+        (places, states, entries) each; exact where the values are quadratic: for all except directions and
+        zeros.
         """
         numbers, size = np.arange(len(self.places))[:, None], self.sizes[:, None]
         up, down = (self.values(numbers, sign * size) for sign in (1.0, -1.0))
         return (up - down) / 2.0 * self.weight, ((up + down) / 2.0 - self.right) * self.weight
 
     def pairs(self, kinds: Sequence[str]) -> list[Fitted]:
-        """Two places of some kinds together: the most promising, where each change is taken to act alone, are fitted."""
+        """Two places of some kinds together; the most promising pairs are fitted."""
         columns = np.concatenate([part.reshape(len(self.places), -1) for part in self.expansion])
         lengths = np.linalg.norm(columns, axis=1)
         columns = columns / np.where(lengths > 0.0, lengths, 1.0)[:, None]
@@ -205,7 +206,7 @@ class Search:
         return self.outcome(np.tile(pairs[best], (2, 1)), np.concatenate([near, np.zeros_like(near)]))
 
 
-def nearest_changes(first: np.ndarray, second: np.ndarray, off: np.ndarray) -> list[tuple[float, float]]:
+def nearest_changes(first: ndarray, second: ndarray, off: ndarray) -> list[tuple[float, float]]:
     """What the best change x of each place leaves, |off - x first - x^2 second|, and x, a root of a cubic.
 
     first, second: (places, states, entries), off: (states, entries), in tolerances.

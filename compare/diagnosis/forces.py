@@ -1,13 +1,14 @@
 """What else acts in accelerations than Mbar and h: a torque of the opposite sign, damping, springs, friction.
 
-For given accelerations the force  r = tau - D qd - k (q - rest) - h - Mbar qdd  is left over, with Mbar and h of the same source:
-zero if nothing else acts.
+For given accelerations the force  r = tau - D qd - k (q - rest) - h - Mbar qdd  is left over, with Mbar and h
+of the same source: zero if nothing else acts.
 """
 
 from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
+from numpy import ndarray
 
 import tmt
 from tmt import literal
@@ -33,7 +34,7 @@ class LeftOver:
     """
 
     def __init__(
-        self, tree: tmt.Tree, values: Values, tau: np.ndarray, qdd: np.ndarray, rounding: float = FACTOR * EPS
+        self, tree: tmt.Tree, values: Values, tau: ndarray, qdd: ndarray, rounding: float = FACTOR * EPS
     ):
         self.tree, self.values, self.tau = tree, values, tau
         q, qd, M, h, _ = values
@@ -69,7 +70,7 @@ class LeftOver:
         """The causes in words; "" if there is none."""
         return say(Finding(TEMPLATE, "forces", {"list": self.causes})) if self.causes else ""
 
-    def options(self) -> Iterator[tuple[Cause, np.ndarray]]:
+    def options(self) -> Iterator[tuple[Cause, ndarray]]:
         """Each option, and the force that is left over with it."""
         for place, stated, term in (
             ("torque in the acceleration", "tau", -self.tau),

@@ -1,8 +1,8 @@
 """The equations of motion as functions of a tree's numbers, for many changes of the numbers at once.
 
-Mbar and h are TMT's sum over the bodies, by the functions of tmt. The numbers may be arrays (changes, 1) that broadcast with
-positions (states,), real or complex; the derivative by a number is the imaginary part after an imaginary change of 1e-100, exact
-to rounding.
+Mbar and h are TMT's sum over the bodies, by the functions of tmt. The numbers may be arrays (changes, 1) that
+broadcast with positions (states,), real or complex; the derivative by a number is the imaginary part after an
+imaginary change of 1e-100, exact to rounding.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy import ndarray
 
 import tmt
 from tmt.derivation import method
@@ -28,13 +29,8 @@ OF_TERM = {  # of each body; the first two of Mbar
 }  # fmt: skip
 BODY_TERMS = tuple(OF_TERM)
 VELOCITY_TERMS = BODY_TERMS[3:]
-NOTHING: dict[str, Any] = {
-    "mass": 0.0,
-    "inertia": Matrix([ZERO] * 3),
-    "v_conv": ZERO,
-    "w_conv": ZERO,
-    "omega": ZERO,
-}
+NOTHING: dict[str, Any] = dict.fromkeys(("v_conv", "w_conv", "omega"), ZERO)
+NOTHING |= {"mass": 0.0, "inertia": Matrix([ZERO] * 3)}
 FIELDS_OF_TERMS = {  # of a body, on which a term depends
     "translation": ("mass",), "rotation": ("inertia",), "gravity": ("mass",), "convective": ("mass", "v_conv"),
     "Euler": ("inertia", "w_conv"), "gyroscopic": ("inertia", "omega"),
@@ -67,7 +63,7 @@ class Entry(NamedTuple):
         return self.kind + "".join(f"[{name}]" for name in names)
 
 
-Changes = Mapping[Path, np.ndarray]  # what is added to a number, (changes,)
+Changes = Mapping[Path, ndarray]  # what is added to a number, (changes,)
 
 
 class Equations:
@@ -76,7 +72,7 @@ class Equations:
     One array of numbers for each state: the lower triangle of Mbar by rows, then h; see `entries`.
     """
 
-    def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray):
+    def __init__(self, tree: tmt.Tree, q: ndarray, qd: ndarray):
         self.tree, self.q, self.qd = tree, q, qd
         self.nv = len(tree.axis)
         self.coordinates = Coordinates(tree.joint_names, tree.kind)
@@ -96,7 +92,7 @@ class Equations:
         return method.bodies(self.tree, list(self.q.T), list(self.qd.T))
 
     @cached_property
-    def terms(self) -> dict[str, np.ndarray]:
+    def terms(self) -> dict[str, ndarray]:
         """What each term of all bodies adds, (bodies, states, entries)."""
         terms = {}
         for term, fields in FIELDS_OF_TERMS.items():
@@ -107,23 +103,23 @@ class Equations:
         return terms
 
     @cached_property
-    def right(self) -> np.ndarray:
+    def right(self) -> ndarray:
         """The values without changes, (states, entries)."""
-        return self.values({})[0]
+        return self.summed(self.bodies, self.tree.gravity, self.tree.armature)[0]
 
     @cached_property
-    def coefficients(self) -> dict[Entry, np.ndarray]:
+    def coefficients(self) -> dict[Entry, ndarray]:
         """The entries of Mbar, and the coefficients of h, (states,) each."""
 
-        def bias(speeds: np.ndarray) -> np.ndarray:
+        def bias(speeds: ndarray) -> ndarray:
             at_speeds = Equations(self.tree, self.q, np.broadcast_to(speeds, self.qd.shape))
             return at_speeds.right[:, self.in_h]
 
         of_M = dict(zip(self.entries[self.in_M], self.right.T))
         return of_M | coefficients_of(bias, self.nv)
 
-    def values(self, changes: Changes) -> np.ndarray:
-        """Mbar and h with entries of the tree changed, (changes, states, entries). Changed axes are normalized."""
+    def values(self, changes: Changes) -> ndarray:
+        """Mbar and h with numbers of the tree changed, (changes, states, entries); axes are normalized."""
         numbers = {name: value.tolist() for name, value in self.stated.items()}
         for path, added in changes.items():
             row, (*places, last) = numbers[path.field], path.at
@@ -132,20 +128,18 @@ class Equations:
             row[last] = row[last] + np.asarray(added)[:, None]
         for k in {path.at[0] for path in changes if path.field == "axis"}:
             numbers["axis"][k] = unit_direction(*numbers["axis"][k])
-        structure = {
-            name: getattr(self.tree, name) for name in ("parent", "coordinates", "body_joint", "moves")
-        }
-        changed = SimpleNamespace(**numbers, **structure)
+        structure = ("parent", "coordinates", "body_joint", "moves")
+        changed = SimpleNamespace(**numbers, **{name: getattr(self.tree, name) for name in structure})
         bodies = method.bodies(changed, list(self.q.T), list(self.qd.T))
         return self.summed(bodies, changed.gravity, changed.armature)
 
-    def with_bias(self, h: np.ndarray) -> np.ndarray:
+    def with_bias(self, h: ndarray) -> ndarray:
         """The right values with another h (states, nv)."""
         return np.concatenate([self.right[:, self.in_M], h], axis=1)
 
     def summed(
         self, bodies: Sequence[method.Body], gravity: Iterable[Any], armature: Sequence[Any] = ()
-    ) -> np.ndarray:
+    ) -> ndarray:
         """Mbar and h of some bodies, (changes, states, entries)."""
         M, h = method.mass_matrix(bodies), method.bias(bodies, gravity)
         for i, rotor in enumerate(armature):
@@ -154,7 +148,7 @@ class Equations:
         count = max([np.shape(value)[0] for value in flat if np.ndim(value) == 2], default=1)
         return np.stack([np.broadcast_to(value, (count, len(self.q))) for value in flat], axis=-1)
 
-    def full_mass_matrix(self, values: np.ndarray) -> np.ndarray:
+    def full_mass_matrix(self, values: ndarray) -> ndarray:
         """Mbar (..., nv, nv) of values (..., entries)."""
         i, j = self.triangle
         M = np.zeros((*values.shape[:-1], self.nv, self.nv), values.dtype)
@@ -162,24 +156,24 @@ class Equations:
         return M
 
 
-def packed(mass_matrix: np.ndarray, bias: np.ndarray) -> np.ndarray:
+def packed(mass_matrix: ndarray, bias: ndarray) -> ndarray:
     """Mbar (..., nv, nv) and h (..., nv) as `Equations` has them, (..., entries)."""
     i, j = np.tril_indices(np.shape(bias)[-1])
     return np.concatenate([np.asarray(mass_matrix)[..., i, j], bias], axis=-1)
 
 
 class Values(NamedTuple):
-    """Mbar and h with their tolerances, at states in the model's joints; NaN where a quantity is not given."""
+    """Mbar and h with their tolerances, in the model's joints; NaN where a quantity is not given."""
 
-    q: np.ndarray  # (states, nq)
-    qd: np.ndarray  # (states, nv)
-    mass_matrix: np.ndarray  # (states, nv, nv)
-    bias: np.ndarray  # (states, nv)
-    tolerances: tuple[np.ndarray, np.ndarray]  # of both
+    q: ndarray  # (states, nq)
+    qd: ndarray  # (states, nv)
+    mass_matrix: ndarray  # (states, nv, nv)
+    bias: ndarray  # (states, nv)
+    tolerances: tuple[ndarray, ndarray]  # of both
 
     @classmethod
     def of(
-        cls, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, mass_matrix: np.ndarray | None, bias: np.ndarray | None,
+        cls, tree: tmt.Tree, q: ndarray, qd: ndarray, mass_matrix: ndarray | None, bias: ndarray | None,
         rounding: float = FACTOR * EPS,
     ) -> "Values":  # fmt: skip
         """With the tolerances of judge.entries. None: not given; rounding: of the scale of an entry."""
@@ -189,12 +183,12 @@ class Values(NamedTuple):
         return cls(q, qd, M, h, (rounding * np.broadcast_to(scale.mass_matrix, shape), rounding * scale.bias))
 
     @property
-    def packed(self) -> np.ndarray:
+    def packed(self) -> ndarray:
         """As `Equations` has them, (states, entries)."""
         return packed(self.mass_matrix, self.bias)
 
     @property
-    def packed_tolerance(self) -> np.ndarray:
+    def packed_tolerance(self) -> ndarray:
         return packed(*self.tolerances)
 
     @property
@@ -202,8 +196,9 @@ class Values(NamedTuple):
         return bool(np.isfinite(self.packed).all())
 
 
-def coefficients_of(bias: Callable[[np.ndarray], np.ndarray], nv: int) -> dict[Entry, np.ndarray]:
-    """Coefficients of h, (states,) each: "gravity" (i,), and "velocity" (i, j, k) of qd_j qd_k, j <= k, in h_i.
+def coefficients_of(bias: Callable[[ndarray], ndarray], nv: int) -> dict[Entry, ndarray]:
+    """Coefficients of h, (states,) each: "gravity" (i,), and "velocity" (i, j, k) of qd_j qd_k, j <= k, in
+    h_i.
 
     bias: speeds (nv,) -> h (states, nv), of which the part that is even in the speeds is taken.
     """
@@ -219,7 +214,7 @@ def coefficients_of(bias: Callable[[np.ndarray], np.ndarray], nv: int) -> dict[E
     return found
 
 
-def unit_direction(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> list[np.ndarray]:
+def unit_direction(x: ndarray, y: ndarray, z: ndarray) -> list[ndarray]:
     """A direction at length 1."""
     length = np.sqrt(x * x + y * y + z * z)
     length = np.where(length == 0.0, 1.0, length)  # of a change that leaves no direction

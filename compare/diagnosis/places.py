@@ -1,7 +1,7 @@
 """The places where equations can be wrong by one number: of the model, of a term, of a coefficient.
 
-A change x of a place adds x times a coefficient to numbers of the tree, or x times a column of values to entries of Mbar or h.
-The zero of a joint is a convention and has rank 1; the other numbers have rank 2.
+A change x of a place adds x times a coefficient to numbers of the tree, or x times a column of values to
+entries of Mbar or h. The zero of a joint is a convention and has rank 1; the other numbers have rank 2.
 """
 
 from collections.abc import Iterator
@@ -56,12 +56,12 @@ class Place(NamedTuple):
         return not any(path.field in ("axis", "reference") for path, _ in self.moves)
 
     def value(self, change: float) -> float:
-        """The value after a change; 0 where only the digits of a fit remain. A hinge's zero moves by half a turn at most."""
+        """The value after a change (of a zero, half a turn at most); 0 if only digits of a fit remain."""
         value = self.stated + (within_a_turn(change, self.unit == "m") if self.kind == OF_ZERO else change)
         return 0.0 if abs(value) < FIT_ROUNDING * self.size else float(value)
 
     def is_possible(self, change: float) -> bool:
-        """Whether no mass, moment of inertia, damping or stiffness is below zero, and a part has a common factor."""
+        """Whether no mass, inertia, damping or stiffness is below zero, and a part has a common factor."""
         return self.value(change) >= self.least and (self.kind != "part" or is_common(self.value(change)))
 
     def cause(self, change: float) -> Cause:
@@ -109,9 +109,8 @@ def forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Place]:
         return Place("number", name, stated, unit, 1.0, column=force, least=least)
 
     for i, joint in enumerate(tree.coordinates.joints):
-        of_damping, of_stiffness, of_force = (
-            unit_of(unit, joint.kind) for unit in ("N m s/rad", "N m/rad", "N m")
-        )
+        units = [unit_of(unit, joint.kind) for unit in ("N m s/rad", "N m/rad", "N m")]
+        of_damping, of_stiffness, of_force = units
         for v in range(joint.qd.start, joint.qd.stop):
             speed, at_joint = qd[:, v : v + 1], np.eye(qd.shape[1])[v]
             yield place(f"damping of {names[v]}", of_damping, tree.damping[v], speed * at_joint)
@@ -181,7 +180,8 @@ def terms(equations: Equations) -> Iterator[Place]:
 def parts_of_terms(equations: Equations) -> Iterator[Place]:
     """The factor of each part of a term of a body in an entry of M, in M, and in M and h, for a few hinges.
 
-    T is a sum over the offsets of the joints that carry the body and its CoM, T' m T over pairs of these lengths.
+    T is a sum over the offsets of the joints that carry the body and its CoM, T' m T over pairs of these
+    lengths.
     """
     tree, in_M = equations.tree, equations.in_M
     if set(tree.kind) != {"hinge"} or equations.nv > MOST_HINGES:
@@ -209,9 +209,8 @@ def parts_of_bodies(equations: Equations) -> dict[str, np.ndarray]:
         absent = [(path, x) for path, x in all_numbers if (path.field, path.at[0]) not in present]
         return equations.values({path: np.array([-x]) for path, x in absent})[0]
 
-    lengths = {
-        f"offset of {name}": ("offset", i) for i, name in enumerate(tree.joint_names) if tree.parent[i] >= 0
-    }
+    carried = [i for i, parent in enumerate(tree.parent) if parent >= 0]
+    lengths = {f"offset of {tree.joint_names[i]}": ("offset", i) for i in carried}
     for b, body in enumerate(tree.body_names):
         mass = ("mass", b)
         parts[f"B' I B of {body}"] = alone(("inertia", b))

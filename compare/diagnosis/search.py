@@ -4,11 +4,12 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from math import inf
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-import tmt
+from tmt import Tree
 
 from ..core.cause import Cause
 from ..judge.scale import EPS, FACTOR
@@ -34,16 +35,12 @@ class Stated(NamedTuple):
 
 
 def diagnose(
-    tree: tmt.Tree,
-    values: Values,
-    seconds: float = np.inf,
-    bias: Bias | None = None,
-    stated: Stated | None = None,
+    tree: Tree, values: Values, seconds: float = inf, bias: Bias | None = None, stated: Stated | None = None
 ) -> Diagnosis:
     """What explains given values that differ from those of a tree's equations.
 
-    seconds: for the search of numbers, terms and pairs. bias: the given h at the same q and other speeds, if there is a function.
-    stated: how the joints were stated, which may be wrong; None: they cannot be.
+    seconds: for the search of numbers, terms and pairs. bias: the given h at the same q and other speeds, if
+    there is a function. stated: how the joints were stated, which may be wrong; None: they cannot be.
     """
     given, tolerance = values.packed, values.packed_tolerance
     with np.errstate(all="ignore"):  # values may be no numbers, or beyond the largest
@@ -91,8 +88,8 @@ class Explanations(NamedTuple):
     def ranks(self, singles: list[Fitted]) -> Iterator[list[Cause]]:
         """The explanations of each rank, computed when the previous ranks are empty. singles: that explain.
 
-        Where joints may be otherwise, numbers and terms that explain as much are listed too: whoever states the joints so,
-        and has a wrong number, agrees with a wrong model.
+        Where joints may be otherwise, numbers and terms that explain as much are listed too: whoever states
+        the joints so, and has a wrong number, agrees with a wrong model.
         """
         search, compared = self.search, self.compared
         options, of_joints = search.explained(program_options(self.equations)), self.of_joints()
@@ -145,7 +142,7 @@ class Explanations(NamedTuple):
         return JointMap(coordinates, joints)
 
     def restated(self, cause: Cause, convention: JointMap) -> list[Cause]:
-        """A cause with how the joints are to be stated in its convention; [] if both conventions together cannot be."""
+        """A cause with how joints are to be stated in its convention; [] if that cannot be."""
         if self.stated is None:
             return [cause]
         wrong, by = self.stated
@@ -162,7 +159,7 @@ class Explanations(NamedTuple):
 
 
 def order(cause: Cause) -> int:
-    """Of a cause of rank 2 in a list: slips and factors that are common mistakes, numbers, other factors, negative ones."""
+    """A key to sort causes of rank 2: slips and common factors, numbers, other factors, negative ones."""
     if cause.unit != "times" or not isinstance(cause.explains, float):
         return int(cause.kind != "slip")
     return 0 if is_common(cause.explains) else UNCOMMON + (cause.explains < 0.0)

@@ -1,4 +1,4 @@
-"""Common slips in a derivation: Mbar and h with each of them, made in the Jacobians and convective terms of one body or all."""
+"""Mbar and h with common slips in the Jacobians and convective terms of one body or all."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -15,7 +15,7 @@ from .variants import Variant
 
 
 def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
-    """For each slip: of single bodies; of all; these in M alone. The first of these lists that explains is meant."""
+    """For each slip: in single bodies; in all; these in M alone. The first list that explains is meant."""
     right, in_h, bodies = equations.right, equations.in_h, groups(equations.tree)
     gravity, parts = equations.tree.gravity, np.sum(list(equations.terms.values()), axis=0)
     for name, changed in changed_bodies(equations, equations.bodies):

@@ -1,4 +1,5 @@
-"""Explanations without a number to fit: options and conventions of joints, rank 1; slips.py has those of the derivation.
+"""Explanations without a number to fit: options and conventions of joints, rank 1; slips.py has those of the
+derivation.
 
 A variant is a cause with Mbar and h as they would be, as `Equations.values` has them.
 """
@@ -32,10 +33,8 @@ def program_options(equations: Equations) -> Iterator[Variant]:
     def option(place: str, stated: str, explains: str, values: np.ndarray) -> Variant:
         return Cause(rank=1, kind="option", place=place, stated=stated, explains=explains), values
 
-    weight, of_speeds = (
-        terms["gravity"].sum(axis=0),
-        np.sum([terms[name] for name in VELOCITY_TERMS], axis=(0, 1)),
-    )
+    weight = terms["gravity"].sum(axis=0)
+    of_speeds = np.sum([terms[name] for name in VELOCITY_TERMS], axis=(0, 1))
     yield option("gravity", "on", "off", equations.right - weight)
     yield option("sign of gravity", "+", "-", equations.right - 2.0 * weight)
     yield option("velocity terms in h", "there", "left out", equations.right - of_speeds)
@@ -63,7 +62,7 @@ def program_options(equations: Equations) -> Iterator[Variant]:
 
 
 def absolute_angles(tree: tmt.Tree) -> np.ndarray | None:
-    """Joint angles from the angles of bodies to the world, (nv, nv), in a row of parallel hinges; None: there is none."""
+    """Joint angles from angles to the world, (nv, nv), in a row of parallel hinges; None: there is none."""
     if set(tree.kind) != {"hinge"}:
         return None
     turns = np.eye(len(tree.axis))

@@ -24,14 +24,12 @@ def asked(mass_matrix=tmt.mass_matrix, bias=tmt.bias, tree=ARM):
 
 
 @pytest.mark.parametrize(
-    "tree", [ARM, reading.read(PATHS["gripper"]).tree, reading.read(PATHS["free_body"]).tree]
+    "tree", [ARM, *(reading.read(PATHS[name]).tree for name in ("gripper", "free_body"))]
 )
 def test_right_equations_meet_all(tree):
     found = asked(lambda q: tmt.mass_matrix(q, tree), lambda q, qd: tmt.bias(q, qd, tree), tree)
-    assert all(condition.is_met for condition in found) and len(found) >= 5
-    assert all(
-        condition.value < 0.5 * condition.tolerance for condition in found if condition.rule == "at most"
-    )
+    assert all(one.is_met for one in found) and len(found) >= 5
+    assert all(one.value < 0.5 * one.tolerance for one in found if one.rule == "at most")
 
 
 def with_skew(q):
@@ -50,7 +48,7 @@ FAULTS = {  # of an M that is not symmetric the power is not asked
     "not definite": (lambda q: tmt.mass_matrix(q) - 0.1 * np.eye(3), tmt.bias, [DEFINITE]),
     "no gradient": (
         tmt.mass_matrix,
-        lambda q, qd: tmt.bias(q, qd) + 1e-5 * q[:, [1, 1, 1]] * [1, 0, 0],
+        lambda q, qd: tmt.bias(q, qd) + 1e-5 * q[:, 1:2] * [1, 0, 0],
         [GRADIENT],
     ),
     "damping": (tmt.mass_matrix, lambda q, qd: tmt.bias(q, qd) + 1e-9 * qd, [EVEN]),
@@ -75,6 +73,5 @@ def test_the_power_is_that_of_M_to_the_rounding_of_its_difference_quotient(share
         lambda q: np.tile(np.diag([2.0, 1.0]), (len(q), 1, 1)), lambda q, qd: share * allowed * qd**2 * [1.0, 0.0],
         of_slides, np.zeros((1, 2)), qd,
     )  # fmt: skip
-    assert (
-        power.unit == "W" and power.tolerance == pytest.approx(allowed, rel=1e-6) and power.is_met is is_met
-    )
+    assert power.unit == "W" and power.is_met is is_met
+    assert power.tolerance == pytest.approx(allowed, rel=1e-6)

@@ -73,17 +73,14 @@ CAUSES = {  # the given values, or the tree whose values these are: rank, place 
     "no bias": (added(slice(6, None), 0.0, 0.0), 1, "bias", "left out", False),
     "an armature": (added(5, 0.1), 2, "armature of gamma", 0.1, False),
     "two numbers": (
-        replace(HEAVY, gravity=(0.0, 0.0, -9.8)), 3, "mass of forearm and gravity z", "1.52 and -9.8", False,
-    ),
+        replace(HEAVY, gravity=(0.0, 0.0, -9.8)), 3, "mass of forearm and gravity z", "1.52 and -9.8", False),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("given, rank, place, explains, alone", CAUSES.values(), ids=CAUSES)
 def test_a_cause_is_named_with_its_value_and_its_rank(given, rank, place, explains, alone):
     causes = diagnosis(given, DAMPED if "D qd" in place else ARM).causes
-    assert {cause.rank for cause in causes} == {rank} and {cause.tied for cause in causes} == {
-        len(causes) - 1
-    }
+    assert {(cause.rank, cause.tied) for cause in causes} == {(rank, len(causes) - 1)}
     assert len(causes) == 1 or not alone
     (cause,) = (cause for cause in causes if cause.place == place)
     assert cause.explains == (explains if isinstance(explains, str) else pytest.approx(explains, rel=1e-9))
@@ -233,12 +230,8 @@ def test_two_numbers_that_differ_are_not_printed_as_one(values):
 
 def test_slides_have_powers():
     """A cart with a rod: M[slide][slide] is the constant, M[slide][hinge] has cos(hinge)."""
-    cart = {
-        "kind": ("slide", "hinge"),
-        "axis": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
-        "offset": ((0.0,) * 3,) * 2,
-    }
-    tree = replace(TREE, joint_names=("cart", "rod"), **cart)
+    cart = {"kind": ("slide", "hinge"), "axis": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))}
+    tree = replace(TREE, joint_names=("cart", "rod"), offset=((0.0,) * 3,) * 2, **cart)
     given = values(tree, RODS, SPEEDS)
     given[:, 0] += 0.3 * HIP * np.cos(KNEE)
     (cause,) = diagnosis(given, tree).causes

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 
 import numpy as np
+from numpy import ndarray
 from numpy.typing import ArrayLike
 
 import tmt
@@ -46,8 +47,8 @@ class Own:
 class OwnDynamics:
     """A case in a user's equations.
 
-    A case without gravity subtracts the gravity of the equations, or their bias at rest. Added damping acts as a torque. Locked
-    joints have no rows and columns.
+    A case without gravity subtracts the gravity of the equations, or their bias at rest. Added damping acts
+    as a torque. Locked joints have no rows and columns.
     """
 
     def __init__(self, equations: OwnEquations, case: Case):
@@ -63,27 +64,27 @@ class OwnDynamics:
     def has(self, name: str) -> bool:
         return self.equations.has(name)
 
-    def all_q(self, q: ArrayLike) -> np.ndarray:
+    def all_q(self, q: ArrayLike) -> ndarray:
         """The positions of all joints, those of the locked ones too, (..., nq)."""
         return inserted(self.still_q, self.free_q, q)
 
-    def all_v(self, v: ArrayLike) -> np.ndarray:
+    def all_v(self, v: ArrayLike) -> ndarray:
         """The speeds of all joints, zero for the locked ones, (..., nv)."""
         return inserted(self.still_v, self.free_v, v)
 
-    def mass_matrix(self, q: ArrayLike) -> np.ndarray:
+    def mass_matrix(self, q: ArrayLike) -> ndarray:
         return self.equations.mass_matrix(self.all_q(q))[..., self.free_v, :][..., self.free_v]
 
-    def bias(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+    def bias(self, q: ArrayLike, v: ArrayLike) -> ndarray:
         q, v = self.all_q(q), self.all_v(v)
         h = self.equations.bias(q, v)
         return (h if self.case.scene.gravity else h - self.equations.gravity_balance(q))[..., self.free_v]
 
-    def gravity_balance(self, q: ArrayLike) -> np.ndarray:
+    def gravity_balance(self, q: ArrayLike) -> ndarray:
         weight = self.equations.gravity_balance(self.all_q(q))
         return weight[..., self.free_v] * self.case.scene.gravity
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
         case, equations = self.case, self.equations
         if case.locked:
             forces = tau - passive(self.tree, q, v) - self.bias(q, v)
@@ -91,17 +92,17 @@ class OwnDynamics:
         lifted = 0.0 if case.scene.gravity else equations.gravity_balance(q)
         return equations.acceleration(q, v, np.asarray(tau) - case.added_damping * v + lifted)
 
-    def energy(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+    def energy(self, q: ArrayLike, v: ArrayLike) -> ndarray:
         return self.equations.energy(self.all_q(q), self.all_v(v))
 
-    def potential_energy(self, q: ArrayLike) -> np.ndarray:
+    def potential_energy(self, q: ArrayLike) -> ndarray:
         """The energy at rest, J, (...), from the zero of the equations."""
         return self.energy(q, np.zeros(self.coordinates.nv))
 
-    def com_positions(self, q: ArrayLike) -> np.ndarray:
+    def com_positions(self, q: ArrayLike) -> ndarray:
         return self.equations.com_positions(self.all_q(q))
 
-    def jacobians(self, q: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    def jacobians(self, q: ArrayLike) -> tuple[ndarray, ndarray]:
         T, B = self.equations.jacobians(self.all_q(q))
         return T[..., self.free_v], B[..., self.free_v]
 
@@ -117,7 +118,7 @@ class OwnDynamics:
         states = np.full((len(q), steps + 1, nq + v.shape[1]), np.nan)
         states[:, 0] = np.concatenate([q, v], axis=1)
 
-        def slope(q: list[np.ndarray], v: list[np.ndarray]) -> list[np.ndarray]:
+        def slope(q: list[ndarray], v: list[ndarray]) -> list[ndarray]:
             q_rows, v_rows = (np.stack([np.broadcast_to(a, len(torque)) for a in x], axis=-1) for x in (q, v))
             return list(np.moveaxis(self.acceleration(q_rows, v_rows, torque), -1, 0))
 
@@ -133,9 +134,7 @@ class OwnDynamics:
         ended = np.array([why for _, why in runs], dtype=object).reshape(batch)[()]
         return Motion(t, paths[..., :nq], paths[..., nq:], 4 * steps * len(q), ended, steps)
 
-    def prepare(
-        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, setting: Setting, method: str
-    ) -> Prepared:
+    def prepare(self, q: ndarray, v: ndarray, tau: ndarray, setting: Setting, method: str) -> Prepared:
         steps, every = setting.steps or 0, setting.every
 
         def run() -> Motion:
@@ -148,7 +147,7 @@ class OwnDynamics:
         return run, read
 
 
-def inserted(still: np.ndarray, free: list[int], values: ArrayLike) -> np.ndarray:
+def inserted(still: ndarray, free: list[int], values: ArrayLike) -> ndarray:
     """The numbers of all joints, (..., n), of which the free ones have these values."""
     values = np.asarray(values, float)
     every = np.broadcast_to(still, (*values.shape[:-1], len(still))).copy()

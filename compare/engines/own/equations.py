@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy import ndarray
 from numpy.typing import ArrayLike
 
 import tmt
@@ -17,13 +18,13 @@ from ...robots.coordinates import Coordinates
 from ...robots.joint_map import JointMap, JointsError, joint_map
 from .. import rows_of_states
 from . import functions
-from .functions import QUANTITIES, STATE, OwnError, Problem, Shape, call, state_in_words
+from .functions import QUANTITIES, STATE, OwnError, Problem, call, state_in_words
 
 SKEW = 1e-9  # of the largest entry: a mass matrix with a larger asymmetry is reported as not symmetric
 DIVERGED = 2.0**49  # rad etc.: beyond it a run has diverged, and errors are not those of the equations
 
 States = Sequence[
-    np.ndarray
+    ndarray
 ]  # q (states, nq), and qd and tau (states, nv) where they are needed; or of one state (nq,) ...
 
 
@@ -38,11 +39,12 @@ class Noted(NamedTuple):
 class OwnEquations:
     """A user's equations; quantities at any states of the model's joints, q (..., nq), v and tau (..., nv).
 
-    source: an object or module with mass_matrix(q) and bias(q, qd), or a mapping of such names to functions; further functions
-    see QUANTITIES; `joint_names` if it has them. Or a tmt.Tree. Or the same names with SymPy matrices, and `symbols`.
-    joints: the map from its joints to the model's; None: by its own names if it has them, else the model's.
-    tree: the model's equations; their damping and springs are used if the source has no acceleration. required: functions that
-    the source must have. OwnError for a source that cannot be used.
+    source: an object or module with mass_matrix(q) and bias(q, qd), or a mapping of such names to functions;
+    further functions see QUANTITIES; `joint_names` if it has them. Or a tmt.Tree. Or the same names with
+    SymPy matrices, and `symbols`. joints: the map from its joints to the model's; None: by its own names if
+    it has them, else the model's. tree: the model's equations; their damping and springs are used if the
+    source has no acceleration. required: functions that the source must have. OwnError for a source that
+    cannot be used.
     """
 
     def __init__(
@@ -59,9 +61,8 @@ class OwnEquations:
             self.joints = joints or joint_map(coordinates, functions.names_of(source))
         except JointsError as error:
             raise OwnError(f"joint_names: {error}") from None
-        self.shapes: dict[str, Shape] = {
-            name: quantity.shape_for(coordinates.nv) for name, quantity in QUANTITIES.items()
-        }
+        nv = coordinates.nv
+        self.shapes = {name: quantity.shape_for(nv) for name, quantity in QUANTITIES.items()}  # of one state
         # of each function that was called
         self.takes_batches: dict[str, bool] = {}
         self.times: dict[str, tuple[float, float]] = {}  # of one state, alone and in a batch, s
@@ -92,7 +93,7 @@ class OwnEquations:
 
     # quantities at states
 
-    def mass_matrix(self, q: ArrayLike) -> np.ndarray:
+    def mass_matrix(self, q: ArrayLike) -> ndarray:
         """Mbar, kg m2, (..., nv, nv)."""
         M = self.values_of("mass_matrix", q)
         rows, own_q = M.reshape(-1, *M.shape[-2:]), self.own_states(rows_of_states(q)[1])
@@ -101,18 +102,18 @@ class OwnEquations:
         self.note("mass_matrix", "is not symmetric", own_q, skew > SKEW * np.abs(rows).max(axis=(1, 2)))
         return self.joints.mass_matrix(M)
 
-    def bias(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+    def bias(self, q: ArrayLike, v: ArrayLike) -> ndarray:
         """h, N m, (..., nv)."""
         return self.joints.forces(self.values_of("bias", q, v))
 
-    def gravity_balance(self, q: ArrayLike) -> np.ndarray:
+    def gravity_balance(self, q: ArrayLike) -> ndarray:
         """Its gravity, or its bias at rest, N m, (..., nv)."""
         if self.has("gravity"):
             return self.joints.forces(self.values_of("gravity", q))
         return self.bias(q, np.zeros(self.coordinates.nv))
 
-    def acceleration(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> np.ndarray:
-        """rad/s2, (..., nv): its own, or from Mbar a = tau - D v - k (q - rest) - h with the model's damping and springs."""
+    def acceleration(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> ndarray:
+        """rad/s2, (..., nv): its own, or from Mbar a = tau - D v - k (q - rest) - h, D and k of the model."""
         if self.has("acceleration"):
             return self.joints.forces(self.values_of("acceleration", q, v, tau))
         batch, (q, v, tau) = rows_of_states(q, v, tau)
@@ -127,21 +128,21 @@ class OwnEquations:
                 self.note("mass_matrix", "is singular", self.own_states([q]), np.arange(len(q)) == i)
         return solved.reshape(*batch, -1)
 
-    def energy(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+    def energy(self, q: ArrayLike, v: ArrayLike) -> ndarray:
         """J, (...); its zero is its own."""
         return self.values_of("energy", q, v)
 
-    def com_positions(self, q: ArrayLike) -> np.ndarray:
+    def com_positions(self, q: ArrayLike) -> ndarray:
         """m, (..., m, 3)."""
         return self.values_of("com_positions", q)
 
-    def jacobians(self, q: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    def jacobians(self, q: ArrayLike) -> tuple[ndarray, ndarray]:
         """T_b and B_b, (..., m, 3, nv)."""
         T, B = np.moveaxis(self.values_of("jacobians", q), -4, 0)
         return self.joints.forces(T), self.joints.forces(B)
 
     def try_at(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> None:
-        """Call every function at the first of some states until its time is known; OwnError if one cannot be used."""
+        """Call every function at the first of some states; OwnError if one cannot be used."""
         states = self.own_states(rows_of_states(q, v, tau)[1])
         for name in self.functions:
             if name not in self.takes_batches:
@@ -149,8 +150,8 @@ class OwnEquations:
 
     # how functions are called
 
-    def values_of(self, name: str, *states: ArrayLike) -> np.ndarray:
-        """The values of a function at states of the model's joints, in its own joints; NaN where it raised."""
+    def values_of(self, name: str, *states: ArrayLike) -> ndarray:
+        """The values of a function at states of the model, in its own joints; NaN where it raised."""
         if not self.has(name):
             raise OwnError(f"the equations have no {call(name)}")
         batch, rows = rows_of_states(*states)
@@ -165,12 +166,12 @@ class OwnEquations:
         values[finite] = computed
         return values.reshape((*batch, *values.shape[1:]))
 
-    def own_states(self, rows: States) -> list[np.ndarray]:
+    def own_states(self, rows: States) -> list[ndarray]:
         """q, qd and tau, those that are given, in the user's joints."""
         ways = (self.joints.own_positions, self.joints.own_speeds, self.joints.own_forces)
         return [way(part) for way, part in zip(ways, rows)]
 
-    def each(self, name: str, states: States) -> tuple[np.ndarray, np.ndarray]:
+    def each(self, name: str, states: States) -> tuple[ndarray, ndarray]:
         """Values (states, ...) at states in the user's joints, NaN where it raised; and where it raised."""
         raised = np.zeros(len(states[0]), bool)
         if self.takes_batches.get(name) and len(raised):
@@ -191,7 +192,7 @@ class OwnEquations:
     def first(self, name: str, states: States) -> None:
         """Call a function at one state (OwnError if it fails), then find out whether it takes batches."""
         count = 3 if self.coordinates.nv == 2 else 2  # not as many as there are joints
-        singles: list[np.ndarray] = []
+        singles: list[ndarray] = []
         times = []
         for i in range(min(count, len(states[0]))):
             state = [part[i] for part in states]
@@ -214,8 +215,8 @@ class OwnEquations:
         if len(states[0]) > 1:  # else another time
             self.takes_batches.setdefault(name, False)
 
-    def tried_together(self, name: str, states: States) -> np.ndarray | None:
-        """Values of several states at once; None if it does not take batches. No error is noted: it need not take them."""
+    def tried_together(self, name: str, states: States) -> ndarray | None:
+        """Values of several states at once; None if it does not take batches, which is no error."""
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore")
@@ -223,10 +224,8 @@ class OwnEquations:
         except OwnError:
             return None
 
-    def called(
-        self, name: str, states: States, count: int | None = None, is_trial: bool = False
-    ) -> np.ndarray:
-        """The value of a function at one state, or at count of them; OwnError if it raised or returned anything else."""
+    def called(self, name: str, states: States, count: int | None = None, is_trial: bool = False) -> ndarray:
+        """The value of a function at one state, or at count of them; OwnError if it is none."""
         copies = [np.array(part) for part in states]
         try:
             value = self.functions[name](*copies)
@@ -243,7 +242,7 @@ class OwnEquations:
         if name != "jacobians":
             return functions.converted(name, value, shape)
         of_part = (*shape[:-4], *shape[-3:])
-        if not isinstance(value, tuple | list | np.ndarray) or len(value) != 2:
+        if not isinstance(value, tuple | list | ndarray) or len(value) != 2:
             wanted = f"two arrays, T and B, of shape (bodies, 3, {shape[-1]})"
             raise OwnError(f"jacobians is {shown(value)}; expected {wanted}")
         return np.stack([functions.converted(name, part, of_part) for part in value], axis=-4)
@@ -256,7 +255,7 @@ class OwnEquations:
             return f"; expected {call(name)}"
         return ""
 
-    def note(self, name: str, what: str, states: States, where: np.ndarray) -> None:
+    def note(self, name: str, what: str, states: States, where: ndarray) -> None:
         """Add an error at those of the states (states, n), in the user's joints, where it occurred."""
         where = np.logical_and.reduce([where, *((np.abs(part) <= DIVERGED).all(axis=1) for part in states)])
         if where.any():
@@ -267,7 +266,7 @@ class OwnEquations:
             noted.states.update(hash(row.tobytes()) for row in rows)
 
 
-def passive(tree: tmt.Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def passive(tree: tmt.Tree, q: ndarray, v: ndarray) -> ndarray:
     """The torque of damping and springs, N m, (..., nv); NaN where q is."""
     springs = method.spring_torque(tree, list(np.moveaxis(q, -1, 0)))
     return np.array(tree.damping) * v + np.stack(np.broadcast_arrays(*springs), axis=-1)

@@ -1,4 +1,4 @@
-"""A user's equations as functions, from an object, a module, a mapping, a Tree or SymPy matrices; and their values as arrays."""
+"""A user's equations as functions, in whatever form they are given, and their values as arrays."""
 
 import traceback
 from collections.abc import Callable, Mapping, Sequence
@@ -64,17 +64,13 @@ def functions_of(source: object, coordinates: Coordinates, required: Sequence[st
         return of_tree(source, coordinates)
     symbols = attribute(source, "symbols")
     values = {name: attribute(source, name) for name in QUANTITIES}
-    functions = {
-        name: function_of(name, value, symbols, coordinates)
-        for name, value in values.items()
-        if value is not None
-    }
-    if missing := [name for name in required if name not in functions]:
-        raise OwnError(
-            f"{source_name(source)} has no {missing[0]}; expected {' and '.join(map(call, required))}"
-        )
+    values = {name: value for name, value in values.items() if value is not None}
+    functions = {name: function_of(name, value, symbols, coordinates) for name, value in values.items()}
+    missing, name = [name for name in required if name not in functions], source_name(source)
+    if missing:
+        raise OwnError(f"{name} has no {missing[0]}; expected {' and '.join(map(call, required))}")
     if not functions:
-        raise OwnError(f"{source_name(source)} has none of {', '.join(map(call, QUANTITIES))}")
+        raise OwnError(f"{name} has none of {', '.join(map(call, QUANTITIES))}")
     return functions
 
 
@@ -108,12 +104,11 @@ def names_of(source: object) -> Sequence[str] | None:
 
 
 def of_tree(tree: tmt.Tree, coordinates: Coordinates) -> dict[str, Function]:
-    own = tree.coordinates
-    if (own.nq, own.nv) != (coordinates.nq, coordinates.nv):
-        raise OwnError(
-            f"the Tree has {own.nq} positions and {own.nv} speeds ({', '.join(tree.joint_names)}); "
-            f"expected {coordinates.nq} and {coordinates.nv} ({', '.join(coordinates.names)})"
-        )
+    nq, nv = tree.coordinates.nq, tree.coordinates.nv
+    if (nq, nv) != (coordinates.nq, coordinates.nv):
+        has = f"{nq} positions and {nv} speeds ({', '.join(tree.joint_names)})"
+        wanted = f"{coordinates.nq} and {coordinates.nv} ({', '.join(coordinates.names)})"
+        raise OwnError(f"the Tree has {has}; expected {wanted}")
     return {name: partial(getattr(tmt, method), model=tree) for name, method in METHOD_NAMES.items()}
 
 
@@ -141,7 +136,10 @@ def function_of(name: str, value: Any, symbols: object, coordinates: Coordinates
 
 
 def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Coordinates) -> Function:
-    """The function of a SymPy matrix or expression. given_symbols: of q, or of q and qd, or of q, qd and tau, in order."""
+    """The function of a SymPy matrix or expression.
+
+    given_symbols: of q, or of q and qd, or of q, qd and tau, in order.
+    """
     import sympy
 
     def flat(value: Any) -> list[Any]:

@@ -1,7 +1,8 @@
 """A user's equations from a Python file or a module: FILE.py:OBJECT or MODULE:OBJECT.
 
-The last colon separates them, so that FILE may start with a Windows drive. OBJECT may be dotted; without it the object is the
-module itself. While it is imported, print writes to stderr, and no compiled files are written.
+The last colon separates them, so that FILE may start with a Windows drive. OBJECT may be dotted; without it
+the object is the module itself. While it is imported, print writes to stderr, and no compiled files are
+written.
 """
 
 import difflib
@@ -30,7 +31,7 @@ class OwnFileError(ValueError):
 
 
 def own_object(stated: str) -> object:
-    """The object that FILE.py:OBJECT or MODULE:OBJECT names; a class is instantiated. OwnFileError, in one line."""
+    """The object that FILE.py:OBJECT or MODULE:OBJECT names; a class is instantiated. OwnFileError."""
     place, _, name = stated.rpartition(":")
     if not place:
         raise OwnFileError(f"{stated!r} names neither a file nor a module; expected {FORMS_OF_REFERENCE}")
@@ -52,13 +53,13 @@ def module_of_file(place: str) -> ModuleType:
     if path.is_dir():
         raise OwnFileError(f"{place} is a folder; expected a Python file")
     if not path.is_file():
-        neighbours = path.parent.glob("*.py") if path.parent.is_dir() else ()
-        raise OwnFileError(
-            f"{place}: no such file{close_names(path.name, [other.name for other in neighbours])}"
-        )
+        neighbours = [file.name for file in path.parent.glob("*.py")]
+        raise OwnFileError(f"{place}: no such file{close_names(path.name, neighbours)}")
     name = f"compare_own_{path.stem}"  # a name that nothing else has: a file numpy.py shadows no package
     loader = importlib.machinery.SourceFileLoader(name, str(path.resolve()))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
+    spec = importlib.util.spec_from_loader(name, loader)
+    assert spec is not None  # since there is a loader
+    module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # dataclasses look for it there
     loader.exec_module(module)
     return module
@@ -73,9 +74,8 @@ def module_named(name: str) -> ModuleType:
         except ModuleNotFoundError:
             spec = None
     if spec is None:
-        raise OwnFileError(
-            f"{name}: no such module{close_names(name, [path.stem for path in Path().glob('*.py')])}"
-        )
+        neighbours = [file.stem for file in Path().glob("*.py")]
+        raise OwnFileError(f"{name}: no such module{close_names(name, neighbours)}")
     return importlib.import_module(name)
 
 
@@ -93,15 +93,15 @@ def part_of(module: ModuleType, place: str, name: str) -> object:
 
 def close_names(name: str, known: Sequence[str]) -> str:
     """The names that are close to one, else all if they are few, for a message."""
-    close = difflib.get_close_matches(name, known, 3, 0.6) or (
-        list(known) if len(known) <= SHOWN_NAMES else []
-    )
+    close = difflib.get_close_matches(name, known, 3, 0.6)
+    if not close and len(known) <= SHOWN_NAMES:
+        close = list(known)
     return f"; known: {listed(close)}" if close else ""
 
 
 @contextmanager
 def raised_in(place: str) -> Iterator[None]:
-    """An error of a user's code in this block becomes an OwnFileError of one line, with its line in the user's file."""
+    """Make an error of a user's code an OwnFileError of one line, with its line in the user's file."""
     try:
         yield
     except (OwnFileError, OwnError):
@@ -109,9 +109,8 @@ def raised_in(place: str) -> Iterator[None]:
     except SyntaxError as error:
         text = f": {' '.join(error.text.split())[:60]}" if error.text else ""
         where = place if Path(error.filename or place).stem == Path(place).stem else error.filename
-        raise OwnFileError(
-            f"{where}, line {error.lineno}: {type(error).__name__}, {error.msg}{text}"
-        ) from None
+        what = f"{type(error).__name__}, {error.msg}{text}"
+        raise OwnFileError(f"{where}, line {error.lineno}: {what}") from None
     except BaseException as error:  # also SystemExit: the file may be a script
         if is_interrupt(error):
             raise
