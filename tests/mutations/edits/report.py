@@ -22,7 +22,7 @@ EDITS = (
          "the numbers of another tree are those of this one"),
     Edit("run.explained", "lifted_less_work", "np.full(len(q), np.nan)", "np.zeros(len(q))",
          "the potential of balls is explained"),
-    Edit("run.explained", "what_follows", "module('diagnosis').is_solved(*_1)", "True",
+    Edit("run.explained", "what_follows", "diagnosis.is_solved(*_1)", "True",
          "accelerations that are wrong at rare states are explained"),
     Edit("run.explained", "explained", "_1 not in still", "True", "one wrong number of a file explains all"),
     Edit("run.explained", "what_follows", "found.force_ratio <= 1.0 or bool(found.of_forces)", "True",
