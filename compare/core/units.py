@@ -1,17 +1,17 @@
-"""Tables of a robot whose joints do not all move in rad."""
+"""Tables of dictionaries of a robot whose joints do not all move in rad; a MovementRow needs none of this."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 
-def renamed(rows: Sequence[dict], unit: str) -> list[dict]:
+def renamed(rows: Sequence[Mapping[str, Any]], unit: str) -> list[dict[str, Any]]:
     """Rows with the suffix _rad of columns replaced by a column `unit`, unless the unit is rad."""
     if unit == "rad":
-        return list(rows)
-    return [
-        {name.removesuffix("_rad"): value for name, value in row.items()} | {"unit": unit} for row in rows
-    ]
+        return [dict(row) for row in rows]
+    in_unit = [{name.removesuffix("_rad"): value for name, value in row.items()} for row in rows]
+    return [row | {"unit": unit} for row in in_unit]
 
 
-def value(row: dict, name: str) -> object:
+def value(row: Mapping[str, Any], name: str) -> Any:
     """The value of a column, with or without the suffix _rad."""
     return row[name + "_rad"] if name + "_rad" in row else row[name]
