@@ -9,9 +9,8 @@ from .process import interrupt, streams
 if __name__ == "__main__":
     streams.prepare()
     os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")  # it clears up after an interrupt
-    os.environ.setdefault(
-        "MUJOCO_GL", "disabled"
-    )  # nothing is rendered: no further process looks for a display
+    # nothing is rendered: no further process looks for a display
+    os.environ.setdefault("MUJOCO_GL", "disabled")
     # the matrices are small, and other processes compute too: threads of a product would wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     interrupt.listen()  # before anything that takes its time

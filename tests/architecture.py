@@ -5,6 +5,7 @@ test_structure asserts the directions of these imports, and that the diagram sho
 
 import ast
 import re
+from collections import Counter
 from functools import cache
 from pathlib import Path
 
@@ -61,13 +62,9 @@ def folder(module: str) -> str:
 
 def folder_imports() -> dict[tuple[str, str], int]:
     """How many imports there are from a folder to another."""
-    counts = {}
-    for path in [*FILES, *OF_TMT]:
-        for name in modules_imported(path):
-            pair = folder(dotted(path)), folder(name)
-            if pair[0] != pair[1]:
-                counts[pair] = counts.get(pair, 0) + 1
-    return counts
+    pairs = [(path, name) for path in [*FILES, *OF_TMT] for name in modules_imported(path)]
+    counts = Counter((folder(dotted(path)), folder(name)) for path, name in pairs)
+    return {pair: count for pair, count in counts.items() if pair[0] != pair[1]}
 
 
 def reached(pairs, start: str) -> set[str]:
@@ -104,9 +101,8 @@ def diagram() -> str:
 
 def drawn() -> list[tuple[str, str]]:
     """The arrows of the diagram in ARCHITECTURE.md."""
-    return re.findall(
-        r"^  (\S+) --> (\S+)$", DIAGRAM.search(PAGE.read_text(encoding="utf-8"))[0], re.MULTILINE
-    )
+    (text,) = DIAGRAM.findall(PAGE.read_text(encoding="utf-8"))
+    return re.findall(r"^  (\S+) --> (\S+)$", text, re.MULTILINE)
 
 
 if __name__ == "__main__":

@@ -46,9 +46,8 @@ def of_crane():
         report = verdict.Report(sections, robot, {"command": "c"}, words, causes, list(reasons.items()))
         files.write(folder, report)
         texts = {name: (folder / name).read_text(encoding="utf-8") for name in ("report.md", "results.json")}
-        sizes = {
-            path.name.removesuffix(".png"): path.stat().st_size for path in (folder / "figures").iterdir()
-        }
+        figures = (folder / "figures").iterdir()
+        sizes = {path.name.removesuffix(".png"): path.stat().st_size for path in figures}
     for section in sections:
         section.result.curves = {}  # which need not be sent
     return SimpleNamespace(sections=sections, reasons=reasons, lines=lines, texts=texts, sizes=sizes)

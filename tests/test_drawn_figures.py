@@ -18,18 +18,13 @@ def flaws(figure) -> list[str]:
     figure.draw_without_rendering()
     panels = [ax for ax in figure.findobj(Axes) if ax.get_visible()]
     flat = [ax for ax in panels if ax.name != "3d"]
-    written = [
-        (text.get_text(), Text.get_window_extent(text).extents) for text in texts_of(figure, panels, flat)
-    ]
-    small = (text for text in texts_of(figure, panels, flat) if text.get_fontsize() < SMALLEST)
-    found = [f"too small: {text.get_text()!r}" for text in small]
+    texts = texts_of(figure, panels, flat)
+    written = [(text.get_text(), Text.get_window_extent(text).extents) for text in texts]
+    found = [f"too small: {text.get_text()!r}" for text in texts if text.get_fontsize() < SMALLEST]
     found += [f"cut: {text!r}" for text, box in written if cut(box, figure.bbox.extents)]
     for k, (text, box) in enumerate(written):
-        found += [
-            f"on each other: {text!r} and {other!r}"
-            for other, its_box in written[:k]
-            if overlap(box, its_box)
-        ]
+        others = [other for other, its_box in written[:k] if overlap(box, its_box)]
+        found += [f"on each other: {text!r} and {other!r}" for other in others]
     for ax in flat:
         offsets = (axis.get_offset_text().get_text() for axis in (ax.xaxis, ax.yaxis))
         found += [f"a factor at the end of an axis: {text}" for text in offsets if text]

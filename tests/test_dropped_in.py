@@ -101,9 +101,8 @@ def test_all_runs_them_and_the_report_and_the_chart_of_speed_have_them(copy):
     printed = output(copy, "all", "--quick", "--mjcf", "models/pendulum.xml", "--out", "report")
     assert "trace" in printed
     checks = json.loads((copy / "report/results.json").read_text())["checks"]
-    assert [check["value"] for check in checks if check["experiment"] == "trace"] == pytest.approx(
-        [0.5e-9], rel=1e-3
-    )
+    values = [check["value"] for check in checks if check["experiment"] == "trace"]
+    assert values == pytest.approx([0.5e-9], rel=1e-3)
     report = (copy / "report/report.md").read_text()
     assert "Trace of the" in report and "Compared at" in report and "A caption with the number 3." in report
     with open(copy / "report/tables/speed.csv", newline="") as file:

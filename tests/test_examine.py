@@ -36,17 +36,14 @@ def made(monkeypatch, name, **functions):
 def only(monkeypatch, *names):
     """These are all experiments that there are."""
     for module in (command, command_line, experiment):
-        monkeypatch.setattr(
-            module, "EXPERIMENTS", {name: EXPERIMENTS.get(name, Experiment(0)) for name in names}
-        )
+        records = {name: EXPERIMENTS.get(name, Experiment()) for name in names}
+        monkeypatch.setattr(module, "EXPERIMENTS", records)
 
 
 def ran(tmp_path, *arguments):
     """Exit status and results.json, None if there is no report."""
-    status, path = (
-        main([*arguments, "--quick", "--out", str(tmp_path / "out")]),
-        tmp_path / "out" / "results.json",
-    )
+    path = tmp_path / "out" / "results.json"
+    status = main([*arguments, "--quick", "--out", str(path.parent)])
     return status, json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
 
 
@@ -63,9 +60,7 @@ BROKEN = {  # functions of the experiment; the check that fails, and the error t
 }  # fmt: skip
 
 
-def test_an_experiment_that_raises_is_one_failed_check_and_a_part_that_breaks_is_said(
-    tmp_path, capsys, monkeypatch
-):
+def test_what_raises_is_one_failed_check_and_a_part_that_breaks_is_said(tmp_path, capsys, monkeypatch):
     for name, (functions, *_) in BROKEN.items():
         made(monkeypatch, name, **functions)
     made(monkeypatch, "odd", rows=lambda setup: Result("odd", shown=["a", "b"], rows=[{"a": 1.5}]))
@@ -97,10 +92,8 @@ def test_a_part_of_a_report_that_breaks_fails_the_run_although_all_checks_pass(t
 
 
 def test_a_problem_of_a_users_function_is_told_once_by_an_experiment_that_asks_it():
-    problems, reported = (
-        [SimpleNamespace(quantity=name, text="NaN") for name in ("bias", "mass_matrix")],
-        set(),
-    )
+    problems = [SimpleNamespace(quantity=name, text="NaN") for name in ("bias", "mass_matrix")]
+    reported = set()
     for name, told in (("mass", ["mass_matrix"]), ("mass", []), ("acceleration", ["bias"])):
         result = Result(name)
         experiment.add_problems(result, problems, reported)
@@ -176,10 +169,7 @@ def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, m
 
 
 def test_figures_whose_names_differ_in_capitals_are_two_files(tmp_path, monkeypatch):
-    made(
-        monkeypatch,
-        "two",
-        figures=lambda result, robot: [partial(plot, None, name) for name in ("first", "First")],
-    )
+    figures = [partial(plot, None, name) for name in ("first", "First")]
+    made(monkeypatch, "two", figures=lambda result, robot: figures)
     assert drawing.draw("two", None, ARM, tmp_path, {}) == [("first", "A caption."), ("First_", "A caption.")]
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["First_.png", "first.png"]

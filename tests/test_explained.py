@@ -81,17 +81,21 @@ def test_what_is_the_users_own_must_follow_from_the_m_and_h_that_the_cause_expla
         assert {check.experiment for check in left} == stands
 
 
+def setup_of_heavy(tmp_path):
+    """The arm, whose forearm weighs 1.51 kg for 1.5 in MuJoCo's file."""
+    file = tmp_path / "heavy.xml"
+    file.write_text(Path("mjcf/arm.xml").read_text().replace('mass="1.5"', 'mass="1.51"'))
+    _, robot, mujoco, reading = compared_with("arm", str(file))
+    size = {"states": 30, "exact_states": 1, "finer": (1,), "size": "quick"}
+    return Setup(robot, engines(mujoco), reading=reading, **size)
+
+
 @pytest.mark.parametrize("wrong, stands", [(0.0, {"parameters"}), (1e-9, set(NAMES) - {"mass"})])
 def test_a_wrong_number_of_a_file_explains_no_error_of_an_engine(tmp_path, monkeypatch, wrong, stands):
     """The forearm weighs 1.51 kg for 1.5; and MuJoCo's bias is off by 1e-9 N m."""
-    file, bias = tmp_path / "heavy.xml", MujocoDynamics.bias
-    file.write_text(Path("mjcf/arm.xml").read_text().replace('mass="1.5"', 'mass="1.51"'))
+    bias = MujocoDynamics.bias
     monkeypatch.setattr(MujocoDynamics, "bias", lambda *a: bias(*a) + wrong)
-    _, robot, mujoco, reading = compared_with("arm", str(file))
-    setup = Setup(
-        robot, engines(mujoco), states=30, exact_states=1, finer=(1,), size="quick", reading=reading
-    )
-    sections, causes, _ = examine(NAMES, setup, tmp_path, Lines(), IDLE)
+    sections, causes, _ = examine(NAMES, setup_of_heavy(tmp_path), tmp_path, Lines(), IDLE)
     assert causes[0]["text"].startswith("mass of forearm")
     assert {check.experiment for check in standing(sections)} == stands
     assert sections[2].name == "mass" and sections[2].explained
@@ -107,15 +111,10 @@ def section_of(name, *checks):
 
 def test_what_no_cause_explains(tmp_path, monkeypatch):
     """A stated robot's own numbers, a file with another tree, what is no number, and the potential energy of balls."""
-    file = tmp_path / "heavy.xml"
-    file.write_text(Path("mjcf/arm.xml").read_text().replace('mass="1.5"', 'mass="1.51"'))
-    _, robot, mujoco, reading = compared_with("arm", str(file))
-    setup = Setup(
-        robot, engines(mujoco), states=30, exact_states=1, finer=(1,), size="quick", reading=reading
-    )
+    setup = setup_of_heavy(tmp_path)
     printed = section_of("published", ("TMT, torque", 2.0), ("MuJoCo, torque", 2.0))
     assert [check.quantity for check in explained(setup, printed)] == ["MuJoCo, torque"]
-    other = replace(robot, tree=replace(robot.tree, parent=(-1, 0, 0)))
+    other = replace(setup.robot, tree=replace(setup.robot.tree, parent=(-1, 0, 0)))
     assert explained(replace(setup, robot=other), printed) == []
     monkeypatch.setattr("compare.run.explained.what_follows", lambda setup: {"equations": True})
     own = SimpleNamespace(robot=SimpleNamespace(own=("mass_matrix",)))

@@ -88,11 +88,7 @@ def test_a_command_line_that_is_shown_can_be_given(line, capsys):
         assert request(words).experiment == words[0]
 
 
-TAKES_SECONDS = (
-    "equations --out arm_c",
-    "mass --out /tmp/mass",
-    "parameters --mjcf my_arm.xml --reference arm",
-)
+IN_SECONDS = "equations --out arm_c", "mass --out /tmp/mass", "parameters --mjcf my_arm.xml --reference arm"
 
 
 def lines_to_run():
@@ -100,7 +96,7 @@ def lines_to_run():
     elsewhere = {"", "all", "all --quick", "all --out reports/example"}  # test_command_line runs these
     for line in command_lines():
         if line not in elsewhere and not {"--dask", "--since", "--help"} & {*line.split()}:
-            yield pytest.param(line, marks=[] if line in TAKES_SECONDS else pytest.mark.slow)
+            yield pytest.param(line, marks=[] if line in IN_SECONDS else pytest.mark.slow)
 
 
 @pytest.mark.parametrize("line", list(lines_to_run()))

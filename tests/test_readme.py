@@ -5,6 +5,7 @@ import json
 import os
 import re
 import traceback
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -65,15 +66,16 @@ def test_its_figures_are_those_of_the_example():
     ):  # fmt: skip
         assert figure in text, figure
     rows = [row for row in table("evaluations") if row["quantity"] == "forward_dynamics"]
-    asked = (
-        [row for row in rows if row["implementation"] == name] for name in ("MuJoCo, mj_forward", "compiled")
+    times = [(row["implementation"], float(row["ns_per_state"] or "inf")) for row in rows]
+    of_both = (
+        [time for name, time in times if name == asked] for asked in ("MuJoCo, mj_forward", "compiled")
     )
-    mujoco, compiled = (min(float(row["ns_per_state"]) for row in of) for of in asked)
+    mujoco, compiled = map(min, of_both)
     assert f"is {mujoco / compiled:.0f} times as fast as mj_forward per evaluation" in README
-    shown = [
-        (row, f"| {row['scene']}: {float(row['target_rad']):.0e} rad |") for row in table("what_should_i_use")
-    ]
-    shown = [f"{said} {cheapest(row)} |" for row, said in shown if said in README]
+    rows = {
+        f"| {row['scene']}: {float(row['target_rad']):.0e} rad |": row for row in table("what_should_i_use")
+    }
+    shown = [f"{said} {cheapest(row)} |" for said, row in rows.items() if said in README]
     assert len(shown) == 4 and all(line in README for line in shown)
 
 
@@ -88,9 +90,7 @@ def cheapest(row):
 @pytest.mark.parametrize("text", blocks("python"), ids=lambda text: text.splitlines()[0])
 def test_python_runs_as_it_is_printed(text, tmp_path, monkeypatch):
     """A block that fails does so with the message that the next block shows."""
-    following = (
-        [block for at, block in enumerate(BLOCKS) if at and BLOCKS[at - 1][1] == text] or [("", "")]
-    )[0]
+    following = next((after for block, after in pairwise(BLOCKS) if block[1] == text), ("", ""))
     try:
         names = run(text, tmp_path, monkeypatch)
     except AssertionError as error:

@@ -16,6 +16,7 @@ from ..robots import Robot
 from .plain_rows import in_rows
 
 Value = TypeVar("Value")
+Causes = Sequence[Mapping[str, Any]]
 UNKNOWN = Experiment()
 OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
 
@@ -90,7 +91,7 @@ class Report(NamedTuple):
     robot: Robot
     origin: dict[str, Any]  # see provenance
     verdict: str  # in words, a sentence in each line
-    causes: Sequence[Mapping[str, Any]] = ()  # of the failures, lowest rank first
+    causes: Causes = ()  # of the failures, lowest rank first
     skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
     reference: Mapping[str, str] | None = None  # kind and name of what MuJoCo is compared with
     first_lines: Sequence[str] = ()  # what is said of it
@@ -143,15 +144,11 @@ def worst(sections: Sequence[Section]) -> Check | None:
 
 
 def verdict(
-    sections: Sequence[Section],
-    experiments: int,
-    causes: Sequence[Mapping[str, Any]] = (),
-    compared: str = "The two models",
-    robot: str = "the robot",
+    sections: Sequence[Section], experiments: int, causes: Causes = (), subject: str = "", robot: str = ""
 ) -> str:
     """The outcome, a sentence in each line, with its cause or its largest share of a tolerance.
 
-    experiments: how many there are in all; compared: what agrees or differs; robot: its name.
+    experiments: how many there are in all; subject: what agrees or differs; robot: its name.
     """
     checked = [section for section in sections if section.result.checks]
     checks = [check for section in checked for check in section.judged]
@@ -163,9 +160,10 @@ def verdict(
     failing = failing._replace(unconfirmed=unconfirmed)
     differing = [section for section in checked if section.record.compares and failures([section]).differing]
     top = worst(checked)
-    values = {"compared": compared, "robot": robot, "experiments": experiments, "sections": sections}
+    values: dict[str, Any] = {"experiments": experiments, "sections": sections, "causes": causes}
+    values |= {"compared": subject or "The two models", "robot": robot or "the robot"}
     values |= {"names": [section.name for section in differing or checked], "differ": bool(differing)}
-    values |= {"checked": checked, "checks": checks, "failing": failing, "causes": causes}
+    values |= {"checked": checked, "checks": checks, "failing": failing}
     values |= {"explained": explained, "stating": stating, "unexplained": unexplained}
     values["top"] = top if top and top.value and not any(failing) else None
     lines = block("verdict", "verdict", **values)

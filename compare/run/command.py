@@ -27,6 +27,8 @@ if TYPE_CHECKING:  # they take long to load
     from ..report.verdict import Parts, Report
     from .examine import Examined
 
+Written = tuple["Report", "Parts"]
+Reasons = Sequence[tuple[str, str]]  # experiments, and why they are skipped
 COMPUTING = "compare.run.examine", "tmt.compiled.machine"  # modules that take long to load
 DRAWING = "compare.report.style", *COMPUTING
 
@@ -63,7 +65,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
 
 def compute(
     options: argparse.Namespace, command: str, compared: Compared, folder: Path, terminal: Terminal
-) -> tuple["Report", "Parts"]:
+) -> Written:
     """Run the experiments and write the report to a folder; see write_report."""
     is_alone, robot, started = options.experiment != "all", compared.robot, time.perf_counter()
     step = compared.integrator_step(options.dt, options.integrator)
@@ -92,12 +94,8 @@ def compute(
 
 
 def write_report(
-    folder: Path,
-    examined: "Examined",
-    skipped: Sequence[tuple[str, str]],
-    origin: dict[str, Any],
-    compared: Compared,
-) -> tuple["Report", "Parts"]:
+    folder: Path, examined: "Examined", skipped: Reasons, origin: dict[str, Any], compared: Compared
+) -> Written:
     """Write a report with its verdict to a folder that has its figures; what could not be made of it.
 
     skipped, origin: see Report.

@@ -14,14 +14,11 @@ from ..report.folder import writing
 from ..report.verdict import Figure, Section
 from ..robots import Robot
 
+Results = Mapping[str, Result]
+
 
 def draw(
-    experiment: str,
-    result: Result,
-    robot: Robot,
-    folder: Path,
-    others: Mapping[str, Result],
-    few: bool = False,
+    experiment: str, result: Result, robot: Robot, folder: Path, others: Results, few: bool = False
 ) -> list[Figure]:
     """The figures of an experiment on disk.
 

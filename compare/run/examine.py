@@ -1,6 +1,6 @@
 """Runs the experiments one after the other; long work and drawing go to other processes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -259,11 +259,7 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
 
 
 def say_outcome(
-    terminal: Terminal,
-    section: Section,
-    seconds: float,
-    new: Sequence[Mapping[str, Any]],
-    known: bool = False,
+    terminal: Terminal, section: Section, seconds: float, new: Sequence[Cause], known: bool = False
 ) -> None:
     """One line for an experiment, then the new causes, and the first failing checks that none explains.
 

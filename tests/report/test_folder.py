@@ -28,9 +28,8 @@ def fill(work, text):
 def files(folder):
     """What is in a folder; of results.json only the text of `fill`."""
     found = {p.relative_to(folder).as_posix(): p.read_text() for p in folder.rglob("*") if p.is_file()}
-    return {
-        name: json.loads(text)["text"] if name == "results.json" else text for name, text in found.items()
-    }
+    of_results = {name: json.loads(found[name])["text"] for name in found if name == "results.json"}
+    return found | of_results
 
 
 def old_report(out):
@@ -146,9 +145,8 @@ def test_two_runs_at_once_both_end_well(tmp_path):
 
 
 def test_only_what_a_run_has_left_is_cleared(tmp_path):
-    left, *kept = (
-        tmp_path / name for name in (".new-a1b2c3_d", ".new-a1b2c3_e/mine", ".new-ideas/report.md")
-    )
+    names = ".new-a1b2c3_d", ".new-a1b2c3_e/mine", ".new-ideas/report.md"
+    left, *kept = (tmp_path / name for name in names)
     (left / "new" / "tables").mkdir(parents=True)
     for path in kept:
         path.mkdir(parents=True)
@@ -182,9 +180,7 @@ def test_a_full_disk_while_a_figure_is_drawn_is_said_with_the_name_of_the_file(t
     monkeypatch.setitem(sys.modules, "compare.experiments.plain", module)
     resource = pytest.importorskip("resource")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(
-        resource.RLIMIT_FSIZE, (1000, before[1])
-    )  # no file may be longer, as on a disk that is full
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))  # bytes of a file, as on a disk that is full
     try:
         with pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
             draw("plain", None, ARM, work, {})

@@ -23,15 +23,13 @@ FIXED = "#", "- *Claim", "- *Tolerance"  # lines that no run changes
 
 def words(text, names) -> str:
     """The sentences of a report without what depends on the machine, a figure in a line."""
-    one_of = re.compile(
-        rf"(?<![\w/])({'|'.join(map(re.escape, sorted(names, key=len, reverse=True)))})(?!\w)"
-    )
+    longest_first = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
+    one_of = re.compile(rf"(?<![\w/])({longest_first})(?!\w)")
     sections = [part for part in re.split(r"(?m)^(?=## )", text) if not part.startswith("## Speed")]
     lines = "".join(sections).replace(" ![", "\n![").splitlines()
     kept = [line for line in lines if line and line[0] != "|" and not any(word in line for word in TIMED)]
-    return "".join(
-        (line if line.startswith(FIXED) else one_of.sub("~", NUMBER.sub("#", line))) + "\n" for line in kept
-    )
+    said = [line if line.startswith(FIXED) else one_of.sub("~", NUMBER.sub("#", line)) for line in kept]
+    return "".join(f"{line}\n" for line in said)
 
 
 def report_of_arm(small, folder) -> str:
@@ -50,10 +48,9 @@ def report_of_arm(small, folder) -> str:
 def test_the_words_of_a_small_report(small, tmp_path, monkeypatch):
     monkeypatch.setattr(images, "save_figure", lambda figure, path: path.touch())
     checks = [check for name in NAMES for check in small(name).checks]
-    names = {
-        NUMBER.sub("#", name) for check in checks for name in (check.quantity, check.scene) if len(name) > 2
-    }
-    found = words(report_of_arm(small, tmp_path), names | set(ARM.coordinates.names))
+    names = {name for check in checks for name in (check.quantity, check.scene) if len(name) > 2}
+    names = {NUMBER.sub("#", name) for name in names} | set(ARM.coordinates.names)
+    found = words(report_of_arm(small, tmp_path), names)
     if "RENEW" in os.environ:
         GOLDEN.write_text(found, encoding="utf-8")
     assert found.splitlines() == GOLDEN.read_text(encoding="utf-8").splitlines()

@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import html
+import math
 import random
 import re
 
@@ -19,12 +20,8 @@ from compare.report.terminal import Terminal
 
 MARKDOWN = MarkdownIt("commonmark", {"html": True}).enable(["table", "strikethrough"])
 ATTACK = "<img src=x onerror=document.documentElement.id='run'>"
-NAMES = (
-    f"`{ATTACK}``",
-    "*/ [x](http://x.y) | a | __b__ &lt; \\",
-    '=$\\frac{1}$"""',
-    f"\u202e\n\n# {ATTACK}\x1b[31m",
-)
+NAMES = [f"`{ATTACK}``", "*/ [x](http://x.y) | a | __b__ &lt; \\", '=$\\frac{1}$"""']
+NAMES.append(f"\u202e\n\n# {ATTACK}\x1b[31m")
 SIGNS = [
     *"`*_[](){}<>#|~!\\+-=.:;&$%'\"@ab1é \t\n\r\u202e", "**", "](u)", "[a]: /u", ATTACK, "&lt;", "---", "- ",
     "1. ",
@@ -56,9 +53,8 @@ def test_a_report_of_a_robot_with_any_names(tmp_path, capsys):
     file.write_text(ROBOT.format(*("".join(f"&#{ord(c)};" for c in name) for name in NAMES)))
     with without_workers():
         assert main(["trajectory", "--quick", f"--mjcf={file}", f"--out={tmp_path / 'out'}"]) == 0
-    page, text = (
-        (tmp_path / "out" / name).read_text(encoding="utf-8") for name in ("index.html", "report.md")
-    )
+    paths = (tmp_path / "out" / name for name in ("index.html", "report.md"))
+    page, text = (path.read_text(encoding="utf-8") for path in paths)
     for of in (page, MARKDOWN.render(text)):
         assert NAMES[2] in html.unescape(of) and ATTACK in html.unescape(of) and "<img src=x" not in of
         assert not re.search(r'(href|src)="(?!#|data:image/png|tables/|figures/|index.html)', of)
@@ -75,10 +71,7 @@ def test_a_report_of_a_robot_with_any_names(tmp_path, capsys):
 
 
 def test_in_a_table_on_the_terminal_and_in_a_figure(capsys):
-    rows = [
-        {"text": "=1+1", "number": -1.5, "count": 2},
-        {"text": "-x", "number": float("nan"), "count": None},
-    ]
+    rows = [{"text": "=1+1", "number": -1.5, "count": 2}, {"text": "-x", "number": math.nan, "count": None}]
     assert files.csv(rows) == "text,number,count\n'=1+1,-1.5,2\n'-x,,\n"
     Terminal().say("a\x1b[31m\u202e[red]")
     assert capsys.readouterr().out == "a\\x1b[31m\\u202e[red]\n"

@@ -58,10 +58,7 @@ def test_a_table_has_the_digits_of_its_columns_and_lists_are_cut():
     columns, (first, second) = tables.of_rows(rows)
     assert columns == ["at", "share", "passed", "difference", "printed", "names", "unknown"]
     assert first == ["2", "1.23", "True", "0", "1.234568", f"{76 * 'x'} ...", ""]
-    assert second[1::5] == [
-        "",
-        "2",
-    ]
+    assert second[1] == "" and second[6] == "2"
     assert tables.of_rows(rows, ["share"]) == (["share"], [["1.23"], [""]])
 
 
