@@ -22,7 +22,9 @@ def test_the_two_sets_of_numbers_are_one(mujoco):
     """tmt/arm.py and mjcf/arm.xml have the arm's numbers twice; this ties them."""
     compiled = parameters(mujoco.of(ARM.case()))
     for quantity, value in compiled.items():
-        assert np.allclose(value, stated_of_hinges(tmt.ARM).get(quantity, 0.0), rtol=1e-15, atol=1e-16), quantity
+        assert np.allclose(value, stated_of_hinges(tmt.ARM).get(quantity, 0.0), rtol=1e-15, atol=1e-16), (
+            quantity
+        )
 
 
 def test_states_move_and_engines_do_not_have_the_same_bits(setup):

@@ -70,12 +70,11 @@ def test_an_option_that_asks_for_a_change_is_named_where_it_changes(option):
         assert row.why in ("", name) and (difference(row) > 0.1) == (row.quantity in quantities)
 
 
-@pytest.mark.parametrize(
-    "of", ['boundmass="0.5"', 'boundinertia="0.5"', 'balanceinertia="true"', 'settotalmass="1"']
-)
-def test_an_option_without_effect_is_not_named(of):
-    rows = rows_of(mjcf(BODY.format("1 1.5 2", ""), f"<compiler {of}/>"))
-    assert not any(row.why for row in rows.values())
+def test_an_option_without_effect_is_not_named():
+    options = 'boundmass="0.5" boundinertia="0.5" balanceinertia="true" settotalmass="1"'
+    for option in options.split():
+        rows = rows_of(mjcf(BODY.format("1 1.5 2", ""), f"<compiler {option}/>"))
+        assert not any(row.why for row in rows.values())
 
 
 def test_the_mass_of_geoms_is_stated_where_each_has_one():
