@@ -60,13 +60,10 @@ def test_a_case_keeps_the_gravity_and_the_damping_of_the_file():
     sticky = parse(XML.replace('axis="1 0 0"/>', 'axis="1 0 0" damping="0.3"/>'), ARM.tree)
     for case in ARM.cases:
         gravity, damping = case.scene.gravity, case.scene.damping
-        assert moon.of(case).model.opt.gravity.tolist() == (
-            [0.5, -0.3, -1.62] if gravity else [0.0, 0.0, 0.0]
-        )
-        one = sticky.of(case)
-        assert one.model.dof_damping[one.dofs].tolist() == [
-            damping + 0.3 * (name == "beta") for name in case.joints
-        ]
+        of_moon = [0.5, -0.3, -1.62] if gravity else [0.0, 0.0, 0.0]
+        assert moon.of(case).model.opt.gravity.tolist() == of_moon
+        one, added = sticky.of(case), [0.3 * (name == "beta") for name in case.joints]
+        assert one.model.dof_damping[one.dofs].tolist() == [damping + more for more in added]
         assert case.tree.gravity == (tmt.ARM.gravity if gravity else (0.0, 0.0, 0.0))
         assert case.tree.damping == (damping,) * len(case.joints)
 

@@ -53,14 +53,12 @@ def test_what_does_not_fit_is_one_line(coordinates, stated, word):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("first", ["hip,knee-0.1rad,rail+0.2m", "-knee+170deg,-hip+0.3rad,-rail+5m"])
 @pytest.mark.parametrize(
-    "first", [["hip", "knee-0.1rad", "rail+0.2m"], ["-knee+170deg", "-hip+0.3rad", "-rail+5m"]]
-)
-@pytest.mark.parametrize(
-    "second", [["rail-7m", "-knee+20deg", "hip"], ["-hip in deg", "knee+90deg in deg (rad/s)", "-rail+3m"]]
+    "second", ["rail-7m,-knee+20deg,hip", "-hip in deg,knee+90deg in deg (rad/s),-rail+3m"]
 )
 def test_two_maps_one_after_the_other_are_one(first, second, rng):
-    inner, outer = joint_map(ARM, first), joint_map(ARM, second)
+    inner, outer = joint_map(ARM, first.split(",")), joint_map(ARM, second.split(","))
     both, q, v = outer.after(inner, ARM), ARM.random(rng, 20), rng.normal(size=(20, 3))
     turns = (both.own_positions(q) - outer.own_positions(inner.own_positions(q))) / (2.0 * np.pi * both.of_q)
     slides = [joint.slides for joint in both.joints]

@@ -34,9 +34,7 @@ NO_FORCE = "kinematics"  # no masses nor forces in positions, speeds and Jacobia
 NO_WEIGHT = "kinematics gravity"  # no inertia in the torque that holds
 NO_MASS = "kinematics mass"  # it is no part of M
 NOT_AT_REST = "kinematics mass published gravity"
-NOT_AT_ZERO = (
-    "kinematics mass gravity published reduction"  # springs and servos are at rest, or joints are locked
-)
+NOT_AT_ZERO = "kinematics mass gravity published reduction"  # springs and servos rest, or joints are locked
 STANDS_STILL = OFF = f"kinematics {MOTION}"  # beside the arm; the file switches the constraint stage off
 MIRROR = MOTION  # M, torques and runs are those of the arm turned about beta the other way
 NO_PLACE = MOTION.replace("acceleration ", "")  # the equations do not depend on where the shoulder is
@@ -120,23 +118,20 @@ RUNS = {
     "stability": linearise,
     "reduction": without_some_joints,
 }
+SLOW = pytest.param(RUNS, marks=pytest.mark.slow)
+TRIED = [name for name, (*_, unseen) in EDITS.items() if unseen is not None]
 
 
-@pytest.mark.parametrize(
-    "experiments", [STATES, pytest.param(RUNS, marks=pytest.mark.slow)], ids=["states", "runs"]
-)
-@pytest.mark.parametrize(
-    "name", [None, *(name for name, (*_, unseen) in EDITS.items() if unseen is not None)]
-)
+@pytest.mark.parametrize("experiments", [STATES, SLOW], ids=["states", "runs"])
+@pytest.mark.parametrize("name", [None, *TRIED])
 def test_a_wrong_model_fails_wherever_it_matters(name, experiments):
     old, new, _, unseen = EDITS[name] if name else ("</mujoco>", "</mujoco>", [], " ".join(experiments))
     try:
         setup = setup_of(edited((old, new)), Setup, states=20, exact_states=1, finer=(1,), size="small")
     except ValueError:
         pytest.skip("this MuJoCo does not know what the edit asks for")
-    failing = {
-        each for each, rows in experiments.items() if not all(check.passed for check in rows(setup).checks)
-    }
+    checks = {each: rows(setup).checks for each, rows in experiments.items()}
+    failing = {each for each in checks if not all(check.passed for check in checks[each])}
     assert failing == experiments.keys() - set(unseen.split())
 
 
@@ -172,14 +167,13 @@ def test_a_number_that_differs_fails_its_own_check_and_is_the_cause(quantity):
     except ValueError:
         if quantity == "flag damper":  # one flag for springs and dampers before there were two
             failed, known = found(edited((old, '<flag passive="disable"')))
-        elif quantity in parameters.NOT_HAD:
+        elif quantity in parameters.ABSENT:
             pytest.skip("this MuJoCo does not have it")
         else:
             raise
     assert quantity.removesuffix(" of all") in failed
-    assert [
-        (c["rank"], c["place"], c["stated"], pytest.approx(c["found"], rel=1e-14)) for c in known
-    ] == causes
+    numbers = [(c["rank"], c["place"], c["stated"], pytest.approx(c["found"], rel=1e-14)) for c in known]
+    assert numbers == causes
 
 
 def test_causes_come_by_rank_then_by_size():
@@ -200,12 +194,9 @@ def test_a_force_that_no_number_explains_is_the_cause():
 def test_geoms_that_cannot_touch_are_no_cause():
     """They are excluded, or MuJoCo has no contact stage."""
     excluded = '<contact><exclude body1="world" body2="forearm"/></contact></mujoco>'
-    for stages, end in (
-        ('contact="disable"', "</mujoco>"),
-        ('constraint="disable"', "</mujoco>"),
-        ("", excluded),
-    ):
-        assert places(TOUCHING.replace(STAGES_OFF, stages).replace("</mujoco>", end)) == []
+    for stages in ('contact="disable"', 'constraint="disable"'):
+        assert places(TOUCHING.replace(STAGES_OFF, stages)) == []
+    assert places(TOUCHING.replace(STAGES_OFF, "").replace("</mujoco>", excluded)) == []
 
 
 @pytest.mark.parametrize("edits, causes", [

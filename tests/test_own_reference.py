@@ -68,11 +68,8 @@ def test_the_tree_of_another_robot_agrees(folder):
     text = "from models import PATHS\nfrom compare.engines.mujoco import read\n"
     (folder / "trees.py").write_text(f"{text}tree = read(PATHS['pendulum_ball']).tree\n")
     run = examined(folder, "trees.py:tree", ["kinematics", *STATIC], PATHS["pendulum_ball"])
-    assert not run.failed and {row["quantity"] for row in run.sections[0].result.rows} == {
-        "x_b",
-        "T_b",
-        "B_b",
-    }
+    quantities = {row["quantity"] for row in run.sections[0].result.rows}
+    assert not run.failed and quantities == {"x_b", "T_b", "B_b"}
 
 
 @pytest.mark.parametrize("asked, names, where, quantity", [
@@ -98,9 +95,8 @@ def test_trajectories_are_those_of_rk4(folder):
 def test_slow_equations_get_fewer_states_no_scenes_and_a_cause(folder):
     run = examined(folder, "mine.py:slow_sign", ["mass", "trajectory"], states=5000)
     mass, trajectory = (section.result for section in run.sections)
-    assert (
-        1 <= next(row["states"] for row in mass.rows if row["scene"] == "random states") < 5000 and mass.notes
-    )
+    states = next(row["states"] for row in mass.rows if row["scene"] == "random states")
+    assert 1 <= states < 5000 and mass.notes
     assert trajectory.notes and not trajectory.checks and not run.failed
     run = examined(folder, "mine.py:slow_sign", ["diagnosis"])
     assert run.failed and run.causes
@@ -108,18 +104,14 @@ def test_slow_equations_get_fewer_states_no_scenes_and_a_cause(folder):
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_equations_without_any_use_are_compared_to_the_end(folder):
-    run = examined(
-        folder, "mine.py:infinite", ["acceleration", "trajectory", "diagnosis"], workers=InProcess()
-    )
+    names = ["acceleration", "trajectory", "diagnosis"]
+    run = examined(folder, "mine.py:infinite", names, workers=InProcess())
     found = {check.quantity for check in run.failed}
     assert any(one.startswith("bias") for one in found) and "runs to its end" not in found
     assert not any(one.startswith("figure") for one in found)
-    texts = [
-        text
-        for one in run.sections
-        for text in (one.title, one.claim, *(caption for _, caption in one.figures))
-    ]
-    assert not any("TMT" in text or "nan" in text for text in texts)
+    for section in run.sections:
+        for text in (section.title, section.claim, *(caption for _, caption in section.figures)):
+            assert "TMT" not in text and "nan" not in text
 
 
 @pytest.mark.parametrize("asked, joints, right", [
@@ -130,7 +122,7 @@ def test_the_right_joints_are_named_in_place_of_the_stated_ones(folder, asked, j
     run = examined(folder, asked, ["diagnosis"], joints=joints)
     mirrored = ",".join(
         f"-{name}" for name in right.split(",")
-    )  # the mirror image of a double pendulum is the same
+    )  # the mirror image of the pendulum is the same
     assert any(f"--joints={one})" in cause["text"] for cause in run.causes for one in (right, mirrored))
 
 
@@ -171,11 +163,8 @@ def test_a_bad_reference_gets_one_line_and_status_2(folder, capsys, asked, word)
         status = stop.code
     out, err = capsys.readouterr()
     lines = [line for line in err.splitlines() if line != "a user's file may print"]
-    assert (
-        (status, out, len(lines)) == (2, "", 1)
-        and lines[0].startswith("python -m compare: ")
-        and word in lines[0]
-    )
+    assert (status, out, len(lines)) == (2, "", 1)
+    assert lines[0].startswith("python -m compare: ") and word in lines[0]
     assert sorted(folder.iterdir()) == before
 
 

@@ -23,16 +23,10 @@ def test_the_arm_and_a_file_with_its_hinges_in_any_order_are_compared_with_the_s
     exchanged = XML.replace('"alpha"', '"x"').replace('"beta"', '"alpha"').replace('"x"', '"beta"')
     for path in (None, written(tmp_path, exchanged)):
         reference, robot, mujoco, reading = compared_with(None, path)
-        assert (reference.kind, reference.name, robot, reading) == (
-            "arm",
-            "arm",
-            ARM,
-            None,
-        ) and not mujoco.bare
-        assert (
-            reference.lines[0].startswith(f"reference: arm; {path or 'mjcf/arm.xml'} ")
-            and len(reference.lines) == 1
-        )
+        assert (reference.kind, reference.name, reading, mujoco.bare) == ("arm", "arm", None, False)
+        assert robot.tree == ARM.tree and robot.mjcf == Path(path or ARM.mjcf)  # that other engines read too
+        (line,) = reference.lines
+        assert line.startswith(f"reference: arm; {path or 'mjcf/arm.xml'} ")
 
 
 @pytest.mark.parametrize("asked, path", [(None, str(PATHS["arm7"])), ("model", None)])
@@ -44,10 +38,8 @@ def test_any_other_file_is_compared_with_its_own_compiled_model(asked, path):
 
 
 RENAMED = XML.replace('"alpha"', '"Alpha"').replace(' name="beta"', "").replace('"gamma"', '"wrist"')
-ORDER = [
-    f'<joint name="{name}" type="hinge" axis="{axis}"/>'
-    for name, axis in (("alpha", "0 1 0"), ("beta", "1 0 0"))
-]
+HINGE = '<joint name="{}" type="hinge" axis="{}"/>'
+ORDER = [HINGE.format("alpha", "0 1 0"), HINGE.format("beta", "1 0 0")]
 EXCHANGED = XML.replace(ORDER[0], "X").replace(ORDER[1], ORDER[0].replace("alpha", "second")).replace(
     "X", ORDER[1].replace("beta", "first")
 )  # fmt: skip
@@ -90,10 +82,8 @@ def test_bodies_of_a_solution_are_found_on_their_joints(tmp_path):
     texts = (XML.replace("</body>", f"{pair}</body>", 1) for pair in (a + b, b + a))
     first, second = (written(tmp_path, text, f"{k}.xml") for k, text in enumerate(texts))
     engines = [compared_with(first, second).mujoco, compared_with(second, first).mujoco]
-    assert [engine.model.body_mass[engine.bodies].tolist()[-2:] for engine in engines] == [
-        [1.0, 2.0],
-        [2.0, 1.0],
-    ]
+    masses = [engine.model.body_mass[engine.bodies].tolist() for engine in engines]
+    assert [of_bodies[-2:] for of_bodies in masses] == [[1.0, 2.0], [2.0, 1.0]]
     hand = '<body><inertial pos="0.3 0 0" mass="1" diaginertia="1 1 1"/></body></body>'
     with pytest.raises(ModelError, match="joint gamma: 2, in the solution 1"):
         compared_with(ITSELF, written(tmp_path, XML.replace("</body>", hand, 1)))

@@ -25,9 +25,8 @@ from compare.robots.file import (
     scenes_from,
 )
 
-ONE = replace(
-    tmt.ARM.lock({"alpha": 0.0, "beta": 0.0}), gravity=(0.0, 0.0, 0.0)
-)  # one hinge, its inertia 0.0527 kg m2
+FOREARM = tmt.ARM.lock({"alpha": 0.0, "beta": 0.0})
+ONE = replace(FOREARM, gravity=(0.0, 0.0, 0.0))  # one hinge, its inertia 0.0527 kg m2
 
 
 ONLY = (Feature("hinge", ("one",), "modelled", ""),)
@@ -54,16 +53,15 @@ def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
     alone = robot_of(file_of(arm), "my.xml")
     assert list(alone.poses) == ["qpos0"] and alone.scenes[0].posture == "qpos0" and alone.is_read
     keys = {name: np.full(3, 0.1 * k) for k, name in enumerate(["qpos0", "key qpos0"], start=1)}
-    assert list(robot_of(file_of(arm, keyframes=keys), "my.xml").poses) == [
+    assert [*robot_of(file_of(arm, keyframes=keys), "my.xml").poses] == [
         "key key qpos0",
         "key qpos0",
         "qpos0",
     ]
     reading = read(PATHS["pendulum_ball"])  # quaternions of one turn are one posture
-    assert list(robot_of(replace(reading, keyframes={"turned": -reading.qpos0}), "p.xml").poses) == ["turned"]
-    assert list(robot_of(replace(reading, keyframes={}, ranges=((0.0, 1.0),) * 2), "p.xml").poses) == [
-        "qpos0"
-    ]
+    turned = replace(reading, keyframes={"turned": -reading.qpos0})
+    ranged = replace(reading, keyframes={}, ranges=((0.0, 1.0),) * 2)  # a ball's range is not of q
+    assert [[*robot_of(file, "p.xml").poses] for file in (turned, ranged)] == [["turned"], ["qpos0"]]
 
 
 @pytest.mark.parametrize("name", [*PATHS, 0, 1])
@@ -103,10 +101,8 @@ def test_three_slides_and_a_ball_in_one_place_are_free_and_float_if_not_carried(
 
 
 def test_a_free_body_is_thrown_up_and_tumbles():
-    (scene,) = (
-        scene for scene in robot_of(read(PATHS["free_body"]), "s.xml").scenes if scene.name.endswith("thrown")
-    )
-    assert scene.speed == (0.0, 0.0, 2.0, 120.0, 60.0, -90.0)
+    scenes = {scene.name: scene for scene in robot_of(read(PATHS["free_body"]), "s.xml").scenes}
+    assert scenes["qpos0, thrown"].speed == (0.0, 0.0, 2.0, 120.0, 60.0, -90.0)
 
 
 def test_what_rests_where_it_is_let_go_is_set_going():
@@ -123,9 +119,8 @@ def test_what_rests_where_it_is_let_go_is_set_going():
 @pytest.mark.parametrize("sign, how", [(1.0, "set going"), (-1.0, "held")])
 def test_what_a_spring_holds_rests(sign, how):
     """The forearm, whose weight is the spring's torque k (q - rest), or is beside it."""
-    forearm = tmt.ARM.lock({"alpha": 0.0, "beta": 0.0})
-    rest = sign * tmt.gravity_balance(np.zeros(1), forearm) / 2.0
-    spring = replace(forearm, stiffness=(2.0,), rest=rest)
+    rest = sign * tmt.gravity_balance(np.zeros(1), FOREARM) / 2.0
+    spring = replace(FOREARM, stiffness=(2.0,), rest=rest)
     assert scenes_from(spring, "qpos0", np.zeros(1), 0.002)[0].name == f"qpos0, {how}"
 
 
@@ -148,9 +143,8 @@ def test_steps_are_four_of_the_files_own_and_no_longer_than_the_fastest_rate():
     inverse = np.array([[1.0 / inertia]])
 
     def count(dt, rate=0.0, swing=0.0, added=()):
-        return coarsest(
-            replace(ONE, damping=(rate * inertia,), stiffness=(swing**2 * inertia,)), inverse, dt, added
-        )
+        tree = replace(ONE, damping=(rate * inertia,), stiffness=(swing**2 * inertia,))
+        return coarsest(tree, inverse, dt, added)
 
     assert count(1.0) == 64 and count(DURATION / 64 / COARSER) == 64
     assert count(0.99 * DURATION / 64 / COARSER) == 128 and count(1e-9) == 8192

@@ -45,9 +45,8 @@ def refused(tmp_path, text, word, robot=ARM):
 
 def test_every_key_is_read(tmp_path):
     thrown, held = (Case(ARM, scene) for scene in from_text(tmp_path, WHOLE))
-    assert np.allclose(thrown.q, np.radians([10, 20.5, -30])) and np.allclose(
-        thrown.v, np.radians([100, 0, -50])
-    )
+    assert np.allclose(thrown.q, np.radians([10, 20.5, -30]))
+    assert np.allclose(thrown.v, np.radians([100, 0, -50]))
     assert thrown.tau.tolist() == [0.5, 0, 0] and thrown.tree.gravity == (0, 0, 0)
     assert thrown.tree.damping == (0.05,) * 3 and (thrown.duration, thrown.steps) == (1.0, 64)
     assert held.joints == ("alpha", "gamma") and held.is_held and held.scene.dt == 0.03125

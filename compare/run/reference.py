@@ -94,10 +94,10 @@ def compared_with(
     """
     source, shown = Source(Path(path or ARM.mjcf)), in_one_line(shown or path or "mjcf/arm.xml")
     if reference == "arm" or (reference is None and (path is None or has_hinges(source, ARM.joints))):
-        robot, renamed = ARM, Matched(ARM.joints, ()).renamed
+        robot, renamed = replace(ARM, mjcf=Path(path or ARM.mjcf)), Matched(ARM.joints, ()).renamed
         if not has_hinges(source, ARM.joints):
             names, renamed = joints_matched(ARM, read(source), shown, "the arm")
-            robot = ARM.with_joints(names)
+            robot = robot.with_joints(names)
         said = tuple(map(say, of_source(source))) if path else ()
         of_arm = Reference("arm", shown, said, source.warnings, renamed=renamed)
         return Compared(of_arm, robot, parse(source, robot.tree), None)

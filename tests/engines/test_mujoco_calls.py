@@ -42,24 +42,15 @@ def test_a_loop_repeats_its_calls_at_the_current_state(mujoco, rng):
     assert np.allclose(minimal.data.qacc, dynamics.acceleration(run.q[1], run.v[1], nothing), rtol=1e-12)
 
 
-# of models with quaternions
-
-
-@pytest.fixture(scope="module")
-def reading():
-    return read(PATHS["mixed"])
-
-
-def test_a_step_is_differenced_in_movements(reading, rng):
+def test_a_step_is_differenced_in_movements(rng):
+    reading = read(PATHS["mixed"])  # with quaternions
     dynamics, (q, _, tau) = engine(reading).of(case_of(reading.tree)), random_states(rng, reading.tree, 1)
     for integrator in ("Euler", "implicit"):
         model, data = dynamics.own_copy(1e-3, integrator, q[0], 0.0, tau[0])
         A = np.zeros((2 * model.nv + model.na,) * 2)
         calls.mujoco.mjd_transitionFD(model, data, 1e-6, True, A, None, None, None)
         order = np.concatenate([dynamics.dofs, model.nv + dynamics.dofs])
-        assert np.allclose(
-            A[np.ix_(order, order)], transition(dynamics, q[0], tau[0], 1e-3, integrator), atol=1e-6
-        )
-    assert np.allclose(
-        transition(dynamics, q[0], tau[0], 1e-9, "RK4"), np.eye(2 * len(dynamics.dofs)), atol=1e-5
-    )
+        found = transition(dynamics, q[0], tau[0], 1e-3, integrator)
+        assert np.allclose(A[np.ix_(order, order)], found, atol=1e-6)
+    found = transition(dynamics, q[0], tau[0], 1e-9, "RK4")
+    assert np.allclose(found, np.eye(2 * len(dynamics.dofs)), atol=1e-5)

@@ -9,22 +9,15 @@ from crane import TREE
 from crane import XML as CRANE
 from edited import XML
 
-from compare.engines.mujoco import ModelError, load, parse, read
+from compare.engines.mujoco import ModelError, Source, load, parse, read
 from compare.engines.mujoco.parameters import parameters
-from compare.engines.mujoco.source import compiled_without, without_visuals
 from compare.robots.arm import ARM
 
 JOINTS = 'name="gamma" type="hinge"'
-NUMBERS = (
-    "body_mass",
-    "body_inertia",
-    "body_pos",
-    "body_quat",
-    "body_ipos",
-    "body_iquat",
+NUMBERS = [f"body_{name}" for name in ("mass", "inertia", "pos", "quat", "ipos", "iquat")] + [
     "dof_M0",
     "jnt_axis",
-)
+]
 PIXELS = 3000  # of a texture's edges: 27 MB
 STATED = '<inertial pos="0.1 0.2 0.3" mass="7" diaginertia="1 1.1 1.2"/>'
 SHAPE = '<geom type="capsule" size="0.1 0.2" pos="0.1 0.02 0.3"/>'
@@ -76,9 +69,7 @@ def test_bodies_whose_hinges_have_exchanged_their_names():
 def test_body_axes_are_those_of_the_world_at_zero(rng):
     """A forearm frame that lies turned in the file describes the same arm."""
     turned = edited('"forearm" pos="0 0 -0.3"', '"forearm" pos="0 0 -0.3" euler="0 0 1.5707963267948966"')
-    turned = turned.replace(
-        'name="gamma" type="hinge" axis="0 1 0"', 'name="gamma" type="hinge" axis="1 0 0"'
-    )
+    turned = turned.replace(f'{JOINTS} axis="0 1 0"', f'{JOINTS} axis="1 0 0"')
     turned = turned.replace('pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"',
                             'pos="0 -0.15 0" mass="1.5" diaginertia="0.019 0.001 0.019"')  # fmt: skip
     engine, arm = (parse(text, ARM.tree).of(ARM.case()) for text in (turned, XML))
@@ -94,18 +85,12 @@ def test_body_axes_are_those_of_the_world_at_zero(rng):
 ])  # fmt: skip
 @pytest.mark.filterwarnings("ignore:compiler attribute")
 def test_what_is_taken_out_changes_no_number_of_the_motion(compiler, option):
-    def spec():
-        return mujoco.MjSpec.from_string(
-            f"<mujoco><compiler {compiler}/>{option}{ASSETS.replace(str(PIXELS), '2')}{BODIES}</mujoco>"
-        )
-
-    complete = spec()
+    assets = ASSETS.replace(str(PIXELS), "2")
+    source = Source(f"<mujoco><compiler {compiler}/>{option}{assets}{BODIES}</mujoco>")
+    complete = source.spec.copy()
     complete.compiler.fusestatic = False
     whole = complete.compile()
-    for lighter in (
-        without_visuals(spec()).compile(),
-        compiled_without(without_visuals(spec()), {}, bare=True),
-    ):
+    for lighter in (source.model, source.without({}, bare=True)):
         for name in NUMBERS:
             assert np.array_equal(getattr(whole, name), getattr(lighter, name)), name
 

@@ -52,12 +52,11 @@ def test_a_file_with_every_kind_of_joint():
     assert [f.feature for f in reading.features] == OF_MIXED
 
 
+SOME_KINDS = st.lists(st.sampled_from(KINDS), min_size=1, max_size=3, unique=True)
+
+
 @settings(max_examples=20)
-@given(
-    st.integers(0, 2**32 - 1),
-    st.lists(st.sampled_from(KINDS), min_size=1, max_size=3, unique=True),
-    st.integers(3, 6),
-)
+@given(st.integers(0, 2**32 - 1), SOME_KINDS, st.integers(3, 6))
 def test_a_random_tree_is_the_same_in_both(seed, kinds, joints):
     compared(random_tree(seed, kinds, joints), np.random.default_rng(seed))
 
@@ -96,19 +95,7 @@ def test_a_flag_of_the_file_counts(flag, field, rng):
     assert_the_same(engine(reading).of(case_of(damped, damping=0.5)), damped, rng)
 
 
-OF_MIXED = [
-    "hinge",
-    "slide",
-    "ball",
-    "free",
-    "armature",
-    "damping",
-    "spring",
-    "limit",
-    "clamp",
-    "actuator",
-    "keyframe",
-]
+OF_MIXED = [*KINDS, "armature", "damping", "spring", "limit", "clamp", "actuator", "keyframe"]
 LIGHT = PLAIN.replace('name="b"', 'name="b" gravcomp="1"').replace('name="j"', 'name="j" axis="0 1 0"')
 MORE = {  # feature: file, names
     "contact": (mjcf(PLAIN + '<geom name="floor" type="plane" size="1 1 1"/>'), ("floor", "g")),
@@ -158,23 +145,18 @@ def test_what_else_changes_a_motion_is_switched_off_by_name(name, rng):
         assert [row.names for row in reading.features if row.feature == "other"] == [(name,)] * (not paths)
         dynamics = engine(reading).of(case_of(reading.tree))
         assert dynamics.model.opt.enableflags == 0
-        paths.append(
-            dynamics.run(np.array([1.2]), np.array([2.0]), np.array([0.1]), 0.01, 50, "Euler").states
-        )
+        q, v, tau = np.array([[1.2], [2.0], [0.1]])
+        paths.append(dynamics.run(q, v, tau, 0.01, 50, "Euler").states)
     assert np.array_equal(*paths)
 
 
-def test_what_has_no_name_is_called_by_its_kind_and_number():
+def test_what_has_no_name_is_called_by_its_kind_and_number_but_not_as_another():
     body = '<body><joint name="w" type="ball"/><joint type="slide"/><geom size="0.1" pos="0.1 0 0"/></body>'
-    found = read(
-        mjcf(body, after='<keyframe><key name="k" qpos="0 0 2 0 0"/><key qpos="2 0 0 0 0"/></keyframe>')
-    )
+    keys = '<keyframe><key name="k" qpos="0 0 2 0 0"/><key qpos="2 0 0 0 0"/></keyframe>'
+    found = read(mjcf(body, after=keys))
     assert found.tree.joint_names == ("w", "joint 1")
     keys = {"k": [0.0, 0.0, 1.0, 0.0, 0.0], "key 1": [1.0, 0.0, 0.0, 0.0, 0.0]}  # quaternions of length 1
     assert {name: q.tolist() for name, q in found.keyframes.items()} == keys
-
-
-def test_a_joint_without_a_name_does_not_get_that_of_another():
     text = mjcf(TWO.replace('name="j"', "").replace('name="k"', 'name="joint 0"'))
     assert read(text).tree.joint_names[1] == "joint 0"
 

@@ -79,9 +79,8 @@ def test_a_pipe_is_never_waited_for(text, tmp_path):
     (tmp_path / "sub" / "a").mkdir(parents=True)
     for place in (tmp_path, tmp_path / "sub", tmp_path / "sub" / "a"):
         os.mkfifo(place / "pipe.stl")
-    (tmp_path / "sub" / "part.xml").write_text(
-        "<mujoco><asset><hfield name='h' file='pipe.stl'/></asset></mujoco>"
-    )
+    part = "<mujoco><asset><hfield name='h' file='pipe.stl'/></asset></mujoco>"
+    (tmp_path / "sub" / "part.xml").write_text(part)
     (path := tmp_path / "robot.xml").write_text(text)
     with pytest.raises(ModelError, match=r"pipe\.stl is a pipe"):
         read(path if text else tmp_path / "pipe.stl")

@@ -64,11 +64,6 @@ def test_numbers_that_an_option_changes_are_no_checks_and_have_its_name():
     assert (rows["lift", "damping"].unit, rows["turn", "damping"].unit) == ("N s/m", "N m s/rad")
 
 
-def compared(result, number):
-    """The causes of a number that differs."""
-    return compare_number(result, number, "")
-
-
 @pytest.mark.parametrize("quantity, stated, scale", [
     ("mass", 2.0, None), ("com", np.array([0.0, -3.0, 1.0]), 5.0), ("inertia", np.diag([1.0, 2.0, 2.5]), 5.5),
     ("anchor", np.zeros(3), 0.7),
@@ -77,18 +72,18 @@ def compared(result, number):
 def test_a_number_may_be_off_by_64_eps_of_its_scale(quantity, stated, scale, share, passes):
     off, result = share * 64 * EPS * (scale or stated), Result("parameters")
     number = row_of("arm", quantity, stated, stated + off, {}, scale)
-    causes = compared(result, number)
+    causes = compare_number(result, number, "")
     assert (result.checks[0].passed, not causes) == (passes, passes)
 
 
 def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none():
-    (cause,) = compared(Result("parameters"), Stated("arm", "mass", 2.0, 2.5, ""))
+    (cause,) = compare_number(Result("parameters"), Stated("arm", "mass", 2.0, 2.5), "")
     assert (cause["rank"], cause["place"], cause["stated"], cause["found"]) == (2, "mass of arm", 2.0, 2.5)
-    vector, result = (
-        Stated("arm", "com", np.zeros(3), np.array([0.0, 1e-30, np.nan]), ""),
-        Result("parameters"),
-    )
-    assert [cause["place"] for cause in compared(result, vector)] == ["com y of arm", "com z of arm"]
+    result, vector = Result("parameters"), Stated("arm", "com", np.zeros(3), np.array([0.0, 1e-30, np.nan]))
+    assert [cause["place"] for cause in compare_number(result, vector, "")] == [
+        "com y of arm",
+        "com z of arm",
+    ]
     assert failing(result) == ["com"]
 
 
@@ -138,12 +133,9 @@ def test_a_number_that_is_another_one_than_in_the_solution_is_the_cause(tmp_path
 
 
 @pytest.mark.parametrize("off, names", [(4e-15, []), (4e-14, ["com"])])
-def test_a_centre_of_mass_is_that_of_the_solution_to_rounding_of_the_lengths_that_lead_there(
-    tmp_path, off, names
-):
-    assert (
-        failing(beside_solution(tmp_path, CART.replace('pos="0 0 0.4"', f'pos="0 0 {0.4 + off!r}"'))) == names
-    )
+def test_a_centre_of_mass_is_that_of_the_solution_to_rounding_of_lengths(tmp_path, off, names):
+    text = CART.replace('pos="0 0 0.4"', f'pos="0 0 {0.4 + off!r}"')
+    assert failing(beside_solution(tmp_path, text)) == names
 
 
 def test_a_small_body_beside_a_large_one_has_its_own_tolerance(tmp_path):

@@ -65,11 +65,10 @@ def test_forces_that_the_equations_lack_are_zero_except_for_rounding_of_what_is_
     least, forces = 64 * EPS * 0.5 * 4.0, {"actuators": 0.0, "constraints and contacts": 1e-300}
     other_forces = lambda q, qd: {source: np.array([[force]]) for source, force in forces.items()}  # noqa: E731
     sample = Sample(tree, "random states", state, np.array([[1.0, -4.0, 2.0]]), state, 0)
-    setup = SimpleNamespace(robot=SimpleNamespace(tree=tree), random=sample)
-    setup.compared = lambda: {"mujoco": SimpleNamespace(other_forces=other_forces)}
+    dynamics = SimpleNamespace(other_forces=other_forces)
     for share, passed in ((0.99, [True, False, True]), (1.01, [True, False, False])):
         forces["fluid and tendons"], result = share * least, Result("parameters")
-        check_forces(result, setup)
+        check_forces(result, sample, tree, dynamics, [])
         assert list(verdicts(result).values()) == passed
 
 

@@ -47,8 +47,8 @@ class Acting:
             m.opt.tolerance, m.opt.iterations = SOLVED, max(m.opt.iterations, MOST_ITERATIONS)
         m.opt.enableflags, m.opt.density, m.opt.viscosity = 0, 0.0, 0.0
         set_fields(m, (*(set(NOT_HAD_FIELDS) - set(DRIVES)), *UNLIMITED), 0)
-        for i, one in enumerate(drive.actuators):
-            if not one.acts or i in cut:
+        for i, actuator in enumerate(drive.actuators):
+            if not actuator.acts or i in cut:
                 m.actuator_gaintype[i] = mujoco.mjtGain.mjGAIN_FIXED
                 m.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_AFFINE
                 m.actuator_gainprm[i], m.actuator_biasprm[i] = 0.0, 0.0
@@ -122,21 +122,22 @@ class Acting:
         model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
         data = mujoco.MjData(model)
         data.qpos[:] = q
-        for i, one in enumerate(self.drive.actuators):
+        for i, actuator in enumerate(self.drive.actuators):
             place, inputs = control_of(model, i)
             if inputs == 1:
-                data.ctrl[place] = 0.0 if one.dynamics == "integrator" else u[i]
-            if one.dynamics != "none" and one.acts:
+                data.ctrl[place] = 0.0 if actuator.dynamics == "integrator" else u[i]
+            if actuator.dynamics != "none" and actuator.acts:
                 data.act[model.actuator_actadr[i]] = u[i]
         return model, data
 
     @property
     def filters(self) -> list[int]:
         """Indices of the activations of filters that act: they decay by themselves."""
-        filters = [
-            i for i, one in enumerate(self.drive.actuators) if one.acts and one.dynamics.startswith("filter")
-        ]
-        return [int(self.model.actuator_actadr[i]) for i in filters]
+        addresses = []
+        for i, actuator in enumerate(self.drive.actuators):
+            if actuator.acts and actuator.dynamics.startswith("filter"):
+                addresses.append(int(self.model.actuator_actadr[i]))
+        return addresses
 
     def deviations(
         self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str, steps: Sequence[int],
@@ -156,9 +157,9 @@ class Acting:
         spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
         both = [data, self.at(q, u, dt, integrator)[1]] if self.is_coupled else [data]
         state = np.zeros((len(both), mujoco.mj_stateSize(model, spec)))
-        for one, row in zip(both, state):
-            mujoco.mj_getState(model, one, row, spec)
-        controls = np.array([one.ctrl for one in both])[:, None]
+        for run, row in zip(both, state):
+            mujoco.mj_getState(model, run, row, spec)
+        controls = np.array([run.ctrl for run in both])[:, None]
         for count in steps:
             # rollout sets controls anew, and leaves out the initial state
             states, _ = rollout(model, data, state, np.repeat(controls, count, axis=1), nstep=count)

@@ -95,23 +95,15 @@ def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> 
     counts = [place.q.stop - place.q.start for place in places]
     positions = np.concatenate([np.arange(place.q.start, place.q.stop) for place in places])
     speeds = np.concatenate([np.arange(place.qd.start, place.qd.stop) for place in places])
-    indices = {-1: -1} | {j: i for i, j in enumerate(joints)}
-    of_joints = {name: np.array(getattr(tree, name))[joints] for name in ("reference", "stiffness")}
-    of_speeds = {name: np.array(getattr(tree, name))[speeds] for name in ("axis", "damping", "armature")}
-    of_bodies = {name: np.array(getattr(tree, name))[bodies] for name in ("mass", "com", "inertia")}
-    is_sprung = np.repeat(of_joints["stiffness"] > 0.0, counts)
-    return (
-        of_speeds
-        | of_bodies
-        | {
-            "parent": np.array([indices[tree.parent[j]] for j in joints]),
-            "anchor": anchors[joints],
-            "ref": of_joints["reference"],
-            "stiffness": of_joints["stiffness"],
-            "rest": np.array(tree.rest)[positions] * is_sprung,
-            "gravity": np.array(tree.gravity),
-        }
-    )
+    chosen = dict.fromkeys(("reference", "stiffness"), np.array(joints)) | {"rest": positions}
+    chosen |= dict.fromkeys(("axis", "damping", "armature"), speeds)
+    chosen |= dict.fromkeys(("mass", "com", "inertia"), np.array(bodies))
+    numbers = {name: np.array(getattr(tree, name))[indices] for name, indices in chosen.items()}
+    numbers["rest"] = numbers["rest"] * np.repeat(numbers["stiffness"] > 0.0, counts)
+    number_of_joint = {-1: -1} | {j: i for i, j in enumerate(joints)}
+    parents = np.array([number_of_joint[tree.parent[j]] for j in joints])
+    numbers |= {"parent": parents, "anchor": anchors[joints], "gravity": np.array(tree.gravity)}
+    return numbers | {"ref": numbers.pop("reference")}
 
 
 def stated_of_hinges(tree: tmt.Tree) -> dict[str, Any]:
@@ -134,10 +126,8 @@ def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
 
 def compare_features(result: ParametersResult, robot: Robot) -> list[dict[str, Any]]:
     """Checks that features without a term in the equations are as many as in the solution; the causes where they are not."""
-    compiled, stated = (
-        {feature.feature: feature for feature in features}
-        for features in (robot.features, robot.features_stated)
-    )
+    compiled = {feature.feature: feature for feature in robot.features}
+    stated = {feature.feature: feature for feature in robot.features_stated}
     causes = []
     for name, feature in (stated | compiled).items():
         if feature.treatment in (MODELLED, LEFT_OUT) or name in MAY_DIFFER:
