@@ -22,7 +22,6 @@ from compare.diagnosis.model import OF_TERM
 from compare.engines.mujoco import reading
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
-from tests.trees import tree_of_kinds
 from tmt import literal
 from tmt.derivation import method
 from tmt.derivation.composite import mass_matrix_and_bias
@@ -147,10 +146,23 @@ def faults_of(robot: str, tree: tmt.Tree, rng: np.random.Generator) -> list[Faul
 
 
 def random_tree(rng: np.random.Generator) -> tmt.Tree:
-    """Two to five bodies, each on a hinge or a slide, without damping and springs."""
-    tree = tree_of_kinds(rng, int(rng.integers(2, 6)), ("hinge", "slide"), most=1)
-    plain = dict.fromkeys(("damping", "stiffness", "rest", "reference"), (0.0,) * len(tree.axis))
-    return replace(tree, **plain)
+    """A tree of two to five hinges and slides with tilted axes, often branched, a body on each joint."""
+    n = int(rng.integers(2, 6))
+    turns = np.linalg.qr(rng.normal(size=(n, 3, 3)))[0]
+    second = turns * 10.0 ** rng.uniform(-3.0, -1.0, (n, 1, 3)) @ np.swapaxes(turns, 1, 2)
+    second = (second + np.swapaxes(second, 1, 2)) / 2.0
+    inertia = np.einsum("nii->n", second)[:, None, None] * np.eye(3) - second
+    return tmt.Tree(
+        joint_names=tuple(f"j{i}" for i in range(n)),
+        kind=("hinge", *(str(kind) for kind in rng.choice(["hinge", "slide"], n - 1, p=[0.75, 0.25]))),
+        parent=(-1, *(i - 1 if rng.random() < 0.8 else int(rng.integers(-1, i)) for i in range(1, n))),
+        offset=rng.uniform(-0.5, 0.5, (n, 3)).tolist(), axis=rng.normal(size=(n, 3)).tolist(),
+        damping=(0.0,) * n,
+        body_names=tuple(f"b{i}" for i in range(n)), body_joint=tuple(range(n)),
+        mass=(10.0 ** rng.uniform(-1.0, 1.0, n)).tolist(), com=rng.uniform(-0.3, 0.3, (n, 3)).tolist(),
+        inertia=inertia.tolist(), gravity=rng.uniform(-10.0, 10.0, 3).tolist(),
+        armature=(rng.uniform(0.0, 0.5, n) * (rng.random(n) < 0.3)).tolist(),
+    )  # fmt: skip
 
 
 def all_faults() -> list[Fault]:
