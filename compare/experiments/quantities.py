@@ -103,8 +103,8 @@ class Comparison:
 
     def acceleration_size(self) -> np.ndarray:
         """The accelerations that scales are taken from: a user's own may be NaN."""
-        own, of_mujoco, *_ = self.values("qdd")
-        return of_mujoco if self.robot.own else own
+        qdd, mujoco_qdd, *_ = self.values("qdd")
+        return mujoco_qdd if self.robot.own else qdd
 
     @cached_property
     def acceleration_scale(self) -> np.ndarray:
