@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,8 @@ from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
 from ..robots.states import Sample
 from . import Experiment
+from .quantities import Drawing
 from .setup import Setup
-
-if TYPE_CHECKING:
-    from .quantities import Drawing
 
 EXPERIMENT = Experiment(order=80, needs_file=True, options=("--joints",))
 SECONDS = 8.0  # of a search
@@ -177,8 +175,8 @@ def headline(result: DiagnosisResult) -> Finding | None:
     return result.finding("headline", place=result.rows[0].place, more=len(result.rows) - 1)
 
 
-def figures(result: DiagnosisResult, robot: Robot) -> Iterator["Drawing"]:
+def figures(result: DiagnosisResult, robot: Robot) -> Iterator[Drawing]:
     if result.nearest:
         from .figures import draw_nearest  # matplotlib is for the process that draws
 
-        yield partial(draw_nearest, result)
+        yield partial(draw_nearest, result.nearest)

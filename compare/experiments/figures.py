@@ -1,5 +1,7 @@
 """Figures of the experiments at single states: differences and corrections."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -7,7 +9,6 @@ from ..core.finding import Finding
 from ..judge.agree import AgreementResult
 from ..judge.scale import EPS, FACTOR
 from ..report.style import GREEN, GREY, RED, WIDTH, zero_at_the_end
-from .diagnosis import DiagnosisResult
 from .figures_overview import LOOKS
 
 ZERO_AT = 1e-3  # eps: where differences of exactly zero are drawn
@@ -54,9 +55,9 @@ def drawn(ascending: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.maximum(ascending[points], ZERO_AT), (points + 1) / count
 
 
-def draw_nearest(result: DiagnosisResult) -> tuple[str, Figure, Finding]:
+def draw_nearest(nearest: Sequence[tuple[str, float, bool]]) -> tuple[str, Figure, Finding]:
     """The share of the difference that remains after each of the best single corrections."""
-    names, shares, explains = zip(*result.nearest)
+    names, shares, explains = zip(*nearest)
     left = np.maximum(shares, EPS)
     fig = Figure(figsize=(WIDTH, 0.9 + 0.25 * len(names)), layout="constrained")
     ax, rows = fig.subplots(), np.arange(len(names))
@@ -69,4 +70,8 @@ def draw_nearest(result: DiagnosisResult) -> tuple[str, Figure, Finding]:
     ax.set_yticks(rows, names)
     ax.set_ylim(len(names) - 0.5, -0.5)
     fig.legend(loc="outside upper center", ncols=2)
-    return "diagnosis_nearest", fig, result.finding("nearest", names=names[:2], left=left[:2].tolist())
+    return (
+        "diagnosis_nearest",
+        fig,
+        Finding("diagnosis", "nearest", {"names": names[:2], "left": left[:2].tolist()}),
+    )

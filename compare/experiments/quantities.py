@@ -26,11 +26,9 @@ from ..robots.states import MOST_SPEEDS, Sample
 from .setup import Setup
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from tmt.exact.many import Pairs
 
-    Drawing = partial[tuple[str, Figure, Finding]]
+Drawing = partial[tuple[str, Any, Finding]]  # of a file's name, a figure of matplotlib, its caption
 
 
 class Quantity(NamedTuple):
@@ -164,14 +162,14 @@ def headline(result: AgreementResult) -> Finding | None:
     return Finding("shared", "agreement_headline", {"row": top}) if top else None
 
 
-def figures(result: AgreementResult, robot: Robot) -> Iterator["Drawing"]:
+def figures(result: AgreementResult, robot: Robot) -> Iterator[Drawing]:
     from .figures import draw_distances  # matplotlib is for the process that draws
 
     drawn = [name for name in QUANTITIES if name in result.distances["random states"]]
     yield partial(draw_distances, result, drawn)
 
 
-def overview(results: Mapping[str, Result], robot: Robot) -> Iterator["Drawing"]:
+def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[Drawing]:
     """The picture of M, h and accelerations on the first screen, where one of them was compared."""
     from .figures_overview import agreements, draw_agreement
 
