@@ -68,6 +68,12 @@ def test_a_quantity_of_mujoco_that_is_off_fails_its_own_checks(mujoco, experimen
     assert failing(experiment, Off(mujoco, quantity, **which)) == expected | compiled
 
 
+def test_a_mass_matrix_of_mujoco_that_is_not_definite_fails_its_own_check(mujoco, monkeypatch):
+    monkeypatch.setitem(globals(), "off", lambda values, place: -values)
+    (definiteness,) = failing(mass, Off(mujoco, "mass_matrix")) - {"Mbar", "Mbar, compiled"}
+    assert definiteness.startswith("MuJoCo: least eigenvalue")
+
+
 def test_a_joint_whose_accelerations_are_all_smaller_than_their_tolerance_is_not_judged(setup):
     """At all states together: 3 rad/s2 of alpha, 1 rad/s2 of beta, whose least tolerance is just below or above; gamma rests."""
     sizes, robot = [np.array([[3.0, 0.5, 0.0]]), np.array([[2.0, np.nan, 0.0], [0.0, 1.0, 0.0]])], setup.robot
