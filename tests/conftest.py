@@ -58,9 +58,8 @@ def pytest_terminal_summary(terminalreporter):
     if len(seconds) > LONGEST:
         terminalreporter.section(f"processor time: {sum(seconds.values()):.0f} s")
         for name, of_folder in sorted(folders.items()):
-            allowed = f" of {BUDGET.get(name, 0):3} s" * (
-                terminalreporter.config.option.markexpr == "not slow"
-            )
+            is_default = terminalreporter.config.option.markexpr == "not slow"
+            allowed = f" of {BUDGET.get(name, 0):3} s" if is_default else ""
             terminalreporter.line(f"{of_folder:7.1f} s{allowed}  {name}")
         for name in sorted(seconds, key=seconds.get, reverse=True)[:LONGEST]:
             terminalreporter.line(f"{seconds[name]:7.1f} s  {name}")
@@ -79,10 +78,8 @@ def shared(common):
     """shared(function, *args): what a function of a module returns, computed once for all processes that run the tests."""
 
     def result(function, *args):
-        path = (
-            common
-            / "-".join([function.__module__, function.__name__, *map(str, args)]).replace(os.sep, "_")[-200:]
-        )
+        name = "-".join([function.__module__, function.__name__, *map(str, args)])
+        path = common / name.replace(os.sep, "_")[-200:]
         with FileLock(f"{path}.lock"):
             if not path.exists():
                 path.write_bytes(pickle.dumps(function(*args)))

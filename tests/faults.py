@@ -92,13 +92,9 @@ def tree_numbers(tree: tmt.Tree) -> Iterator[tuple[str, str, tuple, float]]:
     for b, body in enumerate(tree.body_names):
         yield f"mass of {body}", "mass", (b,), tree.mass[b]
         yield from ((f"CoM {axis} of {body}", "com", (b, k), length) for k, axis in enumerate("xyz"))
+        size = np.abs(tree.inertia[b]).max()
         for name in ("xx", "yy", "zz", "xy", "xz", "yz"):
-            yield (
-                f"inertia {name} of {body}",
-                "inertia",
-                (b, *map("xyz".index, name)),
-                np.abs(tree.inertia[b]).max(),
-            )
+            yield f"inertia {name} of {body}", "inertia", (b, *map("xyz".index, name)), size
     for i, joint in enumerate(tree.joint_names):
         for k, axis in enumerate("xyz"):
             yield f"offset {axis} of {joint}", "offset", (i, k), length
@@ -152,9 +148,8 @@ def random_tree(rng: np.random.Generator) -> tmt.Tree:
     n = int(rng.integers(2, 6))
     turns = np.linalg.qr(rng.normal(size=(n, 3, 3)))[0]
     second = turns * 10.0 ** rng.uniform(-3.0, -1.0, (n, 1, 3)) @ np.swapaxes(turns, 1, 2)
-    inertia = (
-        np.einsum("nii->n", second)[:, None, None] * np.eye(3) - (second + np.swapaxes(second, 1, 2)) / 2.0
-    )
+    second = (second + np.swapaxes(second, 1, 2)) / 2.0
+    inertia = np.einsum("nii->n", second)[:, None, None] * np.eye(3) - second
     return tmt.Tree(
         joint_names=tuple(f"j{i}" for i in range(n)),
         kind=("hinge", *(str(kind) for kind in rng.choice(["hinge", "slide"], n - 1, p=[0.75, 0.25]))),

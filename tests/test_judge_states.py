@@ -39,9 +39,8 @@ def test_random_states_fill_the_ranges_of_joints_which_a_speed_passes_in_a_secon
 def larger(joints):
     """The arm with this many times its joints and bodies, one chain."""
     tree, n = ARM.tree, 3 * joints
-    many = {
-        name: getattr(tree, name) * joints for name in ("offset", "axis", "damping", "mass", "com", "inertia")
-    }
+    repeated = ("offset", "axis", "damping", "mass", "com", "inertia")
+    many = {name: getattr(tree, name) * joints for name in repeated}
     names = {"joint_names": [f"h{i}" for i in range(n)], "body_names": [f"b{i}" for i in range(2 * joints)]}
     hinges = {"parent": range(-1, n - 1), "body_joint": [3 * k + i for k in range(joints) for i in (1, 2)]}
     rest = dict.fromkeys(("kind", "armature", "stiffness", "rest", "reference"), ())
@@ -57,11 +56,8 @@ def test_a_large_robot_gets_fewer_states_with_a_note():
     giant = larger(states.MOST_SPEEDS // 3 + 1)
     assert states.named(giant).exact_states == 0
     some = states.random(giant, 10_000, 5)
-    assert (
-        some.exact_states == 0
-        and len(some.notes) == 2
-        and states.random(giant, 10, 5).notes == some.notes[1:]
-    )
+    assert some.exact_states == 0 and len(some.notes) == 2
+    assert states.random(giant, 10, 5).notes == some.notes[1:]
     numbers = 3 * len(giant.tree.mass) * giant.coordinates.nv
     assert len(some.q) * numbers <= states.MOST_NUMBERS < (len(some.q) + 1) * numbers
 

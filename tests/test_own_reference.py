@@ -60,7 +60,7 @@ def examined(folder, asked, names, mjcf="double.xml", joints=None, states=30, wo
 def test_right_equations_agree_in_whatever_form(folder, asked, joints):
     run = examined(folder, asked, STATIC, joints=joints)
     assert not run.failed and all(section.result.checks for section in run.sections)
-    quantities = {row["quantity"] for section in run.sections for row in section.result.rows}
+    quantities = {row.quantity for section in run.sections for row in section.result.rows}
     assert ("energy above the zero position's" in quantities) == ("energy" in run.robot.own)
 
 
@@ -68,8 +68,8 @@ def test_the_tree_of_another_robot_agrees(folder):
     text = "from models import PATHS\nfrom compare.engines.mujoco import read\n"
     (folder / "trees.py").write_text(f"{text}tree = read(PATHS['pendulum_ball']).tree\n")
     run = examined(folder, "trees.py:tree", ["kinematics", *STATIC], PATHS["pendulum_ball"])
-    quantities = {row["quantity"] for row in run.sections[0].result.rows}
-    assert not run.failed and quantities == {"x_b", "T_b", "B_b"}
+    assert not run.failed
+    assert {row.quantity for row in run.sections[0].result.rows} == {"x_b", "T_b", "B_b"}
 
 
 @pytest.mark.parametrize("asked, names, where, quantity", [
@@ -95,7 +95,7 @@ def test_trajectories_are_those_of_rk4(folder):
 def test_slow_equations_get_fewer_states_no_scenes_and_a_cause(folder):
     run = examined(folder, "mine.py:slow_sign", ["mass", "trajectory"], states=5000)
     mass, trajectory = (section.result for section in run.sections)
-    states = next(row["states"] for row in mass.rows if row["scene"] == "random states")
+    (states,) = {row.states for row in mass.rows if row.scene == "random states"}
     assert 1 <= states < 5000 and mass.notes
     assert trajectory.notes and not trajectory.checks and not run.failed
     run = examined(folder, "mine.py:slow_sign", ["diagnosis"])

@@ -38,7 +38,7 @@ def rows(setup: Setup) -> Result:
         comparison.agree(f"tau from {whose} qdd by mj_inverse", torques, tau, back, closing)
         if "energy" in robot.own:  # which may be zero at any position
             zero = np.array(tree.zero)[None], np.zeros((1, tree.coordinates.nv))
-            above, mujoco_above = (of.energy(q, qd) - of.energy(*zero) for of in (engine, mujoco))
+            above, mujoco_above = (side.energy(q, qd) - side.energy(*zero) for side in (engine, mujoco))
             comparison.agree("energy above the zero position's", "J", above, mujoco_above, scale.energy)
 
         power, size = np.einsum("si,si->s", tau - drag, qd), np.einsum("si,si->s", closing, np.abs(qd))

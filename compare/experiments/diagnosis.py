@@ -168,4 +168,4 @@ def figures(result: DiagnosisResult, robot: Robot) -> Iterator[Drawing]:
     if result.nearest:
         from .figures import draw_nearest  # matplotlib is for the process that draws
 
-        yield partial(draw_nearest, result, result.nearest)
+        yield partial(draw_nearest, result.nearest)

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..core.check import Result
 from ..core.finding import Finding
 from ..judge.agree import AgreementResult
 from ..judge.scale import EPS, FACTOR
@@ -56,7 +55,7 @@ def drawn(ascending: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.maximum(ascending[points], ZERO_AT), (points + 1) / count
 
 
-def draw_nearest(result: Result, nearest: Sequence[tuple[str, float, bool]]) -> tuple[str, Figure, Finding]:
+def draw_nearest(nearest: Sequence[tuple[str, float, bool]]) -> tuple[str, Figure, Finding]:
     """The share of the difference that remains after each of the best single corrections."""
     names, shares, explains = zip(*nearest)
     left = np.maximum(shares, EPS)
@@ -71,4 +70,8 @@ def draw_nearest(result: Result, nearest: Sequence[tuple[str, float, bool]]) -> 
     ax.set_yticks(rows, names)
     ax.set_ylim(len(names) - 0.5, -0.5)
     fig.legend(loc="outside upper center", ncols=2)
-    return "diagnosis_nearest", fig, result.finding("nearest", names=names[:2], left=left[:2].tolist())
+    return (
+        "diagnosis_nearest",
+        fig,
+        Finding("diagnosis", "nearest", {"names": names[:2], "left": left[:2].tolist()}),
+    )

@@ -18,10 +18,10 @@ EXPERIMENT = Experiment(
 def rows(setup: Setup) -> Result:
     """Agreement at named postures and random states; symmetry and definiteness at random states."""
     result, (_, at_random) = compared(setup, "mass", "Mbar")
-    ours, theirs, *_ = at_random.values("Mbar")
-    check_symmetry(result, ours, at_random.scale.mass_matrix)  # MuJoCo's is one triangle written twice
-    check_definiteness(result, result.label, ours)
-    check_definiteness(result, "MuJoCo", theirs)
+    M, mujoco_M, *_ = at_random.values("Mbar")
+    check_symmetry(result, M, at_random.scale.mass_matrix)  # MuJoCo's is one triangle written twice
+    check_definiteness(result, result.label, M)
+    check_definiteness(result, "MuJoCo", mujoco_M)
     return result
 
 
@@ -34,12 +34,10 @@ def check_symmetry(result: Result, M: np.ndarray, scale: np.ndarray) -> None:
 def check_definiteness(result: Result, label: str, M: np.ndarray) -> None:
     """The smallest eigenvalue of Mbar over the largest, in units of its diagonal, is more than rounding."""
     diagonal = np.einsum("sii->si", M)
-    root = np.sqrt(
-        np.where((diagonal > 0.0).all(axis=1, keepdims=True), diagonal, 1.0)
-    )  # else it is not definite
+    is_positive = (diagonal > 0.0).all(axis=1, keepdims=True)  # else it is not definite
+    root = np.sqrt(np.where(is_positive, diagonal, 1.0))
     scaled = M / (root[:, :, None] * root[:, None, :])
     values = np.linalg.eigvalsh(scaled) if np.isfinite(scaled).all() else np.full((1, 2), np.nan)
-    what, least = f"{label}: least eigenvalue of Mbar in units of its diagonal over the largest", values[:, 0]
-    result.check(
-        "random states", what, (least / np.abs(values).max(axis=1)).min(), FACTOR * EPS, "", rule="at least"
-    )
+    what = f"{label}: least eigenvalue of Mbar in units of its diagonal over the largest"
+    least = (values[:, 0] / np.abs(values).max(axis=1)).min()
+    result.check("random states", what, least, FACTOR * EPS, "", rule="at least")

@@ -126,30 +126,28 @@ def rows_of(item: Printed, computed: Answer, joints: tuple[str, ...]) -> list[Pr
 
 def check_answer(result: Result, item: Printed, computed: Answer, joints: tuple[str, ...]) -> None:
     """Checks of one item: the printed digits, or, where those are rounding, the exact value."""
-    printed, where, unit = np.array(item.values), f"({item.item}) {item.posture}", item.unit
+    printed, where = np.array(item.values), f"({item.item}) {item.posture}"
+    quantity, unit = item.quantity, item.unit
     by_label = {"TMT": computed.tmt, "MuJoCo": computed.mujoco, "exact": computed.nearest}
     from_printed = {label: np.abs(values - printed).max() for label, values in by_label.items()}
-    for label, values in by_label.items():
-        if not item.is_rounding:
-            printed_digits, tolerance = (
-                f"{label}: {item.quantity} - printed",
-                item.half_digit + computed.rounding,
-            )
-            result.check(where, printed_digits, from_printed[label], tolerance, unit)
-        elif label != "exact":
-            from_exact, off = f"{label}: {item.quantity} - exact", distance(values, computed.exact).max()
-            result.check(where, from_exact, off, computed.rounding, unit, rounding=True)
+    if item.is_rounding:
+        for label in ("TMT", "MuJoCo"):
+            from_exact = f"{label}: {quantity} - exact"
+            difference = distance(by_label[label], computed.exact).max()
+            result.check(where, from_exact, difference, computed.rounding, unit, rounding=True)
+    else:
+        for label, difference in from_printed.items():
+            printed_digits = f"{label}: {quantity} - printed"
+            result.check(where, printed_digits, difference, item.half_digit + computed.rounding, unit)
     for label in ("exact", "TMT"):
         if label.lower() in item.to_every_digit:
-            every_digit = f"{label}: {item.quantity} - printed"
+            every_digit = f"{label}: {quantity} - printed"
             result.check(where, every_digit, from_printed[label], item.half_digit, unit)
     for joint in item.sizes:
         k = joints.index(joint)
-        size, off = (
-            f"exact: |{item.quantity}_{joint}| - |printed|",
-            abs(computed.nearest[k]) - abs(printed[k]),
-        )
-        result.check(where, size, abs(off), item.half_digit, unit)
+        size = f"exact: |{quantity}_{joint}| - |printed|"
+        difference = abs(abs(computed.nearest[k]) - abs(printed[k]))
+        result.check(where, size, difference, item.half_digit, unit)
 
 
 def headline(result: Result) -> Finding | None:

@@ -78,9 +78,9 @@ class Comparison:
 
     def __init__(self, setup: Setup, result: AgreementResult, sample: Sample):
         self.result, self.sample, self.robot = result, sample, setup.robot
-        self.engines: list[Any] = list(
-            setup.compared().values()
-        )  # Dynamics with more functions; MuJoCo is the second
+        self.engines: list[Any] = [
+            *setup.compared().values()
+        ]  # Dynamics that know more; MuJoCo is the second
         is_small = self.robot.coordinates.nv <= MOST_SPEEDS  # code for more takes minutes to compile
         if sample is setup.random and is_small and not self.robot.own:
             self.engines.append(Compiled(self.robot.tree))
@@ -100,8 +100,8 @@ class Comparison:
 
     def acceleration_size(self) -> np.ndarray:
         """The accelerations that scales are taken from: a user's own may be NaN."""
-        own, of_mujoco, *_ = self.values("qdd")
-        return of_mujoco if self.robot.own else own
+        qdd, mujoco_qdd, *_ = self.values("qdd")
+        return mujoco_qdd if self.robot.own else qdd
 
     @cached_property
     def acceleration_scale(self) -> np.ndarray:

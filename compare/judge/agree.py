@@ -95,7 +95,7 @@ def agree(result: AgreementResult, sample: Sample, compared: Compared) -> None:
             measured[f"{quantity}, {engine} to exact"] = distance_from_exact(exact, values, compared.scale)
     checks = [check_closest(result, sample, name, compared.unit, *pair) for name, pair in measured.items()]
     (check, worst), (difference, scale) = checks[0], measured[quantity]
-    in_eps = [np.sort(over(difference, EPS * scale)) for difference, scale in measured.values()]
+    in_eps = (np.sort(over(sizes, EPS * of_sizes)) for sizes, of_sizes in measured.values())
     distances = dict(zip(DISTANCES, in_eps))
     result.distances.setdefault(sample.name, {})[quantity] = distances
     row = AgreementRow(

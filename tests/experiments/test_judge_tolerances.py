@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from edited import MOON, setup_of
-from judged import verdicts
+from judged import BOTH, verdicts
 
 import tmt
 from compare.core.check import Result
@@ -26,10 +26,8 @@ def tolerances(module, qd) -> dict:
     """Of the arm at one state, zero with these rates, in units of 64 eps, by quantity."""
     setup, zero = setup_of(make=Setup, states=1, exact_states=1), np.zeros((1, 3))
     setup.__dict__["random"] = Sample(ARM.tree, "random states", zero, np.array([qd]), zero, 1)
-    checks = module.rows(setup).checks
-    return {
-        check.quantity: check.tolerance / (64 * EPS) for check in checks if check.scene == "random states"
-    }
+    checks = [check for check in module.rows(setup).checks if check.scene == "random states"]
+    return {check.quantity: check.tolerance / (64 * EPS) for check in checks}
 
 
 @pytest.mark.parametrize("module", [kinematics, mass, gravity, acceleration])
@@ -41,9 +39,8 @@ def test_tolerances_are_64_eps_of_the_scale_of_an_entry_of_the_quantity(module):
     sizes = {name: getattr(of, quantity.scale) for name, quantity in QUANTITIES.items() if name in found}
     if module is acceleration:
         closing = of.closing(force, qdd)
-        sizes |= {"qdd": of.acceleration(force, qdd)} | {
-            name: closing for name in found if name.startswith("tau from")
-        }
+        sizes |= {name: closing for name in found if name.startswith("tau from")}
+        sizes["qdd"] = of.acceleration(force, qdd)
         sizes |= {name: closing @ np.abs(rates) for name in found if name.startswith("dE/dt")}
         assert len(sizes) == 8
     assert sizes and all(np.isclose(found[name], size, rtol=1e-9).any() for name, size in sizes.items())
@@ -99,21 +96,13 @@ def of_item(name, ours=0.0, theirs=0.0, scale=0.0, exactly=0.0, printed=True):
 
 
 @pytest.mark.parametrize("name", ["c", "f1", "g", "h"])
-@pytest.mark.parametrize(
-    "off, inside", [(0.499e-4, True), (-0.499e-4, True), (0.501e-4, False), (-0.501e-4, False)]
-)
-def test_four_decimals_are_met_to_half_a_unit_of_the_last(name, off, inside):
-    what = ITEMS[name].quantity + " - printed"
-    assert of_item(name, ours=off) == {
-        f"TMT: {what}": inside,
-        f"MuJoCo: {what}": True,
-        f"exact: {what}": True,
-    }
-    assert of_item(name, theirs=off) == {
-        f"TMT: {what}": True,
-        f"MuJoCo: {what}": inside,
-        f"exact: {what}": True,
-    }
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@BOTH
+def test_four_decimals_are_met_to_half_a_unit_of_the_last(name, share, passes, sign):
+    what, off = ITEMS[name].quantity + " - printed", sign * share * 0.5e-4
+    labels = [f"{label}: {what}" for label in ("TMT", "MuJoCo", "exact")]
+    assert of_item(name, ours=off) == dict(zip(labels, (passes, True, True)))
+    assert of_item(name, theirs=off) == dict(zip(labels, (True, passes, True)))
 
 
 @pytest.mark.parametrize("name", ["f2", "f3", "f4"])

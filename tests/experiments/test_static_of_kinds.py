@@ -6,13 +6,12 @@ from edited import CART, STONE, setup_between
 from models import random_tree
 
 from compare.core.text import say
-from compare.experiments import acceleration, figures_sketch, gravity, kinematics, mass
+from compare.experiments import acceleration, figures_sketch, gravity, kinematics, mass, module
 from compare.experiments import figures as draw
 from compare.judge.agree import AgreementResult
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 
-MODULES = (kinematics, mass, gravity, acceleration)
 BODY = '<inertial pos="0.1 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/></body></worldbody></mujoco>'
 ROBOTS = {
     "a random tree": random_tree(3, joints=4), "springs without gravity": CART.replace("0 0 -9.81", "0 0 0"),
@@ -42,22 +41,21 @@ def failing(result) -> list:
     return [str(check) for check in result.checks if not check.passed]
 
 
-def drawn(module, setup):
+def drawn(experiment, setup):
     """The result of an experiment, of which every figure can be drawn."""
-    result = module.rows(setup)
-    for figure in module.figures(result, setup.robot):
+    result = experiment.rows(setup)
+    for figure in experiment.figures(result, setup.robot):
         name, fig, caption = figure()
-        assert (
-            name.startswith((result.experiment, setup.robot.name)) and fig.axes and "nan" not in say(caption)
-        )
+        assert name.startswith((result.experiment, setup.robot.name))
+        assert fig.axes and "nan" not in say(caption)
     return result
 
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_quantity_of_a_robot_of_any_joints_agrees_and_every_figure_is_drawn(name):
     setup = setup_between(ROBOTS[name], states=5)
-    for module in MODULES:
-        assert failing(drawn(module, setup)) == []
+    for experiment in (kinematics, mass, gravity, acceleration):
+        assert failing(drawn(experiment, setup)) == []
     figures_sketch.draw_sketch(setup.robot)
 
 
@@ -67,9 +65,10 @@ def test_every_quantity_of_a_robot_of_any_joints_agrees_and_every_figure_is_draw
 ])  # fmt: skip
 def test_units_are_those_of_the_joints_and_the_tolerance_of_springs_is_of_the_sums(name, unit, force):
     setup = setup_between(ROBOTS[name], states=5)
-    units = {check.quantity: check.unit for module in (mass, gravity) for check in module.rows(setup).checks}
+    checks = mass.rows(setup).checks + gravity.rows(setup).checks
+    units = {check.quantity: check.unit for check in checks}
     assert (units["Mbar"], units["holding torque"]) == (unit, force)
-    held = [check for check in gravity.rows(setup).checks if check.quantity == "holding torque, springs too"]
+    held = [check for check in checks if check.quantity == "holding torque, springs too"]
     of = Entries(setup.robot.tree, setup.random.q)
     assert len(held) == 2 * setup.robot.tree.has_springs
     sums = FACTOR * EPS * (of.weight + of.springs)
@@ -80,11 +79,9 @@ def test_units_are_those_of_the_joints_and_the_tolerance_of_springs_is_of_the_su
 def test_an_error_of_a_number_fails_the_checks_that_depend_on_it(text, old, new, expected):
     assert text.count(old) == 1
     setup = setup_between(text, text.replace(old, new), states=10)
-    modules = {each.__name__.split(".")[-1]: each for each in MODULES}
-    results = {name: modules[name].rows(setup) for name in {name.split()[0] for name in expected}}
-    failed = [
-        f"{name} {check.quantity}" for name, of in results.items() for check in of.checks if check.failed
-    ]
+    results = [module(name).rows(setup) for name in {name.split()[0] for name in expected}]
+    checks = [check for result in results for check in result.checks if check.failed]
+    failed = [f"{check.experiment} {check.quantity}" for check in checks]
     assert all(any(name.startswith(named) for name in failed) for named in expected)
 
 

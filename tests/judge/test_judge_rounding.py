@@ -74,12 +74,8 @@ def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
     q, qd, tau, dt, M = 0.3, -4.0, 2.0, 0.01, 0.05275
     (h,) = tmt.bias(np.array([q]), np.array([qd]), tree)
     a = (tau - 0.5 * qd - h) / M
-    S = (
-        9.81 * 1.5 * (0.15 + 0.15 / 8 + 0.45 / 64)
-        + 1.5 * 0.15**2 * abs(np.sin(2 * q)) * qd**2
-        + tau
-        + 0.5 * 4.0
-    )
+    weight = 9.81 * 1.5 * (0.15 + 0.15 / 8 + 0.45 / 64)
+    S = weight + 1.5 * 0.15**2 * abs(np.sin(2 * q)) * qd**2 + tau + 0.5 * 4.0
     rates = dt * (64 * EPS * M * abs(a) + 64 * EPS * S) / M + 8 * EPS * (4.0 + dt * abs(a))
     expected = [8 * EPS * (q + dt * 4.0) + dt * rates, rates]
     at = tree, np.array([[q]]), np.array([[qd]]), np.array([tau]), dt

@@ -29,17 +29,17 @@ ENDS = (
 T = np.array([0.0, 0.5])
 
 
-@pytest.mark.parametrize(
-    "name, moved", [("bent, free", 0.0), ("ball catch, held", [0.1, -0.2, 0.3]), ("thrown, no gravity", 0.0)]
-)
+MOVED = ("bent, free", 0.0), ("ball catch, held", [0.1, -0.2, 0.3]), ("thrown, no gravity", 0.0)
+
+
+@pytest.mark.parametrize("name, moved", MOVED)
 def test_a_run_has_diverged_beyond_the_energy_that_the_arm_can_have(name, moved):
     """A second state that has gained this share of all energy that the case's arm can have."""
     case, (start, rate) = CASES[name], CASES[name].start
     q, at_first = start + moved, rate @ tmt.mass_matrix(start, case.tree) @ rate / 2
     allowed = 2.0 * 9.81 * (1.9 * 0.15 + 1.5 * 0.45) + at_first
-    gained = (
-        tmt.potential_energy(q, case.tree) - tmt.potential_energy(start, case.tree) - (q - start) @ case.tau
-    )
+    before, after = (tmt.potential_energy(at, case.tree) for at in (start, q))
+    gained = after - before - (q - start) @ case.tau
     for share, ends in ENDS:
         kinetic = share * allowed + at_first - gained
         new = np.array([np.sqrt(2.0 * kinetic / tmt.mass_matrix(q, case.tree)[0, 0]), 0.0, 0.0])

@@ -26,9 +26,7 @@ COUNT = (1, 2, 1)  # of hinges and balls on the way to each body, at least 1
 LARGEST = (0.04, 0.002, 0.02)  # moments of inertia
 Q = np.array([[-0.7, 0.4, *np.array([1.0, 2.0, 0.0, 2.0]) / 3.0, 1.0], [0.05, -1.0, 1.0, 0.0, 0.0, 0.0, 0.0]])
 QD = np.array([[0.5, -1.0, 2.0, 0.0, 1.0, -3.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
-REACH = np.array(
-    [[0.3 + 0.75 + 0.1, 0.3 + 0.75 + 0.2 + 0.4 + 0.2, 0.6 + 0.3], [0.3 + 0.1, 0.3 + 0.2 + 0.4 + 0.2, 0.9]]
-)
+REACH = np.array([[0.3 + 0.1, 0.3 + 0.2 + 0.4 + 0.2, 0.6 + 0.3]] * 2) + [[0.75, 0.75, 0.0], [0.0, 0.0, 0.0]]
 # of each body and speed
 LEVERS = np.array([[0, 0, 0, 0, 0, 0], [0, 0.4 + 0.2, 0.2, 0.2, 0.2, 0], [0, 0, 0, 0, 0, 0.3]])
 MOVES = SLIDES + LEVERS + TURNS * (0.6 / 8 + np.max(REACH, axis=0)[:, None] / 64)
@@ -48,9 +46,8 @@ def moving_of(b, s):
 
 def test_lengths_are_from_the_joint_and_have_what_slides_have_moved():
     from_joints, from_origin = scale.levers(TREE, Q)
-    assert np.allclose(from_origin, REACH, rtol=1e-14) and np.allclose(
-        scale.levers(TREE)[1], REACH[1], rtol=1e-14
-    )
+    assert np.allclose(from_origin, REACH, rtol=1e-14)
+    assert np.allclose(scale.levers(TREE)[1], REACH[1], rtol=1e-14)
     assert np.allclose(from_joints, LEVERS[:, [0, 1, 2, 5]], rtol=1e-14)
     turned = dataclasses.replace(TREE, kind=("hinge", "slide", "ball", "hinge"))  # a slide after a hinge
     lengthened = [0.4 + 0.2 + 0.2 + 0.4, 0.4 + 0.2 + 0.2 + 1.0]
@@ -62,18 +59,16 @@ def test_lengths_are_from_the_joint_and_have_what_slides_have_moved():
             S, _, w = moving_of(b, s)
             assert np.allclose(OF.v_conv[s, b, 0], COUNT[b] * 2.0 * S * w)
             assert np.allclose(OF.w_conv[s, b, 0], COUNT[b] * S**2)
-        assert np.allclose(OF.B[0, b], COUNT[b]) and np.allclose(
-            OF.positions[:, b, 0], COUNT[b] * REACH[:, b]
-        )
+        assert np.allclose(OF.B[0, b], COUNT[b])
+        assert np.allclose(OF.positions[:, b, 0], COUNT[b] * REACH[:, b])
 
 
 def test_a_base_elsewhere_adds_the_rounding_of_positions_and_nothing_else():
     """A door of 0.3 m that hangs 10 m farther away: 64 eps of its lever, and eps of its distance."""
     moved = dataclasses.replace(TREE, offset=(*TREE.offset[:3], (0.0, -10.6, 0.0)))
     before, after = (entries.Entries(tree, Q, QD).mass_matrix[0, 5, 5] for tree in (TREE, moved))
-    assert [before, after] == pytest.approx(
-        0.02 + 1.5 * (0.3 + 0.6 / 8 + np.array([0.9, 10.9]) / 64) ** 2, rel=1e-13
-    )
+    levers = 0.3 + 0.6 / 8 + np.array([0.9, 10.9]) / 64
+    assert [before, after] == pytest.approx(0.02 + 1.5 * levers**2, rel=1e-13)
     assert after < 2.2 * before
 
 
@@ -84,9 +79,8 @@ def test_the_mass_matrix_sums_every_term_where_it_is_largest():
     terms = summed(of_body)[:1] + np.diag(TREE.armature)
     root = np.sqrt(np.einsum("sii->si", terms))  # of a structural zero: of its diagonal
     assert np.allclose(OF.added, terms, rtol=1e-13) and (terms == 0.0).any()
-    assert np.allclose(
-        OF.mass_matrix, np.where(terms == 0.0, root[:, :, None] * root[:, None, :], terms), rtol=1e-13
-    )
+    sizes = np.where(terms == 0.0, root[:, :, None] * root[:, None, :], terms)
+    assert np.allclose(OF.mass_matrix, sizes, rtol=1e-13)
 
 
 def test_forces_sum_weight_springs_and_what_moves():

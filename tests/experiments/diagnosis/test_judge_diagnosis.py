@@ -27,9 +27,8 @@ def test_the_arm_has_nothing_to_explain(monkeypatch):
             at_limit = found._replace(**{field: ratio})
             monkeypatch.setattr(diagnosis, "diagnosed", lambda setup, at_limit=at_limit: at_limit)
             noted = diagnosis.rows(setup)
-            assert noted.checks[k].passed is passes and [note.kind == "nothing" for note in noted.notes] == [
-                passes
-            ]
+            assert noted.checks[k].passed is passes
+            assert [note.kind == "nothing" for note in noted.notes] == [passes]
     assert found._replace(ratio=1e3).share == 1e3 * FACTOR * EPS
 
 
@@ -39,11 +38,8 @@ def test_a_cause_is_a_row_and_a_note_of_the_check_that_fails():
     assert row.explains == pytest.approx(1.51, rel=1e-12) and row.left_over < 1e-9
     stated = {"rank": 2, "kind": "number", "place": "mass of forearm", "stated": 1.5, "unit": "kg", "tied": 0}
     assert row.record().items() >= stated.items()
-    assert (
-        "mass of forearm" in check.note
-        and "1.51 kg" in check.note
-        and list(map(say, result.notes)) == [check.note]
-    )
+    assert "mass of forearm" in check.note and "1.51 kg" in check.note
+    assert list(map(say, result.notes)) == [check.note]
     ((*_, caption),) = [draw() for draw in diagnosis.figures(result, None)]
     assert caption.values["names"][0] == "mass of forearm"
 
@@ -63,7 +59,6 @@ def test_beside_others_it_is_made_where_one_fails(names, text, made, found, tmp_
     monkeypatch.setattr(parameters, "rows", lambda setup: parameters.ParametersResult("parameters"))
     setup = setup_of(text, make=experiment.Setup, states=20, exact_states=1, size="small")
     sections, causes, reasons = experiment.examine(names, setup, tmp_path, Lines(), InProcess())
-    assert [section.name for section in sections] == made and list(reasons) == [
-        n for n in names if n not in made
-    ]
+    assert [section.name for section in sections] == made
+    assert list(reasons) == [name for name in names if name not in made]
     assert [cause["place"] for cause in causes] == found
