@@ -30,9 +30,8 @@ def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None)
     ways = [path, path + apart] if rng is None else [rng.normal(size=path.shape) for _ in range(2)]
     t, off = np.linspace(0.0, 5.0, pictures), np.full(pictures, apart)
     if ended is not None:
-        ways[1], off = (
-            np.where((t >= ended).reshape(-1, *[1] * (v.ndim - 1)), np.nan, v) for v in (ways[1], off)
-        )
+        ways[1] = np.where((t >= ended)[:, None, None], np.nan, ways[1])
+        off = np.where(t >= ended, np.nan, off)
     links = [(k, k + 1) for k in range(points - 1)]
     paths, left = dict(zip(("tmt", "mujoco"), ways)), dict.fromkeys(("tmt", "mujoco"))
     return Pictures(scene, "RK4, dt = 5/128 s", t, paths, links, off, "rad", left, "What is seen.", True)
@@ -74,9 +73,8 @@ def test_the_pictures_are_those_that_were_computed(apart, ended):
     one = drawn(apart=apart, ended=ended)
     scene = data_of(page_of(one))["scenes"][0]
     found = pictures_of(scene)
-    low, high = (
-        of(np.concatenate([*one.points.values()]).reshape(-1, 2), axis=0) for of in (np.nanmin, np.nanmax)
-    )
+    every = np.concatenate([*one.points.values()]).reshape(-1, 2)
+    low, high = np.nanmin(every, axis=0), np.nanmax(every, axis=0)
     scale = min((np.array([motion.WIDE, motion.HIGH]) - 2 * motion.BORDER) / (high - low))
     for picture, path in zip(found, one.points.values()):
         for values, points in zip(picture, path):
@@ -119,9 +117,8 @@ def test_a_large_robot_has_fewer_pictures_and_then_fewer_scenes(rng):
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="there is no Chromium to run the script")
 def test_the_script_draws_each_engine_where_it_is(tmp_path):
     values = {"title": "", "good": True, "links": (), "script": motion.SCRIPT}
-    attack = (
-        "<img src=x onerror=document.title=1><script>document.title=1</script>"  # as if nothing were escaped
-    )
+    # as if nothing were escaped
+    attack = "<img src=x onerror=document.title=1><script>document.title=1</script>"
     values["body"] = Markup(page_of(drawn(apart=0.3)) + attack)
     text = environment().get_template("page.html.jinja").render(values)  # whose policy allows the script
     script = text.index("<script")
@@ -132,9 +129,8 @@ def test_the_script_draws_each_engine_where_it_is(tmp_path):
     run = subprocess.run(["chromium", *asked], capture_output=True, text=True, timeout=120)
     for name, pictures in zip(("ours", "theirs"), pictures_of(data_of(text)["scenes"][0])):
         assert f'class="{name}" d="{motion.outline(pictures[-1], [(0, 1), (1, 2)])}"' in run.stdout, name
-    assert all(
-        part in run.stdout for part in ("5.00 s", "0.3 rad", '<div class="controls">', "<title></title>")
-    )
+    parts = "5.00 s", "0.3 rad", '<div class="controls">', "<title></title>"
+    assert all(part in run.stdout for part in parts)
 
 
 # figures

@@ -76,9 +76,9 @@ def judged(setup: Setup, scenes: Sequence[SceneRuns]) -> SpeedResult:
     if setup.size != "full":  # errors are regular in one scene only, and other engines have too few settings
         falling, engines = [scene for scene in scenes if scene.case.name == regular.name], IN_QUICK_RUNS
     result.tables["speed_orders"] = accuracy.check_orders(result, falling, engines)
-    for scene in scenes:
-        accuracy.check_same_schemes(result, scene)
-        accuracy.check_smallest_errors(result, scene)
+    for check in (accuracy.check_same_schemes, accuracy.check_smallest_errors):
+        for scene in scenes:
+            check(result, scene)
     result.find("references", runs=[about_reference(scene) for scene in scenes], unit=result.unit)
     return result
 
