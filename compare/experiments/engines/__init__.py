@@ -209,8 +209,8 @@ def compare_quantity(
     size = np.broadcast_to(size, values.shape)
     difference, tolerance = exact.distance(values), FACTOR * eps * size
     worst = closest(difference, tolerance)
-    numbers = {of: [repr(float(x)) for x in getattr(sample, of)[worst[0]]] for of in ("q", "qd", "tau")}
-    note = "; ".join(f"{of} = ({', '.join(numbers[of])})" for of in quantity.arguments)
+    numbers = {name: [repr(float(x)) for x in getattr(sample, name)[worst[0]]] for name in ("q", "qd", "tau")}
+    note = "; ".join(f"{argument} = ({', '.join(numbers[argument])})" for argument in quantity.arguments)
     units, what = unit(sample.tree, *quantity.units), f"{name} to exact"
     pair = difference[worst], tolerance[worst]
     check = result.check(record.label, what, *pair, units, note, True, about=About.ENGINE)

@@ -57,13 +57,13 @@ def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
         try:
             if method.scheme in METHODS and not method.adaptive:
                 compare_steps(result, setup, engine, method)
-            found = add_runs(result, setup, case, engine, method) if case else None
+            measured = add_runs(result, setup, case, engine, method) if case else None
         except (TooLong, Unread) as error:
             result.find("left_out", what=method.label, reason=str(error))
             break
-        if case and found and method.order:
-            where, note = f"{case.name}, {method.label}", f"{found.order:.2f}"
-            check_order(result, where, method.order, found.order, note=note)
+        if case and measured and method.order:
+            where, note = f"{case.name}, {method.label}", f"{measured.order:.2f}"
+            check_order(result, where, method.order, measured.order, note=note)
 
 
 def follow_known(result: Result, setup: Setup) -> None:
@@ -88,10 +88,10 @@ def compare_steps(result: Result, setup: Setup, engine: Engine, method: Method) 
     sample, record = setup.random, RECORDS[engine.name]
     states = [values[:STATES].astype(record.precision).astype(float) for values in (sample.q, sample.qd)]
     case, tau = setup.robot.case(), np.zeros(setup.robot.coordinates.nv)
-    ours = setup.engines["tmt"].of(case).run(*states, tau, STEP, 1, method.scheme)
-    theirs = engine.of(case).run(*states, tau, STEP, 1, method.name)
-    movement = case.coordinates.difference(theirs.q[:, 1], ours.q[:, 1])
-    difference = np.abs(np.concatenate([movement, theirs.v[:, 1] - ours.v[:, 1]], axis=1))
+    twin = setup.engines["tmt"].of(case).run(*states, tau, STEP, 1, method.scheme)
+    stepped = engine.of(case).run(*states, tau, STEP, 1, method.name)
+    movement = case.coordinates.difference(stepped.q[:, 1], twin.q[:, 1])
+    difference = np.abs(np.concatenate([movement, stepped.v[:, 1] - twin.v[:, 1]], axis=1))
     tolerance = step_rounding(METHODS[method.scheme], case.tree, *states, tau, STEP) * record.eps / EPS
     worst = closest(difference, tolerance)
     where, note = LABELS[engine.name], sample.describe(worst[0])
@@ -130,11 +130,11 @@ def add_runs(
             errors.append(run.early)
         if run.seconds > LONGEST:
             break
-    found = order_of(steps, errors, RECORDS[engine.name].eps)
+    measured = order_of(steps, errors, RECORDS[engine.name].eps)
     for row in rows:
-        row.measured_order = found and found.order
+        row.measured_order = measured and measured.order
     result.tables["engines_methods"] += rows
-    return found
+    return measured
 
 
 def order_of(steps: Sequence[float], errors: Sequence[float], eps: float) -> MeasuredOrder | None:

@@ -63,11 +63,11 @@ def answers(result: ReductionResult, robot: Robot) -> list[Finding]:
     for scene, need in result.needs.items():
         groups.setdefault(need, []).append(scene)
     about = {"joint": joint_word(robot.coordinates), "unit": movement_unit(robot.coordinates)}
-    found = []
+    findings = []
     for need, scenes in sorted(groups.items(), key=lambda group: bool(group[0].needed and group[0].stays)):
         apart = max((value for (scene, _), value in result.apart.items() if scene in scenes), default=None)
-        found.append(result.finding("answer", scenes=scenes, apart=apart, **need._asdict(), **about))
-    return found
+        findings.append(result.finding("answer", scenes=scenes, apart=apart, **need._asdict(), **about))
+    return findings
 
 
 def untimed(setup: Setup) -> ReductionResult:

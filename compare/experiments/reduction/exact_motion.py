@@ -55,9 +55,9 @@ def check_falling(
     for engine, values in errors.items():
         is_rounded = [value <= ROUNDED for value in values]
         clear = [*is_rounded, True].index(True)  # the errors above rounding, from the first on
-        found = measured_order(dt[:clear], values[:clear])
-        if found:
-            orders[engine] = found.order
+        measured = measured_order(dt[:clear], values[:clear])
+        if measured:
+            orders[engine] = measured.order
             where = f"{scene}, RK4, {LABELS[engine]}"
-            check_order(result, where, order, found.order, "error from the elliptic function")
+            check_order(result, where, order, measured.order, "error from the elliptic function")
     return orders

@@ -43,10 +43,10 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
             q = coordinates.random(rng, states)
             v = rng.uniform(-10.0, 10.0, (states, coordinates.nv))
             case = robot.case(scene_name(locked), posture=posture_of(coordinates, q[0]), locked=locked)
-            for quantity, pair, found in sub_block_differences(setup, case, q, v):
-                pairs.setdefault((quantity, pair), []).append(found)
-        for (quantity, pair), found in pairs.items():
-            apart, scale = np.concatenate(found, axis=1)
+            for quantity, pair, values in sub_block_differences(setup, case, q, v):
+                pairs.setdefault((quantity, pair), []).append(values)
+        for (quantity, pair), choices in pairs.items():
+            apart, scale = np.concatenate(choices, axis=1)
             check_blocks(result, locked, (quantity, pair, units[quantity]), apart, scale)
 
 
@@ -99,11 +99,17 @@ def sub_block_differences(
         q[:, case.places[name].q], v[:, case.places[name].qd] = position, 0.0
     positions, speeds = columns_of(case, setup.robot.case())
     scale = Entries(setup.robot.tree, q, v)
-    reduced, whole = setup.compared(case).values(), setup.compared().values()
+    reduced, unlocked = setup.compared(case).values(), setup.compared().values()
     block, rows = np.ix_(range(len(q)), speeds, speeds), np.ix_(range(len(q)), speeds)
     free_q, free_v = q[:, positions], v[:, speeds]
-    masses = [a.mass_matrix(free_q) for a in reduced], [b.mass_matrix(q)[block] for b in whole]
-    biases = [a.bias(free_q, free_v) for a in reduced], [b.bias(q, v)[rows] for b in whole]
+    masses = (
+        [engine.mass_matrix(free_q) for engine in reduced],
+        [engine.mass_matrix(q)[block] for engine in unlocked],
+    )
+    biases = (
+        [engine.bias(free_q, free_v) for engine in reduced],
+        [engine.bias(q, v)[rows] for engine in unlocked],
+    )
     for quantity, values, size in (
         ("Mbar", masses, scale.mass_matrix[block]),
         ("bias", biases, scale.bias[rows]),

@@ -85,9 +85,9 @@ def judged(setup: Setup, scenes: Sequence[SceneRuns]) -> SpeedResult:
 
 def about_reference(scene: SceneRuns) -> dict[str, str | float | None]:
     """What is said of the reference of a scene, and of the error that rounding leaves in a run."""
-    known = scene.reference
-    errors = {"apart": known.apart, "floor": scene.floor, "expected": LOST * scene.floor / EPS}
-    return {"scene": scene.case.name, "steps": known.steps, "why": known.why, **errors}
+    reference = scene.reference
+    errors = {"apart": reference.apart, "floor": scene.floor, "expected": LOST * scene.floor / EPS}
+    return {"scene": scene.case.name, "steps": reference.steps, "why": reference.why, **errors}
 
 
 def add_times(setup: Setup, scenes: Sequence[SceneRuns]) -> list[SpeedRow]:
@@ -97,8 +97,8 @@ def add_times(setup: Setup, scenes: Sequence[SceneRuns]) -> list[SpeedRow]:
     for scene, calls in zip(scenes, calls_of_scenes):
         setup.progress(f"speed: timing {scene.case.name}")
         called, rows = runs_of(scene, setup.engines, setup.size, compiled=False)
-        here = [run for run in called if not RECORDS[run.method.engine].reads_file]
-        again = [run for run in here if run.row.time < timing.TIMED_ENOUGH]
+        in_process = [run for run in called if not RECORDS[run.method.engine].reads_file]
+        again = [run for run in in_process if run.row.time < timing.TIMED_ENOUGH]
         take_times(scene.runs + again, calls + prepared(scene.case, again, setup.engines))
         scene.runs += called
         failed += rows

@@ -92,13 +92,13 @@ def at_many_states(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarra
     out = np.ones((count, compiled.size))
     columns = [np.ascontiguousarray(values.T) for values in (q, qd, tau, out)]
     paths = [np.stack([part, part], axis=1) for part in (q, qd)]
-    each = EvaluationRow(FORWARD, ONE_BY_ONE, count, operations=compiled.operations)
-    lanes = EvaluationRow(FORWARD, SIDE_BY_SIDE, count, operations=compiled.operations)
+    one_by_one = EvaluationRow(FORWARD, ONE_BY_ONE, count, operations=compiled.operations)
+    side_by_side = EvaluationRow(FORWARD, SIDE_BY_SIDE, count, operations=compiled.operations)
     called = EvaluationRow(FORWARD, CALLED, count, cores())
     step = EvaluationRow(RK4_STEP, SIDE_BY_SIDE, count, cores())
     return [
-        Loop(each, repeated(lambda: compiled.each(q, qd, tau, out))),
-        Loop(lanes, repeated(lambda: compiled.lanes(*columns))),
+        Loop(one_by_one, repeated(lambda: compiled.each(q, qd, tau, out))),
+        Loop(side_by_side, repeated(lambda: compiled.lanes(*columns))),
         Loop(called, repeated(lambda: tmt.acceleration(q, qd, tau, tree))),
         Loop(step, repeated(lambda: run(*paths, tau, 1e-3))),
     ]

@@ -99,8 +99,8 @@ class SpeedResult(Result):
 
 def scene_runs(case: Case, engines: Mapping[str, Engine], size: str) -> SceneRuns:
     """The runs of a scene by compiled methods, which are not yet timed."""
-    known = reference(case)
-    scene = SceneRuns(case, known, max(floor(case, engines["tmt"].of(case)), known.apart))
+    exact = reference(case)
+    scene = SceneRuns(case, exact, max(floor(case, engines["tmt"].of(case)), exact.apart))
     scene.runs, _ = runs_of(scene, engines, size, compiled=True)
     for run in scene.runs:
         run.row.seconds = None

@@ -59,8 +59,8 @@ def methods(engines: Mapping[str, Engine], size: str, case: Case) -> list[Method
     """The methods by which a case is followed. Where the robot's actuators act, some have other schemes."""
     excluded = left_out(engines, size, case.robot)
     asked = [engine for name, engine in engines.items() if size != "quick" or name in IN_QUICK_RUNS]
-    every = [method for engine in asked for method in methods_in(engine, case).values()]
-    return [method for method in every if (method.engine, method.name) not in excluded]
+    candidates = [method for engine in asked for method in methods_in(engine, case).values()]
+    return [method for method in candidates if (method.engine, method.name) not in excluded]
 
 
 def left_out(engines: Mapping[str, Engine], size: str, robot: Robot) -> dict[tuple[str, str], str]:

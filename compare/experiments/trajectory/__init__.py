@@ -68,11 +68,11 @@ def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], list[F
     """The scenes that a user's own equations have and can follow in time, and a finding about the others."""
     equations, seconds = setup.engines["own"].equations, SECONDS_OF_OWN[setup.size]
     parts = ("acceleration",) if equations.has("acceleration") else ("mass_matrix", "bias")
-    each = OVERHEAD_OF_OWN + sum(equations.times[part][0] for part in parts)
+    of_evaluation = OVERHEAD_OF_OWN + sum(equations.times[part][0] for part in parts)
     unlike = [case.name for case in cases if case.controller or not case.scene.gravity]
     able, slow, left = [], [], seconds
     for case in [case for case in cases if case.name not in unlike]:
-        left -= each * STAGES_OF_RK4 * (case.steps + recorded(case))
+        left -= of_evaluation * STAGES_OF_RK4 * (case.steps + recorded(case))
         if left >= 0.0:
             able.append(case)
         else:

@@ -67,8 +67,8 @@ def rounding(case: Case) -> float:
     """The largest drift of the energy that may be rounding, J."""
     speed, springs = np.abs(case.v), 0.0
     if case.tree.has_springs:
-        off = case.coordinates.difference(case.q, np.array(case.tree.rest))
-        springs = literal.spring_torque(case.q, case.tree) @ off / 2.0
+        stretch = case.coordinates.difference(case.q, np.array(case.tree.rest))
+        springs = literal.spring_torque(case.q, case.tree) @ stretch / 2.0
     kinetic = speed @ np.abs(literal.mass_matrix(case.q, case.tree)) @ speed / 2.0
     return ROUNDED * (gravity_scale(case.tree, case.q) + kinetic + springs)
 
@@ -85,8 +85,8 @@ def check_order(
     orders: dict[str, float | None] = {}  # None: a run has diverged, or does not drift
     least, name = order - ORDER_MARGIN, "order of the drift of energy"
     for engine, of_engine in drifts.items():
-        found = measured_order((2.0, 1.0), of_engine)
-        measured = orders[engine] = number_or_none(found and found.order)
+        measured = measured_order((2.0, 1.0), of_engine)
+        orders[engine] = number_or_none(measured and measured.order)
         place = f"{where}, {LABELS[engine]}, {DURATION:g} s"
-        result.check(place, name, measured, least, "", rule="at least", about=About.PREDICTION)
+        result.check(place, name, orders[engine], least, "", rule="at least", about=About.PREDICTION)
     return orders

@@ -84,8 +84,8 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
 
 def draw_difference(ax: Axes, run: Run, label: str) -> None:
     """The engines' difference in a run, and its band."""
-    ours, theirs = (run.until_diverged(engine, path.q) for engine, path in run.paths.items())
-    difference = moved_from(ours, theirs, run.case.coordinates).max(axis=1)
+    first, mujoco = (run.until_diverged(engine, path.q) for engine, path in run.paths.items())
+    difference = moved_from(first, mujoco, run.case.coordinates).max(axis=1)
     band, end = np.where(run.band < 1e3, run.band, np.nan), run.case.duration
     shown = np.maximum(difference[1:], DRAWN_ZERO)
     ax.semilogy(run.t[1:], shown, color="black", linewidth=1, label=f"{label} to MuJoCo")
@@ -132,14 +132,14 @@ def over_time(
     shown: the numbers of those that are drawn, (): all.
     """
     every = slice(None, None, max(1, len(run.t) // marks_at_most))
-    robot, names, (ours, theirs) = run.case.robot, run.case.coordinates.speeds, values
+    robot, names, (first, mujoco) = run.case.robot, run.case.coordinates.speeds, values
     all_names = robot.coordinates.speeds
     few = len(all_names) <= MOST_LINES  # then a joint looks the same in every figure
     for k, i in enumerate(shown or range(len(names))):
         colour, dash = LINES[all_names.index(names[i]) if few else k]
         label = f"{robot.symbol(names[i])}, {LABELS[robot.compared[0]]}"
-        ax.plot(run.t, ours[:, i], linestyle=dash, color=colour, label=label)
-        ax.plot(run.t[every], theirs[every, i], color=colour, clip_on=False, **MARKS)
+        ax.plot(run.t, first[:, i], linestyle=dash, color=colour, label=label)
+        ax.plot(run.t[every], mujoco[every, i], color=colour, clip_on=False, **MARKS)
     ax.plot([], [], color="black", label="MuJoCo", **MARKS)
 
 
@@ -168,6 +168,6 @@ def differing_most(case: Case, runs: Sequence[Run]) -> list[int]:
         return list(range(count))
     largest = np.zeros(count)
     for run in runs:
-        ours, theirs = (path.q[run.t <= run.judged_until] for path in run.paths.values())
-        largest = np.fmax(largest, moved_from(ours, theirs, case.coordinates).max(axis=0))
+        first, mujoco = (path.q[run.t <= run.judged_until] for path in run.paths.values())
+        largest = np.fmax(largest, moved_from(first, mujoco, case.coordinates).max(axis=0))
     return sorted(np.argsort(-largest, kind="stable")[:MOST_LINES].tolist())

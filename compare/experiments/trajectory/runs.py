@@ -107,7 +107,7 @@ class Run:
         return values if ended is None else np.where((self.t < ended)[:, None], values, np.nan)
 
 
-class Ours(NamedTuple):
+class Twin(NamedTuple):
     """The side of TMT, or of a user's own equations: its run, and what MuJoCo's is compared with."""
 
     run: Run
@@ -148,23 +148,23 @@ def recorded(case: Case) -> int:
 
 def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int]) -> TrajectoryResult:
     """One case with every scheme that both engines have and every step size, in multiples of the scene's own steps."""
-    ours, theirs = case.robot.compared
-    result, dynamics = TrajectoryResult("trajectory", label=LABELS[ours]), compared(engines, case)
-    available = {method.scheme for method in methods_in(engines[ours], case).values()}
+    first, mujoco = case.robot.compared
+    result, dynamics = TrajectoryResult("trajectory", label=LABELS[first]), compared(engines, case)
+    available = {method.scheme for method in methods_in(engines[first], case).values()}
     schemes: dict[str, list[Method]] = {}
-    for method in methods_in(engines[theirs], case).values():
+    for method in methods_in(engines[mujoco], case).values():
         if method.scheme in available:
             schemes.setdefault(method.scheme, []).append(method)
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for steps in step_counts(case, finer):
             for scheme, methods in schemes.items():
-                mine = run_of_ours(case, dynamics[ours], steps, scheme)
-                runs = [compare_run(result, mine, dynamics[theirs], method) for method in methods]
+                twin = run_of_twin(case, dynamics[first], steps, scheme)
+                runs = [compare_run(result, twin, dynamics[mujoco], method) for method in methods]
                 result.runs.append(runs[0])
     return result
 
 
-def run_of_ours(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Ours:
+def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin:
     """TMT's side of a case, or a user's: the run, its band, and single steps from its recorded states."""
     stepping, tree, tau = METHODS[scheme], case.tree, case.tau
     dt, every = case.duration / steps, steps // recorded(case)
@@ -185,7 +185,7 @@ def run_of_ours(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Ours
         rules.widest_judged(case, path.q, path.v),
         step_rounding(stepping, tree, *states, tau, dt),
     )
-    return Ours(run, width, widest, times[single], states, stepped, tolerance)
+    return Twin(run, width, widest, times[single], states, stepped, tolerance)
 
 
 def one_step(
@@ -196,12 +196,12 @@ def one_step(
     return [motion.q[:, 1], motion.v[:, 1]]
 
 
-def compare_run(result: Result, ours: Ours, dynamics: Dynamics, method: Method) -> Run:
+def compare_run(result: Result, twin: Twin, dynamics: Dynamics, method: Method) -> Run:
     """One side and an integrator of MuJoCo with the same scheme, from the same start with the same step."""
-    case, (run, width, widest, at, states, stepped, step_tolerance) = ours.run.case, ours
-    mine, coordinates, times = run.paths[case.robot.compared[0]], case.coordinates, run.t[:: run.every]
-    theirs = Path.of(case, dynamics.run(*case.start, case.tau, run.dt, run.steps, method.name))
-    run = replace(run, integrator=method.name, paths=run.paths | {"mujoco": theirs})
+    case, (run, width, widest, at, states, stepped, step_tolerance) = twin.run.case, twin
+    first, coordinates, times = run.paths[case.robot.compared[0]], case.coordinates, run.t[:: run.every]
+    mujoco = Path.of(case, dynamics.run(*case.start, case.tau, run.dt, run.steps, method.name))
+    run = replace(run, integrator=method.name, paths=run.paths | {"mujoco": mujoco})
     count = judged(times, width < widest, run.ends)
     run = replace(run, judged_until=float(times[count - 1]))
     if len(at):
@@ -210,7 +210,7 @@ def compare_run(result: Result, ours: Ours, dynamics: Dynamics, method: Method) 
         if (step_tolerance.min(axis=0) >= widest).any():
             result.not_judged(run.where, "one step", say(result.finding("wide_step")))
     recorded_states = (
-        [path.q[:: run.every][:count], path.v[:: run.every][:count]] for path in (mine, theirs)
+        [path.q[:: run.every][:count], path.v[:: run.every][:count]] for path in (first, mujoco)
     )
     apart = differences(coordinates, *recorded_states)
     check_level(result, run, "open loop", Deviation(coordinates, times[:count], apart, width[:count]))
@@ -284,9 +284,9 @@ def check_divergence(result: Result, run: Run) -> bool:
         return False
     is_narrow = bool(run.band[-(-round(end / dt) // run.every)] < NARROW)
     if is_narrow:
-        ours, theirs = (steps + 1 if at is None else round(at / dt) for at in run.ends)
+        first, mujoco = (steps + 1 if at is None else round(at / dt) for at in run.ends)
         whose = "TMT's" if result.label == "TMT" else result.label
-        note = f"{steps + 1}: never" if steps + 1 in (ours, theirs) else ""
+        note = f"{steps + 1}: never" if steps + 1 in (first, mujoco) else ""
         what = f"step of divergence, MuJoCo's, is {whose}"
-        result.check(run.where, what, theirs, ours, "", note, rule="equal")
+        result.check(run.where, what, mujoco, first, "", note, rule="equal")
     return is_narrow

@@ -42,11 +42,11 @@ def find_errors(result: TrajectoryResult, robot: Robot, references: Mapping[str,
     """
     scenes = []
     for run in coarsest_runs(result, robot):
-        name, known = run.case.name, references.get(run.case.name)
+        name, reference = run.case.name, references.get(run.case.name)
         if run.case.is_held:
             first, second = deviations(run).values()
-        elif known:
-            first, second = (number_or_none(known.error(path.q).max()) for path in run.paths.values())
+        elif reference:
+            first, second = (number_or_none(reference.error(path.q).max()) for path in run.paths.values())
         else:
             continue
         result.errors[name] = first, second
@@ -61,15 +61,15 @@ def find_errors(result: TrajectoryResult, robot: Robot, references: Mapping[str,
 
 def is_far(errors: Sequence[float | None], difference: float) -> bool:
     """Whether the larger error is so large that the engines' difference says nothing about it."""
-    known = [error for error in errors if error is not None]
-    return len(known) == len(errors) and max(known) > SAYS_NOTHING * difference
+    numbers = [error for error in errors if error is not None]
+    return len(numbers) == len(errors) and max(numbers) > SAYS_NOTHING * difference
 
 
 def difference_while_judged(run: Run) -> float:
     """The largest difference of the engines while they are judged, rad or m."""
     last = int(np.searchsorted(run.t, run.judged_until * (1 + 1e-9), side="right"))
-    ours, theirs = (path.q[: last : run.every] for path in run.paths.values())
-    return float(moved_from(ours, theirs, run.case.coordinates).max())
+    first, mujoco = (path.q[: last : run.every] for path in run.paths.values())
+    return float(moved_from(first, mujoco, run.case.coordinates).max())
 
 
 def find_departures(result: TrajectoryResult, robot: Robot, engines: Mapping[str, Engine]) -> None:
@@ -90,16 +90,16 @@ def departures(run: Run, engines: Mapping[str, Engine]) -> dict[str, Any]:
     Both of the joint whose acceleration is the largest share of what rounding can cause in it.
     """
     case = run.case
-    dt, ((name, ours), (other, theirs)) = case.duration / case.steps, compared(engines, case).items()
+    dt, ((name, first), (mujoco, last)) = case.duration / case.steps, compared(engines, case).items()
     allowed = slope_rounding(METHODS["rk4"], case.tree, case.q[None], case.v[None], case.tau, dt)[2][0]
     initial = {
-        name: ours.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
-        other: theirs.acceleration(*case.start, case.tau),
+        name: first.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
+        mujoco: last.acceleration(*case.start, case.tau),
     }
     joint = int(np.argmax(np.max(np.abs([*initial.values()]), axis=0) / allowed))
-    farthest, found = deviations(run), []
+    farthest, told = deviations(run), []
     for engine, acceleration in initial.items():
         push = number_or_none(np.abs(acceleration[joint]))
         about = {"label": LABELS[engine], "left": run.paths[engine].left, "farthest": farthest[engine]}
-        found.append(about | {"push": push, "holds": push is not None and push <= allowed[joint]})
-    return {"allowed": float(allowed[joint]), "engines": found}
+        told.append(about | {"push": push, "holds": push is not None and push <= allowed[joint]})
+    return {"allowed": float(allowed[joint]), "engines": told}

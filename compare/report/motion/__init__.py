@@ -73,7 +73,7 @@ def inlined_scene(pictures: Pictures, stride: int) -> dict[str, Any]:
     A picture is 0 where it is the one before, 1 where it is that of the first engine, None where the run has diverged.
     """
     slower = max(1.0, pictures.slower(SHOWN_FOR / (len(pictures.t) - 1)))
-    ours, theirs = (path[::stride] for path in on_page(pictures))
+    first, mujoco = (path[::stride] for path in on_page(pictures))
     dt = stride * float(pictures.t[1] - pictures.t[0])
     about = {"scene": pictures.scene, "run": pictures.run, "seen": say(pictures.seen), "slower": slower}
     return {
@@ -82,11 +82,11 @@ def inlined_scene(pictures: Pictures, stride: int) -> dict[str, Any]:
         "dt": dt,
         "pause": max(1, round(1000.0 * dt * slower)),
         "unit": pictures.unit,
-        "still": max(k for k, both in enumerate(zip(ours, theirs)) if None not in both),
-        "base": "M{} {}m-18-18h36v36h-36z".format(*ours[0][:2]) if pictures.fixed else "",
+        "still": max(k for k, both in enumerate(zip(first, mujoco)) if None not in both),
+        "base": "M{} {}m-18-18h36v36h-36z".format(*first[0][:2]) if pictures.fixed else "",
         "links": pictures.links,
         "apart": [float(f"{off:.1e}") if math.isfinite(off) else None for off in pictures.apart[::stride]],
-        "paths": [shorter(ours, [[]] * len(ours)), shorter(theirs, ours)],
+        "paths": [shorter(first, [[]] * len(first)), shorter(mujoco, first)],
     }
 
 

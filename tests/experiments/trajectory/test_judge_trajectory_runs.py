@@ -23,9 +23,9 @@ from compare.robots.file import robot_of
 LEVELS = {f"{level}, TMT to MuJoCo" for level in ("one step", "open loop")}
 
 
-def side(case) -> runs.Ours:
+def side(case) -> runs.Twin:
     """TMT's side of a case by RK4 with its own steps."""
-    return runs.run_of_ours(case, Tmt().of(case), case.steps, "rk4")
+    return runs.run_of_twin(case, Tmt().of(case), case.steps, "rk4")
 
 
 def judged_with(mujoco, mine) -> dict:
