@@ -20,9 +20,9 @@ class ReductionRow(MovementRow):
     engine: str
     nv: int
     operations: int | None
-    ns_per_step: float | None
-    speedup: float | None  # relative to the whole model
-    max_difference: float | None = column(MOVEMENT)  # from the whole model
+    ns_per_step: float | None = None
+    speedup: float | None = None  # relative to the whole model
+    max_difference: float | None = column(MOVEMENT, default=None)  # from the whole model
     integrator: str = "RK4"
 
 
@@ -40,10 +40,10 @@ class SubsetRow(Row):
     locked: str = column(names=True)
     quantity: str
     parties: str
-    states: int
-    largest_difference: float | None
+    states: int = 0
+    largest_difference: float | None = None
     unit: str
-    difference_over_bar: float | None
+    difference_over_bar: float | None = None
 
     @property
     def urgency(self) -> tuple[bool, bool, float]:

@@ -222,10 +222,11 @@ def check_level(result: Result, run: Run, level: str, deviation: Deviation) -> N
     """A row and a check: the component and the recorded state that come closest to their tolerance."""
     check = check_closest(result, run.where, f"{level}, {result.label} to MuJoCo", deviation)
     movements = deviation.difference[:, : deviation.coordinates.nv]
+    largest = None if check.value is None else movements.max()
     twin_diverged_at, diverged_at = run.ends
     result.rows.append(TrajectoryRow(
         scene=run.case.name, engine_integrator=run.integrator, twin=run.scheme, dt=run.dt, level=level,
-        largest_difference=None if check.value is None else movements.max(), unit=rules.movement_unit(run.case.coordinates),
+        largest_difference=largest, unit=rules.movement_unit(run.case.coordinates),
         worst_difference=check.value, band=check.tolerance, worst_unit=check.unit, worst_place=check.note,
         difference_over_band=check.over_tolerance, judged_until=run.judged_until, required=run.required,
         diverged_at=diverged_at, twin_diverged_at=twin_diverged_at,

@@ -7,7 +7,7 @@ from edited import XML
 from compare.engines.mujoco import parse
 from compare.experiments.followed import Deviation
 from compare.experiments.reduction import exact_motion, needs, sub_blocks, times
-from compare.experiments.reduction.records import Model, ReductionResult
+from compare.experiments.reduction.records import Model, ReductionResult, SubsetRow
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
 from compare.judge.scale import EPS
@@ -26,8 +26,8 @@ def verdicts(check, *arguments):
 def test_sub_blocks_agree_within_64_eps(apart, passes):
     scale = np.array([2.0, 1e-3, 5.0])
     off = np.array([0.0, apart * EPS * 1e-3, 0.0])  # in the state with the small scale
-    names = "Mbar", "reduced, TMT to MuJoCo", "kg m2"
-    found = verdicts(sub_blocks.check_blocks, ("beta",), names, off, scale)
+    row = SubsetRow(locked="beta", quantity="Mbar", parties="reduced, TMT to MuJoCo", unit="kg m2")
+    found = verdicts(sub_blocks.check_blocks, "beta locked", row, off, scale)
     assert found == {"Mbar, reduced, TMT to MuJoCo": passes}
 
 

@@ -77,7 +77,7 @@ EDITS = (
     Edit("exact_motion", "check_falling", "measured_order(*_1)", "None", "no order is measured"),
     Edit("pendulum", "swing", "ellipj(frequency * t + _1, k * k)[0]", "np.sin(frequency * t)",
          "a sine as the exact swing"),
-    Edit("sub_blocks", "sub_block_differences", "of_tmt - of_mujoco", "of_tmt - of_tmt", "TMT is compared with itself"),
+    Edit("sub_blocks", "pairs_of", "reduced[0] - reduced[1]", "reduced[0] - reduced[0]", "TMT is compared with itself"),
     Edit("sub_blocks", "compare_blocks", "rng.uniform(-10.0, 10.0, _1)", "rng.uniform(-1e-9, 1e-9, _1)",
          "no bias in motion"),
     Edit("needs", "compare_smaller", "references[engine].q", "references['tmt'].q",
