@@ -9,7 +9,8 @@ import numpy as np
 from ..core.check import Check, Result
 from ..engines import Dynamics, Method, Motion, Setting
 from ..judge.agree import closest
-from ..robots.case import Case, Coordinates
+from ..robots.case import Case
+from ..robots.coordinates import Coordinates
 from ..truth.reference import Reference
 
 States = Sequence[np.ndarray]  # q and v

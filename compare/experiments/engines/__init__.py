@@ -225,10 +225,9 @@ def compare_quantity(
 def asked_at(setup: Setup, precision: str) -> Sample:
     """The random states that have exact values, and the Tree, with numbers that this precision has."""
     sample = setup.random
-    states = [values[: sample.exact_states] for values in (sample.q, sample.qd, sample.tau)]
-    if precision == "float32":
-        states = [values.astype(np.float32).astype(float) for values in states]
-    return Sample(setup.robot.tree, sample.name, *states, sample.exact_states)
+    states = (values[: sample.exact_states] for values in (sample.q, sample.qd, sample.tau))
+    q, qd, tau = (values.astype(precision).astype(float) for values in states)
+    return Sample(setup.robot.tree, sample.name, q, qd, tau, sample.exact_states)
 
 
 def figures(result: EnginesResult, robot: Robot) -> Iterator[partial[Any]]:

@@ -17,7 +17,7 @@ from ...judge.rounding import step_rounding
 from ...judge.scale import EPS
 from ...robots.case import Case
 from ...truth.reference import has_no_reference, reference
-from ..followed import EARLY, REGULAR, follow
+from ..followed import EARLY, REGULAR, differences, follow
 from ..setup import Setup
 
 STEP = 2.0**-7  # s: of single steps, a number that float32 has
@@ -86,13 +86,13 @@ def free_scene(setup: Setup) -> Case | None:
 def compare_steps(result: Result, setup: Setup, engine: Engine, method: Method) -> None:
     """A check of one step from random states, compared with the same scheme of tmt."""
     sample, record = setup.random, RECORDS[engine.name]
-    states = [values[:STATES].astype(record.precision).astype(float) for values in (sample.q, sample.qd)]
+    q, v = (values[:STATES].astype(record.precision).astype(float) for values in (sample.q, sample.qd))
     case, tau = setup.robot.case(), np.zeros(setup.robot.coordinates.nv)
-    twin = setup.engines["tmt"].of(case).run(*states, tau, STEP, 1, method.scheme)
-    stepped = engine.of(case).run(*states, tau, STEP, 1, method.name)
-    movement = case.coordinates.difference(stepped.q[:, 1], twin.q[:, 1])
-    difference = np.abs(np.concatenate([movement, stepped.v[:, 1] - twin.v[:, 1]], axis=1))
-    tolerance = step_rounding(METHODS[method.scheme], case.tree, *states, tau, STEP) * record.eps / EPS
+    twin = setup.engines["tmt"].of(case).run(q, v, tau, STEP, 1, method.scheme)
+    stepped = engine.of(case).run(q, v, tau, STEP, 1, method.name)
+    pair = ((motion.q[:, 1], motion.v[:, 1]) for motion in (stepped, twin))
+    difference = differences(case.coordinates, *pair)
+    tolerance = step_rounding(METHODS[method.scheme], case.tree, q, v, tau, STEP) * record.eps / EPS
     worst = closest(difference, tolerance)
     where, note = LABELS[engine.name], sample.describe(worst[0])
     what = f"one step of {method.name}, compared with tmt's {method.scheme}"
@@ -121,7 +121,7 @@ def add_runs(
             worst_error=None if run.motion.ended else float(run.error.max()),
             seconds=run.seconds,
             seconds_prepared=getattr(dynamics, "seconds_prepared", None),
-            ended=run.motion.ended,
+            ended=None if run.motion.ended is None else str(run.motion.ended),
             order=method.order,
         )
         rows.append(row)

@@ -48,7 +48,7 @@ def rows(setup: Setup, work: Work | None = None) -> ReductionResult:
         setup.quiet()
         time_models(result, setup, rounds=setup.of(64, 16, 2))
         best = largest_gain(result.rows, setup.robot.coordinates.nv)
-        if best and best.speedup >= NO_GAIN:
+        if best and (best.speedup or 0.0) >= NO_GAIN:
             joints = best.hinges.split()
             result.headline = result.finding(
                 "headline", speedup=best.speedup, joints=joints, scene=best.scene

@@ -8,7 +8,8 @@ from ...core.check import About, Result
 from ...engines import LABELS, Motion
 from ...judge.rounding import NARROW, band
 from ...judge.run import check_movement, deviation, required_time, step_in_words
-from ...robots.case import Case, Coordinates
+from ...robots.case import Case
+from ...robots.coordinates import Coordinates
 from ...robots.states import seconds
 from ...truth.smallest import Needed, needed, reduced
 from ..followed import Deviation, check_closest, differences

@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import numpy as np
-
 from ...core.check import Result
 from ...core.rows import MOVEMENT, MovementRow, Row, column
 from ...robots.case import Case
@@ -61,7 +59,7 @@ class Need(NamedTuple):
 
 
 class Swing(NamedTuple):
-    dt: np.ndarray  # s
+    dt: list[float]  # s
     errors: dict[str, list[float]]  # of each engine, rad
     orders: dict[str, float]
 

@@ -10,7 +10,8 @@ from ...judge.agree import closest, worst_of_each
 from ...judge.entries import Entries
 from ...judge.run import number_or_none
 from ...judge.scale import EPS, FACTOR
-from ...robots.case import SEED, Case, Coordinates
+from ...robots.case import SEED, Case
+from ...robots.coordinates import Coordinates
 from ...robots.states import seconds
 from ..setup import Setup
 from .needs import columns_of

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -48,7 +48,8 @@ class Loop(NamedTuple):
 
 def loops(setup: Setup) -> tuple[list[Loop], list[EvaluationRow]]:
     """All ways, compiled and not yet timed; and a row for what cannot be timed."""
-    from ...engines.mujoco.calls import MinimalCalls  # here, since importing MuJoCo takes long
+    from ...engines.mujoco.calls import MinimalCalls  # here, as importing MuJoCo takes long
+    from ...engines.mujoco.dynamics import MujocoDynamics
 
     tree, coordinates = setup.robot.tree, setup.robot.coordinates
     many = setup.of(MANY if coordinates.nv <= MOST_OF_MANY else 10 * FEW, FEW, FEW)
@@ -59,8 +60,8 @@ def loops(setup: Setup) -> tuple[list[Loop], list[EvaluationRow]]:
     if missing := MinimalCalls.unavailable():
         absent.append(EvaluationRow(FORWARD, "MuJoCo, mj_forward", None, None, why_not=missing))
     else:
-        minimal = MinimalCalls(setup.engines["mujoco"].of(setup.robot.case()))
-        of_mujoco = minimal.loops(*first).items()
+        dynamics = cast(MujocoDynamics, setup.engines["mujoco"].of(setup.robot.case()))
+        of_mujoco = MinimalCalls(dynamics).loops(*first).items()
         ready += [Loop(EvaluationRow(quantity, name), run) for name, (quantity, run) in of_mujoco]
     for loop in ready:
         loop.run(1)  # its code is compiled, or loaded, on the first call

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from .. import Experiment
 from ..setup import Setup
 from . import energy, motion, true_motion
 from .runs import TrajectoryResult, follow, recorded
+
+if TYPE_CHECKING:
+    from ...engines.own import Own
 
 EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=True, overview="scenes")
 SECONDS_OF_OWN = {
@@ -51,7 +54,8 @@ def begin(setup: Setup) -> Work:
     """Start the long work, in parallel, while other experiments compute. A quick run takes fewer scenes."""
     robot, engines = setup.robot, setup.engines
     cases = [case for case in robot.cases if not (setup.is_quick and "full only" in case.scene.tags)]
-    spread, finer, left_out = setup.map, setup.finer, []
+    spread, finer = setup.map, setup.finer
+    left_out: list[Finding] = []
     if robot.own:  # whose equations stay in this process
         spread, finer = map, setup.finer[:1]
         cases, left_out = within_time(setup, cases)
@@ -66,7 +70,7 @@ def begin(setup: Setup) -> Work:
 
 def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], list[Finding]]:
     """The scenes that a user's own equations have and can follow in time, and a finding about the others."""
-    equations, seconds = setup.engines["own"].equations, SECONDS_OF_OWN[setup.size]
+    equations, seconds = cast("Own", setup.engines["own"]).equations, SECONDS_OF_OWN[setup.size]
     parts = ("acceleration",) if equations.has("acceleration") else ("mass_matrix", "bias")
     of_evaluation = OVERHEAD_OF_OWN + sum(equations.times[part][0] for part in parts)
     unlike = [case.name for case in cases if case.controller or not case.scene.gravity]
@@ -108,9 +112,9 @@ def find_schemes(result: TrajectoryResult, robot: Robot, mujoco: Engine) -> None
         schemes.setdefault(method.scheme, []).append(method.name)
     missing = [] if robot.own else [name for name in INTEGRATORS if name not in mujoco.methods]
     result.find("schemes", own=robot.own, schemes=schemes, missing=missing, noun=robot.noun)
-    driven = [case for case in cases_run(result, robot) if case.controller]
+    driven = {case.name: case.controller for case in cases_run(result, robot) if case.controller}
     if driven:
-        scenes, left_out = [case.name for case in driven], dict(driven[0].controller.left_out)
+        scenes, left_out = [*driven], dict(next(iter(driven.values())).left_out)
         result.find("servos", noun=robot.noun, scenes=scenes, left_out=left_out)
 
 

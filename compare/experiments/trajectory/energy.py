@@ -42,11 +42,12 @@ def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[i
     free = [case for case in robot.cases if case.is_free and "own" not in case.scene.tags]
     for case in [case for case in free if not any(case.tree.damping)]:
         for method in one_of_each_scheme(engines["mujoco"]):
-            counts, drifts = steps[method.order], {}
+            order, drifts = method.order or 0, {}
+            counts = steps[order]
             for engine, dynamics in compared(engines, case).items():
                 name = method.name if engine == method.engine else same_scheme(engines, method, engine).name
                 drifts[engine] = [largest_drift(case, dynamics, name, count) for count in counts]
-            orders = check_order(result, case, f"{case.name}, {method.name}", method.order, drifts)
+            orders = check_order(result, case, f"{case.name}, {method.name}", order, drifts)
             for engine, (_, drift) in drifts.items():
                 row = EnergyRow(case.name, method.name, DURATION / counts[-1], engine, number_or_none(drift))
                 row.order = orders.get(engine)

@@ -1,6 +1,6 @@
 """The picture of trajectory on the first screen: its scenes."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
@@ -86,6 +86,11 @@ def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Fi
     share = largest_known([scene.share for scene in scenes])
     failing = [scene.name for scene in scenes if not scene.passed]
     shortest, longest = min(scene.shortest for scene in scenes), max(scene.longest for scene in scenes)
-    values = {"label": result.label, "share": share, "scenes": len(scenes), "failing": failing}
+    values: dict[str, Any] = {
+        "label": result.label,
+        "share": share,
+        "scenes": len(scenes),
+        "failing": failing,
+    }
     caption = result.finding("overview_caption", **values, shortest=shortest, longest=longest)
     return "overview_scenes", fig, caption

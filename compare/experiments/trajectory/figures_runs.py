@@ -62,10 +62,9 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
     for (positions, speeds, below), run in zip(axes.T, runs):
         for ax, name in ((positions, "q"), (speeds, "v")):
             paths = {engine: getattr(path, name) for engine, path in run.paths.items()}
-            values = [
-                run.until_diverged(engine, drawable(case, name, path)) for engine, path in paths.items()
-            ]
-            over_time(ax, run, values, shown, 64 // len(runs))
+            drawn = {engine: drawable(case, name, path) for engine, path in paths.items()}
+            alive = [run.until_diverged(engine, path) for engine, path in drawn.items()]
+            over_time(ax, run, alive, shown, 64 // len(runs))
         positions.set_title(f"{run.integrator}, {step}" if len(runs) < 4 else f"{run.integrator}\n{step}")
         draw_difference(below, run, result.label)
     values = np.concatenate([line.get_ydata() for ax in axes[2] for line in ax.lines])

@@ -26,7 +26,7 @@ def pictures_of(case: Case, runs: Sequence[Run]) -> Pictures | None:
     if not by_steps:
         return None
     run, unit = by_steps[(min if case.is_held else max)(by_steps)], movement_unit(case.coordinates)
-    positions, points, links = [], {}, []
+    positions, points = [], {}
     for engine, path in run.paths.items():
         times, q = frames(case, run.t, path)
         alive = np.isfinite(q).all(axis=1)

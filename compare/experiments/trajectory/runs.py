@@ -183,7 +183,7 @@ def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin
     run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, of_positions)
     widest, tolerance = (
         rules.widest_judged(case, path.q, path.v),
-        step_rounding(stepping, tree, *states, tau, dt),
+        step_rounding(stepping, tree, states[0], states[1], tau, dt),
     )
     return Twin(run, width, widest, times[single], states, stepped, tolerance)
 
@@ -192,7 +192,8 @@ def one_step(
     dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str
 ) -> list[np.ndarray]:
     """q and v one step after each of the states."""
-    motion = dynamics.run(*states, tau, dt, 1, method)
+    q, v = states
+    motion = dynamics.run(q, v, tau, dt, 1, method)
     return [motion.q[:, 1], motion.v[:, 1]]
 
 

@@ -78,10 +78,9 @@ def find_departures(result: TrajectoryResult, robot: Robot, engines: Mapping[str
     for run in coarsest_runs(result, robot):
         case = run.case
         if case.is_held:
-            about = {"scene": scene_begins(case.name, robot), "claim": claims.get(case.name), "limit": LEFT}
-            unit, stated = movement_unit(case.coordinates), robot.compared[0] == "tmt"
-            values = departures(run, engines)
-            result.find("held", **about, duration=case.duration, unit=unit, stated=stated, **values)
+            about: dict[str, Any] = {"claim": claims.get(case.name), "limit": LEFT, "duration": case.duration}
+            about |= {"unit": movement_unit(case.coordinates), "stated": robot.compared[0] == "tmt"}
+            result.find("held", scene=scene_begins(case.name, robot), **about, **departures(run, engines))
 
 
 def departures(run: Run, engines: Mapping[str, Engine]) -> dict[str, Any]:

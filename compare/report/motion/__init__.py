@@ -36,7 +36,7 @@ def motion_in_html(sections: Sequence[Section], noun: str) -> str:
     section = next((section for section in sections if getattr(section.result, "pictures", None)), None)
     if section is None:
         return ""
-    drawn: list[Pictures] = section.result.pictures
+    drawn: list[Pictures] = section.result.pictures  # type: ignore[attr-defined]  # of a TrajectoryResult
     names = [pictures.scene for pictures in drawn]
     differing = {scene_of(check.scene, names) for check in failures([section]).differing}
     drawn = sorted(drawn, key=lambda pictures: pictures.scene not in differing)
@@ -45,7 +45,13 @@ def motion_in_html(sections: Sequence[Section], noun: str) -> str:
     still = stride * scenes[0]["still"]
     first, second = (outline(path[still], drawn[0].links) for path in on_page(drawn[0]))
     wide, ring = (20, 16) if drawn[0].few_sticks else (9, 7)
-    values = {"ours": engines[0], "theirs": engines[1], "scenes": scenes, "data": Markup(data), "noun": noun}
+    values: dict[str, Any] = {
+        "ours": engines[0],
+        "theirs": engines[1],
+        "scenes": scenes,
+        "data": Markup(data),
+        "noun": noun,
+    }
     values |= {"width": WIDE, "height": HIGH, "wide": wide, "ring": ring, "first": first, "second": second}
     values |= {"stride": stride, "left_out": [pictures.scene for pictures in drawn[len(scenes) :]]}
     text = environment().get_template("motion.html.jinja").render(values)
@@ -74,7 +80,7 @@ def inlined_scene(pictures: Pictures, stride: int) -> dict[str, Any]:
     """
     slower = max(1.0, pictures.slower(SHOWN_FOR / (len(pictures.t) - 1)))
     first, mujoco = (path[::stride] for path in on_page(pictures))
-    dt = stride * float(pictures.t[1] - pictures.t[0])
+    dt, start = stride * float(pictures.t[1] - pictures.t[0]), first[0] or [0, 0]
     about = {"scene": pictures.scene, "run": pictures.run, "seen": say(pictures.seen), "slower": slower}
     return {
         "name": pictures.scene,
@@ -83,7 +89,7 @@ def inlined_scene(pictures: Pictures, stride: int) -> dict[str, Any]:
         "pause": max(1, round(1000.0 * dt * slower)),
         "unit": pictures.unit,
         "still": max(k for k, both in enumerate(zip(first, mujoco)) if None not in both),
-        "base": "M{} {}m-18-18h36v36h-36z".format(*first[0][:2]) if pictures.fixed else "",
+        "base": "M{} {}m-18-18h36v36h-36z".format(*start[:2]) if pictures.fixed else "",
         "links": pictures.links,
         "apart": [float(f"{off:.1e}") if math.isfinite(off) else None for off in pictures.apart[::stride]],
         "paths": [shorter(first, [[]] * len(first)), shorter(mujoco, first)],

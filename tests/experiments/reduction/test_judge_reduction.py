@@ -64,7 +64,7 @@ FALLING = {
 @pytest.mark.parametrize("errors, passed", FALLING.values(), ids=FALLING)
 def test_errors_fall_at_the_order_of_the_method(errors, passed):
     dt = [0.1 / 2**k for k in range(len(errors))]
-    found = verdicts(exact_motion.check_falling, "swing", dt, {"tmt": errors}, 4)
+    found = verdicts(exact_motion.check_falling, "swing", dt, {"tmt": errors})
     assert list(found.values()) == passed
 
 
