@@ -18,13 +18,11 @@ class Pictures(NamedTuple):
     t: np.ndarray  # (pictures,) s
     points: dict[
         str, np.ndarray
-    ]  # of each engine (pictures, points, 2): to the right and up, m; NaN once it has diverged
+    ]  # by engine (pictures, points, 2): right and up, m; NaN once it has diverged
     links: list[tuple[int, int]]  # pairs of points that a stick joins
-    apart: (
-        np.ndarray
-    )  # (pictures,): the largest difference of the engines in any joint; NaN if one has diverged
+    apart: np.ndarray  # (pictures,): the largest difference of a joint; NaN if an engine has diverged
     unit: str  # of that
-    left: dict[str, float | None]  # of each engine: when a held robot left its posture, s
+    left: dict[str, float | None]  # by engine: when a held robot left its posture, s
     seen: Finding  # departures, the largest difference, divergence
     fixed: bool  # whether the first point does not move, as the first joint only turns
 
@@ -36,11 +34,6 @@ class Pictures(NamedTuple):
         """By what factor the motion is slower than it was, if each picture is shown for this time; 1 where it is hardly seen."""
         factor = seconds / float(self.t[1] - self.t[0])
         return 1.0 if 0.9 < factor < 1.1 else factor
-
-    def every(self, stride: int) -> "Pictures":
-        """Every second, third ... picture."""
-        points = {engine: path[::stride] for engine, path in self.points.items()}
-        return self._replace(t=self.t[::stride], points=points, apart=self.apart[::stride])
 
     def placed(self, room: Sequence[float], middle: Sequence[float]) -> list[np.ndarray]:
         """The points of each engine in a drawing, whose y goes down: all in a room, (2,), about a middle, (2,)."""

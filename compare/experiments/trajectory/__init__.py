@@ -24,11 +24,7 @@ if TYPE_CHECKING:
     from ...engines.own import Own
 
 EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=True, overview="scenes")
-SECONDS_OF_OWN = {
-    "full": 20.0,
-    "quick": 4.0,
-    "small": 2.0,
-}  # of all runs of a user's own equations together, about
+SECONDS_OF_OWN = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all runs of a user's own equations, about
 OVERHEAD_OF_OWN = 1e-4  # s of an evaluation in a run, about, beyond the equations themselves
 STAGES_OF_RK4 = 4  # evaluations in a step of RK4
 SHOWN = ["scene", "engine_integrator", "dt_s", "level", "largest_difference", "unit", "difference_over_band",
@@ -137,8 +133,9 @@ def figures(result: TrajectoryResult, robot: Robot) -> Iterator[partial[Any]]:
     cases = cases_run(result, robot)
     numbers = robot.claims.figures if robot.claims else {}
     for case in cases:
-        if case.is_held and case.name in numbers:
-            yield partial(figures_runs.draw_held, result, case, numbers[case.name])
+        run = result.run_of(case, "rk4") if case.is_held else None
+        if run and case.name in numbers:
+            yield partial(figures_runs.draw_held, result, run, numbers[case.name])
     for case in cases:
         yield partial(figures_runs.draw_run, result, case)
     if result.pictures:

@@ -31,18 +31,17 @@ class SceneRuns(NamedTuple):
 def scenes_of(result: TrajectoryResult, robot: Robot) -> list[SceneRuns]:
     names = {row.scene for row in result.rows}
     failing = [check.scene for check in result.checks if check.failed and check.about == About.MODELS]
-    runs = {(run.case.name, run.scheme, run.steps): run for run in result.runs}
     scenes = []
     for case in (case for case in robot.cases if case.name in names):
         rows = [row for row in result.rows if row.scene == case.name]
         until = [row.judged_until for row in rows]
         diverged = min((row.diverged_at for row in rows if row.diverged_at is not None), default=None)
-        run = runs.get((case.name, "rk4", case.steps)) if case.is_held else None
+        run = result.run_of(case, "rk4") if case.is_held else None
         left = tuple(path.left for path in run.paths.values()) if run else ()
         passed = not any(scene_of(where, [*names]) == case.name for where in failing)
         share = largest_known([row.difference_over_band for row in rows])
-        runs_of = SceneRuns(case.name, share, min(until), max(until), case.duration, diverged, left, passed)
-        scenes.append(runs_of)
+        times = min(until), max(until), case.duration, diverged
+        scenes.append(SceneRuns(case.name, share, *times, left, passed))
     return scenes
 
 
@@ -86,11 +85,6 @@ def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Fi
     share = largest_known([scene.share for scene in scenes])
     failing = [scene.name for scene in scenes if not scene.passed]
     shortest, longest = min(scene.shortest for scene in scenes), max(scene.longest for scene in scenes)
-    values: dict[str, Any] = {
-        "label": result.label,
-        "share": share,
-        "scenes": len(scenes),
-        "failing": failing,
-    }
-    caption = result.finding("overview_caption", **values, shortest=shortest, longest=longest)
-    return "overview_scenes", fig, caption
+    values: dict[str, Any] = {"label": result.label, "share": share, "scenes": len(scenes)}
+    values |= {"failing": failing, "shortest": shortest, "longest": longest}
+    return "overview_scenes", fig, result.finding("overview_caption", **values)

@@ -27,9 +27,9 @@ NOT_JUDGED: dict[str, Any] = {"color": (GREY, 0.2), "linewidth": 0}
 MOST_LINES = len(LINES)  # of joints in a panel
 
 
-def draw_held(result: TrajectoryResult, case: Case, number: int) -> tuple[str, Figure, Finding]:
+def draw_held(result: TrajectoryResult, run: Run, number: int) -> tuple[str, Figure, Finding]:
     """The assignment's figure of a held posture: joint angles against time, and when each engine leaves it."""
-    (run,) = (run for run in runs_of(result, case) if run.scheme == "rk4" and run.steps == case.steps)
+    case = run.case
     fig = Figure(figsize=(WIDTH, 3.3), layout="constrained")
     ax = fig.subplots()
     over_time(ax, run, [np.degrees(run.until_diverged(engine, path.q)) for engine, path in run.paths.items()])

@@ -126,6 +126,14 @@ class TrajectoryResult(Result):
     errors: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
     pictures: list[Pictures] = field(default_factory=list)
 
+    def run_of(self, case: Case, *schemes: str) -> Run | None:
+        """The run of a case with its own step by one of these schemes."""
+        name, steps = case.name, case.steps
+        fit = (
+            run for run in self.runs if (run.case.name, run.steps) == (name, steps) and run.scheme in schemes
+        )
+        return next(fit, None)
+
 
 def steps_afforded(case: Case) -> int:
     """The steps of a run for which its band is computed: each has a Jacobian of (2 nv)^2 entries."""

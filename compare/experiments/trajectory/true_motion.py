@@ -22,11 +22,9 @@ NO_TIME = 1e-6  # s: a step in which nothing moves
 
 def coarsest_runs(result: TrajectoryResult, robot: Robot) -> Iterator[Run]:
     """The run of each scene with the coarsest step of MuJoCo's RK4, held scenes first."""
-    runs = {(run.case.name, run.scheme, run.steps): run for run in result.runs}
     for case in sorted(robot.cases, key=lambda case: not case.is_held):
-        for scheme in SCHEMES_OF_RK4:
-            if run := runs.get((case.name, scheme, case.steps)):
-                yield run
+        if run := result.run_of(case, *SCHEMES_OF_RK4):
+            yield run
 
 
 def deviations(run: Run) -> dict[str, float | None]:

@@ -135,7 +135,7 @@ def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
     schemes = "rk4", "implicit", "discrete"
     found = [run_of(HELD, 0.1, 0.2, (None, 4.0), scheme=scheme, until=2.5) for scheme in schemes]
     result = TrajectoryResult("trajectory", runs=found, errors={HELD.name: (0.1, 0.2)})
-    caption = figures_runs.draw_held(result, HELD, 2)[2].values
+    caption = figures_runs.draw_held(result, found[0], 2)[2].values
     engines = [{"label": "TMT", "left": None, "error": 0.1}, {"label": "MuJoCo", "left": 4.0, "error": 0.2}]
     assert caption["engines"] == engines
     assert (caption["judged"], caption["apart"]) == (2.5, pytest.approx(0.05))
