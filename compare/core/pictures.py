@@ -31,12 +31,12 @@ class Pictures(NamedTuple):
         return len(self.links) <= FEW_STICKS
 
     def slower(self, seconds: float) -> float:
-        """By what factor the motion is slower than it was, if each picture is shown for this time; 1 where it is hardly seen."""
+        """The factor by which the motion is slower, if each picture is shown for this time; 1 if hardly."""
         factor = seconds / float(self.t[1] - self.t[0])
         return 1.0 if 0.9 < factor < 1.1 else factor
 
     def placed(self, room: Sequence[float], middle: Sequence[float]) -> list[np.ndarray]:
-        """The points of each engine in a drawing, whose y goes down: all in a room, (2,), about a middle, (2,)."""
+        """The points of each engine in a drawing whose y goes down: in a room (2,), about a middle (2,)."""
         points = np.concatenate([path.reshape(-1, 2) for path in self.points.values()])
         points = points[np.isfinite(points).all(axis=1)]
         low, high = points.min(axis=0), points.max(axis=0)

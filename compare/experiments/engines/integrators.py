@@ -1,4 +1,4 @@
-"""The integrators of other engines: one step compared with the same scheme of tmt, errors and orders in a free scene."""
+"""The integrators of other engines: one step against the same scheme of tmt, errors and orders."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ class MethodRow(Row):
 
 
 def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
-    """Single steps from random states, and the runs of the regular free scene with several steps or tolerances."""
+    """Single steps from random states, and runs of the regular free scene with several settings."""
     case = free_scene(setup)
     for method in engine.methods_in(setup.robot.case()).values():
         setup.progress(f"engines: {method.label}{' compiles' * RECORDS[engine.name].compiles}")
@@ -76,7 +76,7 @@ def follow_known(result: Result, setup: Setup) -> None:
 
 
 def free_scene(setup: Setup) -> Case | None:
-    """The first scene without locked joints and servos, preferably one with regular errors; None if there is no reference."""
+    """The first scene without locked joints and servos, better a regular one; None: no reference."""
     cases = [case for case in setup.robot.cases_of_torque if not case.scene.locked and not case.is_held]
     if has_no_reference(setup.robot):
         return None

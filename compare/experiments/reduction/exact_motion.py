@@ -28,7 +28,7 @@ def is_pendulum(case: Case) -> bool:
 
 
 def compare_swing(result: ReductionResult, setup: Setup, case: Case) -> None:
-    """Errors of RK4 against the elliptic function fall at its order; not where the hinge turns over or hardly moves."""
+    """Errors of RK4 fall at its order; not checked where the hinge turns over or hardly moves."""
     (q,), (v,), t = *case.start, np.linspace(0.0, case.duration, SWING_STEPS[0] * case.steps + 1)
     hanging, frequency = pendulum(case.tree)
     exact = swing(t, q, v, hanging, frequency) if frequency else np.full_like(t, np.nan)

@@ -70,7 +70,7 @@ def columns_of(smaller: Case, case: Case) -> tuple[np.ndarray, np.ndarray]:
 
 
 def check_smaller(result: Result, where: str, deviation: Deviation, required: float) -> float:
-    """The runs stay within the band of rounding while it is narrow, for the required time; until when they are judged, s."""
+    """Until when the runs are judged, s: they stay within the band of rounding while it is narrow."""
     coordinates, t, apart, width = deviation
     judged = np.cumsum(~(width[:, : coordinates.nv].max(axis=1) < NARROW)) == 0
     narrow = Deviation(coordinates, t[judged], apart[judged], width[judged])

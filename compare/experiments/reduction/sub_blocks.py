@@ -23,7 +23,7 @@ MOST_TO_LOCK = 2.0  # s that an exact state may take
 
 
 def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
-    """A check and a row of a table for each subset, quantity and pair of models, over random angles and states."""
+    """A check and a row for each subset, quantity and pair of models, over random angles and states."""
     result.tables["reduction_subsets"] = []
     robot, rng, states = setup.robot, np.random.default_rng(SEED), 20
     coordinates = robot.coordinates
@@ -69,7 +69,10 @@ def scene_name(locked: Sequence[str]) -> str:
 
 
 def check_blocks(result: Result, where: str, row: SubsetRow, apart: np.ndarray, scale: np.ndarray) -> None:
-    """A check of the state that comes closest to its tolerance, 64 eps x scale, and the row. apart, scale: (states,)."""
+    """A check of the state that comes closest to its tolerance, 64 eps x scale, and the row.
+
+    apart, scale: (states,).
+    """
     tolerance = FACTOR * EPS * scale
     (worst,) = closest(apart, tolerance)
     name = f"{row.quantity}, {row.parties}"
@@ -84,7 +87,7 @@ def sub_block_differences(
 ) -> dict[tuple[str, str], Differences]:
     """By quantity and pair of models, at states whose locked joints are set to the case's.
 
-    The difference of a state is the one closest to its tolerance, with its scale, as in `mass` and `acceleration`.
+    The difference of a state is the one closest to its tolerance, with its scale, as in `mass`.
     """
     q, v = q.copy(), v.copy()
     for name, position in case.locked.items():

@@ -1,4 +1,4 @@
-"""How long an RK4 step takes, with the whole model and with the smallest one that has the motion of a case."""
+"""How long an RK4 step takes, with the whole model and with the smallest one of a case."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache

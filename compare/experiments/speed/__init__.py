@@ -1,4 +1,4 @@
-"""Time against error: every integrator of MuJoCo, every method of tmt, SciPy and heyoka, over all useful steps."""
+"""Time against error: all integrators of MuJoCo, all methods of tmt, SciPy and heyoka, all useful steps."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
@@ -91,7 +91,7 @@ def about_reference(scene: SceneRuns) -> dict[str, str | float | None]:
 
 
 def add_times(setup: Setup, scenes: Sequence[SceneRuns]) -> list[SpeedRow]:
-    """Set the seconds of all runs, after those of engines that are called are added; the rows of methods that fail."""
+    """The rows of methods that fail. Adds the runs of engines that are called; sets the seconds of all."""
     calls_of_scenes, failed = [prepared(scene.case, scene.runs, setup.engines) for scene in scenes], []
     setup.quiet()  # nothing else may run while times are taken
     for scene, calls in zip(scenes, calls_of_scenes):
@@ -116,7 +116,7 @@ def add_advice(result: SpeedResult) -> None:
 
 
 def add_absent(result: SpeedResult, setup: Setup) -> None:
-    """A row for each scene and engine that does not run, or not with all methods, and a finding for each engine."""
+    """Rows and findings: engines that do not run, or not with all methods."""
     groups: dict[tuple[str, str], list[str]] = {}
     for (engine, method), reason in left_out(setup.engines, setup.size, setup.robot).items():
         groups.setdefault((engine, reason), []).append(method)

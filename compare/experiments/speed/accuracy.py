@@ -1,4 +1,4 @@
-"""Checks of the errors of the runs: the order of each method, MuJoCo against the same scheme in tmt, rounding."""
+"""Checks of errors: the order of each method, MuJoCo against the same scheme in tmt, rounding."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ def check_orders(
 
 
 def order_in(scene: SceneRuns, runs: Sequence[Run]) -> MeasuredOrder | None:
-    """The order that the runs of a method show where their errors are regular; of a robot from a file one that has settled."""
+    """The order of a method where its errors are regular; of a robot from a file, one that has settled."""
     clear, least_runs = CLEAR, 2
     if scene.case.robot.is_read:  # the error of rounding, or of the reference, differs from robot to robot
         clear, least_runs = max(CLEAR, NEAR_ROUNDING * scene.floor), 3
@@ -70,7 +70,7 @@ def check_same_schemes(result: SpeedResult, scene: SceneRuns) -> None:
 
 
 def check_smallest_errors(result: SpeedResult, scene: SceneRuns) -> None:
-    """Where errors stop falling they are of the size of rounding; MuJoCo's RK4 is as exact as tmt's with the same steps."""
+    """Errors that stop falling are rounding; MuJoCo's RK4 is as exact as tmt's with the same steps."""
     rounding = FACTOR * scene.floor
     rk4 = check_stopped(result, scene, "mujoco", "RK4", rounding)
     rk4_of_tmt = check_stopped(result, scene, "tmt", "rk4", rounding)
@@ -86,7 +86,7 @@ def check_smallest_errors(result: SpeedResult, scene: SceneRuns) -> None:
 def check_stopped(
     result: SpeedResult, scene: SceneRuns, engine: str, method: str, rounding: float
 ) -> dict[float, float]:
-    """A check of the smallest error of a method if finer steps gain nothing; its errors by the step, from coarse to fine."""
+    """The errors of a method by its step. Checks the smallest one, if finer steps gain nothing."""
     runs = [run for run in scene.runs if (run.method.engine, run.method.name) == (engine, method)]
     errors = {run.dt: run.row.largest_error for run in runs}
     least = min(errors.values(), default=np.inf)

@@ -54,7 +54,7 @@ def drawn(rows: Sequence[SpeedRow]) -> tuple[np.ndarray, list[float]]:
 
 
 def draw_overview(result: SpeedResult) -> tuple[str, Figure, Finding]:
-    """Time against error: the best settings of each engine in one scene, the cheapest within the target in a circle."""
+    """Time against error: the best settings of each engine; the cheapest within the target has a circle."""
     fig, ax = chart()
     fronts = best_rows(result)
     for engine, rows in fronts.items():

@@ -82,7 +82,7 @@ def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], list[F
 
 
 def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
-    """Each scene, integrator and step: single steps and open loop; then departures, errors and the drift of the energy."""
+    """Single steps and open loops of each scene, integrator and step; departures, errors, drift of energy."""
     robot, work = setup.robot, begin(setup) if work is None else work
     result = TrajectoryResult("trajectory", label=LABELS[robot.compared[0]], shown=SHOWN)
     (drifts,) = work.energy
@@ -102,7 +102,7 @@ def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
 
 
 def find_schemes(result: TrajectoryResult, robot: Robot, mujoco: Engine) -> None:
-    """Which integrators are which scheme, which have none, and which of a robot's own actuators are left out."""
+    """Which integrators are which scheme, which have none, and which actuators are left out."""
     schemes: dict[str, list[str]] = {}
     for method in mujoco.methods.values():
         schemes.setdefault(method.scheme, []).append(method.name)

@@ -35,7 +35,10 @@ class EnergyRow(Row):
 
 
 def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, Sequence[int]]) -> Result:
-    """The drift of the energy along free, undamped runs of a second. steps: two counts by the order, one twice the other."""
+    """The drift of the energy along free, undamped runs of a second.
+
+    steps: two counts by the order of the method, the second twice the first.
+    """
     result = Result("trajectory")
     rows = result.tables["energy"] = []
     # in a scene of a user's own the order may not show in a second
@@ -77,7 +80,7 @@ def rounding(case: Case) -> float:
 def check_order(
     result: Result, case: Case, where: str, order: int, drifts: Mapping[str, Sequence[float]]
 ) -> dict[str, float | None]:
-    """The measured order of each engine, at least the method's; not checked, and {}, where both drift by rounding alone.
+    """The measured order of each engine, at least the method's; {} where both drift by rounding alone.
 
     drifts: J, with a step and with half of it.
     """

@@ -46,7 +46,7 @@ def scenes_of(result: TrajectoryResult, robot: Robot) -> list[SceneRuns]:
 
 
 def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Finding]:
-    """Scene by scene: the difference over its band at the left; at the right how long it is judged, and what ends it."""
+    """Each scene: at the left the difference over its band; at the right how long it is judged."""
     scenes = scenes_of(result, robot)
     wrong_first = sorted(scenes, key=lambda scene: scene.passed)[:MOST_ROWS]
     shown = [scene for scene in scenes if scene in wrong_first]

@@ -28,7 +28,7 @@ MOST_LINES = len(LINES)  # of joints in a panel
 
 
 def draw_held(result: TrajectoryResult, run: Run, number: int) -> tuple[str, Figure, Finding]:
-    """The assignment's figure of a held posture: joint angles against time, and when each engine leaves it."""
+    """The assignment's figure of a held posture: angles against time, and when each engine leaves it."""
     case = run.case
     fig = Figure(figsize=(WIDTH, 3.3), layout="constrained")
     ax = fig.subplots()
@@ -109,7 +109,7 @@ def add_legend(fig: Figure, axes: np.ndarray, long: bool) -> None:
 
 
 def run_caption(result: TrajectoryResult, case: Case, runs: Sequence[Run], shown: int) -> Finding:
-    """The engines' difference in a scene, until when it is judged, and their errors. shown: the number of positions."""
+    """The engines' difference in a scene and their errors. shown: the number of positions."""
     rows = [row for row in result.rows if row.scene == case.name and row.level == "open loop"]
     errors, coordinates = result.errors.get(case.name), case.coordinates
     values: dict[str, Any] = {
@@ -161,7 +161,7 @@ def drawable(case: Case, name: str, values: np.ndarray) -> np.ndarray:
 
 
 def differing_most(case: Case, runs: Sequence[Run]) -> list[int]:
-    """The numbers of the movements that are drawn: all, or those in which the engines differ most while judged."""
+    """The movements that are drawn: all, or those in which the engines differ most while judged."""
     count = case.coordinates.nv
     if count <= MOST_LINES:
         return list(range(count))

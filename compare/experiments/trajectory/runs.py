@@ -147,7 +147,7 @@ def step_counts(case: Case, finer: Sequence[int]) -> list[int]:
 
 
 def recorded(case: Case) -> int:
-    """The number of states of a run that are compared, without its start: all its own steps, or every 2nd, 4th ..."""
+    """The number of states of a run that are compared, without its start: one for each 1, 2, 4 ... steps."""
     count = case.steps
     while count > RECORDED and count % 2 == 0:
         count //= 2
@@ -155,7 +155,7 @@ def recorded(case: Case) -> int:
 
 
 def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int]) -> TrajectoryResult:
-    """One case with every scheme that both engines have and every step size, in multiples of the scene's own steps."""
+    """One case with every scheme that both engines have. finer: multiples of the scene's own steps."""
     first, mujoco = case.robot.compared
     result, dynamics = TrajectoryResult("trajectory", label=LABELS[first]), compared(engines, case)
     available = {method.scheme for method in methods_in(engines[first], case).values()}
@@ -182,7 +182,7 @@ def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin
     alive = motion.t[::every] < ends_first([path.ended])
     states, times = [values[::every][alive] for values in (path.q, path.v)], motion.t[::every][alive]
     stepped = one_step(dynamics, states, tau, dt, scheme)
-    # the bound of a step's rounding is of first order in dt, and too small where a joint turns by more than half a turn
+    # the bound of a step's rounding is of first order in dt: too small beyond half a turn of a joint
     turning = [i for i, unit in enumerate(case.coordinates.units) if unit == "rad"]
     rates = np.maximum(*(np.abs(speeds[:, turning]) for speeds in (states[1], stepped[1])))
     single = dt * rates.max(axis=1, initial=0.0) <= np.pi
@@ -263,7 +263,7 @@ def ends_first(ends: Sequence[float | None]) -> float:
 
 
 def judged(times: np.ndarray, narrow: np.ndarray, ends: Sequence[float | None]) -> int:
-    """The number of recorded states that are judged: those before the band is wide or a run has diverged, and the start.
+    """The number of recorded states that are judged: up to where the band is wide or a run has diverged.
 
     narrow: whether the band still judges each movement and speed, (recorded, 2 nv).
     """
@@ -272,7 +272,7 @@ def judged(times: np.ndarray, narrow: np.ndarray, ends: Sequence[float | None]) 
 
 
 def check_time_judged(result: Result, run: Run, alive: float) -> None:
-    """A run is judged for the time that its scene states, or for a tenth of it while it is alive; else it is not judged.
+    """A run is judged for the time that its scene states, or for a tenth of it; else it is not judged.
 
     alive: the last recorded time before one of both runs diverges, s.
     """
@@ -285,7 +285,7 @@ def check_time_judged(result: Result, run: Run, alive: float) -> None:
 
 
 def check_divergence(result: Result, run: Run) -> bool:
-    """Both diverge at the same step, if one does and the band is narrow at the first recorded state after that.
+    """Both diverge at the same step, if the band is narrow at the first recorded state after that.
 
     Returned: whether that is compared.
     """

@@ -1,4 +1,4 @@
-"""Errors of both engines against the true motion, where that is known; and why a held robot leaves its posture."""
+"""Errors of both engines against the true motion; and why a held robot leaves its posture."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -34,7 +34,7 @@ def deviations(run: Run) -> dict[str, float | None]:
 
 
 def find_errors(result: TrajectoryResult, robot: Robot, references: Mapping[str, Reference]) -> None:
-    """The largest error of both engines with the coarsest step of RK4 in each scene, and where it is far above their difference.
+    """The largest error of both engines in each scene, and where it is far above their difference.
 
     references: by the name of the scene; the true motion of a held scene is rest.
     """
@@ -71,7 +71,7 @@ def difference_while_judged(run: Run) -> float:
 
 
 def find_departures(result: TrajectoryResult, robot: Robot, engines: Mapping[str, Engine]) -> None:
-    """When each engine leaves the posture of each held scene, and whether its torque holds it within rounding."""
+    """When each engine leaves the posture of each held scene, and whether its torque holds it."""
     claims = robot.claims.of_scenes if robot.claims else {}
     for run in coarsest_runs(result, robot):
         case = run.case
@@ -82,7 +82,7 @@ def find_departures(result: TrajectoryResult, robot: Robot, engines: Mapping[str
 
 
 def departures(run: Run, engines: Mapping[str, Engine]) -> dict[str, Any]:
-    """The initial acceleration of each engine under the torque that should hold, and what rounding can cause, rad/s2.
+    """The initial acceleration under the torque that should hold, and what rounding can cause, rad/s2.
 
     Both of the joint whose acceleration is the largest share of what rounding can cause in it.
     """

@@ -1,4 +1,4 @@
-"""The motion in the page: stick figures of both engines over each other, with a slider; it fetches nothing."""
+"""The motion in the page: stick figures of both engines, with a slider; it fetches nothing."""
 
 import json
 import math
@@ -30,8 +30,8 @@ Outline = list[int] | None  # x and y of each point of a picture in the drawing;
 def motion_in_html(sections: Sequence[Section], noun: str) -> str:
     """A <figure> with its style and data, for SCRIPT, at most 300 kB; "" where no scene is drawn.
 
-    It opens on a scene in which the engines differ, if there is one. To stay small, it leaves out every second, fourth ...
-    picture, then the last scenes, with a note.
+    It opens on a scene in which the engines differ, if there is one. To stay small, it has every second,
+    fourth ... picture, then fewer scenes, with a note.
     """
     section = next((section for section in sections if getattr(section.result, "pictures", None)), None)
     if section is None:
@@ -76,7 +76,7 @@ def inlined(drawn: Sequence[Pictures], engines: Sequence[str]) -> tuple[str, int
 def inlined_scene(pictures: Pictures, stride: int) -> dict[str, Any]:
     """One scene as the script has it: of each engine a list of pictures, x and y of each point.
 
-    A picture is 0 where it is the one before, 1 where it is that of the first engine, None where the run has diverged.
+    A picture is 0 if it is the one before, 1 if it is that of the first engine, None if the run has diverged.
     """
     slower = max(1.0, pictures.slower(SHOWN_FOR / (len(pictures.t) - 1)))
     first, mujoco = (path[::stride] for path in on_page(pictures))
