@@ -259,4 +259,4 @@ def test_a_step_is_compared_with_the_same_scheme():
     for scheme, passes in (("semi_implicit_euler", True), ("explicit_euler", False)):
         method = Method("mujoco", "Euler", 1, scheme)
         integrators.compare_steps(result, setup, setup.engines["mujoco"], method)
-        assert result.checks[-1].passed == passes
+        assert result.checks[-1].passed == passes and result.checks[-1].tolerance < 1e-11  # rounding alone

@@ -54,7 +54,8 @@ def compare_smaller(result: ReductionResult, case: Case, smaller: Case | None, s
         q, v = (np.tile(start, (steps + 1, 1)) for start in case.start)
         if smaller:
             positions, speeds = columns_of(smaller, case)
-            q[:, positions], v[:, speeds] = references[engine].q, references[engine].v
+            reference = references[engine]
+            q[:, positions], v[:, speeds] = reference.q, reference.v
             if "own" not in case.scene.tags:  # a user's own scene may hardly move
                 check_movement(result, where, deviation(run.q, run.q[0], coordinates))
         apart = differences(coordinates, (run.q, run.v), (q, v))[::every]

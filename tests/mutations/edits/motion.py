@@ -80,7 +80,7 @@ EDITS = (
     Edit("sub_blocks", "pairs_of", "reduced[0] - reduced[1]", "reduced[0] - reduced[0]", "TMT is compared with itself"),
     Edit("sub_blocks", "compare_blocks", "rng.uniform(-10.0, 10.0, _1)", "rng.uniform(-1e-9, 1e-9, _1)",
          "no bias in motion"),
-    Edit("needs", "compare_smaller", "references[engine].q", "references['tmt'].q",
+    Edit("needs", "compare_smaller", "references[engine]", "references['tmt']",
          "MuJoCo is compared with TMT's smaller model"),
     Edit("needs", "check_smaller", "apart[judged]", "apart[:1]", "the first state is judged"),
 )  # fmt: skip
