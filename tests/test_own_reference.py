@@ -88,7 +88,7 @@ def test_what_is_wrong_is_seen_where_it_acts(folder, asked, names, where, quanti
 def test_trajectories_are_those_of_rk4(folder):
     run = examined(folder, "mine.py:Object", ["trajectory"])
     assert run.sections[0].result.checks and not run.failed
-    found = {(row["engine_integrator"], row["level"]) for row in run.sections[0].result.rows}
+    found = {(row.engine_integrator, row.level) for row in run.sections[0].result.rows}
     assert found == {("RK4", level) for level in ("one step", "open loop")}
 
 

@@ -18,13 +18,11 @@ class Pictures(NamedTuple):
     t: np.ndarray  # (pictures,) s
     points: dict[
         str, np.ndarray
-    ]  # of each engine (pictures, points, 2): to the right and up, m; NaN once it has diverged
+    ]  # by engine (pictures, points, 2): right and up, m; NaN once it has diverged
     links: list[tuple[int, int]]  # pairs of points that a stick joins
-    apart: (
-        np.ndarray
-    )  # (pictures,): the largest difference of the engines in any joint; NaN if one has diverged
+    apart: np.ndarray  # (pictures,): the largest difference of a joint; NaN if an engine has diverged
     unit: str  # of that
-    left: dict[str, float | None]  # of each engine: when a held robot left its posture, s
+    left: dict[str, float | None]  # by engine: when a held robot left its posture, s
     seen: Finding  # departures, the largest difference, divergence
     fixed: bool  # whether the first point does not move, as the first joint only turns
 
@@ -33,17 +31,12 @@ class Pictures(NamedTuple):
         return len(self.links) <= FEW_STICKS
 
     def slower(self, seconds: float) -> float:
-        """By what factor the motion is slower than it was, if each picture is shown for this time; 1 where it is hardly seen."""
+        """The factor by which the motion is slower, if each picture is shown for this time; 1 if hardly."""
         factor = seconds / float(self.t[1] - self.t[0])
         return 1.0 if 0.9 < factor < 1.1 else factor
 
-    def every(self, stride: int) -> "Pictures":
-        """Every second, third ... picture."""
-        points = {engine: path[::stride] for engine, path in self.points.items()}
-        return self._replace(t=self.t[::stride], points=points, apart=self.apart[::stride])
-
     def placed(self, room: Sequence[float], middle: Sequence[float]) -> list[np.ndarray]:
-        """The points of each engine in a drawing, whose y goes down: all in a room, (2,), about a middle, (2,)."""
+        """The points of each engine in a drawing whose y goes down: in a room (2,), about a middle (2,)."""
         points = np.concatenate([path.reshape(-1, 2) for path in self.points.values()])
         points = points[np.isfinite(points).all(axis=1)]
         low, high = points.min(axis=0), points.max(axis=0)

@@ -1,4 +1,4 @@
-"""Runs of a method along a scene, timed and measured against the reference of the scene; the difference of two runs."""
+"""Runs of a method along a scene, timed and measured against its reference; differences of two runs."""
 
 import time
 from collections.abc import Sequence
@@ -9,7 +9,8 @@ import numpy as np
 from ..core.check import Check, Result
 from ..engines import Dynamics, Method, Motion, Setting
 from ..judge.agree import closest
-from ..robots.case import Case, Coordinates
+from ..robots.case import Case
+from ..robots.coordinates import Coordinates
 from ..truth.reference import Reference
 
 States = Sequence[np.ndarray]  # q and v
@@ -34,7 +35,7 @@ def follow(
     reference: Reference,
     repeat: float = 0.0,
 ) -> Followed:
-    """The run of a method with a setting; it is timed up to 5 times, as long as these take less than `repeat` s together."""
+    """The run of a method with a setting, timed up to 5 times while these take less than `repeat` s."""
     run, read = dynamics.prepare(*case.start, case.tau, setting, method.name)
     times: list[float] = []
     with np.errstate(all="ignore"):  # in a run that diverges
@@ -58,7 +59,7 @@ class Deviation(NamedTuple):
 
 
 def differences(coordinates: Coordinates, states: States, others: States) -> np.ndarray:
-    """The absolute differences of two runs, each q (times, nq) and v (times, nv), movements first: (times, 2 nv)."""
+    """Absolute differences of q (times, nq) and v (times, nv) of two runs: (times, 2 nv), movements first."""
     movements = coordinates.difference(states[0], others[0])
     return np.abs(np.concatenate([movements, states[1] - others[1]], axis=-1))
 

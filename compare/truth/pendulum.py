@@ -10,7 +10,7 @@ def pendulum(tree: tmt.Tree) -> tuple[float, float]:
     """The hanging angle of a Tree with one hinge, rad, and the frequency of small swings about it, rad/s.
 
     Mechanics of a rigid body on a fixed axis, from the numbers of the Tree and not by the method:
-    I qdd = -|sum m r| |g| sin(q - hanging), with r and g across the axis and I the moment of inertia about it.
+    I qdd = -|sum m r| |g| sin(q - hanging), with r and g across the axis and I the moment of inertia.
     """
     axis, gravity = np.array(tree.axis[0]), np.array(tree.gravity)
     inertia, moment = tree.armature[0], np.zeros(3)
@@ -28,8 +28,8 @@ def pendulum(tree: tmt.Tree) -> tuple[float, float]:
 def swing(t: np.ndarray, q: float, qd: float, hanging: float, frequency: float) -> np.ndarray:
     """Angle of a pendulum that started at q, qd (rad, rad/s), at times t in s: rad.
 
-    sin(theta / 2) = k sn(frequency t + u, k), theta from hanging; k = sin(half the amplitude). Whittaker, Analytical
-    Dynamics, 44. NaN if it turns over (k of 1 or more).
+    sin(theta / 2) = k sn(frequency t + u, k), theta from hanging; k = sin(half the amplitude). NaN if it turns
+    over (k of 1 or more). Whittaker, Analytical Dynamics, 44.
     """
     theta = np.remainder(q - hanging + np.pi, 2 * np.pi) - np.pi
     height, speed = np.sin(theta / 2), qd / (2 * frequency)

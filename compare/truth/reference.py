@@ -1,7 +1,8 @@
 """Reference runs for errors: Taylor's method in pairs of doubles, for any robot and any scene.
 
-A second run with another form of the equations and another order gives the accuracy. Where a series takes too long, as for a
-stiff robot, the reference is a run in doubles of order 8, whose accuracy is known from halving its steps.
+A second run with another form of the equations and another order gives the accuracy. Where a series takes
+too long, as for a stiff robot, the reference is a run in doubles of order 8. Halving its steps gives its
+accuracy.
 """
 
 from functools import lru_cache
@@ -73,7 +74,7 @@ def times(case: Case) -> np.ndarray:
 
 
 def in_doubles(case: Case) -> Reference:
-    """A run in doubles by tmt's method of order 8: the steps are doubled while the difference of two runs falls.
+    """A run in doubles by a method of order 8: the steps are doubled while the difference of two runs falls.
 
     ValueError if no run reaches the end of the scene.
     """
@@ -95,7 +96,7 @@ def in_doubles(case: Case) -> Reference:
 
 
 def has_no_reference(robot: Robot) -> Finding | None:
-    """Why a file's robot has no reference, as its fastest mode diverges even with the finest steps; or None."""
+    """Why a file's robot has no reference: its fastest mode diverges with the finest steps; or None."""
     for case in robot.cases_of_torque if robot.is_read else ():
         dt = case.duration / (first_steps(case) << MOST_DOUBLINGS)
         decay, swing = rates_at(case.tree, case.q)

@@ -1,8 +1,9 @@
-"""The smallest model with the same motion in a scene: which joints stay where they start for any motion of the others.
+"""The smallest model with the same motion in a scene: which joints stay, however the others move.
 
-A set of joints stays if their accelerations vanish for all values of the others, with these joints at their start and at
-rest. There is a largest such set: remove the joints that move from all joints until none moves. Whether a joint moves is decided
-at a random state, by its acceleration in 50 digits of the robot's doubles: an analytic function that is 0 there is 0 everywhere.
+A set of joints stays if their accelerations vanish for all values of the others, with these joints at their
+start and at rest. There is a largest such set: remove the joints that move from all joints until none moves.
+Whether a joint moves is decided at a random state, by its acceleration in 50 digits of the robot's doubles:
+an analytic function that is 0 there is 0 everywhere.
 """
 
 import dataclasses
@@ -22,7 +23,7 @@ from tmt.exact.values import DIGITS
 
 from ..robots.case import SEED, Case
 
-# an acceleration in 50 digits that counts as 0, relative to the largest one at that state, which is taken as at least 1
+# an acceleration that counts as 0, relative to the largest one at that state, or to 1
 ZERO = mpmath.mpf(10) ** (10 - DIGITS)
 Numbers = list[mpmath.mpf]
 
@@ -55,9 +56,9 @@ def needed(case: Case) -> Needed:
 def forces(
     case: Case, tree: SimpleNamespace, still: Sequence[str], start: Numbers, q: Numbers, qd: Numbers
 ) -> tuple[Numbers, Numbers]:
-    """Mbar qdd (nv,) and the position: joints in `still` at their start and at rest, the others at q, qd; in mpmath's numbers.
+    """Mbar qdd (nv,) and the position; joints in `still` are at their start and at rest.
 
-    A holding torque is the model's own bias (and springs) at the start in these numbers, not its rounded value.
+    A holding torque is the model's own bias (and springs) at the start in these numbers, not rounded.
     """
     q, qd, joints = [*q], [*qd], dict(zip(case.joints, tree.coordinates.joints))
     for name in still:
@@ -77,7 +78,7 @@ def forces(
 def exact_accelerations(
     case: Case, still: Sequence[str], of_q: np.ndarray, of_qd: np.ndarray
 ) -> dict[str, tuple[mpmath.mpf, ...]]:
-    """The accelerations of the joints in `still` with 50 digits, rad/s2 or m/s2: tuples by name; 0 where they vanish."""
+    """The accelerations of the joints in `still` by name, 50 digits, rad/s2 or m/s2; 0 where they vanish."""
     with mpmath.workdps(DIGITS):
         tree = exact_tree(case.tree, mpmath.mpf)
         start, q, qd = ([mpmath.mpf(float(v)) for v in values] for values in (case.q, of_q, of_qd))
@@ -103,7 +104,7 @@ def exact_mass_matrix(tree: tmt.Tree, q: tuple[mpmath.mpf, ...]) -> list[Numbers
 
 
 def reduced(case: Case, need: Needed | None = None) -> Case | None:
-    """The same case with the joints locked that stay; None if it needs all of them, or none. need: the result of `needed`."""
+    """The same case with the joints locked that stay; None if it needs all of them, or none."""
     stays = (need or needed(case)).stays
     if not stays or len(stays) == len(case.joints):
         return None

@@ -29,7 +29,8 @@ def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None)
     ways = [path, path + apart] if rng is None else [rng.normal(size=path.shape) for _ in range(2)]
     t, off = np.linspace(0.0, 5.0, pictures), np.full(pictures, apart)
     if ended is not None:
-        ways[1][t >= ended], off[t >= ended] = np.nan, np.nan
+        ways[1] = np.where((t >= ended)[:, None, None], np.nan, ways[1])
+        off = np.where(t >= ended, np.nan, off)
     links = [(k, k + 1) for k in range(points - 1)]
     paths, left = dict(zip(("tmt", "mujoco"), ways)), dict.fromkeys(("tmt", "mujoco"))
     return Pictures(scene, "RK4, dt = 5/128 s", t, paths, links, off, "rad", left, "What is seen.", True)
@@ -70,8 +71,8 @@ def test_the_pictures_are_those_that_were_computed(apart, ended):
     one = drawn(apart=apart, ended=ended)
     scene = data_of(page_of(one))["scenes"][0]
     found = pictures_of(scene)
-    points = np.concatenate([*one.points.values()]).reshape(-1, 2)
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    every = np.concatenate([*one.points.values()]).reshape(-1, 2)
+    low, high = np.nanmin(every, axis=0), np.nanmax(every, axis=0)
     scale = min((np.array([motion.WIDE, motion.HIGH]) - 2 * motion.BORDER) / (high - low))
     for picture, path in zip(found, one.points.values()):
         for values, points in zip(picture, path):

@@ -21,9 +21,8 @@ SCENES = {  # what is not needed, and the scene
 
 
 def test_what_is_not_needed():
-    assert {case.name: needed(case).stays for case in ARM.cases} == {
-        case.name: () for case in ARM.cases
-    } | KNOWN
+    for case in ARM.cases:
+        assert needed(case).stays == KNOWN.get(case.name, ()), case.name
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -37,8 +36,7 @@ def test_what_stays_by_numbers_that_cancel():
     body = {"body_names": ("top",), "body_joint": (2,), "mass": (1.0,), "com": ((0.0, 0.0, -0.2),)}
     inertia = (np.diag([0.01, 0.01, 0.002]),)
     axes = {"parent": (-1, 0, 1), "offset": np.zeros((3, 3)), "axis": np.eye(3)[[1, 0, 2]]}
-    robot = dataclasses.replace(
-        ARM, name="top", tree=dataclasses.replace(tmt.ARM, **axes, **body, inertia=inertia)
-    )
+    tree = dataclasses.replace(tmt.ARM, **axes, **body, inertia=inertia)
+    robot = dataclasses.replace(ARM, name="top", tree=tree)
     found = needed(robot.case("top", posture=(0, 30, 40)))
     assert set(found.moves) == {"beta"} and found.stays == ("alpha", "gamma")

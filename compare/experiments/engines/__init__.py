@@ -1,4 +1,4 @@
-"""Other engines that read the robot's file: what each has read, its equations at random states, and its integrators."""
+"""Other engines that read the robot's file: what each has read, its equations, its integrators."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -27,14 +27,14 @@ from . import integrators
 
 EXPERIMENT = Experiment(order=65, serves_own=False, in_quick=False)
 COMPARED = ("Mbar", "bias", "qdd")
-UNITS = {"gravity": "m/s2", "mass": "kg", "moments": "kg m2", "com": "m", "inertia": "kg m2", "armature": "kg m2",
-         "damping": "N m s/rad", "stiffness": "N m/rad"}  # fmt: skip
+UNITS = {"gravity": "m/s2", "mass": "kg", "moments": "kg m2", "com": "m", "inertia": "kg m2",
+         "armature": "kg m2", "damping": "N m s/rad", "stiffness": "N m/rad"}  # fmt: skip
 OF_BODIES = "mass", "moments"  # no convention makes these differ
 ENTRIES = {"mass": 1, "moments": 3, "com": 3, "inertia": 9}  # of a joint
 AS_READ = "as read"  # checks of numbers
 SECONDS = 5.0  # of the search for the cause of a difference
-SHOWN = ["engine", "quantity", "unit", "states", "worst_difference", "bar", "difference_over_bar", "difference_eps",
-         "mujoco_eps"]  # fmt: skip
+SHOWN = ["engine", "quantity", "unit", "states", "worst_difference", "bar", "difference_over_bar",
+         "difference_eps", "mujoco_eps"]  # fmt: skip
 
 
 @dataclass
@@ -88,7 +88,7 @@ def skipped(robot: Robot) -> Finding | None:
 
 
 def rows(setup: Setup) -> EnginesResult:
-    """For each installed engine: what it has read, M, h and accelerations compared with exact values, its integrators."""
+    """What each installed engine has read, its M, h and accelerations, and its integrators."""
     result = EnginesResult("engines", shown=SHOWN, tables={"engines_read": [], "engines_methods": []})
     absent: dict[str, list[str]] = {}
     for engine in [engine for engine in setup.engines.values() if isinstance(engine, Outside)]:
@@ -114,7 +114,7 @@ def rows(setup: Setup) -> EnginesResult:
 
 
 def add_answer(result: EnginesResult) -> None:
-    """Which engines differ, which have read other numbers, and the largest distance of each from the exact values."""
+    """Which engines differ, which have read other numbers, and how far each is from the exact values."""
     largest: dict[str, float] = {}
     for row in result.rows:
         largest[row.engine] = max(row.difference_eps, largest.get(row.engine, 0.0))
@@ -139,7 +139,7 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
 def compare_numbers(
     result: EnginesResult, robot: Robot, record: EngineRecord, reading: Mapping[str, Mapping[str, Any]]
 ) -> None:
-    """A row for each number that the engine has read differently, and a check of the masses and moments of inertia."""
+    """Rows of what the engine has read differently, and checks of the masses and moments of inertia."""
     for number, values in reading["read"].items():
         stated = reading["stated"][number]
         tolerance = FACTOR * record.eps * size_of(reading["stated"], number)
@@ -179,7 +179,7 @@ def named_after(robot: Robot, number: str) -> list[str]:
 def compare_quantities(
     result: EnginesResult, setup: Setup, record: EngineRecord, dynamics: OutsideDynamics
 ) -> None:
-    """Rows and checks: M, h and accelerations at the states that have exact values, in eps of the engine's precision."""
+    """Rows and checks of M, h and accelerations at the states that have exact values."""
     sample, mujoco = asked_at(setup, record.precision), setup.engines["mujoco"].of(setup.robot.case())
     computed = {}
     for name in COMPARED:
@@ -209,8 +209,8 @@ def compare_quantity(
     size = np.broadcast_to(size, values.shape)
     difference, tolerance = exact.distance(values), FACTOR * eps * size
     worst = closest(difference, tolerance)
-    numbers = {of: [repr(float(x)) for x in getattr(sample, of)[worst[0]]] for of in ("q", "qd", "tau")}
-    note = "; ".join(f"{of} = ({', '.join(numbers[of])})" for of in quantity.arguments)
+    numbers = {name: [repr(float(x)) for x in getattr(sample, name)[worst[0]]] for name in ("q", "qd", "tau")}
+    note = "; ".join(f"{argument} = ({', '.join(numbers[argument])})" for argument in quantity.arguments)
     units, what = unit(sample.tree, *quantity.units), f"{name} to exact"
     pair = difference[worst], tolerance[worst]
     check = result.check(record.label, what, *pair, units, note, True, about=About.ENGINE)
@@ -225,10 +225,9 @@ def compare_quantity(
 def asked_at(setup: Setup, precision: str) -> Sample:
     """The random states that have exact values, and the Tree, with numbers that this precision has."""
     sample = setup.random
-    states = [values[: sample.exact_states] for values in (sample.q, sample.qd, sample.tau)]
-    if precision == "float32":
-        states = [values.astype(np.float32).astype(float) for values in states]
-    return Sample(setup.robot.tree, sample.name, *states, sample.exact_states)
+    states = (values[: sample.exact_states] for values in (sample.q, sample.qd, sample.tau))
+    q, qd, tau = (values.astype(precision).astype(float) for values in states)
+    return Sample(setup.robot.tree, sample.name, q, qd, tau, sample.exact_states)
 
 
 def figures(result: EnginesResult, robot: Robot) -> Iterator[partial[Any]]:

@@ -1,4 +1,4 @@
-"""The integrators of other engines: one step compared with the same scheme of tmt, errors and orders in a free scene."""
+"""The integrators of other engines: one step against the same scheme of tmt, errors and orders."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from ...judge.rounding import step_rounding
 from ...judge.scale import EPS
 from ...robots.case import Case
 from ...truth.reference import has_no_reference, reference
-from ..followed import EARLY, REGULAR, follow
+from ..followed import EARLY, REGULAR, differences, follow
 from ..setup import Setup
 
 STEP = 2.0**-7  # s: of single steps, a number that float32 has
@@ -50,20 +50,20 @@ class MethodRow(Row):
 
 
 def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
-    """Single steps from random states, and the runs of the regular free scene with several steps or tolerances."""
+    """Single steps from random states, and runs of the regular free scene with several settings."""
     case = free_scene(setup)
     for method in engine.methods_in(setup.robot.case()).values():
         setup.progress(f"engines: {method.label}{' compiles' * RECORDS[engine.name].compiles}")
         try:
             if method.scheme in METHODS and not method.adaptive:
                 compare_steps(result, setup, engine, method)
-            found = add_runs(result, setup, case, engine, method) if case else None
+            measured = add_runs(result, setup, case, engine, method) if case else None
         except (TooLong, Unread) as error:
             result.find("left_out", what=method.label, reason=str(error))
             break
-        if case and found and method.order:
-            where, note = f"{case.name}, {method.label}", f"{found.order:.2f}"
-            check_order(result, where, method.order, found.order, note=note)
+        if case and measured and method.order:
+            where, note = f"{case.name}, {method.label}", f"{measured.order:.2f}"
+            check_order(result, where, method.order, measured.order, note=note)
 
 
 def follow_known(result: Result, setup: Setup) -> None:
@@ -76,7 +76,7 @@ def follow_known(result: Result, setup: Setup) -> None:
 
 
 def free_scene(setup: Setup) -> Case | None:
-    """The first scene without locked joints and servos, preferably one with regular errors; None if there is no reference."""
+    """The first scene without locked joints and servos, better a regular one; None: no reference."""
     cases = [case for case in setup.robot.cases_of_torque if not case.scene.locked and not case.is_held]
     if has_no_reference(setup.robot):
         return None
@@ -86,13 +86,13 @@ def free_scene(setup: Setup) -> Case | None:
 def compare_steps(result: Result, setup: Setup, engine: Engine, method: Method) -> None:
     """A check of one step from random states, compared with the same scheme of tmt."""
     sample, record = setup.random, RECORDS[engine.name]
-    states = [values[:STATES].astype(record.precision).astype(float) for values in (sample.q, sample.qd)]
+    q, v = (values[:STATES].astype(record.precision).astype(float) for values in (sample.q, sample.qd))
     case, tau = setup.robot.case(), np.zeros(setup.robot.coordinates.nv)
-    ours = setup.engines["tmt"].of(case).run(*states, tau, STEP, 1, method.scheme)
-    theirs = engine.of(case).run(*states, tau, STEP, 1, method.name)
-    movement = case.coordinates.difference(theirs.q[:, 1], ours.q[:, 1])
-    difference = np.abs(np.concatenate([movement, theirs.v[:, 1] - ours.v[:, 1]], axis=1))
-    tolerance = step_rounding(METHODS[method.scheme], case.tree, *states, tau, STEP) * record.eps / EPS
+    twin = setup.engines["tmt"].of(case).run(q, v, tau, STEP, 1, method.scheme)
+    stepped = engine.of(case).run(q, v, tau, STEP, 1, method.name)
+    pair = ((motion.q[:, 1], motion.v[:, 1]) for motion in (stepped, twin))
+    difference = differences(case.coordinates, *pair)
+    tolerance = step_rounding(METHODS[method.scheme], case.tree, q, v, tau, STEP) * record.eps / EPS
     worst = closest(difference, tolerance)
     where, note = LABELS[engine.name], sample.describe(worst[0])
     what = f"one step of {method.name}, compared with tmt's {method.scheme}"
@@ -121,7 +121,7 @@ def add_runs(
             worst_error=None if run.motion.ended else float(run.error.max()),
             seconds=run.seconds,
             seconds_prepared=getattr(dynamics, "seconds_prepared", None),
-            ended=run.motion.ended,
+            ended=None if run.motion.ended is None else str(run.motion.ended),
             order=method.order,
         )
         rows.append(row)
@@ -130,11 +130,11 @@ def add_runs(
             errors.append(run.early)
         if run.seconds > LONGEST:
             break
-    found = order_of(steps, errors, RECORDS[engine.name].eps)
+    measured = order_of(steps, errors, RECORDS[engine.name].eps)
     for row in rows:
-        row.measured_order = found and found.order
+        row.measured_order = measured and measured.order
     result.tables["engines_methods"] += rows
-    return found
+    return measured
 
 
 def order_of(steps: Sequence[float], errors: Sequence[float], eps: float) -> MeasuredOrder | None:

@@ -48,7 +48,7 @@ def rows(setup: Setup, work: Work | None = None) -> ReductionResult:
         setup.quiet()
         time_models(result, setup, rounds=setup.of(64, 16, 2))
         best = largest_gain(result.rows, setup.robot.coordinates.nv)
-        if best and best.speedup >= NO_GAIN:
+        if best and (best.speedup or 0.0) >= NO_GAIN:
             joints = best.hinges.split()
             result.headline = result.finding(
                 "headline", speedup=best.speedup, joints=joints, scene=best.scene
@@ -63,11 +63,11 @@ def answers(result: ReductionResult, robot: Robot) -> list[Finding]:
     for scene, need in result.needs.items():
         groups.setdefault(need, []).append(scene)
     about = {"joint": joint_word(robot.coordinates), "unit": movement_unit(robot.coordinates)}
-    found = []
+    findings = []
     for need, scenes in sorted(groups.items(), key=lambda group: bool(group[0].needed and group[0].stays)):
         apart = max((value for (scene, _), value in result.apart.items() if scene in scenes), default=None)
-        found.append(result.finding("answer", scenes=scenes, apart=apart, **need._asdict(), **about))
-    return found
+        findings.append(result.finding("answer", scenes=scenes, apart=apart, **need._asdict(), **about))
+    return findings
 
 
 def untimed(setup: Setup) -> ReductionResult:

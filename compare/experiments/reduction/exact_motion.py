@@ -16,6 +16,7 @@ from .times import rk4_of
 
 SWING_STEPS = (4, 8, 16, 32, 64, 128)  # multiples of the case's own steps
 IN_TABLE = 16  # the one of these whose error is in the table
+ORDER = 4  # of RK4
 ROUNDED = 1e-11  # rad: smaller errors contain rounding
 
 
@@ -27,25 +28,26 @@ def is_pendulum(case: Case) -> bool:
 
 
 def compare_swing(result: ReductionResult, setup: Setup, case: Case) -> None:
-    """Errors of RK4 against the elliptic function fall at its order; not where the hinge turns over or hardly moves."""
+    """Errors of RK4 fall at its order; not checked where the hinge turns over or hardly moves."""
     (q,), (v,), t = *case.start, np.linspace(0.0, case.duration, SWING_STEPS[0] * case.steps + 1)
     hanging, frequency = pendulum(case.tree)
     exact = swing(t, q, v, hanging, frequency) if frequency else np.full_like(t, np.nan)
     if not np.ptp(exact) >= MOVES:  # NaN where it turns over
         return
-    dt, errors = case.duration / case.steps / np.array(SWING_STEPS), {}
+    dt = [case.duration / case.steps / finer for finer in SWING_STEPS]
+    errors: dict[str, list[float]] = {}
     for engine, dynamics in setup.compared(case).items():
         method, errors[engine] = rk4_of(setup.engines, engine).name, []
         for finer, step in zip(SWING_STEPS, dt):
             path = dynamics.run(*case.start, case.tau, step, finer * case.steps, method).q
             errors[engine].append(float(np.abs(path[:: finer // SWING_STEPS[0], 0] - exact).max()))
         result.apart[case.name, engine] = errors[engine][SWING_STEPS.index(IN_TABLE)]
-    orders = check_falling(result, case.name, dt, errors, setup.engines["mujoco"].methods["RK4"].order)
+    orders = check_falling(result, case.name, dt, errors)
     result.swings[case.name] = Swing(dt, errors, orders)
 
 
 def check_falling(
-    result: Result, scene: str, dt: Sequence[float], errors: Mapping[str, Sequence[float]], order: int
+    result: Result, scene: str, dt: Sequence[float], errors: Mapping[str, Sequence[float]]
 ) -> dict[str, float]:
     """Errors, rad, fall at the method's order; the measured orders of the engines.
 
@@ -55,9 +57,9 @@ def check_falling(
     for engine, values in errors.items():
         is_rounded = [value <= ROUNDED for value in values]
         clear = [*is_rounded, True].index(True)  # the errors above rounding, from the first on
-        found = measured_order(dt[:clear], values[:clear])
-        if found:
-            orders[engine] = found.order
+        measured = measured_order(dt[:clear], values[:clear])
+        if measured:
+            orders[engine] = measured.order
             where = f"{scene}, RK4, {LABELS[engine]}"
-            check_order(result, where, order, found.order, "error from the elliptic function")
+            check_order(result, where, ORDER, measured.order, "error from the elliptic function")
     return orders

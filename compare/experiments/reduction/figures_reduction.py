@@ -47,9 +47,9 @@ def draw_needs(result: ReductionResult, robot: Robot) -> tuple[str, Figure, Find
         mark_times(right, result, name, y)
     right.set(xscale="log", xlabel="time of an RK4 step, ns")
     right.margins(x=0.3)
-    found = {kind_of_joint(joint, need) for need in scenes.values() for joint in joints}
+    kinds = {kind_of_joint(joint, need) for need in scenes.values() for joint in joints}
     handles = [Line2D([], [], linestyle="none", label=kind, markersize=7, **style)
-               for kind, style in KINDS_OF_JOINT.items() if kind in found]  # fmt: skip
+               for kind, style in KINDS_OF_JOINT.items() if kind in kinds]  # fmt: skip
     left.legend(handles=handles, ncols=1, **ABOVE)
     handles = [
         Line2D([], [], linestyle="none", label=f"{LABELS[engine]}, {model}", **look_of(engine) | more)
@@ -76,12 +76,12 @@ def mark_times(ax: Axes, result: ReductionResult, scene: str, y: float) -> None:
     """The time of a step of each engine in a scene, of the whole and of the smallest model."""
     for engine, offset in HEIGHTS.items():
         times = [row.ns_per_step for row in result.rows if (row.scene, row.engine) == (scene, engine)]
-        whole, smallest = times[0], times[-1]
-        ax.plot(whole, y + offset, mfc="none", **look_of(engine))
+        whole_model, smallest = times[0], times[-1]
+        ax.plot(whole_model, y + offset, mfc="none", **look_of(engine))
         if len(times) > 1 and smallest:
-            ax.plot([smallest, whole], [y + offset] * 2, color=COLOURS[engine], linewidth=1)
+            ax.plot([smallest, whole_model], [y + offset] * 2, color=COLOURS[engine], linewidth=1)
             ax.plot(smallest, y + offset, markersize=3.5, **look_of(engine))
-            speedup = f"×{whole / smallest:.2f}"
+            speedup = f"×{whole_model / smallest:.2f}"
             ax.text(smallest / 1.15, y + offset, speedup, ha="right", va="center", fontsize=8)
 
 

@@ -8,7 +8,8 @@ from ...core.check import About, Result
 from ...engines import LABELS, Motion
 from ...judge.rounding import NARROW, band
 from ...judge.run import check_movement, deviation, required_time, step_in_words
-from ...robots.case import Case, Coordinates
+from ...robots.case import Case
+from ...robots.coordinates import Coordinates
 from ...robots.states import seconds
 from ...truth.smallest import Needed, needed, reduced
 from ..followed import Deviation, check_closest, differences
@@ -53,7 +54,8 @@ def compare_smaller(result: ReductionResult, case: Case, smaller: Case | None, s
         q, v = (np.tile(start, (steps + 1, 1)) for start in case.start)
         if smaller:
             positions, speeds = columns_of(smaller, case)
-            q[:, positions], v[:, speeds] = references[engine].q, references[engine].v
+            reference = references[engine]
+            q[:, positions], v[:, speeds] = reference.q, reference.v
             if "own" not in case.scene.tags:  # a user's own scene may hardly move
                 check_movement(result, where, deviation(run.q, run.q[0], coordinates))
         apart = differences(coordinates, (run.q, run.v), (q, v))[::every]
@@ -69,7 +71,7 @@ def columns_of(smaller: Case, case: Case) -> tuple[np.ndarray, np.ndarray]:
 
 
 def check_smaller(result: Result, where: str, deviation: Deviation, required: float) -> float:
-    """The runs stay within the band of rounding while it is narrow, for the required time; until when they are judged, s."""
+    """Until when the runs are judged, s: they stay within the band of rounding while it is narrow."""
     coordinates, t, apart, width = deviation
     judged = np.cumsum(~(width[:, : coordinates.nv].max(axis=1) < NARROW)) == 0
     narrow = Deviation(coordinates, t[judged], apart[judged], width[judged])

@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import numpy as np
-
 from ...core.check import Result
 from ...core.rows import MOVEMENT, MovementRow, Row, column
 from ...robots.case import Case
@@ -20,9 +18,9 @@ class ReductionRow(MovementRow):
     engine: str
     nv: int
     operations: int | None
-    ns_per_step: float | None
-    speedup: float | None  # relative to the whole model
-    max_difference: float | None = column(MOVEMENT)  # from the whole model
+    ns_per_step: float | None = None
+    speedup: float | None = None  # relative to the whole model
+    max_difference: float | None = column(MOVEMENT, default=None)  # from the whole model
     integrator: str = "RK4"
 
 
@@ -40,10 +38,10 @@ class SubsetRow(Row):
     locked: str = column(names=True)
     quantity: str
     parties: str
-    states: int
-    largest_difference: float | None
+    states: int = 0
+    largest_difference: float | None = None
     unit: str
-    difference_over_bar: float | None
+    difference_over_bar: float | None = None
 
     @property
     def urgency(self) -> tuple[bool, bool, float]:
@@ -61,7 +59,7 @@ class Need(NamedTuple):
 
 
 class Swing(NamedTuple):
-    dt: np.ndarray  # s
+    dt: list[float]  # s
     errors: dict[str, list[float]]  # of each engine, rad
     orders: dict[str, float]
 

@@ -1,8 +1,7 @@
 """Locked joints: Mbar and the bias of the reduced model compared with the sub-blocks of the whole model."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +10,8 @@ from ...judge.agree import closest, worst_of_each
 from ...judge.entries import Entries
 from ...judge.run import number_or_none
 from ...judge.scale import EPS, FACTOR
-from ...robots.case import SEED, Case, Coordinates
+from ...robots.case import SEED, Case
+from ...robots.coordinates import Coordinates
 from ...robots.states import seconds
 from ..setup import Setup
 from .needs import columns_of
@@ -23,7 +23,7 @@ MOST_TO_LOCK = 2.0  # s that an exact state may take
 
 
 def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
-    """A check and a row of a table for each subset, quantity and pair of models, over random angles and states."""
+    """A check and a row for each subset, quantity and pair of models, over random angles and states."""
     result.tables["reduction_subsets"] = []
     robot, rng, states = setup.robot, np.random.default_rng(SEED), 20
     coordinates = robot.coordinates
@@ -36,18 +36,16 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
     if "slide" in coordinates.all_kinds:
         units = {"Mbar": "kg m2, kg m or kg", "bias": "N m or N"}
     for locked in subsets(robot.joints, setup.of(12, 6, 4)):
-        pairs: dict[
-            tuple[str, str], list[Differences]
-        ] = {}  # by quantity and pair: for each choice of angles
+        choices = []  # of the angles at which they are locked
         for _ in range(angles):
             q = coordinates.random(rng, states)
             v = rng.uniform(-10.0, 10.0, (states, coordinates.nv))
             case = robot.case(scene_name(locked), posture=posture_of(coordinates, q[0]), locked=locked)
-            for quantity, pair, found in sub_block_differences(setup, case, q, v):
-                pairs.setdefault((quantity, pair), []).append(found)
-        for (quantity, pair), found in pairs.items():
-            apart, scale = np.concatenate(found, axis=1)
-            check_blocks(result, locked, (quantity, pair, units[quantity]), apart, scale)
+            choices.append(sub_block_differences(setup, case, q, v))
+        for quantity, pair in choices[0]:
+            apart, scale = np.concatenate([choice[quantity, pair] for choice in choices], axis=1)
+            row = SubsetRow(locked=" ".join(locked), quantity=quantity, parties=pair, unit=units[quantity])
+            check_blocks(result, scene_name(locked), row, apart, scale)
 
 
 def subsets(joints: Sequence[str], most: int) -> list[tuple[str, ...]]:
@@ -70,46 +68,49 @@ def scene_name(locked: Sequence[str]) -> str:
     return f"{' and '.join(locked)} locked"
 
 
-def check_blocks(
-    result: Result, locked: Sequence[str], names: tuple[str, str, str], apart: np.ndarray, scale: np.ndarray
-) -> None:
-    """A check of the state that comes closest to its tolerance, 64 eps x scale, and a row.
+def check_blocks(result: Result, where: str, row: SubsetRow, apart: np.ndarray, scale: np.ndarray) -> None:
+    """A check of the state that comes closest to its tolerance, 64 eps x scale, and the row.
 
-    names: quantity, pair of models, unit; apart, scale: (states,).
+    apart, scale: (states,).
     """
-    (quantity, pair, unit), tolerance = names, FACTOR * EPS * scale
+    tolerance = FACTOR * EPS * scale
     (worst,) = closest(apart, tolerance)
-    name = f"{quantity}, {pair}"
-    check = result.check(scene_name(locked), name, apart[worst], tolerance[worst], unit, rounding=True)
-    about: dict[str, Any] = {"locked": " ".join(locked), "quantity": quantity, "parties": pair, "unit": unit}
-    largest, share = number_or_none(apart.max()), check.over_tolerance
-    row = SubsetRow(**about, states=len(apart), largest_difference=largest, difference_over_bar=share)
+    name = f"{row.quantity}, {row.parties}"
+    check = result.check(where, name, apart[worst], tolerance[worst], row.unit, rounding=True)
+    row.states, row.largest_difference = len(apart), number_or_none(apart.max())
+    row.difference_over_bar = check.over_tolerance
     result.tables["reduction_subsets"].append(row)
 
 
 def sub_block_differences(
     setup: Setup, case: Case, q: np.ndarray, v: np.ndarray
-) -> Iterator[tuple[str, str, Differences]]:
-    """(quantity, pair, (differences, scales)) at states whose locked joints are set to the case's.
+) -> dict[tuple[str, str], Differences]:
+    """By quantity and pair of models, at states whose locked joints are set to the case's.
 
-    The difference of a state is the one closest to its tolerance, with its scale, as in `mass` and `acceleration`.
+    The difference of a state is the one closest to its tolerance, with its scale, as in `mass`.
     """
     q, v = q.copy(), v.copy()
     for name, position in case.locked.items():
         joint = case.robot.coordinates.by_name[name]
         q[:, joint.q], v[:, joint.qd] = position, 0.0
     positions, speeds = columns_of(case, setup.robot.case())
-    scale = Entries(setup.robot.tree, q, v)
-    reduced, whole = setup.compared(case).values(), setup.compared().values()
-    block, rows = np.ix_(range(len(q)), speeds, speeds), np.ix_(range(len(q)), speeds)
-    free_q, free_v = q[:, positions], v[:, speeds]
-    masses = [a.mass_matrix(free_q) for a in reduced], [b.mass_matrix(q)[block] for b in whole]
-    biases = [a.bias(free_q, free_v) for a in reduced], [b.bias(q, v)[rows] for b in whole]
-    for quantity, values, size in (
-        ("Mbar", masses, scale.mass_matrix[block]),
-        ("bias", biases, scale.bias[rows]),
-    ):
-        (of_tmt, of_mujoco), (whole_tmt, whole_mujoco) = values
-        yield quantity, "TMT, reduced to whole", worst_of_each(of_tmt - whole_tmt, size)
-        yield quantity, "MuJoCo, reduced to whole", worst_of_each(of_mujoco - whole_mujoco, size)
-        yield quantity, "reduced, TMT to MuJoCo", worst_of_each(of_tmt - of_mujoco, size)
+    free_q, free_v, scale = q[:, positions], v[:, speeds], Entries(setup.robot.tree, q, v)
+    reduced, unlocked = setup.compared(case).values(), setup.compared().values()
+    block, rows = np.ix_(np.arange(len(q)), speeds, speeds), np.ix_(np.arange(len(q)), speeds)
+    masses = [engine.mass_matrix(free_q) for engine in reduced]
+    pairs = pairs_of("Mbar", masses, [engine.mass_matrix(q)[block] for engine in unlocked])
+    of_masses = {pair: worst_of_each(apart, scale.mass_matrix[block]) for pair, apart in pairs.items()}
+    biases = [engine.bias(free_q, free_v) for engine in reduced]
+    pairs = pairs_of("bias", biases, [engine.bias(q, v)[rows] for engine in unlocked])
+    return of_masses | {pair: worst_of_each(apart, scale.bias[rows]) for pair, apart in pairs.items()}
+
+
+def pairs_of(
+    quantity: str, reduced: Sequence[np.ndarray], whole: Sequence[np.ndarray]
+) -> dict[tuple[str, str], np.ndarray]:
+    """The differences of a quantity of the reduced and of the whole model, each by TMT and MuJoCo."""
+    return {
+        (quantity, "TMT, reduced to whole"): reduced[0] - whole[0],
+        (quantity, "MuJoCo, reduced to whole"): reduced[1] - whole[1],
+        (quantity, "reduced, TMT to MuJoCo"): reduced[0] - reduced[1],
+    }

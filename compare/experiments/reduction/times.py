@@ -1,7 +1,8 @@
-"""How long an RK4 step takes, with the whole model and with the smallest one that has the motion of a case."""
+"""How long an RK4 step takes, with the whole model and with the smallest one of a case."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
+from typing import Any
 
 import tmt
 from tmt.compiled import evaluator
@@ -14,10 +15,8 @@ from ...robots.case import Case
 from ..setup import Setup
 from .records import ReductionResult, ReductionRow
 
-TIMED_STEPS = {
-    "tmt": 1024,
-    "mujoco": 128,
-}  # of a run: shorter than the time between interruptions of a busy machine
+# of a run: shorter than the time between interruptions of a busy machine
+TIMED_STEPS = {"tmt": 1024, "mujoco": 128}
 MOST_TRACED = 12  # nv up to which operations are counted
 
 
@@ -33,32 +32,32 @@ def rk4_of(engines: Mapping[str, Engine], engine: str) -> Method:
 
 def time_models(result: ReductionResult, setup: Setup, rounds: int) -> None:
     """The rows: all models of all cases, timed in turn, relative to the whole model of the same case."""
-    calls = {}
+    calls: dict[Any, Callable[..., Any]] = {}
     for scene, case in result.models or ():
-        for engine, dynamics in setup.compared(case).items() if case else ():
-            steps = TIMED_STEPS[engine]
-            setting = Setting(case.duration / case.steps / finer(case) * steps, steps)
-            call, _ = dynamics.prepare(*case.start, case.tau, setting, rk4_of(setup.engines, engine).name)
-            calls[scene, case.joints, engine] = call
+        if case:
+            for engine, dynamics in setup.compared(case).items():
+                steps = TIMED_STEPS[engine]
+                setting = Setting(case.duration / case.steps / finer(case) * steps, steps)
+                method = rk4_of(setup.engines, engine).name
+                calls[scene, case.joints, engine], _ = dynamics.prepare(
+                    *case.start, case.tau, setting, method
+                )
     add_rows(result, setup.robot, fastest(calls, rounds))
 
 
-def add_rows(
-    result: ReductionResult, robot: Robot, seconds: Mapping[tuple[str, tuple[str, ...], str], float]
-) -> None:
+def add_rows(result: ReductionResult, robot: Robot, seconds: Mapping[Any, float]) -> None:
     """The rows of all models. seconds: of a run, by scene, joints and engine."""
+    unit = movement_unit(robot.coordinates)
     for scene, case in result.models or ():
-        joints = case.joints if case else ()
+        joints, nv, count = (case.joints, case.coordinates.nv, operations(case.tree)) if case else ((), 0, 0)
+        about: dict[str, Any] = {"scene": scene, "hinges": " ".join(joints) or "none", "nv": nv, "unit": unit}
         for engine, steps in TIMED_STEPS.items():
-            time = seconds.get((scene, joints, engine))
-            result.rows.append(ReductionRow(
-                scene=scene, hinges=" ".join(joints) or "none", engine=engine, nv=case.coordinates.nv if case else 0,
-                operations=(operations(case.tree) if case else 0) if engine == "tmt" else None,
-                ns_per_step=1e9 * time / steps if time else None,
-                speedup=seconds[scene, robot.joints, engine] / time if time else None,
-                max_difference=None if joints == robot.joints else result.apart.get((scene, engine)),
-                unit=movement_unit(robot.coordinates),
-            ))  # fmt: skip
+            row = ReductionRow(engine=engine, operations=count if engine == "tmt" else None, **about)
+            if time := seconds.get((scene, joints, engine)):
+                row.ns_per_step, row.speedup = 1e9 * time / steps, seconds[scene, robot.joints, engine] / time
+            if joints != robot.joints:
+                row.max_difference = result.apart.get((scene, engine))
+            result.rows.append(row)
 
 
 @lru_cache

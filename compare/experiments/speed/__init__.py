@@ -1,4 +1,4 @@
-"""Time against error: every integrator of MuJoCo, every method of tmt, SciPy and heyoka, over all useful steps."""
+"""Time against error: all integrators of MuJoCo, all methods of tmt, SciPy and heyoka, all useful steps."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
@@ -75,29 +75,29 @@ def judged(setup: Setup, scenes: Sequence[SceneRuns]) -> SpeedResult:
     if setup.size != "full":  # errors are regular in one scene only, and other engines have too few settings
         falling, engines = [scene for scene in scenes if scene.case.name == regular.name], IN_QUICK_RUNS
     result.tables["speed_orders"] = accuracy.check_orders(result, falling, engines)
-    for scene in scenes:
-        accuracy.check_same_schemes(result, scene)
-        accuracy.check_smallest_errors(result, scene)
+    for check in (accuracy.check_same_schemes, accuracy.check_smallest_errors):
+        for scene in scenes:
+            check(result, scene)
     result.find("references", runs=[about_reference(scene) for scene in scenes], unit=result.unit)
     return result
 
 
 def about_reference(scene: SceneRuns) -> dict[str, str | float | None]:
     """What is said of the reference of a scene, and of the error that rounding leaves in a run."""
-    known = scene.reference
-    errors = {"apart": known.apart, "floor": scene.floor, "expected": LOST * scene.floor / EPS}
-    return {"scene": scene.case.name, "steps": known.steps, "why": known.why, **errors}
+    reference = scene.reference
+    errors = {"apart": reference.apart, "floor": scene.floor, "expected": LOST * scene.floor / EPS}
+    return {"scene": scene.case.name, "steps": reference.steps, "why": reference.why, **errors}
 
 
 def add_times(setup: Setup, scenes: Sequence[SceneRuns]) -> list[SpeedRow]:
-    """Set the seconds of all runs, after those of engines that are called are added; the rows of methods that fail."""
+    """The rows of methods that fail. Adds the runs of engines that are called; sets the seconds of all."""
     calls_of_scenes, failed = [prepared(scene.case, scene.runs, setup.engines) for scene in scenes], []
     setup.quiet()  # nothing else may run while times are taken
     for scene, calls in zip(scenes, calls_of_scenes):
         setup.progress(f"speed: timing {scene.case.name}")
         called, rows = runs_of(scene, setup.engines, setup.size, compiled=False)
-        here = [run for run in called if not RECORDS[run.method.engine].reads_file]
-        again = [run for run in here if run.row.time < timing.TIMED_ENOUGH]
+        in_process = [run for run in called if not RECORDS[run.method.engine].reads_file]
+        again = [run for run in in_process if run.row.time < timing.TIMED_ENOUGH]
         take_times(scene.runs + again, calls + prepared(scene.case, again, setup.engines))
         scene.runs += called
         failed += rows
@@ -115,7 +115,7 @@ def add_advice(result: SpeedResult) -> None:
 
 
 def add_absent(result: SpeedResult, setup: Setup) -> None:
-    """A row for each scene and engine that does not run, or not with all methods, and a finding for each engine."""
+    """Rows and findings: engines that do not run, or not with all methods."""
     groups: dict[tuple[str, str], list[str]] = {}
     for (engine, method), reason in left_out(setup.engines, setup.size, setup.robot).items():
         groups.setdefault((engine, reason), []).append(method)

@@ -1,4 +1,4 @@
-"""Checks of the errors of the runs: the order of each method, MuJoCo against the same scheme in tmt, rounding."""
+"""Checks of errors: the order of each method, MuJoCo against the same scheme in tmt, rounding."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -36,16 +36,16 @@ def check_orders(
     rows = []
     for scene in scenes:
         for method, runs in groupby(scene.runs, key=lambda run: run.method):
-            found = order_in(scene, list(runs)) if method.order and method.engine in engines else None
-            if found:
-                where, note = f"{scene.case.name}, {method.engine} {method.name}", f"{found.order:.2f}"
-                check_order(result, where, method.order, found.order, note=note)
-                rows.append(OrderRow(scene.case.name, method.engine, method.name, method.order, *found))
+            measured = order_in(scene, list(runs)) if method.order and method.engine in engines else None
+            if measured:
+                where, note = f"{scene.case.name}, {method.engine} {method.name}", f"{measured.order:.2f}"
+                check_order(result, where, method.order, measured.order, note=note)
+                rows.append(OrderRow(scene.case.name, method.engine, method.name, method.order, *measured))
     return rows
 
 
 def order_in(scene: SceneRuns, runs: Sequence[Run]) -> MeasuredOrder | None:
-    """The order that the runs of a method show where their errors are regular; of a robot from a file one that has settled."""
+    """The order of a method where its errors are regular; of a robot from a file, one that has settled."""
     clear, least_runs = CLEAR, 2
     if scene.case.robot.is_read:  # the error of rounding, or of the reference, differs from robot to robot
         clear, least_runs = max(CLEAR, NEAR_ROUNDING * scene.floor), 3
@@ -61,24 +61,24 @@ def check_same_schemes(result: SpeedResult, scene: SceneRuns) -> None:
     """
     by_tmt = {(run.method.name, run.row.dt): run.row for run in scene.runs if run.method.engine == "tmt"}
     for run in scene.runs:
-        theirs, ours = run.row, by_tmt.get((run.method.scheme, run.row.dt))
-        if theirs.engine == "mujoco" and ours and min(theirs.largest_error, ours.largest_error) < SMALL_ERROR:
-            difference = abs(theirs.largest_error - ours.largest_error)
-            where = f"{scene.case.name}, {theirs.method}, dt = {run.dt:.3g} s"
-            quantity = f"the same error as tmt's {ours.method}"
+        mujoco, twin = run.row, by_tmt.get((run.method.scheme, run.row.dt))
+        if mujoco.engine == "mujoco" and twin and min(mujoco.largest_error, twin.largest_error) < SMALL_ERROR:
+            difference = abs(mujoco.largest_error - twin.largest_error)
+            where = f"{scene.case.name}, {mujoco.method}, dt = {run.dt:.3g} s"
+            quantity = f"the same error as tmt's {twin.method}"
             result.check(where, quantity, difference, FACTOR * scene.floor, result.unit, rounding=True)
 
 
 def check_smallest_errors(result: SpeedResult, scene: SceneRuns) -> None:
-    """Where errors stop falling they are of the size of rounding; MuJoCo's RK4 is as exact as tmt's with the same steps."""
+    """Errors that stop falling are rounding; MuJoCo's RK4 is as exact as tmt's with the same steps."""
     rounding = FACTOR * scene.floor
     rk4 = check_stopped(result, scene, "mujoco", "RK4", rounding)
-    ours = check_stopped(result, scene, "tmt", "rk4", rounding)
+    rk4_of_tmt = check_stopped(result, scene, "tmt", "rk4", rounding)
     check_stopped(result, scene, "tmt", "dopri8", rounding)
     least, finest = min(rk4.values(), default=np.inf), min(rk4, default=np.inf)
-    least_of_ours = min((error for dt, error in ours.items() if dt >= finest), default=np.inf)
-    if np.isfinite([least, least_of_ours]).any() and ours:
-        tolerance = rounding + (2.0 * least_of_ours if np.isfinite(least_of_ours) else 0.0)
+    least_of_tmt = min((error for dt, error in rk4_of_tmt.items() if dt >= finest), default=np.inf)
+    if np.isfinite([least, least_of_tmt]).any() and rk4_of_tmt:
+        tolerance = rounding + (2.0 * least_of_tmt if np.isfinite(least_of_tmt) else 0.0)
         quantity = "smallest error of MuJoCo's RK4, compared with tmt's rk4"
         result.check(scene.case.name, quantity, least, tolerance, result.unit)
 
@@ -86,7 +86,7 @@ def check_smallest_errors(result: SpeedResult, scene: SceneRuns) -> None:
 def check_stopped(
     result: SpeedResult, scene: SceneRuns, engine: str, method: str, rounding: float
 ) -> dict[float, float]:
-    """A check of the smallest error of a method if finer steps gain nothing; its errors by the step, from coarse to fine."""
+    """The errors of a method by its step. Checks the smallest one, if finer steps gain nothing."""
     runs = [run for run in scene.runs if (run.method.engine, run.method.name) == (engine, method)]
     errors = {run.dt: run.row.largest_error for run in runs}
     least = min(errors.values(), default=np.inf)

@@ -1,4 +1,4 @@
-"""The cheapest settings: of MuJoCo, of tmt and of all engines for each error, and those of the first screen."""
+"""The cheapest settings of MuJoCo, of tmt and of all engines for each error; and the first screen."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,8 +17,8 @@ NOT_SOLVED = 1.0  # rad or m: a run with a larger error is none
 class AdviceRow(MovementRow):
     """The cheapest settings for an error in a scene.
 
-    ratio: MuJoCo's time over tmt's. It is the product of integrator_part, MuJoCo's cheapest over its RK4; kernel_part,
-    MuJoCo's RK4 over tmt's with the same step; and method_part, that over tmt's cheapest.
+    ratio: MuJoCo's time over tmt's. It is the product of integrator_part (MuJoCo's cheapest over its RK4),
+    kernel_part (MuJoCo's RK4 over tmt's with the same step) and method_part (that over tmt's cheapest).
     """
 
     scene: str

@@ -4,7 +4,7 @@ import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -49,7 +49,8 @@ class Loop(NamedTuple):
 
 def loops(setup: Setup) -> tuple[list[Loop], list[EvaluationRow]]:
     """All ways, compiled and not yet timed; and a row for what cannot be timed."""
-    from ...engines.mujoco.calls import MinimalCalls  # here, since importing MuJoCo takes long
+    from ...engines.mujoco.calls import MinimalCalls  # here, as importing MuJoCo takes long
+    from ...engines.mujoco.dynamics import MujocoDynamics
 
     tree, coordinates = setup.robot.tree, setup.robot.coordinates
     many = setup.of(MANY if coordinates.nv <= MOST_OF_MANY else 10 * FEW, FEW, FEW)
@@ -60,8 +61,8 @@ def loops(setup: Setup) -> tuple[list[Loop], list[EvaluationRow]]:
     if missing := MinimalCalls.unavailable():
         absent.append(EvaluationRow(FORWARD, "MuJoCo, mj_forward", None, None, why_not=missing))
     else:
-        minimal = MinimalCalls(setup.engines["mujoco"].of(setup.robot.case()))
-        of_mujoco = minimal.loops(*first).items()
+        dynamics = cast(MujocoDynamics, setup.engines["mujoco"].of(setup.robot.case()))
+        of_mujoco = MinimalCalls(dynamics).loops(*first).items()
         ready += [Loop(EvaluationRow(quantity, name), run) for name, (quantity, run) in of_mujoco]
     for loop in ready:
         loop.run(1)  # its code is compiled, or loaded, on the first call
@@ -94,13 +95,13 @@ def at_many_states(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarra
     count, run, compiled = len(qd), runner_of(tree, "rk4").follow, evaluator(tree, "acceleration")
     out = np.empty((count, compiled.size))
     paths = [np.stack([part, part], axis=1) for part in (q, qd)]
-    each = EvaluationRow(FORWARD, ONE_BY_ONE, count, operations=compiled.operations)
-    lanes = EvaluationRow(FORWARD, SIDE_BY_SIDE, count, operations=compiled.operations)
+    one_by_one = EvaluationRow(FORWARD, ONE_BY_ONE, count, operations=compiled.operations)
+    side_by_side = EvaluationRow(FORWARD, SIDE_BY_SIDE, count, operations=compiled.operations)
     called = EvaluationRow(FORWARD, CALLED, count, cores())
     step = EvaluationRow(RK4_STEP, SIDE_BY_SIDE, count, cores())
     return [
-        Loop(each, repeated(lambda: compiled.fill(False, out, q, qd, tau))),
-        Loop(lanes, repeated(lambda: compiled.fill(True, out, q, qd, tau))),
+        Loop(one_by_one, repeated(lambda: compiled.fill(False, out, q, qd, tau))),
+        Loop(side_by_side, repeated(lambda: compiled.fill(True, out, q, qd, tau))),
         Loop(called, repeated(lambda: tmt.acceleration(q, qd, tau, tree))),
         Loop(step, repeated(lambda: run(*paths, tau, 1e-3, 0.0, 1))),
     ]

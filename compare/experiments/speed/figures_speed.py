@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import cycle
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -30,16 +31,19 @@ def draw_times(result: SpeedResult, scene: str, beginning: str = "") -> tuple[st
     markers: dict[str, cycle[str]] = {}
     for (engine, method), rows in curves.items():
         marker = next(markers.setdefault(engine, cycle(METHOD_MARKERS)))
-        look = {"color": COLOURS.get(engine, GREY), "marker": marker, "markersize": 4.5, "linewidth": 1.0}
-        ax.plot(*drawn(rows), label=f"{LABELS.get(engine, engine)} {method}", **look)
+        label, colour = f"{LABELS.get(engine, engine)} {method}", COLOURS.get(engine, GREY)
+        ax.plot(*drawn(rows), label=label, color=colour, marker=marker, markersize=4.5, linewidth=1.0)
     ax.plot(*drawn(front(good)), "ko", markersize=9, markerfacecolor="none", label="Pareto front")
-    looks = {"color": GREY, "linestyle": ":", "label": "rounding, or accuracy of the reference"}
-    ax.axvline(result.floors[scene], **looks)
+    label = "rounding, or accuracy of the reference"
+    ax.axvline(result.floors[scene], color=GREY, linestyle=":", label=label)
     ax.set(xscale="log", yscale="log", xlim=(2.0 * COARSE_END, FINE_END / 30), ylabel="time of the run, ms")
     ax.set(xlabel=f"maximum error, {unit} (decreasing)", xticks=[10.0**k for k in range(0, -17, -2)])
     ax.minorticks_off()
     fig.legend(loc="outside right upper", fontsize=7, handlelength=1.6)
-    values = {"diverged": sum(bool(row.diverged) for row in ran), "missing": len(ran) - len(good)}
+    values: dict[str, Any] = {
+        "diverged": sum(bool(row.diverged) for row in ran),
+        "missing": len(ran) - len(good),
+    }
     caption = result.finding("times", begins=beginning or scene, unit=unit, end=COARSE_END, **values)
     return file_name("speed", scene), fig, caption
 
@@ -50,13 +54,13 @@ def drawn(rows: Sequence[SpeedRow]) -> tuple[np.ndarray, list[float]]:
 
 
 def draw_overview(result: SpeedResult) -> tuple[str, Figure, Finding]:
-    """Time against error: the best settings of each engine in one scene, the cheapest within the target in a circle."""
+    """Time against error: the best settings of each engine; the cheapest within the target has a circle."""
     fig, ax = chart()
     fronts = best_rows(result)
     for engine, rows in fronts.items():
         colour, (errors, times) = COLOURS.get(engine, GREY), drawn(rows)
-        look = {"marker": MARKS.get(engine, "v"), "markersize": 3.5, "linewidth": 1.2, "color": colour}
-        ax.plot(errors, times, label=LABELS.get(engine, engine), **look)
+        label, mark = LABELS.get(engine, engine), MARKS.get(engine, "v")
+        ax.plot(errors, times, label=label, color=colour, marker=mark, markersize=3.5, linewidth=1.2)
         best = within_target(rows)
         if best:
             (error,), (time,) = drawn([best])

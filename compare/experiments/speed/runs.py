@@ -1,4 +1,4 @@
-"""The runs of each scene by each method and setting: their errors, their times, and the error that rounding leaves."""
+"""The runs of each scene by each method and setting: errors, times, and the error that rounding leaves."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -99,8 +99,8 @@ class SpeedResult(Result):
 
 def scene_runs(case: Case, engines: Mapping[str, Engine], size: str) -> SceneRuns:
     """The runs of a scene by compiled methods, which are not yet timed."""
-    known = reference(case)
-    scene = SceneRuns(case, known, max(floor(case, engines["tmt"].of(case)), known.apart))
+    exact = reference(case)
+    scene = SceneRuns(case, exact, max(floor(case, engines["tmt"].of(case)), exact.apart))
     scene.runs, _ = runs_of(scene, engines, size, compiled=True)
     for run in scene.runs:
         run.row.seconds = None
@@ -110,7 +110,7 @@ def scene_runs(case: Case, engines: Mapping[str, Engine], size: str) -> SceneRun
 def runs_of(
     scene: SceneRuns, engines: Mapping[str, Engine], size: str, compiled: bool
 ) -> tuple[list[Run], list[SpeedRow]]:
-    """The runs by methods whose loop over the steps is compiled, or by the others; and a row for each method that fails."""
+    """The runs by methods whose loop is compiled, or by the others; and a row for each method that fails."""
     runs: list[Run] = []
     failed = []
     for method in methods(engines, size, scene.case):
@@ -140,12 +140,12 @@ def series(scene: SceneRuns, engine: Engine, method: Method, size: str) -> Itera
 
 
 def gained_nothing(error: float, work: int, best: float, last: int, floor: float) -> bool:
-    """Whether a run that cost more than the last one is not more exact, when the best error is already near rounding."""
+    """Whether a run that cost more is not more exact, when the best error is already near rounding."""
     return best < NEAR_ROUNDING * floor and work > 1.2 * last and not error < 0.7 * best
 
 
 def measured(scene: SceneRuns, engine: Engine, method: Method, setting: Setting) -> Run:
-    """One run; a reference in doubles resolves no error below the floor of the scene: smaller ones are set to it."""
+    """One run. With a reference in doubles, errors below the floor of the scene are set to it."""
     case, reference = scene.case, scene.reference
     motion, seconds, errors, early = follow(engine.of(case), case, method, setting, reference)
     least, unit = scene.floor if reference.why else 0.0, movement_unit(case.robot.coordinates)
@@ -160,7 +160,7 @@ def measured(scene: SceneRuns, engine: Engine, method: Method, setting: Setting)
 
 
 def floor(case: Case, dynamics: Dynamics) -> float:
-    """Error of the angles that rounding leaves: eps times the largest growth of a small difference up to each time, rad.
+    """The error of the angles that rounding leaves, rad: eps times the largest growth of a small difference.
 
     dynamics: tmt's, run by RK4 with 1024 steps or as many as the scene needs; ValueError if the run diverges.
     """

@@ -1,4 +1,4 @@
-"""What is run: the scenes, the methods of the available engines, and the steps or tolerances of each method."""
+"""What is run: scenes, methods of the available engines, steps or tolerances of each method."""
 
 from collections.abc import Mapping
 
@@ -13,12 +13,13 @@ from ...robots.case import Case
 FINEST = {"mujoco": 2**15, ("mujoco", "RK4"): 2**16, "tmt": 2**18}
 FINEST_OTHERS = 2**15  # of other engines, and of methods that solve their stages
 EXPONENTS = {  # k of the coarsest and of the finest tolerance, 10^-k
-    "dopri8_adaptive": (2, 14), "RK45": (2, 10), "DOP853": (2, 13), "Radau": (2, 4), "LSODA": (2, 12), "Taylor": (4, 16),
+    "dopri8_adaptive": (2, 14), "RK45": (2, 10), "DOP853": (2, 13), "Radau": (2, 4), "LSODA": (2, 12),
+    "Taylor": (4, 16),
 }  # fmt: skip
 FEW_SETTINGS = {"quick": 5, "small": 7}  # of a run that is not full: the coarsest settings
 FEW_OTHERS = 2  # the same for engines other than MuJoCo and tmt
-# A robot from a file may have any number of joints. Seconds of one evaluation are about a constant times nv^1.5, and of
-# engines that are called from Python those of a call and of the solver's own work:
+# A robot from a file may have any number of joints. Seconds of one evaluation are about a constant times
+# nv^1.5; an engine that is called from Python adds those of a call and of the solver's own work:
 SECONDS, CALL_SECONDS = {"mujoco": 2e-7, "tmt": 5e-8}, 3e-5
 ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
 MOST_SECONDS = {"full": 0.6, "quick": 0.1, "small": 0.1}  # estimated, of the finest run of a method
@@ -28,7 +29,7 @@ SLOWEST_RUN = 0.6  # s, estimated: a method whose coarsest run takes longer is l
 
 
 def scenes_of(robot: Robot) -> list[Case]:
-    """The scenes with the tag `speed`, and a user's own except held postures of a file's robot, which do not move."""
+    """The scenes with the tag `speed`, and a user's own except held postures of a file's robot."""
     return [case for case in robot.cases if "speed" in case.scene.tags or (is_own(case) and not rests(case))]
 
 
@@ -42,13 +43,13 @@ def rests(case: Case) -> bool:
 
 
 def regular_of(robot: Robot) -> Case:
-    """The scene in which errors fall regularly from coarse steps on; the first scene, if none has that tag."""
+    """The scene in which errors are regular from coarse steps on; the first, if none has that tag."""
     cases = scenes_of(robot)
     return next((case for case in cases if "regular" in case.scene.tags), cases[0])
 
 
 def followed(robot: Robot, size: str) -> list[Case]:
-    """The scenes of a run of this size: quick: the regular one and a user's own; small: the first and the regular one."""
+    """The scenes of a run. quick: the regular one and a user's own; small: the first and the regular one."""
     cases, regular = scenes_of(robot), regular_of(robot).name
     if size == "quick":
         return [case for case in cases if case.name == regular or is_own(case)]
@@ -59,12 +60,12 @@ def methods(engines: Mapping[str, Engine], size: str, case: Case) -> list[Method
     """The methods by which a case is followed. Where the robot's actuators act, some have other schemes."""
     excluded = left_out(engines, size, case.robot)
     asked = [engine for name, engine in engines.items() if size != "quick" or name in IN_QUICK_RUNS]
-    every = [method for engine in asked for method in methods_in(engine, case).values()]
-    return [method for method in every if (method.engine, method.name) not in excluded]
+    candidates = [method for engine in asked for method in methods_in(engine, case).values()]
+    return [method for method in candidates if (method.engine, method.name) not in excluded]
 
 
 def left_out(engines: Mapping[str, Engine], size: str, robot: Robot) -> dict[tuple[str, str], str]:
-    """{(engine, method): reason} of methods that are not run: the engine is unavailable, or takes too long for this robot."""
+    """Methods that are not run, (engine, method), and why: no engine, or too slow for this robot."""
     reasons = {}
     for engine in engines.values():
         if size == "quick" and engine.name not in IN_QUICK_RUNS:
@@ -107,7 +108,7 @@ def estimated(method: Method, tree: Tree) -> float:
 
 
 def settings_of(method: Method, case: Case, size: str = "full") -> tuple[Setting, ...]:
-    """The settings of a method in a scene, from coarse to fine: steps halved, or tolerances divided by ten."""
+    """The settings of a method, from coarse to fine: steps are halved, tolerances divided by ten."""
     if method.adaptive:
         first, last = EXPONENTS.get(method.name, (2, 12))
         settings = tuple(Setting(case.duration, tolerance=10.0**-k) for k in range(first, last + 1))

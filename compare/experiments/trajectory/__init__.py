@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -21,12 +21,11 @@ from ..setup import Setup
 from . import energy, motion, true_motion
 from .runs import TrajectoryResult, follow, recorded
 
+if TYPE_CHECKING:
+    from ...engines.own import Own
+
 EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=True, overview="scenes")
-SECONDS_OF_OWN = {
-    "full": 20.0,
-    "quick": 4.0,
-    "small": 2.0,
-}  # of all runs of a user's own equations together, about
+SECONDS_OF_OWN = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all runs of a user's own equations, about
 OVERHEAD_OF_OWN = 1e-4  # s of an evaluation in a run, about, beyond the equations themselves
 STAGES_OF_RK4 = 4  # evaluations in a step of RK4
 SHOWN = ["scene", "engine_integrator", "dt_s", "level", "largest_difference", "unit", "difference_over_band",
@@ -52,7 +51,8 @@ def begin(setup: Setup) -> Work:
     """Start the long work, in parallel, while other experiments compute. A quick run takes fewer scenes."""
     robot, engines = setup.robot, setup.engines
     cases = [case for case in robot.cases if not (setup.is_quick and "full only" in case.scene.tags)]
-    spread, finer, left_out = setup.map, setup.finer, []
+    spread, finer = setup.map, setup.finer
+    left_out: list[Finding] = []
     if robot.own:  # whose equations stay in this process
         spread, finer = map, setup.finer[:1]
         cases, left_out = within_time(setup, cases)
@@ -67,13 +67,13 @@ def begin(setup: Setup) -> Work:
 
 def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], list[Finding]]:
     """The scenes that a user's own equations have and can follow in time, and a finding about the others."""
-    equations, seconds = setup.engines["own"].equations, SECONDS_OF_OWN[setup.size]
+    equations, seconds = cast("Own", setup.engines["own"]).equations, SECONDS_OF_OWN[setup.size]
     parts = ("acceleration",) if equations.has("acceleration") else ("mass_matrix", "bias")
-    each = OVERHEAD_OF_OWN + sum(equations.times[part][0] for part in parts)
+    of_evaluation = OVERHEAD_OF_OWN + sum(equations.times[part][0] for part in parts)
     unlike = [case.name for case in cases if case.controller or not case.scene.gravity]
     able, slow, left = [], [], seconds
     for case in [case for case in cases if case.name not in unlike]:
-        left -= each * STAGES_OF_RK4 * (case.steps + recorded(case))
+        left -= of_evaluation * STAGES_OF_RK4 * (case.steps + recorded(case))
         if left >= 0.0:
             able.append(case)
         else:
@@ -83,7 +83,7 @@ def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], list[F
 
 
 def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
-    """Each scene, integrator and step: single steps and open loop; then departures, errors and the drift of the energy."""
+    """Single steps and open loops of each scene, integrator and step; departures, errors, drift of energy."""
     robot, work = setup.robot, begin(setup) if work is None else work
     result = TrajectoryResult("trajectory", label=LABELS[robot.compared[0]], shown=SHOWN)
     (drifts,) = work.energy
@@ -103,15 +103,15 @@ def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
 
 
 def find_schemes(result: TrajectoryResult, robot: Robot, mujoco: Engine) -> None:
-    """Which integrators are which scheme, which have none, and which of a robot's own actuators are left out."""
+    """Which integrators are which scheme, which have none, and which actuators are left out."""
     schemes: dict[str, list[str]] = {}
     for method in mujoco.methods.values():
         schemes.setdefault(method.scheme, []).append(method.name)
     missing = [] if robot.own else [name for name in INTEGRATORS if name not in mujoco.methods]
     result.find("schemes", own=robot.own, schemes=schemes, missing=missing, noun=robot.noun)
-    driven = [case for case in cases_run(result, robot) if case.controller]
+    driven = {case.name: case.controller for case in cases_run(result, robot) if case.controller}
     if driven:
-        scenes, left_out = [case.name for case in driven], dict(driven[0].controller.left_out)
+        scenes, left_out = [*driven], dict(next(iter(driven.values())).left_out)
         result.find("servos", noun=robot.noun, scenes=scenes, left_out=left_out)
 
 
@@ -134,8 +134,9 @@ def figures(result: TrajectoryResult, robot: Robot) -> Iterator[partial[Any]]:
     cases = cases_run(result, robot)
     numbers = robot.claims.figures if robot.claims else {}
     for case in cases:
-        if case.is_held and case.name in numbers:
-            yield partial(figures_runs.draw_held, result, case, numbers[case.name])
+        run = result.run_of(case, "rk4") if case.is_held else None
+        if run and case.name in numbers:
+            yield partial(figures_runs.draw_held, result, run, numbers[case.name])
     for case in cases:
         yield partial(figures_runs.draw_run, result, case)
     if result.pictures:

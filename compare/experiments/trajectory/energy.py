@@ -35,18 +35,22 @@ class EnergyRow(Row):
 
 
 def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, Sequence[int]]) -> Result:
-    """The drift of the energy along free, undamped runs of a second. steps: two counts by the order, one twice the other."""
+    """The drift of the energy along free, undamped runs of a second.
+
+    steps: two counts by the order of the method, the second twice the first.
+    """
     result = Result("trajectory")
     rows = result.tables["energy"] = []
     # in a scene of a user's own the order may not show in a second
     free = [case for case in robot.cases if case.is_free and "own" not in case.scene.tags]
     for case in [case for case in free if not any(case.tree.damping)]:
         for method in one_of_each_scheme(engines["mujoco"]):
-            counts, drifts = steps[method.order], {}
+            order, drifts = method.order or 0, {}
+            counts = steps[order]
             for engine, dynamics in compared(engines, case).items():
                 name = method.name if engine == method.engine else same_scheme(engines, method, engine).name
                 drifts[engine] = [largest_drift(case, dynamics, name, count) for count in counts]
-            orders = check_order(result, case, f"{case.name}, {method.name}", method.order, drifts)
+            orders = check_order(result, case, f"{case.name}, {method.name}", order, drifts)
             for engine, (_, drift) in drifts.items():
                 row = EnergyRow(case.name, method.name, DURATION / counts[-1], engine, number_or_none(drift))
                 row.order = orders.get(engine)
@@ -67,8 +71,8 @@ def rounding(case: Case) -> float:
     """The largest drift of the energy that may be rounding, J."""
     speed, springs = np.abs(case.v), 0.0
     if case.tree.has_springs:
-        off = case.coordinates.difference(case.q, np.array(case.tree.rest))
-        springs = literal.spring_torque(case.q, case.tree) @ off / 2.0
+        stretch = case.coordinates.difference(case.q, np.array(case.tree.rest))
+        springs = literal.spring_torque(case.q, case.tree) @ stretch / 2.0
     kinetic = speed @ np.abs(literal.mass_matrix(case.q, case.tree)) @ speed / 2.0
     return ROUNDED * (gravity_scale(case.tree, case.q) + kinetic + springs)
 
@@ -76,7 +80,7 @@ def rounding(case: Case) -> float:
 def check_order(
     result: Result, case: Case, where: str, order: int, drifts: Mapping[str, Sequence[float]]
 ) -> dict[str, float | None]:
-    """The measured order of each engine, at least the method's; not checked, and {}, where both drift by rounding alone.
+    """The measured order of each engine, at least the method's; {} where both drift by rounding alone.
 
     drifts: J, with a step and with half of it.
     """
@@ -85,8 +89,8 @@ def check_order(
     orders: dict[str, float | None] = {}  # None: a run has diverged, or does not drift
     least, name = order - ORDER_MARGIN, "order of the drift of energy"
     for engine, of_engine in drifts.items():
-        found = measured_order((2.0, 1.0), of_engine)
-        measured = orders[engine] = number_or_none(found and found.order)
+        measured = measured_order((2.0, 1.0), of_engine)
+        orders[engine] = number_or_none(measured and measured.order)
         place = f"{where}, {LABELS[engine]}, {DURATION:g} s"
-        result.check(place, name, measured, least, "", rule="at least", about=About.PREDICTION)
+        result.check(place, name, orders[engine], least, "", rule="at least", about=About.PREDICTION)
     return orders

@@ -20,7 +20,8 @@ from ...engines import LABELS
 from ...report.style import BLUE, ORANGE
 from .runs import TrajectoryResult
 
-Pen, Links = ImageDraw.ImageDraw, Sequence[tuple[int, int]]
+Pen = ImageDraw.ImageDraw
+Links = Sequence[tuple[int, int]]
 PIXELS, TOP, BOTTOM = (640, 420), 78, 34  # pixels; and the margins for text above and below
 ROOM = PIXELS[0] - 36, PIXELS[1] - TOP - BOTTOM - 36
 MIDDLE = PIXELS[0] / 2, (PIXELS[1] + TOP - BOTTOM) / 2

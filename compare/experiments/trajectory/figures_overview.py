@@ -1,6 +1,6 @@
 """The picture of trajectory on the first screen: its scenes."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
@@ -31,23 +31,22 @@ class SceneRuns(NamedTuple):
 def scenes_of(result: TrajectoryResult, robot: Robot) -> list[SceneRuns]:
     names = {row.scene for row in result.rows}
     failing = [check.scene for check in result.checks if check.failed and check.about == About.MODELS]
-    runs = {(run.case.name, run.scheme, run.steps): run for run in result.runs}
     scenes = []
     for case in (case for case in robot.cases if case.name in names):
         rows = [row for row in result.rows if row.scene == case.name]
         until = [row.judged_until for row in rows]
         diverged = min((row.diverged_at for row in rows if row.diverged_at is not None), default=None)
-        run = runs.get((case.name, "rk4", case.steps)) if case.is_held else None
+        run = result.run_of(case, "rk4") if case.is_held else None
         left = tuple(path.left for path in run.paths.values()) if run else ()
         passed = not any(scene_of(where, [*names]) == case.name for where in failing)
         share = largest_known([row.difference_over_band for row in rows])
-        runs_of = SceneRuns(case.name, share, min(until), max(until), case.duration, diverged, left, passed)
-        scenes.append(runs_of)
+        times = min(until), max(until), case.duration, diverged
+        scenes.append(SceneRuns(case.name, share, *times, left, passed))
     return scenes
 
 
 def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Finding]:
-    """Scene by scene: the difference over its band at the left; at the right how long it is judged, and what ends it."""
+    """Each scene: at the left the difference over its band; at the right how long it is judged."""
     scenes = scenes_of(result, robot)
     wrong_first = sorted(scenes, key=lambda scene: scene.passed)[:MOST_ROWS]
     shown = [scene for scene in scenes if scene in wrong_first]
@@ -86,6 +85,6 @@ def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Fi
     share = largest_known([scene.share for scene in scenes])
     failing = [scene.name for scene in scenes if not scene.passed]
     shortest, longest = min(scene.shortest for scene in scenes), max(scene.longest for scene in scenes)
-    values = {"label": result.label, "share": share, "scenes": len(scenes), "failing": failing}
-    caption = result.finding("overview_caption", **values, shortest=shortest, longest=longest)
-    return "overview_scenes", fig, caption
+    values: dict[str, Any] = {"label": result.label, "share": share, "scenes": len(scenes)}
+    values |= {"failing": failing, "shortest": shortest, "longest": longest}
+    return "overview_scenes", fig, result.finding("overview_caption", **values)

@@ -26,9 +26,9 @@ NOT_JUDGED: dict[str, Any] = {"color": (GREY, 0.2), "linewidth": 0}
 MOST_LINES = len(LINES)  # of joints in a panel
 
 
-def draw_held(result: TrajectoryResult, case: Case, number: int) -> tuple[str, Figure, Finding]:
-    """The assignment's figure of a held posture: joint angles against time, and when each engine leaves it."""
-    (run,) = (run for run in runs_of(result, case) if run.scheme == "rk4" and run.steps == case.steps)
+def draw_held(result: TrajectoryResult, run: Run, number: int) -> tuple[str, Figure, Finding]:
+    """The assignment's figure of a held posture: angles against time, and when each engine leaves it."""
+    case = run.case
     fig = Figure(figsize=(WIDTH, 3.3), layout="constrained")
     ax = fig.subplots()
     over_time(ax, run, [np.degrees(run.until_diverged(engine, path.q)) for engine, path in run.paths.items()])
@@ -61,10 +61,9 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
     for (positions, speeds, below), run in zip(axes.T, runs):
         for ax, name in ((positions, "q"), (speeds, "v")):
             paths = {engine: getattr(path, name) for engine, path in run.paths.items()}
-            values = [
-                run.until_diverged(engine, drawable(case, name, path)) for engine, path in paths.items()
-            ]
-            over_time(ax, run, values, shown, 64 // len(runs))
+            drawn = {engine: drawable(case, name, path) for engine, path in paths.items()}
+            alive = [run.until_diverged(engine, path) for engine, path in drawn.items()]
+            over_time(ax, run, alive, shown, 64 // len(runs))
         positions.set_title(f"{run.integrator}, {step}" if len(runs) < 4 else f"{run.integrator}\n{step}")
         draw_difference(below, run, result.label)
     values = np.concatenate([line.get_ydata() for ax in axes[2] for line in ax.lines])
@@ -83,8 +82,8 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
 
 def draw_difference(ax: Axes, run: Run, label: str) -> None:
     """The engines' difference in a run, and its band."""
-    ours, theirs = (run.until_diverged(engine, path.q) for engine, path in run.paths.items())
-    difference = moved_from(ours, theirs, run.case.coordinates).max(axis=1)
+    first, mujoco = (run.until_diverged(engine, path.q) for engine, path in run.paths.items())
+    difference = moved_from(first, mujoco, run.case.coordinates).max(axis=1)
     band, end = np.where(run.band < 1e3, run.band, np.nan), run.case.duration
     shown = np.maximum(difference[1:], DRAWN_ZERO)
     ax.semilogy(run.t[1:], shown, color="black", linewidth=1, label=f"{label} to MuJoCo")
@@ -109,7 +108,7 @@ def add_legend(fig: Figure, axes: np.ndarray, long: bool) -> None:
 
 
 def run_caption(result: TrajectoryResult, case: Case, runs: Sequence[Run], shown: int) -> Finding:
-    """The engines' difference in a scene, until when it is judged, and their errors. shown: the number of positions."""
+    """The engines' difference in a scene and their errors. shown: the number of positions."""
     rows = [row for row in result.rows if row.scene == case.name and row.level == "open loop"]
     errors, coordinates = result.errors.get(case.name), case.coordinates
     values: dict[str, Any] = {
@@ -131,14 +130,14 @@ def over_time(
     shown: the numbers of those that are drawn, (): all.
     """
     every = slice(None, None, max(1, len(run.t) // marks_at_most))
-    robot, names, (ours, theirs) = run.case.robot, run.case.coordinates.speeds, values
+    robot, names, (first, mujoco) = run.case.robot, run.case.coordinates.speeds, values
     all_names = robot.coordinates.speeds
     few = len(all_names) <= MOST_LINES  # then a joint looks the same in every figure
     for k, i in enumerate(shown or range(len(names))):
         colour, dash = LINES[all_names.index(names[i]) if few else k]
         label = f"{robot.symbol(names[i])}, {LABELS[robot.compared[0]]}"
-        ax.plot(run.t, ours[:, i], linestyle=dash, color=colour, label=label)
-        ax.plot(run.t[every], theirs[every, i], color=colour, clip_on=False, **MARKS)
+        ax.plot(run.t, first[:, i], linestyle=dash, color=colour, label=label)
+        ax.plot(run.t[every], mujoco[every, i], color=colour, clip_on=False, **MARKS)
     ax.plot([], [], color="black", label="MuJoCo", **MARKS)
 
 
@@ -161,12 +160,12 @@ def drawable(case: Case, name: str, values: np.ndarray) -> np.ndarray:
 
 
 def differing_most(case: Case, runs: Sequence[Run]) -> list[int]:
-    """The numbers of the movements that are drawn: all, or those in which the engines differ most while judged."""
+    """The movements that are drawn: all, or those in which the engines differ most while judged."""
     count = case.coordinates.nv
     if count <= MOST_LINES:
         return list(range(count))
     largest = np.zeros(count)
     for run in runs:
-        ours, theirs = (path.q[run.t <= run.judged_until] for path in run.paths.values())
-        largest = np.fmax(largest, moved_from(ours, theirs, case.coordinates).max(axis=0))
+        first, mujoco = (path.q[run.t <= run.judged_until] for path in run.paths.values())
+        largest = np.fmax(largest, moved_from(first, mujoco, case.coordinates).max(axis=0))
     return sorted(np.argsort(-largest, kind="stable")[:MOST_LINES].tolist())

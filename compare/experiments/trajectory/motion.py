@@ -26,7 +26,7 @@ def pictures_of(case: Case, runs: Sequence[Run]) -> Pictures | None:
     if not by_steps:
         return None
     run, unit = by_steps[(min if case.is_held else max)(by_steps)], movement_unit(case.coordinates)
-    positions, points, links = [], {}, []
+    positions, points = [], {}
     for engine, path in run.paths.items():
         times, q = frames(case, run.t, path)
         alive = np.isfinite(q).all(axis=1)
@@ -37,9 +37,10 @@ def pictures_of(case: Case, runs: Sequence[Run]) -> Pictures | None:
     apart = np.abs(case.coordinates.difference(*positions)).max(axis=1)
     left = {engine: path.left if case.is_held else None for engine, path in run.paths.items()}
     ended = {engine: path.ended for engine, path in run.paths.items() if path.ended is not None}
+    leaves = [{"label": LABELS[name], "left": time} for name, time in left.items()]
     seen = Finding("trajectory", "seen", {
         "noun": case.robot.noun, "unit": unit, "limit": LEFT, "held": case.is_held, "end": case.duration,
-        "leaves": [{"label": LABELS[name], "left": time} for name, time in left.items()] if any(left.values()) else [],
+        "leaves": leaves if any(left.values()) else [],
         "apart": float(np.nanmax(apart)) if np.isfinite(apart).any() else None,
         "diverged": [{"label": LABELS[name], "time": end} for name, end in ended.items()],
     })  # fmt: skip
@@ -48,7 +49,7 @@ def pictures_of(case: Case, runs: Sequence[Run]) -> Pictures | None:
 
 
 def frames(case: Case, t: np.ndarray, path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Times and positions of the pictures of a run, (frames,) and (frames, nq), NaN from where it has diverged.
+    """The times and positions of the pictures of a run, (frames,) and (frames, nq); NaN once it has diverged.
 
     A run of few steps is interpolated between them, unless a joint is a ball.
     """
@@ -67,7 +68,10 @@ def frames(case: Case, t: np.ndarray, path: Path) -> tuple[np.ndarray, np.ndarra
 
 
 def in_order(drawn: Sequence[Pictures], robot: Robot) -> list[Pictures]:
-    """Scenes in the order of the page: a held one, if possible with a departure; a free one, if possible from there; the rest."""
+    """Scenes in the order of the page: a held one, a free one, the rest.
+
+    The first with a departure, the second from the same posture, if there are such scenes.
+    """
     cases = {case.name: case for case in robot.cases}
     held = [scene for scene in drawn if cases[scene.scene].is_held]
     free = [scene for scene in drawn if cases[scene.scene].is_free]

@@ -107,7 +107,7 @@ class Run:
         return values if ended is None else np.where((self.t < ended)[:, None], values, np.nan)
 
 
-class Ours(NamedTuple):
+class Twin(NamedTuple):
     """The side of TMT, or of a user's own equations: its run, and what MuJoCo's is compared with."""
 
     run: Run
@@ -126,6 +126,14 @@ class TrajectoryResult(Result):
     errors: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
     pictures: list[Pictures] = field(default_factory=list)
 
+    def run_of(self, case: Case, *schemes: str) -> Run | None:
+        """The run of a case with its own step by one of these schemes."""
+        name, steps = case.name, case.steps
+        fit = (
+            run for run in self.runs if (run.case.name, run.steps) == (name, steps) and run.scheme in schemes
+        )
+        return next(fit, None)
+
 
 def steps_afforded(case: Case) -> int:
     """The steps of a run for which its band is computed: each has a Jacobian of (2 nv)^2 entries."""
@@ -139,7 +147,7 @@ def step_counts(case: Case, finer: Sequence[int]) -> list[int]:
 
 
 def recorded(case: Case) -> int:
-    """The number of states of a run that are compared, without its start: all its own steps, or every 2nd, 4th ..."""
+    """The number of states of a run that are compared, without its start: one for each 1, 2, 4 ... steps."""
     count = case.steps
     while count > RECORDED and count % 2 == 0:
         count //= 2
@@ -147,24 +155,24 @@ def recorded(case: Case) -> int:
 
 
 def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int]) -> TrajectoryResult:
-    """One case with every scheme that both engines have and every step size, in multiples of the scene's own steps."""
-    ours, theirs = case.robot.compared
-    result, dynamics = TrajectoryResult("trajectory", label=LABELS[ours]), compared(engines, case)
-    available = {method.scheme for method in methods_in(engines[ours], case).values()}
+    """One case with every scheme that both engines have. finer: multiples of the scene's own steps."""
+    first, mujoco = case.robot.compared
+    result, dynamics = TrajectoryResult("trajectory", label=LABELS[first]), compared(engines, case)
+    available = {method.scheme for method in methods_in(engines[first], case).values()}
     schemes: dict[str, list[Method]] = {}
-    for method in methods_in(engines[theirs], case).values():
+    for method in methods_in(engines[mujoco], case).values():
         if method.scheme in available:
             schemes.setdefault(method.scheme, []).append(method)
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for steps in step_counts(case, finer):
             for scheme, methods in schemes.items():
-                mine = run_of_ours(case, dynamics[ours], steps, scheme)
-                runs = [compare_run(result, mine, dynamics[theirs], method) for method in methods]
+                twin = run_of_twin(case, dynamics[first], steps, scheme)
+                runs = [compare_run(result, twin, dynamics[mujoco], method) for method in methods]
                 result.runs.append(runs[0])
     return result
 
 
-def run_of_ours(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Ours:
+def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin:
     """TMT's side of a case, or a user's: the run, its band, and single steps from its recorded states."""
     stepping, tree, tau = METHODS[scheme], case.tree, case.tau
     dt, every = case.duration / steps, steps // recorded(case)
@@ -174,7 +182,7 @@ def run_of_ours(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Ours
     alive = motion.t[::every] < ends_first([path.ended])
     states, times = [values[::every][alive] for values in (path.q, path.v)], motion.t[::every][alive]
     stepped = one_step(dynamics, states, tau, dt, scheme)
-    # the bound of a step's rounding is of first order in dt, and too small where a joint turns by more than half a turn
+    # the bound of a step's rounding is of first order in dt: too small beyond half a turn of a joint
     turning = [i for i, unit in enumerate(case.coordinates.units) if unit == "rad"]
     rates = np.maximum(*(np.abs(speeds[:, turning]) for speeds in (states[1], stepped[1])))
     single = dt * rates.max(axis=1, initial=0.0) <= np.pi
@@ -183,25 +191,26 @@ def run_of_ours(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Ours
     run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, of_positions)
     widest, tolerance = (
         rules.widest_judged(case, path.q, path.v),
-        step_rounding(stepping, tree, *states, tau, dt),
+        step_rounding(stepping, tree, states[0], states[1], tau, dt),
     )
-    return Ours(run, width, widest, times[single], states, stepped, tolerance)
+    return Twin(run, width, widest, times[single], states, stepped, tolerance)
 
 
 def one_step(
     dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str
 ) -> list[np.ndarray]:
     """q and v one step after each of the states."""
-    motion = dynamics.run(*states, tau, dt, 1, method)
+    q, v = states
+    motion = dynamics.run(q, v, tau, dt, 1, method)
     return [motion.q[:, 1], motion.v[:, 1]]
 
 
-def compare_run(result: Result, ours: Ours, dynamics: Dynamics, method: Method) -> Run:
+def compare_run(result: Result, twin: Twin, dynamics: Dynamics, method: Method) -> Run:
     """One side and an integrator of MuJoCo with the same scheme, from the same start with the same step."""
-    case, (run, width, widest, at, states, stepped, step_tolerance) = ours.run.case, ours
-    mine, coordinates, times = run.paths[case.robot.compared[0]], case.coordinates, run.t[:: run.every]
-    theirs = Path.of(case, dynamics.run(*case.start, case.tau, run.dt, run.steps, method.name))
-    run = replace(run, integrator=method.name, paths=run.paths | {"mujoco": theirs})
+    case, (run, width, widest, at, states, stepped, step_tolerance) = twin.run.case, twin
+    first, coordinates, times = run.paths[case.robot.compared[0]], case.coordinates, run.t[:: run.every]
+    mujoco = Path.of(case, dynamics.run(*case.start, case.tau, run.dt, run.steps, method.name))
+    run = replace(run, integrator=method.name, paths=run.paths | {"mujoco": mujoco})
     count = judged(times, width < widest, run.ends)
     run = replace(run, judged_until=float(times[count - 1]))
     if len(at):
@@ -210,7 +219,7 @@ def compare_run(result: Result, ours: Ours, dynamics: Dynamics, method: Method) 
         if (step_tolerance.min(axis=0) >= widest).any():
             result.not_judged(run.where, "one step", say(result.finding("wide_step")))
     recorded_states = (
-        [path.q[:: run.every][:count], path.v[:: run.every][:count]] for path in (mine, theirs)
+        [path.q[:: run.every][:count], path.v[:: run.every][:count]] for path in (first, mujoco)
     )
     apart = differences(coordinates, *recorded_states)
     check_level(result, run, "open loop", Deviation(coordinates, times[:count], apart, width[:count]))
@@ -222,10 +231,11 @@ def check_level(result: Result, run: Run, level: str, deviation: Deviation) -> N
     """A row and a check: the component and the recorded state that come closest to their tolerance."""
     check = check_closest(result, run.where, f"{level}, {result.label} to MuJoCo", deviation)
     movements = deviation.difference[:, : deviation.coordinates.nv]
+    largest = None if check.value is None else movements.max()
     twin_diverged_at, diverged_at = run.ends
     result.rows.append(TrajectoryRow(
         scene=run.case.name, engine_integrator=run.integrator, twin=run.scheme, dt=run.dt, level=level,
-        largest_difference=None if check.value is None else movements.max(), unit=rules.movement_unit(run.case.coordinates),
+        largest_difference=largest, unit=rules.movement_unit(run.case.coordinates),
         worst_difference=check.value, band=check.tolerance, worst_unit=check.unit, worst_place=check.note,
         difference_over_band=check.over_tolerance, judged_until=run.judged_until, required=run.required,
         diverged_at=diverged_at, twin_diverged_at=twin_diverged_at,
@@ -253,7 +263,7 @@ def ends_first(ends: Sequence[float | None]) -> float:
 
 
 def judged(times: np.ndarray, narrow: np.ndarray, ends: Sequence[float | None]) -> int:
-    """The number of recorded states that are judged: those before the band is wide or a run has diverged, and the start.
+    """The number of recorded states that are judged: up to where the band is wide or a run has diverged.
 
     narrow: whether the band still judges each movement and speed, (recorded, 2 nv).
     """
@@ -262,7 +272,7 @@ def judged(times: np.ndarray, narrow: np.ndarray, ends: Sequence[float | None]) 
 
 
 def check_time_judged(result: Result, run: Run, alive: float) -> None:
-    """A run is judged for the time that its scene states, or for a tenth of it while it is alive; else it is not judged.
+    """A run is judged for the time that its scene states, or for a tenth of it; else it is not judged.
 
     alive: the last recorded time before one of both runs diverges, s.
     """
@@ -275,7 +285,7 @@ def check_time_judged(result: Result, run: Run, alive: float) -> None:
 
 
 def check_divergence(result: Result, run: Run) -> bool:
-    """Both diverge at the same step, if one does and the band is narrow at the first recorded state after that.
+    """Both diverge at the same step, if the band is narrow at the first recorded state after that.
 
     Returned: whether that is compared.
     """
@@ -284,9 +294,9 @@ def check_divergence(result: Result, run: Run) -> bool:
         return False
     is_narrow = bool(run.band[-(-round(end / dt) // run.every)] < NARROW)
     if is_narrow:
-        ours, theirs = (steps + 1 if at is None else round(at / dt) for at in run.ends)
+        first, mujoco = (steps + 1 if at is None else round(at / dt) for at in run.ends)
         whose = "TMT's" if result.label == "TMT" else result.label
-        note = f"{steps + 1}: never" if steps + 1 in (ours, theirs) else ""
+        note = f"{steps + 1}: never" if steps + 1 in (first, mujoco) else ""
         what = f"step of divergence, MuJoCo's, is {whose}"
-        result.check(run.where, what, theirs, ours, "", note, rule="equal")
+        result.check(run.where, what, mujoco, first, "", note, rule="equal")
     return is_narrow

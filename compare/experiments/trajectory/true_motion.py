@@ -1,4 +1,4 @@
-"""Errors of both engines against the true motion, where that is known; and why a held robot leaves its posture."""
+"""Errors of both engines against the true motion; and why a held robot leaves its posture."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -21,11 +21,9 @@ NO_TIME = 1e-6  # s: a step in which nothing moves
 
 def coarsest_runs(result: TrajectoryResult, robot: Robot) -> Iterator[Run]:
     """The run of each scene with the coarsest step of MuJoCo's RK4, held scenes first."""
-    runs = {(run.case.name, run.scheme, run.steps): run for run in result.runs}
     for case in sorted(robot.cases, key=lambda case: not case.is_held):
-        for scheme in SCHEMES_OF_RK4:
-            if run := runs.get((case.name, scheme, case.steps)):
-                yield run
+        if run := result.run_of(case, *SCHEMES_OF_RK4):
+            yield run
 
 
 def deviations(run: Run) -> dict[str, float | None]:
@@ -35,17 +33,17 @@ def deviations(run: Run) -> dict[str, float | None]:
 
 
 def find_errors(result: TrajectoryResult, robot: Robot, references: Mapping[str, Reference]) -> None:
-    """The largest error of both engines with the coarsest step of RK4 in each scene, and where it is far above their difference.
+    """The largest error of both engines in each scene, and where it is far above their difference.
 
     references: by the name of the scene; the true motion of a held scene is rest.
     """
     scenes = []
     for run in coarsest_runs(result, robot):
-        name, known = run.case.name, references.get(run.case.name)
+        name, reference = run.case.name, references.get(run.case.name)
         if run.case.is_held:
             first, second = deviations(run).values()
-        elif known:
-            first, second = (number_or_none(known.error(path.q).max()) for path in run.paths.values())
+        elif reference:
+            first, second = (number_or_none(reference.error(path.q).max()) for path in run.paths.values())
         else:
             continue
         result.errors[name] = first, second
@@ -68,45 +66,44 @@ def coarsest_steps(result: TrajectoryResult) -> int | None:
 
 def is_far(errors: Sequence[float | None], difference: float) -> bool:
     """Whether the larger error is so large that the engines' difference says nothing about it."""
-    known = [error for error in errors if error is not None]
-    return len(known) == len(errors) and max(known) > SAYS_NOTHING * difference
+    numbers = [error for error in errors if error is not None]
+    return len(numbers) == len(errors) and max(numbers) > SAYS_NOTHING * difference
 
 
 def difference_while_judged(run: Run) -> float:
     """The largest difference of the engines while they are judged, rad or m."""
     last = int(np.searchsorted(run.t, run.judged_until * (1 + 1e-9), side="right"))
-    ours, theirs = (path.q[: last : run.every] for path in run.paths.values())
-    return float(moved_from(ours, theirs, run.case.coordinates).max())
+    first, mujoco = (path.q[: last : run.every] for path in run.paths.values())
+    return float(moved_from(first, mujoco, run.case.coordinates).max())
 
 
 def find_departures(result: TrajectoryResult, robot: Robot, engines: Mapping[str, Engine]) -> None:
-    """When each engine leaves the posture of each held scene, and whether its torque holds it within rounding."""
+    """When each engine leaves the posture of each held scene, and whether its torque holds it."""
     claims = robot.claims.of_scenes if robot.claims else {}
     for run in coarsest_runs(result, robot):
         case = run.case
         if case.is_held:
-            about = {"scene": robot.scene_begins(case.name), "claim": claims.get(case.name), "limit": LEFT}
-            unit, stated = movement_unit(case.coordinates), robot.compared[0] == "tmt"
-            values = departures(run, engines)
-            result.find("held", **about, duration=case.duration, unit=unit, stated=stated, **values)
+            about: dict[str, Any] = {"claim": claims.get(case.name), "limit": LEFT, "duration": case.duration}
+            about |= {"unit": movement_unit(case.coordinates), "stated": robot.compared[0] == "tmt"}
+            result.find("held", scene=robot.scene_begins(case.name), **about, **departures(run, engines))
 
 
 def departures(run: Run, engines: Mapping[str, Engine]) -> dict[str, Any]:
-    """The initial acceleration of each engine under the torque that should hold, and what rounding can cause, rad/s2.
+    """The initial acceleration under the torque that should hold, and what rounding can cause, rad/s2.
 
     Both of the joint whose acceleration is the largest share of what rounding can cause in it.
     """
     case = run.case
-    dt, ((name, ours), (other, theirs)) = case.duration / case.steps, compared(engines, case).items()
+    dt, ((name, first), (mujoco, last)) = case.duration / case.steps, compared(engines, case).items()
     allowed = slope_rounding(METHODS["rk4"], case.tree, case.q[None], case.v[None], case.tau, dt)[2][0]
     initial = {
-        name: ours.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
-        other: theirs.acceleration(*case.start, case.tau),
+        name: first.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
+        mujoco: last.acceleration(*case.start, case.tau),
     }
     joint = int(np.argmax(np.max(np.abs([*initial.values()]), axis=0) / allowed))
-    farthest, found = deviations(run), []
+    farthest, told = deviations(run), []
     for engine, acceleration in initial.items():
         push = number_or_none(np.abs(acceleration[joint]))
         about = {"label": LABELS[engine], "left": run.paths[engine].left, "farthest": farthest[engine]}
-        found.append(about | {"push": push, "holds": push is not None and push <= allowed[joint]})
-    return {"allowed": float(allowed[joint]), "engines": found}
+        told.append(about | {"push": push, "holds": push is not None and push <= allowed[joint]})
+    return {"allowed": float(allowed[joint]), "engines": told}

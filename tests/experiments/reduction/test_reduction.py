@@ -49,12 +49,9 @@ def test_a_model_whose_joints_cannot_be_locked_fails():
 
 
 def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_done_again(setup, monkeypatch):
-    log = []
-    for name, said in (("untimed", "computed"), ("time_models", "timed")):
-        result = ReductionResult("reduction", models=[])
-        monkeypatch.setattr(
-            reduction, name, lambda *_, said=said, result=result, **__: log.append(said) or result
-        )
+    log, result = [], ReductionResult("reduction", models=[])
+    monkeypatch.setattr(reduction, "untimed", lambda setup: log.append("computed") or result)
+    monkeypatch.setattr(reduction, "time_models", lambda *_, **__: log.append("timed"))
     setup = dataclasses.replace(setup, quiet=lambda: log.append("quiet"))
     reduction.rows(setup, reduction.begin(setup))
     assert log == ["computed", "quiet", "timed"]
@@ -94,10 +91,8 @@ def test_each_pair_has_its_own_models_and_the_bias_is_compared_in_motion(mujoco)
 
     wrong = Faster(mujoco.source, mujoco.joints, mujoco.bodies)
     off = [check for check in blocks(Setup.small(ARM, engines(wrong))).checks if not check.passed]
-    assert {check.quantity for check in off} == {
-        "bias, MuJoCo, reduced to whole",
-        "bias, reduced, TMT to MuJoCo",
-    }
+    quantities = {"bias, MuJoCo, reduced to whole", "bias, reduced, TMT to MuJoCo"}
+    assert {check.quantity for check in off} == quantities
 
 
 @pytest.mark.parametrize("model, joints", [("gripper", 4), ("free_body", 4), ("pendulum_ball", 2)])

@@ -20,8 +20,9 @@ STOPPED = "smallest error of mujoco's RK4, where smaller steps gain nothing"
 
 def run_of(engine, method, error, steps=64, seconds=1e-3) -> Run:
     """A run: diverged where the error is None."""
+    errors = dict.fromkeys(("error", "worst_error", "energy_error"), error)
     row = SpeedRow(
-        "bent, free", engine, method, 5.0 / steps, None, steps, steps, 4 * steps, seconds, error, error, error
+        "bent, free", engine, method, 5.0 / steps, None, steps, steps, 4 * steps, seconds, **errors
     )
     row.diverged = error is None
     return Run(Method(engine, method, 4, SCHEMES.get(method, method)), Setting(5.0, steps), error, row)
@@ -114,12 +115,10 @@ def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
     found = [run_of("scipy", "DOP853", 1e-9, 500, 1e-4), run_of("mujoco", "implicit", None, 64, 1e-9)]
     for k in range(5):
         steps, error = 64 << k, 2e-2 / 16**k
-        found += [
-            run_of("mujoco", "RK4", error, steps, 20e-3 * 2**k),
-            run_of("tmt", "rk4", error, steps, 1e-3 * 2**k),
-        ]
-        found += [run_of("mujoco", "Euler", 0.5 / 2**k, steps, 4e-3 * 2**k)]
-        found += [run_of("tmt", "dopri8", error**2, steps, 2e-3 * 2**k)]
+        found.append(run_of("mujoco", "RK4", error, steps, 20e-3 * 2**k))
+        found.append(run_of("tmt", "rk4", error, steps, 1e-3 * 2**k))
+        found.append(run_of("mujoco", "Euler", 0.5 / 2**k, steps, 4e-3 * 2**k))
+        found.append(run_of("tmt", "dopri8", error**2, steps, 2e-3 * 2**k))
     table = {row.target: row for row in advised(found)}
     row = table[1e-3]
     settings = "mujoco RK4, 256 steps", "tmt dopri8, 64 steps", "scipy DOP853, 500 steps"
@@ -172,13 +171,14 @@ def test_what_is_timed_in_part_counts_as_the_whole(setup, monkeypatch):
 def test_what_is_called_is_followed_once_after_all_else_has_ended(setup, monkeypatch):
     log, setup = [], replace(setup, quiet=lambda: log.append("quiet"))
     known, called = run_of("tmt", "rk4", 1.0), [run_of("scipy", "RK45", 1.0, 64, s) for s in (0.014, 0.016)]
-    monkeypatch.setattr(
-        speed, "runs_of", lambda *_, compiled: log.append(compiled) or (called, ["a failure"])
-    )
-    monkeypatch.setattr(speed, "prepared", lambda case, runs, engines: runs)
-    monkeypatch.setattr(
-        speed, "take_times", lambda runs, calls: log.append(runs == calls == [known, called[0]])
-    )
+    follow = lambda *_, compiled: log.append(compiled) or (called, ["a failure"])  # noqa: E731
+    take = lambda runs, calls: log.append(runs == calls == [known, called[0]])  # noqa: E731
+    for name, act in (
+        ("runs_of", follow),
+        ("prepared", lambda case, runs, engines: runs),
+        ("take_times", take),
+    ):
+        monkeypatch.setattr(speed, name, act)
     scene = SceneRuns(setup.robot.cases[0], None, 0.0, [known])
     assert speed.add_times(setup, [scene]) == ["a failure"]
     assert log == ["quiet", False, True] and scene.runs == [known, *called]

@@ -52,9 +52,7 @@ def test_a_band_judges_nothing_that_moves_less():
         return widest_judged(free, q, v)
 
     assert np.allclose(widest(lift=2e-4, speeds=(3.0, 0, 0, 0)), [2e-4, 1e-3, 1e-3, 1e-3, 3.0, *[np.inf] * 3])
-    assert np.allclose(
-        widest(lift=0.5, turn=1.0, speeds=(3.0, 2.0, 1e-9, 0)), [*[1e-3] * 4, 3.0, 2.0, 2.0, 2.0]
-    )
+    assert np.allclose(widest(0.5, 1.0, (3.0, 2.0, 1e-9, 0)), [*[1e-3] * 4, 3.0, 2.0, 2.0, 2.0])
     slow, rounded = widest(1.0, 4e-4, (1.0, 2e-2, 1e-3, 0)), widest(2.0, 1e-12, (1.0, 1e-12, 0, 0))
     assert np.allclose(slow, [1e-3, *[4e-4] * 3, 1.0, 2e-2, 1e-3, 2e-2])
     assert np.allclose(rounded, [*[1e-3] * 4, 1.0, *[np.inf] * 3])

@@ -33,12 +33,8 @@ def drawn(runs):
     return motion.pictures_of(CATCH, runs)
 
 
-def by_rk4(runs, steps):
-    return next(run for run in runs if (run.scheme, run.steps) == ("rk4", steps))
-
-
 def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_of_it(drawn, runs):
-    run = by_rk4(runs, 256)
+    run = next(run for run in runs if (run.scheme, run.steps) == ("rk4", 256))
     np.testing.assert_array_equal(drawn.t, run.t[::2])
     for name, path in run.paths.items():
         np.testing.assert_allclose(drawn.points[name], seen(path.q[::2]), atol=1e-15)
@@ -47,7 +43,7 @@ def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_
 
 
 def test_between_steps_a_run_is_interpolated_until_it_has_diverged(runs):
-    coarse = by_rk4(runs, 64)
+    coarse = next(run for run in runs if (run.scheme, run.steps) == ("rk4", 64))
     path = coarse.paths["tmt"]
     for ended, last in ((None, 5.0), (2.5, 2.5 - 5 / 64), (5 / 64, 0.0)):
         times, q = motion.frames(CATCH, coarse.t, path._replace(ended=ended))
@@ -67,9 +63,8 @@ def test_a_free_body_is_a_cross_that_turns_with_it():
     points, links = stick_figure(robot, a_quarter_about_z, crosses=True)
     before, after = points[:, -3:] - points[:, :1]
     assert links[-3:] == [(0, 2), (0, 3), (0, 4)] and np.abs(before).max() > 0.1
-    np.testing.assert_allclose(
-        after, before @ [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], atol=1e-15
-    )
+    turn = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    np.testing.assert_allclose(after, before @ turn, atol=1e-15)
 
 
 def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_and_up_is_up():
@@ -81,10 +76,8 @@ def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_a
 
 
 def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(drawn, tmp_path):
-    left, right = (
-        np.array([[-1.0, 1.0], [-1.0, 1.5], [-1.0, 2.0]]),
-        np.array([[1.0, -1.0], [1.5, -1.0], [2.0, -1.0]]),
-    )
+    left = np.array([[-1.0, 1.0], [-1.0, 1.5], [-1.0, 2.0]])
+    right = left[:, ::-1]
     points = {"tmt": np.stack([left] * 3), "mujoco": np.stack([right, left, np.nan * right])}
     scene = drawn._replace(t=drawn.t[:3], apart=drawn.apart[:3], points=points)
     name, figure, _ = gif.draw_motion(TrajectoryResult("trajectory", pictures=[scene]))

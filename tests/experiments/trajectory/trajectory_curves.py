@@ -14,10 +14,7 @@ def run_of(
 ) -> Run:
     """A run of 64 steps by RK4 whose angles end so far from where they started, or one that is said to be another."""
     ramp = np.linspace(0.0, 1.0, 65)[:, None] * np.ones(len(case.joints))
-    paths = {
-        engine: Path(case.q + end * ramp, speed + end * ramp, *of_engine)
-        for engine, end, speed, of_engine in zip(
-            ("tmt", "mujoco"), (ours, theirs), (10.0, 20.0), zip(ended, left)
-        )
-    }
+    mine = Path(case.q + ours * ramp, 10.0 + ours * ramp, ended[0], left[0])
+    other = Path(case.q + theirs * ramp, 20.0 + theirs * ramp, ended[1], left[1])
+    paths = {"tmt": mine, "mujoco": other}
     return Run(case, scheme, steps, np.linspace(0.0, 5.0, 65), paths, np.full(65, 1e-9), "RK4", until)

@@ -102,7 +102,7 @@ EDITS = (
     Edit("figures_runs", "draw_held", "result.errors[case.name]", "result.errors[case.name][::-1]",
          "the caption exchanges the engines"),
     Edit("figures_runs", "run_caption", "largest_known(_1)", "min(_1)", "the least use of the band is told as the most"),
-    Edit("figures_runs", "over_time", "ours[:, i]", "theirs[:, i]", "MuJoCo's run is drawn as TMT's"),
+    Edit("figures_runs", "over_time", "first[:, i]", "mujoco[:, i]", "MuJoCo's run is drawn as TMT's"),
     Edit("reduction.times", "largest_gain", "max(smaller, key=_1, default=None)", "min(smaller, key=_1, default=None)",
          "the least gain is told as the best"),
 )  # fmt: skip
