@@ -8,8 +8,8 @@ import numpy as np
 
 from tmt import Tree
 
-from . import EngineRecord
-from .outside.model import Course, File, Unread
+from . import Array, Course, EngineRecord
+from .outside.model import File, Unread
 from .outside.of_compiled import METHODS as METHODS
 from .outside.of_compiled import STAGES, OfCompiled
 
@@ -47,14 +47,14 @@ class Model(OfCompiled):
         model = self.models["RK4"]
         return model.replace(**{name: 0.0 * getattr(model, name) for name in STIFFNESS_AND_DAMPING})
 
-    def held(self, name: str) -> np.ndarray:
+    def held(self, name: str) -> Array:
         return np.array(getattr(self.models["Euler"], name))
 
-    def gravity(self) -> np.ndarray:
+    def gravity(self) -> Array:
         return np.asarray(self.models["Euler"].opt.gravity)
 
-    def mend(self, name: str, values: np.ndarray) -> bool:
-        changes: dict[str, np.ndarray] = {}
+    def mend(self, name: str, values: Array) -> bool:
+        changes: dict[str, Array] = {}
         if name == "gravity":
             changes = {"opt.gravity": values}
         elif name in ("armature", "damping"):
@@ -67,7 +67,7 @@ class Model(OfCompiled):
         self.models = {method: model.tree_replace(changes) for method, model in self.models.items()}
         return bool(changes)
 
-    def placed(self, q: np.ndarray, *of_speeds: np.ndarray) -> list[np.ndarray]:
+    def placed(self, q: Array, *of_speeds: Array) -> list[Array]:
         """The arguments in MuJoCo's order of joints."""
         placed = [np.zeros(np.shape(values), self.precision) for values in (q, *of_speeds)]
         placed[0][..., self.bare.qpos] = q
@@ -75,22 +75,22 @@ class Model(OfCompiled):
             vector[..., self.bare.dofs] = values
         return placed
 
-    def values(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, ...]:
+    def values(self, q: Array, v: Array, force: Array) -> tuple[Array, ...]:
         M, h, a = functions()["values"](self.model, self.data, *self.placed(q, v, force))
         at = self.bare.dofs
         return np.asarray(M)[np.ix_(at, at)], np.asarray(h)[at], np.asarray(a)[at]
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> Array:
         zero = np.zeros(len(self.bare.dofs))
         return self.values(q, zero, zero)[0]
 
-    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> Array:
         return self.values(q, v, np.zeros_like(v))[1]
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
         return self.values(q, v, force)[2]
 
-    def run(self, course: Course) -> tuple[np.ndarray, int]:
+    def run(self, course: Course) -> tuple[Array, int]:
         model = self.models[course.method].tree_replace(
             {"opt.timestep": np.asarray(course.dt, self.precision)}
         )

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import GRID
-from .model import Course, Numbers, ReadModel
+from .. import GRID, Array, Course
+from .model import Numbers, ReadModel
 
 if TYPE_CHECKING:
     from ..mujoco.bare import Bare
@@ -20,11 +20,11 @@ class OfCompiled(ReadModel):
     bare: Bare
     models: dict[str, Any]  # the engine's, by the names of METHODS
 
-    def held(self, name: str) -> np.ndarray:
+    def held(self, name: str) -> Array:
         """A field of the engine's models by MuJoCo's name of it."""
         raise NotImplementedError
 
-    def gravity(self) -> np.ndarray:
+    def gravity(self) -> Array:
         raise NotImplementedError
 
     def numbers(self) -> Numbers:
