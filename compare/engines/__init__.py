@@ -14,7 +14,7 @@ order of the case; and Mbar a + bias = tau - D v.
 
 import importlib
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -43,7 +43,7 @@ class EngineRecord:
     in_quick_runs: bool = False  # a quick run measures its speed too, and a small run with more settings
     from_file: bool = False  # it is made of a user's file: of a model, or of the user's own equations
     package: str = ""  # that must be installed
-    extra: str = ""  # of this project, which installs the package
+    extra: str = ""  # of this project, which installs the package; by default of the engine's name
     reads_file: bool = False  # it reads the robot's file itself, in a process of its own: see engines.outside
     precision: str = "float64"
     environment: tuple[tuple[str, str], ...] = ()  # of that process
@@ -56,7 +56,10 @@ class EngineRecord:
         return float(np.finfo(self.precision).eps)
 
 
-RECORDS = records_in(Path(__file__).parent, "ENGINE", EngineRecord)
+RECORDS = {
+    name: replace(record, extra=record.extra or name)
+    for name, record in records_in(Path(__file__).parent, "ENGINE", EngineRecord).items()
+}
 LABELS = {name: record.label for name, record in RECORDS.items()}
 WHOSE = {name: record.possessive or f"{record.label}'s" for name, record in RECORDS.items()}
 COLOURS = {name: record.colour for name, record in RECORDS.items()}
@@ -217,7 +220,7 @@ class Engine(Protocol):
         package, extra = RECORDS[self.name].package, RECORDS[self.name].extra
         if not package or find_spec(package):
             return None
-        return f"{package} is not installed" + (f"; `pip install .[{extra}]` installs it" if extra else "")
+        return f"{package} is not installed; `pip install .[{extra}]` installs it"
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         """The methods in a case: where a robot's own actuators act, others may be the same scheme."""

@@ -17,9 +17,7 @@ from .outside.model import Body, File, Link, carried
 from .outside.of_urdf import OfUrdf
 from .outside.order import order_of
 
-ENGINE = EngineRecord(
-    order=75, label="DART", colour="#882255", marker="*", package="dartpy", extra="dart", reads_file=True
-)
+ENGINE = EngineRecord(order=75, label="DART", colour="#882255", marker="*", package="dartpy", reads_file=True)
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
 
 

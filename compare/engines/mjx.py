@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import cache, cached_property, partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from .outside.of_compiled import METHODS as METHODS
 from .outside.of_compiled import STAGES, OfCompiled
 
 ENGINE = EngineRecord(
-    order=60, label="MJX", colour="#332288", marker="<", package="mujoco.mjx", extra="mjx", reads_file=True, compiles=True,
+    order=60, label="MJX", colour="#332288", marker="<", package="mujoco.mjx", reads_file=True, compiles=True,
     environment=(("JAX_ENABLE_X64", "1"), ("JAX_PLATFORMS", "cpu")),
 )  # fmt: skip
 # its fusions repeat what they share: an acceleration of an arm of seven hinges took 412 ms, 3 ms without them
@@ -53,19 +54,10 @@ class Model(OfCompiled):
     def gravity(self) -> Array:
         return np.asarray(self.models["Euler"].opt.gravity)
 
-    def mend(self, name: str, values: Array) -> bool:
-        changes: dict[str, Array] = {}
-        if name == "gravity":
-            changes = {"opt.gravity": values}
-        elif name in ("armature", "damping"):
-            changes = {f"dof_{name}": np.zeros(len(values))}
-            changes[f"dof_{name}"][self.bare.dofs] = values
-        elif name == "stiffness":
-            changes = {"jnt_stiffness": np.zeros(self.bare.model.njnt)}
-            changes["jnt_stiffness"][self.bare.model.dof_jntid[self.bare.dofs]] = values
-        changes = {field: values.astype(self.precision) for field, values in changes.items()}
-        self.models = {method: model.tree_replace(changes) for method, model in self.models.items()}
-        return bool(changes)
+    def set_field(self, method: str, name: str, index: Array, values: Array) -> None:
+        field = np.array(attrgetter(name)(self.models[method]))
+        field[index] = values
+        self.models[method] = self.models[method].tree_replace({name: field})
 
     def placed(self, q: Array, *of_speeds: Array) -> list[Array]:
         """The arguments in MuJoCo's order of joints."""

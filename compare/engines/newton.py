@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from . import Array, Course, EngineRecord
 from .outside.model import Body, File, Link, Numbers, ReadModel, Unread, carried
 
-ENGINE = EngineRecord(order=70, label="Newton", colour="#999933", marker="h", package="newton", extra="newton",
+ENGINE = EngineRecord(order=70, label="Newton", colour="#999933", marker="h", package="newton",
                       reads_file=True, precision="float32")  # fmt: skip
 METHODS = {"Featherstone": (1, "newton_featherstone")}  # semi-implicit Euler whose damping is explicit
 OFF = ("target_ke", "target_kd", "limit_ke", "limit_kd")  # actuators and limits

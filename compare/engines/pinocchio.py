@@ -16,13 +16,7 @@ from .outside.model import Body, File, Numbers, ReadModel, Unread
 from .outside.order import near, order_of, wrong_masses
 
 ENGINE = EngineRecord(
-    order=55,
-    label="Pinocchio",
-    colour="#56B4E9",
-    marker="X",
-    package="pinocchio",
-    extra="pinocchio",
-    reads_file=True,
+    order=55, label="Pinocchio", colour="#56B4E9", marker="X", package="pinocchio", reads_file=True
 )
 METHODS: dict[str, tuple[int, str]] = {}  # it has no integrators
 

@@ -17,13 +17,7 @@ from .outside.model import Body, File, Link, carried
 from .outside.of_urdf import OfUrdf
 
 ENGINE = EngineRecord(
-    order=80,
-    label="PyBullet",
-    colour="#661100",
-    marker="d",
-    package="pybullet",
-    extra="pybullet",
-    reads_file=True,
+    order=80, label="PyBullet", colour="#661100", marker="d", package="pybullet", reads_file=True
 )
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
 

@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from .outside.model import File, Unread
 from .outside.of_compiled import METHODS as METHODS
 from .outside.of_compiled import STAGES, OfCompiled
 
-ENGINE = EngineRecord(order=65, label="MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp", extra="warp",
+ENGINE = EngineRecord(order=65, label="MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp",
                       reads_file=True, compiles=True, precision="float32")  # fmt: skip
 
 
@@ -51,19 +52,11 @@ class Model(OfCompiled):
     def gravity(self) -> Array:
         return np.array(self.models["Euler"].opt.gravity.numpy()[0])
 
-    def mend(self, name: str, values: Array) -> bool:
-        joints = self.bare.model.dof_jntid[self.bare.dofs]
-        index = {"stiffness": joints, "gravity": slice(None)}.get(name, self.bare.dofs)
-        for model in self.models.values():
-            fields = {"gravity": model.opt.gravity, "armature": model.dof_armature}
-            fields |= {"damping": model.dof_damping, "stiffness": model.jnt_stiffness}
-            if name not in fields:
-                return False
-            field = fields[name]
-            numbers = field.numpy()
-            numbers[0, index] = values
-            field.assign(numbers)
-        return True
+    def set_field(self, method: str, name: str, index: Array, values: Array) -> None:
+        field = attrgetter(name)(self.models[method])
+        numbers = field.numpy()
+        numbers[0, index] = values
+        field.assign(numbers)
 
     @cached_property
     def model(self) -> Any:

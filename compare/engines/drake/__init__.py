@@ -25,7 +25,7 @@ from .plant import (
 )
 
 ENGINE = EngineRecord(
-    order=50, label="Drake", colour="#D55E00", marker="P", package="pydrake", extra="drake", reads_file=True
+    order=50, label="Drake", colour="#D55E00", marker="P", package="pydrake", reads_file=True
 )
 SCHEMES = {"RK2": (2, "runge_kutta2"), "RK3": (3, "runge_kutta3"), "RK5": (5, "runge_kutta5"),
            "implicit Euler": (1, "implicit_euler"), "Radau3": (3, "radau3")}  # fmt: skip

@@ -30,6 +30,18 @@ class OfCompiled(ReadModel):
     def numbers(self) -> Numbers:
         return {"gravity": self.gravity(), **self.bare.numbers(self.held)}
 
+    def mend(self, name: str, values: Array) -> bool:
+        dofs, joints = self.bare.dofs, self.bare.model.dof_jntid[self.bare.dofs]
+        places = {"armature": ("dof_armature", dofs), "damping": ("dof_damping", dofs)}
+        places |= {"stiffness": ("jnt_stiffness", joints), "gravity": ("opt.gravity", np.arange(3))}
+        for method in self.models if name in places else ():
+            self.set_field(method, *places[name], values)
+        return name in places
+
+    def set_field(self, method: str, name: str, index: Array, values: Array) -> None:
+        """Set a field of the engine's model for a method, by MuJoCo's name of it."""
+        raise NotImplementedError
+
     def prepare(self, course: Course) -> None:
         """Compile, by a run without steps."""
         q, rest = self.bare.model.qpos0[self.bare.qpos], np.zeros_like(course.tau)
