@@ -11,7 +11,10 @@ from compare.run import command
 
 
 class InProcess:
-    """Runs functions at once, in this process; see process.workers."""
+    """Workers that compute and draw in this process, at once; see process.workers."""
+
+    def __init__(self):
+        self.clock = Clock()
 
     def submit(self, function, /, *arguments, **named):
         future = Future()
@@ -20,13 +23,6 @@ class InProcess:
         except Exception as error:
             future.set_exception(error)
         return future
-
-
-class Inside(InProcess):
-    """Workers that compute and draw in this process, at once."""
-
-    def __init__(self):
-        self.clock = Clock()
 
     def map(self, function, *arguments):
         return iter([function(*each) for each in zip(*arguments)])
@@ -39,7 +35,7 @@ class Inside(InProcess):
 def without_workers():
     """In this block runs start no further processes."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(command, "start_workers", contextmanager(lambda: iter([Inside()])))
+        patch.setattr(command, "start_workers", contextmanager(lambda: iter([InProcess()])))
         yield
 
 

@@ -23,10 +23,12 @@ EXPECTED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "path",
-    [pytest.param(path, marks=[pytest.mark.slow] * (path.stem in SLOW), id=path.stem) for path in EXAMPLES],
-)
+CASES = [
+    pytest.param(path, marks=[pytest.mark.slow] * (path.stem in SLOW), id=path.stem) for path in EXAMPLES
+]
+
+
+@pytest.mark.parametrize("path", CASES)
 def test_an_example_runs_and_says_what_it_finds(path, tmp_path):
     if path.stem == "exported_c" and not shutil.which("gcc"):
         pytest.skip("needs gcc")

@@ -13,8 +13,8 @@ order of the case; and Mbar a + bias = tau - D v.
 """
 
 import importlib
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -26,6 +26,8 @@ from ..core.records import records_in
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates
 
+Array = np.ndarray  # of floats
+Tolerance = float | None  # of a method that chooses its steps; None: its own, or fixed steps
 GRID = 64  # number of equal intervals at whose ends a prepared run is read
 
 
@@ -41,7 +43,7 @@ class EngineRecord:
     in_quick_runs: bool = False  # a quick run measures its speed too, and a small run with more settings
     from_file: bool = False  # it is made of a user's file: of a model, or of the user's own equations
     package: str = ""  # that must be installed
-    extra: str = ""  # of this project, which installs the package
+    extra: str = ""  # of this project, which installs the package; by default of the engine's name
     reads_file: bool = False  # it reads the robot's file itself, in a process of its own: see engines.outside
     precision: str = "float64"
     environment: tuple[tuple[str, str], ...] = ()  # of that process
@@ -54,7 +56,10 @@ class EngineRecord:
         return float(np.finfo(self.precision).eps)
 
 
-RECORDS = records_in(Path(__file__).parent, "ENGINE", EngineRecord)
+RECORDS = {
+    name: replace(record, extra=record.extra or name)
+    for name, record in records_in(Path(__file__).parent, "ENGINE", EngineRecord).items()
+}
 LABELS = {name: record.label for name, record in RECORDS.items()}
 WHOSE = {name: record.possessive or f"{record.label}'s" for name, record in RECORDS.items()}
 COLOURS = {name: record.colour for name, record in RECORDS.items()}
@@ -92,7 +97,7 @@ class Setting(NamedTuple):
 
     duration: float  # s
     steps: int | None = None
-    tolerance: float | None = None
+    tolerance: Tolerance = None
 
     @property
     def every(self) -> int:
@@ -105,19 +110,50 @@ class Setting(NamedTuple):
 class Motion(NamedTuple):
     """One run, or a batch of them. A run that ends early is NaN from there on."""
 
-    t: np.ndarray  # (times,) s
-    q: np.ndarray  # (..., times, nq) rad
-    v: np.ndarray  # (..., times, nv) rad/s
+    t: Array  # (times,) s
+    q: Array  # (..., times, nq) rad
+    v: Array  # (..., times, nv) rad/s
     evaluations: int | None = None  # of the dynamics in all; None where a method has no such thing
     # when and why a run ended early, or None; of a batch an array of its shape
-    ended: str | np.ndarray | None = None
+    ended: str | Array | None = None
     steps: int | None = None  # that the method took; None: not known
     seconds: float | None = None  # of the run, where the engine measures it in a process of its own
 
     @property
-    def states(self) -> np.ndarray:
+    def states(self) -> Array:
         """q and v side by side, (..., times, nq + nv)."""
         return np.concatenate([self.q, self.v], axis=-1)
+
+
+class Course(NamedTuple):
+    """A run that an engine is asked for."""
+
+    q: Array  # (nq,)
+    v: Array  # (nv,)
+    tau: Array  # (nv,) constant
+    times: Array  # s, equal, the first one 0, at which it is read
+    steps: int  # of equal length, a multiple of len(times) - 1; 0: within the tolerance
+    method: str
+    tolerance: Tolerance = None
+
+    @property
+    def dt(self) -> float:
+        return float(self.times[-1]) / max(self.steps, 1)
+
+    @property
+    def every(self) -> int:
+        """The number of steps from one time to the next."""
+        return self.steps // (len(self.times) - 1)
+
+    @property
+    def start(self) -> Array:
+        """q and v side by side."""
+        return np.concatenate([self.q, self.v])
+
+    def motion(self, states: Array, why: str) -> Motion:
+        """The motion of these states (times reached, nq + nv), as far as it goes; why: the reason if it ends early."""
+        path, ended = as_far_as_it_goes(self.times, states, self.start, why)
+        return Motion(self.times, path[:, : self.q.size], path[:, self.q.size :], ended=ended)
 
 
 Prepared = tuple[Callable[[], Any], Callable[[Any], Motion]]  # run() and read(what it returned)
@@ -128,31 +164,47 @@ class Dynamics(Protocol):
 
     coordinates: Coordinates
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> Array:
         """Mbar, kg m2, (..., nv, nv)."""
 
-    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> Array:
         """h, N m, (..., nv)."""
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         """rad/s2, (..., nv), from Mbar a = tau - D v - h."""
 
     def run(
-        self,
-        q: np.ndarray,
-        v: np.ndarray,
-        tau: np.ndarray,
-        dt: float,
-        steps: int,
-        method: str,
-        tolerance: float | None = None,
+        self, q: Array, v: Array, tau: Array, dt: float, steps: int, method: str, tolerance: Tolerance = None
     ) -> Motion:
         """Motion under constant torque from q, v, recorded at every multiple of dt."""
 
-    def prepare(
-        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, setting: Setting, method: str
-    ) -> Prepared:
+    def prepare(self, q: Array, v: Array, tau: Array, setting: Setting, method: str) -> Prepared:
         """run() follows one motion once more; read(what it returned) is the motion at the start and at 64 equal times."""
+
+
+class OneByOne:
+    """Runs of dynamics that follow one motion at a time."""
+
+    def prepared(self, course: Course) -> Prepared:
+        raise NotImplementedError
+
+    def run(
+        self, q: Array, v: Array, tau: Array, dt: float, steps: int, method: str, tolerance: Tolerance = None
+    ) -> Motion:
+        t, (batch, states), motions = np.linspace(0.0, dt * steps, steps + 1), rows_of_states(q, v, tau), []
+        for position, speed, torque in zip(*states):
+            count = 0 if tolerance else steps
+            run, read = self.prepared(Course(position, speed, torque, t, count, method, tolerance))
+            motions.append(read(run()))
+        q, v = (np.reshape([motion[i] for motion in motions], (*batch, steps + 1, -1)) for i in (1, 2))
+        counts = [motion.evaluations for motion in motions if motion.evaluations is not None]
+        evaluations = sum(counts) if len(counts) == len(motions) else None
+        ended = np.array([motion.ended for motion in motions], dtype=object).reshape(batch)
+        return Motion(t, q, v, evaluations, ended[()])
+
+    def prepare(self, q: Array, v: Array, tau: Array, setting: Setting, method: str) -> Prepared:
+        t = np.linspace(0.0, setting.duration, GRID + 1)
+        return self.prepared(Course(q, v, tau, t, setting.steps or 0, method, setting.tolerance))
 
 
 class Engine(Protocol):
@@ -168,7 +220,7 @@ class Engine(Protocol):
         package, extra = RECORDS[self.name].package, RECORDS[self.name].extra
         if not package or find_spec(package):
             return None
-        return f"{package} is not installed" + (f"; `pip install .[{extra}]` installs it" if extra else "")
+        return f"{package} is not installed; `pip install .[{extra}]` installs it"
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         """The methods in a case: where a robot's own actuators act, others may be the same scheme."""
@@ -187,7 +239,7 @@ def methods_in(engine: Engine, case: Case) -> Mapping[str, Method]:
     return engine.methods_in(case) if hasattr(engine, "methods_in") else engine.methods
 
 
-def rows_of_states(*values: ArrayLike) -> tuple[tuple[int, ...], list[np.ndarray]]:
+def rows_of_states(*values: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:
     """The batch shape that values (..., n) have together, and each of them as rows, (states, n), contiguous.
 
     Each has an n of its own, as positions and speeds may; a number is a row of one.
@@ -198,9 +250,7 @@ def rows_of_states(*values: ArrayLike) -> tuple[tuple[int, ...], list[np.ndarray
     return batch, [np.array(row, order="C").reshape(-1, row.shape[-1]) for row in rows]
 
 
-def as_far_as_it_goes(
-    t: np.ndarray, states: np.ndarray, start: np.ndarray, why: str
-) -> tuple[np.ndarray, str | None]:
+def as_far_as_it_goes(t: Array, states: Array, start: Array, why: str) -> tuple[Array, str | None]:
     """The states of one run at the times t, NaN from where they are no longer finite; and when and why that is, or None.
 
     states: (times reached, n); start: (n,), the first.
@@ -211,21 +261,6 @@ def as_far_as_it_goes(
     path[np.cumsum(~finite) > 0] = np.nan
     ended = None if finite.all() else f"at t = {t[int(np.argmin(finite)) - 1]:g} s: {' '.join(why.split())}"
     return path, ended
-
-
-def motion_of_states(t: np.ndarray, states: np.ndarray, start: np.ndarray, nq: int, why: str) -> Motion:
-    """One run as far as it goes; see as_far_as_it_goes."""
-    path, ended = as_far_as_it_goes(t, states, start, why)
-    return Motion(t, path[:, :nq], path[:, nq:], ended=ended)
-
-
-def batch_of(motions: Sequence[Motion], batch: tuple[int, ...]) -> Motion:
-    """Runs at the same times as those of a batch of this shape."""
-    q, v = (np.array(paths).reshape(*batch, *np.shape(paths[0])) for paths in zip(*(m[1:3] for m in motions)))
-    ended = np.array([motion.ended for motion in motions], dtype=object).reshape(batch)[()]
-    evaluations = [motion.evaluations for motion in motions if motion.evaluations is not None]
-    total = sum(evaluations) if len(evaluations) == len(motions) else None
-    return Motion(motions[0].t, q, v, total, ended)
 
 
 def same_scheme(engines: Mapping[str, Engine], method: Method, engine: str) -> Method:

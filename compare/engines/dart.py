@@ -12,14 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from tmt import Tree
 
-from . import EngineRecord
+from . import Array, EngineRecord
 from .outside.model import Body, File, Link, carried
 from .outside.of_urdf import OfUrdf
 from .outside.order import order_of
 
-ENGINE = EngineRecord(
-    order=75, label="DART", colour="#882255", marker="*", package="dartpy", extra="dart", reads_file=True
-)
+ENGINE = EngineRecord(order=75, label="DART", colour="#882255", marker="*", package="dartpy", reads_file=True)
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
 
 
@@ -33,7 +31,7 @@ class Model(OfUrdf):
 
     has_free_bodies = True
 
-    def load(self, text: str, file: File) -> np.ndarray:
+    def load(self, text: str, file: File) -> Array:
         import dartpy
 
         loader, options = dartpy.utils.DartLoader(), dartpy.utils.DartLoaderOptions()
@@ -72,30 +70,30 @@ class Model(OfUrdf):
             links.append(Link(node.getName(), parent and parent.getName(), joint, body))
         return carried(links, len(self.file.names))
 
-    def gravity(self) -> np.ndarray:
+    def gravity(self) -> Array:
         return np.array(self.world.getGravity())
 
-    def set_gravity(self, gravity: np.ndarray) -> None:
+    def set_gravity(self, gravity: Array) -> None:
         self.world.setGravity(gravity)
 
-    def set_state(self, q: np.ndarray, v: np.ndarray) -> None:
+    def set_state(self, q: Array, v: Array) -> None:
         self.q, (x, speeds) = q, self.order.engine(q, v)
         for at, place in self.order.turned:
             x[at] = Rotation.from_quat(np.roll(q[place], -1)).as_rotvec()
         self.skeleton.setPositions(x)
         self.skeleton.setVelocities(speeds)
 
-    def start(self, q: np.ndarray, v: np.ndarray, dt: float, damping: np.ndarray) -> None:
+    def start(self, q: Array, v: Array, dt: float, damping: Array) -> None:
         self.world.setTimeStep(dt)
         self.rotors = self.armature / dt  # coefficients of the dampers that are armature
         for place, joint in self.dampers.items():
             joint.setDampingCoefficient(0, (damping + self.rotors)[self.order.v[place]])
         self.set_state(q, v)
 
-    def set_force(self, force: np.ndarray, v: np.ndarray) -> None:
+    def set_force(self, force: Array, v: Array) -> None:
         self.skeleton.setForces(self.order.engine(self.q, force + self.rotors * v)[1])
 
-    def step(self, force: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def step(self, force: Array, v: Array) -> tuple[Array, Array]:
         self.set_force(force, v)
         self.world.step()
         x, self.q = self.skeleton.getPositions(), self.q.copy()
@@ -104,15 +102,15 @@ class Model(OfUrdf):
             self.q[place] = np.roll(Rotation.from_rotvec(x[at]).as_quat(), 1)
         return self.q, self.order.tree(self.q, self.skeleton.getVelocities())
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> Array:
         self.set_state(q, np.zeros(len(self.armature)))
         return self.order.tree_matrix(q, self.skeleton.getMassMatrix()) + np.diag(self.armature)
 
-    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> Array:
         self.set_state(q, v)
         return self.order.tree(q, self.skeleton.getCoriolisAndGravityForces())
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
         self.start(q, v, 1.0, np.zeros_like(v))
         self.set_force(force, v)
         self.skeleton.computeForwardDynamics()

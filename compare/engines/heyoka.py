@@ -13,7 +13,7 @@ from tmt.derivation.method import acceleration
 from tmt.derivation.vectors import arctan, cos, sin, sqrt
 
 from ..robots.case import Case
-from . import Engine, EngineRecord, Method, Motion, Prepared, motion_of_states
+from . import Course, Engine, EngineRecord, Method, Motion, Prepared
 from .scipy import ScipyDynamics, of_length_1
 
 ENGINE = EngineRecord(
@@ -43,26 +43,17 @@ def engine(schemes: Iterable[str]) -> Heyoka:
 
 
 class HeyokaDynamics(ScipyDynamics):
-    def prepared(
-        self,
-        q: np.ndarray,
-        v: np.ndarray,
-        tau: np.ndarray,
-        t: np.ndarray,
-        method: str,
-        tolerance: float | None,
-    ) -> Prepared:
-        torque = tuple(np.asarray(tau, float).tolist())
-        stepper = integrator(self.tree, torque, FULL if tolerance is None else tolerance)
-        start = np.concatenate([q, v])
+    def prepared(self, course: Course) -> Prepared:
+        torque = tuple(np.asarray(course.tau, float).tolist())
+        stepper = integrator(self.tree, torque, FULL if course.tolerance is None else course.tolerance)
 
         def run() -> Any:
-            stepper.time, stepper.state[:] = 0.0, start
-            return stepper.propagate_grid(t)
+            stepper.time, stepper.state[:] = 0.0, course.start
+            return stepper.propagate_grid(course.times)
 
         def read(outcome: Any) -> Motion:
             why, *_, steps, _, path = outcome
-            motion = motion_of_states(t, path, start, self.coordinates.nq, f"heyoka stops: {why}")
+            motion = course.motion(path, f"heyoka stops: {why}")
             return motion._replace(q=of_length_1(self.coordinates, motion.q), steps=int(steps))
 
         return run, read

@@ -2,19 +2,20 @@
 
 from collections.abc import Callable
 from functools import cache, cached_property, partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from tmt import Tree
 
-from . import EngineRecord
-from .outside.model import Course, File, Unread
+from . import Array, Course, EngineRecord
+from .outside.model import File, Unread
 from .outside.of_compiled import METHODS as METHODS
 from .outside.of_compiled import STAGES, OfCompiled
 
 ENGINE = EngineRecord(
-    order=60, label="MJX", colour="#332288", marker="<", package="mujoco.mjx", extra="mjx", reads_file=True, compiles=True,
+    order=60, label="MJX", colour="#332288", marker="<", package="mujoco.mjx", reads_file=True, compiles=True,
     environment=(("JAX_ENABLE_X64", "1"), ("JAX_PLATFORMS", "cpu")),
 )  # fmt: skip
 # its fusions repeat what they share: an acceleration of an arm of seven hinges took 412 ms, 3 ms without them
@@ -47,27 +48,18 @@ class Model(OfCompiled):
         model = self.models["RK4"]
         return model.replace(**{name: 0.0 * getattr(model, name) for name in STIFFNESS_AND_DAMPING})
 
-    def held(self, name: str) -> np.ndarray:
+    def held(self, name: str) -> Array:
         return np.array(getattr(self.models["Euler"], name))
 
-    def gravity(self) -> np.ndarray:
+    def gravity(self) -> Array:
         return np.asarray(self.models["Euler"].opt.gravity)
 
-    def mend(self, name: str, values: np.ndarray) -> bool:
-        changes: dict[str, np.ndarray] = {}
-        if name == "gravity":
-            changes = {"opt.gravity": values}
-        elif name in ("armature", "damping"):
-            changes = {f"dof_{name}": np.zeros(len(values))}
-            changes[f"dof_{name}"][self.bare.dofs] = values
-        elif name == "stiffness":
-            changes = {"jnt_stiffness": np.zeros(self.bare.model.njnt)}
-            changes["jnt_stiffness"][self.bare.model.dof_jntid[self.bare.dofs]] = values
-        changes = {field: values.astype(self.precision) for field, values in changes.items()}
-        self.models = {method: model.tree_replace(changes) for method, model in self.models.items()}
-        return bool(changes)
+    def set_field(self, method: str, name: str, index: Array, values: Array) -> None:
+        field = np.array(attrgetter(name)(self.models[method]))
+        field[index] = values
+        self.models[method] = self.models[method].tree_replace({name: field})
 
-    def placed(self, q: np.ndarray, *of_speeds: np.ndarray) -> list[np.ndarray]:
+    def placed(self, q: Array, *of_speeds: Array) -> list[Array]:
         """The arguments in MuJoCo's order of joints."""
         placed = [np.zeros(np.shape(values), self.precision) for values in (q, *of_speeds)]
         placed[0][..., self.bare.qpos] = q
@@ -75,22 +67,22 @@ class Model(OfCompiled):
             vector[..., self.bare.dofs] = values
         return placed
 
-    def values(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, ...]:
+    def values(self, q: Array, v: Array, force: Array) -> tuple[Array, ...]:
         M, h, a = functions()["values"](self.model, self.data, *self.placed(q, v, force))
         at = self.bare.dofs
         return np.asarray(M)[np.ix_(at, at)], np.asarray(h)[at], np.asarray(a)[at]
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> Array:
         zero = np.zeros(len(self.bare.dofs))
         return self.values(q, zero, zero)[0]
 
-    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> Array:
         return self.values(q, v, np.zeros_like(v))[1]
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
         return self.values(q, v, force)[2]
 
-    def run(self, course: Course) -> tuple[np.ndarray, int]:
+    def run(self, course: Course) -> tuple[Array, int]:
         model = self.models[course.method].tree_replace(
             {"opt.timestep": np.asarray(course.dt, self.precision)}
         )

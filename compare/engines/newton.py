@@ -9,10 +9,10 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
-from . import EngineRecord
-from .outside.model import Body, Course, File, Link, Numbers, ReadModel, Unread, carried
+from . import Array, Course, EngineRecord
+from .outside.model import Body, File, Link, Numbers, ReadModel, Unread, carried
 
-ENGINE = EngineRecord(order=70, label="Newton", colour="#999933", marker="h", package="newton", extra="newton",
+ENGINE = EngineRecord(order=70, label="Newton", colour="#999933", marker="h", package="newton",
                       reads_file=True, precision="float32")  # fmt: skip
 METHODS = {"Featherstone": (1, "newton_featherstone")}  # semi-implicit Euler whose damping is explicit
 OFF = ("target_ke", "target_kd", "limit_ke", "limit_kd")  # actuators and limits
@@ -40,7 +40,7 @@ class Model(ReadModel):
         firsts, children = self.model.joint_qd_start.numpy().tolist(), self.model.joint_child.numpy()
         coords, dofs, self.reference = {}, {}, np.zeros(own.nq)  # in Newton's vectors
         # the first coordinate and dof of balls, and the centre of mass of a free body
-        self.turns: list[tuple[int, int, np.ndarray | None]] = []
+        self.turns: list[tuple[int, int, Array | None]] = []
         places, nq, nv = joint_places(own), 0, 0
 
         def slides_first(name: str) -> tuple[int, bool]:
@@ -80,7 +80,7 @@ class Model(ReadModel):
             links.append(Link(child, parent, None if kind == fixed else self.joint_of[end - 1], body))
         return carried(links, len(self.joint_of))
 
-    def mend(self, name: str, values: np.ndarray) -> bool:
+    def mend(self, name: str, values: Array) -> bool:
         if name == "gravity":
             self.model.gravity.assign(np.reshape(values, (1, 3)))
         elif name in self.read:
@@ -88,7 +88,7 @@ class Model(ReadModel):
             getattr(self.model, f"joint_{name}").assign(self.read[name])
         return name not in ("mass", "moments")
 
-    def speeds(self, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def speeds(self, x: Array, v: Array) -> tuple[Array, Array]:
         """S at Newton's coordinates x, and c at the Tree's speeds v."""
         S, c = np.eye(len(v))[np.argsort(self.dofs)], np.zeros(len(v))
         for at, dof, centre in self.turns:
@@ -99,7 +99,7 @@ class Model(ReadModel):
                 c[dof - 3 : dof] = np.cross(S[own] @ v, np.cross(S[own] @ v, R @ centre))
         return S, c
 
-    def set_state(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def set_state(self, q: Array, v: Array) -> tuple[Array, Array]:
         x = -self.reference
         x[self.coords] += q
         for at, _, _ in self.turns:
@@ -110,17 +110,17 @@ class Model(ReadModel):
         self.newton.eval_fk(self.model, self.state.joint_q, self.state.joint_qd, self.state)
         return S, c
 
-    def own_mass_matrix(self) -> np.ndarray:
+    def own_mass_matrix(self) -> Array:
         """M in Newton's coordinates; each tree of the file is an articulation of its own."""
         sizes = np.diff(self.model.joint_qd_start.numpy()[self.model.articulation_start.numpy()])
         blocks = self.newton.eval_mass_matrix(self.model, self.state).numpy()
         return block_diag(*(block[:size, :size] for block, size in zip(blocks, sizes)))
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> Array:
         S, _ = self.set_state(q, np.zeros(len(self.dofs)))
         return S.T @ self.own_mass_matrix() @ S
 
-    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> Array:
         S, c = self.set_state(q, v)
         weight, rest = self.model.state().joint_qd, self.model.state().joint_qd
         self.newton.eval_inverse_dynamics_passive(
@@ -128,7 +128,7 @@ class Model(ReadModel):
         )
         return S.T @ (weight.numpy().astype(float) + rest.numpy() + self.own_mass_matrix() @ c)
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
         S, c = self.set_state(q, v)
         self.model.joint_damping.zero_()
         self.model.joint_stiffness.zero_()
@@ -147,7 +147,7 @@ class Model(ReadModel):
                 "the Featherstone solver has no springs of ball joints and no damping of free joints"
             )
 
-    def run(self, course: Course) -> tuple[np.ndarray, int]:
+    def run(self, course: Course) -> tuple[Array, int]:
         self.prepare(course)
         states, (S, _) = [course.start], self.set_state(course.q, course.v)
         for step in range(1, course.steps + 1):

@@ -10,19 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from . import EngineRecord
+from . import Array, EngineRecord
 from .outside.mjcf_text import whole_text
 from .outside.model import Body, File, Numbers, ReadModel, Unread
 from .outside.order import near, order_of, wrong_masses
 
 ENGINE = EngineRecord(
-    order=55,
-    label="Pinocchio",
-    colour="#56B4E9",
-    marker="X",
-    package="pinocchio",
-    extra="pinocchio",
-    reads_file=True,
+    order=55, label="Pinocchio", colour="#56B4E9", marker="X", package="pinocchio", reads_file=True
 )
 METHODS: dict[str, tuple[int, str]] = {}  # it has no integrators
 
@@ -57,7 +51,7 @@ class Model(ReadModel):
         )
         self.data = self.model.createData()
 
-    def own(self, q: np.ndarray, *vectors: np.ndarray) -> list[np.ndarray]:
+    def own(self, q: Array, *vectors: Array) -> list[Array]:
         """q, and vectors of speeds or forces, as Pinocchio has them."""
         q, *placed = self.order.engine(q, *vectors)
         if self.circles.size:
@@ -82,7 +76,7 @@ class Model(ReadModel):
             bodies[k].append(Body(body.mass, place.act(body.lever), inertia))
         return bodies
 
-    def mend(self, name: str, values: np.ndarray) -> bool:
+    def mend(self, name: str, values: Array) -> bool:
         import pinocchio
 
         if name == "gravity":
@@ -100,26 +94,26 @@ class Model(ReadModel):
             return bool(near(self.numbers()[name], values).all())
         return True
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> Array:
         import pinocchio
 
         upper = np.triu(pinocchio.crba(self.model, self.data, *self.own(q)))
         return self.order.tree_matrix(q, upper + np.triu(upper, 1).T)
 
-    def turning(self, v: np.ndarray) -> np.ndarray:
+    def turning(self, v: Array) -> Array:
         """The acceleration that Pinocchio's speeds have where those of the Tree have none: -w x v of a free body."""
         turning = np.zeros_like(v)
         for at, _ in self.order.turned:
             turning[at] = np.cross(v[at], v[at.stop : at.stop + 3])
         return turning
 
-    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> Array:
         import pinocchio
 
         q_own, v_own = self.own(q, v)
         return self.order.tree(q, pinocchio.rnea(self.model, self.data, q_own, v_own, self.turning(v_own)))
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
         import pinocchio
 
         q_own, v_own, force = self.own(q, v, force)

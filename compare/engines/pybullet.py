@@ -12,18 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from tmt import Tree
 
-from . import EngineRecord
+from . import Array, EngineRecord
 from .outside.model import Body, File, Link, carried
 from .outside.of_urdf import OfUrdf
 
 ENGINE = EngineRecord(
-    order=80,
-    label="PyBullet",
-    colour="#661100",
-    marker="d",
-    package="pybullet",
-    extra="pybullet",
-    reads_file=True,
+    order=80, label="PyBullet", colour="#661100", marker="d", package="pybullet", reads_file=True
 )
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
 
@@ -36,7 +30,7 @@ def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
 
 
 class Model(OfUrdf):
-    def load(self, text: str, file: File) -> np.ndarray:
+    def load(self, text: str, file: File) -> Array:
         import pybullet
         from pybullet_utils.bullet_client import BulletClient
 
@@ -58,7 +52,7 @@ class Model(OfUrdf):
         self.apply(pybullet.VELOCITY_CONTROL, np.zeros(len(file.names)))
         return np.array([by_name[name][6] for name in file.names])
 
-    def apply(self, mode: int, forces: np.ndarray) -> None:
+    def apply(self, mode: int, forces: Array) -> None:
         """Set the torques of the joints, or the largest ones of the motors that they have by default."""
         self.bullet.setJointMotorControlArray(self.robot, self.links, mode, forces=forces.tolist())
 
@@ -72,41 +66,41 @@ class Model(OfUrdf):
             links.append(Link(link, info[16], joints.get(link), body))
         return carried(links, len(self.links))
 
-    def gravity(self) -> np.ndarray:
+    def gravity(self) -> Array:
         engine = self.bullet.getPhysicsEngineParameters()
         return np.array([engine[f"gravityAcceleration{axis}"] for axis in "XYZ"])
 
-    def set_gravity(self, gravity: np.ndarray) -> None:
+    def set_gravity(self, gravity: Array) -> None:
         self.bullet.setGravity(*gravity)
 
     @property
     def lacks(self) -> tuple[str, ...]:
         return ("acceleration",) if self.armature.any() else ()
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> Array:
         M, own = np.empty((len(q), len(q))), q[self.order].tolist()
         M[np.ix_(self.order, self.order)] = self.bullet.calculateMassMatrix(self.robot, own)
         return M + np.diag(self.armature)
 
-    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> Array:
         h, zero = np.empty_like(q), [0.0] * len(q)
         state = q[self.order].tolist(), v[self.order].tolist()
         h[self.order] = self.bullet.calculateInverseDynamics(self.robot, *state, zero)
         return h
 
-    def start(self, q: np.ndarray, v: np.ndarray, dt: float, damping: np.ndarray) -> None:
+    def start(self, q: Array, v: Array, dt: float, damping: Array) -> None:
         self.bullet.setTimeStep(dt)
         for link, coefficient, *state in zip(self.links, damping, q, v):
             self.bullet.changeDynamics(self.robot, link, jointDamping=coefficient)
             self.bullet.resetJointState(self.robot, link, *state)
 
-    def step(self, force: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def step(self, force: Array, v: Array) -> tuple[Array, Array]:
         self.apply(self.bullet.TORQUE_CONTROL, force)
         self.bullet.stepSimulation()
         states = self.bullet.getJointStates(self.robot, self.links)
         q, v = np.array([state[:2] for state in states]).T
         return q, v
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
         self.start(q, v, 1.0, np.zeros_like(v))
         return self.step(force, v)[1] - v

@@ -9,19 +9,8 @@ from tmt.compiled import evaluator
 
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates
-from . import (
-    GRID,
-    Engine,
-    EngineRecord,
-    Method,
-    Motion,
-    Prepared,
-    Setting,
-    batch_of,
-    motion_of_states,
-    rows_of_states,
-)
-from .tmt import TmtDynamics
+from . import Array, Course, Engine, EngineRecord, Method, Motion, OneByOne, Prepared
+from .tmt import TmtQuantities
 
 ENGINE = EngineRecord(order=30, label="SciPy", colour="#009E73", marker="^")
 DEFAULT = 1e-9  # tolerance
@@ -41,15 +30,15 @@ def engine(schemes: Iterable[str]) -> Scipy:
     return Scipy()
 
 
-class ScipyDynamics(TmtDynamics):
+class ScipyDynamics(TmtQuantities, OneByOne):
     """tmt's quantities; runs by SciPy."""
 
-    def rate(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    def rate(self) -> Callable[[Array, Array], Array]:
         """rate(y, tau): dy/dt of y = (q, v), (nq + nv,)."""
         acceleration, tree, nq = evaluator(self.tree, "acceleration").of_one, self.tree, self.coordinates.nq
         has_balls = bool(tree.coordinates.balls)
 
-        def rate(y: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        def rate(y: Array, tau: Array) -> Array:
             q, v = y[:nq], y[nq:]
             if has_balls:  # between its steps a solver lets quaternions drift
                 q = of_length_1(self.coordinates, q[None])[0]
@@ -61,54 +50,24 @@ class ScipyDynamics(TmtDynamics):
 
         return rate
 
-    def run(
-        self,
-        q: np.ndarray,
-        v: np.ndarray,
-        tau: np.ndarray,
-        dt: float,
-        steps: int,
-        method: str,
-        tolerance: float | None = None,
-    ) -> Motion:
-        batch, states = rows_of_states(q, v, tau)
-        t, motions = np.linspace(0.0, dt * steps, steps + 1), []
-        for position, speed, torque in zip(*states):
-            run, read = self.prepared(position, speed, torque, t, method, tolerance)
-            motions.append(read(run()))
-        return batch_of(motions, batch)
-
-    def prepare(
-        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, setting: Setting, method: str
-    ) -> Prepared:
-        t = np.linspace(0.0, setting.duration, GRID + 1)
-        return self.prepared(q, v, tau, t, method, setting.tolerance)
-
-    def prepared(
-        self,
-        q: np.ndarray,
-        v: np.ndarray,
-        tau: np.ndarray,
-        t: np.ndarray,
-        method: str,
-        tolerance: float | None,
-    ) -> Prepared:
-        """As in `prepare`, read at the times t."""
+    def prepared(self, course: Course) -> Prepared:
         from scipy.integrate import solve_ivp
 
-        rate, tolerance = self.rate(), DEFAULT if tolerance is None else tolerance
-        start, torque = np.concatenate([q, v]), np.array(tau, float)
+        rate, torque, t = self.rate(), np.array(course.tau, float), course.times
+        tolerance = DEFAULT if course.tolerance is None else course.tolerance
         options = {"rtol": max(tolerance, LEAST_RELATIVE), "atol": tolerance}
 
-        def slope(time: float, y: np.ndarray) -> np.ndarray:
+        def slope(time: float, y: Array) -> Array:
             rates = rate(np.ascontiguousarray(y), torque)  # Radau gives columns of a matrix
             if not np.isfinite(rates).all():  # solve_ivp would try ever smaller steps without end
                 raise NotFinite(time)
             return rates
 
-        def run(times: np.ndarray = t) -> Any:  # SciPy's result, or NotFinite
+        def run(times: Array = t) -> Any:  # SciPy's result, or NotFinite
             try:
-                return solve_ivp(slope, (0.0, times[-1]), start, method, t_eval=times, **options)
+                return solve_ivp(
+                    slope, (0.0, times[-1]), course.start, course.method, t_eval=times, **options
+                )
             except NotFinite as error:
                 return error
 
@@ -118,13 +77,12 @@ class ScipyDynamics(TmtDynamics):
                 count = int(np.searchsorted(t, solution.time)) + 1
                 times = t[: max(2, min(len(times) - 1, count))]
                 solution = run(times)
-            states, evaluations, why = start[None], 1, "its slope is not finite"
+            states, evaluations, why = course.start[None], 1, "its slope is not finite"
             if not isinstance(solution, NotFinite):
                 states, evaluations = solution.y.T, int(solution.nfev)
                 why = why if solution.success else solution.message
-            motion = motion_of_states(t, states, start, self.coordinates.nq, why)
-            q = of_length_1(self.coordinates, motion.q)
-            return motion._replace(q=q, evaluations=evaluations)
+            motion = course.motion(states, why)
+            return motion._replace(q=of_length_1(self.coordinates, motion.q), evaluations=evaluations)
 
         return run, read
 
@@ -136,7 +94,7 @@ class NotFinite(ArithmeticError):
         self.time = time  # s
 
 
-def of_length_1(coordinates: Coordinates, q: np.ndarray) -> np.ndarray:
+def of_length_1(coordinates: Coordinates, q: Array) -> Array:
     """Positions (times, nq) with each quaternion divided by its length, which a coarse tolerance lets drift."""
     q = q.copy()
     for joint in coordinates.places.balls:

@@ -16,7 +16,7 @@ from tmt.simulation import reasons
 
 from ..robots.case import Case
 from ..robots.states import MOST_SPEEDS
-from . import GRID, Engine, EngineRecord, Method, Motion, Prepared, Setting, rows_of_states
+from . import GRID, Array, Engine, EngineRecord, Method, Motion, Prepared, Setting, Tolerance, rows_of_states
 
 ENGINE = EngineRecord(order=20, label="TMT", colour="#0072B2", marker="o", in_quick_runs=True)
 # schemes of MuJoCo that differ from others only for robots with balls, springs or a free body on its own
@@ -50,24 +50,24 @@ def engine(schemes: Iterable[str]) -> Tmt:
     return Tmt(schemes)
 
 
-class TmtDynamics:
+class TmtQuantities:
     """A case's Tree; each quantity by the literal method, its sums as products of matrices where there are many speeds."""
 
     def __init__(self, case: Case):
         self.tree, self.coordinates = case.tree, case.coordinates
         self.is_large = case.coordinates.nv > MOST_SPEEDS
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> Array:
         if not self.is_large:
             return literal.mass_matrix(q, self.tree)
         batch, (states,) = rows_of_states(q)
         nv = self.coordinates.nv
         return mass_matrices(self.tree, states).reshape(*batch, nv, nv)
 
-    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> Array:
         return literal.bias(q, v, self.tree)
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         if not self.is_large:
             return literal.acceleration(q, v, tau, self.tree)
         forces = tau - np.array(self.tree.damping) * v - literal.spring_torque(q, self.tree)
@@ -79,23 +79,18 @@ class TmtDynamics:
             raise AttributeError(quantity)
         return partial(getattr(literal, quantity), model=self.tree)
 
+
+class TmtDynamics(TmtQuantities):
+    """With tmt's compiled runs."""
+
     def run(
-        self,
-        q: np.ndarray,
-        v: np.ndarray,
-        tau: np.ndarray,
-        dt: float,
-        steps: int,
-        method: str,
-        tolerance: float | None = None,
+        self, q: Array, v: Array, tau: Array, dt: float, steps: int, method: str, tolerance: Tolerance = None
     ) -> Motion:
         t, q, v = motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance)
         taken = None if method_named(method).adaptive else steps
         return Motion(t, q, v, motion.evaluations, motion.ended, taken)
 
-    def prepare(
-        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, setting: Setting, method: str
-    ) -> Prepared:
+    def prepare(self, q: Array, v: Array, tau: Array, setting: Setting, method: str) -> Prepared:
         stepping, tolerance = method_named(method), setting.tolerance or 0.0
         if setting.tolerance is not None and not stepping.adaptive:
             raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")

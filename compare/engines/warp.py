@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,12 @@ import numpy as np
 from tmt import Tree
 from tmt.methods import lone_speeds
 
-from . import EngineRecord
-from .outside.model import Course, File, Unread
+from . import Array, Course, EngineRecord
+from .outside.model import File, Unread
 from .outside.of_compiled import METHODS as METHODS
 from .outside.of_compiled import STAGES, OfCompiled
 
-ENGINE = EngineRecord(order=65, label="MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp", extra="warp",
+ENGINE = EngineRecord(order=65, label="MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp",
                       reads_file=True, compiles=True, precision="float32")  # fmt: skip
 
 
@@ -45,25 +46,17 @@ class Model(OfCompiled):
         self.worlds: dict[int, Any] = {}  # data by the number of states
         self.graphs: dict[tuple[str, int], Any] = {}
 
-    def held(self, name: str) -> np.ndarray:
+    def held(self, name: str) -> Array:
         return shared(getattr(self.models["Euler"], name))
 
-    def gravity(self) -> np.ndarray:
+    def gravity(self) -> Array:
         return np.array(self.models["Euler"].opt.gravity.numpy()[0])
 
-    def mend(self, name: str, values: np.ndarray) -> bool:
-        joints = self.bare.model.dof_jntid[self.bare.dofs]
-        index = {"stiffness": joints, "gravity": slice(None)}.get(name, self.bare.dofs)
-        for model in self.models.values():
-            fields = {"gravity": model.opt.gravity, "armature": model.dof_armature}
-            fields |= {"damping": model.dof_damping, "stiffness": model.jnt_stiffness}
-            if name not in fields:
-                return False
-            field = fields[name]
-            numbers = field.numpy()
-            numbers[0, index] = values
-            field.assign(numbers)
-        return True
+    def set_field(self, method: str, name: str, index: Array, values: Array) -> None:
+        field = attrgetter(name)(self.models[method])
+        numbers = field.numpy()
+        numbers[0, index] = values
+        field.assign(numbers)
 
     @cached_property
     def model(self) -> Any:
@@ -74,7 +67,7 @@ class Model(OfCompiled):
         none = [warp.zeros_like(field) for field in (model.dof_damping, model.jnt_stiffness)]
         return replace(model, dof_damping=none[0], jnt_stiffness=none[1])
 
-    def at(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> Any:
+    def at(self, q: Array, v: Array, force: Array) -> Any:
         """Data of as many worlds as there are states, at these states (worlds, n)."""
         import mujoco_warp
 
@@ -99,7 +92,7 @@ class Model(OfCompiled):
             self.graphs[name, data.nworld] = capture.graph
         return lambda: warp.capture_launch(self.graphs[name, data.nworld])
 
-    def forward(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> Any:
+    def forward(self, q: Array, v: Array, force: Array) -> Any:
         """Data after forward dynamics at states (worlds, n)."""
         from mujoco_warp import forward
 
@@ -107,20 +100,20 @@ class Model(OfCompiled):
         self.replay("forward", lambda data: forward(self.model, data), data)()
         return data
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> Array:
         zero, model, at = np.zeros((1, len(self.bare.dofs))), self.model, self.bare.dofs
         row, column = np.repeat(np.arange(zero.size), model.M_rownnz.numpy()), model.M_colind.numpy()
         M = np.zeros((zero.size, zero.size))  # its lower triangle is given, row by row
         M[row, column] = M[column, row] = self.forward(q[None], zero, zero).M.numpy()[0]
         return M[np.ix_(at, at)]
 
-    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> Array:
         return self.forward(q[None], v[None], np.zeros_like(v[None])).qfrc_bias.numpy()[0, self.bare.dofs]
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
         return self.forward(q[None], v[None], force[None]).qacc.numpy()[0, self.bare.dofs]
 
-    def run(self, course: Course) -> tuple[np.ndarray, int]:
+    def run(self, course: Course) -> tuple[Array, int]:
         from mujoco_warp import step
 
         model, path = self.models[course.method], [course.start]
@@ -147,7 +140,7 @@ def silently(call: Callable[[], object]) -> None:
         os.dup2(kept, 2)
 
 
-def shared(field: Any) -> np.ndarray:
+def shared(field: Any) -> Array:
     """The numbers of a field that all worlds share."""
-    values: np.ndarray = field.numpy()
+    values: Array = field.numpy()
     return values[0] if field.ndim > 1 else values

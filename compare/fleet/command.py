@@ -29,9 +29,8 @@ PERIOD = 10.0  # s between two lines of the progress where it cannot be shown
 
 def fleet_reference(text: str) -> str:
     if ":" in text:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a reference of a fleet; expected arm, model or FILE.xml"
-        )
+        why = f"{text!r} is not a reference of a fleet; expected arm, model or FILE.xml"
+        raise argparse.ArgumentTypeError(why)
     return cli.stated_reference(text)
 
 

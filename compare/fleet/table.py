@@ -1,7 +1,6 @@
 """The table of a fleet: rows, fleet.csv, index.html with its summary, changes since an earlier fleet."""
 
 import csv
-import dataclasses
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -77,6 +76,7 @@ class FileRow(Row):
         return VERDICTS.index(self.verdict), is_stable, -(self.worst_ratio or 0.0), self.file
 
 
+Cause = Mapping[str, Any]  # its text, and more
 FIELDS = get_type_hints(FileRow)
 FLEET_COLUMNS = tuple(name for name in FileRow(file="", verdict="").columns() if name != "has_report")
 
@@ -89,56 +89,41 @@ def row_of_data(data: object) -> FileRow | None:
     return FileRow(**data) if are_right else None
 
 
-def judged(
+def judge(
     row: FileRow,
     sections: Sequence[Section],
-    causes: Sequence[Mapping[str, Any]],
+    causes: Sequence[Cause],
     lost: Sequence[str],
     reference: Reference,
-) -> FileRow:
-    """The row of a file with its verdict and reason, largest share of a tolerance, and step. lost: broken parts of the report.
+) -> None:
+    """Set verdict and reason of a row, largest share of a tolerance, and step. lost: parts of the report that broke off.
 
     An unstable step of the file and joints that are matched by other names do not change the verdict; the reason names them.
     """
-    failed = failures(sections)
+    failed, top = failures(sections), worst(sections)
     unfinished = [*(f"{check.experiment}: {check.note}" for check in failed.broke), *lost]
     checks = [check for section in sections for check in section.result.checks]
     reasons: list[str] = []
     if failed.differing:
-        verdict = DIFFER
-        reasons.append(first_of([cause["text"] for cause in causes] or [str(failed.differing[0])]))
+        row.verdict = DIFFER
+        names = [cause["text"] for cause in causes] or [str(failed.differing[0])]
+        reasons.append(block("fleet", "first_of", reasons=names))
     elif unfinished:
-        verdict = BROKE
+        row.verdict = BROKE
     elif not any(check.about == About.MODELS for check in checks):
-        verdict = REFUSED
+        row.verdict = REFUSED
         reasons.append(block("fleet", "nothing_compared"))
     else:
         verdict = ITSELF if reference.kind == "model" else AGREE
         verdict = UNCONFIRMED if failed.unconfirmed else verdict
-        verdict = NOT_JUDGED if failed.not_judged else verdict
-        named = {
-            "not_judged": failed.not_judged,
-            "unconfirmed": failed.unconfirmed,
-            "unstable": failed.unstable,
-        }
-        reasons += [
-            say(Finding("verdict", kind, {"checks": of_kind})) for kind, of_kind in named.items() if of_kind
-        ]
-    reasons += [block("fleet", "unfinished", first=first_of(unfinished))] if unfinished else []
-    top = worst(sections)
-    stable, limit = own_step(sections)
-    return dataclasses.replace(
-        row,
-        verdict=verdict,
-        reason="; ".join(filter(None, (*reasons, reference.matched))),
-        worst_ratio=None if top is None else top.over_tolerance,
-        stable_at_file_dt=stable,
-        limit=limit,
-    )
-
-
-def first_of(reasons: Sequence[str]) -> str:
-    return block("fleet", "first_of", reasons=reasons)
+        row.verdict = NOT_JUDGED if failed.not_judged else verdict
+        kinds = [kind for kind in ("not_judged", "unconfirmed", "unstable") if getattr(failed, kind)]
+        reasons += [say(Finding("verdict", kind, {"checks": getattr(failed, kind)})) for kind in kinds]
+    if unfinished:
+        reasons.append(block("fleet", "unfinished", reasons=unfinished))
+    row.reason = "; ".join(filter(None, (*reasons, reference.matched)))
+    row.worst_ratio = None if top is None else top.over_tolerance
+    row.stable_at_file_dt, row.limit = own_step(sections)
 
 
 def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:

@@ -100,22 +100,30 @@ class Beginning:
         os._exit(1)
 
 
-DEFAULT = Beginning()
-
-
 class Whole(BaseProcess):
-    """A process that complains if it is half started when its parent ends: an interrupt waits."""
+    """A process whose start is not interrupted, and whose end is noticed after what it has sent.
+
+    One that is half started complains when its parent ends. And Pebble loses a call if it notices the end of its process first.
+    """
+
+    is_noticed = False
 
     def start(self) -> None:
         with interrupt.postponed:
             super().start()
 
+    def terminate(self) -> None:
+        self.is_noticed = True
+        super().terminate()
 
-class Spawned(Whole, contexts.SpawnProcess):
-    """A process that makes one call."""
+    def is_alive(self) -> bool:
+        """Whether it runs; True once more after it has failed, for a tenth of a second until Pebble asks again."""
+        was_noticed, is_alive = self.is_noticed, super().is_alive()
+        self.is_noticed = was_noticed or not is_alive
+        return is_alive or not (was_noticed or self.exitcode == 0)
 
 
-class Lasting(Spawned):
+class Lasting(Whole, contexts.SpawnProcess):
     """A process that makes calls as long as it is asked."""
 
     @property
@@ -166,7 +174,7 @@ class Workers:
     def __init__(
         self,
         count: int,
-        beginning: Beginning = DEFAULT,
+        beginning: Beginning,
         limit: float | None = None,
         retries: int = 0,
         is_fresh: bool = False,
@@ -178,7 +186,7 @@ class Workers:
 
     def new_pool(self) -> ProcessPool:
         """A pool whose processes start with its first call."""
-        kind: type[BaseProcess] = Spawned if self.is_fresh else Lasting
+        kind: type[BaseProcess] = contexts.SpawnProcess if self.is_fresh else Lasting
         if self.is_fresh and hasattr(os, "fork") and len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PATH:
             kind = Forked
         return ProcessPool(self.count, int(self.is_fresh), self.beginning.begin, context=Context(kind))
@@ -247,7 +255,7 @@ def kill_children() -> None:
 @contextmanager
 def start_workers() -> Iterator[Workers]:
     """The two workers of a run, for figures and scenes."""
-    workers = Workers(2)
+    workers = Workers(2, Beginning())
     try:
         yield workers
     finally:

@@ -18,14 +18,8 @@ def test_a_folder_is_for_one_fleet_at_a_time_and_what_cannot_be_written_is_said(
         write_whole(tmp_path / "none" / "a", b"1")
 
 
-SOURCES = (
-    "compare/a.py",
-    "compare/a.jinja",
-    "compare/deep/page.html",
-    "compare/page.js",
-    "mjcf/arm.xml",
-    "tmt/b.py",
-)
+SOURCES = [f"compare/{name}" for name in ("a.py", "a.jinja", "deep/page.html", "page.js")]
+SOURCES += ["mjcf/arm.xml", "tmt/b.py"]
 
 
 def test_a_source_that_changes_or_moves_and_another_version_make_another_program(tmp_path, monkeypatch):

@@ -40,12 +40,8 @@ def test_a_fleet_says_which_file_differs_and_why_and_has_a_tidy_table(folder, mo
     shown, err = capsys.readouterr()
     lines = shown.splitlines()
     said = {line.split()[0]: line for line in lines if line.split()[:1] and ".xml:" in line}
-    assert (
-        err == ""
-        and "0 of 3 files" in shown
-        and "Left out: 1 file" in shown
-        and "out/index.html (" in lines[-1]
-    )
+    assert err == "" and "out/index.html (" in lines[-1]
+    assert "0 of 3 files" in shown and "Left out: 1 file" in shown
     assert f"m/x/{NAME}: " in said["self-consistent"] and " %" in said["self-consistent"]
     assert "m/heavy.xml: mass of upper arm: stated 1.9 kg, compiled 9 kg" in said["differ"]
     assert "\x1b" not in shown and "\r" not in shown  # nothing moves in a pipe
@@ -70,10 +66,8 @@ def test_a_file_has_the_report_that_it_has_alone(folder):
     assert {path.name for path in one.iterdir()} <= {path.name for path in many.iterdir()}
 
 
-def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_is_said(
-    folder, monkeypatch, capsys
-):
-    said = []
+def test_the_status_is_1_where_a_file_differs_and_what_has_changed_is_said(folder, monkeypatch, capsys):
+    said, words = [], ["fleet", "m/x", "--only", "mass", "--out", "out", "--workers", "1"]
 
     def carry_out(self, progress):
         self.rows += [
@@ -84,10 +78,10 @@ def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_
     statuses = {"agree": 0, "self-consistent": 0, "refused": 0, "unconfirmed": 1, "broke": 1, "differ": 1}
     for verdict, status in statuses.items():
         said.append(verdict)
-        assert main(["fleet", "m/x", "--only", "mass", "--out", "out", "--workers", "1"]) == status
+        assert main(words) == status
     said.append("agree")
     assert "since" not in capsys.readouterr().out
-    assert main(["fleet", "m/x", "--only", "mass", "--out", "out", "--workers", "1", "--since", "out"]) == 0
+    assert main([*words, "--since", "out"]) == 0
     assert re.search(rf"since out: m/x/{NAME}: .*differ.*agree", capsys.readouterr().out)
 
 
@@ -97,19 +91,14 @@ def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_
     (["fleet", "m", "--dask", "x", "--workers", "2"], "--workers"), (["fleet", "m", "--timing", "--workers", "2"], "--workers"),
     (["fleet", "m", "--since", "nowhere"], "nowhere/fleet.csv"), (["fleet", "m", "--out", "m/part.xml"], "m/part.xml"),
 ])  # fmt: skip
-def test_what_is_mistyped_or_cannot_be_carried_out_gets_status_2_and_one_line(
-    arguments, word, folder, capsys
-):
+def test_what_cannot_be_carried_out_gets_status_2_and_one_line(arguments, word, folder, capsys):
     try:
         status = main(arguments)
     except SystemExit as stop:
         status = stop.code
     out, err = capsys.readouterr()
-    assert (
-        (status, out, len(err.splitlines())) == (2, "", 1)
-        and word in err
-        and not (folder / "reports").exists()
-    )
+    assert (status, out, len(err.splitlines())) == (2, "", 1) and word in err
+    assert not (folder / "reports").exists()
 
 
 @pytest.mark.parametrize("words, asked", [
@@ -126,10 +115,8 @@ def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, cap
         raise Refused("seen")
 
     for name in ("Pool", "Cluster"):
-        made = {
-            "__init__": lambda self, *given: seen.extend((type(self).__name__, *given)),
-            "close": lambda self: None,
-        }
+        start = lambda self, *given: seen.extend((type(self).__name__, *given))  # noqa: E731
+        made = {"__init__": start, "close": lambda self: None}
         monkeypatch.setattr(f"compare.fleet.executors.{name}", type(name, (), made))
     monkeypatch.setattr("compare.fleet.run.Run", run)
     assert main(["fleet", "m", "--only", "gravity,mass", "--out", "asked", *words]) == 2
@@ -139,16 +126,8 @@ def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, cap
 # ended in the middle: a line, nothing left behind, and the same command goes on from there
 
 FILES = [str(MODELS / f"{name}.xml") for name in ("pendulum_ball", "free_body")]
-WORDS = (
-    "fleet",
-    *FILES,
-    "--only",
-    "parameters",
-    "--out",
-    "out",
-    "--workers",
-    "1",
-)  # one file after the other
+OPTIONS = ["--only", "parameters", "--out", "out", "--workers", "1"]  # one file after the other
+WORDS = ("fleet", *FILES, *OPTIONS)
 
 
 @pytest.fixture

@@ -73,9 +73,8 @@ def fleet(tmp_path, monkeypatch):
         executor = Inside(tmp_path / "places", answer)
         of = Run(found_models(paths)[0], options, executor, tmp_path / "out", sent)
         of.carry_out(lambda rows: None)
-        return SimpleNamespace(
-            of=of, executor=executor, rows={os.path.basename(row.file): row for row in of.rows}
-        )
+        rows = {os.path.basename(row.file): row for row in of.rows}
+        return SimpleNamespace(of=of, executor=executor, rows=rows)
 
     return run
 
@@ -114,12 +113,8 @@ def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
     assert fleet({}, answer=agrees).executor.calls == ["m/b.xml"]
     for more in ({"is_quick": False}, {"names": ("gravity",)}):
         assert fleet({}, answer=agrees, paths=["m/a.xml"], **more).executor.calls == ["m/a.xml"]
-    for solution, computed in (
-        (PENDULUM.format(0.1), 1),
-        (PENDULUM.format(0.1), 0),
-        (PENDULUM.format(0.2), 1),
-    ):
-        (tmp_path / "solution.xml").write_text(solution)
+    for place, computed in ((0.1, 1), (0.1, 0), (0.2, 1)):
+        (tmp_path / "solution.xml").write_text(PENDULUM.format(place))
         found = fleet({}, answer=agrees, paths=["m/a.xml"], reference="solution.xml")
         assert len(found.executor.calls) == computed
 
@@ -136,13 +131,10 @@ def test_what_lies_in_the_folder_of_a_report_is_data_and_a_row_or_computed_anew(
     mark = report(tmp_path, "a.xml") / ".fleet"
     key, row = json.loads(mark.read_text())
     assert fleet({}, answer=agrees).executor.calls == []
-    others = [
-        row | more for more in ({"verdict": "fine"}, {"worst_ratio": "1"}, {"reason": [1]}, {"other": 1})
-    ]
-    poisons = [json.dumps((key, other)).encode() for other in (*others, [row])] + [
-        pickle.dumps((key, Touch()))
-    ]
-    for poison in poisons:
+    wrong = {"verdict": "fine"}, {"worst_ratio": "1"}, {"reason": [1]}, {"other": 1}
+    others = [*(row | more for more in wrong), [row]]
+    poisons = [json.dumps((key, other)).encode() for other in others]
+    for poison in (*poisons, pickle.dumps((key, Touch()))):
         mark.write_bytes(poison)
         assert fleet({}, answer=agrees).executor.calls == ["m/a.xml"], poison
     assert not Path("ran").exists()
@@ -151,9 +143,7 @@ def test_what_lies_in_the_folder_of_a_report_is_data_and_a_row_or_computed_anew(
 def test_a_copy_has_the_row_of_the_first_file_and_is_not_computed(fleet):
     whole, of_parts = PENDULUM.format(0.1), "<mujoco><include file='part.xml'/></mujoco>"
     same = {"a.xml": whole, "b.xml": whole, "c.mjcf": whole}  # MuJoCo reads a file by the end of its name
-    parts = {
-        f"{name}/part.xml": PENDULUM.format(number) for name, number in (("x", 0.1), ("y", 0.1), ("z", 0.2))
-    }
+    parts = {f"{name}/part.xml": PENDULUM.format(0.2 if name == "z" else 0.1) for name in "xyz"}
     first = fleet(same | parts | {f"{name}/whole.xml": of_parts for name in "xyz"}, answer=agrees)
     assert first.executor.calls == ["m/a.xml", "m/c.mjcf", "m/x/whole.xml", "m/z/whole.xml"]
     copies = {row.file: row.same_as for row in first.of.rows if row.same_as}
@@ -166,11 +156,8 @@ def test_a_file_that_breaks_off_keeps_its_earlier_report_and_is_tried_again(flee
     fleet(ONE, answer=agrees)
     found = fleet({"a.xml": PENDULUM.format(0.2)}, answer=lambda *_: Outcome(None, "killed by SIGKILL"))
     row = found.rows["a.xml"]
-    assert (row.verdict, row.has_report, found.of.is_good) == (
-        BROKE,
-        False,
-        False,
-    ) and "SIGKILL" in row.reason
+    assert row.verdict == BROKE and "SIGKILL" in row.reason
+    assert not row.has_report and not found.of.is_good
     assert (report(tmp_path, "a.xml") / "index.html").read_bytes() == b"all"
     assert fleet({}, answer=agrees).executor.calls == ["m/a.xml"]
 
@@ -198,7 +185,5 @@ def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_ma
     assert verdicts(found) == {name: verdict for name, (verdict, _) in named.items()}
     assert all(word in found.rows[name].reason for name, (_, word) in named.items())
     assert [name for name, row in found.rows.items() if not row.has_report] == ["slide.xml"]
-    assert (
-        "--only parameters --reference solution.xml"
-        in (report(tmp_path, "renamed.xml") / "report.md").read_text()
-    )
+    text = (report(tmp_path, "renamed.xml") / "report.md").read_text()
+    assert "--only parameters --reference solution.xml" in text

@@ -56,7 +56,9 @@ def judged(*checks, limits=(), runs=(), causes=(), lost=(), reference=("arm",)):
         result.check("home", quantity, value, tolerance, "s", note, about == About.MODELS, rule, about)
     kind, *renamed = reference
     section = Section("stability", "", "", "", result)
-    return table.judged(ROW, [section], causes, lost, Reference(kind, "a.xml", renamed=tuple(renamed)))
+    judged_row = row()
+    table.judge(judged_row, [section], causes, lost, Reference(kind, "a.xml", renamed=tuple(renamed)))
+    return judged_row
 
 
 @pytest.mark.parametrize("verdict, checks, more, named", [

@@ -38,17 +38,8 @@ def left_out(*asked):
 
 
 def test_a_folder_gives_its_mjcf_at_any_depth_and_nothing_else(here):
-    here(
-        [
-            "m/a.xml",
-            "m/b/c/d.XML",
-            "m/e.mjcf",
-            "m/.git/f.xml",
-            "m/b/.g.xml",
-            "m/mesh.obj",
-            "m/folder.xml/h.xml",
-        ]
-    )
+    here(["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/folder.xml/h.xml"])
+    here(["m/.git/f.xml", "m/b/.g.xml", "m/mesh.obj"])
     here(["m/robot.urdf", "m/robot.urdf.xml"], "<robot name='x'/>")
     here(["m/robot.urdf.xacro", "m/world.sdf.xml"], "<sdf/>")
     here("m/part.xml", "<mujocoinclude><body>")
@@ -86,16 +77,10 @@ def test_a_word_that_names_nothing_is_refused_in_one_line(asked, says, here):
 
 def test_the_same_file_is_there_once_however_it_is_named(here, tmp_path):
     here(["m/a.xml", "m/b.xml"])
-    assert names("m", "m/a.xml", "./m/../m/a.xml", str(tmp_path / "m" / "a.xml"), "m/*.xml") == [
-        "m/a.xml",
-        "m/b.xml",
-    ]
-    for name, target in (
-        ("m/0.xml", "a.xml"),
-        ("m/dangling.xml", "nowhere.xml"),
-        ("m/self", "."),
-        ("n", "m"),
-    ):
+    asked = "m", "m/a.xml", "./m/../m/a.xml", str(tmp_path / "m" / "a.xml"), "m/*.xml"
+    assert names(*asked) == ["m/a.xml", "m/b.xml"]
+    links = {"m/0.xml": "a.xml", "m/dangling.xml": "nowhere.xml", "m/self": ".", "n": "m"}
+    for name, target in links.items():
         Path(name).symlink_to(target)
     assert names("m", "n") == ["m/a.xml", "m/b.xml"]
 
@@ -139,11 +124,10 @@ def collection(here):
     Image.linear_gradient("L").save(image, "PNG")
     hand = robot(MESH.format("finger.obj"), more="<compiler meshdir='shapes'/>")
     defaults = "<default><geom density='500'/></default><include file='deeper/settings.xml'/>"
-    assets = (
-        MESH.format("../../../shared/meshes/above.obj")
-        + "<hfield name='h' file='ground.png' size='1 1 0.1 0.1'/>"
+    assets = MESH.format("../../../shared/meshes/above.obj")
+    assets += (
+        "<hfield name='h' file='ground.png' size='1 1 0.1 0.1'/><model name='hand' file='hand/hand.xml'/>"
     )
-    assets += "<model name='hand' file='hand/hand.xml'/>"
     assets += "<texture name='c' type='cube' fileup='up.png'/>"
     more = "<compiler meshdir='assets' texturedir='pictures'/><include file='parts/defaults.xml'/>"
     files = {
@@ -164,9 +148,8 @@ def test_everything_that_a_model_needs_is_sent_and_compiles_elsewhere(collection
     (model,) = found_models(["robots/r/r.xml"])[0]
     files = bundle(model)
     assert set(files) == set(collection)
-    assert next(iter(files)) == "robots/r/r.xml" and all(
-        files[name] == Path(name).read_bytes() for name in files
-    )
+    assert next(iter(files)) == "robots/r/r.xml"
+    assert all(content == Path(name).read_bytes() for name, content in files.items())
     before = MjModel.from_xml_path("robots/r/r.xml")
     os.rename("robots", "gone")
     os.rename("shared", "gone_too")

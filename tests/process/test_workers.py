@@ -7,7 +7,7 @@ from contextlib import closing
 
 import pytest
 
-from compare.process.workers import Clock, WorkerEnded, Workers, start_workers
+from compare.process.workers import Beginning, Clock, WorkerEnded, Workers, start_workers
 
 LONG = 0.1  # s
 SOON = 60.0  # s, far more than anything here takes
@@ -59,10 +59,10 @@ ENDS = {"killed by SIGKILL": (signal.raise_signal, signal.SIGKILL), "exit status
 
 @pytest.mark.parametrize("is_fresh", [False, True])
 def test_a_process_that_ends_or_takes_too_long_is_replaced(is_fresh):
-    with closing(Workers(1, limit=1.0, is_fresh=is_fresh)) as workers:
+    with closing(Workers(1, Beginning(), limit=2.0, is_fresh=is_fresh)) as workers:
         first = workers.submit(os.getpid)
         assert (workers.submit(os.getpid).result(SOON) == first.result(SOON)) is not is_fresh
-        with pytest.raises(TimeoutError, match=r"1\.0"):
+        with pytest.raises(TimeoutError, match=r"2\.0"):
             workers.submit(time.sleep, 600.0).result(SOON)
         for how, call in list(ENDS.items())[: 1 if is_fresh else 2]:
             with pytest.raises(WorkerEnded) as error:
@@ -73,12 +73,12 @@ def test_a_process_that_ends_or_takes_too_long_is_replaced(is_fresh):
 
 
 def test_a_process_that_is_killed_while_it_is_idle_is_replaced():
-    with closing(Workers(1)) as workers:
+    with closing(Workers(1, Beginning())) as workers:
         os.kill(workers.submit(os.getpid).result(SOON), signal.SIGKILL)
         time.sleep(5 * LONG)
         assert workers.submit(abs, -4).result(SOON) == 4
 
 
 def test_what_cannot_be_sent_is_raised():
-    with closing(Workers(1)) as workers, pytest.raises((AttributeError, TypeError)):
+    with closing(Workers(1, Beginning())) as workers, pytest.raises((AttributeError, TypeError)):
         workers.submit(lambda: 4).result(SOON)

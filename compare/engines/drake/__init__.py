@@ -10,8 +10,8 @@ import numpy as np
 
 from tmt import Tree
 
-from .. import EngineRecord
-from ..outside.model import Body, Course, File, Numbers, ReadModel, Unread
+from .. import Array, Course, EngineRecord
+from ..outside.model import Body, File, Numbers, ReadModel, Unread
 from ..outside.order import near, order_of, wrong_masses
 from .plant import (
     bodies_of,
@@ -25,7 +25,7 @@ from .plant import (
 )
 
 ENGINE = EngineRecord(
-    order=50, label="Drake", colour="#D55E00", marker="P", package="pydrake", extra="drake", reads_file=True
+    order=50, label="Drake", colour="#D55E00", marker="P", package="pydrake", reads_file=True
 )
 SCHEMES = {"RK2": (2, "runge_kutta2"), "RK3": (3, "runge_kutta3"), "RK5": (5, "runge_kutta5"),
            "implicit Euler": (1, "implicit_euler"), "Radau3": (3, "radau3")}  # fmt: skip
@@ -77,7 +77,7 @@ class Model(ReadModel):
         joints = range(len(self.file.names))
         return [[in_world(self.context, body) for body in of_joints.get(k, ())] for k in joints]
 
-    def mend(self, name: str, values: np.ndarray) -> bool:
+    def mend(self, name: str, values: Array) -> bool:
         if name in self.used:  # a free body has no rotor and no spring, and its damping is in other axes
             wrong, self.used[name] = values != self.used[name], values
             self.settle()
@@ -107,16 +107,16 @@ class Model(ReadModel):
         for index, inertia in self.inertias.items():
             plant.get_body(index).SetSpatialInertiaInBodyFrame(context, inertia)
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> Array:
         self.plant.SetPositions(self.context, *self.order.engine(q))
         return self.order.tree_matrix(q, self.plant.CalcMassMatrix(self.context))
 
-    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> Array:
         self.plant.SetPositionsAndVelocities(self.context, np.concatenate(self.order.engine(q, v)))
         gravity = self.plant.CalcGravityGeneralizedForces(self.context)
         return self.order.tree(q, self.plant.CalcBiasTerm(self.context) - gravity)
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
         q_drake, v_drake, force = self.order.engine(q, v, force)
         self.plant.SetPositionsAndVelocities(self.context, np.concatenate([q_drake, v_drake]))
         self.force.SetFromVector(force)
@@ -151,7 +151,7 @@ class Model(ReadModel):
             self.simulators[key] = simulator, plant, context
         return self.simulators[key]
 
-    def run(self, course: Course) -> tuple[np.ndarray, int]:
+    def run(self, course: Course) -> tuple[Array, int]:
         simulator, plant, context = self.simulator(course)
         q, v = self.order.engine(course.q, course.v)
         simulator.get_mutable_context().SetTime(0.0)

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from .. import Array
 from ..outside.mjcf_text import whole_text
 from ..outside.model import Body, File, Numbers, Unread
 from ..outside.order import Order
@@ -50,9 +51,7 @@ def needs_text(file: File) -> bool:
     return has_unnamed or has_parts or "model" not in root.attrib
 
 
-def finished(
-    file: File, dt: float, joints: Mapping[Any, int], numbers: Numbers, rest: np.ndarray | None
-) -> Any:
+def finished(file: File, dt: float, joints: Mapping[Any, int], numbers: Numbers, rest: Array | None) -> Any:
     """A final plant with the gravity and armature of `numbers`, and, unless `rest` is None, with its springs."""
     from pydrake.multibody.tree import PrismaticSpring, RevoluteSpring
 
@@ -133,7 +132,7 @@ def fixed_force(plant: Any, context: Any) -> Any:
     return port.FixValue(context, np.zeros(plant.num_velocities())).GetMutableData().get_mutable_value()
 
 
-def with_turned_force(plant: Any, order: Order, force: np.ndarray) -> Any:
+def with_turned_force(plant: Any, order: Order, force: Array) -> Any:
     """A system of the plant and of forces that turn with its free bodies: (nv,), constant as the Tree has it.
 
     Drake's force on a free body is in world axes. These are computed in Python at each evaluation.

@@ -23,20 +23,9 @@ import numpy as np
 from ...core.words import listed
 from ...process.workers import Beginning, WorkerEnded, Workers
 from ...robots.case import Case
-from .. import (
-    GRID,
-    RECORDS,
-    Engine,
-    Method,
-    Motion,
-    Prepared,
-    Setting,
-    batch_of,
-    motion_of_states,
-    rows_of_states,
-)
+from .. import RECORDS, Array, Course, Engine, Method, Motion, OneByOne, Prepared, Setting
 from . import answers
-from .model import Course, EngineError, File, Reading, TooLong, passive
+from .model import EngineError, File, Reading, TooLong, passive
 
 T = TypeVar("T")
 
@@ -72,7 +61,7 @@ class Outside(Engine):
         return OutsideDynamics(self.name, case)
 
 
-class OutsideDynamics:
+class OutsideDynamics(OneByOne):
     """A case in an outside engine: a robot without locked joints and without servos."""
 
     seconds_prepared: float | None = None  # of compilation, where it compiles
@@ -98,62 +87,40 @@ class OutsideDynamics:
         except WorkerEnded:
             raise EngineError("its process was killed") from None
 
-    def rows(self, quantity: str, *values: np.ndarray) -> np.ndarray:
+    def rows(self, quantity: str, *values: Array) -> Array:
         """A quantity at many states, (states, ...)."""
         return self.ask(
             answers.each, quantity, *(np.atleast_2d(np.asarray(value, float)) for value in values)
         )
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> Array:
         return self.rows("mass_matrix", q)
 
-    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> Array:
         return self.rows("bias", q, v)
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         return self.rows("acceleration", q, v, tau - passive(self.tree, q, v))
 
     def has(self, quantity: str) -> bool:
         return quantity in self.reading["has"]
 
-    def run(
-        self,
-        q: np.ndarray,
-        v: np.ndarray,
-        tau: np.ndarray,
-        dt: float,
-        steps: int,
-        method: str,
-        tolerance: float | None = None,
-    ) -> Motion:
-        """Motions recorded at every multiple of dt."""
-        t, (batch, states) = np.linspace(0.0, dt * steps, steps + 1), rows_of_states(q, v, tau)
-        count = 0 if tolerance else steps
-        courses = [
-            Course(position, speed, torque, t, count, method, tolerance)
-            for position, speed, torque in zip(*states)
-        ]
-        motions = [self.motion(course, self.ask(answers.ran, course)) for course in courses]
-        return batch_of(motions, batch)._replace(evaluations=None, steps=steps)
-
-    def motion(self, course: Course, run: answers.Run) -> Motion:
-        motion = motion_of_states(course.times, run.states, course.start, self.coordinates.nq, run.why)
-        return motion._replace(evaluations=run.evaluations, seconds=run.seconds)
-
-    def prepare(
-        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, setting: Setting, method: str
-    ) -> Prepared:
+    def prepare(self, q: Array, v: Array, tau: Array, setting: Setting, method: str) -> Prepared:
         if different := [number for number, is_set in self.reading["mended"].items() if not is_set]:
             raise EngineError(f"it has read another {listed(different)}, which cannot be set")
-        t = np.linspace(0.0, setting.duration, GRID + 1)
-        course = Course(q, v, tau, t, setting.steps or 0, method, setting.tolerance)
+        return super().prepare(q, v, tau, setting, method)
+
+    def prepared(self, course: Course) -> Prepared:
         self.seconds_prepared = self.ask(answers.prepared, course)
 
         def run() -> answers.Run:
             return self.ask(answers.ran, course)
 
         def read(run: answers.Run) -> Motion:
-            return self.motion(course, run)._replace(steps=setting.steps)
+            motion = course.motion(run.states, run.why)
+            return motion._replace(
+                evaluations=run.evaluations, seconds=run.seconds, steps=course.steps or None
+            )
 
         return run, read
 

@@ -13,8 +13,8 @@ import tmt
 from ...core.errors import described
 from ...core.words import in_one_line
 from ...judge.scale import FACTOR
-from .. import RECORDS
-from .model import Course, EngineError, File, Reading, ReadModel, Unread, numbers_of, size_of
+from .. import RECORDS, Array, Course
+from .model import EngineError, File, Reading, ReadModel, Unread, numbers_of, size_of
 
 LIMIT = 120.0  # s, of an answer: compiling a large model may take hours
 QUANTITIES = "mass_matrix", "bias", "acceleration"
@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class Run(NamedTuple):
-    states: np.ndarray  # (times, nq + nv)
+    states: Array  # (times, nq + nv)
     evaluations: int | None
     seconds: float  # of the run alone
     why: str  # why it may have ended early
@@ -74,7 +74,7 @@ def reading(model: ReadModel) -> Reading:
     return model.reading
 
 
-def each(model: ReadModel, quantity: str, *values: np.ndarray) -> np.ndarray:
+def each(model: ReadModel, quantity: str, *values: Array) -> Array:
     """A quantity at many states, (states, ...)."""
     return np.array([getattr(model, quantity)(*state) for state in zip(*values)], dtype=float)
 

@@ -8,6 +8,12 @@ import numpy as np
 from .model import Unread
 
 FROM_FILES = "mesh", "hfield"  # of geoms
+FIELDS = {
+    "pos": "ipos",
+    "quat": "iquat",
+    "mass": "mass",
+    "diaginertia": "inertia",
+}  # of a body in the compiled model
 
 
 def whole_text(path: Path) -> str:
@@ -47,17 +53,10 @@ def state_inertias(bodies: list[ElementTree.Element], path: Path) -> None:
         raise Unread("its bodies are not all in the text")
     for number, body in enumerate(bodies, start=1):
         if any(map(is_from_file, body)) and body.find("inertial") is None:
-            names = {
-                "pos": "ipos",
-                "quat": "iquat",
-                "mass": "mass",
-                "diaginertia": "inertia",
-            }  # in MJCF, in the model
-            numbers = {
-                name: np.ravel(getattr(model, f"body_{of}")[number]).tolist() for name, of in names.items()
-            }
-            numbers = {name: " ".join(map(repr, values)) for name, values in numbers.items()}
-            ElementTree.SubElement(body, "inertial", numbers)
+            inertial = ElementTree.SubElement(body, "inertial")
+            for name, field in FIELDS.items():
+                values = np.ravel(getattr(model, f"body_{field}")[number]).tolist()
+                inertial.set(name, " ".join(map(repr, values)))
 
 
 def included(element: ElementTree.Element, folder: Path) -> ElementTree.Element:

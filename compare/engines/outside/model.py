@@ -12,8 +12,9 @@ from tmt.methods import by_speed
 
 from ...robots.coordinates import Coordinates
 from ...robots.joint_map import places_of
+from .. import Array, Course
 
-Numbers = Mapping[str, np.ndarray]
+Numbers = Mapping[str, Array]
 
 
 class File(NamedTuple):
@@ -44,8 +45,8 @@ class Body(NamedTuple):
     """A body, or bodies that move as one; of those that are combined in common axes."""
 
     mass: float  # kg
-    com: np.ndarray  # (3,) m
-    inertia: np.ndarray  # (3, 3) kg m2, about the centre of mass
+    com: Array  # (3,) m
+    inertia: Array  # (3, 3) kg m2, about the centre of mass
 
 
 class Link(NamedTuple):
@@ -55,32 +56,6 @@ class Link(NamedTuple):
     parent: object
     joint: int | None  # of the Tree, by which it moves on its parent; None: it is fixed there
     body: Body
-
-
-class Course(NamedTuple):
-    """A run that an engine is asked for."""
-
-    q: np.ndarray  # (nq,)
-    v: np.ndarray  # (nv,)
-    tau: np.ndarray  # (nv,) constant
-    times: np.ndarray  # s, equal, the first one 0, at which it is read
-    steps: int  # of equal length, a multiple of len(times) - 1; 0: within the tolerance
-    method: str
-    tolerance: float | None = None
-
-    @property
-    def dt(self) -> float:
-        return float(self.times[-1]) / max(self.steps, 1)
-
-    @property
-    def every(self) -> int:
-        """The number of steps from one time to the next."""
-        return self.steps // (len(self.times) - 1)
-
-    @property
-    def start(self) -> np.ndarray:
-        """q and v side by side."""
-        return np.concatenate([self.q, self.v])
 
 
 class EngineError(ValueError):
@@ -98,7 +73,7 @@ class TooLong(EngineError):
 class Reading(TypedDict):
     """What an engine has read, by the names of ReadModel.numbers."""
 
-    read: dict[str, np.ndarray]
+    read: dict[str, Array]
     stated: Numbers
     mended: dict[str, bool]  # of the numbers that differ: whether they are set now
     seconds: float  # until the model was there
@@ -148,26 +123,26 @@ class ReadModel:
         """Of each joint the bodies that move with it and not with the next one."""
         raise NotImplementedError
 
-    def mend(self, name: str, values: np.ndarray) -> bool:
+    def mend(self, name: str, values: Array) -> bool:
         """Set numbers that it has read differently, of the same shape as in `numbers`; False: that is not possible."""
         return False
 
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q: Array) -> Array:
         """M (nv, nv), with the armature."""
         raise NotImplementedError
 
-    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def bias(self, q: Array, v: Array) -> Array:
         """h (nv,): Coriolis, centrifugal and gravity terms, with the sign of MuJoCo's qfrc_bias; no springs, no damping."""
         raise NotImplementedError
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
         """(nv,), from M a = force - h by the engine's own forward dynamics; damping and springs are part of the force."""
         raise NotImplementedError
 
     def prepare(self, course: Course) -> None:
         """What a run needs that does not depend on its start and length: objects, compiled code."""
 
-    def run(self, course: Course) -> tuple[np.ndarray, int | None]:
+    def run(self, course: Course) -> tuple[Array, int | None]:
         """States (nq + nv,) at the times as (times, nq + nv), fewer if it breaks off; and its evaluations.
 
         The damping and the springs of the file act.
@@ -175,7 +150,7 @@ class ReadModel:
         raise NotImplementedError
 
 
-def numbers_of(tree: tmt.Tree) -> dict[str, np.ndarray]:
+def numbers_of(tree: tmt.Tree) -> dict[str, Array]:
     """The Tree's numbers in the shapes of ReadModel.numbers; and about_origin (joints,): mass x com^2 from the joint, kg m2."""
     nv = tree.coordinates.nv
     origins, *_ = places_of(tree)  # of the joints, at the reference positions
@@ -214,13 +189,13 @@ def carried(links: Iterable[Link], joints: int) -> list[list[Body]]:
     return bodies
 
 
-def together(bodies: Iterable[tuple[float, np.ndarray, np.ndarray]]) -> tuple[float, np.ndarray]:
+def together(bodies: Iterable[tuple[float, Array, Array]]) -> tuple[float, Array]:
     """The mass of bodies that move as one, and the moments of inertia about their centre of mass, ascending, (3,)."""
     mass, _, inertia = combined(bodies)
     return mass, np.linalg.eigvalsh(inertia)
 
 
-def combined(bodies: Iterable[tuple[float, np.ndarray, np.ndarray]]) -> Body:
+def combined(bodies: Iterable[tuple[float, Array, Array]]) -> Body:
     """Bodies that move as one, with the inertia about their common centre of mass; of no bodies: 0."""
     parts = [Body(*body) for body in bodies]
     mass, tensor = sum((body.mass for body in parts), 0.0), np.zeros((3, 3))
@@ -231,7 +206,7 @@ def combined(bodies: Iterable[tuple[float, np.ndarray, np.ndarray]]) -> Body:
     return Body(mass, centre, tensor)
 
 
-def passive(tree: tmt.Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def passive(tree: tmt.Tree, q: Array, v: Array) -> Array:
     """The forces of damping and springs of the joints, N m, (..., nv): D v + k (q - rest)."""
     drag = np.array(tree.damping) * v
     return drag + tmt.literal.spring_torque(q, tree) if tree.has_springs else drag

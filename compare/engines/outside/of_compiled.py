@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import GRID
-from .model import Course, Numbers, ReadModel
+from .. import GRID, Array, Course
+from .model import Numbers, ReadModel
 
 if TYPE_CHECKING:
     from ..mujoco.bare import Bare
@@ -20,15 +20,27 @@ class OfCompiled(ReadModel):
     bare: Bare
     models: dict[str, Any]  # the engine's, by the names of METHODS
 
-    def held(self, name: str) -> np.ndarray:
+    def held(self, name: str) -> Array:
         """A field of the engine's models by MuJoCo's name of it."""
         raise NotImplementedError
 
-    def gravity(self) -> np.ndarray:
+    def gravity(self) -> Array:
         raise NotImplementedError
 
     def numbers(self) -> Numbers:
         return {"gravity": self.gravity(), **self.bare.numbers(self.held)}
+
+    def mend(self, name: str, values: Array) -> bool:
+        dofs, joints = self.bare.dofs, self.bare.model.dof_jntid[self.bare.dofs]
+        places = {"armature": ("dof_armature", dofs), "damping": ("dof_damping", dofs)}
+        places |= {"stiffness": ("jnt_stiffness", joints), "gravity": ("opt.gravity", np.arange(3))}
+        for method in self.models if name in places else ():
+            self.set_field(method, *places[name], values)
+        return name in places
+
+    def set_field(self, method: str, name: str, index: Array, values: Array) -> None:
+        """Set a field of the engine's model for a method, by MuJoCo's name of it."""
+        raise NotImplementedError
 
     def prepare(self, course: Course) -> None:
         """Compile, by a run without steps."""

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from .model import Course, File, Numbers, ReadModel, Unread
+from .. import Array, Course
+from .model import File, Numbers, ReadModel, Unread
 
 SPEEDS = "armature", "damping", "stiffness"  # numbers of each speed
 
@@ -31,25 +32,25 @@ class OfUrdf(ReadModel):
         self.is_free = np.array([name in free for _, name in speeds])
         self.damping = self.load(text, file)
 
-    def load(self, text: str, file: File) -> np.ndarray:
+    def load(self, text: str, file: File) -> Array:
         """Read the text; the damping of the joints, (nv,)."""
         raise NotImplementedError
 
-    def gravity(self) -> np.ndarray:
+    def gravity(self) -> Array:
         raise NotImplementedError
 
-    def set_gravity(self, gravity: np.ndarray) -> None:
+    def set_gravity(self, gravity: Array) -> None:
         raise NotImplementedError
 
-    def start(self, q: np.ndarray, v: np.ndarray, dt: float, damping: np.ndarray) -> None:
+    def start(self, q: Array, v: Array, dt: float, damping: Array) -> None:
         """Prepare steps of dt from a state, with this damping of the joints."""
         raise NotImplementedError
 
-    def step(self, force: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def step(self, force: Array, v: Array) -> tuple[Array, Array]:
         """q and v after a step from speeds v."""
         raise NotImplementedError
 
-    def run(self, course: Course) -> tuple[np.ndarray, int]:
+    def run(self, course: Course) -> tuple[Array, int]:
         (q, v, tau), states = course[:3], [course.start]
         self.start(q, v, course.dt, self.damping)
         for step in range(1, course.steps + 1):
@@ -62,7 +63,7 @@ class OfUrdf(ReadModel):
         speeds = {name: getattr(self, name) for name in SPEEDS}
         return {"gravity": self.gravity(), **speeds}
 
-    def mend(self, name: str, values: np.ndarray) -> bool:
+    def mend(self, name: str, values: Array) -> bool:
         if name == "gravity":
             self.set_gravity(values)
         elif name in SPEEDS:

@@ -5,19 +5,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import Array
 from .model import File, Numbers
 
 
 class Order(NamedTuple):
-    q: np.ndarray  # the place in the Tree's q of each of the engine's numbers
-    v: np.ndarray  # (nv,) the same in v
+    q: Array  # the place in the Tree's q of each of the engine's numbers
+    v: Array  # (nv,) the same in v
     turned: tuple[
         tuple[slice, slice], ...
     ]  # of each free body: speeds of the engine, the quaternion in the Tree's q
     # those speeds are in world axes where the Tree's are in body axes; False: the other way round
     in_world: bool
 
-    def engine(self, q: np.ndarray, *vectors: np.ndarray) -> list[np.ndarray]:
+    def engine(self, q: Array, *vectors: Array) -> list[Array]:
         """q, and vectors of speeds or forces at q, of the Tree as the engine has them."""
         placed = [vector[self.v] for vector in vectors]
         for at, place in self.turned:
@@ -26,7 +27,7 @@ class Order(NamedTuple):
                 vector[at] = turn @ vector[at]
         return [q[self.q], *placed]
 
-    def tree(self, q: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    def tree(self, q: Array, vector: Array) -> Array:
         """A vector of the engine, (nv,), or vectors as columns, at q of the Tree, as the Tree has it."""
         placed = np.empty_like(vector)
         placed[self.v] = vector
@@ -34,15 +35,15 @@ class Order(NamedTuple):
             placed[self.v[at]] = rotation(q[place], not self.in_world) @ vector[at]
         return placed
 
-    def tree_matrix(self, q: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    def tree_matrix(self, q: Array, matrix: Array) -> Array:
         return self.tree(q, self.tree(q, matrix).T)
 
-    def tree_position(self, q: np.ndarray) -> np.ndarray:
+    def tree_position(self, q: Array) -> Array:
         placed = np.empty_like(q)
         placed[self.q] = q
         return placed
 
-    def tree_states(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def tree_states(self, q: Array, v: Array) -> Array:
         """States of the engine, (times, nq) and (times, nv), as those of the Tree, with quaternions of length 1."""
         states = np.empty((len(q), len(self.q) + len(self.v)))
         states[:, self.q] = q
@@ -82,7 +83,7 @@ def order_of(
     return Order(in_q, in_v, tuple(turned), in_world)
 
 
-def rotation(quaternion: np.ndarray, is_forward: bool = True) -> np.ndarray:
+def rotation(quaternion: Array, is_forward: bool = True) -> Array:
     """The matrix of a quaternion w x y z of any length, from body axes to world axes; not is_forward: its inverse."""
     w, x, y, z = quaternion
     s, w = 2.0 / (w * w + x * x + y * y + z * z), w if is_forward else -w
@@ -91,10 +92,10 @@ def rotation(quaternion: np.ndarray, is_forward: bool = True) -> np.ndarray:
                      [s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)]])  # fmt: skip
 
 
-def near(read: np.ndarray, stated: np.ndarray) -> np.ndarray:
+def near(read: Array, stated: Array) -> Array:
     """Whether numbers that an engine has read are those stated, for each joint."""
     size = np.abs(stated).max(initial=0.0)
-    is_near: np.ndarray = (np.abs(read - stated) <= 1e-13 * size).reshape(len(stated), -1)
+    is_near: Array = (np.abs(read - stated) <= 1e-13 * size).reshape(len(stated), -1)
     return np.asarray(is_near.all(axis=1))
 
 
