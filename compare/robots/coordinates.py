@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from tmt import Tree
 from tmt.derivation.composite import mass_matrix_and_bias
-from tmt.derivation import coordinates
+from tmt.model import coordinates
 
 
 class Kind(NamedTuple):

@@ -14,7 +14,7 @@ from compare.judge.scale import gain_scale
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from tmt.methods import METHODS, amplification
-from tmt.derivation.coordinates import coordinates_of
+from tmt.model.coordinates import coordinates_of
 
 EPS = 2.0**-52
 EULER = METHODS["semi_implicit_euler"]

@@ -115,8 +115,10 @@ def test_nonsense_is_refused_in_one_line(call):
 
 
 def test_compiled_code_takes_its_own_arrays_only():
-    compiled = evaluator(tmt.ARM, "acceleration")
-    path = [np.zeros((32, 3, 3)), np.zeros((32, 3, 3)), np.zeros((32, 3))]
+    compiled, path = (
+        evaluator(tmt.ARM, "acceleration"),
+        [np.zeros((32, 3, 3)), np.zeros((32, 3, 3)), np.zeros((32, 3))],
+    )
     fixed, adaptive = (runner(tmt.ARM, name) for name in ("rk4", "dopri8_adaptive"))
     for call, own in (
         (compiled.each, [np.zeros((40, 3)) for _ in range(4)]),

@@ -7,9 +7,9 @@ it did not, after how many steps, and how often the dynamics were evaluated. Wha
 
 from collections.abc import Callable
 
-from tmt.derivation.coordinates import FLAT
 from tmt.methods.implicit import CLOSE, ITERATIONS
 from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED, Method
+from tmt.model.coordinates import FLAT
 
 from . import forms, linear
 from .ir import DOUBLE, FLAG, INDEX, POINTER, Code, Value, Variable, module, wide

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import mpmath
 
-from tmt.derivation.coordinates import Coordinates, normalized
 from tmt.derivation.vectors import Vector, sqrt
+from tmt.model.coordinates import Coordinates, normalized
 from tmt.model.tree import Tree
 
 NUMBERS = (

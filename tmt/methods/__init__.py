@@ -6,7 +6,6 @@ code, see tmt.compiled). METHODS may be given further ones, and objects of a use
 
 from dataclasses import dataclass, field
 
-from tmt.derivation.coordinates import FLAT
 from tmt.derivation.method import mass_matrix_and_bias, reduced_force
 from tmt.methods import dop853
 from tmt.methods.derivatives import amplification as amplification
@@ -24,6 +23,7 @@ from tmt.methods.stepping import (
     increments,
     left_over,
 )
+from tmt.model.coordinates import FLAT
 from tmt.model.values import shown
 
 

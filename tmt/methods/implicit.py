@@ -13,10 +13,10 @@ from functools import partial
 
 import numpy as np
 
-from tmt.derivation.coordinates import FLAT, normalized, product
 from tmt.derivation.dual import Dual, jacobian, seeded, unit_vectors
 from tmt.derivation.vectors import solve_any
 from tmt.methods.stepping import Method, checked_sums, checked_tableau
+from tmt.model.coordinates import FLAT, normalized, product
 
 ITERATIONS = (
     50  # Newton's method doubles the correct digits each time: a stage that needs more is not being found

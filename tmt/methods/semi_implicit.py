@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from tmt.derivation import articulated
-from tmt.derivation.coordinates import FLAT
 from tmt.derivation.method import bias_rates, mass_matrix_and_bias, reduced_force
 from tmt.derivation.vectors import solve_any
 from tmt.methods.stepping import Method, advance, increments, left_over
+from tmt.model.coordinates import FLAT
 
 
 @dataclass(frozen=True)

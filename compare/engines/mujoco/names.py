@@ -8,7 +8,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from tmt.derivation.coordinates import KINDS as NUMBERS  # of a joint in qpos and in qvel: MuJoCo has the same
+from tmt.model.coordinates import KINDS as NUMBERS  # of a joint in qpos and in qvel: MuJoCo has the same
 
 from ...robots.case import Coordinates
 
