@@ -1,22 +1,24 @@
-"""Equations of motion of a tree of rigid bodies on hinges, slides and balls by the TMT method, and their integration.
+"""Equations of motion of rigid bodies on hinges, slides and balls by the TMT method, and their integration.
 
-Stands alone: needs NumPy, llvmlite and mpmath, and knows nothing of any physics engine.
-Every function takes states of any leading batch shape, a further argument `model` for another Tree than
-the assignment's arm, and raises ValueError for wrong shapes, values that are not finite, unknown names, a singular Mbar
-and results beyond the largest double.
+Stands alone: needs NumPy, llvmlite and mpmath, and knows nothing of any physics engine. Every function takes
+states of any leading batch shape, a further argument `model` for another Tree than the assignment's arm, and
+raises ValueError for wrong shapes, values that are not finite, unknown names, a singular Mbar and results
+beyond the largest double.
 
-Shapes: q (..., nq), qd and tau (..., nv). Of a hinge or slide one number each, of a ball four (a quaternion w, x, y, z of length
-1) and three (angular velocity in its own axes, and torque): nq = nv = n, the number of joints, where no joint is a ball.
+Shapes: q (..., nq), qd and tau (..., nv). Of a hinge or slide one number each, of a ball four (a quaternion
+w, x, y, z of length 1) and three (angular velocity in its own axes, and torque): nq = nv = n, the number of
+joints, where no joint is a ball.
 
-Units: rad, s, kg, m, N m, J; of a slide m and N. Frames: inertial frame at the shoulder, x north, y west, z up; "body axes"
-are those that coincide with it at q = 0. Signs: Mbar qdd + h = tau - D qd, with h = `bias` (MuJoCo's
-qfrc_bias) and D the joint damping; `gravity_balance` is +dV/dq, the torque that holds the arm at rest
-where no springs act.
+Units: rad, s, kg, m, N m, J; of a slide m and N. Frames: inertial frame at the shoulder, x north, y west, z
+up; "body axes" are those that coincide with it at q = 0. Signs: Mbar qdd + h = tau - D qd, with h = `bias`
+(MuJoCo's qfrc_bias) and D the joint damping; `gravity_balance` is +dV/dq, the torque that holds the arm at
+rest where no springs act.
 
-Symbols of the assignment: Mbar is `mass_matrix`, dV/dq `gravity_balance`, x_b `com_positions`, omega_b `angular_velocities`,
-T_b and B_b `jacobians`, h_b and g_b `convective_terms`, V and E `potential_energy` and `energy`. In MuJoCo's names tau is
-qfrc_applied, qdd is qacc, and joint damping and springs are in qfrc_passive. The arm's alpha turns about y, then beta about x,
-then, at the elbow, gamma about y, all right-handed; with all angles zero the upper arm points along -z, the forearm along +x.
+Symbols of the assignment: Mbar is `mass_matrix`, dV/dq `gravity_balance`, x_b `com_positions`, omega_b
+`angular_velocities`, T_b and B_b `jacobians`, h_b and g_b `convective_terms`, V and E `potential_energy` and
+`energy`. In MuJoCo's names tau is qfrc_applied, qdd is qacc, and joint damping and springs are in
+qfrc_passive. The arm's alpha turns about y, then beta about x, then, at the elbow, gamma about y, all
+right-handed; with all angles zero the upper arm points along -z, the forearm along +x.
 
     import numpy as np, tmt
 
@@ -24,20 +26,22 @@ then, at the elbow, gamma about y, all right-handed; with all angles zero the up
     tmt.mass_matrix(q)  # Mbar, kg m2; any leading batch shape: q may be (1000, 3)
     tmt.gravity_balance(q)  # the torque that holds the arm, N m
     tmt.acceleration(q, qd, tau)  # qdd, rad/s2
-    t, q, qd = tmt.simulate(q, qd, tau, dt=5 / 64, steps=64)  # RK4, constant tau; (..., 3) are runs side by side
+    t, q, qd = tmt.simulate(q, qd, tau, dt=5 / 64, steps=64)  # RK4, constant tau; (..., 3): many runs
 
-To check a mass matrix of your own: np.abs(mine(q) - tmt.mass_matrix(q)).max() should be about 1e-16; 1e-3 is a wrong term.
-`dataclasses.replace(tmt.ARM, mass=(2.0, 1.5))` is the arm with another mass, `tmt.Tree` any tree of hinges, slides and balls (a
-free joint is three slides and a ball), with damping, armature, springs and the gains of a linear controller.
+To check a mass matrix of your own: np.abs(mine(q) - tmt.mass_matrix(q)).max() should be about 1e-16; 1e-3 is
+a wrong term. `dataclasses.replace(tmt.ARM, mass=(2.0, 1.5))` is the arm with another mass, `tmt.Tree` any
+tree of hinges, slides and balls (a free joint is three slides and a ball), with damping, armature, springs
+and the gains of a linear controller.
 
-Methods of `simulate`: "rk4"; "semi_implicit_euler" (MuJoCo's Euler, implicitfast and discrete), "implicit" (MuJoCo's),
-"explicit_euler"; "dopri8" (Dormand and Prince, order 8: the best for many digits) and "dopri8_adaptive" (with steps of its own);
-"implicit_midpoint" and "gauss_legendre_4", which no linear motion can make unstable; and "taylor", the true motion.
+Methods of `simulate`: "rk4"; "semi_implicit_euler" (MuJoCo's Euler, implicitfast and discrete), "implicit"
+(MuJoCo's), "explicit_euler"; "dopri8" (Dormand and Prince, order 8: the best for many digits) and
+"dopri8_adaptive" (with steps of its own); "implicit_midpoint" and "gauss_legendre_4", which no linear motion
+can make unstable; and "taylor", the true motion.
 
-NumPy (literal.py) answers calls of up to 500 states, compiled code larger ones and, after `prepare`, all calls of a model, which
-suits loops over single states; see answers.py. Both differ in the last bits, and say what is wrong in the same words. Compiled
-code is kept on disk, see compiled/store.py. Without MuJoCo, `pip install numpy llvmlite mpmath && pip install --no-deps .` is
-enough.
+NumPy (literal.py) answers calls of up to 500 states, compiled code larger ones and, after `prepare`, all
+calls of a model, which suits loops over single states; see answers.py. Both differ in the last bits, and say
+what is wrong in the same words. Compiled code is kept on disk, see compiled/store.py. Without MuJoCo,
+`pip install numpy llvmlite mpmath && pip install --no-deps .` is enough.
 """
 
 from __future__ import annotations
@@ -291,17 +295,18 @@ def equations(
     single: bool = False,
     head: Sequence[str] = ("Not checked: compare with the model before use.",),
 ) -> str:
-    """The equations of a model as text in another language, with the model's numbers, for use without this package.
+    """The equations of a model, with its numbers, as text in another language, for use without this package.
 
     Parameters
     ----------
     model : Tree, default ARM
     language : {"c", "c header", "python", "matlab", "latex", "html", "sympy"}
-        C99 with math.h alone, no allocation; Python with NumPy alone, any batch; MATLAB and Octave, one file, states as columns.
-        The last three are simplified, with a symbol for each parameter, for some six hinges and slides (needs SymPy).
+        C99 with math.h alone, no allocation; Python with NumPy alone, any batch; MATLAB and Octave, one file,
+        states as columns. The last three are simplified, with a symbol for each parameter, for some six
+        hinges and slides (needs SymPy).
     quantities : sequence of str
-        Functions of this package of those names; units, signs and shapes are theirs. With symbols: mass_matrix, bias,
-        gravity_balance.
+        Functions of this package of those names; units, signs and shapes are theirs. With symbols:
+        mass_matrix, bias, gravity_balance.
     name : str
         Of the file, which begins the names of C functions.
     single : bool

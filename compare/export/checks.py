@@ -1,4 +1,4 @@
-"""The values of exported equations at random states, compared with MuJoCo and with exact values; and what an evaluation costs."""
+"""Exported equations at random states, compared with MuJoCo and exact values; what an evaluation costs."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -26,7 +26,7 @@ ROUNDS = 20  # of timing
 
 
 class Row(NamedTuple):
-    """A quantity: its largest share of its tolerance, and there the difference and the tolerance; `unit` is theirs."""
+    """A quantity: the differences with the largest shares of their tolerance, and these shares."""
 
     quantity: str
     unit: str
@@ -76,7 +76,7 @@ class Judge:
         return rows
 
     def largest(self, quantity: Quantity, values: Array, exact: Pairs) -> tuple[float, ...]:
-        """The largest difference from MuJoCo and its share of the tolerance, and those of that from the exact value."""
+        """The largest difference from MuJoCo and its share of the tolerance, then from the exact value."""
         arguments = self.states[: len(quantity.arguments)]
         if quantity.function == "convective_terms" and self.tree.coordinates.balls:
             theirs = convective_accelerations(self.mujoco, *arguments)
@@ -114,7 +114,7 @@ def random_states(robot: Robot, count: int) -> list[Array]:
 
 
 def worst_of(difference: Array, tolerance: Array) -> tuple[float, float]:
-    """The difference with the largest share of its tolerance, and that share; inf where it is not a number."""
+    """The difference with the largest share of its tolerance, and the share; inf where it is no number."""
     at = closest(difference, tolerance)
     value, most = abs(float(difference[at])), float(tolerance[at])
     if value == 0.0:
@@ -125,7 +125,7 @@ def worst_of(difference: Array, tolerance: Array) -> tuple[float, float]:
 def times(
     compared: Compared, program: Program | None, quantities: Sequence[str], count: int
 ) -> list[dict[str, Any]]:
-    """ns of one evaluation by C code, by tmt's compiled code, one state after the other, and by mj_forward; []: not C."""
+    """ns of an evaluation by C, by tmt's compiled code state after state, and by mj_forward; []: not C."""
     if not isinstance(program, CProgram):
         return []
     names, (q, qd, tau) = list(dict.fromkeys(quantities)), random_states(compared.robot, count)

@@ -1,4 +1,4 @@
-"""The command: write the equations, run what was written, compare, and say the outcome in the files and on the terminal."""
+"""The command: write the equations, run and compare them, say the outcome in the files and the terminal."""
 
 import argparse
 import hashlib
@@ -41,7 +41,7 @@ OPTIONS = {
 
 
 def equations_status(arguments: Sequence[str], command: str) -> int:
-    """Run the command; the exit status. SystemExit for help and wrong arguments. Refused: it cannot be carried out."""
+    """Run the command; the exit status. SystemExit: help, wrong arguments. Refused: it cannot be done."""
     parser = command_parser(EQUATIONS, "--out DIR", "export", OPTIONS)
     options, unknown = parser.parse_known_args(arguments)
     if options.help:

@@ -56,7 +56,7 @@ class Program:
         """Compile or load the text."""
 
     def values(self, quantity: str, states: States) -> list[Array]:
-        """The results of a function at states, (states, ...) each: one, or one for each part of the quantity."""
+        """The arrays of a quantity at states, (states, ...) each: one, or one for each of its parts."""
         raise NotImplementedError
 
     def operations(self, quantity: str) -> int:
@@ -67,8 +67,8 @@ class Program:
         """The output of a command in the folder."""
         try:
             done = subprocess.run(
-                command, cwd=self.folder, capture_output=True, text=True, errors="replace", timeout=MOST_SECONDS,
-                stdin=subprocess.DEVNULL, check=False,
+                command, cwd=self.folder, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                errors="replace", timeout=MOST_SECONDS, check=False,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
             raise NotRun(f"{command[0]} takes more than {MOST_SECONDS:g} s") from None
@@ -124,7 +124,8 @@ class CProgram(Program):
         given += [f"out + {size} * i + {size // parts(quantity) * k}" for k in range(parts(quantity))]
         arguments = ", ".join(f"const {kind} *{x}" for x in STATE)
         call = f"{self.name}_{quantity}({', '.join(given)});"
-        return f"void states_{quantity}({arguments}, {kind} *out, long n) {{ for (long i = 0; i < n; i++) {call} }}"
+        head = f"void states_{quantity}({arguments}, {kind} *out, long n)"
+        return f"{head} {{ for (long i = 0; i < n; i++) {call} }}"
 
     def call(self, quantity: str, states: States) -> tuple[Callable[[], None], Array]:
         """A call without arguments that evaluates all states, and its output (states, size)."""

@@ -24,16 +24,21 @@ NEEDS = {"c": HAS_C, "matlab": HAS_OCTAVE, "python": True, "latex": True}
 COUNT = 20
 
 
-@pytest.mark.parametrize("language", [name for name in ("c", "python", "matlab") if NEEDS[name]])
-def test_the_arm_in_a_language(language, tmp_path, capsys):
+@pytest.mark.parametrize("language, options", [
+    ("c", []), ("c", ["--float"]), ("python", []), ("matlab", ["--quantity", "mass_matrix,bias,jacobians"]),
+])  # fmt: skip
+def test_the_arm_in_a_language(language, options, tmp_path, capsys):
+    if not NEEDS[language]:
+        pytest.skip("no program runs it")
     out = tmp_path / "new" / "folder"
-    assert main(["equations", "--to", language, "--out", str(out)]) == 0
+    assert main(["equations", "--to", language, *options, "--out", str(out)]) == 0
     shown = capsys.readouterr().out
     assert {path.name for path in out.iterdir()} == {f"arm{ending}" for ending in FILES[language]}
     for path in out.iterdir():
         text = path.read_text(encoding="utf-8")
         assert "Checked at 1,000 random states" in text and "alpha, hinge, 0, 0" in text
-        assert len(re.findall(r"largest difference from MuJoCo", text)) == 3
+        assert len(re.findall(r"largest difference from MuJoCo", text)) >= 3
+        assert ("float out[3]" in text) == ("--float" in options)
     assert all(name in shown for name in ("mass_matrix", "bias", str(out)))
 
 
@@ -110,29 +115,6 @@ def test_what_is_judged_is_what_was_written(language, tmp_path):
         partial(PROGRAMS[language], tmp_path, "arm", tmt.ARM, quantities, False), *quantities
     )
     assert [row.passed for row in outcome.rows] == [True, False] and outcome.rows[0].operations > 10
-
-
-@pytest.mark.skipif(not HAS_OCTAVE, reason="no Octave")
-def test_arrays_of_matlab_are_stored_by_rows(tmp_path):
-    text = tmt.equations(tmt.ARM, "matlab", ["jacobians"], name="arm")
-    (tmp_path / "arm.m").write_text(text, encoding="utf-8")
-    make = partial(PROGRAMS["matlab"], tmp_path, "arm", tmt.ARM, ["jacobians"], False)
-    assert outcome_of(make, "jacobians").passed
-
-
-@pytest.mark.skipif(not HAS_C, reason="no C compiler")
-def test_single_precision_is_written_and_checked_at_all_states(tmp_path, monkeypatch):
-    asked = []
-
-    def values(self, quantity, states):
-        asked.append((len(states[0]), self.single))
-        return of_c(self, quantity, states)
-
-    of_c = PROGRAMS["c"].values
-    monkeypatch.setattr(PROGRAMS["c"], "values", values)
-    assert main(["equations", "--float", "--quantity", "bias", "--out", str(tmp_path / "out")]) == 0
-    assert asked == [(1000, True)]
-    assert all("float out[3]" in (tmp_path / "out" / f"arm.{e}").read_text(encoding="utf-8") for e in "ch")
 
 
 @pytest.mark.parametrize("name", QUANTITIES)

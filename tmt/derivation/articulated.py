@@ -1,17 +1,18 @@
-"""The sums of method.py regrouped for large trees: in world axes about one point, with articulated bodies; any scalar.
+"""The sums of method.py regrouped for large trees, in world axes about one point: articulated bodies.
 
-Frames are walked outward, in the axes of the world about a point O: the origin of the first joint that turns. A frame's motion at
-qdd = 0 is omega, omegad and the acceleration a of its point at O; another of its points, x, accelerates by a + P x,
-P = [omegad]x + [omega]x[omega]x. What a joint carries itself has mass m, first moment s and inertia J about O; moment and force
-about O are
+Frames are walked outward, in the axes of the world about a point O: the origin of the first joint that turns.
+A frame's motion at qdd = 0 is omega, omegad and the acceleration a of its point at O; another of its points,
+x, accelerates by a + P x, P = [omegad]x + [omega]x[omega]x. What a joint carries itself has mass m, first
+moment s and inertia J about O; moment and force about O are
 
     n = J omegad + omega x J omega + s x a        f = m a + P s.
 
-Forward dynamics, from the tips inward (articulated bodies: Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 7): a
-speed has the direction S = (axis, r x axis), of a slide (0, axis). It gives way to what acts along it: its parent meets
-I - U U'/D and p + U u/D, where I = [J H; H' M] and p = (n, f) are those of all that is carried, U = I S,
-D = S'U + armature, u = Q - S'p. Mbar, of composite bodies: a row is the moment and force of S along the directions inward.
-The number of operations of the accelerations grows with n, that of Mbar with n times the length of the paths to the world.
+Forward dynamics, from the tips inward (articulated bodies: Featherstone, Rigid Body Dynamics Algorithms,
+2008, chapter 7): a speed has the direction S = (axis, r x axis), of a slide (0, axis). It gives way to what
+acts along it: its parent meets I - U U'/D and p + U u/D, where I = [J H; H' M] and p = (n, f) are those of
+all that is carried, U = I S, D = S'U + armature, u = Q - S'p. Mbar, of composite bodies: a row is the moment
+and force of S along the directions inward. The number of operations of the accelerations grows with n, that
+of Mbar with n times the length of the paths to the world.
 """
 
 from typing import NamedTuple
@@ -66,7 +67,7 @@ class Frame(NamedTuple):
 
 
 class Carried(NamedTuple):
-    """What a joint carries, rigid or giving way: moment and force about O at qdd = 0, and its inertia [J H; H' M]."""
+    """What a joint carries, rigid or giving way: moment and force about O at qdd = 0, inertia [J H; H' M]."""
 
     n: Vector
     f: Vector
@@ -110,7 +111,7 @@ class Share(NamedTuple):
 def acceleration(
     tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armature: Scalars = ()
 ) -> list[Scalar]:
-    """qdd (nv,) from Mbar qdd = force - h; force: all but the bias (nv,); armature: in place of the tree's."""
+    """qdd (nv,) from Mbar qdd = force - h; force: all but the bias; armature: in place of the tree's."""
     frames, rigid = outward(tree, q, qd)
     armature = armature or tree.armature
     joints, bodies = tree.coordinates.joints, [body.carried for body in rigid]

@@ -1,15 +1,15 @@
 """The sums of method.py regrouped for speed: in the frames of the joints, from the tips of the tree inward.
 
-All that a joint carries is one mass distribution: mass m, first moment s and second moment S = integral of x x' dm about
-the origin of its frame. Where that origin accelerates by a and the frame turns with P = [omegad]x + [omega]x[omega]x, the
-point x accelerates by a + P x, and force and moment of the distribution are
+All that a joint carries is one mass distribution: mass m, first moment s and second moment S = integral of x
+x' dm about the origin of its frame. Where that origin accelerates by a and the frame turns with P = [omegad]x
++ [omega]x[omega]x, the point x accelerates by a + P x, and force and moment of the distribution are
 
     f = m a + P s        n = integral of x cross (a + P x) dm = vee(P S) + s cross a.
 
-Virtual power asks for the component of n along each axis only: h_i = axis_i . n_i, with f and n summed over all that joint
-i carries, gravity as an acceleration -g of the world; along a slide for that of f. Column i of Mbar is the same for
-omegad = axis_i (of a slide a = axis_i), all else 0, and the distribution of the whole subtree. These are the sums of the
-assignment's part e in another order.
+Virtual power asks for the component of n along each axis only: h_i = axis_i . n_i, with f and n summed over
+all that joint i carries, gravity as an acceleration -g of the world; along a slide for that of f. Column i of
+Mbar is the same for omegad = axis_i (of a slide a = axis_i), all else 0, and the distribution of the whole
+subtree. These are the sums of the assignment's part e in another order.
 """
 
 from collections.abc import Callable, Hashable
@@ -54,13 +54,13 @@ class Distribution(NamedTuple):
         return Matrix([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])
 
     def at_unit_acceleration(self, kind: str, axis: Vector) -> tuple[Vector, Vector]:
-        """Force and moment about the origin where a joint of this kind accelerates by 1 along or about its axis."""
+        """Force and moment about the origin where a joint accelerates by 1 along or about its axis."""
         if kind == "slide":
             return self.mass * axis, self.moment.cross(axis)
         return axis.cross(self.moment), self.inertia @ axis
 
     def on_line(self, axis: Vector) -> "Distribution":
-        """Its part on a line through the origin: a hinge about that line cannot tell to which side it belongs."""
+        """Its part on a line through the origin: a hinge about it cannot tell to which side that belongs."""
         along = self.moment.dot(axis)
         return Distribution(self.mass, axis * along, outer(axis, axis * axis.dot(self.second @ axis)))
 
@@ -116,9 +116,9 @@ def distribution_of(tree: AnyTree, body: int) -> Distribution:
 def carried_by_joint(tree: AnyTree) -> list[Distribution]:
     """The distribution that each joint carries itself, in exact fractions, as far inward as it can be handed.
 
-    What lies on a hinge's axis (its mass, first moment and second moment along it) acts the same if it belongs to the
-    parent, and so does the mass at a ball's centre, or the second moment alone of what slides. So it is handed over: many
-    numbers of the outer bodies become zeros, and what reaches the world drops out.
+    What lies on a hinge's axis (its mass, first moment and second moment along it) acts the same if it
+    belongs to the parent, and so does the mass at a ball's centre, or the second moment alone of what slides.
+    So it is handed over: many numbers of the outer bodies become zeros, and what reaches the world drops out.
     """
     joints = tree.coordinates.joints
     own = [NOTHING] * len(joints)
@@ -148,7 +148,7 @@ class Motion(NamedTuple):
 
 
 def motions(tree: AnyTree, placements: list[tuple[Vector, Matrix]], qd: Scalars) -> list[Motion]:
-    """The motions of the joints' frames, walked outward; placements: origin and turn of each in its parent's."""
+    """The motions of the joints' frames; placements: origin and turn of each in its parent's."""
     result: list[Motion] = []
     for i, (joint, (offset, turn)) in enumerate(zip(tree.coordinates.joints, placements)):
         a, omega, omegad = Vector(*tree.gravity) * -1.0, ZERO, ZERO
@@ -171,8 +171,8 @@ def mass_matrix_and_bias(
 ) -> tuple[list[list[Scalar]], list[Scalar]]:
     """Mbar (nv rows of nv, kg m2) and h (nv, N m), as in method.py; over any scalar.
 
-    q (nq), qd (nv): sequences of scalars, rad and rad/s. number: the type of the model's numbers, float or mpmath.mpf; each
-    is the exact value, rounded once.
+    q (nq), qd (nv): sequences of scalars, rad and rad/s. number: the type of the model's numbers, float or
+    mpmath.mpf; each is the exact value, rounded once.
     """
     n, joints = len(tree.axis), tree.coordinates.joints
     axes = [Vector(*axis) for axis in tree.axis]
@@ -185,7 +185,8 @@ def mass_matrix_and_bias(
         """That of a force and a moment along or about the axis of a speed."""
         return axes[k].dot(force if kind == "slide" else moment)
 
-    # inward: force and moment on all that a joint carries, and its mass; what is even about a hinge is not turned
+    # inward: force and moment on all that a joint carries, and its mass
+    # what is even about a hinge is not turned
     h: list[Scalar] = [0.0] * n
     M: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
     forces, moments, moving = [ZERO] * len(joints), [ZERO] * len(joints), motions(tree, placements, qd)
@@ -220,7 +221,7 @@ def mass_matrix_and_bias(
 def rounded_once(
     tree: AnyTree, number: Callable[..., Scalar]
 ) -> tuple[list[Distribution], list[Distribution], list[Distribution]]:
-    """What each joint carries itself, and the part of it that is not even about a hinge, and the part that is."""
+    """What each joint carries itself, its part that is not even about a hinge, and the part that is."""
     exact = carried_by_joint(tree)
     even = [NOTHING] * len(exact)
     for i, joint in enumerate(tree.coordinates.joints):

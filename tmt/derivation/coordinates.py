@@ -1,12 +1,14 @@
 """Where the position and the speeds of each joint stand in q and qd, and how positions move; over any scalar.
 
-A hinge has an angle and its rate, a slide a length and its rate. A ball has a quaternion (w, x, y, z), which turns components
-in its own frame to components in that of its parent, and three speeds: its angular velocity in its own frame. So q has nq
-numbers and qd has nv. A movement u is as a speed that acts for a unit of time: nv numbers.
+A hinge has an angle and its rate, a slide a length and its rate. A ball has a quaternion (w, x, y, z), which
+turns components in its own frame to components in that of its parent, and three speeds: its angular velocity
+in its own frame. So q has nq numbers and qd has nv. A movement u is as a speed that acts for a unit of time:
+nv numbers.
 
-For a ball the position after a movement is p o exp(u / 2), o being the product of quaternions. Along a motion that starts at
-p, u changes by ud = dexp^-1(u) omega (Hairer, Lubich, Wanner, Geometric Numerical Integration, IV.8), here for u that turns
-with the body: omega + u x omega / 2 + c u x (u x omega), c = (1 - (s / 2) cot(s / 2)) / s^2, s = |u|.
+For a ball the position after a movement is p o exp(u / 2), o being the product of quaternions. Along a motion
+that starts at p, u changes by ud = dexp^-1(u) omega (Hairer, Lubich, Wanner, Geometric Numerical Integration,
+IV.8), here for u that turns with the body: omega + u x omega / 2 + c u x (u x omega), c = (1 - (s / 2) cot(s
+/ 2)) / s^2, s = |u|.
 """
 
 from functools import lru_cache
@@ -21,7 +23,7 @@ TINY = 1e-300  # under a root: its own square root is far below any rounding, an
 
 
 class Flat:
-    """Coordinates of any number of hinges and slides: positions move like numbers, and speeds are their rates."""
+    """Coordinates of hinges and slides: positions move like numbers, and speeds are their rates."""
 
     balls: tuple["Joint", ...] = ()
 
@@ -88,7 +90,7 @@ class Coordinates(NamedTuple):
 
     @property
     def first_positions(self) -> list[int]:
-        """For each speed (nv,) the number in q of its joint's first position: of a hinge or slide its only one."""
+        """For each speed (nv,) the number in q of its joint's first position: the only one of a hinge."""
         return [joint.q.start for joint in self.joints for _ in joint.speeds]
 
     def move(self, q: Scalars, u: Scalars) -> list[Scalar]:

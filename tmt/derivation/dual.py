@@ -1,8 +1,8 @@
 """A scalar that carries its derivative: exact derivatives over any other scalar.
 
-The slope may be an array of more dimensions than the value: derivatives in many directions at once. Dual numbers may
-be nested (a derivative inside a step that is itself differentiated): each differentiation has a level of its own, and
-a number of another level is a constant to it.
+The slope may be an array of more dimensions than the value: derivatives in many directions at once. Dual
+numbers may be nested (a derivative inside a step that is itself differentiated): each differentiation has a
+level of its own, and a number of another level is a constant to it.
 """
 
 from collections.abc import Callable, Iterable, Sequence

@@ -12,11 +12,12 @@ Mbar qdd = Qbar with
     Qbar = tau - D qd - k (q - rest) - P q - S qd - h
     h    = sum_b T_b' (m_b v_conv - f_b) + B_b' (I_b w_conv + omega_b x I_b omega_b),  f_b = m_b gravity
 
-(assignment, part e; its h_b and g_b are v_conv and w_conv here). h is MuJoCo's qfrc_bias, D the joint damping, k the
-stiffness of springs at the joints, P and S the gains of a linear controller (position_gain and speed_gain of a Tree);
-armature is added to Mbar's diagonal. The arm has neither springs nor armature nor gains. Scalars may be floats, NumPy
-arrays (one element per state), complex numbers, mpmath numbers, traced or symbolic expressions; q is a sequence of nq
-of them, qd and tau of nv. Vectors are in the inertial frame unless they are said to be in body axes.
+(assignment, part e; its h_b and g_b are v_conv and w_conv here). h is MuJoCo's qfrc_bias, D the joint
+damping, k the stiffness of springs at the joints, P and S the gains of a linear controller (position_gain and
+speed_gain of a Tree); armature is added to Mbar's diagonal. The arm has neither springs nor armature nor
+gains. Scalars may be floats, NumPy arrays (one element per state), complex numbers, mpmath numbers, traced or
+symbolic expressions; q is a sequence of nq of them, qd and tau of nv. Vectors are in the inertial frame
+unless they are said to be in body axes.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -43,7 +44,7 @@ class Frame(NamedTuple):
     omega_conv: Vector  # angular acceleration at qdd = 0, rad/s2
 
     def column(self, axis: Vector, point: Vector, to_body: Matrix) -> tuple[Vector, Vector]:
-        """Velocity of a point (inertial axes) and angular velocity (body axes) for a unit speed of one of its axes."""
+        """Velocity of a point (inertial axes), angular velocity (body axes) for a unit speed of an axis."""
         if self.slides:
             return axis, ZERO
         return axis.cross(point - self.origin), to_body @ axis
@@ -163,14 +164,14 @@ def from_rest(tree: AnyTree, q: Scalars) -> list[tuple[Scalar, Scalar]]:
 
 
 def spring_torque(tree: AnyTree, q: Scalars) -> list[Scalar]:
-    """k (q - rest) (nv, N m or N), which springs take off the force; of a ball k times the movement from its rest."""
+    """k (q - rest) (nv, N m or N), which springs take off; of a ball k times the movement from its rest."""
     if not tree.has_springs:
         return [0.0] * len(tree.axis)
     return [stiffness * x for stiffness, x in from_rest(tree, q)]
 
 
 def fed_back(tree: AnyTree, q: Scalars, qd: Scalars) -> list[Scalar]:
-    """P q + S qd (nv, N m or N), which a linear controller takes off the force; no entry of P is that of a ball."""
+    """P q + S qd (nv, N m or N), which a linear controller takes off; no entry of P is that of a ball."""
     positions = [q[i] for i in tree.coordinates.first_positions]
     terms: list[list[Scalar]] = [[] for _ in qd]
     for gain, values in ((tree.position_gain, positions), (tree.speed_gain, qd)):

@@ -1,7 +1,7 @@
-"""Every quantity of a state, in one table: what it takes, its shape and unit, and how it follows from the bodies; any scalar.
+"""Every quantity of a state, in one table: what it takes, its shape and unit, how it follows from the bodies.
 
-The literal form (literal.py), the compiled one (compiled/evaluator.py) and the truth in many digits (exact/values.py) are all
-served from it.
+The literal form (literal.py), the compiled one (compiled/evaluator.py) and the truth in many digits
+(exact/values.py) are all served from it.
 """
 
 from collections.abc import Callable
@@ -81,7 +81,8 @@ QUANTITIES = {
     ),
     "convective_terms": Quantity(
         QD, (2, "m", 3), "m/s2; rad/s2",
-        lambda s: [[list(b.v_conv) for b in s.bodies], [list(b.w_conv) for b in s.bodies]], ("v_conv", "w_conv"),
+        lambda s: [[list(b.v_conv) for b in s.bodies], [list(b.w_conv) for b in s.bodies]],
+        ("v_conv", "w_conv"),
     ),
     "mass_matrix": Quantity(Q, ("nv", "nv"), "kg m2", lambda s: s.mass_matrix),
     "bias": Quantity(QD, ("nv",), "N m", lambda s: s.bias),

@@ -1,7 +1,7 @@
 """Vectors and rotations over any scalar: float, array, mpf, traced or symbolic.
 
-A scalar is anything with + - * / that `sin` and `cos` know, and for ball joints `sqrt` and `arctan`. A new scalar type
-registers itself with `sin.register` and so on; nothing else has to change.
+A scalar is anything with + - * / that `sin` and `cos` know, and for ball joints `sqrt` and `arctan`. A new
+scalar type registers itself with `sin.register` and so on; nothing else has to change.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -138,7 +138,7 @@ def rotation(axis: Iterable[Scalar], angle: Scalar) -> Matrix:
 
 
 def turn_of(quaternion: Iterable[Scalar]) -> Matrix:
-    """Matrix that turns as a quaternion (w, x, y, z) of any length: R = 1 + 2 (w [v]x + [v]x [v]x) / (p . p)."""
+    """Matrix that turns as a quaternion p = (w, v) of any length: R = 1 + 2 (w [v]x + [v]x [v]x) / p.p."""
     w, x, y, z = quaternion
     scale = 2.0 / (w * w + x * x + y * y + z * z)
     a, b, c = x * scale, y * scale, z * scale
@@ -153,8 +153,9 @@ def turn_of(quaternion: Iterable[Scalar]) -> Matrix:
 def solve(matrix: Sequence[Scalars], right: Scalars) -> list[Scalar]:
     """Solution x of `matrix` x = `right`, for a symmetric positive definite matrix given by rows.
 
-    Factorised as U D U' from the last row to the first, without square roots or pivots (none are needed: it is positive
-    definite). In that order a joint meets only its ancestors: zeros between branches stay zeros, as in MuJoCo.
+    Factorised as U D U' from the last row to the first, without square roots or pivots (none are needed: it
+    is positive definite). In that order a joint meets only its ancestors: zeros between branches stay zeros,
+    as in MuJoCo.
     """
     n = len(right)
     scaled: list[list[Scalar]] = [[None] * n for _ in range(n)]  # U D

@@ -30,10 +30,12 @@ UNITS = {
     "ball": "quaternion w x y z, rad/s in its own axes, N m",
 }
 # names that a file could not have: words of C, C++ and MATLAB, functions and modules that the files use
-WORDS = """auto bool break case catch char class const continue default delete do double else elseif end enum extern float for
-friend function global goto if inline int long namespace new operator otherwise parfor persistent private public register restrict
-return short signed sizeof spmd static struct switch template this throw try typedef typename union unsigned using virtual void
-volatile while main arrays sin cos sqrt atan size zeros permute reshape assert error math numpy sympy"""
+WORDS = """\
+auto bool break case catch char class const continue default delete do double else elseif end enum extern
+float for friend function global goto if inline int long namespace new operator otherwise parfor persistent
+private public register restrict return short signed sizeof spmd static struct switch template this throw try
+typedef typename union unsigned using virtual void volatile while main arrays sin cos sqrt atan size zeros
+permute reshape assert error math numpy sympy"""
 CONVENTIONS = """\
 M(q) qdd + h(q, qd) = tau - D qd - k (q - rest) - P q - S qd, by the TMT method; Mbar is M, with armature.
 h: bias, MuJoCo's qfrc_bias: Coriolis, centrifugal and gravity terms. D: damping, k and rest: springs of the joints,

@@ -73,7 +73,7 @@ def beside(h: Expression, gravity: Expression, i: int, display: Mapping[Expressi
 
 
 def tokens(expression: Expression, display: Mapping[Expression, str]) -> Formula:
-    """A formula as a list, its factors in the order of textbooks; brackets are tokens too, so that a line may break in them."""
+    """A formula, its factors in the order of textbooks; brackets are tokens: a line may break in them."""
     if expression.is_Add or is_negative(expression):
         return sum_of(expression.args if expression.is_Add else [expression], display)
     if expression.is_Mul:
@@ -146,7 +146,7 @@ def width(formula: Formula) -> int:
 
 
 def tables(symbolic: Symbolic) -> list[list[tuple[str, ...]]]:
-    """Rows of the joints, what each symbol is, and of the parameters, with value, unit and meaning; none that is empty."""
+    """Rows of joints (symbol, meaning), and of parameters (symbol, value, unit, meaning); no empty table."""
     joints: list[tuple[str, ...]] = [
         (symbolic.display[q], text) for q, text in zip(symbolic.q, symbolic.joints)
     ]

@@ -9,7 +9,10 @@ SYNTAX = Syntax(
     times=".*",
     over="./",
 )
-STATES = "States are columns: q (nq, N), qd and tau (nv, N). The last dimension of each result is that of the states."
+STATES = (
+    "States are columns: q (nq, N), qd and tau (nv, N). "
+    "The last dimension of each result is that of the states."
+)
 
 
 def source(program: Program) -> str:

@@ -31,10 +31,12 @@ class Parameter(NamedTuple):
 
 
 class Names:
-    """Symbols of a Tree's joints and numbers; `parameters`, {symbol: Parameter}, is {} where numbers are not `named`.
+    """Symbols of a Tree's joints and numbers.
 
-    Masses, centres of mass and inertias are named after their body, armatures after their joint, offsets l_1, l_2 and so on.
-    display: {symbol: LaTeX}, with the number of the body or joint in place of its name. joints: what each q is, in words.
+    parameters: {symbol: Parameter}, {} where numbers are not `named`.
+    Masses, centres of mass and inertias are named after their body, armatures after their joint, offsets l_1,
+    l_2 and so on. display: {symbol: LaTeX}, with the number of the body or joint in place of its name.
+    joints: what each q is, in words.
     """
 
     def __init__(self, tree: Tree, named: bool):
@@ -163,7 +165,7 @@ def identifiers(names: Iterable[str]) -> list[str]:
 
 
 def meant(value: float) -> float:
-    """The number of at most 10 digits that a double was before it was rounded a few times, else the double."""
+    """The number of at most 10 digits that a double was before a few roundings, else the double."""
     short = float(f"{value:.10g}")
     return short if abs(short - value) <= ROUND * abs(value) else value
 

@@ -1,4 +1,4 @@
-"""The shortest form of a polynomial of trigonometry.py as a SymPy expression: the one that a textbook would print."""
+"""The shortest form of a polynomial of trigonometry.py as a SymPy expression: that of a textbook."""
 
 import itertools
 from collections import Counter, defaultdict
@@ -20,8 +20,8 @@ Harmonics = dict[tuple[bool, tuple[int, ...]], Scalar]  # {(is_sine, k): number}
 class Forms:
     """Expressions of polynomials of a Ring.
 
-    Masses and speeds are taken out of sums, other symbols where all terms have them. angles: SymPy expressions.
-    parallel: {i: (j, sign)} where hinge i turns on hinge j about sign times its axis.
+    Masses and speeds are taken out of sums, other symbols where all terms have them. angles: SymPy
+    expressions. parallel: {i: (j, sign)} where hinge i turns on hinge j about sign times its axis.
     """
 
     def __init__(self, ring: Ring, names: Names, angles: Sequence[Expression], parallel: Parallel):
@@ -61,7 +61,7 @@ class Forms:
         return self.found[poly]
 
     def candidates(self, poly: Polynomial) -> Iterator[Expression]:
-        """Forms of a polynomial in sines and cosines: of the angles, of sums of parallel hinges' angles, and its harmonics."""
+        """Forms of a polynomial in sines and cosines: in angles, sums of parallel hinges' angles, waves."""
         few, harmonics = len(poly) <= FEW_TERMS, self.harmonics(poly)
         spaces = [(poly, self.angles)]
         if self.parallel:
@@ -122,7 +122,7 @@ class Forms:
         return {harmonic: number for harmonic, number in result.items() if abs(number) > least}
 
     def waves(self, sines: int, cosines: int) -> dict[int, Scalar]:
-        """(i sin q)^sines (cos q)^cosines as {k: the factor of exp(i k q)}: 2 i sin q = z - 1/z, 2 cos q = z + 1/z."""
+        """(i sin q)^sines (cos q)^cosines as {k: factor of z^k}: 2 i sin q = z - 1/z, 2 cos q = z + 1/z."""
         waves: dict[int, Scalar] = {0: self.ring.ring.domain.one}
         for sign in [-1] * sines + [1] * cosines:
             turned: dict[int, Scalar] = Counter()
@@ -189,7 +189,7 @@ def term(number: Expression, form: Expression, symbols: Mapping[Expression, Expr
 
 
 def grouped(terms: list[Term], first: Collection[Expression], last: Collection[Expression]) -> Expression:
-    """The sum of terms, a factor that several of them have taken out: of `first` if possible, of `last` only if all have it."""
+    """The sum of terms, common factors taken out: of `first` if possible, of `last` only if all have it."""
     from sympy import Add, Mul
 
     counts = Counter(factor for _, factors in terms for factor in factors.items())
@@ -213,7 +213,7 @@ def grouped(terms: list[Term], first: Collection[Expression], last: Collection[E
 
 
 def content(numbers: Sequence[Expression]) -> Expression:
-    """What is taken out of a sum with these coefficients: their common divisor, with the sign of most of them."""
+    """What is taken out of a sum with these coefficients: their divisor, with the sign of most of them."""
     from sympy import Integer, gcd
 
     size = reduce(gcd, numbers) if all(number.is_Rational for number in numbers) else Integer(1)

@@ -1,4 +1,4 @@
-"""A traced function as assignments in a programming language: one for each value that is used twice or is long."""
+"""A traced function as assignments in a language: one for each value that is used twice or is long."""
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
@@ -74,7 +74,7 @@ def statements(function: Function, syntax: Syntax) -> tuple[list[str], list[str]
 
 
 class Writer:
-    """The assignments of a traced function, and the expressions of its results; `inputs` are the expressions of its inputs."""
+    """The assignments of a traced function, and the expressions of its results, from those of its inputs."""
 
     def __init__(self, traced: Traced, inputs: Sequence[str], syntax: Syntax):
         self.tape, self.syntax = traced.tape, syntax

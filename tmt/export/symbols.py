@@ -1,4 +1,4 @@
-"""Mbar, h and gravity of a Tree as SymPy expressions: the method of tmt.derivation over polynomials, with named parameters."""
+"""Mbar, h and gravity of a Tree as SymPy expressions: the method over polynomials in named parameters."""
 
 import operator
 import time
@@ -26,9 +26,10 @@ NOISE = 1e-16  # of the largest coefficient of an entry: left over where terms c
 class Symbolic(NamedTuple):
     """Equations of a Tree in SymPy.
 
-    q, qd: symbols of the joints and their speeds, in order. joint_names: as the Tree has them. joints: what each q is, in words.
-    parameters: {symbol: (value, unit, meaning)}; {} where all numbers are in the expressions, then `named` is False.
-    entries: {quantity: Matrix}. display: {symbol: LaTeX}. note: "", or why parameters have no names.
+    q, qd: symbols of the joints and their speeds, in order. joint_names: as the Tree has them. joints: what
+    each q is, in words. parameters: {symbol: (value, unit, meaning)}; {} where all numbers are in the
+    expressions, then `named` is False. entries: {quantity: Matrix}. display: {symbol: LaTeX}. note: "", or
+    why parameters have no names.
     """
 
     q: list[Expression]
@@ -47,8 +48,9 @@ def symbolic(
 ) -> Symbolic:
     """Mbar, h and the torque that balances gravity of a Tree of hinges and slides, simplified.
 
-    quantities: some of QUANTITIES. seconds: the time that it may take; parameters that have no names by half of it are numbers.
-    Raises ValueError for a ball, an unknown quantity, without SymPy, and where it takes longer.
+    quantities: some of QUANTITIES. seconds: the time that it may take; parameters that have no names by half
+    of it are numbers. Raises ValueError for a ball, an unknown quantity, without SymPy, and where it takes
+    longer.
     """
     try:
         import sympy  # noqa: F401
@@ -144,7 +146,7 @@ def coriolis(
 
 
 def parallel_hinges(tree: Tree) -> dict[int, tuple[int, int]]:
-    """{i: (j, sign)} of hinges i that turn, with no other hinge between them, on hinge j about sign times its axis."""
+    """{i: (j, sign)} of hinges i that turn on hinge j, the next one inward, about sign times its axis."""
     found = {}
     for i, kind in enumerate(tree.kind):
         j = tree.parent[i]
@@ -157,10 +159,10 @@ def parallel_hinges(tree: Tree) -> dict[int, tuple[int, int]]:
 
 
 def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
-    """Python text with SymPy: symbols, `parameters` {symbol: value}, matrices M, h and G, and mass_matrix, bias and gravity.
+    """Python text with SymPy: symbols, `parameters` {symbol: value}, matrices M, h and G.
 
-    These are pairs of a matrix with numbers and the list of its symbols, as compare.assert_agrees and --reference take them.
-    head_lines: lines of text, which become comments.
+    mass_matrix, bias and gravity are pairs of a matrix with numbers and the list of its symbols, as
+    compare.assert_agrees and --reference take them. head_lines: lines of text, which become comments.
     """
     from sympy.printing.str import StrPrinter
 

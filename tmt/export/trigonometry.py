@@ -1,4 +1,4 @@
-"""Polynomials in sines and cosines as scalars of the method, reduced by sin^2 = 1 - cos^2: those of equal functions are equal."""
+"""Polynomials in sines and cosines as scalars, reduced by sin^2 = 1 - cos^2: equal functions are equal."""
 
 import time
 from collections.abc import Iterable, Sequence
@@ -22,9 +22,10 @@ class TooLong(Exception):
 
 
 class Ring:
-    """Polynomials in SymPy symbols and in the sines and cosines of n angles, until a deadline (of time.monotonic).
+    """Polynomials in SymPy symbols and in sines and cosines of n angles, until a deadline (time.monotonic).
 
-    exact: whether coefficients are rational; else they have PRECISION bits. functions: the ring of sines and cosines alone.
+    exact: whether coefficients are rational; else they have PRECISION bits. functions: the ring of sines and
+    cosines alone.
     """
 
     def __init__(self, symbols: Sequence[Expression], n: int, exact: bool, deadline: float):
@@ -51,7 +52,7 @@ class Ring:
         return Angle(*(Trig(self, self.ring.gens[place]) for place in self.pairs[i]))
 
     def reduced(self, poly: Polynomial, pairs: Iterable[tuple[int, int]]) -> Polynomial:
-        """The polynomial with squares of the first generator of each pair replaced by 1 - the square of the second."""
+        """The polynomial with squares of each pair's first generator replaced by 1 - that of the second."""
         for first, second in pairs:
             if any(monomial[first] > 1 for monomial in poly):
                 low, high, cosine = poly.ring.zero, poly.ring.zero, poly.ring.gens[second]

@@ -23,7 +23,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def quantity(function: Function) -> Function:
-    """The function without NumPy's warnings, which no caller can place; what does not fit into memory is a ValueError."""
+    """The function without NumPy's warnings, which no caller can place; ValueError where memory is short."""
 
     @functools.wraps(function)
     def evaluated(*arguments: Any, **named: Any) -> Any:
@@ -114,7 +114,7 @@ def whole(name: str, value: Any) -> int:
 
 
 def paths(runs: int, steps: int, every: int, nq: int, nv: int) -> tuple[Array, Array]:
-    """Arrays for the q and qd of all runs, (runs, steps / every + 1, nq or nv); ValueError if there is no memory for them."""
+    """Arrays for q and qd of all runs, (runs, steps / every + 1, nq or nv); ValueError without memory."""
     records = steps // every + 1
     size = runs * records * (nq + nv) * 8
     try:
@@ -124,8 +124,8 @@ def paths(runs: int, steps: int, every: int, nq: int, nv: int) -> tuple[Array, A
     except MemoryError:
         needed = f"{size / 1e9:.3g} GB" if size < 10**100 else "more than 1e+100 B"
         raise ValueError(
-            f"steps is {shown(steps)}: with {nq} positions and {nv} speeds the states of {runs} runs would take "
-            f"{needed} of memory, more than there is; with every=k each k-th of them is kept"
+            f"steps is {shown(steps)}: with {nq} positions and {nv} speeds the states of {runs} runs would "
+            f"take {needed} of memory, more than there is; with every=k each k-th of them is kept"
         ) from None
 
 

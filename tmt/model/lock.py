@@ -110,17 +110,16 @@ def chosen(values: Sequence[Value], places: Sequence[int]) -> tuple[Value, ...]:
 
 
 def _refuse_fed_back(tree: Tree, locked_names: Any, q: Sequence[float]) -> None:
-    """Raise ValueError if the position of a locked joint makes a torque at a free one: a Tree has no place for it."""
+    """Raise ValueError if a locked joint's position makes a torque at a free one: no Tree has that."""
     joints = dict(zip(tree.joint_names, tree.coordinates.joints))
     for name in locked_names if tree.position_gain else ():
         position = q[joints[name].q.start]
         for other, joint in joints.items():
             gains = [tree.position_gain[k][joints[name].qd.start] for k in joint.speeds]
             if other not in locked_names and position and any(gains):
-                raise ValueError(
-                    f"{name!r} cannot be locked at {shown(position)}: its position makes a torque at {other!r} "
-                    "(position_gain); a joint that is fed back to itself alone, or 0, is expected"
-                )
+                torque = f"its position makes a torque at {other!r} (position_gain)"
+                expected = "a joint that is fed back to itself alone, or 0, is expected"
+                raise ValueError(f"{name!r} cannot be locked at {shown(position)}: {torque}; {expected}")
 
 
 def _fixed(tree: Tree, i: int, q: Sequence[float]) -> tuple[Vector, Matrix]:

@@ -1,7 +1,7 @@
 """Where Mbar is singular: joints that move without moving any mass, alone or against each other.
 
-What counts is Mbar in units of the largest value that each of its diagonal entries can have: an eigenvalue of that which is
-no larger than its rounding is zero.
+What counts is Mbar in units of the largest value that each of its diagonal entries can have: an eigenvalue of
+that which is no larger than its rounding is zero.
 """
 
 import math
@@ -23,7 +23,7 @@ APART = 1e-3  # sine of the angle between two axes that are clearly not parallel
 
 
 def scales(tree: Mechanism[float]) -> Array:
-    """The largest value of each Mbar_ii, kg m2, (nv,): with all that the joint carries stretched out, slides by 1 m."""
+    """The largest value of each Mbar_ii, kg m2, (nv,): all that is carried stretched out, slides by 1 m."""
     sums = np.array(tree.armature)
     for mass, com, inertia, carrier in zip(tree.mass, tree.com, tree.inertia, tree.body_joint):
         reach, spread = math.hypot(*com), sum(abs(inertia[i][i]) for i in range(3))
@@ -38,10 +38,11 @@ def scales(tree: Mechanism[float]) -> Array:
 def never(tree: Mechanism[float]) -> bool:
     """Whether Mbar is regular at every q, by an argument from the tips inward: False may also mean unknown.
 
-    A joint whose own rotor has inertia is at rest if nothing moves. A body with inertia about every axis is at rest only if
-    it does not turn; and it does not turn only if none of the hinges and balls does that move it and not yet another such
-    body, if those are one joint, or two hinges in a row that are not parallel. If it does not turn, its mass is at rest only
-    if none of the slides moves that move it, if those are in a row and none of their directions follows from the others.
+    A joint whose own rotor has inertia is at rest if nothing moves. A body with inertia about every axis is
+    at rest only if it does not turn; and it does not turn only if none of the hinges and balls does that move
+    it and not yet another such body, if those are one joint, or two hinges in a row that are not parallel. If
+    it does not turn, its mass is at rest only if none of the slides moves that move it, if those are in a row
+    and none of their directions follows from the others.
     """
     size, joints = scales(tree), tree.coordinates.joints
     first_speed = [joint.qd.start for joint in joints]
@@ -79,7 +80,7 @@ def _turn_alone(tree: Mechanism[float], turning: list[int]) -> bool:
 
 
 def mass_matrices(tree: Mechanism[float], q: Array) -> Array:
-    """Mbar at positions q (N, nq): (N, nv, nv), in time that grows less with n than that of the method's own sums."""
+    """Mbar at positions q (N, nq): (N, nv, nv), in time that grows less with n than that of method.py."""
     count, n = len(q), len(tree.axis)
     total = np.zeros((count, n, n)) + np.diag(tree.armature)
     for body in method.bodies(tree, list(q.T)):
@@ -95,7 +96,7 @@ def mass_matrices(tree: Mechanism[float], q: Array) -> Array:
 
 
 def found(tree: Mechanism[float], M: Array) -> NDArray[np.bool_]:
-    """Which joints move without moving mass at each state of Mbar (..., nv, nv): (..., n) of bool, none where it is regular."""
+    """Which joints move without moving mass, (..., n), for Mbar (..., nv, nv): none where it is regular."""
     root = np.sqrt(scales(tree))
     values, vectors = np.linalg.eigh(M / np.multiply.outer(root, root))
     moving = np.abs(vectors[..., 0]) / root

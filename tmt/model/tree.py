@@ -28,12 +28,14 @@ NAMES_SHOWN = 60  # characters
 @accepts_former_names({"hinge_names": "joint_names", "body_hinge": "body_joint"})
 @dataclass(frozen=True)
 class Tree(Mechanism[float]):
-    """A tree of n joints and m rigid bodies; at their reference positions every frame is parallel to the inertial frame.
+    """A tree of n joints and m rigid bodies.
 
-    A joint is a hinge, a slide or a ball; a free joint is three slides and a ball. Each has a frame that moves with it, with
-    its origin on the axis of a hinge, at the centre of a ball. Several joints in one body are joints in a row with no body
-    between them. There are nv speeds, one of a hinge or slide and three of a ball, and nq numbers in a position: see
-    coordinates.py. All fields are nested tuples; arrays and lists are converted.
+    At the reference positions of the joints every frame is parallel to the inertial frame.
+    A joint is a hinge, a slide or a ball; a free joint is three slides and a ball. Each has a frame that
+    moves with it, with its origin on the axis of a hinge, at the centre of a ball. Several joints in one body
+    are joints in a row with no body between them. There are nv speeds, one of a hinge or slide and three of a
+    ball, and nq numbers in a position: see coordinates.py. All fields are nested tuples; arrays and lists are
+    converted.
 
     Parameters
     ----------
@@ -68,7 +70,8 @@ class Tree(Mechanism[float]):
     reference : (n,), rad or m, optional
         Where the joint leaves frames parallel; 0 for a ball.
     position_gain, speed_gain : (nv, nv), N m/rad or N/m, and N m s/rad or N s/m, optional
-        Of a linear controller of hinges and slides: torque = tau - position_gain @ q - speed_gain @ qd, q as it stands.
+        Of a linear controller of hinges and slides: torque = tau - position_gain @ q - speed_gain @ qd, q as
+        it stands.
 
     Raises
     ------
@@ -79,8 +82,8 @@ class Tree(Mechanism[float]):
     --------
     >>> pendulum = tmt.Tree(
     ...     joint_names=["hip"], parent=[-1], offset=[(0, 0, 0)], axis=[(0, 1, 0)], damping=[0.1],
-    ...     body_names=["rod"], body_joint=[0], mass=[1.0], com=[(0, 0, -0.5)], inertia=[np.diag([0.1, 0.1, 0.01])],
-    ...     gravity=(0, 0, -9.81),
+    ...     body_names=["rod"], body_joint=[0], mass=[1.0], com=[(0, 0, -0.5)],
+    ...     inertia=[np.diag([0.1, 0.1, 0.01])], gravity=(0, 0, -9.81),
     ... )
     >>> print(tmt.mass_matrix([0.0], pendulum))  # 0.1 + 1 kg (0.5 m)^2
     [[0.35]]
@@ -147,8 +150,9 @@ class Tree(Mechanism[float]):
     def lock(self, angles: Mapping[str, ArrayLike]) -> Tree:
         """The tree without the joints that are named in `angles`: they stay there, at rest.
 
-        What hangs on a locked joint is carried by the joint before it, its vectors turned so that all frames are again parallel
-        to the inertial frame where the free joints are at their reference. A joint locked there rounds nothing.
+        What hangs on a locked joint is carried by the joint before it, its vectors turned so that all frames
+        are again parallel to the inertial frame where the free joints are at their reference. A joint locked
+        there rounds nothing.
 
         Parameters
         ----------
@@ -163,8 +167,8 @@ class Tree(Mechanism[float]):
         Raises
         ------
         ValueError
-            For an unknown joint, a position that is none, if no joint is left, or if a controller takes the position of a
-            locked joint for the torque at a free one.
+            For an unknown joint, a position that is none, if no joint is left, or if a controller takes the
+            position of a locked joint for the torque at a free one.
 
         Examples
         --------

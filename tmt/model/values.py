@@ -16,7 +16,7 @@ def shown(value: Any) -> str:
 
 
 def real_numbers(values: Any) -> NDArray[np.float64] | None:
-    """The values as an array of float, None if they are anything else but real numbers: truth values, masked ones, text."""
+    """The values as an array of float; None for what are no real numbers: truth values, masked ones, text."""
     try:
         if _masked(values):
             return None
