@@ -19,7 +19,7 @@ from .trace import LEAVES, Expression, Tape
 
 LONGEST = 1_000  # nodes of one function
 OF_ONE = ("solution", "bias_rates")  # functions of linear.py, which take one state
-OPERATIONS = {
+OPERATIONS: dict[str, Callable[..., Any]] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
