@@ -121,7 +121,7 @@ def simulate(
         raise ValueError(f"{sizes}; their product is beyond the largest double")
     path_q[:, 0], path_qd[:, 0], torque = start
     if taylor:
-        ended, evaluations = by_series(model, path_q, path_qd, torque, dt, steps, every, tolerance)
+        ended, evaluations = by_series(model, path_q, path_qd, torque, dt, every, tolerance)
     else:
         codes, evaluations = runner.follow(path_q, path_qd, torque, dt, tolerance, every)
 
@@ -153,19 +153,12 @@ def starts(model: Tree, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
 
 
 def by_series(
-    tree: Tree,
-    q: np.ndarray,
-    qd: np.ndarray,
-    tau: np.ndarray,
-    dt: float,
-    steps: int,
-    every: int,
-    tolerance: float,
+    tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, every: int, tolerance: float
 ) -> tuple[np.ndarray, int]:
     """Write the true motions to the paths (runs, records, nq and nv), which hold the starts: why each ended, and the steps."""
     from tmt.exact.motion import followed  # here, so that `import tmt` need not wait for it
 
-    ended, count = np.full(len(q), None, dtype=object), 0
+    ended, count, steps = np.full(len(q), None, dtype=object), 0, (q.shape[1] - 1) * every
     for run in range(len(q)):
         start = q[run, 0], qd[run, 0], tau[run]
         path, series, error = followed(tree, *start, dt, steps, every, tolerance=tolerance)

@@ -46,9 +46,8 @@ def compiled(traced):
     code = Code("f", {"in": POINTER, "out": POINTER})
     code.call(traced.name, code["in"], code["out"])
     code.give_back()
-    function = Library(module([*functions(traced, 1), code])).function(
-        "f", None, ctypes.c_void_p, ctypes.c_void_p
-    )
+    library = Library(module([*functions(traced, 1), code]))
+    function = library.function("f", None, ctypes.c_void_p, ctypes.c_void_p)
 
     def call(given):
         given, out = np.array(given, dtype=float), np.full(len(traced.outputs), np.nan)
@@ -59,9 +58,7 @@ def compiled(traced):
 
 
 @pytest.mark.parametrize("name, few", [("rk4", 0), ("implicit", 99)])
-def test_the_derivative_of_a_slope_is_that_of_dual_numbers_through_the_literal_form(
-    name, few, rng, monkeypatch
-):
+def test_the_derivative_of_a_slope_is_that_of_dual_numbers_in_the_literal_form(name, few, rng, monkeypatch):
     """In articulated bodies, where that can be, and by Mbar and h."""
     monkeypatch.setattr(forms, "FEW", few)
     stepping, (q, qd, tau), dt = METHODS[name], random_state(rng, SMALL), 0.05
@@ -78,11 +75,14 @@ def test_the_derivative_of_a_slope_is_that_of_dual_numbers_through_the_literal_f
 sincos = compiled(trace("both", [1], lambda x: [sin(x[0]), cos(x[0])]))
 
 
-@given(
+ANGLES = (
     st.floats(LIMIT / 2, LIMIT)
     | st.floats(-10.0, 10.0)
     | st.integers(-1000, 1000).map(lambda n: n * np.pi / 4)
 )
+
+
+@given(ANGLES)
 def test_sine_and_cosine_to_the_last_digit(x):
     with mpmath.workdps(60):
         for value, truth in zip(sincos([x]), (mpmath.sin(x), mpmath.cos(x))):

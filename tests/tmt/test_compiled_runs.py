@@ -19,9 +19,9 @@ def starts(count) -> list[np.ndarray]:
 
 
 def paths_from(q, qd, steps) -> list[np.ndarray]:
-    return [
-        np.concatenate([x[:, None], np.full((len(x), steps, x.shape[1]), np.nan)], axis=1) for x in (q, qd)
-    ]
+    paths = [np.full((len(x), steps + 1, x.shape[1]), np.nan) for x in (q, qd)]
+    paths[0][:, 0], paths[1][:, 0] = q, qd
+    return paths
 
 
 def assert_is_the_step(name, q, qd, tau, dt):
@@ -81,10 +81,8 @@ def test_several_cores_give_the_bits_of_one(monkeypatch):
         monkeypatch.setattr(runner, "cores", lambda: 3)
         monkeypatch.setattr(runner, "SPREAD", 0)
         three = tmt.simulate(q, qd, tau, 0.02, 6, name, SMALL)
-        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, three))
-        assert (
-            one.evaluations == three.evaluations and np.array_equal(one.ended, three.ended) and one.ended[40]
-        )
+        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, three)) and one.ended[40]
+        assert one.evaluations == three.evaluations and np.array_equal(one.ended, three.ended)
 
 
 def test_threads_ask_at_once_for_what_is_not_compiled(folder, monkeypatch):
@@ -92,13 +90,11 @@ def test_threads_ask_at_once_for_what_is_not_compiled(folder, monkeypatch):
     tree = tmt.ARM.lock({"alpha": 0.1, "gamma": 0.25})
     q = np.random.default_rng(0).uniform(-1, 1, (9, 1))
     with ThreadPoolExecutor(4) as pool:
-        asked = [
-            pool.submit(tmt.simulate, q[k % 2 :], q[k % 2 :], q[k % 2 :], 0.01, 3, model=tree)
-            for k in range(8)
-        ]
-        found = [one.result().q for one in asked]
-    assert all(np.array_equal(one, found[k % 2]) for k, one in enumerate(found))
-    assert np.array_equal(found[0][1:], found[1]) and len(known) == 1
+        starts = [[q[k % 2 :]] * 3 for k in range(8)]
+        runs = [pool.submit(tmt.simulate, *start, 0.01, 3, model=tree) for start in starts]
+        paths = [run.result().q for run in runs]
+    assert all(np.array_equal(path, paths[k % 2]) for k, path in enumerate(paths))
+    assert np.array_equal(paths[0][1:], paths[1]) and len(known) == 1
 
 
 def test_a_call_that_is_made_once_fills_its_paths_each_time():

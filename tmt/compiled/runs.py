@@ -113,19 +113,16 @@ class Step:
                 state.store(h, nq + 2 * n)
                 code.call("attempt", state, found)
                 evaluations.set(evaluations.get() + self.stepping.stages)
-                e5, e3 = (
-                    squares(state, found, first, scales, code["tolerance"]) for first in (nq + n, nq + 3 * n)
-                )
+                e5 = squares(state, found, nq + n, scales, code["tolerance"])
+                e3 = squares(state, found, nq + 3 * n, scales, code["tolerance"])
                 root = (2.0 * n * (e5 + 0.01 * e3)).function("sqrt")
                 error = e5.compare("gt", 0.0).choose(e5 / root, 0.0)
-                accepted = error.compare("lt", 1.0)
-                with code.when(accepted):
+                with code.when(error.compare("lt", 1.0)):  # it is accepted
                     for k in code.each(nq + n):
                         state.store(found.load(k), k)
                     left.set(pieces.compare("gt", 1.0).choose(left.get() - h, 0.0))
-                factor = SAFETY * code.intrinsic(
-                    "pow", error, code.number(-1.0 / order)
-                )  # of no error infinite
+                # infinite where there is no error
+                factor = SAFETY * code.intrinsic("pow", error, code.number(-1.0 / order))
                 factor = factor.compare("gt", SHRINKING).choose(factor, SHRINKING)
                 factor = factor.compare("lt", GROWTH).choose(factor, GROWTH)
                 wanted.set(h * factor)

@@ -15,10 +15,10 @@ from typing import Any
 from tmt.derivation.vectors import arctan, cos, sin, sqrt
 from tmt.scalar import Scalar
 
+Function = Callable[[Scalar], Scalar]
 
-def folded(
-    of_float: Callable[[float], float], function: Callable[[Scalar], Scalar]
-) -> Callable[[Scalar], Scalar]:
+
+def folded(of_float: Function, function: Function) -> Function:
     """A function of a number, of a float by the C library."""
     return lambda x: of_float(x) if isinstance(x, float) else function(x)
 
@@ -136,14 +136,9 @@ class Tape:
             return self.node("item", self.node("sincos", values[0].i).i, ("sin", "cos").index(operation))
         if operation in FUNCTIONS:
             return self.node(operation, values[0].i)
-        rules: dict[str, Callable[..., Expression]]
-        rules = {
-            "+": self.add,
-            "-": self.subtract,
-            "*": self.multiply,
-            "/": self.divide,
-            "neg": self.negative,
-        }
+        if operation == "neg":
+            return self.negative(values[0])
+        rules = {"+": self.add, "-": self.subtract, "*": self.multiply, "/": self.divide}
         return rules[operation](*values)
 
     def fused(self, order: list[int], outputs: list["Expression"]) -> dict[int, int]:

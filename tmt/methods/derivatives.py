@@ -25,9 +25,8 @@ class Differentiated(Dynamics):
 
     def __init__(self) -> None:
         super().__init__(composite.mass_matrix_and_bias)
-        self.system: tuple[
-            np.ndarray, np.ndarray
-        ]  # of the last states: A (states, nv, nv) and the force (states, nv)
+        # of the last states: A (states, nv, nv) and the force (states, nv) of A a = force
+        self.system: tuple[np.ndarray, np.ndarray]
 
     def residual(
         self, tree: Tree, a: Values, q: Values, qd: Values, tau: Values, implicit: Implicit | None
