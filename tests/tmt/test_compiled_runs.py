@@ -1,6 +1,7 @@
 """Compiled runs: the steps of the methods, several side by side and in threads with the bits of each alone."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from tmt.compiled.runner import Runner, known, runner_of
 from tmt.methods import METHODS, one_step
 
 SMALL = small_tree()
+FREE = replace(SMALL, position_gain=(), speed_gain=())  # without a controller
 
 
 def starts(count) -> list[np.ndarray]:
@@ -24,11 +26,11 @@ def paths_from(q, qd, steps) -> list[np.ndarray]:
     return paths
 
 
-def assert_is_the_step(name, q, qd, tau, dt):
+def assert_is_the_step(name, q, qd, tau, dt, tree=SMALL):
     """The first run is that of the method over floats."""
     state = q[0, 0].tolist(), qd[0, 0].tolist()
     for k in (1, 2):
-        state = one_step(METHODS[name], SMALL, *state, tau[0].tolist(), dt)
+        state = one_step(METHODS[name], tree, *state, tau[0].tolist(), dt)
         assert np.allclose(q[0, k], state[0], rtol=0, atol=1e-11)
         assert np.allclose(qd[0, k], state[1], rtol=0, atol=1e-10)
 
@@ -58,18 +60,26 @@ def test_runs_together_have_the_bits_of_each_alone(name, counts):
         assert_is_the_step(name, batch.q, batch.qd, tau, dt)
 
 
-@pytest.mark.parametrize("name", ["implicit", "implicit_midpoint"])
-def test_the_code_of_larger_trees_does_the_same(name, folder, monkeypatch):
+@pytest.mark.parametrize(
+    "name, tree", [("implicit", SMALL), ("implicit", FREE), ("implicit_midpoint", SMALL)]
+)
+def test_the_code_of_larger_trees_does_the_same(name, tree, folder, monkeypatch):
     """Linear systems and derivatives by calls, articulated bodies, no lines in the place of a call, lines cut into parts."""
-    sizes = (forms, "DENSE", 0), (forms, "FEW", 0), (runs, "INLINED", 0), (straight, "LONGEST", 50)
+    sizes = (
+        (forms, "DENSE", 0),
+        (forms, "FEW", 0),
+        (forms, "MANY", 0),
+        (runs, "INLINED", 0),
+        (straight, "LONGEST", 50),
+    )
     for module, field, size in sizes:
         monkeypatch.setattr(module, field, size)
     q, qd, tau = starts(9)
     (q, qd), other = paths_from(q, qd, 3), paths_from(q[4:5], qd[4:5], 3)
     for paths, torque in (((q, qd), tau), (other, tau[4:5])):
-        Runner(SMALL, METHODS[name], METHODS[name]).follow(*paths, torque, 0.02, 0.0, 1)
+        Runner(tree, METHODS[name], METHODS[name]).follow(*paths, torque, 0.02, 0.0, 1)
     assert np.array_equal(q[4], other[0][0]) and np.array_equal(qd[4], other[1][0])
-    assert_is_the_step(name, q, qd, tau, 0.02)
+    assert_is_the_step(name, q, qd, tau, 0.02, tree)
 
 
 def test_several_cores_give_the_bits_of_one(monkeypatch):

@@ -28,6 +28,8 @@ EDITS = (
          "a quaternion may be shorter than 1"),
     Edit("forms", "directional", "[*(_1), *(slope for _, slope in parts)]", "[*(_1), *(2 * slope for _, slope in parts)]",
          "Newton's method has twice the Jacobian"),
+    Edit("forms", "acts_at_single_joints", "not implicit.bias_rows", "True", "an implicit bias counts as armature"),
+    Edit("derivatives", "takes_terms", "_1 > 5", "True", "a slope of one's own is asked with other terms"),
     Edit("runs", "unsound", "angles.compare('lt', LIMIT)", "angles.compare('lt', float('inf'))", "turns have no limit"),
     Edit("semi_implicit", "SemiImplicitEuler.gains_held", "(tree.position_gain, tree.speed_gain)",
          "(tree.speed_gain, tree.position_gain)", "gains of positions act on speeds"),
