@@ -24,8 +24,8 @@ def literal(name: str) -> Callable[..., Any]:
     """The quantity of that name as a function of q, qd, tau (as far as it takes them) and a model."""
     takes, formula, parts = QUANTITIES[name].takes, QUANTITIES[name].of, QUANTITIES[name].parts
 
-    def function(*given: ArrayLike | Tree, model: ArrayLike | Tree = ARM) -> Any:
-        arrays, last = given[: len(takes)], given[len(takes) :]
+    def function(*arguments: ArrayLike | Tree, model: ArrayLike | Tree = ARM) -> Any:
+        arrays, last = arguments[: len(takes)], arguments[len(takes) :]
         if len(arrays) < len(takes) or len(last) > 1:
             raise TypeError(f"{name} takes {', '.join(takes)} and a model")
         tree = last[0] if last else model

@@ -9,7 +9,7 @@ from trees import random_states, small_tree
 
 import tmt
 from tmt.compiled import forms, runner, runs, straight
-from tmt.compiled.runner import Runner, known, runner_of
+from tmt.compiled.runner import Runner, runner_of, runners
 from tmt.methods import METHODS, one_step
 
 SMALL = small_tree()
@@ -104,7 +104,7 @@ def test_threads_ask_at_once_for_what_is_not_compiled(folder, monkeypatch):
         runs = [pool.submit(tmt.simulate, *start, 0.01, 3, model=tree) for start in starts]
         paths = [run.result().q for run in runs]
     assert all(np.array_equal(path, paths[k % 2]) for k, path in enumerate(paths))
-    assert np.array_equal(paths[0][1:], paths[1]) and len(known) == 1
+    assert np.array_equal(paths[0][1:], paths[1]) and len(runners) == 1
 
 
 def test_a_call_that_is_made_once_fills_its_paths_each_time():

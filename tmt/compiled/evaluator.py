@@ -68,22 +68,22 @@ class Evaluator:
             self.loops[wide] = library.function("rows", WHOLE, *[POINTER] * 4, *[WHOLE] * 4)
         return self.loops[wide]
 
-    def of_one(self, *given: np.ndarray) -> Any:
+    def of_one(self, *arrays: np.ndarray) -> Any:
         """The quantity of one state, arrays of doubles of the right shapes; None where it is none or a number is not finite."""
         try:
             out, address = self.local.place
         except AttributeError:  # of this thread
             out = np.empty(self.shape)
             self.local.place = out, address = out, out.ctypes.data
-        wrong = self.one_state(*[array.tobytes() for array in given], *self.rest[len(given) :], address)
+        wrong = self.one_state(*[array.tobytes() for array in arrays], *self.rest[len(arrays) :], address)
         if wrong:
             return None
         return tuple(out.copy()) if self.has_parts else out.copy()
 
-    def of_any(self, *given: np.ndarray) -> Any:
+    def of_any(self, *arrays: np.ndarray) -> Any:
         """The quantity of states of any batch shape, arrays of doubles, as tmt's function returns it; None as above."""
-        batch = np.broadcast_shapes(*(array.shape[:-1] for array in given))
-        q, *rates = (rows_of(x, batch if k == 0 or x.ndim > 1 else ()) for k, x in enumerate(given))
+        batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+        q, *rates = (rows_of(x, batch if k == 0 or x.ndim > 1 else ()) for k, x in enumerate(arrays))
         rows = self.of_rows(q, *rates)
         if rows is None:
             return None

@@ -18,7 +18,7 @@ PIECES = 4  # for each core, as one of them may be busy with something else
 MOST = 64  # trees and methods whose compiled runs are held
 DIRECT = ctypes.c_void_p
 ARGUMENTS = [DIRECT, DIRECT, DIRECT, ctypes.c_double, ctypes.c_double, DIRECT, *[ctypes.c_int64] * 3]
-known: dict[tuple[int, str], "Runner"] = {}
+runners: dict[tuple[int, str], "Runner"] = {}
 
 
 class Runner:
@@ -104,12 +104,12 @@ def address(array: np.ndarray) -> int:
 
 def runner_of(tree: Tree, name: str) -> Runner:
     """The Runner of a tree and the method of that name as it is now; ValueError if they are none."""
-    runner = known.get((id(tree), name)) if type(name) is str else None
+    runner = runners.get((id(tree), name)) if type(name) is str else None
     # whose tree is held, so that no other has its id
     if runner is None or runner.entry is not METHODS.get(name):
         checked_model(tree)
         stepping = method_named(name)
-        if len(known) >= MOST:
-            known.clear()
-        known[id(tree), name] = runner = Runner(tree, stepping, METHODS[name])
+        if len(runners) >= MOST:
+            runners.clear()
+        runners[id(tree), name] = runner = Runner(tree, stepping, METHODS[name])
     return runner

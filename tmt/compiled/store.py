@@ -40,10 +40,10 @@ def library(
     Of what is the user's own (a class of trees, a method), or of changed sources, nothing is kept: it may be another.
     """
     words = [own_sources(), versions(), *map(word_of, what)]
-    known = [word for word in words if word is not None]
-    if len(known) < len(words):
+    parts = [word for word in words if word is not None]
+    if len(parts) < len(words):
         return Library(source())
-    name = hashlib.sha256("\n".join(known).encode()).hexdigest()[:32]
+    name = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
     try:
         path = own_folder() / f"{name}.o"
         code = read(path)

@@ -142,9 +142,9 @@ def equations(tree: Tree, tau: Numbers, form: str) -> Equations:
         exact = exact_tree(tree, mpmath.mpf)
         qdd = method.acceleration(exact, q, qd, [mpmath.mpf(float(v)) for v in tau], FORMS[form])
         rates = [tape.lift(rate) for rate in (*coordinates.component_rates(q, qd), *qdd)]
-        found, row = program(tape, [*q, *qd], rates)
+        traced, row = program(tape, [*q, *qd], rates)
         more = [(series.RATE, k, row[rate.i], 0) for k, rate in enumerate(rates)]
-    return found._replace(code=np.array([*found.code, *more]))
+    return traced._replace(code=np.array([*traced.code, *more]))
 
 
 def program(

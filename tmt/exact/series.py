@@ -39,10 +39,12 @@ def values_at(high: np.ndarray, low: np.ndarray, th: float, tl: float, state: np
 @lru_cache(maxsize=1)
 def functions() -> dict[str, Callable[..., None]]:
     """The two compiled functions."""
-    library, whole, place = store.library(source, "series"), ctypes.c_int64, ctypes.c_void_p
+    library, integer, place = store.library(source, "series"), ctypes.c_int64, ctypes.c_void_p
     return {
-        "expand": library.function("expand", None, place, whole, whole, place, place),
-        "values_at": library.function("values_at", None, *[place] * 3, *[ctypes.c_double] * 2, whole, whole),
+        "expand": library.function("expand", None, place, integer, integer, place, place),
+        "values_at": library.function(
+            "values_at", None, *[place] * 3, *[ctypes.c_double] * 2, integer, integer
+        ),
     }
 
 
@@ -78,8 +80,8 @@ def convolution(code: Code, a: Value, b: Value, first: Value, last: Value) -> tu
         total.set(sum_)
         error.set(error.get() + (rounded + x.fma(of_y, of_x.fma(y, x.fma(y, -p)))))
 
-    whole = count / BESIDE * BESIDE
-    with code.loop(whole, BESIDE) as loop:
+    paired = count / BESIDE * BESIDE
+    with code.loop(paired, BESIDE) as loop:
         at = first + loop.index
         take(a + at, b - at - (BESIDE - 1), totals, errors)
     total, error = Variable(code, DOUBLE, totals.get().lane(0)), Variable(code, DOUBLE, errors.get().lane(0))
@@ -87,8 +89,8 @@ def convolution(code: Code, a: Value, b: Value, first: Value, last: Value) -> tu
         sum_, rounded = two_sum(total.get(), totals.get().lane(l))
         total.set(sum_)
         error.set(error.get() + (rounded + errors.get().lane(l)))
-    with code.loop(count - whole) as loop:
-        at = first + whole + loop.index
+    with code.loop(count - paired) as loop:
+        at = first + paired + loop.index
         take(a + at, b - at, total, error)
     return joined(total.get(), error.get())
 
@@ -163,10 +165,10 @@ def evaluation() -> Code:
         h, l = Variable(code, DOUBLE, 0.0), Variable(code, DOUBLE, 0.0)
         with code.loop(code["width"]) as orders:
             k = numbers.index * code["width"] + (code["width"] - 1 - orders.index)
-            found = multiply(h.get(), l.get(), code["th"], code["tl"])
-            found = add(*found, code["high"].load(k), code["low"].load(k))
-            h.set(found[0])
-            l.set(found[1])
+            total = multiply(h.get(), l.get(), code["th"], code["tl"])
+            total = add(*total, code["high"].load(k), code["low"].load(k))
+            h.set(total[0])
+            l.set(total[1])
         code["state"].store(h.get(), numbers.index)
         code["state"].store(l.get(), numbers.index + code["n"])
     code.give_back()

@@ -117,8 +117,8 @@ METHODS = {
 def method_named(name: str) -> Method:
     """The method of that name in METHODS, as it is there now, with all fields; ValueError if there is none, or no method."""
     if not isinstance(name, str) or name not in METHODS:
-        known = ", ".join(METHODS)
-        raise ValueError(f"unknown method {shown(name)}; known are {known}, and for simulate taylor")
+        names = ", ".join(METHODS)
+        raise ValueError(f"unknown method {shown(name)}; known are {names}, and for simulate taylor")
     try:
         return completed(METHODS[name])
     except ValueError as error:

@@ -36,6 +36,6 @@ EDITS = (
     Edit("answers", "Answers.__init__", "not tree.never_singular", "False", "compiled code answers where Mbar is singular"),
     Edit("answers", "answers_of", "not answers.prepared", "True", "a prepared model is forgotten"),
     Edit("compiled.sources", "own_sources", "stamps(IMPORTED) == IMPORTED", "True", "changed sources keep their name"),
-    Edit("simulation", "simulate", "given.positive('dt', dt, 'a step in s')", "float(dt)", "a step may be negative"),
+    Edit("simulation", "simulate", "arguments.positive('dt', dt, 'a step in s')", "float(dt)", "a step may be negative"),
     Edit("answers", "Answers.by_machine_code", "count <= SMALL", "True", "machine code never answers unasked"),
 )  # fmt: skip
