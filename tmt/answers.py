@@ -23,31 +23,31 @@ from tmt.model.values import real_numbers, shown
 
 MOST = 64  # models that are held, besides those that are prepared
 DOUBLE = np.dtype(float)
-known: dict[int, "Answers"] = {}
+all_answers: dict[int, "Answers"] = {}
 
 
-def answered(quantity: str, model: Tree, *given: ArrayLike) -> Any:
+def answered(quantity: str, model: Tree, *arguments: ArrayLike) -> Any:
     """The quantity of states of any batch shape: what the function of that name in literal.py returns.
 
-    given: q, or q and qd, or q, qd and tau, as that function takes them.
+    arguments: q, or q and qd, or q, qd and tau, as that function takes them.
     """
-    answers = known.get(id(model))
+    answers = all_answers.get(id(model))
     if answers is None and isinstance(model, Tree):
         answers = answers_of(model)
-    result = answers.by_machine_code(quantity, given) if answers else None
+    result = answers.by_machine_code(quantity, arguments) if answers else None
     if result is not None:
         return result
-    return getattr(literal, quantity)(*given, model)
+    return getattr(literal, quantity)(*arguments, model)
 
 
 def answers_of(model: Tree) -> "Answers":
     """What is compiled of a model; of the prepared ones and the last others."""
-    answers = known.get(id(model))
+    answers = all_answers.get(id(model))
     if answers is None:
-        others = [key for key, answers in list(known.items()) if not answers.prepared]
+        others = [key for key, answers in list(all_answers.items()) if not answers.prepared]
         for key in others if len(others) >= MOST else ():
-            known.pop(key, None)
-        answers = known.setdefault(id(model), Answers(model))
+            all_answers.pop(key, None)
+        answers = all_answers.setdefault(id(model), Answers(model))
     return answers
 
 
@@ -93,18 +93,18 @@ class Answers:
         self.shapes = [(tree.coordinates.nq,), (tree.coordinates.nv,), (tree.coordinates.nv,)]
         self.may_be_singular = not tree.never_singular
 
-    def by_machine_code(self, quantity: str, given: tuple[ArrayLike, ...]) -> Any:
+    def by_machine_code(self, quantity: str, arguments: tuple[ArrayLike, ...]) -> Any:
         """The quantity of states; None where NumPy is to answer: of few states, and where something is wrong."""
         evaluator, is_prepared = self.evaluators[quantity], quantity in self.prepared
         may_be_singular = self.may_be_singular and quantity == "acceleration"
-        if is_prepared and not may_be_singular and self.is_state(given):
-            return evaluator.of_one(*given)
+        if is_prepared and not may_be_singular and self.is_state(arguments):
+            return evaluator.of_one(*arguments)
         with np.errstate(
             all="ignore"
         ):  # of numbers beyond the largest double, which the literal form refuses
-            numbers = [x if type(x) is ndarray and x.dtype is DOUBLE else real_numbers(x) for x in given]
+            numbers = [x if type(x) is ndarray and x.dtype is DOUBLE else real_numbers(x) for x in arguments]
         arrays = [x for x in numbers if x is not None]
-        if [array.shape[-1:] for array in arrays] != self.shapes[: len(given)]:
+        if [array.shape[-1:] for array in arrays] != self.shapes[: len(arguments)]:
             return None
         try:
             batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
@@ -120,9 +120,9 @@ class Answers:
         except MemoryError:
             return None
 
-    def is_state(self, given: tuple[ArrayLike, ...]) -> TypeGuard[tuple[ndarray, ...]]:
+    def is_state(self, arguments: tuple[ArrayLike, ...]) -> TypeGuard[tuple[ndarray, ...]]:
         """Whether one state is given, in arrays of doubles: then nothing else has to be looked at."""
-        for array, shape in zip(given, self.shapes):  # no generator, which takes as long as the rest
+        for array, shape in zip(arguments, self.shapes):  # no generator, which takes as long as the rest
             if type(array) is not ndarray or array.shape != shape or array.dtype is not DOUBLE:
                 return False
         return True

@@ -5,70 +5,71 @@ package return is compared with it. Arguments, results and errors are those of t
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tmt.arm import ARM
 from tmt.derivation.quantities import QUANTITIES, State
+from tmt.derivation.scalar import Scalar
 from tmt.model import singular
 from tmt.model.arguments import quantity, states
+from tmt.model.tree import Tree
+
+BEYOND = "the result is beyond the largest double; smaller numbers in the state or model are expected"
 
 
-def literal(name: str) -> Callable:
+def literal(name: str) -> Callable[..., Any]:
     """The quantity of that name as a function of q, qd, tau (as far as it takes them) and a model."""
-    takes, of, parts = QUANTITIES[name].takes, QUANTITIES[name].of, QUANTITIES[name].parts
+    takes, formula, parts = QUANTITIES[name].takes, QUANTITIES[name].of, QUANTITIES[name].parts
 
-    def function(*given, model=ARM):
-        if len(given) > len(takes):
-            *given, model = given
-        if len(given) != len(takes):
+    def function(*arguments: ArrayLike | Tree, model: ArrayLike | Tree = ARM) -> Any:
+        arrays, last = arguments[: len(takes)], arguments[len(takes) :]
+        if len(arrays) < len(takes) or len(last) > 1:
             raise TypeError(f"{name} takes {', '.join(takes)} and a model")
-        arrays = states(model, **dict(zip(takes, given)))
-        state, batch = State(model, *arrays), arrays[0][0].shape
-        if name == "acceleration" and not model.never_singular:
-            check_regular(model, state, batch)
-        found = of(state)
+        tree = last[0] if last else model
+        scalars = states(tree, **dict(zip(takes, arrays)))
+        state, batch = State(tree, *scalars), scalars[0][0].shape
+        if name == "acceleration" and not state.tree.never_singular:
+            check_regular(state, batch)
+        values = formula(state)
         if parts:
-            return tuple(gather(part, batch) for part in found)
-        return gather(found, batch, overflow=np.inf if name == "energy" else None)
+            return tuple(gather(part, batch) for part in values)
+        return gather(values, batch, overflow=np.inf if name == "energy" else None)
 
     function.__name__ = function.__qualname__ = name
     return quantity(function)
 
 
-def check_regular(model, state, batch) -> None:
+def check_regular(state: State, batch: tuple[int, ...]) -> None:
     """Raise ValueError where Mbar is singular."""
-    n = len(state.qd)
-    angles = gather(state.q, batch).reshape(-1, len(state.q))
-    if found := singular.first(model, angles, gather(state.mass_matrix, batch).reshape(-1, n, n)):
-        at = ", ".join(f"{angle:.6g}" for angle in angles[found[0]])
-        unit = " rad" if set(model.kind) == {"hinge"} else ""
-        raise ValueError(f"Mbar is singular at q = ({at}){unit}: {found[1]}")
+    n, tree = len(state.qd), state.tree
+    positions = gather(state.q, batch).reshape(-1, len(state.q))
+    if place := singular.first(tree, positions, gather(state.mass_matrix, batch).reshape(-1, n, n)):
+        at = ", ".join(f"{value:.6g}" for value in positions[place[0]])
+        unit = " rad" if set(tree.kind) == {"hinge"} else ""
+        raise ValueError(f"Mbar is singular at q = ({at}){unit}: {place[1]}")
 
 
-def gather(nested, batch, overflow=None) -> np.ndarray:
+def gather(nested: Scalar, batch: tuple[int, ...], overflow: float | None = None) -> np.ndarray:
     """Nested iterables of scalars, each of the batch shape or constant, as one array with that shape in front.
 
     overflow: what stands for what is not finite, since all that was given is; None: it is a ValueError.
     """
 
-    def lists(item):
-        return (
-            [lists(i) for i in item]
-            if not isinstance(item, (float, np.ndarray))
-            else np.broadcast_to(item, batch)
-        )
+    def lists(item: Scalar) -> Scalar:
+        is_scalar = isinstance(item, (float, np.ndarray))
+        return np.broadcast_to(item, batch) if is_scalar else [lists(part) for part in item]
 
     array = np.array(lists(nested), dtype=float)
     finite = np.isfinite(array)
-    if not finite.all():
-        if overflow is None:
-            raise ValueError(
-                "the result is beyond the largest double; smaller numbers in the state or model are expected"
-            )
+    if overflow is not None:
         array = np.where(finite, array, overflow)
-    own = array.ndim - len(batch)
-    return np.moveaxis(array, range(own), range(-own, 0)).copy()
+    elif not finite.all():
+        raise ValueError(BEYOND)
+    components = array.ndim - len(batch)
+    return np.moveaxis(array, range(components), range(-components, 0)).copy()
 
 
 com_positions = literal("com_positions")

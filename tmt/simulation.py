@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,12 +12,12 @@ from numpy.typing import ArrayLike
 from tmt.arm import ARM
 from tmt.compiled.runner import runner_of
 from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED
-from tmt.model import arguments as given
-from tmt.model import singular
+from tmt.model import arguments, singular
 from tmt.model.tree import Tree
 from tmt.model.values import shown
 
 DOUBLE = np.dtype(float)
+Between = Callable[[int, int], list[np.ndarray]]  # (run, record): its states q and qd up to the next record
 
 
 class _Path(NamedTuple):
@@ -106,28 +105,24 @@ def simulate(
     taylor = isinstance(method, str) and method == "taylor"
     runner = runner_of(model, "dopri8_adaptive" if taylor else method)
     stepping = runner.stepping
-    steps, every, dt = (
-        given.whole("steps", steps),
-        given.whole("every", every),
-        given.positive("dt", dt, "a step in s"),
-    )
+    steps, every = arguments.whole("steps", steps), arguments.whole("every", every)
+    dt = arguments.positive("dt", dt, "a step in s")
     if steps % every:
         why = f"of which steps = {shown(steps)} is no multiple"
         raise ValueError(f"every is {shown(every)}, {why}; a divisor is expected")
     if tolerance is not None and not stepping.adaptive:
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
     usual = 1e-33 if taylor else 1e-9
-    tolerance = usual if tolerance is None else given.positive("tolerance", tolerance, "a number")
+    tolerance = usual if tolerance is None else arguments.positive("tolerance", tolerance, "a number")
     batch, *start = starts(model, q, qd, tau)
     runs = len(start[0])
-    path_q, path_qd = given.paths(runs, steps, every, model.coordinates.nq, model.coordinates.nv)
+    path_q, path_qd = arguments.paths(runs, steps, every, model.coordinates.nq, model.coordinates.nv)
     if steps * dt == np.inf:
-        raise ValueError(
-            f"dt is {dt:g} and steps is {shown(steps)}; their product is beyond the largest double"
-        )
+        sizes = f"dt is {dt:g} and steps is {shown(steps)}"
+        raise ValueError(f"{sizes}; their product is beyond the largest double")
     path_q[:, 0], path_qd[:, 0], torque = start
     if taylor:
-        ended, evaluations = by_series(model, path_q, path_qd, torque, dt, steps, every, tolerance)
+        ended, evaluations = by_series(model, path_q, path_qd, torque, dt, every, tolerance)
     else:
         codes, evaluations = runner.follow(path_q, path_qd, torque, dt, tolerance, every)
 
@@ -149,101 +144,89 @@ def starts(model: Tree, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
     if type(q) is type(qd) is type(tau) is np.ndarray and q.dtype is qd.dtype is tau.dtype is DOUBLE:
         nq, nv, batch = model.coordinates.nq, model.coordinates.nv, q.shape[:-1]
         if q.shape == (*batch, nq) and qd.shape == tau.shape == (*batch, nv) and not model.coordinates.balls:
-            found = [np.ascontiguousarray(values).reshape(-1, values.shape[-1]) for values in (q, qd, tau)]
+            rows = [np.ascontiguousarray(values).reshape(-1, values.shape[-1]) for values in (q, qd, tau)]
             # with a number that is not finite no sum of squares is
-            if all(np.vdot(values, values) < np.inf for values in found):
-                return batch, *found
-    state = given.states(model, q=q, qd=qd, tau=tau)
+            if all(np.vdot(values, values) < np.inf for values in rows):
+                return batch, *rows
+    state = arguments.states(model, q=q, qd=qd, tau=tau)
     batch = state[0][0].shape
     return batch, *(np.stack(part, axis=-1).reshape(math.prod(batch), len(part)) for part in state)
 
 
 def by_series(
-    tree: Tree,
-    q: np.ndarray,
-    qd: np.ndarray,
-    tau: np.ndarray,
-    dt: float,
-    steps: int,
-    every: int,
-    tolerance: float,
+    tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, every: int, tolerance: float
 ) -> tuple[np.ndarray, int]:
     """Write the true motions to the paths (runs, records, nq and nv), which hold the starts: why each ended, and the steps."""
     from tmt.exact.motion import followed  # here, so that `import tmt` need not wait for it
 
-    ended, count = np.full(len(q), None, dtype=object), 0
+    ended, count, steps = np.full(len(q), None, dtype=object), 0, (q.shape[1] - 1) * every
     for run in range(len(q)):
-        path, took, error = followed(
-            tree, q[run, 0], qd[run, 0], tau[run], dt, steps, every, tolerance=tolerance
-        )
-        count, alive = count + took, len(path)
+        start = q[run, 0], qd[run, 0], tau[run]
+        path, series, error = followed(tree, *start, dt, steps, every, tolerance=tolerance)
+        count, alive = count + series, len(path)
         q[run, 1:alive], qd[run, 1:alive] = np.split(path[1:, 0], [q.shape[-1]], axis=1)
         q[run, alive:], qd[run, alive:] = np.nan, np.nan
-        ended[run] = error and str(error)
+        ended[run] = str(error) if error else None
     return ended, count
 
 
 def reasons(
     tree: Tree, q: np.ndarray, qd: np.ndarray, codes: np.ndarray, dt: float, tolerance: float, every: int = 1,
-    between: Callable[[int, int], list[np.ndarray]] | None = None,
+    between: Between | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
 
     q, qd: the paths (runs, records, nq and nv); codes (runs, 2): why the compiled loop ended each, 0: it did not, and after how
     many steps. Where each so-manyth state is kept alone, between(run, record) are all from a record to the next.
     """
-    why = np.full(len(codes), None, dtype=object)
+    ended = np.full(len(codes), None, dtype=object)
     if tree.never_singular and not codes.any():
-        return why
-    steps, codes = codes[:, 1].copy(), codes[:, 0]
-    if not tree.never_singular:
-        for run in range(len(codes)):
-            if found := singular_step(tree, q[run], qd[run], every, between and partial(between, run)):
-                steps[run], why[run] = found
-                q[run, steps[run] // every + 1 :] = qd[run, steps[run] // every + 1 :] = np.nan
+        return ended
     words = {
         OVERFLOW: "the motion diverges: within a step its numbers overflow, or its angles pass 2^49 rad",
         TURNED: "a hinge turns by 2^49 rad or more, where doubles are too far apart for a sine",
         NEWTON: f"Newton's method does not find the stages of a step of {dt:g} s",
         SMALL: f"the tolerance of {tolerance:g} would need steps below 1e-9 dt",
     }
+    for run, (code, step) in enumerate(codes.tolist()):
+        place = None if tree.never_singular else singular_step(tree, q[run], qd[run], every, between, run)
+        if place:
+            step, why = place
+            q[run, step // every + 1 :] = qd[run, step // every + 1 :] = np.nan
+        elif code:
+            record, last = divmod(step, every)
+            states = between(run, record) if last and between else (q[run, record:], qd[run, record:])
+            why = words[cause(tree, code, states[0][last], states[1][last], dt)]
+        if place or code:
+            ended[run] = f"at t = {step * dt:g} s: {why}"
+    return ended
+
+
+def cause(tree: Tree, code: int, q: np.ndarray, qd: np.ndarray, dt: float) -> int:
+    """The code of what ended a run after this state: a hinge far from there has no sine at the stages of the next step."""
     hinges = [joint for joint in tree.coordinates.joints if joint.kind == "hinge"]
-    for run in (run for run in range(len(codes)) if codes[run] or why[run]):
-        record, last = divmod(int(steps[run]), every)
-        path, speeds = between(run, record) if last and between else (q[run, record:], qd[run, record:])
-        code = int(codes[run])
-        reach = max(
-            (max(abs(path[last, joint.q][0]), dt * abs(speeds[last, joint.qd][0])) for joint in hinges),
-            default=0.0,
-        )
-        if code in (OVERFLOW, NEWTON) and reach > 2.0**48:
-            code = TURNED  # within the step: there is no sine at its stages
-        elif code == TURNED and not reach > 2.0**48:
-            code = OVERFLOW  # neither the state nor its speed leads there: what it turned by came from within the step
-        why[run] = f"at t = {steps[run] * dt:g} s: {why[run] or words[code]}"
-    return why
+    reach = max((max(abs(q[joint.q.start]), dt * abs(qd[joint.qd.start])) for joint in hinges), default=0.0)
+    if code in (OVERFLOW, NEWTON) and reach > 2.0**48:
+        return TURNED
+    # neither the state nor its speed leads there: what it turned by came from within the step
+    return OVERFLOW if code == TURNED and not reach > 2.0**48 else code
 
 
 def singular_step(
-    tree: Tree, q: np.ndarray, qd: np.ndarray, every: int, between: Callable[[int], list[np.ndarray]] | None
+    tree: Tree, q: np.ndarray, qd: np.ndarray, every: int, between: Between | None, run: int
 ) -> tuple[int, str] | None:
     """The first step of a run after which Mbar is singular, as far as `singular_in` looks, and the words for it.
 
     Where each so-manyth state is kept alone it also looks at those before the last record and where the rates change most.
     """
-    found = singular_in(tree, q, qd)
-    if every == 1 or between is None:
-        return found
-    last = int(np.isfinite(q[:, 0]).sum()) - 1
-    change = np.abs(np.diff(qd[: last + 1], axis=0)).max(axis=1)
-    more = {min(last, len(q) - 2), int(np.argmax(change)) if len(change) else 0}
-    looked = [
-        (0, every, found),
-        *((record * every, 1, singular_in(tree, *between(record))) for record in more),
-    ]
-    return min(
-        ((first + stride * found[0], found[1]) for first, stride, found in looked if found), default=None
-    )
+    place = singular_in(tree, q, qd)
+    places = [(place[0] * every, place[1])] if place else []
+    if between and every > 1:
+        alive = int(np.isfinite(q[:, 0]).sum())
+        for record in {min(alive - 1, len(q) - 2), fastest_change(qd[:alive])}:
+            place = singular_in(tree, *between(run, record))
+            places += [(record * every + place[0], place[1])] if place else []
+    return min(places, default=None)
 
 
 def singular_in(tree: Tree, q: np.ndarray, qd: np.ndarray) -> tuple[int, str] | None:
@@ -252,7 +235,12 @@ def singular_in(tree: Tree, q: np.ndarray, qd: np.ndarray) -> tuple[int, str] | 
     They are its start, its last, and the one before the largest change of the rates.
     """
     alive = int(np.isfinite(q[:, 0]).sum())
-    change = np.abs(np.diff(qd[:alive], axis=0)).max(axis=1)
-    places = np.unique([0, alive - 1, int(np.argmax(change)) if len(change) else 0])
-    found = singular.first(tree, q[places])
-    return found and (int(places[found[0]]), f"Mbar is singular: {found[1]}")
+    records = np.unique([0, alive - 1, fastest_change(qd[:alive])])
+    place = singular.first(tree, q[records])
+    return (int(records[place[0]]), f"Mbar is singular: {place[1]}") if place else None
+
+
+def fastest_change(qd: np.ndarray) -> int:
+    """The record before the largest change of the rates; 0 where there is but one."""
+    change = np.abs(np.diff(qd, axis=0)).max(axis=1)
+    return int(np.argmax(change)) if len(change) else 0

@@ -93,7 +93,6 @@ PLACES = {
     "A of an implicit method": with_field(METHODS["implicit_midpoint"], "A"),
     "tree of an evaluator": lambda tree: evaluator(tree, "acceleration"),
     "quantity": lambda quantity: evaluator(tmt.ARM, quantity),
-    "terms": lambda terms: evaluator(tmt.ARM, "acceleration", terms),
     "tree of a runner": lambda tree: runner_of(tree, "rk4"),
     "method of a runner": lambda name: runner_of(tmt.ARM, name),
     "model of prepare": tmt.prepare,
@@ -106,11 +105,6 @@ PLACES = {
 def test_nonsense_is_refused_in_one_line(call):
     for value in NONSENSE:
         refused(call, value)
-
-
-def test_wrong_terms_are_refused():
-    for returned in (None, ([[1.0]], [1.0]), (["abc"] * 3, [0.0] * 3)):
-        refused(lambda found=returned: evaluator(tmt.ARM, "bias", lambda *_: found).scalar)
 
 
 @pytest.mark.filterwarnings("error")

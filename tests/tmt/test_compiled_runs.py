@@ -1,6 +1,7 @@
 """Compiled runs: the steps of the methods, several side by side and in threads with the bits of each alone."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,10 +9,11 @@ from trees import random_states, small_tree
 
 import tmt
 from tmt.compiled import forms, runner, runs, straight
-from tmt.compiled.runner import Runner, known, runner_of
+from tmt.compiled.runner import Runner, runner_of, runners
 from tmt.methods import METHODS, one_step
 
 SMALL = small_tree()
+FREE = replace(SMALL, position_gain=(), speed_gain=())  # without a controller
 
 
 def starts(count) -> list[np.ndarray]:
@@ -19,16 +21,16 @@ def starts(count) -> list[np.ndarray]:
 
 
 def paths_from(q, qd, steps) -> list[np.ndarray]:
-    return [
-        np.concatenate([x[:, None], np.full((len(x), steps, x.shape[1]), np.nan)], axis=1) for x in (q, qd)
-    ]
+    paths = [np.full((len(x), steps + 1, x.shape[1]), np.nan) for x in (q, qd)]
+    paths[0][:, 0], paths[1][:, 0] = q, qd
+    return paths
 
 
-def assert_is_the_step(name, q, qd, tau, dt):
+def assert_is_the_step(name, q, qd, tau, dt, tree=SMALL):
     """The first run is that of the method over floats."""
     state = q[0, 0].tolist(), qd[0, 0].tolist()
     for k in (1, 2):
-        state = one_step(METHODS[name], SMALL, *state, tau[0].tolist(), dt)
+        state = one_step(METHODS[name], tree, *state, tau[0].tolist(), dt)
         assert np.allclose(q[0, k], state[0], rtol=0, atol=1e-11)
         assert np.allclose(qd[0, k], state[1], rtol=0, atol=1e-10)
 
@@ -58,18 +60,26 @@ def test_runs_together_have_the_bits_of_each_alone(name, counts):
         assert_is_the_step(name, batch.q, batch.qd, tau, dt)
 
 
-@pytest.mark.parametrize("name", ["implicit", "implicit_midpoint"])
-def test_the_code_of_larger_trees_does_the_same(name, folder, monkeypatch):
+@pytest.mark.parametrize(
+    "name, tree", [("implicit", SMALL), ("implicit", FREE), ("implicit_midpoint", SMALL)]
+)
+def test_the_code_of_larger_trees_does_the_same(name, tree, folder, monkeypatch):
     """Linear systems and derivatives by calls, articulated bodies, no lines in the place of a call, lines cut into parts."""
-    sizes = (forms, "DENSE", 0), (forms, "FEW", 0), (runs, "INLINED", 0), (straight, "LONGEST", 50)
+    sizes = (
+        (forms, "DENSE", 0),
+        (forms, "FEW", 0),
+        (forms, "MANY", 0),
+        (runs, "INLINED", 0),
+        (straight, "LONGEST", 50),
+    )
     for module, field, size in sizes:
         monkeypatch.setattr(module, field, size)
     q, qd, tau = starts(9)
     (q, qd), other = paths_from(q, qd, 3), paths_from(q[4:5], qd[4:5], 3)
     for paths, torque in (((q, qd), tau), (other, tau[4:5])):
-        Runner(SMALL, METHODS[name], METHODS[name]).follow(*paths, torque, 0.02, 0.0, 1)
+        Runner(tree, METHODS[name], METHODS[name]).follow(*paths, torque, 0.02, 0.0, 1)
     assert np.array_equal(q[4], other[0][0]) and np.array_equal(qd[4], other[1][0])
-    assert_is_the_step(name, q, qd, tau, 0.02)
+    assert_is_the_step(name, q, qd, tau, 0.02, tree)
 
 
 def test_several_cores_give_the_bits_of_one(monkeypatch):
@@ -81,10 +91,8 @@ def test_several_cores_give_the_bits_of_one(monkeypatch):
         monkeypatch.setattr(runner, "cores", lambda: 3)
         monkeypatch.setattr(runner, "SPREAD", 0)
         three = tmt.simulate(q, qd, tau, 0.02, 6, name, SMALL)
-        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, three))
-        assert (
-            one.evaluations == three.evaluations and np.array_equal(one.ended, three.ended) and one.ended[40]
-        )
+        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, three)) and one.ended[40]
+        assert one.evaluations == three.evaluations and np.array_equal(one.ended, three.ended)
 
 
 def test_threads_ask_at_once_for_what_is_not_compiled(folder, monkeypatch):
@@ -92,13 +100,11 @@ def test_threads_ask_at_once_for_what_is_not_compiled(folder, monkeypatch):
     tree = tmt.ARM.lock({"alpha": 0.1, "gamma": 0.25})
     q = np.random.default_rng(0).uniform(-1, 1, (9, 1))
     with ThreadPoolExecutor(4) as pool:
-        asked = [
-            pool.submit(tmt.simulate, q[k % 2 :], q[k % 2 :], q[k % 2 :], 0.01, 3, model=tree)
-            for k in range(8)
-        ]
-        found = [one.result().q for one in asked]
-    assert all(np.array_equal(one, found[k % 2]) for k, one in enumerate(found))
-    assert np.array_equal(found[0][1:], found[1]) and len(known) == 1
+        starts = [[q[k % 2 :]] * 3 for k in range(8)]
+        runs = [pool.submit(tmt.simulate, *start, 0.01, 3, model=tree) for start in starts]
+        paths = [run.result().q for run in runs]
+    assert all(np.array_equal(path, paths[k % 2]) for k, path in enumerate(paths))
+    assert np.array_equal(paths[0][1:], paths[1]) and len(runners) == 1
 
 
 def test_a_call_that_is_made_once_fills_its_paths_each_time():

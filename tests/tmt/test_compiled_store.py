@@ -67,12 +67,11 @@ def test_each_question_has_a_file_of_its_own(folder):
     assert len(files(folder)) == len(questions)
 
 
-def test_another_version_of_tmt_or_another_processor_has_other_files(folder, monkeypatch):
-    for count, name in enumerate(("own_sources", "versions"), start=2):
-        asked()
-        monkeypatch.setattr(store, name, lambda: "another")
-        asked()
-        assert len(files(folder)) == count
+@pytest.mark.parametrize("part", ["own_sources", "versions"])
+def test_another_version_of_tmt_or_another_processor_has_other_files(part, folder, monkeypatch):
+    assert is_kept(folder)
+    monkeypatch.setattr(store, part, lambda: "another")
+    assert is_kept(folder) and len(files(folder)) == 2
 
 
 COPIED = """import sys, tmt
@@ -93,10 +92,11 @@ print(first, sources.own_sources(), len(list(store.cache_folder().glob("*.o"))))
 def test_what_is_compiled_is_kept_under_the_name_of_what_was_imported(change, kept, folder, tmp_path):
     """Of sources that are others by now, or gone, nothing is kept: the next process would run another version's code."""
     shutil.copytree(ROOT / "tmt", tmp_path / "tmt", ignore=shutil.ignore_patterns("__pycache__"))
-    command = [sys.executable, "-c", COPIED, f"import os\n{change}"]
-    done = subprocess.run(
-        command, capture_output=True, text=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": "."}
+    command, environment = (
+        [sys.executable, "-c", COPIED, f"import os\n{change}"],
+        os.environ | {"PYTHONPATH": "."},
     )
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment)
     first, later, count = done.stdout.split()
     assert len(first) == 64 and later == (first if kept else "None") and int(count) == kept
 
@@ -143,19 +143,19 @@ def test_a_group_of_the_user_alone_may_write(folder, name, members, accepted, mo
 
 
 @posix
-@pytest.mark.parametrize("open_to_others", ["folder", "file", "link", "owner"])
-def test_planted_code_is_not_run(folder, tmp_path, monkeypatch, open_to_others):
+@pytest.mark.parametrize("way", ["writable", "link", "owner"])
+def test_planted_code_is_not_run(folder, tmp_path, monkeypatch, way):
     assert is_kept(folder)
     (file,) = files(folder)
     plant(file)
-    if open_to_others == "link":
+    if way == "link":
         file.rename(tmp_path / "elsewhere")
         file.symlink_to(tmp_path / "elsewhere")
-    elif open_to_others == "owner":
+    elif way == "owner":
         owner = os.geteuid()
         monkeypatch.setattr(os, "geteuid", lambda: owner + 1)
     else:
-        {"folder": folder, "file": file}[open_to_others].chmod(0o777)
+        file.chmod(0o777)
     assert asked() == 3.0 and len(store.complaints) == 1
 
 
@@ -193,13 +193,13 @@ def test_processes_share_what_they_compile(tmp_path):
     """In any path, where Python takes every text for ASCII, and nothing is left elsewhere; a refusal is a line on stderr."""
     folder, home = tmp_path / os.fsdecode("Zwischenlager für Übersetztes".encode()), tmp_path / "home"
     home.mkdir()
-    environment = {
+    ascii_only = {
         "LC_ALL": "C",
         "PYTHONUTF8": "0",
         "PYTHONCOERCECLOCALE": "0",
         "PYTHONDONTWRITEBYTECODE": "1",
     }
-    environment |= {
+    places = {
         "PYTHONPATH": str(ROOT),
         "TMT_CACHE": str(folder),
         "HOME": str(home),
@@ -207,15 +207,12 @@ def test_processes_share_what_they_compile(tmp_path):
     }
 
     def output(program):
-        run = subprocess.run(
-            [sys.executable, "-c", program], env=environment, cwd=home, capture_output=True, text=True
-        )
+        command = [sys.executable, "-c", program]
+        run = subprocess.run(command, env=ascii_only | places, cwd=home, capture_output=True, text=True)
         return run.stdout, run.stderr
 
     first, errors = output(PROGRAM)
-    assert (
-        first and output(NO_COMPILER + PROGRAM) == (first, errors) == (first, "") and len(files(folder)) == 1
-    )
+    assert first and errors == "" and output(NO_COMPILER + PROGRAM) == (first, "") and len(files(folder)) == 1
     folder.chmod(0o777)
     again, errors = output(PROGRAM)
     assert again == first and errors.count("\n") == 1 and "0777" in errors and not list(home.iterdir())

@@ -27,11 +27,8 @@ ONE_HINGE = tmt.Tree(
 def off(path, expected, record=-1):
     """The largest difference of a record from numbers of many digits."""
     with mpmath.workdps(60):
-        found = [
-            mpmath.mpf(h) + mpmath.mpf(l)
-            for h, l in zip(path.high[record].tolist(), path.low[record].tolist())
-        ]
-        return float(max(abs(a - b) for a, b in zip(found, expected)))
+        pairs = zip(path.high[record].tolist(), path.low[record].tolist(), expected)
+        return float(max(abs(mpmath.mpf(high) + mpmath.mpf(low) - value) for high, low, value in pairs))
 
 
 def short_run(tree, q, qd, tau, duration) -> list:
@@ -46,9 +43,8 @@ def short_run(tree, q, qd, tau, duration) -> list:
 
         def rate(state):
             q, qd = list(state[:nq]), list(state[nq:])
-            return mpmath.matrix(
-                [*exact.coordinates.component_rates(q, qd), *acceleration(exact, q, qd, torque)]
-            )
+            rates = exact.coordinates.component_rates(q, qd)
+            return mpmath.matrix([*rates, *acceleration(exact, q, qd, torque)])
 
         start = rate(first)
         for j in range(1, COLUMNS + 1):
@@ -67,13 +63,8 @@ def short_run(tree, q, qd, tau, duration) -> list:
 def test_a_pendulum_is_its_elliptic_function(axis, arm, form):
     """Pulled along its arm each is that of frequency 2 per second, after many turns; of one axis no double has the direction."""
     square, arm = sum(x * x for x in arm), tuple(map(float, arm))
-    more = {
-        "axis": [axis],
-        "com": [arm],
-        "inertia": [square * np.eye(3)],
-        "gravity": tuple(8.0 * x for x in arm),
-    }
-    tree = dataclasses.replace(ONE_HINGE, **more)
+    tree = dataclasses.replace(ONE_HINGE, axis=[axis], com=[arm], inertia=[square * np.eye(3)])
+    tree = dataclasses.replace(tree, gravity=tuple(8.0 * x for x in arm))
     assert (sum(Fraction(x) ** 2 for x in tree.axis[0]) != 1) == (axis == (1, 2, 2))
     path = trajectory(tree, [200.0], [1.5], [0.0], 0.375, 8, form=form)
     expected = exact_swing(0.375 * np.arange(9), 200.0, 1.5, 0.0, 2.0)
@@ -94,11 +85,9 @@ def turned_about(omega, t):
 
 
 def test_a_symmetric_free_body_precesses_about_its_angular_momentum():
+    turn, spin, inertia = (0.5, 0.5, -0.5, 0.5), (4.0, 1.0, 3.0), np.diag([2.0, 2.0, 0.5])
     tree = read(PATHS["free_body"]).tree
-    turn, spin = (0.5, 0.5, -0.5, 0.5), (4.0, 1.0, 3.0)
-    tree = dataclasses.replace(
-        tree, inertia=[np.diag([2.0, 2.0, 0.5])], com=[(0.0, 0.0, 0.0)], damping=[0.0] * 6
-    )
+    tree = dataclasses.replace(tree, inertia=[inertia], com=[(0.0, 0.0, 0.0)], damping=[0.0] * 6)
     path = trajectory(tree, [0.0] * 3 + list(turn), [1.0, 0.0, 2.0, *spin], [0.0] * 6, 0.25, 4)
     assert np.array_equal(tree.axis[3:], np.eye(3))
     for k in (1, 4):
@@ -146,9 +135,8 @@ def test_two_runs_of_other_forms_and_orders_agree_and_a_seeded_error_sets_them_a
     assert np.all(np.abs(path.low) <= np.spacing(np.abs(path.high)) / 2)
 
     def wrong(tree, q, qd):
-        return composite.mass_matrix_and_bias(
-            tree, q, [v * (1 + mpmath.mpf(2) ** -60) for v in qd], mpmath.mpf
-        )
+        faster = [v * (1 + mpmath.mpf(2) ** -60) for v in qd]
+        return composite.mass_matrix_and_bias(tree, q, faster, mpmath.mpf)
 
     monkeypatch.setitem(reference_run.FORMS, "literal", wrong)
     assert truth(tree, *start, 0.0625, 4)[1] > 1e-20

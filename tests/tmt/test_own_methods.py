@@ -8,14 +8,7 @@ import pytest
 import tmt
 from tmt.compiled import forms
 from tmt.derivation import method
-from tmt.methods import (
-    METHODS,
-    RungeKutta,
-    SemiImplicitEuler,
-    amplification,
-    method_named,
-    one_step,
-)
+from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler, amplification, method_named, one_step
 from tmt.methods.stepping import FIELDS, Method, advance
 
 BENT = np.radians([30.0, 20.0, 60.0])

@@ -6,7 +6,6 @@ of length 1. rows(q, qd, tau, out, count, of_q, of_qd, of_tau): states one after
 """
 
 from tmt.derivation.quantities import QUANTITIES
-from tmt.methods.dynamics import Terms
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.tree import Tree
 
@@ -19,9 +18,9 @@ SHORTEST, LONGEST = (1.0 - CLOSE_TO_ONE) ** 2, (1.0 + CLOSE_TO_ONE) ** 2
 ARRAYS = ("q", "qd", "tau")
 
 
-def source(tree: Tree, quantity: str, width: int, terms: Terms | None = None) -> str:
+def source(tree: Tree, quantity: str, width: int) -> str:
     """The module of a quantity for one state at a time, or for several side by side."""
-    traced = forms.quantity(tree, quantity, terms)
+    traced = forms.quantity(tree, quantity)
     entries = Entries(tree, quantity, traced, width)
     called = [entries.rows(), entries.one()] if width == 1 else [entries.rows()]
     return module([*functions(traced, width, inline=len(traced.nodes) <= INLINED), *called])
@@ -35,8 +34,7 @@ class Entries:
         self.sizes = tree.coordinates.nq, tree.coordinates.nv, tree.coordinates.nv
         self.begins = 0, self.sizes[0], self.sizes[0] + self.sizes[1]  # of q, qd, tau in a state
         self.count, self.results = sum(self.sizes), len(traced.outputs)
-        takes = QUANTITIES[quantity].takes if quantity in QUANTITIES else ("q", "qd")
-        self.taken = sum(size for name, size in zip(ARRAYS, self.sizes) if name in takes)
+        self.taken = sum(size for name, size in zip(ARRAYS, self.sizes) if name in QUANTITIES[quantity].takes)
         self.balls = [joint.q.start for joint in tree.coordinates.balls]
 
     def wrong(self, code: Code, state: Value, out: Value) -> Value:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tmt.derivation.quantities import QUANTITIES, shape_of
-from tmt.methods.dynamics import Terms
 from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree
 from tmt.model.values import shown
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from .machine import Library
 
 POINTER, WHOLE = ctypes.c_void_p, ctypes.c_int64
-TERMS = "mass_matrix_and_bias"
 SMALL = 500  # states for which code of several side by side is not compiled
 SHARED = 5_000  # states times speeds from which several cores share them
 TOGETHER = 32  # states that are not parted
@@ -30,22 +28,17 @@ TOGETHER = 32  # states that are not parted
 class Evaluator:
     """One quantity of a tree, flat, `size` numbers for each state: what it takes stands in q (nq), qd and tau (nv).
 
-    `terms` is another form of Mbar and h that is traced in place of the fastest. Arrays are contiguous and float64: their shapes
-    are not checked. Numbers are computed as they are: of angles beyond 2^49 rad results are NaN.
+    Arrays are contiguous and float64: their shapes are not checked. Numbers are computed as they are: of angles beyond 2^49 rad
+    results are NaN.
     """
 
-    def __init__(self, tree: Tree, quantity: str, terms: Terms | None = None):
+    def __init__(self, tree: Tree, quantity: str):
         checked_model(tree)
-        if not isinstance(quantity, str) or quantity not in (*QUANTITIES, TERMS):
-            raise ValueError(f"quantity is {shown(quantity)}; known are {', '.join([*QUANTITIES, TERMS])}")
-        if terms is not None and not callable(terms):
-            wanted = "a function terms(tree, q, qd) -> (Mbar, h) is expected"
-            raise ValueError(f"terms is {shown(terms)}; {wanted}")
-        self.tree, self.quantity, self.terms = tree, quantity, terms
+        if not isinstance(quantity, str) or quantity not in QUANTITIES:
+            raise ValueError(f"quantity is {shown(quantity)}; known are {', '.join(QUANTITIES)}")
+        self.tree, self.quantity = tree, quantity
         self.sizes = tree.coordinates.nq, tree.coordinates.nv, tree.coordinates.nv
-        n = len(tree.axis)
-        self.shape = (n * (n + 3) // 2,) if quantity == TERMS else shape_of(quantity, tree)
-        self.has_parts = quantity in QUANTITIES and bool(QUANTITIES[quantity].parts)
+        self.shape, self.has_parts = shape_of(quantity, tree), bool(QUANTITIES[quantity].parts)
         self.size = math.prod(self.shape)
         self.rest = [bytes(8 * size) for size in self.sizes]  # at rest, without torque
         self.local = threading.local()
@@ -54,7 +47,7 @@ class Evaluator:
     def library(self, width: int) -> "Library":
         from . import entries, store  # here, so that `import tmt` need not wait for llvmlite
 
-        what = self.tree, self.quantity, width, self.terms
+        what = self.tree, self.quantity, width
         return store.library(partial(entries.source, *what), "quantity", *what)
 
     @cached_property
@@ -75,22 +68,22 @@ class Evaluator:
             self.loops[wide] = library.function("rows", WHOLE, *[POINTER] * 4, *[WHOLE] * 4)
         return self.loops[wide]
 
-    def of_one(self, *given: np.ndarray) -> Any:
+    def of_one(self, *arrays: np.ndarray) -> Any:
         """The quantity of one state, arrays of doubles of the right shapes; None where it is none or a number is not finite."""
         try:
             out, address = self.local.place
         except AttributeError:  # of this thread
             out = np.empty(self.shape)
             self.local.place = out, address = out, out.ctypes.data
-        wrong = self.one_state(*[array.tobytes() for array in given], *self.rest[len(given) :], address)
+        wrong = self.one_state(*[array.tobytes() for array in arrays], *self.rest[len(arrays) :], address)
         if wrong:
             return None
         return tuple(out.copy()) if self.has_parts else out.copy()
 
-    def of_any(self, *given: np.ndarray) -> Any:
+    def of_any(self, *arrays: np.ndarray) -> Any:
         """The quantity of states of any batch shape, arrays of doubles, as tmt's function returns it; None as above."""
-        batch = np.broadcast_shapes(*(array.shape[:-1] for array in given))
-        q, *rates = (rows_of(x, batch if k == 0 or x.ndim > 1 else ()) for k, x in enumerate(given))
+        batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+        q, *rates = (rows_of(x, batch if k == 0 or x.ndim > 1 else ()) for k, x in enumerate(arrays))
         rows = self.of_rows(q, *rates)
         if rows is None:
             return None
@@ -121,7 +114,7 @@ class Evaluator:
         """+ - * / and changes of sign of one evaluation; a sine, a cosine, a root count as one each."""
         from . import forms
 
-        return forms.quantity(self.tree, self.quantity, self.terms).operations
+        return forms.quantity(self.tree, self.quantity).operations
 
 
 def rows_of(array: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
@@ -130,6 +123,6 @@ def rows_of(array: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
     return np.require(states.reshape(-1, array.shape[-1]), requirements=["C", "A", "W"])
 
 
-def evaluator(tree: Tree, quantity: str, terms: Terms | None = None) -> Evaluator:
-    """The Evaluator of a quantity: of tmt's public ones, flat, or "mass_matrix_and_bias": the upper triangle of Mbar, then h."""
-    return Evaluator(tree, quantity, terms)
+def evaluator(tree: Tree, quantity: str) -> Evaluator:
+    """The Evaluator of a quantity, one of tmt's public ones."""
+    return Evaluator(tree, quantity)

@@ -4,17 +4,16 @@ Up to some ten joints in a row, and for trees of short branches, those are the s
 beyond, those in the axes of the world (articulated.py), whose number grows with the number of joints.
 """
 
-from functools import lru_cache, partial
+from functools import lru_cache
 
 from tmt.derivation import articulated, composite
 from tmt.derivation.dual import seeded
 from tmt.derivation.method import reduced_force
 from tmt.derivation.quantities import QUANTITIES, State
 from tmt.derivation.scalar import Scalar
-from tmt.methods.dynamics import Dynamics, Implicit, Rows, Terms, Values, minus, plus
+from tmt.methods.dynamics import Dynamics, Implicit, Rows, Values, minus, plus
 from tmt.methods.stepping import Method
 from tmt.model.tree import Tree
-from tmt.model.values import shown
 
 from .straight import Traced, trace
 from .trace import Expression
@@ -24,8 +23,7 @@ FEW, MANY = (
     20,
 )  # speeds: up to FEW the composite form alone is traced, from MANY on the articulated one alone
 DENSE = 10  # speeds from which solving linear systems and the derivatives of the bias are loops and no longer straight lines
-DYNAMICS = ("mass_matrix", "bias", "gravity_balance", "acceleration")
-TERMS = "mass_matrix_and_bias"
+DYNAMICS = ("mass_matrix", "bias", "gravity_balance")
 
 
 class Traceable(Dynamics):
@@ -78,55 +76,26 @@ def is_shorter_articulated(tree: Tree) -> bool:
     n = len(tree.axis)
     if n <= FEW or n >= MANY:
         return n >= MANY
-    forms = articulated.mass_matrix_and_bias, composite.mass_matrix_and_bias
-    inner, outer = (len(of_terms(tree, Dynamics(terms)).nodes) for terms in forms)
-    return inner < outer
+    sizes = tree.coordinates.nq, n
+    inner, outer = (
+        trace("terms", sizes, lambda q, qd, form=form: flat(form.mass_matrix_and_bias(tree, q, qd)))
+        for form in (articulated, composite)
+    )
+    return len(inner.nodes) < len(outer.nodes)
 
 
-def of_terms(tree: Tree, dynamics: Dynamics) -> Traced:
-    """The upper triangle of Mbar, row by row, and h as a function of (q, qd, tau)."""
-    n = len(tree.axis)
-
-    def both(q: Values, qd: Values, tau: Values) -> Values:
-        M, h = dynamics(tree, q, qd)
-        return [*(M[i][j] for i in range(n) for j in range(i, n)), *h]
-
-    return trace("quantity", (tree.coordinates.nq, n, n), both)
-
-
-def quantity(tree: Tree, name: str, terms: Terms | None = None) -> Traced:
-    """A quantity as a function of (q, qd, tau), flat; or "mass_matrix_and_bias", see `of_terms`.
-
-    terms: another form of Mbar and h; ValueError if they are not what a function of tmt's would return.
-    """
-    dynamics = Dynamics(partial(checked_terms, terms)) if terms else Traceable(tree)
-    if name == TERMS:
-        return of_terms(tree, dynamics)
-    if name == "acceleration" and not terms:
+def quantity(tree: Tree, name: str) -> Traced:
+    """A quantity as a function of (q, qd, tau), flat."""
+    if name == "acceleration":
         return slope(tree, Method(), "quantity", with_step=False)
 
     def function(q: Values, qd: Values, tau: Values) -> Values:
         state = State(tree, q, qd if "qd" in QUANTITIES[name].takes else None, tau)
         if name in DYNAMICS:
-            state.mass_matrix, state.bias = dynamics(tree, q, state.qd)
+            state.mass_matrix, state.bias = Traceable(tree)(tree, q, state.qd)
         return flat(state.bias if name == "gravity_balance" else QUANTITIES[name].of(state))
 
     return trace("quantity", (tree.coordinates.nq, len(tree.axis), len(tree.axis)), function)
-
-
-def checked_terms(terms: Terms, tree: Tree, q: Values, qd: Values) -> tuple[Rows, Values]:
-    """Mbar and h as a user's function gives them."""
-    n = len(tree.axis)
-    try:
-        M, h = terms(tree, q, qd)
-        M, h = [[row[j] for j in range(n)] for row in (M[i] for i in range(n))], [h[i] for i in range(n)]
-        if wrong := [x for x in flat([h, M]) if not isinstance(x, int | float | Expression)]:
-            raise TypeError(f"{shown(wrong[0])} is no scalar")
-        return M, h
-    except Exception as error:
-        why = f"{type(error).__name__}: {error}".splitlines()[0]
-        wanted = f"Mbar, {n} rows of {n}, and h, {n} numbers"
-        raise ValueError(f"terms(tree, q, qd) does not return {wanted}: {why}") from error
 
 
 def flat(nested: Scalar) -> Values:

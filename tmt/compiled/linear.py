@@ -11,8 +11,8 @@ def solve() -> Code:
 
     matrix: n rows of `stride` numbers, of which the first n belong to it; it is written over.
     """
-    given = {"matrix": POINTER, "stride": INDEX, "right": POINTER, "n": INDEX}
-    code = Code("solve", given, attributes="noinline")
+    arguments = {"matrix": POINTER, "stride": INDEX, "right": POINTER, "n": INDEX}
+    code = Code("solve", arguments, attributes="noinline")
     matrix, stride, right, n = (code[name] for name in code.arguments)
     with code.loop(n) as outer:
         k = outer.index
@@ -55,15 +55,15 @@ def bias_rates(nq: int, n: int, width: int) -> Code:
     """bias_rates(in, out): dh/dqd (n, n) from (q, qd), by `bias_rate`, several directions at a time."""
     code = Code("bias_rates", {"in": POINTER, "out": POINTER}, attributes="noinline")
     state = code.reserve(wide(DOUBLE, width), nq + 2 * n)
-    found = code.reserve(wide(DOUBLE, width), n)
+    rates = code.reserve(wide(DOUBLE, width), n)
     for k in range(nq + n):
         state.store(code["in"].load(k).everywhere(width), k * width)
     with code.loop(n, width) as loop:
         put_directions(state, nq + n, n, loop.index, width)
-        code.call("bias_rate", state, found)
+        code.call("bias_rate", state, rates)
         for l in range(width):
             with code.when((loop.index + l).compare("lt", n)), code.loop(n) as rows:
-                code["out"].store(found.load(rows.index * width + l), rows.index * n + loop.index + l)
+                code["out"].store(rates.load(rows.index * width + l), rows.index * n + loop.index + l)
     code.give_back()
     return code
 

@@ -18,7 +18,7 @@ PIECES = 4  # for each core, as one of them may be busy with something else
 MOST = 64  # trees and methods whose compiled runs are held
 DIRECT = ctypes.c_void_p
 ARGUMENTS = [DIRECT, DIRECT, DIRECT, ctypes.c_double, ctypes.c_double, DIRECT, *[ctypes.c_int64] * 3]
-known: dict[tuple[int, str], "Runner"] = {}
+runners: dict[tuple[int, str], "Runner"] = {}
 
 
 class Runner:
@@ -28,10 +28,9 @@ class Runner:
     float64 and memory of their own, which is not checked.
     """
 
-    def __init__(
-        self, tree: Tree, stepping: Method, entry: object
-    ):  # entry: of METHODS, which may be a user's own object
-        self.tree, self.stepping, self.entry = tree, stepping, entry
+    def __init__(self, tree: Tree, stepping: Method, entry: object):
+        self.tree, self.stepping = tree, stepping
+        self.entry = entry  # of METHODS, which may be a user's own object
         self.functions: dict[int, Callable[..., None]] = {}
 
     def compiled(self, width: int) -> Callable[..., None]:
@@ -68,14 +67,15 @@ class Runner:
 
         def follow_some(part: slice) -> None:
             arrays = [array[part] for array in (q, qd, tau, info)]
-            missing = -len(arrays[0]) % width  # too few for a register: their last one again
-            filled = (
-                [np.concatenate([array, *[array[-1:]] * missing]) for array in arrays] if missing else arrays
-            )
-            self.call(width, filled, dt, tolerance, every)()
-            if missing:
-                for array, padded in zip(arrays, filled):
-                    array[:] = padded[:-missing]
+            missing = -len(arrays[0]) % width
+            if not missing:
+                self.call(width, arrays, dt, tolerance, every)()
+                return
+            # too few for a register: their last one again
+            padded = [np.concatenate([array, *[array[-1:]] * missing]) for array in arrays]
+            self.call(width, padded, dt, tolerance, every)()
+            for array, filled in zip(arrays, padded):
+                array[:] = filled[:-missing]
 
         threads = cores() if count > width and steps * count * self.stepping.stages > SPREAD else 1
         parts = min(count // width, PIECES * threads) if threads > 1 else 1
@@ -104,12 +104,12 @@ def address(array: np.ndarray) -> int:
 
 def runner_of(tree: Tree, name: str) -> Runner:
     """The Runner of a tree and the method of that name as it is now; ValueError if they are none."""
-    runner = known.get((id(tree), name)) if type(name) is str else None
+    runner = runners.get((id(tree), name)) if type(name) is str else None
     # whose tree is held, so that no other has its id
     if runner is None or runner.entry is not METHODS.get(name):
         checked_model(tree)
         stepping = method_named(name)
-        if len(known) >= MOST:
-            known.clear()
-        known[id(tree), name] = runner = Runner(tree, stepping, METHODS[name])
+        if len(runners) >= MOST:
+            runners.clear()
+        runners[id(tree), name] = runner = Runner(tree, stepping, METHODS[name])
     return runner

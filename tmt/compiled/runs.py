@@ -104,34 +104,31 @@ class Step:
 
         def advance(code: Code, state: Value, new: Value, dt: Value, evaluations: Variable) -> Value:
             wanted, left, why = self.wanted, Variable(code, DOUBLE, dt), Variable(code, INDEX, 0)
-            found = code.reserve(DOUBLE, count)
+            result = code.reserve(DOUBLE, count)
             with code.loop(2**62) as loop:
                 loop.leave(left.get().compare("le", 0.0))
                 loop.leave(why.get().compare("ne", 0))
                 pieces = (left.get() / wanted.get()).function("ceil")
                 h = left.get() / pieces
                 state.store(h, nq + 2 * n)
-                code.call("attempt", state, found)
+                code.call("attempt", state, result)
                 evaluations.set(evaluations.get() + self.stepping.stages)
-                e5, e3 = (
-                    squares(state, found, first, scales, code["tolerance"]) for first in (nq + n, nq + 3 * n)
-                )
+                e5 = squares(state, result, nq + n, scales, code["tolerance"])
+                e3 = squares(state, result, nq + 3 * n, scales, code["tolerance"])
                 root = (2.0 * n * (e5 + 0.01 * e3)).function("sqrt")
                 error = e5.compare("gt", 0.0).choose(e5 / root, 0.0)
-                accepted = error.compare("lt", 1.0)
-                with code.when(accepted):
+                with code.when(error.compare("lt", 1.0)):  # it is accepted
                     for k in code.each(nq + n):
-                        state.store(found.load(k), k)
+                        state.store(result.load(k), k)
                     left.set(pieces.compare("gt", 1.0).choose(left.get() - h, 0.0))
-                factor = SAFETY * code.intrinsic(
-                    "pow", error, code.number(-1.0 / order)
-                )  # of no error infinite
+                # infinite where there is no error
+                factor = SAFETY * code.intrinsic("pow", error, code.number(-1.0 / order))
                 factor = factor.compare("gt", SHRINKING).choose(factor, SHRINKING)
                 factor = factor.compare("lt", GROWTH).choose(factor, GROWTH)
                 wanted.set(h * factor)
-                off = unsound(code, self.tree, state, 1)
+                flaw = unsound(code, self.tree, state, 1)
                 short = h.compare("gt", dt * SHORTEST_STEP).choose(code.number(0, INDEX), SMALL)
-                why.set(off.compare("ne", 0).choose(off, short))
+                why.set(flaw.compare("ne", 0).choose(flaw, short))
             for k in code.each(nq + n):
                 new.store(state.load(k), k)
             state.store(dt, nq + 2 * n)
@@ -158,36 +155,36 @@ class Step:
 
         def advance(code: Code, state: Value, new: Value, dt: Value, evaluations: Variable) -> Value:
             inputs = nq + 2 * n + 1
-            given = code.reserve(wide(DOUBLE, width), inputs + 2 * unknown)
-            found = code.reserve(wide(DOUBLE, width), 2 * unknown)
+            arguments = code.reserve(wide(DOUBLE, width), inputs + 2 * unknown)
+            residuals = code.reserve(wide(DOUBLE, width), 2 * unknown)
             matrix, right = code.reserve(DOUBLE, unknown * columns), code.reserve(DOUBLE, unknown)
             last = code.reserve(DOUBLE, nq + n + 1 + unknown)  # what `finish` takes
             a = last.at(nq + n + 1)
-            each = code.number(unknown, INDEX)
+            length = code.number(unknown, INDEX)
             why = Variable(code, INDEX, NEWTON)
             for k in code.each(inputs):
-                given.store(state.load(k).everywhere(width), k * width)
-            with code.loop(each) as loop:
+                arguments.store(state.load(k).everywhere(width), k * width)
+            with code.loop(length) as loop:
                 a.store(0.0, loop.index)
             with code.loop(ITERATIONS + 1) as iteration:
                 is_linear = iteration.index.compare("eq", 0)
-                with code.loop(each) as loop:
-                    given.store(a.load(loop.index).everywhere(width), (loop.index + inputs) * width)
-                with code.loop(each, width) as loop:
-                    linear.put_directions(given, inputs + unknown, unknown, loop.index, width)
+                with code.loop(length) as loop:
+                    arguments.store(a.load(loop.index).everywhere(width), (loop.index + inputs) * width)
+                with code.loop(length, width) as loop:
+                    linear.put_directions(arguments, inputs + unknown, unknown, loop.index, width)
                     with code.when(is_linear):
-                        code.call("linear_residual", given, found)
+                        code.call("linear_residual", arguments, residuals)
                     with code.when(is_linear.negated()):
-                        code.call("residual", given, found)
-                    with code.loop(each) as rows:
-                        change = found.load((rows.index + unknown) * width, wide(DOUBLE, width))
+                        code.call("residual", arguments, residuals)
+                    with code.loop(length) as rows:
+                        change = residuals.load((rows.index + unknown) * width, wide(DOUBLE, width))
                         matrix.store(-change, rows.index * columns + loop.index)
-                with code.loop(each) as rows:
-                    right.store(found.load(rows.index * width), rows.index)
-                code.call("solve", matrix, code.number(columns, INDEX), right, each)
+                with code.loop(length) as rows:
+                    right.store(residuals.load(rows.index * width), rows.index)
+                code.call("solve", matrix, code.number(columns, INDEX), right, length)
                 evaluations.set(evaluations.get() + stepping.stages)
                 size, most = Variable(code, DOUBLE, 0.0), Variable(code, DOUBLE, 0.0)
-                with code.loop(each) as loop:
+                with code.loop(length) as loop:
                     change = right.load(loop.index)
                     a.store(a.load(loop.index) + change, loop.index)
                     for largest, value in ((size, a.load(loop.index)), (most, change)):
@@ -211,15 +208,15 @@ class Step:
         return advance
 
 
-def squares(state: Value, found: Value, first: int, scales: list[int | None], tolerance: Value) -> Value:
+def squares(state: Value, result: Value, first: int, scales: list[int | None], tolerance: Value) -> Value:
     """The sum of the squares of an estimate of the error, from number `first` on, in units of tolerance (1 + |value|)."""
     total = state.code.number(0.0)
     for k, scale in enumerate(scales):
         unit: Value | float = 2.0
         if scale is not None:
-            before, after = state.load(scale).function("fabs"), found.load(scale).function("fabs")
+            before, after = state.load(scale).function("fabs"), result.load(scale).function("fabs")
             unit = 1.0 + after.compare("gt", before).choose(after, before)
-        share = found.load(first + k) / (tolerance * unit)
+        share = result.load(first + k) / (tolerance * unit)
         total = total + share * share
     return total
 
@@ -296,12 +293,12 @@ def run(step: Step, advance: Advance) -> Code:
 
 def unsound(code: Code, tree: Tree, state: Value, width: int) -> Value:
     """Why a state cannot be gone on from; 0: it can."""
-    kind, whole = wide(DOUBLE, width), wide(INDEX, width)
+    kind, indices = wide(DOUBLE, width), wide(INDEX, width)
     hinges = [joint.q.start for joint in tree.coordinates.joints if joint.kind == "hinge"]
     total, angles = Variable(code, kind, 0.0), code.number(0.0, kind)
     for k in code.each(tree.coordinates.nq + tree.coordinates.nv):
         total.set(total.get() + state.load(k * width, kind))
     for k in hinges:
         angles = angles + state.load(k * width, kind).function("fabs")
-    turned = angles.compare("lt", LIMIT).choose(code.number(0, whole), TURNED)
+    turned = angles.compare("lt", LIMIT).choose(code.number(0, indices), TURNED)
     return total.get().function("fabs").compare("lt", float("inf")).choose(turned, OVERFLOW)

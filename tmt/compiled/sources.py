@@ -11,8 +11,8 @@ from pathlib import Path
 
 def stamps(files: Iterable[str]) -> dict[str, tuple[int, int]]:
     """When each file was written, and its size."""
-    found = {file: os.stat(file) for file in files}
-    return {file: (of.st_mtime_ns, of.st_size) for file, of in found.items()}
+    stats = {file: os.stat(file) for file in files}
+    return {file: (stat.st_mtime_ns, stat.st_size) for file, stat in stats.items()}
 
 
 IMPORTED = stamps(sorted(map(str, Path(__file__).parents[1].rglob("*.py"))))
@@ -20,10 +20,10 @@ IMPORTED = stamps(sorted(map(str, Path(__file__).parents[1].rglob("*.py"))))
 
 @lru_cache(maxsize=1)
 def contents() -> str:
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for file in IMPORTED:
-        found.update(Path(file).read_bytes())
-    return found.hexdigest()
+        digest.update(Path(file).read_bytes())
+    return digest.hexdigest()
 
 
 def own_sources() -> str | None:

@@ -37,13 +37,13 @@ def library(
 ) -> Library:
     """The compiled module of a source, from the folder if it lies there; what: all that the source follows from, with tmt itself.
 
-    Of what is the user's own (a class of trees, a method, a function), or of changed sources, nothing is kept: it may be another.
+    Of what is the user's own (a class of trees, a method), or of changed sources, nothing is kept: it may be another.
     """
     words = [own_sources(), versions(), *map(word_of, what)]
-    known = [word for word in words if word is not None]
-    if len(known) < len(words):
+    parts = [word for word in words if word is not None]
+    if len(parts) < len(words):
         return Library(source())
-    name = hashlib.sha256("\n".join(known).encode()).hexdigest()[:32]
+    name = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
     try:
         path = own_folder() / f"{name}.o"
         code = read(path)
@@ -62,7 +62,7 @@ def library(
 
 def word_of(value: object) -> str | None:
     """What stands for a value in the name of a file; None if it may mean something else another time."""
-    if isinstance(value, (str, int)) or value is None:
+    if isinstance(value, (str, int)):
         return repr(value)
     is_of_tmt = type(value).__module__.split(".")[0] == __name__.split(".")[0]
     if is_of_tmt and isinstance(value, Tree | Method) and is_dataclass(value):

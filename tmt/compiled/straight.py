@@ -19,7 +19,7 @@ from .trace import LEAVES, Expression, Tape
 
 LONGEST = 1_000  # nodes of one function
 OF_ONE = ("solution", "bias_rates")  # functions of linear.py, which take one state
-OPERATIONS = {
+OPERATIONS: dict[str, Callable[..., Any]] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
@@ -80,13 +80,13 @@ def functions(traced: Traced, width: int, inline: bool = False) -> list[Code]:
         code = entry(traced.name, "alwaysinline" if inline else "noinline")
         steps.write(code, steps.order, width, None)
         return [code]
-    cuts = [steps.order[k : k + LONGEST] for k in range(0, len(steps.order), LONGEST)]
-    places, size = steps.handed_on(cuts)
+    sections = [steps.order[k : k + LONGEST] for k in range(0, len(steps.order), LONGEST)]
+    places, size = steps.handed_on(sections)
     main, result = entry(traced.name, "noinline"), []
     handed = main.reserve(wide(DOUBLE, width), size)
-    for k, cut in enumerate(cuts):
+    for k, section in enumerate(sections):
         part = entry(f"{traced.name}.{k}", "noinline", "handed")
-        steps.write(part, cut, width, Handed(part["handed"], places))
+        steps.write(part, section, width, Handed(part["handed"], places))
         main.call(part.name, main["in"], main["out"], handed)
         result.append(part)
     main.give_back()
@@ -123,15 +123,15 @@ class Steps:
             arguments = *(a for a in arguments if a != product), *self.tape.operands(product)
         return [a for a in arguments if self.tape.nodes[a][0] != "number"]
 
-    def handed_on(self, cuts: list[list[int]]) -> tuple[dict[int, int], int]:
+    def handed_on(self, sections: list[list[int]]) -> tuple[dict[int, int], int]:
         """The place of each value that a part hands to a later one, and how many places there are."""
-        made: list[list[int]] = [[] for _ in cuts]  # by each part
+        made: list[list[int]] = [[] for _ in sections]  # by each part
         last: dict[int, int] = {}  # the part that takes a value last
-        for k, cut in enumerate(cuts):
-            for i in cut:
+        for k, section in enumerate(sections):
+            for i in section:
                 made[k] += self.items.get(i, [i])
                 last |= {a: k for a in self.takes(i) if a not in self.input}
-        leaving: list[list[int]] = [[] for _ in cuts]
+        leaving: list[list[int]] = [[] for _ in sections]
         free: list[int] = []
         places: dict[int, int] = {}
         size = 0
@@ -203,18 +203,18 @@ class Steps:
 
 def called(code: Code, name: str, values: list[Value], count: int, width: int) -> Value:
     """Call void name(ptr in, ptr out), lane by lane where it is for one state alone; the place of its results."""
-    given = code.reserve(wide(DOUBLE, width), len(values))
+    taken = code.reserve(wide(DOUBLE, width), len(values))
     out = code.reserve(wide(DOUBLE, width), count)
     for k, x in enumerate(values):
-        given.store(x, k * width)
+        taken.store(x, k * width)
     if width == 1 or name not in OF_ONE:
-        code.call(name, given, out)
+        code.call(name, taken, out)
         return out
-    given_one, out_one = code.reserve(DOUBLE, len(values)), code.reserve(DOUBLE, count)
+    taken_one, out_one = code.reserve(DOUBLE, len(values)), code.reserve(DOUBLE, count)
     with code.loop(width) as lane:
         with code.loop(len(values)) as loop:
-            given_one.store(given.load(loop.index * width + lane.index), loop.index)
-        code.call(name, given_one, out_one)
+            taken_one.store(taken.load(loop.index * width + lane.index), loop.index)
+        code.call(name, taken_one, out_one)
         with code.loop(count) as loop:
             out.store(out_one.load(loop.index), loop.index * width + lane.index)
     return out

@@ -15,10 +15,10 @@ from typing import Any
 from tmt.derivation.scalar import Scalar
 from tmt.derivation.vectors import arctan, cos, sin, sqrt
 
+Function = Callable[[Scalar], Scalar]
 
-def folded(
-    of_float: Callable[[float], float], function: Callable[[Scalar], Scalar]
-) -> Callable[[Scalar], Scalar]:
+
+def folded(of_float: Function, function: Function) -> Function:
     """A function of a number, of a float by the C library."""
     return lambda x: of_float(x) if isinstance(x, float) else function(x)
 
@@ -95,11 +95,11 @@ class Tape:
             return self.lift(0.0)
         if 1.0 in (a.number, b.number):
             return b if a.number == 1.0 else a
-        for one, other in ((a, b), (b, a)):
-            if one.negated is not None:
-                return self.negative(self.multiply(one.negated, other))
-            if one.number is not None and one.number < 0.0:
-                return self.negative(self.multiply(self.lift(-one.number), other))
+        for x, y in ((a, b), (b, a)):
+            if x.negated is not None:
+                return self.negative(self.multiply(x.negated, y))
+            if x.number is not None and x.number < 0.0:
+                return self.negative(self.multiply(self.lift(-x.number), y))
         return self.merged("*", a, b) or self.node("*", *sorted((a.i, b.i)))
 
     def divide(self, a: "Expression", b: "Expression") -> "Expression":
@@ -118,12 +118,12 @@ class Tape:
 
     def merged(self, operation: str, a: "Expression", b: "Expression") -> "Expression | None":
         """c1 o (c2 o x) as (c1 o c2) o x for numbers c1, c2: else None."""
-        for one, other in ((a, b), (b, a)):
-            if one.number is not None and self.nodes[other.i][0] == operation:
-                inner = [Expression(self, i) for i in self.nodes[other.i][1]]
+        for x, y in ((a, b), (b, a)):
+            if x.number is not None and self.nodes[y.i][0] == operation:
+                inner = [Expression(self, i) for i in self.nodes[y.i][1]]
                 inner.sort(key=lambda part: part.number is None)
                 if inner[0].number is not None:
-                    return self.apply(operation, self.apply(operation, one, inner[0]), inner[1])
+                    return self.apply(operation, self.apply(operation, x, inner[0]), inner[1])
         return None
 
     def apply(self, operation: str, *operands: Scalar) -> "Expression":
@@ -136,14 +136,9 @@ class Tape:
             return self.node("item", self.node("sincos", values[0].i).i, ("sin", "cos").index(operation))
         if operation in FUNCTIONS:
             return self.node(operation, values[0].i)
-        rules: dict[str, Callable[..., Expression]]
-        rules = {
-            "+": self.add,
-            "-": self.subtract,
-            "*": self.multiply,
-            "/": self.divide,
-            "neg": self.negative,
-        }
+        if operation == "neg":
+            return self.negative(values[0])
+        rules = {"+": self.add, "-": self.subtract, "*": self.multiply, "/": self.divide}
         return rules[operation](*values)
 
     def fused(self, order: list[int], outputs: list["Expression"]) -> dict[int, int]:

@@ -12,6 +12,7 @@ from tmt.derivation.quantities import QUANTITIES, State, shape_of
 from tmt.exact import series
 from tmt.exact.motion import DIGITS, FORMS, Equations, program
 from tmt.exact.tree import exact_tree
+from tmt.model.tree import Tree
 
 
 class Pairs(NamedTuple):
@@ -24,41 +25,34 @@ class Pairs(NamedTuple):
         """One of several arrays of a quantity; None: all."""
         return self if k is None else Pairs(self.high[:, k], self.low[:, k])
 
-    def distance(self, values) -> np.ndarray:
+    def distance(self, values: np.ndarray) -> np.ndarray:
         """|values - exact|, (states, ...)."""
         with np.errstate(invalid="ignore"):  # a user's own equations may give NaN
             return np.abs((values - self.high) - self.low)
 
 
-def exact_of_many(tree, name: str, q, qd, tau) -> Pairs:
+def exact_of_many(tree: Tree, name: str, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> Pairs:
     """A quantity at q (states, nq), qd, tau (states, nv): doubles, taken as exact. Shapes and units as in `tmt`."""
     states, shape = np.concatenate([q, qd, tau], axis=1), shape_of(name, tree)
-    if not len(states):
-        return Pairs(*np.empty((2, 0, *shape)))
-    found, at = traced(tree, name)
-    count, (high, low) = states.shape[1], np.zeros((2, found.rows, 2))
-    high[count : count + found.numbers.shape[1], 0], low[count : count + found.numbers.shape[1], 0] = (
-        found.numbers
-    )
-    values = np.empty((2, len(states), len(at)))
+    equations, rows = traced(tree, name)
+    high, low = equations.tables(states.shape[1], 2)
+    values = np.empty((2, len(states), len(rows)))
     for k, numbers in enumerate(states):
-        high[:count, 0] = numbers
-        series.expand(found.code, high, low)  # the first coefficients are the values
-        values[:, k] = high[at, 0], low[at, 0]
+        high[: len(numbers), 0] = numbers
+        series.expand(equations.code, high, low)  # the first coefficients are the values
+        values[:, k] = high[rows, 0], low[rows, 0]
     return Pairs(*values.reshape(2, len(states), *shape))
 
 
 @lru_cache(maxsize=64)
-def traced(tree, name: str) -> tuple[Equations, list[int]]:
+def traced(tree: Tree, name: str) -> tuple[Equations, list[int]]:
     """The operations of a quantity, and the rows of its numbers."""
     tape, n = Tape(mpmath.mpf), len(tree.axis)
     with mpmath.workdps(DIGITS):
-        sizes = tree.coordinates.nq, n, n
-        inputs = [
-            tape.inputs(*(f"{of}{i}" for i in range(size))) for of, size in zip(("q", "qd", "tau"), sizes)
-        ]
-        state = State(exact_tree(tree, mpmath.mpf), *inputs)
-        state.mass_matrix, state.bias = FORMS["composite"](state.tree, state.q, state.qd)
+        sizes = {"q": tree.coordinates.nq, "qd": n, "tau": n}
+        q, qd, tau = (tape.inputs(*(f"{array}{i}" for i in range(size))) for array, size in sizes.items())
+        state = State(exact_tree(tree, mpmath.mpf), q, qd, tau)
+        state.mass_matrix, state.bias = FORMS["composite"](state.tree, q, qd)
         results = [tape.lift(x) for x in flat(QUANTITIES[name].of(state))]
-        found, row = program(tape, [x for part in inputs for x in part], results)
-    return found, [row[x.i] for x in results]
+        equations, row = program(tape, [*q, *qd, *tau], results)
+    return equations, [row[x.i] for x in results]

@@ -6,21 +6,26 @@ torque is constant: where it jumps a run ends and another begins.
 """
 
 import math
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mpmath
 import numpy as np
 
-from tmt.compiled.trace import Tape
+from tmt.compiled.trace import Expression, Tape
 from tmt.derivation import composite, method
+from tmt.derivation.coordinates import Coordinates
 from tmt.exact import series
 from tmt.exact.pairs import pair
 from tmt.exact.tree import exact_tree, of_length_1
+from tmt.model.tree import Tree
+
+Numbers = Sequence[float] | np.ndarray
 
 DIGITS = 60  # of the numbers that are traced
-FORMS = {
+FORMS: dict[str, Callable[..., Any]] = {
     "composite": partial(composite.mass_matrix_and_bias, number=mpmath.mpf),
     "literal": method.mass_matrix_and_bias,
 }
@@ -55,8 +60,17 @@ class Equations(NamedTuple):
     numbers: np.ndarray  # (2, numbers), in the rows after the inputs
     rows: int
 
+    def tables(self, inputs: int, width: int) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of `width` coefficients, high and low, with the numbers that are constant."""
+        high, low = np.zeros((2, self.rows, width))
+        constant = slice(inputs, inputs + self.numbers.shape[1])
+        high[constant, 0], low[constant, 0] = self.numbers
+        return high, low
 
-def truth(tree, q, qd, tau, dt: float, steps: int, every: int = 1) -> tuple[Path, float]:
+
+def truth(
+    tree: Tree, q: Numbers, qd: Numbers, tau: Numbers, dt: float, steps: int, every: int = 1
+) -> tuple[Path, float]:
     """The motion, see `trajectory`, and its largest difference from a second run, rad or rad/s.
 
     The two share neither the order nor, up to 40 speeds, the form of the equations: their difference shows what truncation,
@@ -69,8 +83,8 @@ def truth(tree, q, qd, tau, dt: float, steps: int, every: int = 1) -> tuple[Path
 
 
 def trajectory(
-    tree, q, qd, tau, dt: float, steps: int, every: int = 1, form: str = "composite", order: int = ORDER,
-    tolerance: float = TOLERANCE,
+    tree: Tree, q: Numbers, qd: Numbers, tau: Numbers, dt: float, steps: int, every: int = 1, form: str = "composite",
+    order: int = ORDER,
 ) -> Path:  # fmt: skip
     """The motion under constant torque at the times 0, every dt, 2 every dt ... up to steps dt, these products exact.
 
@@ -78,26 +92,26 @@ def trajectory(
     says no more than these times. form: of FORMS. Raises TooManySteps if a run would take too long, ValueError if its numbers
     overflow.
     """
-    path, count, error = followed(tree, q, qd, tau, dt, steps, every, form, order, tolerance)
+    path, count, error = followed(tree, q, qd, tau, dt, steps, every, form, order)
     if error:
         raise error
-    return Path(*path.transpose(1, 0, 2), count)
+    high, low = path.transpose(1, 0, 2)
+    return Path(high, low, count)
 
 
 def followed(
-    tree, q, qd, tau, dt, steps, every=1, form="composite", order=ORDER, tolerance=TOLERANCE
-) -> tuple[np.ndarray, int, ValueError | None]:
+    tree: Tree, q: Numbers, qd: Numbers, tau: Numbers, dt: float, steps: int, every: int = 1, form: str = "composite",
+    order: int = ORDER, tolerance: float = TOLERANCE,
+) -> tuple[np.ndarray, int, ValueError | None]:  # fmt: skip
     """The records (k, 2, nq + nv) of a run as far as it goes, the number of its series, and why it ends early, or None."""
-    code, numbers, rows = equations(tree, tau, form)
-    n, most = tree.coordinates.nq + tree.coordinates.nv, MOST_OPERATIONS // (BESIDE + len(code))
-    high, low = np.zeros((2, rows, order + 1))
-    high[n : n + numbers.shape[1], 0], low[n : n + numbers.shape[1], 0] = numbers
+    traced, n = equations(tree, tau, form), tree.coordinates.nq + tree.coordinates.nv
+    (high, low), most = traced.tables(n, order + 1), MOST_OPERATIONS // (BESIDE + len(traced.code))
     times = [Fraction(dt) * k for k in range(0, steps + 1, every)]
     state, t, count = first_state(tree.coordinates, q, qd), Fraction(0), 0
     path = [state]
     while len(path) < len(times):
         high[:n, 0], low[:n, 0] = state
-        series.expand(code, high, low)
+        series.expand(traced.code, high, low)
         step = step_size(high[:n], tolerance)
         if not step > 0.0:
             why = "the motion diverges, is too fast, or Mbar is singular"
@@ -119,49 +133,48 @@ def followed(
     return np.array(path), count, None
 
 
-def equations(tree, tau, form: str) -> Equations:
+def equations(tree: Tree, tau: Numbers, form: str) -> Equations:
     """The equations of a tree under constant torque (nv,), N m, in one of FORMS."""
     tape, coordinates = Tape(mpmath.mpf), tree.coordinates
     with mpmath.workdps(DIGITS):
-        q, qd = (
-            tape.inputs(*(f"{name}{i}" for i in range(size)))
-            for name, size in zip(("q", "qd"), coordinates[1:])
-        )
+        sizes = {"q": coordinates.nq, "qd": coordinates.nv}
+        q, qd = (tape.inputs(*(f"{name}{i}" for i in range(size))) for name, size in sizes.items())
         exact = exact_tree(tree, mpmath.mpf)
         qdd = method.acceleration(exact, q, qd, [mpmath.mpf(float(v)) for v in tau], FORMS[form])
         rates = [tape.lift(rate) for rate in (*coordinates.component_rates(q, qd), *qdd)]
-        found, row = program(tape, (*q, *qd), rates)
+        traced, row = program(tape, [*q, *qd], rates)
         more = [(series.RATE, k, row[rate.i], 0) for k, rate in enumerate(rates)]
-    return found._replace(code=np.array([*found.code, *more]))
+    return traced._replace(code=np.array([*traced.code, *more]))
 
 
-def program(tape: Tape, inputs, results) -> tuple[Equations, dict[int, int]]:
+def program(
+    tape: Tape, inputs: list[Expression], results: list[Expression]
+) -> tuple[Equations, dict[int, int]]:
     """The operations that make results of inputs, which stand in the first rows; and the row of each node of the tape."""
-    order, is_number = tape.needed(results), lambda i: tape.nodes[i][0] == "number"
-    row = {x.i: k for k, x in enumerate(inputs)}
-    constant = [i for i in order if is_number(i)]
-    row |= {i: k for k, i in enumerate(constant, start=len(row))}
+    order = tape.needed(results)
+    constant = {i: tape.nodes[i][1][0] for i in order if tape.nodes[i][0] == "number"}
+    row = {i: k for k, i in enumerate([*(x.i for x in inputs), *constant])}
     code, rows = [], len(row)
     for i in order:
         operation, arguments = tape.nodes[i]
         if operation == "item":
             row[i] = row[arguments[0]] + 1 + arguments[1]
         elif i not in row:
-            if operation == "*":  # by a number, if it is one of the two: then the second
-                arguments = sorted(arguments, key=is_number)
+            acts = (
+                (series.SLOPE, series.SINE, series.COSINE)
+                if operation == "sincos"
+                else (OPERATIONS[operation],)
+            )
+            if operation == "*" and any(i in constant for i in arguments):  # the number is the second
+                acts, arguments = (series.SCALE,), tuple(sorted(arguments, key=lambda i: i in constant))
             a, b = row[arguments[0]], row[arguments[-1]]
-            made = [series.SLOPE, series.SINE, series.COSINE]
-            if operation != "sincos":
-                made = [
-                    series.SCALE if operation == "*" and is_number(arguments[1]) else OPERATIONS[operation]
-                ]
-            code += [(act, rows + k, a, b) for k, act in enumerate(made)]
-            row[i], rows = rows, rows + len(made)
-    numbers = np.array([pair(tape.nodes[i][1][0]) for i in constant]).reshape(-1, 2)
+            code += [(act, rows + k, a, b) for k, act in enumerate(acts)]
+            row[i], rows = rows, rows + len(acts)
+    numbers = np.array([pair(number) for number in constant.values()]).reshape(-1, 2)
     return Equations(np.array(code, dtype=np.int64).reshape(-1, 4), numbers.T.copy(), rows), row
 
 
-def first_state(coordinates, q, qd) -> np.ndarray:
+def first_state(coordinates: Coordinates, q: Numbers, qd: Numbers) -> np.ndarray:
     """The state in pairs, (2, nq + nv), quaternions at length 1."""
     with mpmath.workdps(DIGITS):
         q, qd = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd))

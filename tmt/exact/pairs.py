@@ -7,8 +7,10 @@ from fractions import Fraction
 
 import mpmath
 
-from tmt.compiled.ir import INDEX
+from tmt.compiled.ir import INDEX, Value
+from tmt.derivation.scalar import Scalar
 
+Both = tuple[Scalar, Scalar]  # high and low
 TERMS = 16  # of the series of sine and cosine up to pi/4: the next is below 1e-36
 
 
@@ -20,36 +22,36 @@ def pair(x: mpmath.mpf) -> tuple[float, float]:
 
 with mpmath.workdps(80):
     FACTORIALS = [pair(1 / mpmath.factorial(k)) for k in range(2 * TERMS)]
-    QUARTER = pair(mpmath.pi / 2)
-    QUARTER = (*QUARTER, float(mpmath.pi / 2 - QUARTER[0] - QUARTER[1]))  # a quarter turn in three doubles
+    HIGH, LOW = pair(mpmath.pi / 2)
+    QUARTER = HIGH, LOW, float(mpmath.pi / 2 - HIGH - LOW)  # a quarter turn in three doubles
 
 
-def two_sum(a, b):
+def two_sum(a: Scalar, b: Scalar) -> Both:
     """a + b and what it is rounded by."""
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
 
 
-def joined(a, b):
+def joined(a: Scalar, b: Scalar) -> Both:
     """The same for |a| >= |b|: the pair that is a + b."""
     s = a + b
     return s, b - (s - a)
 
 
-def add(ah, al, bh, bl):
+def add(ah: Scalar, al: Scalar, bh: Scalar, bl: Scalar) -> Both:
     s, e = two_sum(ah, bh)
     t, f = two_sum(al, bl)
     s, e = joined(s, e + t)
     return joined(s, e + f)
 
 
-def multiply(ah, al, bh, bl):
+def multiply(ah: Scalar, al: Scalar, bh: Scalar, bl: Scalar) -> Both:
     p = ah * bh
     return joined(p, fused(ah, bh, -p) + fused(ah, bl, al * bh))
 
 
-def divide(ah, al, bh, bl):
+def divide(ah: Scalar, al: Scalar, bh: Scalar, bl: Scalar) -> Both:
     first = ah / bh
     rh, rl = less(ah, al, bh, bl, first)
     second = rh / bh
@@ -58,18 +60,18 @@ def divide(ah, al, bh, bl):
     return add(qh, ql, rh / bh, 0.0)
 
 
-def less(ah, al, bh, bl, times):
+def less(ah: Scalar, al: Scalar, bh: Scalar, bl: Scalar, times: Scalar) -> Both:
     """The pair a - times b."""
     ph, pl = multiply(bh, bl, times, 0.0)
     return add(ah, al, -ph, -pl)
 
 
-def fused(a, b, c):
+def fused(a: Scalar, b: Scalar, c: Scalar) -> Scalar:
     """a b + c, rounded once."""
     return float(Fraction(a) * Fraction(b) + Fraction(c)) if isinstance(a, float) else a.fma(b, c)
 
 
-def root(ah, al):
+def root(ah: Value, al: Value) -> tuple[Value, Value]:
     """The square root of a pair of compiled code: from that of the double on, by Newton's method; 0 where that is 0."""
     first = high = ah.function("sqrt")
     low = 0.0 * high
@@ -81,14 +83,14 @@ def root(ah, al):
     return nothing.choose(first, high), nothing.choose(0.0, low)
 
 
-def sincos(xh, xl):
+def sincos(xh: Value, xl: Value) -> list[Value]:
     """sin x and cos x of a pair of compiled code, x in rad: by their series, after turning x into [-pi/4, pi/4]."""
-    n = (xh / QUARTER[0]).function("rint")
+    n = (xh / HIGH).function("rint")
     for part in QUARTER:
         p = n * part
         xh, xl = add(xh, xl, -p, -n.fma(part, -p))
     zh, zl = multiply(-xh, -xl, xh, xl)
-    (sh, sl), (ch, cl) = (0.0 * xh,) * 2, (0.0 * xh,) * 2
+    sh = sl = ch = cl = 0.0 * xh
     for k in range(TERMS - 1, -1, -1):
         sh, sl = add(*multiply(sh, sl, zh, zl), *FACTORIALS[2 * k + 1])
         ch, cl = add(*multiply(ch, cl, zh, zl), *FACTORIALS[2 * k])

@@ -7,7 +7,8 @@ this kind too (Jorba and Zou, Experimental Mathematics 14, 2005), from c b = a, 
 """
 
 import ctypes
-from functools import lru_cache
+from collections.abc import Callable
+from functools import lru_cache, partial, reduce
 
 import numpy as np
 
@@ -32,17 +33,17 @@ def expand(code: np.ndarray, high: np.ndarray, low: np.ndarray) -> None:
 def values_at(high: np.ndarray, low: np.ndarray, th: float, tl: float, state: np.ndarray) -> None:
     """Write the state (2, n) at the time (th, tl), s after that of the series."""
     n = state.shape[1]
-    functions()["values_at"](high.ctypes.data, low.ctypes.data, high.shape[1], th, tl, state.ctypes.data, n)
+    functions()["values_at"](high.ctypes.data, low.ctypes.data, state.ctypes.data, th, tl, high.shape[1], n)
 
 
 @lru_cache(maxsize=1)
-def functions() -> dict:
+def functions() -> dict[str, Callable[..., None]]:
     """The two compiled functions."""
-    library, whole, place = store.library(source, "series"), ctypes.c_int64, ctypes.c_void_p
+    library, integer, place = store.library(source, "series"), ctypes.c_int64, ctypes.c_void_p
     return {
-        "expand": library.function("expand", None, place, whole, whole, place, place),
+        "expand": library.function("expand", None, place, integer, integer, place, place),
         "values_at": library.function(
-            "values_at", None, place, place, whole, ctypes.c_double, ctypes.c_double, place, whole
+            "values_at", None, *[place] * 3, *[ctypes.c_double] * 2, integer, integer
         ),
     }
 
@@ -69,30 +70,27 @@ def convolution(code: Code, a: Value, b: Value, first: Value, last: Value) -> tu
     high, low, count, kind = code["high"], code["low"], last - first + 1, wide(DOUBLE, BESIDE)
     totals, errors = Variable(code, kind, 0.0), Variable(code, kind, 0.0)
 
-    def take(i, m, total, error, one=lambda place, at: place.load(at)):
-        x, y, of_x, of_y = high.load(i, total.kind), one(high, m), low.load(i, total.kind), one(low, m)
+    def take(i: Value, m: Value, total: Variable, error: Variable) -> None:
+        x, of_x = high.load(i, total.kind), low.load(i, total.kind)
+        y, of_y = high.load(m, total.kind), low.load(m, total.kind)
+        if total is totals:
+            y, of_y = y.shuffled(BACKWARD), of_y.shuffled(BACKWARD)
         p = x * y
         sum_, rounded = two_sum(total.get(), p)
         total.set(sum_)
         error.set(error.get() + (rounded + x.fma(of_y, of_x.fma(y, x.fma(y, -p)))))
 
-    whole = count / BESIDE * BESIDE
-    with code.loop(whole, BESIDE) as loop:
+    paired = count / BESIDE * BESIDE
+    with code.loop(paired, BESIDE) as loop:
         at = first + loop.index
-        take(
-            a + at,
-            b - at - (BESIDE - 1),
-            totals,
-            errors,
-            lambda place, at: place.load(at, kind).shuffled(BACKWARD),
-        )
+        take(a + at, b - at - (BESIDE - 1), totals, errors)
     total, error = Variable(code, DOUBLE, totals.get().lane(0)), Variable(code, DOUBLE, errors.get().lane(0))
     for l in range(1, BESIDE):
         sum_, rounded = two_sum(total.get(), totals.get().lane(l))
         total.set(sum_)
         error.set(error.get() + (rounded + errors.get().lane(l)))
-    with code.loop(count - whole) as loop:
-        at = first + whole + loop.index
+    with code.loop(count - paired) as loop:
+        at = first + paired + loop.index
         take(a + at, b - at, total, error)
     return joined(total.get(), error.get())
 
@@ -108,16 +106,7 @@ def expansion() -> Code:
         r, a, b = row * width, of_a * width, of_b * width
         ah, al = high.load(a + k), low.load(a + k)
 
-        def put(h, l, at=r + k, high=high, low=low):
-            high.store(h, at)
-            low.store(l, at)
-
-        def when(*kinds, operation=operation):
-            flags = [operation.compare("eq", kind) for kind in kinds]
-            for more in flags[1:]:
-                flags[0] = flags[0].bits("or", more)
-            return flags[0]
-
+        when, put = partial(is_any, operation), partial(put_pair, high, low, r + k)
         with code.when(when(ADD, SUBTRACT)):
             sign = when(ADD).choose(code.number(1.0), -1.0)
             put(*add(ah, al, sign * high.load(b + k), sign * low.load(b + k)))
@@ -134,7 +123,7 @@ def expansion() -> Code:
             place = when(SINE).choose(code.number(0, INDEX), 2)
             put(both.load(place), both.load(place + 1))
         with code.when(when(RATE)):
-            put(*divide(ah, al, times + 1.0, code.number(0.0)), at=r + k + 1)
+            put_pair(high, low, r + k + 1, *divide(ah, al, times + 1.0, code.number(0.0)))
         with code.when(when(MULTIPLY)):
             put(*convolution(code, a, b + k, code.number(0, INDEX), k))
         later = at_first.negated()
@@ -156,26 +145,30 @@ def expansion() -> Code:
     return code
 
 
+def is_any(operation: Value, *kinds: int) -> Value:
+    """Whether an operation is one of these."""
+    first, *more = (operation.compare("eq", kind) for kind in kinds)
+    return reduce(lambda flag, other: flag.bits("or", other), more, first)
+
+
+def put_pair(high: Value, low: Value, at: Value, h: Value, l: Value) -> None:
+    high.store(h, at)
+    low.store(l, at)
+
+
 def evaluation() -> Code:
     """The function of `values_at`."""
-    names = {
-        "high": POINTER,
-        "low": POINTER,
-        "width": INDEX,
-        "th": DOUBLE,
-        "tl": DOUBLE,
-        "state": POINTER,
-        "n": INDEX,
-    }
+    names = dict.fromkeys(("high", "low", "state"), POINTER) | dict.fromkeys(("th", "tl"), DOUBLE)
+    names |= dict.fromkeys(("width", "n"), INDEX)
     code = Code("values_at", names)
     with code.loop(code["n"]) as numbers:
         h, l = Variable(code, DOUBLE, 0.0), Variable(code, DOUBLE, 0.0)
         with code.loop(code["width"]) as orders:
             k = numbers.index * code["width"] + (code["width"] - 1 - orders.index)
-            found = multiply(h.get(), l.get(), code["th"], code["tl"])
-            found = add(*found, code["high"].load(k), code["low"].load(k))
-            h.set(found[0])
-            l.set(found[1])
+            total = multiply(h.get(), l.get(), code["th"], code["tl"])
+            total = add(*total, code["high"].load(k), code["low"].load(k))
+            h.set(total[0])
+            l.set(total[1])
         code["state"].store(h.get(), numbers.index)
         code["state"].store(l.get(), numbers.index + code["n"])
     code.give_back()

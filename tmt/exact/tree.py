@@ -1,11 +1,12 @@
 """A Tree with its numbers in another type, so that none is rounded on the way: for many digits."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import SimpleNamespace
 
 import mpmath
 
 from tmt.derivation.coordinates import Coordinates, normalized
+from tmt.derivation.scalar import Scalar
 from tmt.derivation.vectors import Vector, sqrt
 from tmt.model.tree import Tree
 
@@ -18,23 +19,24 @@ with mpmath.workdps(60):  # arcsin x = x (1 + x^2 / 6 + ...), the highest first;
     ARC_SINE = [mpmath.binomial(2 * k, k) / (4**k * (2 * k + 1)) for k in reversed(range(18))]
 
 
-def exact_tree(tree: Tree, number: Callable) -> SimpleNamespace:
+def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> SimpleNamespace:
     """What the method asks of a Tree, each number made by `number` from its double; directions have length 1 in all digits.
 
     number: mpmath.mpf, or another type made from a double. Turns about an axis that is a little longer than 1 would not be
     turns, and regrouped sums would differ from the literal ones by that.
     """
 
-    def lifted(value):
+    def lifted(value: Scalar) -> Scalar:
         return tuple(map(lifted, value)) if isinstance(value, tuple) else number(value)
 
     axis = []
     for joint in tree.coordinates.joints:
-        own = [Vector(*map(number, direction)) for direction in tree.axis[joint.qd]]
-        axis.append(_unit(own[0]))
+        first, *more = [Vector(*map(number, direction)) for direction in tree.axis[joint.qd]]
+        x = _unit(first)
+        axis.append(x)
         if joint.kind == "ball":
-            axis.append(_unit(own[1] - axis[-1] * axis[-1].dot(own[1])))
-            axis.append(axis[-2].cross(axis[-1]))
+            y = _unit(more[0] - x * x.dot(more[0]))
+            axis += [y, x.cross(y)]
     numbers = {name: lifted(getattr(tree, name)) for name in NUMBERS}
     numbers["rest"] = of_length_1(tree.coordinates, numbers["rest"])
     return SimpleNamespace(
@@ -50,20 +52,20 @@ def exact_tree(tree: Tree, number: Callable) -> SimpleNamespace:
     )
 
 
-def _unit(vector) -> Vector:
+def _unit(vector: Vector) -> Vector:
     """The vector at length 1."""
     return vector * (1 / sqrt(vector.dot(vector)))
 
 
-def of_length_1(coordinates: Coordinates, q) -> list:
+def of_length_1(coordinates: Coordinates, q: Iterable[Scalar]) -> list[Scalar]:
     """A position with each quaternion at length 1 in all digits."""
-    q = list(q)
+    position = list(q)
     for joint in coordinates.balls:
-        q[joint.q] = normalized(q[joint.q])
-    return q
+        position[joint.q] = normalized(position[joint.q])
+    return position
 
 
-def logarithm(p) -> list:
+def logarithm(p: Iterable[Scalar]) -> list[Scalar]:
     """coordinates.logarithm without a root of what vanishes: the turn is halved until a series of the arc sine takes it."""
     w, *v = p
     cosine = sqrt(w * w)
@@ -82,5 +84,5 @@ class Analytic(Coordinates):
     """Coordinates whose `difference` of two quaternions of length 1 has derivatives where it is zero too."""
 
     @staticmethod
-    def logarithm(p) -> list:
+    def logarithm(p: Iterable[Scalar]) -> list[Scalar]:
         return logarithm(p)

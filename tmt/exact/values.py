@@ -1,50 +1,47 @@
 """Every quantity of a state with 50 digits: what values in doubles are compared with."""
 
-from collections import namedtuple
+from collections.abc import Sequence
+from types import SimpleNamespace
 
 import mpmath
 import numpy as np
 
 from tmt.derivation.quantities import QUANTITIES, State
+from tmt.derivation.scalar import Scalar
 from tmt.exact.tree import exact_tree
+from tmt.model.tree import Tree
 
 DIGITS = 50
+# the arrays of each quantity: one of its own name, or several with names of their own
+FIELDS = {name: quantity.parts or (name,) for name, quantity in QUANTITIES.items()}
 
 
-# the fields of a Truth: the quantities, of those with several arrays each by its own name
-FIELDS = {name: (name,) for name in QUANTITIES} | {
-    name: of.parts for name, of in QUANTITIES.items() if of.parts
-}
-Truth = namedtuple("Truth", [field for fields in FIELDS.values() for field in fields])
-Truth.__doc__ = (
-    "Every quantity of one state as object arrays of mpmath numbers; names, shapes and units as in `tmt`."
-)
-
-
-def exact(tree, q, qd, tau) -> Truth:
-    """Every TMT quantity at one state, from the same source as the floats, with 50 digits.
+def exact(tree: Tree, q: Sequence[float], qd: Sequence[float], tau: Sequence[float]) -> SimpleNamespace:
+    """Every TMT quantity at one state, from the same source as the floats, with 50 digits, by its name.
 
     q (nq,), qd, tau (nv,): rad, rad/s, N m. The numbers of the tree and of the state are taken as what their
-    doubles are exactly; 0.1 means 0.1000000000000000055511151231257827...
+    doubles are exactly; 0.1 means 0.1000000000000000055511151231257827... Each is an object array of mpmath numbers, of which
+    names, shapes and units are as in `tmt`; a quantity of several arrays has each by its own name.
     """
     with mpmath.workdps(DIGITS):
         q, qd, tau = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd, tau))
-        state, found = State(exact_tree(tree, mpmath.mpf), q, qd, tau), {}
+        state = State(exact_tree(tree, mpmath.mpf), q, qd, tau)
+        values: dict[str, Scalar] = {}
         for name, fields in FIELDS.items():
             value = QUANTITIES[name].of(state)
-            found |= zip(fields, value) if len(fields) > 1 else [(name, value)]
-        return Truth(**{name: _array(value) for name, value in found.items()})
+            values |= zip(fields, value if QUANTITIES[name].parts else [value])
+        return SimpleNamespace(**{field: _array(value) for field, value in values.items()})
 
 
-def _array(nested):
+def _array(nested: Scalar) -> np.ndarray:
     """Nested iterables of numbers as an object array."""
 
-    def lists(item):
+    def lists(item: Scalar) -> Scalar:
         return [lists(i) for i in item] if hasattr(item, "__iter__") else item
 
     return np.array(lists(nested), dtype=object)
 
 
-def distance(values, truth) -> np.ndarray:
+def distance(values: np.ndarray, truth: np.ndarray) -> np.ndarray:
     """|values - truth| as floats: the difference is taken exactly and rounded once."""
     return np.asarray(np.abs(np.asarray(values, dtype=float).astype(object) - truth), dtype=float)

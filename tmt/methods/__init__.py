@@ -98,16 +98,12 @@ METHODS = {
     "rk4": RungeKutta(4, *CLASSICAL),  # the assignment's part i
     "rk4_mean_speed": RungeKutta(2, *CLASSICAL, mean_speed=True),  # of order 2 where a ball tumbles
     "dopri8": RungeKutta(order=8, A=dop853.A, b=dop853.B, c=dop853.C),  # Dormand and Prince, fixed step
-    "dopri8_adaptive": AdaptiveRungeKutta(
-        8, dop853.A, dop853.B, dop853.C, errors=(dop853.ERROR_5, dop853.ERROR_3)
-    ),
+    "dopri8_adaptive": AdaptiveRungeKutta(8, dop853.A, dop853.B, dop853.C, errors=dop853.ERRORS),
     "explicit_euler": RungeKutta(order=1, A=((),), b=(1.0,), c=(0.0,)),
     "semi_implicit_euler": SemiImplicitEuler(implicit_bias=False),
     "implicit": SemiImplicitEuler(implicit_bias=True, implicit_gains=True),
     "implicitfast": SemiImplicitEuler(implicit_bias=False, lone_bodies=True, implicit_gains=True),
-    "discrete": SemiImplicitEuler(
-        implicit_bias=False, lone_bodies=True, implicit_springs=True, implicit_gains=True
-    ),
+    "discrete": SemiImplicitEuler(False, lone_bodies=True, implicit_springs=True, implicit_gains=True),
     "implicit_midpoint": ImplicitRungeKutta(order=2, A=((0.5,),), b=(1.0,), c=(0.5,)),
     "gauss_legendre_4": ImplicitRungeKutta(  # Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.7
         order=4,
@@ -121,9 +117,8 @@ METHODS = {
 def method_named(name: str) -> Method:
     """The method of that name in METHODS, as it is there now, with all fields; ValueError if there is none, or no method."""
     if not isinstance(name, str) or name not in METHODS:
-        raise ValueError(
-            f"unknown method {shown(name)}; known are {', '.join(METHODS)}, and for simulate taylor"
-        )
+        names = ", ".join(METHODS)
+        raise ValueError(f"unknown method {shown(name)}; known are {names}, and for simulate taylor")
     try:
         return completed(METHODS[name])
     except ValueError as error:

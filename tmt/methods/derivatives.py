@@ -25,9 +25,8 @@ class Differentiated(Dynamics):
 
     def __init__(self) -> None:
         super().__init__(composite.mass_matrix_and_bias)
-        self.system: tuple[
-            np.ndarray, np.ndarray
-        ]  # of the last states: A (states, nv, nv) and the force (states, nv)
+        # of the last states: A (states, nv, nv) and the force (states, nv) of A a = force
+        self.system: tuple[np.ndarray, np.ndarray]
 
     def residual(
         self, tree: Tree, a: Values, q: Values, qd: Values, tau: Values, implicit: Implicit | None
@@ -61,18 +60,18 @@ class Differentiated(Dynamics):
     def acceleration(
         self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
     ) -> Values:
-        plain = implicit and implicit._replace(pull=values_of(implicit.pull))
+        plain = implicit._replace(pull=values_of(implicit.pull)) if implicit else None
         A, force = self.linear_system(tree, values_of(q), values_of(qd), tau, plain)
         self.system = A, force
         a = np.linalg.solve(A, force[..., None])[..., 0].T.copy()
-        one = next((x for x in (*q, *qd) if isinstance(x, Dual)), None)
-        if one is None:
+        dual = next((x for x in (*q, *qd) if isinstance(x, Dual)), None)
+        if dual is None:
             return list(a)
         left = self.residual(tree, list(a), q, qd, tau, implicit)
         # what no state changes is no dual number: a sphere that floats free
-        rows = np.array([np.broadcast_to(one.parts(x)[1], (len(one.slope), a.shape[1])) for x in left])
+        rows = np.array([np.broadcast_to(dual.parts(x)[1], (len(dual.slope), a.shape[1])) for x in left])
         slopes = -np.linalg.solve(A, rows.transpose(2, 0, 1)).transpose(1, 2, 0)
-        return [Dual(value, slope, one.level) for value, slope in zip(a, slopes.copy())]
+        return [Dual(value, slope, dual.level) for value, slope in zip(a, slopes.copy())]
 
 
 def one_step(
@@ -84,7 +83,7 @@ def one_step(
 
 def takes_terms(stepping: Method) -> bool:
     """Whether the slope of a method takes other terms; a user's own need not have that argument."""
-    return len(signature(stepping.slope).parameters) > len(("tree", "q", "qd", "tau", "dt"))
+    return len(signature(stepping.slope).parameters) > 5  # tree, q, qd, tau, dt
 
 
 def amplification(
@@ -96,14 +95,10 @@ def amplification(
     equilibrium it is what a step does to a small deviation: its eigenvalues are the growth of each mode per step. By dual
     numbers, all directions at once; so it holds for partitioned and implicit methods too.
     """
-    q, qd, steps, nv = np.asarray(q), np.asarray(qd), np.asarray(dt), tree.coordinates.nv
-    batch = np.broadcast_shapes(q.shape[:-1], qd.shape[:-1], steps.shape)
-    q, qd = (np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in (q, qd))
-    steps, torque, size = (
-        np.broadcast_to(steps, batch).reshape(-1),
-        [float(t) for t in tau],
-        max(1, PART // nv),
-    )
+    nv, torque = tree.coordinates.nv, [float(t) for t in tau]
+    batch = np.broadcast_shapes(np.shape(q)[:-1], np.shape(qd)[:-1], np.shape(dt))
+    q, qd = (np.broadcast_to(x, (*batch, np.shape(x)[-1])).reshape(-1, np.shape(x)[-1]) for x in (q, qd))
+    steps, size = np.broadcast_to(dt, batch).reshape(-1), max(1, PART // nv)
     parts = [slice(k, k + size) for k in range(0, len(qd), size)]
     jacobians = [of_part(stepping, tree, q[part], qd[part], torque, steps[part]) for part in parts]
     return np.concatenate([np.empty((0, 2 * nv, 2 * nv)), *jacobians]).reshape(*batch, 2 * nv, 2 * nv)

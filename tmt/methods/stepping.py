@@ -27,12 +27,8 @@ class Method:
     """
 
     order: int = 1  # the error of a run falls with dt to this power
-    adaptive = (
-        False  # chooses its own steps, takes a tolerance and has an `attempt`, as AdaptiveRungeKutta does
-    )
-    solves_stages = (
-        False  # its stages solve an equation: it has `stage_states` and `finish`, as in implicit.py
-    )
+    adaptive = False  # chooses its own steps, takes a tolerance and has an `attempt`, see AdaptiveRungeKutta
+    solves_stages = False  # its stages solve an equation: it has `stage_states` and `finish`, see implicit.py
     damps_implicitly = False  # its slope takes the joint damping at the rates one dt later
 
     @cached_property
@@ -44,9 +40,8 @@ class Method:
     def stages(self) -> int:
         """Evaluations of the dynamics in one step; of a method that solves its stages, in one iteration."""
         if self.solves_stages:
-            raise ValueError(
-                "it solves its stages and does not say how many they are; a field stages is expected"
-            )
+            why = "it solves its stages and does not say how many they are"
+            raise ValueError(f"{why}; a field stages is expected")
         positions = []
 
         def slope(q: Values, qd: Values) -> Values:

@@ -19,7 +19,7 @@ from compare.robots.case import Case, Scene
 from compare.robots.file import robot_of
 from tmt.compiled import store
 from tmt.compiled.machine import Library
-from tmt.compiled.runner import known as compiled_runs
+from tmt.compiled.runner import runners as compiled_runs
 from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler, semi_implicit
 
 STEPS = {"one step", "open loop"}
