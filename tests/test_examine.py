@@ -10,7 +10,7 @@ import pandas as pd
 from in_process import InProcess, without_workers
 from jinja2 import ChoiceLoader, DictLoader
 from matplotlib.figure import Figure
-from sections import section
+from sections import row_of, section
 
 from compare.__main__ import main
 from compare.cli import command_line
@@ -51,19 +51,24 @@ def raises(*_):
     raise ValueError("two\nlines")
 
 
+def unsendable(setup):
+    result = Result("sending", shown=[])
+    result.for_figures = lambda: None
+    return result
+
+
 BROKEN = {  # functions of the experiment; the check that fails, and the error that it names
     "begin": ({"begin": raises}, "runs to its end", "ValueError: two lines"),
     "rows": ({"rows": raises}, "runs to its end", "ValueError: two lines"),
     "background": ({"rows": lambda setup: list(setup.map(divmod, [1], [0]))}, "runs to its end", "ZeroDivisionError"),
-    "sending": ({"rows": lambda setup: Result("sending", shown=[], curves={"locked": lambda: None})},
-                "figures are drawn", "pickle"),
+    "sending": ({"rows": unsendable}, "figures are drawn", "pickle"),
 }  # fmt: skip
 
 
 def test_what_raises_is_one_failed_check_and_a_part_that_breaks_is_said(tmp_path, capsys, monkeypatch):
     for name, (functions, *_) in BROKEN.items():
         made(monkeypatch, name, **functions)
-    made(monkeypatch, "odd", rows=lambda setup: Result("odd", shown=["a", "b"], rows=[{"a": 1.5}]))
+    made(monkeypatch, "odd", rows=lambda setup: Result("odd", shown=["a", "b"], rows=[row_of(a=1.5)]))
     only(monkeypatch, *BROKEN, "odd", "published")
     status, results = ran(tmp_path, "all")
     out, err = capsys.readouterr()
@@ -80,7 +85,7 @@ def test_what_raises_is_one_failed_check_and_a_part_that_breaks_is_said(tmp_path
 
 def test_a_part_of_a_report_that_breaks_fails_the_run_although_all_checks_pass(tmp_path, monkeypatch):
     def rows(setup):
-        result = Result("odd", shown=["a", "b"], rows=[{"a": 1.5}])
+        result = Result("odd", shown=["a", "b"], rows=[row_of(a=1.5)])
         result.check("zero", "a", 0.5, 1.0, "m")
         return result
 

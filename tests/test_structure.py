@@ -31,7 +31,7 @@ LIBRARIES = {
     "jax": ("compare.engines.mjx",), "heyoka": ("compare.engines.heyoka",),
     "dartpy": ("compare.engines.dart",), "pybullet": ("compare.engines.pybullet",),
     "newton": ("compare.engines.newton",), "pinocchio": ("compare.engines.pinocchio",),
-    "pydrake": ("compare.engines.drake",), "pandas": (),
+    "pydrake": ("compare.engines.drake",), "pandas": ("compare.report",),
     "matplotlib": ("compare.report.style",), "PIL": ("compare.report.images",),
     "distributed": ("compare.fleet.executors",), "rich": ("compare.report.terminal",),
 }  # fmt: skip

@@ -92,7 +92,6 @@ class Result:
     experiment: str
     rows: list[Any] = field(default_factory=list)  # each a Row
     checks: list[Check] = field(default_factory=list)
-    curves: dict[Any, Any] = field(default_factory=dict)
     causes: list[dict[str, Any]] = field(default_factory=list)  # of failing checks: place, stated, text ...
     notes: list[Finding] = field(default_factory=list)  # for the report
     shown: Sequence[str] | None = None  # columns of the table in the report; None: all; []: it is only a file

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import pandas as pd
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
@@ -20,7 +21,6 @@ from . import tables
 from .images import embedded
 from .motion import SCRIPT, motion_in_html
 from .questions import answers
-from .tables import Table
 from .verdict import Figure, Parts, Report, Section, failures, headline, outcome, passed, standing
 
 MOST_ROWS, MOST_IN_MARKDOWN = 40, 6  # of a table; its file has all
@@ -47,7 +47,7 @@ class Listing(NamedTuple):
     """The first rows of a table, and how many it has."""
 
     total: int
-    rows: Table | None  # None: its file alone has them
+    rows: pd.DataFrame | None  # None: its file alone has them
     name: str = ""  # of its file
     title: str = ""
     which: str = ""  # how many of how many are shown, if not all
@@ -81,7 +81,7 @@ class Document:
         texts.append(self.made("the introduction", self.introduction))
         if report.causes:
             texts.append(self.template.causes(tables.of_causes(report.causes)))
-        if self.answers:
+        if self.answers is not None:
             texts.append(self.template.questions(self.answers))
         for section in report.sections:
             missing = self.template.missing(section.name, section.title)
@@ -108,7 +108,7 @@ class Document:
         return environment().get_template("page.html.jinja").render(values)
 
     def links(self) -> list[tuple[str, bool]]:
-        names = [("questions", False)] if self.answers else []
+        names = [("questions", False)] if self.answers is not None else []
         names += [(section.name, standing(section)[0] is False) for section in self.report.sections]
         return [*names, ("provenance", False)]
 
@@ -120,8 +120,7 @@ class Document:
         failed = [check for kind in failures(report.sections) for check in kind]
         failing = listing(failed, FIRST_CAUSES, ON_FIRST_SCREEN)._replace(title="Failing checks")
         if report.causes:
-            columns, cells = tables.of_causes(report.causes[:FIRST_CAUSES])
-            table = Table(columns[1:], [row[1:] for row in cells])  # without the rank
+            table = tables.of_causes(report.causes[:FIRST_CAUSES]).drop(columns="rank")
             title = "Cause" if len(report.causes) == 1 else "Causes"
             failing = Listing(len(report.causes), table, name="causes", title=title)
         return self.template.first_screen(report.sections, report.skipped, pictures, failing)

@@ -3,13 +3,12 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from csv import DictWriter
 from functools import partial
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from ..core.rows import Row
 from ..core.text import escaped
@@ -71,12 +70,9 @@ def csv_of_rows(rows: Sequence[Row]) -> str:
 
 def csv(records: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> str:
     """A table with these or all columns: true and false in lower case, nothing for what is no number."""
-    text, names = StringIO(), dict.fromkeys(name for record in records for name in record)
-    table = DictWriter(text, columns or list(names), extrasaction="ignore", lineterminator="\n")
-    table.writeheader()
-    for record in records:
-        table.writerow({name: cell(value) for name, value in record.items()})
-    return text.getvalue()
+    names = columns or dict.fromkeys(name for record in records for name in record)
+    cells = [{name: cell(value) for name, value in record.items()} for record in records]
+    return pd.DataFrame(cells, columns=list(names), dtype=object).to_csv(index=False, lineterminator="\n")
 
 
 def cell(value: Any) -> Any:

@@ -3,21 +3,22 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import pandas as pd
+
 from ..core.finding import Finding
 from ..core.text import say
 from ..robots import Robot
-from .tables import Table
 from .verdict import Section
 
 COLUMNS = ["part", "question", "answered in", "answer"]
 
 
-def answers(sections: Sequence[Section], robot: Robot) -> Table | None:
+def answers(sections: Sequence[Section], robot: Robot) -> pd.DataFrame | None:
     """For each part that a run has answered: its letter, question, place and answer; None: there is none."""
     ran = {section.name: section for section in sections}
     asked = [q for q in robot.questions if ran.keys() & set(q.answered_in.split(", "))]
     cells = [[q.part, q.question, q.answered_in, say(answer(ran, *q.answer))] for q in asked]
-    return Table(COLUMNS, cells) if cells else None
+    return pd.DataFrame(cells, columns=COLUMNS) if cells else None
 
 
 def answer(ran: Mapping[str, Section], kind: str, *about: Any) -> Finding:

@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
+
+import pandas as pd
 
 from ..core.check import Check
 from ..core.rows import Column, Row, columns_of
@@ -15,17 +17,12 @@ CHECK = ["experiment", "scene", "quantity", "value", "tolerance", "unit", "note"
 IN_WORDS = {"seconds_of": "CPU seconds", "ended_after_s": "seconds from the start to the end"}
 
 
-class Table(NamedTuple):
-    """A table as text."""
-
-    columns: Sequence[str]
-    cells: list[list[str]]  # of each row
-
-
-def of_records(records: Iterable[Mapping[str, Any]], columns: Mapping[str, Column]) -> Table:
-    """These columns of records, with the digits that a reader needs."""
-    cells = [[text_of(record.get(name), column) for name, column in columns.items()] for record in records]
-    return Table([name.replace("_", " ") for name in columns], cells)
+def of_records(records: Iterable[Mapping[str, Any]], columns: Mapping[str, Column]) -> pd.DataFrame:
+    """These columns of records as text, with the digits that a reader needs."""
+    table = pd.DataFrame(list(records), columns=list(columns), dtype=object)
+    for name, column in columns.items():
+        table[name] = [text_of(value, column) for value in table[name]]
+    return table.rename(columns=lambda name: name.replace("_", " "))
 
 
 def text_of(value: Any, column: Column) -> str:
@@ -39,7 +36,7 @@ def text_of(value: Any, column: Column) -> str:
     return f"{text[: LONGEST_LIST - 4]} ..." if is_long else text
 
 
-def of_rows(rows: Sequence[Row], shown: Sequence[str] | None = None) -> Table:
+def of_rows(rows: Sequence[Row], shown: Sequence[str] | None = None) -> pd.DataFrame:
     """The rows of a table. shown: the names of its columns, if not all."""
     columns = columns_of(rows)
     if shown is not None and rows:
@@ -47,12 +44,11 @@ def of_rows(rows: Sequence[Row], shown: Sequence[str] | None = None) -> Table:
     return of_records([row.record() for row in rows], columns)
 
 
-def of_causes(causes: Sequence[Mapping[str, Any]]) -> Table:
-    table = of_records(causes, CAUSE)
-    return table._replace(columns=[*table.columns[:-1], "cause"])
+def of_causes(causes: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    return of_records(causes, CAUSE).rename(columns={"text": "cause"})
 
 
-def of_checks(checks: Sequence[Check], columns: Sequence[str] = CHECK) -> Table:
+def of_checks(checks: Sequence[Check], columns: Sequence[str] = CHECK) -> pd.DataFrame:
     records = [check.record() for check in checks]
     records = [record if record["judged"] else record | {"value": "not judged"} for record in records]
     return of_records(records, dict.fromkeys(columns, Column()))
@@ -75,10 +71,10 @@ def first(items: Sequence[Item], most: int, key: Callable[[Item], Any]) -> list[
     return [items[number] for number in sorted(numbers[:most])]
 
 
-def of_origin(origin: Mapping[str, Any]) -> Table:
+def of_origin(origin: Mapping[str, Any]) -> pd.DataFrame:
     """The provenance: what, and its value."""
     rows = [[IN_WORDS.get(name, name), in_one_cell(value)] for name, value in origin.items()]
-    return Table(["what", "value"], rows)
+    return pd.DataFrame(rows, columns=["what", "value"])
 
 
 def in_one_cell(value: Any) -> str:

@@ -13,7 +13,6 @@ from ..core.rows import Row
 from ..core.text import block, say
 from ..core.words import capital
 from ..robots import Robot
-from .plain_rows import in_rows
 
 Value = TypeVar("Value")
 Causes = Sequence[Mapping[str, Any]]
@@ -65,13 +64,13 @@ class Section:
 
     @property
     def rows(self) -> list[Row]:
-        return in_rows(self.result.rows)
+        return self.result.rows
 
     @property
     def tables(self) -> dict[str, list[Row]]:
         """Its tables that have rows, by their names; its own first."""
         tables = {self.name: self.result.rows} | self.result.tables
-        return {name: in_rows(rows) for name, rows in tables.items() if rows}
+        return {name: rows for name, rows in tables.items() if rows}
 
     @property
     def judged(self) -> list[Check]:

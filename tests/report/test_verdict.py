@@ -14,10 +14,12 @@ from compare.core.check import About, Result
 from compare.core.text import say
 from compare.engines.mujoco.reading import read
 from compare.experiments import figures_overview, module, stability
+from compare.experiments.parameters.numbers import NumberRow
 from compare.experiments.published import PrintedRow
 from compare.experiments.speed import advice
 from compare.experiments.speed.runs import SpeedResult, SpeedRow
 from compare.experiments.stability.tables import LimitRow, StabilityResult, StepLimitRow
+from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.agree import AgreementRow
 from compare.report.questions import answers
 from compare.report.style import BLUE, ORANGE, RED
@@ -149,7 +151,7 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
 
 def answer_of(*sections) -> dict:
     """The answers by their part."""
-    return {part: answer for part, _, _, answer in answers(sections, ARM).cells}
+    return {part: answer for part, _, _, answer in answers(sections, ARM).values}
 
 
 def apart(scene, difference, quantity="Mbar"):
@@ -180,9 +182,10 @@ def test_an_answer_has_what_its_experiment_adds():
 
 # the headline of each experiment
 
-OFF = {"of": "forearm", "quantity": "com", "component": "x", "stated": 2.0, "compiled": 2.5, "difference": 0.5,
-       "unit": "m"}  # fmt: skip
-SAME = OFF | {"compiled": 2.0, "difference": 0.0}
+OFF = NumberRow(
+    of="forearm", quantity="com", component="x", stated=2.0, compiled=2.5, difference=0.5, unit="m"
+)
+SAME = replace(OFF, compiled=2.0, difference=0.0)
 STEP = LimitRow(scene="s", engine="tmt", method="rk4", damping=0.0, mode=9.0, limit="finite", predicted_dt=0.1,
                 observed_dt=0.1001, passed=True)  # fmt: skip
 PRINTED = PrintedRow(item="c", posture="zero", quantity="qdd", component="alpha", unit="rad/s2", published=1.0, exact=1.0,
@@ -201,7 +204,7 @@ AGREED = AgreementRow(engine="TMT", scene="zero", quantity="Mbar", unit="kg m2",
     ("stability", [STEP, replace(STEP, observed_dt=0.0995)], "2 0.5", ""),
 ])  # fmt: skip
 def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, named):
-    kind = StabilityResult if name == "stability" else Result
+    kind = {"stability": StabilityResult, "trajectory": TrajectoryResult}.get(name, Result)
     of = section(name, GOOD, rows=rows, kind=kind)
     said = headline(section_with(name, of.result, ARM))
     found = re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]\d+)?", said.replace(" m2", ""))

@@ -73,8 +73,7 @@ def at_one_state(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray)
     """The ways of tmt at one state, (nq,) and (nv,)."""
     tmt.prepare(tree)
     run, compiled = runner_of(tree, "rk4").follow, evaluator(tree, "acceleration")
-    chain, out = chained(tree), np.empty(len(qd))
-    addresses = [values.ctypes.data for values in (q, qd, tau, out)]
+    chain, arrays = chained(tree), (q, qd, tau, np.empty(len(qd)))
     most = min(MOST_CALLS, MOST_NUMBERS // len(tree.axis))
     paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
     paths[0][0, 0], paths[1][0, 0] = q, qd
@@ -85,7 +84,7 @@ def at_one_state(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray)
     waiting = EvaluationRow(FORWARD, "compiled, each waits for the last", operations=compiled.operations)
     return [
         Loop(EvaluationRow(FORWARD, CALLED), repeated(lambda: tmt.acceleration(q, qd, tau, tree))),
-        Loop(waiting, lambda count: chain(*addresses, count)),
+        Loop(waiting, lambda count: chain(*(values.ctypes.data for values in arrays), count)),
         Loop(EvaluationRow(RK4_STEP, ONE_BY_ONE), steps),
     ]
 
