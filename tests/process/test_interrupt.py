@@ -19,7 +19,7 @@ from compare.engines.mujoco import load
 from compare.robots.arm import ARM
 
 dynamics = load(ARM.mjcf, ARM.tree).of(ARM.case())
-_, run = dynamics.runner(np.zeros(3), np.zeros(3), np.zeros(3), 1e-4, 500_000, "RK4", None)
+_, run = dynamics.runner((np.zeros(3),) * 3, 1e-4, 500_000, "RK4", None)
 print("now", flush=True)
 run()  # some seconds in C
 """

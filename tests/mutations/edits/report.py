@@ -58,7 +58,7 @@ EDITS = (
     Edit("report.terminal", "Terminal.say", "in_one_line(text)", "text", "a name moves the cursor of the terminal"),
     Edit("report.style", "pixels", "text.set_parse_math(_1)", "None", "a name is a formula"),
     Edit("report.files", "cell", "value.startswith(COMPUTED)", "False", "a spreadsheet computes a name"),
-    Edit("report.files", "csv", "for record in records:\n _1", "for record in records[:1]:\n _1", "tables have one row"),
+    Edit("report.files", "csv", "pd.DataFrame(_1, *_2)", "pd.DataFrame(_1[:1], *_2)", "tables have one row"),
     Edit("report.files", "write", "[check.record() for section in report.sections for check in section.result.checks]",
          "[check.record() for section in report.sections for check in section.result.checks if check.passed]",
          "results.json has the checks that pass"),
