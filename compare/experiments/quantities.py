@@ -78,9 +78,7 @@ class Comparison:
 
     def __init__(self, setup: Setup, result: AgreementResult, sample: Sample):
         self.result, self.sample, self.robot = result, sample, setup.robot
-        self.engines: list[Any] = [
-            *setup.compared().values()
-        ]  # Dynamics that know more; MuJoCo is the second
+        self.engines: list[Any] = [*setup.compared().values()]  # Dynamics that know more, MuJoCo second
         is_small = self.robot.coordinates.nv <= MOST_SPEEDS  # code for more takes minutes to compile
         if sample is setup.random and is_small and not self.robot.own:
             self.engines.append(Compiled(self.robot.tree))

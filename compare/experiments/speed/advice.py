@@ -48,11 +48,8 @@ def advice(result: SpeedResult) -> list[AdviceRow]:
         rows = [row for row in result.rows if row.scene == scene and not row.diverged]
         for target in TARGETS:
             reach = [row for row in rows if row.largest_error <= target]
-            mujoco, tmt, rk4 = (
-                cheapest(reach, "mujoco"),
-                cheapest(reach, "tmt"),
-                cheapest(reach, "mujoco", "RK4"),
-            )
+            mujoco, tmt = cheapest(reach, "mujoco"), cheapest(reach, "tmt")
+            rk4 = cheapest(reach, "mujoco", "RK4")
             same_step = cheapest([row for row in rows if rk4 and row.dt == rk4.dt], "tmt", "rk4")
             ratios: dict[str, Any] = {"ratio": ratio(mujoco, tmt), "integrator_part": ratio(mujoco, rk4)}
             ratios |= {"kernel_part": ratio(rk4, same_step), "method_part": ratio(same_step, tmt)}

@@ -27,6 +27,7 @@ RECORDED = 64  # states of a run that are compared: one for each of the scene's 
 class TrajectoryRow(Row):
     """The largest difference of the engines in single steps, or in an open loop."""
 
+    SHARE = "difference_over_band"
     scene: str
     engine_integrator: str
     twin: str
@@ -43,11 +44,6 @@ class TrajectoryRow(Row):
     required: float = column("s")
     diverged_at: float | None = column("s")
     twin_diverged_at: float | None = column("s")
-
-    @property
-    def urgency(self) -> tuple[bool, bool, float]:
-        share = self.difference_over_band
-        return True, True, np.inf if share is None else -share
 
 
 class Path(NamedTuple):
@@ -128,11 +124,8 @@ class TrajectoryResult(Result):
 
     def run_of(self, case: Case, *schemes: str) -> Run | None:
         """The run of a case with its own step by one of these schemes."""
-        name, steps = case.name, case.steps
-        fit = (
-            run for run in self.runs if (run.case.name, run.steps) == (name, steps) and run.scheme in schemes
-        )
-        return next(fit, None)
+        of_case = [run for run in self.runs if (run.case.name, run.steps) == (case.name, case.steps)]
+        return next((run for run in of_case if run.scheme in schemes), None)
 
 
 def steps_afforded(case: Case) -> int:
@@ -189,10 +182,8 @@ def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin
     states, stepped = ([values[single] for values in pair] for pair in (states, stepped))
     of_positions = width[:, : case.coordinates.nv].max(axis=1)
     run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, of_positions)
-    widest, tolerance = (
-        rules.widest_judged(case, path.q, path.v),
-        step_rounding(stepping, tree, states[0], states[1], tau, dt),
-    )
+    widest = rules.widest_judged(case, path.q, path.v)
+    tolerance = step_rounding(stepping, tree, states[0], states[1], tau, dt)
     return Twin(run, width, widest, times[single], states, stepped, tolerance)
 
 
@@ -218,10 +209,9 @@ def compare_run(result: Result, twin: Twin, dynamics: Dynamics, method: Method) 
         check_level(result, run, "one step", Deviation(coordinates, at, apart, step_tolerance))
         if (step_tolerance.min(axis=0) >= widest).any():
             result.not_judged(run.where, "one step", say(result.finding("wide_step")))
-    recorded_states = (
-        [path.q[:: run.every][:count], path.v[:: run.every][:count]] for path in (first, mujoco)
-    )
-    apart = differences(coordinates, *recorded_states)
+    last = count * run.every
+    pair = ([path.q[: last : run.every], path.v[: last : run.every]] for path in (first, mujoco))
+    apart = differences(coordinates, *pair)
     check_level(result, run, "open loop", Deviation(coordinates, times[:count], apart, width[:count]))
     check_end(result, run)
     return run
