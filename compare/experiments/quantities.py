@@ -29,6 +29,8 @@ from .setup import Setup
 if TYPE_CHECKING:
     from tmt.exact.many import Pairs
 
+Array = np.ndarray
+
 
 class Quantity(NamedTuple):
     """How a quantity is computed, and what its difference is measured by."""
@@ -105,9 +107,7 @@ class Comparison:
     def acceleration_scale(self) -> np.ndarray:
         return QUANTITIES["qdd"].size(self.scale, self.sample.tau, self.acceleration_size())
 
-    def agree(
-        self, name: str, unit: str, values: np.ndarray, mujoco_values: np.ndarray, scale: np.ndarray
-    ) -> None:
+    def agree(self, name: str, unit: str, values: Array, mujoco_values: Array, scale: Array) -> None:
         """A row and a check of values of the two engines, (states, ...)."""
         agree(self.result, self.sample, Compared(name, unit, values, mujoco_values, scale))
 

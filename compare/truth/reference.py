@@ -48,7 +48,7 @@ class Reference(NamedTuple):
 
 def reference(case: Case) -> Reference:
     """The reference of one case at 65 equal times; ValueError if no run reaches the end of the scene."""
-    count = RECORDS if case.controller else first_steps(case)  # as the coarsest runs of `speed`
+    count = coarsest_steps(case)
     q, v, tau = (tuple(values.tolist()) for values in (*case.start, case.tau))
     try:
         path, apart = in_pairs(case.tree, q, v, tau, case.duration / count, count, count // RECORDS)
@@ -66,6 +66,11 @@ in_pairs = lru_cache(maxsize=64)(truth)  # several experiments need the same
 def first_steps(case: Case) -> int:
     """The smallest multiple of 64 that is at least the scene's own number of steps."""
     return -(-case.steps // RECORDS) * RECORDS
+
+
+def coarsest_steps(case: Case) -> int:
+    """The same; 64 where servos act, as such a scene has short steps for methods explicit in the speeds."""
+    return RECORDS if case.controller else first_steps(case)
 
 
 def times(case: Case) -> np.ndarray:

@@ -52,9 +52,8 @@ def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[i
                 drifts[engine] = [largest_drift(case, dynamics, name, count) for count in counts]
             orders = check_order(result, case, f"{case.name}, {method.name}", order, drifts)
             for engine, (_, drift) in drifts.items():
-                row = EnergyRow(case.name, method.name, DURATION / counts[-1], engine, number_or_none(drift))
-                row.order = orders.get(engine)
-                rows.append(row)
+                numbers = number_or_none(drift), orders.get(engine)
+                rows.append(EnergyRow(case.name, method.name, DURATION / counts[-1], engine, *numbers))
     return result
 
 

@@ -45,13 +45,9 @@ def draw_held(result: TrajectoryResult, run: Run, number: int) -> tuple[str, Fig
     return f"assignment_figure_{number}", fig, result.finding("figure_held", number=number, **values)
 
 
-def runs_of(result: TrajectoryResult, case: Case) -> list[Run]:
-    return [run for run in result.runs if run.case.name == case.name]
-
-
 def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding]:
     """One scene under each scheme: angles, rates, and the difference under its band; grey: not judged."""
-    runs = runs_of(result, case)
+    runs = [run for run in result.runs if run.case.name == case.name]
     steps = max(run.steps for run in runs if run.steps <= 16 * case.steps)
     runs = [run for run in runs if run.steps == steps]
     shown, unit = differing_most(case, runs), movement_unit(case.coordinates)
@@ -111,11 +107,13 @@ def run_caption(result: TrajectoryResult, case: Case, runs: Sequence[Run], shown
     """The engines' difference in a scene and their errors. shown: the number of positions."""
     rows = [row for row in result.rows if row.scene == case.name and row.level == "open loop"]
     errors, coordinates = result.errors.get(case.name), case.coordinates
-    values: dict[str, Any] = {
+    values: dict[str, Any] = {"unit": movement_unit(coordinates)}
+    values |= {
         "scene": case.robot.scene_begins(case.name),
-        "unit": movement_unit(coordinates),
+        "shown": shown,
+        "positions": coordinates.nv,
+        "balls": coordinates.has_balls,
     }
-    values |= {"shown": shown, "positions": coordinates.nv, "balls": coordinates.has_balls}
     values["errors"] = errors and dict(zip((result.label, "MuJoCo"), errors))
     values["share"] = largest_known([row.difference_over_band for row in rows])
     judged = [(run.integrator, run.judged_until) for run in runs]

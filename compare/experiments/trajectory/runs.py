@@ -16,7 +16,7 @@ from ...engines import LABELS, Dynamics, Engine, Method, Motion, compared, metho
 from ...judge import run as rules
 from ...judge.rounding import NARROW, band, step_rounding
 from ...robots.case import Case
-from ..followed import Deviation, check_closest, differences
+from ..followed import Deviation, check_closest, differences, one_step
 
 STEPS_AT_MOST = 8192  # of a run that is finer than the scene's own
 MOST_ENTRIES = 2_700_000  # of all Jacobians of a run, which take the time
@@ -185,15 +185,6 @@ def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin
     widest = rules.widest_judged(case, path.q, path.v)
     tolerance = step_rounding(stepping, tree, states[0], states[1], tau, dt)
     return Twin(run, width, widest, times[single], states, stepped, tolerance)
-
-
-def one_step(
-    dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str
-) -> list[np.ndarray]:
-    """q and v one step after each of the states."""
-    q, v = states
-    motion = dynamics.run(q, v, tau, dt, 1, method)
-    return [motion.q[:, 1], motion.v[:, 1]]
 
 
 def compare_run(result: Result, twin: Twin, dynamics: Dynamics, method: Method) -> Run:

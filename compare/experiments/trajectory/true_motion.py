@@ -96,10 +96,8 @@ def departures(run: Run, engines: Mapping[str, Engine]) -> dict[str, Any]:
     case = run.case
     dt, ((name, first), (mujoco, last)) = case.duration / case.steps, compared(engines, case).items()
     allowed = slope_rounding(METHODS["rk4"], case.tree, case.q[None], case.v[None], case.tau, dt)[2][0]
-    initial = {
-        name: first.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
-        mujoco: last.acceleration(*case.start, case.tau),
-    }
+    of_step = first.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME
+    initial = {name: of_step, mujoco: last.acceleration(*case.start, case.tau)}
     joint = int(np.argmax(np.max(np.abs([*initial.values()]), axis=0) / allowed))
     farthest, told = deviations(run), []
     for engine, acceleration in initial.items():
