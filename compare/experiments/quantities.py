@@ -151,11 +151,9 @@ def check_wide(result: Result, comparisons: Sequence[Comparison]) -> None:
 
 def headline(result: AgreementResult) -> Finding | None:
     """The difference with the largest share of its tolerance; one that is not a number comes first."""
-    top, largest = None, -1.0
-    for row in result.rows:
-        share = np.inf if row.worst_difference is None else row.difference_over_bar
-        if share is not None and share > largest:
-            top, largest = row, share
+    shares = [np.inf if row.worst_difference is None else row.difference_over_bar for row in result.rows]
+    known = [(share, row) for share, row in zip(shares, result.rows) if share is not None]
+    _, top = max(known, key=lambda pair: pair[0], default=(None, None))
     return Finding("shared", "agreement_headline", {"row": top}) if top else None
 
 

@@ -33,8 +33,6 @@ LEAST_RUNS = 4  # with regular errors, that measure an order
 
 @dataclass(kw_only=True)
 class MethodRow(Row):
-    """A run of an integrator in a scene."""
-
     scene: str
     engine: str
     method: str

@@ -69,10 +69,7 @@ def scene_name(locked: Sequence[str]) -> str:
 
 
 def check_blocks(result: Result, where: str, row: SubsetRow, apart: np.ndarray, scale: np.ndarray) -> None:
-    """A check of the state that comes closest to its tolerance, 64 eps x scale, and the row.
-
-    apart, scale: (states,).
-    """
+    """A check of the state closest to its tolerance, 64 eps x scale, and the row. apart, scale: (states,)."""
     tolerance = FACTOR * EPS * scale
     (worst,) = closest(apart, tolerance)
     name = f"{row.quantity}, {row.parties}"

@@ -18,8 +18,6 @@ CLEAR = 2e-12  # rad: an error up to EARLY above this is far above rounding
 
 @dataclass
 class OrderRow(Row):
-    """The measured order of a method in a scene."""
-
     scene: str
     engine: str
     method: str
@@ -55,10 +53,7 @@ def order_in(scene: SceneRuns, runs: Sequence[Run]) -> MeasuredOrder | None:
 
 
 def check_same_schemes(result: SpeedResult, scene: SceneRuns) -> None:
-    """MuJoCo's integrators and the same schemes in tmt make the same error, except for rounding.
-
-    Checked where at least one of the errors is below 0.1 rad.
-    """
+    """MuJoCo's integrators and the same schemes in tmt make the same error, except for rounding."""
     by_tmt = {(run.method.name, run.row.dt): run.row for run in scene.runs if run.method.engine == "tmt"}
     for run in scene.runs:
         mujoco, twin = run.row, by_tmt.get((run.method.scheme, run.row.dt))

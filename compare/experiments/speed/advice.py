@@ -78,13 +78,9 @@ def ratio(slow: SpeedRow | None, fast: SpeedRow | None) -> float | None:
     return slow.time / fast.time if slow and fast else None
 
 
-# the first screen
-
-
 def target(result: SpeedResult) -> dict[str, Any]:
     """What the sentences about the cheapest setting of the first screen say of the run."""
-    about = {"scene": result.regular, "unit": result.unit, "servos_off": result.servos_off}
-    return about | {"target": TARGET}
+    return {"scene": result.regular, "unit": result.unit, "servos_off": result.servos_off, "target": TARGET}
 
 
 def front(rows: Sequence[SpeedRow]) -> list[SpeedRow]:

@@ -67,11 +67,10 @@ def draw_overview(result: SpeedResult) -> tuple[str, Figure, Finding]:
             ax.annotate(text, (error, time), (0, 8 if above else -11), fontsize=8, color=colour,
                         textcoords="offset points", ha="right" if above else "center" if fine else "left",
                         va="bottom" if above else "top", path_effects=OUTLINE)  # fmt: skip
-    numbers = target(result)
     ax.axvline(TARGET, color=GREY, linestyle=":", linewidth=1.2)
     ax.set(xscale="log", yscale="log", xlabel=f"maximum error, {result.unit} (decreasing)", ylabel="time, ms")
     ax.invert_xaxis()
     ax.margins(0.06, 0.12)
     fig.legend(loc="outside upper center", ncols=4, fontsize=8, handletextpad=0.4, columnspacing=1.0)
     settings = cheapest_of_fronts(fronts)
-    return "overview_times", fig, result.finding("overview_caption", settings=settings, **numbers)
+    return "overview_times", fig, result.finding("overview_caption", settings=settings, **target(result))

@@ -75,8 +75,6 @@ class Run(NamedTuple):
 
 @dataclass
 class SceneRuns:
-    """The runs of one scene."""
-
     case: Case
     reference: Reference
     floor: float  # rad or m: the error that rounding, or the reference, leaves

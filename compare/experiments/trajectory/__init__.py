@@ -34,8 +34,6 @@ skipped = leaves_no_digits
 
 
 class Work(NamedTuple):
-    """What is computed in parallel."""
-
     runs: Iterable[TrajectoryResult]  # of each scene
     energy: Iterable[Result]  # one
     names: Sequence[str]  # of the scenes whose true motion is computed

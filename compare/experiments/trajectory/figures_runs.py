@@ -140,10 +140,7 @@ def over_time(
 
 
 def drawable(case: Case, name: str, values: np.ndarray) -> np.ndarray:
-    """What is drawn of positions "q" or speeds "v", (times, nv).
-
-    Of a ball's position the movement from the start, NaN where it passes half a turn.
-    """
+    """Positions "q" or speeds "v", (times, nv); of a ball's "q" its movement, NaN where it passes half a turn."""
     coordinates = case.coordinates
     if name == "v" or not coordinates.has_balls:
         return values

@@ -253,10 +253,7 @@ def judged(times: np.ndarray, narrow: np.ndarray, ends: Sequence[float | None]) 
 
 
 def check_time_judged(result: Result, run: Run, alive: float) -> None:
-    """A run is judged for the time that its scene states, or for a tenth of it; else it is not judged.
-
-    alive: the last recorded time before one of both runs diverges, s.
-    """
+    """A run is judged for the time that its scene states, or for a tenth of it, or of `alive`, s."""
     until, least = run.judged_until, run.required or min(rules.LEAST_JUDGED * run.case.duration, alive)
     if until < least:
         reason = say(result.finding("wide", until=until, least=least))
@@ -266,10 +263,7 @@ def check_time_judged(result: Result, run: Run, alive: float) -> None:
 
 
 def check_divergence(result: Result, run: Run) -> bool:
-    """Both diverge at the same step, if the band is narrow at the first recorded state after that.
-
-    Returned: whether that is compared.
-    """
+    """Whether the steps at which both diverge are compared: if the band is narrow at the next recorded state."""
     end, steps, dt = ends_first(run.ends), run.steps, run.dt
     if end == np.inf:
         return False
