@@ -79,10 +79,7 @@ def times(case: Case) -> np.ndarray:
 
 
 def in_doubles(case: Case) -> Reference:
-    """A run in doubles by a method of order 8: the steps are doubled while the difference of two runs falls.
-
-    ValueError if no run reaches the end of the scene.
-    """
+    """A run in doubles by a method of order 8: the steps are doubled while the difference of two runs falls."""
     count, before, runs = first_steps(case), None, []
     for _ in range(MOST_DOUBLINGS + 1):
         motion = tmt.simulate(*case.start, case.tau, case.duration / count, count, DOUBLES, case.tree)

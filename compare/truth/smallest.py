@@ -92,8 +92,7 @@ def exact_accelerations(
             values = solve(exact_mass_matrix(still_tree, tuple(q)), values)
         zero = ZERO * max(1, *map(abs, values))
         values = [a if abs(a) > zero else mpmath.mpf(0) for a in values]
-        joints = case.coordinates.by_name
-        return {name: tuple(values[joints[name].qd]) for name in still}
+        return {name: tuple(values[case.coordinates.by_name[name].qd]) for name in still}
 
 
 @lru_cache(maxsize=8)

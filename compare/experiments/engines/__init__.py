@@ -188,8 +188,7 @@ def compare_quantities(
     if differs and {"Mbar", "bias"} <= computed.keys():
         tree, tolerance = sample.tree, FACTOR * record.eps
         values = Values.of(tree, sample.q, sample.qd, computed["Mbar"], computed["bias"], tolerance)
-        text = diagnose(tree, values, SECONDS).sentence()
-        result.find("cause", engine=record.label, text=text)
+        result.find("cause", engine=record.label, text=diagnose(tree, values, SECONDS).sentence())
 
 
 def compare_quantity(

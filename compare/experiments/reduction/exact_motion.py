@@ -42,8 +42,7 @@ def compare_swing(result: ReductionResult, setup: Setup, case: Case) -> None:
             path = dynamics.run(*case.start, case.tau, step, finer * case.steps, method).q
             errors[engine].append(float(np.abs(path[:: finer // SWING_STEPS[0], 0] - exact).max()))
         result.apart[case.name, engine] = errors[engine][SWING_STEPS.index(IN_TABLE)]
-    orders = check_falling(result, case.name, dt, errors)
-    result.swings[case.name] = Swing(dt, errors, orders)
+    result.swings[case.name] = Swing(dt, errors, check_falling(result, case.name, dt, errors))
 
 
 def check_falling(

@@ -65,8 +65,7 @@ def compare_smaller(result: ReductionResult, case: Case, smaller: Case | None, s
 
 def columns_of(smaller: Case, case: Case) -> tuple[np.ndarray, np.ndarray]:
     """The columns of the smaller case's positions and speeds among those of a case."""
-    places = case.coordinates.by_name
-    joints = [places[name] for name in smaller.joints]
+    joints = [case.coordinates.by_name[name] for name in smaller.joints]
     return np.r_[tuple(joint.q for joint in joints)], np.r_[tuple(joint.qd for joint in joints)]
 
 

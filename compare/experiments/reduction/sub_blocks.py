@@ -18,7 +18,8 @@ from .needs import columns_of
 from .records import SubsetRow
 
 ALL_SUBSETS = 6  # joints up to which all subsets are locked; above, some joints, each alone
-Differences = tuple[np.ndarray, np.ndarray]  # of the states, and the scale of each, (states,)
+# by quantity and pair of models: of the states, and the scale of each, (states,)
+Differences = dict[tuple[str, str], tuple[np.ndarray, np.ndarray]]
 MOST_TO_LOCK = 2.0  # s that an exact state may take
 
 
@@ -79,10 +80,8 @@ def check_blocks(result: Result, where: str, row: SubsetRow, apart: np.ndarray, 
     result.tables["reduction_subsets"].append(row)
 
 
-def sub_block_differences(
-    setup: Setup, case: Case, q: np.ndarray, v: np.ndarray
-) -> dict[tuple[str, str], Differences]:
-    """By quantity and pair of models, at states whose locked joints are set to the case's.
+def sub_block_differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Differences:
+    """At states whose locked joints are set to the case's.
 
     The difference of a state is the one closest to its tolerance, with its scale, as in `mass`.
     """

@@ -116,8 +116,7 @@ def add_absent(result: SpeedResult, setup: Setup) -> None:
         methods = [] if len(names) == len(setup.engines[engine].methods) else names
         result.find("absent", engine=LABELS.get(engine, engine), methods=methods, reason=reason)
         for scene in result.floors:
-            row = SpeedRow(scene, engine, ", ".join(names), why_not=reason, unit=result.unit)
-            result.rows.append(row)
+            result.rows.append(SpeedRow(scene, engine, ", ".join(names), why_not=reason, unit=result.unit))
 
 
 def figures(result: SpeedResult, robot: Robot) -> Iterator[partial[Any]]:

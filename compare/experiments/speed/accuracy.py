@@ -1,6 +1,6 @@
 """Checks of errors: the order of each method, MuJoCo against the same scheme in tmt, rounding."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -27,9 +27,7 @@ class OrderRow(Row):
     to_dt: float = column("s", digits=5)
 
 
-def check_orders(
-    result: SpeedResult, scenes: Sequence[SceneRuns], engines: Collection[str]
-) -> list[OrderRow]:
+def check_orders(result: SpeedResult, scenes: Sequence[SceneRuns], engines: Sequence[str]) -> list[OrderRow]:
     """Rows and checks: the stated and the measured order of each method of fixed step of these engines."""
     rows = []
     for scene in scenes:

@@ -63,9 +63,8 @@ def setting(name: str, row: SpeedRow | None) -> dict[str, Any]:
     if row is None:
         return {name: "none", f"{name}_dt": None, f"{name}_ms": None, f"{name}_evaluations": None}
     steps = f"{row.steps} steps" if row.dt else f"tolerance {row.tolerance:.0e}"
-    words = f"{row.engine} {row.method}, {steps}"
     of_run = {f"{name}_dt": row.dt, f"{name}_ms": 1e3 * row.time, f"{name}_evaluations": row.evaluations}
-    return {name: words} | of_run
+    return {name: f"{row.engine} {row.method}, {steps}"} | of_run
 
 
 def cheapest(rows: Sequence[SpeedRow], engine: str = "", method: str = "") -> SpeedRow | None:

@@ -8,7 +8,6 @@ import numpy as np
 
 from ...core.check import Result, largest_known
 from ...core.finding import Finding
-from ...core.pictures import Pictures
 from ...engines import LABELS, Engine
 from ...engines.mujoco.names import INTEGRATORS
 from ...judge.rounding import NARROW
@@ -139,10 +138,6 @@ def figures(result: TrajectoryResult, robot: Robot) -> Iterator[partial[Any]]:
         yield partial(figures_runs.draw_run, result, case)
     if result.pictures:
         yield partial(figures_motion_gif.draw_motion, result)
-
-
-def scenes_drawn(result: TrajectoryResult) -> Sequence[Pictures]:
-    return result.pictures
 
 
 def overview(results: Mapping[str, TrajectoryResult], robot: Robot) -> Iterator[partial[Any]]:

@@ -116,17 +116,13 @@ def run_caption(result: TrajectoryResult, case: Case, runs: Sequence[Run], shown
     }
     values["errors"] = errors and dict(zip((result.label, "MuJoCo"), errors))
     values["share"] = largest_known([row.difference_over_band for row in rows])
-    judged = [(run.integrator, run.judged_until) for run in runs]
-    return result.finding("figure_run", judged=judged, **values)
+    return result.finding("figure_run", judged=[(run.integrator, run.judged_until) for run in runs], **values)
 
 
 def over_time(
     ax: Axes, run: Run, values: Sequence[np.ndarray], shown: Sequence[int] = (), marks_at_most: int = 64
 ) -> None:
-    """Positions or speeds of both engines, (times, nv), against time: lines, and marks for MuJoCo.
-
-    shown: the numbers of those that are drawn, (): all.
-    """
+    """Positions or speeds of both engines, (times, nv): lines, and marks for MuJoCo. shown: which; (): all."""
     every = slice(None, None, max(1, len(run.t) // marks_at_most))
     robot, names, (first, mujoco) = run.case.robot, run.case.coordinates.speeds, values
     all_names = robot.coordinates.speeds

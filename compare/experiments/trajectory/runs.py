@@ -9,7 +9,6 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...core.check import About, Result
-from ...core.pictures import Pictures
 from ...core.rows import Row, column
 from ...core.text import say
 from ...engines import LABELS, Dynamics, Engine, Method, Motion, compared, methods_in
@@ -120,7 +119,6 @@ class TrajectoryResult(Result):
     runs: list[Run] = field(default_factory=list)
     # of each scene whose true motion is known: the largest error of both engines, rad or m
     errors: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
-    pictures: list[Pictures] = field(default_factory=list)
 
     def run_of(self, case: Case, *schemes: str) -> Run | None:
         """The run of a case with its own step by one of these schemes."""
@@ -244,10 +242,7 @@ def ends_first(ends: Sequence[float | None]) -> float:
 
 
 def judged(times: np.ndarray, narrow: np.ndarray, ends: Sequence[float | None]) -> int:
-    """The number of recorded states that are judged: up to where the band is wide or a run has diverged.
-
-    narrow: whether the band still judges each movement and speed, (recorded, 2 nv).
-    """
+    """The number of recorded states up to where the band is not narrow, (recorded, 2 nv), or a run diverges."""
     alive = times < ends_first(ends)
     return max(1, int(np.argmin(np.append(narrow.all(axis=1) & alive, False))))
 

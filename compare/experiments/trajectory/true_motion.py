@@ -33,10 +33,7 @@ def deviations(run: Run) -> dict[str, float | None]:
 
 
 def find_errors(result: TrajectoryResult, robot: Robot, references: Mapping[str, Reference]) -> None:
-    """The largest error of both engines in each scene, and where it is far above their difference.
-
-    references: by the name of the scene; the true motion of a held scene is rest.
-    """
+    """The largest errors in each scene: of a held one from rest, else from its reference, if it has one."""
     scenes = []
     for run in coarsest_runs(result, robot):
         name, reference = run.case.name, references.get(run.case.name)
