@@ -74,7 +74,7 @@ class Row:
         False if the row fails; False if it differs from a stated number; minus its share of a tolerance.
         """
         share = getattr(self, self.SHARE) if self.SHARE else None
-        return getattr(self, "passed", True), True, math.inf if share is None else -share
+        return getattr(self, "passed", True) is not False, True, math.inf if share is None else -share
 
 
 @dataclass(kw_only=True)

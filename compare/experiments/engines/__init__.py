@@ -1,6 +1,6 @@
 """Other engines that read the robot's file: what each has read, its equations, its integrators."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -14,7 +14,7 @@ from ...core.words import some_of
 from ...diagnosis import Values, diagnose
 from ...engines import LABELS, RECORDS, EngineRecord
 from ...engines.outside import Outside, OutsideDynamics
-from ...engines.outside.model import EngineError, TooLong, Unread, size_of
+from ...engines.outside.model import EngineError, Reading, TooLong, Unread, size_of
 from ...judge.agree import closest, over
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
@@ -133,9 +133,7 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
         integrators.compare_methods(result, setup, engine)
 
 
-def compare_numbers(
-    result: EnginesResult, robot: Robot, record: EngineRecord, reading: Mapping[str, Mapping[str, Any]]
-) -> None:
+def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, reading: Reading) -> None:
     """Rows of what the engine has read differently, and checks of the masses and moments of inertia."""
     for number, values in reading["read"].items():
         stated = reading["stated"][number]

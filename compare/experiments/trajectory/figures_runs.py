@@ -56,9 +56,10 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
     step = step_in_words(case, steps)
     for (positions, speeds, below), run in zip(axes.T, runs):
         for ax, name in ((positions, "q"), (speeds, "v")):
-            paths = {engine: getattr(path, name) for engine, path in run.paths.items()}
-            drawn = {engine: drawable(case, name, path) for engine, path in paths.items()}
-            alive = [run.until_diverged(engine, path) for engine, path in drawn.items()]
+            drawn = [
+                (engine, drawable(case, name, getattr(path, name))) for engine, path in run.paths.items()
+            ]
+            alive = [run.until_diverged(engine, values) for engine, values in drawn]
             over_time(ax, run, alive, shown, 64 // len(runs))
         positions.set_title(f"{run.integrator}, {step}" if len(runs) < 4 else f"{run.integrator}\n{step}")
         draw_difference(below, run, result.label)
