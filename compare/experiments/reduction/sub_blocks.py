@@ -59,9 +59,8 @@ def subsets(joints: Sequence[str], most: int) -> list[tuple[str, ...]]:
 def posture_of(coordinates: Coordinates, q: np.ndarray) -> tuple[float, ...]:
     """A position (nq,) with hinges in deg, as in a scene."""
     posture = np.array(q, dtype=float)
-    for joint in coordinates.places.joints:
-        if joint.kind == "hinge":
-            posture[joint.q] = np.degrees(posture[joint.q])
+    hinges = [joint.q.start for joint in coordinates.places.joints if joint.kind == "hinge"]
+    posture[hinges] = np.degrees(posture[hinges])
     return tuple(posture)
 
 
