@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .finding import Finding
+from .pictures import Pictures
 
 RULES = {  # which values pass
     "at most": lambda value, tolerance: value <= tolerance,
@@ -100,6 +101,7 @@ class Result:
     top: list[Finding] = field(default_factory=list)  # for the top of the report and for the terminal
     label: str = "TMT"  # of the engine that is compared with MuJoCo
     headline: Finding | None = None  # for the first screen; None: the number of checks that pass
+    pictures: Sequence[Pictures] = ()  # of motions, for the page
     answer: Finding | None = None  # added to the answers to the assignment's questions that name it
 
     def finding(self, kind: str, of: str = "", **values: Any) -> Finding:

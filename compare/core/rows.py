@@ -13,7 +13,7 @@ import dataclasses
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 RAD = "rad"
 MOVEMENT = "movement"  # the unit of a column: that of a MovementRow
@@ -47,6 +47,8 @@ def column(
 class Row:
     """A row of a table; its columns are its fields, in their order."""
 
+    SHARE: ClassVar[str] = ""  # the field that is its share of a tolerance
+
     def columns(self) -> dict[str, tuple[str, Column]]:
         """The fields by the names of their columns: (name of the field, Column)."""
         columns = {}
@@ -71,7 +73,8 @@ class Row:
 
         False if the row fails; False if it differs from a stated number; minus its share of a tolerance.
         """
-        return True, True, math.inf
+        share = getattr(self, self.SHARE) if self.SHARE else None
+        return getattr(self, "passed", True) is not False, True, math.inf if share is None else -share
 
 
 @dataclass(kw_only=True)

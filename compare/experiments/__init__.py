@@ -6,7 +6,7 @@ for each kind of finding and caption.
 """
 
 import importlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from types import ModuleType
@@ -18,7 +18,6 @@ from ..core.records import records_in
 
 if TYPE_CHECKING:  # for --help, the names are enough
     from ..core.check import Result
-    from ..core.pictures import Pictures
     from ..robots import Robot
     from .setup import Setup
 
@@ -34,7 +33,6 @@ class Functions:
     figures: Callable[["Result", "Robot"], Iterable[Drawing]] = lambda result, robot: ()
     headline: Callable[["Result"], Finding | None] = lambda result: None  # its one number on the first screen
     overview: Callable[[Mapping[str, "Result"], "Robot"], Iterable[Drawing]] = lambda results, robot: ()
-    scenes_drawn: Callable[["Result"], Sequence["Pictures"]] = lambda result: ()  # the motion in the page
     claim_values: Callable[["Robot"], dict[str, Any]] = lambda robot: {}  # for the macros claim and tolerance
     skipped: Callable[["Robot"], Finding | None] = lambda robot: None  # why it does not apply to a robot
 

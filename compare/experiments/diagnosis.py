@@ -82,22 +82,16 @@ def diagnosed(setup: Setup) -> Found:
     tree, sample, engine = setup.robot.tree, setup.random.first(STATES_ASKED), setup.robot.compared[0]
     engine = "own" if engine == "own" else "mujoco"
     dynamics, (q, qd, tau) = setup.engines[engine].of(setup.robot.case()), (sample.q, sample.qd, sample.tau)
-    M, h = np.asarray(dynamics.mass_matrix(q)), np.asarray(dynamics.bias(q, qd))
-    qdd = np.asarray(dynamics.acceleration(q, qd, tau))
-    values = Values.of(tree, q, qd, M, h)
-
-    def bias(qd: np.ndarray) -> np.ndarray:
-        return np.asarray(dynamics.bias(q, qd))
-
+    values = Values.of(tree, q, qd, dynamics.mass_matrix(q), dynamics.bias(q, qd))
     if isinstance(dynamics, OwnDynamics):
         broken, too_slow = conditions_of(dynamics, values)
         stated, is_slow = Stated(dynamics.equations.joints, "option"), dynamics.equations.seconds > QUICK
     else:
         broken, too_slow, stated, is_slow = [], False, None, False
-    diagnosis = diagnose(tree, values, SECONDS, None if is_slow else bias, stated)
+    diagnosis = diagnose(tree, values, SECONDS, None if is_slow else partial(dynamics.bias, q), stated)
     right = values._replace(mass_matrix=literal.mass_matrix(q, tree), bias=literal.bias(q, qd, tree))
-    ratio = largest_ratio(values.packed - right.packed, values.packed_tolerance)
-    left_over = LeftOver(tree, values, tau, qdd)
+    ratio = float(share_of(np.abs(values.packed - right.packed), values.packed_tolerance).max())
+    left_over = LeftOver(tree, values, tau, dynamics.acceleration(q, qd, tau))
     return Found(engine, len(q), broken, too_slow, diagnosis, ratio, left_over.causes, left_over.ratio)
 
 
@@ -119,11 +113,6 @@ def is_solved(dynamics: OwnDynamics, tree: tmt.Tree, sample: Sample) -> bool:
     q, qd, tau = sample.q, sample.qd, sample.tau
     values = Values.of(tree, q, qd, dynamics.mass_matrix(q), dynamics.bias(q, qd))
     return LeftOver(tree, values, tau, dynamics.acceleration(q, qd, tau)).ratio <= 1.0
-
-
-def largest_ratio(difference: np.ndarray, tolerance: np.ndarray) -> float:
-    """Of a difference to its tolerance; inf if one is not a number."""
-    return float(share_of(np.abs(difference), tolerance).max())
 
 
 def rows(setup: Setup) -> DiagnosisResult:

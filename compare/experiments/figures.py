@@ -70,8 +70,5 @@ def draw_nearest(nearest: Sequence[tuple[str, float, bool]]) -> tuple[str, Figur
     ax.set_yticks(rows, names)
     ax.set_ylim(len(names) - 0.5, -0.5)
     fig.legend(loc="outside upper center", ncols=2)
-    return (
-        "diagnosis_nearest",
-        fig,
-        Finding("diagnosis", "nearest", {"names": names[:2], "left": left[:2].tolist()}),
-    )
+    caption = Finding("diagnosis", "nearest", {"names": names[:2], "left": left[:2].tolist()})
+    return "diagnosis_nearest", fig, caption

@@ -19,13 +19,6 @@ SIZE = (4.2, 2.75)  # inches: about 400 px wide on the first screen
 LEAST_EPS, MOST_EPS = 1e-3, 1e6  # eps: where zero, and what is larger, is drawn
 MOST_ROWS = 9  # scenes or methods in one picture
 OUTLINE = [withStroke(linewidth=3, foreground="white")]  # of a text on lines
-LEGEND = {
-    "loc": "outside upper center",
-    "ncols": 3,
-    "fontsize": 7.5,
-    "handletextpad": 0.1,
-    "columnspacing": 0.8,
-}
 # how each of the DISTANCES of judge.agree is drawn: label, colour, dash, mark, shift of its row
 LOOKS = {
     "difference": ("{} to MuJoCo", "black", "-", "D", -0.22),
@@ -99,7 +92,7 @@ def draw_agreement(results: Mapping[str, Result]) -> tuple[str, Figure, Finding]
     beyond_tolerance(ax, FACTOR, f"{FACTOR:g} eps")
     names = [quantity["name"] for quantity in quantities]
     named_rows(ax, [name.replace(" ", "\n", len(name) > 12) for name in names], passed)
-    fig.legend(**LEGEND)
+    fig.legend(loc="outside upper center", ncols=3, fontsize=7.5, handletextpad=0.1, columnspacing=0.8)
     caption = Finding("shared", "agreement_overview", {"quantities": quantities, "label": label})
     return "overview_agreement", fig, caption
 

@@ -28,12 +28,7 @@ class Followed(NamedTuple):
 
 
 def follow(
-    dynamics: Dynamics,
-    case: Case,
-    method: Method,
-    setting: Setting,
-    reference: Reference,
-    repeat: float = 0.0,
+    dynamics: Dynamics, case: Case, method: Method, setting: Setting, reference: Reference, repeat: float = 0
 ) -> Followed:
     """The run of a method with a setting, timed up to 5 times while these take less than `repeat` s."""
     run, read = dynamics.prepare(*case.start, case.tau, setting, method.name)
@@ -47,6 +42,13 @@ def follow(
             times.append(seconds if motion.seconds is None else motion.seconds)
         error = reference.error(motion.q)
     return Followed(motion, min(times), error, float(error[reference.t <= EARLY].max()))
+
+
+def one_step(dynamics: Dynamics, states: States, tau: np.ndarray, dt: float, method: str) -> list[np.ndarray]:
+    """q and v one step after each of the states."""
+    q, v = states
+    motion = dynamics.run(q, v, tau, dt, 1, method)
+    return [motion.q[:, 1], motion.v[:, 1]]
 
 
 class Deviation(NamedTuple):

@@ -29,6 +29,8 @@ from .setup import Setup
 if TYPE_CHECKING:
     from tmt.exact.many import Pairs
 
+Array = np.ndarray
+
 
 class Quantity(NamedTuple):
     """How a quantity is computed, and what its difference is measured by."""
@@ -78,9 +80,7 @@ class Comparison:
 
     def __init__(self, setup: Setup, result: AgreementResult, sample: Sample):
         self.result, self.sample, self.robot = result, sample, setup.robot
-        self.engines: list[Any] = [
-            *setup.compared().values()
-        ]  # Dynamics that know more; MuJoCo is the second
+        self.engines: list[Any] = [*setup.compared().values()]  # Dynamics that know more, MuJoCo second
         is_small = self.robot.coordinates.nv <= MOST_SPEEDS  # code for more takes minutes to compile
         if sample is setup.random and is_small and not self.robot.own:
             self.engines.append(Compiled(self.robot.tree))
@@ -107,9 +107,7 @@ class Comparison:
     def acceleration_scale(self) -> np.ndarray:
         return QUANTITIES["qdd"].size(self.scale, self.sample.tau, self.acceleration_size())
 
-    def agree(
-        self, name: str, unit: str, values: np.ndarray, mujoco_values: np.ndarray, scale: np.ndarray
-    ) -> None:
+    def agree(self, name: str, unit: str, values: Array, mujoco_values: Array, scale: Array) -> None:
         """A row and a check of values of the two engines, (states, ...)."""
         agree(self.result, self.sample, Compared(name, unit, values, mujoco_values, scale))
 
@@ -153,11 +151,9 @@ def check_wide(result: Result, comparisons: Sequence[Comparison]) -> None:
 
 def headline(result: AgreementResult) -> Finding | None:
     """The difference with the largest share of its tolerance; one that is not a number comes first."""
-    top, largest = None, -1.0
-    for row in result.rows:
-        share = np.inf if row.worst_difference is None else row.difference_over_bar
-        if share is not None and share > largest:
-            top, largest = row, share
+    shares = [np.inf if row.worst_difference is None else row.difference_over_bar for row in result.rows]
+    known = [(share, row) for share, row in zip(shares, result.rows) if share is not None]
+    _, top = max(known, key=lambda pair: pair[0], default=(None, None))
     return Finding("shared", "agreement_headline", {"row": top}) if top else None
 
 

@@ -1,6 +1,5 @@
 """The comparison of two engines' values over states: the one closest to its tolerance."""
 
-import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -43,6 +42,7 @@ class Compared:
 class AgreementRow(Row):
     """One quantity over the states of a sample; the column of `from_exact` is named after the engine."""
 
+    SHARE = "difference_over_bar"
     engine: str
     scene: str
     quantity: str
@@ -68,11 +68,6 @@ class AgreementRow(Row):
         del columns["engine"]
         named_after_engine = {"from_exact_eps": f"{self.engine.lower()}_from_exact_eps"}
         return {named_after_engine.get(name, name): field for name, field in columns.items()}
-
-    @property
-    def urgency(self) -> tuple[bool, bool, float]:
-        share = self.difference_over_bar
-        return self.passed, True, math.inf if share is None else -share
 
 
 @dataclass

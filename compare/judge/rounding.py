@@ -124,15 +124,9 @@ def finite_states(q: ndarray, qd: ndarray) -> int:
 
 
 def growth(
-    stepping: Method,
-    tree: Tree,
-    q: ndarray,
-    qd: ndarray,
-    tau: ndarray,
-    dt: float,
-    every: int,
-    stride: int = 1,
-) -> ndarray:
+    stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float,
+    every: int, stride: int = 1,
+) -> ndarray:  # fmt: skip
     """log10 of the growth of a small difference of the initial state, at every `every` steps.
 
     The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled to avoid overflow. NaN from where the run has

@@ -10,15 +10,12 @@ from ..robots import Robot
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates, rates_at
 from .entries import Entries
-from .order import ORDER_MARGIN as ORDER_MARGIN
 from .rounding import NARROW
 from .scale import EPS, FACTOR, gravity_scale
 
 LEFT = 0.1  # rad or m: the distance at which a held model has left its posture
 MOVES = 0.1  # rad or m: the least movement of a run without a holding torque that tests anything
-LEAST_JUDGED = (
-    0.1  # the share of its time for which the runs of a scene that states no minimum must be judged
-)
+LEAST_JUDGED = 0.1  # the share of its time for which a run must be judged, if its scene states no minimum
 RESTS = 1e-9  # rad or m, and per s: what moves less only rounds
 STILL = 1e-3  # of the largest movement of its unit: a joint that moves less is not what a run tests
 COARSE_STEP = 0.01  # s: from this step on, methods other than RK4 may be unstable after STABLE_TIME
@@ -135,13 +132,9 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     for each inertia and stiffness of 1.
     """
     tree, coordinates = case.tree, case.coordinates
-    exchange = 2.0 * gravity_scale(
-        case.robot.tree, case.posture
-    )  # the reach includes the slides at the start
+    exchange = 2.0 * gravity_scale(case.robot.tree, case.posture)  # the reach includes slides at the start
     exchange = exchange + tmt.energy(q[0], case.v, tree) - tmt.potential_energy(q[0], tree)
-    if (
-        tree.position_gain
-    ):  # servos return energy until they exert no force; the other torque is that of a motor
+    if tree.position_gain:  # servos return energy until they exert no force; other torque is a motor's
         gain = np.array(tree.position_gain)
         pull, give = case.tau - fed_back_at(tree, q[0]), np.linalg.pinv(gain, hermitian=True)
         exchange = exchange + pull @ give @ pull / 2.0

@@ -1,9 +1,4 @@
-"""Scales of tolerances: from the stated numbers and TMT's own terms, for each state.
-
-A tolerance is 64 x eps x scale. The scale of a quantity is the sum of the absolute values of the terms that
-are added in it; it is never the quantity itself, which may be zero. `entries.py` has the scales of all
-quantities, entry by entry.
-"""
+"""What the scales of entries.py are made of: from the stated numbers and TMT's own terms, for each state."""
 
 import numpy as np
 from numpy.typing import ArrayLike

@@ -182,8 +182,8 @@ def section_with(name: str, result: Result, robot: Robot) -> Section:
     result.headline = result.headline or experiment.headline(result)
     of_robot = {"robot": robot, "values": experiment.claim_values(robot)}
     claim, tolerance = (say(Finding(name, kind, of_robot)) for kind in ("claim", "tolerance"))
-    title, scenes = block(name, "title", robot=robot), experiment.scenes_drawn(result)
-    return Section(name, title, claim, tolerance, result, record=EXPERIMENTS[name], scenes=scenes)
+    title, record = block(name, "title", robot=robot), EXPERIMENTS[name]
+    return Section(name, title, claim, tolerance, result, record=record, scenes=result.pictures)
 
 
 def add_problems(result: Result, problems: Sequence[Problem], told: set[int]) -> None:

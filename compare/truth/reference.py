@@ -48,7 +48,7 @@ class Reference(NamedTuple):
 
 def reference(case: Case) -> Reference:
     """The reference of one case at 65 equal times; ValueError if no run reaches the end of the scene."""
-    count = RECORDS if case.controller else first_steps(case)  # as the coarsest runs of `speed`
+    count = coarsest_steps(case)
     q, v, tau = (tuple(values.tolist()) for values in (*case.start, case.tau))
     try:
         path, apart = in_pairs(case.tree, q, v, tau, case.duration / count, count, count // RECORDS)
@@ -68,16 +68,18 @@ def first_steps(case: Case) -> int:
     return -(-case.steps // RECORDS) * RECORDS
 
 
+def coarsest_steps(case: Case) -> int:
+    """The same; 64 where servos act, as such a scene has short steps for methods explicit in the speeds."""
+    return RECORDS if case.controller else first_steps(case)
+
+
 def times(case: Case) -> np.ndarray:
     """The recorded times of a run, s."""
     return np.linspace(0.0, case.duration, RECORDS + 1)
 
 
 def in_doubles(case: Case) -> Reference:
-    """A run in doubles by a method of order 8: the steps are doubled while the difference of two runs falls.
-
-    ValueError if no run reaches the end of the scene.
-    """
+    """A run in doubles by a method of order 8: the steps are doubled while the difference of two runs falls."""
     count, before, runs = first_steps(case), None, []
     for _ in range(MOST_DOUBLINGS + 1):
         motion = tmt.simulate(*case.start, case.tau, case.duration / count, count, DOUBLES, case.tree)

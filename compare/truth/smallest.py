@@ -38,7 +38,7 @@ class Needed(NamedTuple):
 def needed(case: Case) -> Needed:
     """Which joints of the case its motion needs."""
     names, coordinates = case.joints, case.coordinates
-    joints = dict(zip(names, coordinates.places.joints))
+    joints = coordinates.by_name
     moves = {name: f"{name} has a speed at the start" for name in names if any(case.v[joints[name].qd])}
     while still := tuple(name for name in names if name not in moves):
         rng = np.random.default_rng(SEED)
@@ -60,7 +60,7 @@ def forces(
 
     A holding torque is the model's own bias (and springs) at the start in these numbers, not rounded.
     """
-    q, qd, joints = [*q], [*qd], dict(zip(case.joints, tree.coordinates.joints))
+    q, qd, joints = [*q], [*qd], case.coordinates.by_name
     for name in still:
         joint = joints[name]
         q[joint.q], qd[joint.qd] = start[joint.q], [mpmath.mpf(0)] * len(qd[joint.qd])
@@ -92,8 +92,7 @@ def exact_accelerations(
             values = solve(exact_mass_matrix(still_tree, tuple(q)), values)
         zero = ZERO * max(1, *map(abs, values))
         values = [a if abs(a) > zero else mpmath.mpf(0) for a in values]
-        joints = dict(zip(case.joints, case.tree.coordinates.joints))
-        return {name: tuple(values[joints[name].qd]) for name in still}
+        return {name: tuple(values[case.coordinates.by_name[name].qd]) for name in still}
 
 
 @lru_cache(maxsize=8)

@@ -1,6 +1,6 @@
 """Other engines that read the robot's file: what each has read, its equations, its integrators."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -14,9 +14,9 @@ from ...core.words import some_of
 from ...diagnosis import Values, diagnose
 from ...engines import LABELS, RECORDS, EngineRecord
 from ...engines.outside import Outside, OutsideDynamics
-from ...engines.outside.model import EngineError, TooLong, Unread, size_of
+from ...engines.outside.model import EngineError, Reading, TooLong, Unread, size_of
 from ...judge.agree import closest, over
-from ...judge.entries import Entries, unit
+from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...robots.states import Sample
@@ -41,6 +41,7 @@ SHOWN = ["engine", "quantity", "unit", "states", "worst_difference", "bar", "dif
 class EngineRow(Row):
     """A quantity of an engine compared with exact values."""
 
+    SHARE = "difference_over_bar"
     engine: str
     precision: str
     quantity: str
@@ -55,10 +56,6 @@ class EngineRow(Row):
     worst_qd: str = ""
     worst_tau: str = ""
     passed: bool = False
-
-    @property
-    def urgency(self) -> tuple[bool, bool, float]:
-        return self.passed, True, -(self.difference_over_bar or 0.0)
 
 
 @dataclass
@@ -136,19 +133,14 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
         integrators.compare_methods(result, setup, engine)
 
 
-def compare_numbers(
-    result: EnginesResult, robot: Robot, record: EngineRecord, reading: Mapping[str, Mapping[str, Any]]
-) -> None:
+def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, reading: Reading) -> None:
     """Rows of what the engine has read differently, and checks of the masses and moments of inertia."""
     for number, values in reading["read"].items():
         stated = reading["stated"][number]
         tolerance = FACTOR * record.eps * size_of(reading["stated"], number)
         if number in OF_BODIES:
-            most, check = (
-                np.abs(values - stated).max(initial=0.0),
-                partial(result.check, rounding=True, about=About.ENGINE),
-            )
-            check(record.label, f"{number} {AS_READ}", most, tolerance, UNITS[number])
+            what, most = f"{number} {AS_READ}", np.abs(values - stated).max(initial=0.0)
+            result.check(record.label, what, most, tolerance, UNITS[number], "", True, about=About.ENGINE)
         if number not in reading["mended"] or (number == "inertia" and "moments" in reading["mended"]):
             continue
         is_set = bool(reading["mended"][number])
@@ -187,15 +179,14 @@ def compare_quantities(
         if not dynamics.has(function):
             result.find("no_function", engine=record.label, quantity=name)
             continue
-        states = [getattr(sample, argument) for argument in QUANTITIES[name].arguments]
+        states = QUANTITIES[name].states(sample)
         computed[name] = getattr(dynamics, function)(*states)
         compare_quantity(result, sample, record, name, computed[name], getattr(mujoco, function)(*states))
     differs = any(row.engine == record.label and not row.passed for row in result.rows)
     if differs and {"Mbar", "bias"} <= computed.keys():
         tree, tolerance = sample.tree, FACTOR * record.eps
         values = Values.of(tree, sample.q, sample.qd, computed["Mbar"], computed["bias"], tolerance)
-        text = diagnose(tree, values, SECONDS).sentence()
-        result.find("cause", engine=record.label, text=text)
+        result.find("cause", engine=record.label, text=diagnose(tree, values, SECONDS).sentence())
 
 
 def compare_quantity(
@@ -203,17 +194,14 @@ def compare_quantity(
 ) -> None:
     """A check of the entry that is closest to its tolerance, and a row."""
     quantity, scale, eps = QUANTITIES[name], Entries(sample.tree, sample.q, sample.qd), record.eps
-    exact, size = sample.exact(quantity.function), getattr(scale, quantity.scale)
-    if name == "qdd":
-        size = size(scale.force(sample.tau), exact.high)
-    size = np.broadcast_to(size, values.shape)
+    exact = quantity.exact(sample)
+    size = np.broadcast_to(quantity.size(scale, sample.tau, exact.high), values.shape)
     difference, tolerance = exact.distance(values), FACTOR * eps * size
     worst = closest(difference, tolerance)
     numbers = {name: [repr(float(x)) for x in getattr(sample, name)[worst[0]]] for name in ("q", "qd", "tau")}
     note = "; ".join(f"{argument} = ({', '.join(numbers[argument])})" for argument in quantity.arguments)
-    units, what = unit(sample.tree, *quantity.units), f"{name} to exact"
-    pair = difference[worst], tolerance[worst]
-    check = result.check(record.label, what, *pair, units, note, True, about=About.ENGINE)
+    units, pair = quantity.unit(sample.tree), (difference[worst], tolerance[worst])
+    check = result.check(record.label, f"{name} to exact", *pair, units, note, True, about=About.ENGINE)
     row = EngineRow(record.label, record.precision, name, units, len(sample.q), check.value, check.tolerance)
     row.difference_over_bar, row.passed = check.over_tolerance, check.passed
     row.difference_eps = float(over(difference, eps * size).max())

@@ -6,19 +6,10 @@ from ...core.check import Result
 from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
 from ...judge.scale import FACTOR
+from ...report import style
 from ...report.style import RED, WIDTH
 
-DASHES = (
-    "-",
-    "--",
-    "-.",
-    ":",
-    (0, (5, 1)),
-    (0, (3, 1, 1, 1)),
-    (0, (1, 3)),
-    (0, (8, 2)),
-    (0, (6, 1, 1, 1, 1, 1)),
-)
+DASHES = (*style.DASHES, (0, (1, 3)), (0, (8, 2)), (0, (6, 1, 1, 1, 1, 1)))
 LOOKS = {LABELS[name]: {"marker": MARKS[name], "color": COLOURS[name]} for name in LABELS}
 
 

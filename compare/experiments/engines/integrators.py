@@ -17,7 +17,7 @@ from ...judge.rounding import step_rounding
 from ...judge.scale import EPS
 from ...robots.case import Case
 from ...truth.reference import has_no_reference, reference
-from ..followed import EARLY, REGULAR, differences, follow
+from ..followed import EARLY, REGULAR, differences, follow, one_step
 from ..setup import Setup
 
 STEP = 2.0**-7  # s: of single steps, a number that float32 has
@@ -33,8 +33,6 @@ LEAST_RUNS = 4  # with regular errors, that measure an order
 
 @dataclass(kw_only=True)
 class MethodRow(Row):
-    """A run of an integrator in a scene."""
-
     scene: str
     engine: str
     method: str
@@ -88,10 +86,9 @@ def compare_steps(result: Result, setup: Setup, engine: Engine, method: Method) 
     sample, record = setup.random, RECORDS[engine.name]
     q, v = (values[:STATES].astype(record.precision).astype(float) for values in (sample.q, sample.qd))
     case, tau = setup.robot.case(), np.zeros(setup.robot.coordinates.nv)
-    twin = setup.engines["tmt"].of(case).run(q, v, tau, STEP, 1, method.scheme)
-    stepped = engine.of(case).run(q, v, tau, STEP, 1, method.name)
-    pair = ((motion.q[:, 1], motion.v[:, 1]) for motion in (stepped, twin))
-    difference = differences(case.coordinates, *pair)
+    twin = one_step(setup.engines["tmt"].of(case), (q, v), tau, STEP, method.scheme)
+    stepped = one_step(engine.of(case), (q, v), tau, STEP, method.name)
+    difference = differences(case.coordinates, stepped, twin)
     tolerance = step_rounding(METHODS[method.scheme], case.tree, q, v, tau, STEP) * record.eps / EPS
     worst = closest(difference, tolerance)
     where, note = LABELS[engine.name], sample.describe(worst[0])

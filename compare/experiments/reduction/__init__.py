@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from tmt.exact.values import DIGITS
 
@@ -26,33 +26,31 @@ EXPERIMENT = Experiment(order=110, serves_own=False, options=("--scenes",), time
 NO_GAIN = 1.05  # a smaller speedup is within the accuracy of the times
 
 
-class Work(NamedTuple):
-    untimed: Iterable[ReductionResult]  # one
-
-
 def claim_values(robot: Robot) -> dict[str, str | float]:
     words = {"joint": joint_word(robot.coordinates), "unit": movement_unit(robot.coordinates)}
     return words | {"digits": DIGITS, "eps": FACTOR, "narrow": NARROW}
 
 
-def begin(setup: Setup) -> Work:
+def begin(setup: Setup) -> Iterable[ReductionResult]:
     """Start everything that is not timed, in parallel with other work."""
     alone = replace(setup, map=map, quiet=nothing, progress=nothing, reading=None)
-    return Work(setup.map(untimed, [alone]))
+    return setup.map(untimed, [alone])
 
 
-def rows(setup: Setup, work: Work | None = None) -> ReductionResult:
+def rows(setup: Setup, work: Iterable[ReductionResult] | None = None) -> ReductionResult:
     """Sub-blocks with joints locked; what each case needs, its runs and times; exact solutions."""
-    (result,) = (begin(setup) if work is None else work).untimed
+    (result,) = begin(setup) if work is None else work
     if result.models is not None:
         setup.quiet()
         time_models(result, setup, rounds=setup.of(64, 16, 2))
         best = largest_gain(result.rows, setup.robot.coordinates.nv)
         if best and (best.speedup or 0.0) >= NO_GAIN:
-            joints = best.hinges.split()
-            result.headline = result.finding(
-                "headline", speedup=best.speedup, joints=joints, scene=best.scene
-            )
+            values: dict[str, Any] = {
+                "speedup": best.speedup,
+                "joints": best.hinges.split(),
+                "scene": best.scene,
+            }
+            result.headline = result.finding("headline", **values)
     result.top += answers(result, setup.robot)
     return result
 

@@ -42,17 +42,13 @@ def compare_swing(result: ReductionResult, setup: Setup, case: Case) -> None:
             path = dynamics.run(*case.start, case.tau, step, finer * case.steps, method).q
             errors[engine].append(float(np.abs(path[:: finer // SWING_STEPS[0], 0] - exact).max()))
         result.apart[case.name, engine] = errors[engine][SWING_STEPS.index(IN_TABLE)]
-    orders = check_falling(result, case.name, dt, errors)
-    result.swings[case.name] = Swing(dt, errors, orders)
+    result.swings[case.name] = Swing(dt, errors, check_falling(result, case.name, dt, errors))
 
 
 def check_falling(
     result: Result, scene: str, dt: Sequence[float], errors: Mapping[str, Sequence[float]]
 ) -> dict[str, float]:
-    """Errors, rad, fall at the method's order; the measured orders of the engines.
-
-    Measured between the last two errors above 1e-11 rad; with fewer than two there is no check.
-    """
+    """The orders at which errors, rad, fall, and their checks: between the last two of at least ROUNDED."""
     orders = {}
     for engine, values in errors.items():
         is_rounded = [value <= ROUNDED for value in values]

@@ -20,12 +20,7 @@ KINDS_OF_JOINT: dict[str, dict[str, Any]] = {
     "not decided": {"marker": "d", "color": ORANGE, "mfc": "none"},
 }
 HEIGHTS = {"tmt": -0.15, "mujoco": 0.15}  # of an engine's times in the line of a scene
-ABOVE: dict[str, Any] = {
-    "loc": "lower center",
-    "bbox_to_anchor": (0.5, 1.0),
-    "handletextpad": 0.2,
-    "columnspacing": 1.0,
-}
+ABOVE: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "columnspacing": 1.0}
 
 
 def draw_needs(result: ReductionResult, robot: Robot) -> tuple[str, Figure, Finding]:
@@ -50,13 +45,13 @@ def draw_needs(result: ReductionResult, robot: Robot) -> tuple[str, Figure, Find
     kinds = {kind_of_joint(joint, need) for need in scenes.values() for joint in joints}
     handles = [Line2D([], [], linestyle="none", label=kind, markersize=7, **style)
                for kind, style in KINDS_OF_JOINT.items() if kind in kinds]  # fmt: skip
-    left.legend(handles=handles, ncols=1, **ABOVE)
+    left.legend(handles=handles, handletextpad=0.2, **ABOVE)
     handles = [
         Line2D([], [], linestyle="none", label=f"{LABELS[engine]}, {model}", **look_of(engine) | more)
         for engine in HEIGHTS
         for model, more in (("whole model", {"mfc": "none"}), ("smallest model", {"markersize": 3.5}))
     ]
-    right.legend(handles=handles, ncols=2, **ABOVE)
+    right.legend(handles=handles, ncols=2, handletextpad=0.2, **ABOVE)
     return "reduction_needs", fig, result.finding("needs", robot=robot.name)
 
 
@@ -90,11 +85,10 @@ def draw_swing(result: ReductionResult, scene: str) -> tuple[str, Figure, Findin
     dt, errors, orders = result.swings[scene]
     fig = Figure(figsize=(WIDTH, 3.0), layout="constrained")
     ax = fig.subplots()
+    engines = []
     for engine, values in errors.items():
         ax.loglog(dt, values, **look_of(engine), mfc="none", label=f"{LABELS[engine]}, RK4")
+        engines.append({"engine": LABELS[engine], "order": orders.get(engine), "error": values[-1]})
     ax.set(xlabel="dt, s", ylabel="maximum error of the angle, rad")
     ax.legend()
-    engines = [
-        {"engine": LABELS[e], "order": orders.get(e), "error": values[-1]} for e, values in errors.items()
-    ]
     return file_name("reduction", scene), fig, result.finding("swing", scene=capital(scene), engines=engines)

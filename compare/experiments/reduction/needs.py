@@ -26,9 +26,9 @@ def compare_case(result: ReductionResult, case: Case, setup: Setup) -> list[Mode
     slow = not case.is_held and seconds(case.robot) > SECONDS_OF_STATE
     need = Needed((), {}) if slow else needed(case)
     smaller, rests = reduced(case, need), len(need.stays) == len(case.joints)
-    models = [Model(case.name, case.changed(locked=()))]
+    models: list[Model] = [(case.name, case.changed(locked=()))]
     if smaller or case.locked or rests:
-        models.append(Model(case.name, None if rests else smaller or case))
+        models.append((case.name, None if rests else smaller or case))
     names = tuple(name for name in case.joints if name in need.moves)
     rows = [NeedRow(case.name, name, need.moves[name]) for name in names]
     result.tables.setdefault("reduction_needs", []).extend(rows)
@@ -65,8 +65,7 @@ def compare_smaller(result: ReductionResult, case: Case, smaller: Case | None, s
 
 def columns_of(smaller: Case, case: Case) -> tuple[np.ndarray, np.ndarray]:
     """The columns of the smaller case's positions and speeds among those of a case."""
-    places = dict(zip(case.joints, case.coordinates.places.joints))
-    joints = [places[name] for name in smaller.joints]
+    joints = [case.coordinates.by_name[name] for name in smaller.joints]
     return np.r_[tuple(joint.q for joint in joints)], np.r_[tuple(joint.qd for joint in joints)]
 
 

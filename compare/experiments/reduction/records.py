@@ -1,6 +1,5 @@
 """What reduction finds: rows of its tables, what each scene needs, and swings that are known exactly."""
 
-import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -35,6 +34,7 @@ class NeedRow(Row):
 class SubsetRow(Row):
     """Blocks of Mbar or of the bias with joints locked."""
 
+    SHARE = "difference_over_bar"
     locked: str = column(names=True)
     quantity: str
     parties: str
@@ -43,10 +43,8 @@ class SubsetRow(Row):
     unit: str
     difference_over_bar: float | None = None
 
-    @property
-    def urgency(self) -> tuple[bool, bool, float]:
-        share = self.difference_over_bar
-        return True, True, math.inf if share is None else -share
+
+Model = tuple[str, Case | None]  # the name of a scene, and what is run; None: nothing moves
 
 
 class Need(NamedTuple):
@@ -62,11 +60,6 @@ class Swing(NamedTuple):
     dt: list[float]  # s
     errors: dict[str, list[float]]  # of each engine, rad
     orders: dict[str, float]
-
-
-class Model(NamedTuple):
-    scene: str
-    case: Case | None  # None: nothing moves
 
 
 @dataclass

@@ -18,7 +18,8 @@ from .needs import columns_of
 from .records import SubsetRow
 
 ALL_SUBSETS = 6  # joints up to which all subsets are locked; above, some joints, each alone
-Differences = tuple[np.ndarray, np.ndarray]  # of the states, and the scale of each, (states,)
+# by quantity and pair of models: of the states, and the scale of each, (states,)
+Differences = dict[tuple[str, str], tuple[np.ndarray, np.ndarray]]
 MOST_TO_LOCK = 2.0  # s that an exact state may take
 
 
@@ -58,9 +59,8 @@ def subsets(joints: Sequence[str], most: int) -> list[tuple[str, ...]]:
 def posture_of(coordinates: Coordinates, q: np.ndarray) -> tuple[float, ...]:
     """A position (nq,) with hinges in deg, as in a scene."""
     posture = np.array(q, dtype=float)
-    for joint in coordinates.places.joints:
-        if joint.kind == "hinge":
-            posture[joint.q] = np.degrees(posture[joint.q])
+    hinges = [joint.q.start for joint in coordinates.places.joints if joint.kind == "hinge"]
+    posture[hinges] = np.degrees(posture[hinges])
     return tuple(posture)
 
 
@@ -69,10 +69,7 @@ def scene_name(locked: Sequence[str]) -> str:
 
 
 def check_blocks(result: Result, where: str, row: SubsetRow, apart: np.ndarray, scale: np.ndarray) -> None:
-    """A check of the state that comes closest to its tolerance, 64 eps x scale, and the row.
-
-    apart, scale: (states,).
-    """
+    """A check of the state closest to its tolerance, 64 eps x scale, and the row. apart, scale: (states,)."""
     tolerance = FACTOR * EPS * scale
     (worst,) = closest(apart, tolerance)
     name = f"{row.quantity}, {row.parties}"
@@ -82,10 +79,8 @@ def check_blocks(result: Result, where: str, row: SubsetRow, apart: np.ndarray, 
     result.tables["reduction_subsets"].append(row)
 
 
-def sub_block_differences(
-    setup: Setup, case: Case, q: np.ndarray, v: np.ndarray
-) -> dict[tuple[str, str], Differences]:
-    """By quantity and pair of models, at states whose locked joints are set to the case's.
+def sub_block_differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Differences:
+    """At states whose locked joints are set to the case's.
 
     The difference of a state is the one closest to its tolerance, with its scale, as in `mass`.
     """

@@ -39,9 +39,8 @@ def time_models(result: ReductionResult, setup: Setup, rounds: int) -> None:
                 steps = TIMED_STEPS[engine]
                 setting = Setting(case.duration / case.steps / finer(case) * steps, steps)
                 method = rk4_of(setup.engines, engine).name
-                calls[scene, case.joints, engine], _ = dynamics.prepare(
-                    *case.start, case.tau, setting, method
-                )
+                run, _ = dynamics.prepare(*case.start, case.tau, setting, method)
+                calls[scene, case.joints, engine] = run
     add_rows(result, setup.robot, fastest(calls, rounds))
 
 

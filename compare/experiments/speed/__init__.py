@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from ...core import timing
 from ...core.finding import Finding
@@ -10,7 +10,6 @@ from ...engines import GRID, IN_QUICK_RUNS, LABELS, RECORDS
 from ...judge.run import leaves_no_digits, movement_unit
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
-from ...robots.case import Case
 from ...truth.reference import LOST, has_no_reference
 from .. import Experiment
 from ..setup import Setup
@@ -21,35 +20,29 @@ from .settings import followed, left_out, regular_of, scenes_of
 EXPERIMENT = Experiment(order=90, serves_own=False, options=("--scenes",), timed=True, overview="times")
 
 
-class Work(NamedTuple):
-    cases: Sequence[Case]
-    scenes: Iterable[SceneRuns]  # of these cases, in another order
-
-
 def claim_values(robot: Robot) -> dict[str, str | float]:
     return {"unit": movement_unit(robot.coordinates), "times": GRID + 1, "eps": FACTOR, "lost": LOST}
 
 
-def skipped(robot: Robot) -> Finding | str | None:
+def skipped(robot: Robot) -> Finding | None:
     if not scenes_of(robot):
         return Finding("speed", "no_scene", {"noun": robot.noun})
     return leaves_no_digits(robot) or has_no_reference(robot)
 
 
-def begin(setup: Setup) -> Work:
+def begin(setup: Setup) -> Iterable[SceneRuns]:
     """Start measuring the errors of MuJoCo and tmt, in parallel with other work: they are timed later."""
     cases = followed(setup.robot, setup.size)
     trees = [case.tree for case in cases]
     # different trees come first: their code compiles in parallel
     different_first = sorted(cases, key=lambda case: trees[: cases.index(case)].count(case.tree))
     measure = partial(scene_runs, engines=setup.engines, size=setup.size)
-    return Work(cases, setup.map(measure, different_first))
+    return setup.map(measure, different_first)
 
 
-def rows(setup: Setup, work: Work | None = None) -> SpeedResult:
+def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
     """Errors, times, orders, the error of rounding, and the cheapest settings."""
-    cases, measured = begin(setup) if work is None else work
-    names = [case.name for case in cases]
+    names, measured = [case.name for case in setup.robot.cases], begin(setup) if work is None else work
     scenes = sorted(measured, key=lambda scene: names.index(scene.case.name))
     loops, absent = evaluations.loops(setup)
     failed = add_times(setup, scenes)
@@ -123,8 +116,7 @@ def add_absent(result: SpeedResult, setup: Setup) -> None:
         methods = [] if len(names) == len(setup.engines[engine].methods) else names
         result.find("absent", engine=LABELS.get(engine, engine), methods=methods, reason=reason)
         for scene in result.floors:
-            row = SpeedRow(scene, engine, ", ".join(names), why_not=reason, unit=result.unit)
-            result.rows.append(row)
+            result.rows.append(SpeedRow(scene, engine, ", ".join(names), why_not=reason, unit=result.unit))
 
 
 def figures(result: SpeedResult, robot: Robot) -> Iterator[partial[Any]]:

@@ -1,6 +1,6 @@
 """Checks of errors: the order of each method, MuJoCo against the same scheme in tmt, rounding."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -18,8 +18,6 @@ CLEAR = 2e-12  # rad: an error up to EARLY above this is far above rounding
 
 @dataclass
 class OrderRow(Row):
-    """The measured order of a method in a scene."""
-
     scene: str
     engine: str
     method: str
@@ -29,9 +27,7 @@ class OrderRow(Row):
     to_dt: float = column("s", digits=5)
 
 
-def check_orders(
-    result: SpeedResult, scenes: Sequence[SceneRuns], engines: Collection[str]
-) -> list[OrderRow]:
+def check_orders(result: SpeedResult, scenes: Sequence[SceneRuns], engines: Sequence[str]) -> list[OrderRow]:
     """Rows and checks: the stated and the measured order of each method of fixed step of these engines."""
     rows = []
     for scene in scenes:
@@ -55,10 +51,7 @@ def order_in(scene: SceneRuns, runs: Sequence[Run]) -> MeasuredOrder | None:
 
 
 def check_same_schemes(result: SpeedResult, scene: SceneRuns) -> None:
-    """MuJoCo's integrators and the same schemes in tmt make the same error, except for rounding.
-
-    Checked where at least one of the errors is below 0.1 rad.
-    """
+    """MuJoCo's integrators and the same schemes in tmt make the same error, except for rounding."""
     by_tmt = {(run.method.name, run.row.dt): run.row for run in scene.runs if run.method.engine == "tmt"}
     for run in scene.runs:
         mujoco, twin = run.row, by_tmt.get((run.method.scheme, run.row.dt))

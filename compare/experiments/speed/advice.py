@@ -48,11 +48,8 @@ def advice(result: SpeedResult) -> list[AdviceRow]:
         rows = [row for row in result.rows if row.scene == scene and not row.diverged]
         for target in TARGETS:
             reach = [row for row in rows if row.largest_error <= target]
-            mujoco, tmt, rk4 = (
-                cheapest(reach, "mujoco"),
-                cheapest(reach, "tmt"),
-                cheapest(reach, "mujoco", "RK4"),
-            )
+            mujoco, tmt = cheapest(reach, "mujoco"), cheapest(reach, "tmt")
+            rk4 = cheapest(reach, "mujoco", "RK4")
             same_step = cheapest([row for row in rows if rk4 and row.dt == rk4.dt], "tmt", "rk4")
             ratios: dict[str, Any] = {"ratio": ratio(mujoco, tmt), "integrator_part": ratio(mujoco, rk4)}
             ratios |= {"kernel_part": ratio(rk4, same_step), "method_part": ratio(same_step, tmt)}
@@ -66,9 +63,8 @@ def setting(name: str, row: SpeedRow | None) -> dict[str, Any]:
     if row is None:
         return {name: "none", f"{name}_dt": None, f"{name}_ms": None, f"{name}_evaluations": None}
     steps = f"{row.steps} steps" if row.dt else f"tolerance {row.tolerance:.0e}"
-    words = f"{row.engine} {row.method}, {steps}"
     of_run = {f"{name}_dt": row.dt, f"{name}_ms": 1e3 * row.time, f"{name}_evaluations": row.evaluations}
-    return {name: words} | of_run
+    return {name: f"{row.engine} {row.method}, {steps}"} | of_run
 
 
 def cheapest(rows: Sequence[SpeedRow], engine: str = "", method: str = "") -> SpeedRow | None:
@@ -81,13 +77,9 @@ def ratio(slow: SpeedRow | None, fast: SpeedRow | None) -> float | None:
     return slow.time / fast.time if slow and fast else None
 
 
-# the first screen
-
-
 def target(result: SpeedResult) -> dict[str, Any]:
     """What the sentences about the cheapest setting of the first screen say of the run."""
-    about = {"scene": result.regular, "unit": result.unit, "servos_off": result.servos_off}
-    return about | {"target": TARGET}
+    return {"scene": result.regular, "unit": result.unit, "servos_off": result.servos_off, "target": TARGET}
 
 
 def front(rows: Sequence[SpeedRow]) -> list[SpeedRow]:

@@ -152,9 +152,9 @@ done:
 
 
 def chained(tree: tmt.Tree) -> Callable[..., None]:
-    """chain(q, qd, tau, out, count): the accelerations at one state again and again, where each call waits for the last.
+    """chain(q, qd, tau, out, count): the accelerations at one state again and again, each after the last.
 
-    It reads the state from the address that is given plus `wrong` of the last call, which is 0 but known only at its end.
+    A call reads the state at its address plus `wrong` of the last call, which is 0 but known only at its end.
     """
     from tmt.compiled import entries, machine  # loads the compiler
 

@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
 
 from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
 from ...report.style import GREY, WIDTH, file_name
-from ..figures_overview import chart
+from ..figures_overview import OUTLINE, chart
 from .advice import TARGET, best_rows, cheapest_of_fronts, front, target, within_target
 from .runs import SpeedResult, SpeedRow
 
@@ -40,12 +39,9 @@ def draw_times(result: SpeedResult, scene: str, beginning: str = "") -> tuple[st
     ax.set(xlabel=f"maximum error, {unit} (decreasing)", xticks=[10.0**k for k in range(0, -17, -2)])
     ax.minorticks_off()
     fig.legend(loc="outside right upper", fontsize=7, handlelength=1.6)
-    values: dict[str, Any] = {
-        "diverged": sum(bool(row.diverged) for row in ran),
-        "missing": len(ran) - len(good),
-    }
-    caption = result.finding("times", begins=beginning or scene, unit=unit, end=COARSE_END, **values)
-    return file_name("speed", scene), fig, caption
+    counts = {"diverged": sum(bool(row.diverged) for row in ran), "missing": len(ran) - len(good)}
+    values: dict[str, Any] = {"begins": beginning or scene, "unit": unit, "end": COARSE_END, **counts}
+    return file_name("speed", scene), fig, result.finding("times", **values)
 
 
 def drawn(rows: Sequence[SpeedRow]) -> tuple[np.ndarray, list[float]]:
@@ -70,13 +66,11 @@ def draw_overview(result: SpeedResult) -> tuple[str, Figure, Finding]:
             text = f"{best.method} {float(f'{time:.2g}'):g} ms"
             ax.annotate(text, (error, time), (0, 8 if above else -11), fontsize=8, color=colour,
                         textcoords="offset points", ha="right" if above else "center" if fine else "left",
-                        va="bottom" if above else "top",
-                        path_effects=[withStroke(linewidth=3, foreground="white")])  # fmt: skip
-    numbers = target(result)
+                        va="bottom" if above else "top", path_effects=OUTLINE)  # fmt: skip
     ax.axvline(TARGET, color=GREY, linestyle=":", linewidth=1.2)
     ax.set(xscale="log", yscale="log", xlabel=f"maximum error, {result.unit} (decreasing)", ylabel="time, ms")
     ax.invert_xaxis()
     ax.margins(0.06, 0.12)
     fig.legend(loc="outside upper center", ncols=4, fontsize=8, handletextpad=0.4, columnspacing=1.0)
     settings = cheapest_of_fronts(fronts)
-    return "overview_times", fig, result.finding("overview_caption", settings=settings, **numbers)
+    return "overview_times", fig, result.finding("overview_caption", settings=settings, **target(result))

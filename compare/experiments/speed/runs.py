@@ -20,9 +20,9 @@ from ...judge.rounding import growth
 from ...judge.run import diverged_at, movement_unit
 from ...judge.scale import EPS
 from ...robots.case import Case
-from ...truth.reference import Reference, reference
+from ...truth.reference import Reference, coarsest_steps, reference
 from ..followed import follow
-from .settings import MOST_SECONDS, coarsest_steps, estimated, methods, settings_of
+from .settings import MOST_SECONDS, estimated, methods, settings_of
 
 NEAR_ROUNDING = 30  # a smaller multiple of the error of rounding counts as rounding
 GROWTH_STEPS = 16  # of the run whose growth is computed, between two recorded times
@@ -75,8 +75,6 @@ class Run(NamedTuple):
 
 @dataclass
 class SceneRuns:
-    """The runs of one scene."""
-
     case: Case
     reference: Reference
     floor: float  # rad or m: the error that rounding, or the reference, leaves

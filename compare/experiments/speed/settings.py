@@ -5,9 +5,10 @@ from collections.abc import Mapping
 from tmt import Tree
 from tmt.methods import method_named
 
-from ...engines import GRID, IN_QUICK_RUNS, Engine, Method, Setting, methods_in
+from ...engines import IN_QUICK_RUNS, Engine, Method, Setting, methods_in
 from ...robots import Robot
 from ...robots.case import Case
+from ...truth.reference import coarsest_steps
 
 # steps; more would take too long
 FINEST = {"mujoco": 2**15, ("mujoco", "RK4"): 2**16, "tmt": 2**18}
@@ -30,16 +31,13 @@ SLOWEST_RUN = 0.6  # s, estimated: a method whose coarsest run takes longer is l
 
 def scenes_of(robot: Robot) -> list[Case]:
     """The scenes with the tag `speed`, and a user's own except held postures of a file's robot."""
-    return [case for case in robot.cases if "speed" in case.scene.tags or (is_own(case) and not rests(case))]
+    cases = [case for case in robot.cases if not (robot.is_read and case.is_held)]
+    return [case for case in cases if "speed" in case.scene.tags or is_own(case)]
 
 
 def is_own(case: Case) -> bool:
     """Whether a scene is the user's own."""
     return case.scene.tags == ("own",)
-
-
-def rests(case: Case) -> bool:
-    return case.robot.is_read and case.is_held
 
 
 def regular_of(robot: Robot) -> Case:
@@ -129,11 +127,3 @@ def halvings(method: Method, case: Case, size: str = "full") -> tuple[Setting, .
         finest = max(min(finest, affordable), count << (LEAST_SETTINGS[size] - 1))
     halved = max(1, (finest // count).bit_length())
     return tuple(Setting(case.duration, steps=count << k) for k in range(halved))
-
-
-def coarsest_steps(case: Case) -> int:
-    """The scene's own number of steps, rounded up to a multiple of 64; 64 where servos act.
-
-    With servos a scene's own steps are short for the sake of methods that are explicit in the speeds.
-    """
-    return GRID if case.controller else -(-case.steps // GRID) * GRID

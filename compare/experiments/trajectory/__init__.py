@@ -2,15 +2,15 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from ...core.check import Result, largest_known
 from ...core.finding import Finding
-from ...core.pictures import Pictures
 from ...engines import LABELS, Engine
 from ...engines.mujoco.names import INTEGRATORS
+from ...engines.own import Own
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES, leaves_no_digits, movement_unit
 from ...robots import Robot
@@ -20,9 +20,6 @@ from .. import Experiment
 from ..setup import Setup
 from . import energy, motion, true_motion
 from .runs import TrajectoryResult, follow, recorded
-
-if TYPE_CHECKING:
-    from ...engines.own import Own
 
 EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=True, overview="scenes")
 SECONDS_OF_OWN = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all runs of a user's own equations, about
@@ -34,8 +31,6 @@ skipped = leaves_no_digits
 
 
 class Work(NamedTuple):
-    """What is computed in parallel."""
-
     runs: Iterable[TrajectoryResult]  # of each scene
     energy: Iterable[Result]  # one
     names: Sequence[str]  # of the scenes whose true motion is computed
@@ -67,7 +62,7 @@ def begin(setup: Setup) -> Work:
 
 def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], list[Finding]]:
     """The scenes that a user's own equations have and can follow in time, and a finding about the others."""
-    equations, seconds = cast("Own", setup.engines["own"]).equations, SECONDS_OF_OWN[setup.size]
+    equations, seconds = cast(Own, setup.engines["own"]).equations, SECONDS_OF_OWN[setup.size]
     parts = ("acceleration",) if equations.has("acceleration") else ("mass_matrix", "bias")
     of_evaluation = OVERHEAD_OF_OWN + sum(equations.times[part][0] for part in parts)
     unlike = [case.name for case in cases if case.controller or not case.scene.gravity]
@@ -141,10 +136,6 @@ def figures(result: TrajectoryResult, robot: Robot) -> Iterator[partial[Any]]:
         yield partial(figures_runs.draw_run, result, case)
     if result.pictures:
         yield partial(figures_motion_gif.draw_motion, result)
-
-
-def scenes_drawn(result: TrajectoryResult) -> Sequence[Pictures]:
-    return result.pictures
 
 
 def overview(results: Mapping[str, TrajectoryResult], robot: Robot) -> Iterator[partial[Any]]:

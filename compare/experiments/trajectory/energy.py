@@ -35,10 +35,7 @@ class EnergyRow(Row):
 
 
 def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, Sequence[int]]) -> Result:
-    """The drift of the energy along free, undamped runs of a second.
-
-    steps: two counts by the order of the method, the second twice the first.
-    """
+    """The drift of the energy in free, undamped runs. steps: two counts by order, the second twice the first."""
     result = Result("trajectory")
     rows = result.tables["energy"] = []
     # in a scene of a user's own the order may not show in a second
@@ -52,9 +49,8 @@ def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[i
                 drifts[engine] = [largest_drift(case, dynamics, name, count) for count in counts]
             orders = check_order(result, case, f"{case.name}, {method.name}", order, drifts)
             for engine, (_, drift) in drifts.items():
-                row = EnergyRow(case.name, method.name, DURATION / counts[-1], engine, number_or_none(drift))
-                row.order = orders.get(engine)
-                rows.append(row)
+                numbers = number_or_none(drift), orders.get(engine)
+                rows.append(EnergyRow(case.name, method.name, DURATION / counts[-1], engine, *numbers))
     return result
 
 
@@ -80,10 +76,7 @@ def rounding(case: Case) -> float:
 def check_order(
     result: Result, case: Case, where: str, order: int, drifts: Mapping[str, Sequence[float]]
 ) -> dict[str, float | None]:
-    """The measured order of each engine, at least the method's; {} where both drift by rounding alone.
-
-    drifts: J, with a step and with half of it.
-    """
+    """The measured order of each engine, at least the method's; {} where both drift by rounding alone."""
     if all(finer <= rounding(case) for _, finer in drifts.values()):
         return {}
     orders: dict[str, float | None] = {}  # None: a run has diverged, or does not drift

@@ -1,13 +1,11 @@
 """The motion as a GIF: the stick figures of both engines over each other, held and let go.
 
-Pictures without matplotlib, which takes seconds for a hundred pictures. The first engine's sticks are wide with
-discs, MuJoCo's narrow with rings.
+Pictures without matplotlib, which takes seconds for a hundred pictures.
 """
 
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -71,16 +69,12 @@ def one_picture(scene: Pictures, k: int, still: Image.Image, paths: Sequence[np.
         if np.isfinite(path[k]).all():
             draw_sticks(pen, path[k], scene.links, which, scene.few_sticks)
     lost = [LABELS[name] for name, path in scene.points.items() if not np.isfinite(path[k]).all()]
-    apart = say_of_picture("apart", lost=lost, apart=scene.apart[k], unit=scene.unit)
+    about = {"lost": lost, "apart": scene.apart[k], "unit": scene.unit}
     left = {LABELS[name]: time for name, time in scene.left.items() if time and time <= scene.t[k]}
     write(pen, (PIXELS[0] - 16, PIXELS[1] - 28), f"t = {scene.t[k]:.2f} s", 17, "ra")
-    write(pen, (16, PIXELS[1] - 28), apart, 17)
-    write(pen, (PIXELS[0] - 16, 68), say_of_picture("left", left=left), 14, "ra")
+    write(pen, (16, PIXELS[1] - 28), say(Finding("trajectory", "picture_apart", about)), 17)
+    write(pen, (PIXELS[0] - 16, 68), say(Finding("trajectory", "picture_left", {"left": left})), 14, "ra")
     return image.reduce(FINE)
-
-
-def say_of_picture(kind: str, **values: Any) -> str:
-    return say(Finding("trajectory", f"picture_{kind}", values))
 
 
 def draw_sticks(pen: Pen, points: np.ndarray, links: Links, which: int, few: bool = True) -> None:
@@ -102,8 +96,8 @@ def text_of_scene(scene: Pictures, label: str, base: np.ndarray) -> Image.Image:
     image = Image.new("RGB", (FINE * PIXELS[0], FINE * PIXELS[1]), "white")
     pen = ImageDraw.Draw(image)
     write(pen, (16, 10), scene.scene, 20)
-    run = say_of_picture("run", run=scene.run, slower=scene.slower(CENTISECONDS / 100.0))
-    write(pen, (PIXELS[0] - 16, 50), run, 14, "ra")
+    about = {"run": scene.run, "slower": scene.slower(CENTISECONDS / 100.0)}
+    write(pen, (PIXELS[0] - 16, 50), say(Finding("trajectory", "picture_run", about)), 14, "ra")
     for which, (x, name) in enumerate(zip(NAMES_AT, (label, LABELS["mujoco"]))):
         draw_sticks(pen, np.array([[x + 4, 62], [x + 36, 62]]), [(0, 1)], which)
         write(pen, (x + 48, 62), name, 16, "lm")

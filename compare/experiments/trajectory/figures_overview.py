@@ -9,7 +9,7 @@ from ...core.finding import Finding
 from ...core.words import scene_of
 from ...report.style import BLUE, GREY, ORANGE, RED
 from ...robots import Robot
-from ..figures_overview import MOST_ROWS, beyond_tolerance, chart, named_rows
+from ..figures_overview import MOST_ROWS, beyond_tolerance, chart, lines_to, named_rows
 from .runs import TrajectoryResult
 
 LEAST_SHARE, MOST_SHARE = 1e-4, 1e3  # of a band
@@ -52,13 +52,12 @@ def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Fi
     shown = [scene for scene in scenes if scene in wrong_first]
     fig, (left, right) = chart(2, sharey=True, width_ratios=(1.15, 1))
     most = 10.0 if all(scene.passed for scene in scenes) else MOST_SHARE
+    left.set(xscale="log", xlim=(LEAST_SHARE, most), xlabel="difference / band")
     marks = {}  # what ends a run: a mark, by its label
     for place, scene in enumerate(shown):
         colour = "black" if scene.passed else RED
         if scene.share is not None:
-            at = min(max(scene.share, LEAST_SHARE), most)
-            left.hlines(place, LEAST_SHARE, at, color=colour, linewidth=1.2)
-            left.plot(at, place, "D" if scene.passed else "X", color=colour, markersize=4.5)
+            lines_to(left, [scene.share], [place], "D" if scene.passed else "X", colour, markersize=4.5)
         right.barh(place, scene.duration, height=0.5, color=(GREY, 0.2))
         right.barh(place, scene.longest, height=0.5, color=(BLUE, 0.4))
         right.barh(place, scene.shortest, height=0.5, color=BLUE)
@@ -70,7 +69,6 @@ def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Fi
                 look = {"color": colour, "markersize": 4.5, "markeredgecolor": "black", "linestyle": "none"}
                 (marks[label],) = right.plot(time, place, mark, label=label, **look)
     beyond_tolerance(left, 1.0, "1")
-    left.set(xscale="log", xlim=(LEAST_SHARE, most), xlabel="difference / band")
     left.set_xticks([1e-4, 1e-2, 1.0])
     left.minorticks_off()
     right.set(xlabel="time, s", xlim=(0, 1.04 * max(scene.duration for scene in shown)))

@@ -45,13 +45,9 @@ def draw_held(result: TrajectoryResult, run: Run, number: int) -> tuple[str, Fig
     return f"assignment_figure_{number}", fig, result.finding("figure_held", number=number, **values)
 
 
-def runs_of(result: TrajectoryResult, case: Case) -> list[Run]:
-    return [run for run in result.runs if run.case.name == case.name]
-
-
 def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding]:
     """One scene under each scheme: angles, rates, and the difference under its band; grey: not judged."""
-    runs = runs_of(result, case)
+    runs = [run for run in result.runs if run.case.name == case.name]
     steps = max(run.steps for run in runs if run.steps <= 16 * case.steps)
     runs = [run for run in runs if run.steps == steps]
     shown, unit = differing_most(case, runs), movement_unit(case.coordinates)
@@ -60,9 +56,10 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
     step = step_in_words(case, steps)
     for (positions, speeds, below), run in zip(axes.T, runs):
         for ax, name in ((positions, "q"), (speeds, "v")):
-            paths = {engine: getattr(path, name) for engine, path in run.paths.items()}
-            drawn = {engine: drawable(case, name, path) for engine, path in paths.items()}
-            alive = [run.until_diverged(engine, path) for engine, path in drawn.items()]
+            drawn = [
+                (engine, drawable(case, name, getattr(path, name))) for engine, path in run.paths.items()
+            ]
+            alive = [run.until_diverged(engine, values) for engine, values in drawn]
             over_time(ax, run, alive, shown, 64 // len(runs))
         positions.set_title(f"{run.integrator}, {step}" if len(runs) < 4 else f"{run.integrator}\n{step}")
         draw_difference(below, run, result.label)
@@ -111,24 +108,22 @@ def run_caption(result: TrajectoryResult, case: Case, runs: Sequence[Run], shown
     """The engines' difference in a scene and their errors. shown: the number of positions."""
     rows = [row for row in result.rows if row.scene == case.name and row.level == "open loop"]
     errors, coordinates = result.errors.get(case.name), case.coordinates
-    values: dict[str, Any] = {
+    values: dict[str, Any] = {"unit": movement_unit(coordinates)}
+    values |= {
         "scene": case.robot.scene_begins(case.name),
-        "unit": movement_unit(coordinates),
+        "shown": shown,
+        "positions": coordinates.nv,
+        "balls": coordinates.has_balls,
     }
-    values |= {"shown": shown, "positions": coordinates.nv, "balls": coordinates.has_balls}
     values["errors"] = errors and dict(zip((result.label, "MuJoCo"), errors))
     values["share"] = largest_known([row.difference_over_band for row in rows])
-    judged = [(run.integrator, run.judged_until) for run in runs]
-    return result.finding("figure_run", judged=judged, **values)
+    return result.finding("figure_run", judged=[(run.integrator, run.judged_until) for run in runs], **values)
 
 
 def over_time(
     ax: Axes, run: Run, values: Sequence[np.ndarray], shown: Sequence[int] = (), marks_at_most: int = 64
 ) -> None:
-    """Positions or speeds of both engines, (times, nv), against time: lines, and marks for MuJoCo.
-
-    shown: the numbers of those that are drawn, (): all.
-    """
+    """Positions or speeds of both engines, (times, nv): lines, and marks for MuJoCo. shown: which; (): all."""
     every = slice(None, None, max(1, len(run.t) // marks_at_most))
     robot, names, (first, mujoco) = run.case.robot, run.case.coordinates.speeds, values
     all_names = robot.coordinates.speeds
@@ -142,10 +137,7 @@ def over_time(
 
 
 def drawable(case: Case, name: str, values: np.ndarray) -> np.ndarray:
-    """What is drawn of positions "q" or speeds "v", (times, nv).
-
-    Of a ball's position the movement from the start, NaN where it passes half a turn.
-    """
+    """Positions "q" or speeds "v", (times, nv); of a ball's "q" its movement, NaN where it passes half a turn."""
     coordinates = case.coordinates
     if name == "v" or not coordinates.has_balls:
         return values

@@ -68,10 +68,7 @@ def frames(case: Case, t: np.ndarray, path: Path) -> tuple[np.ndarray, np.ndarra
 
 
 def in_order(drawn: Sequence[Pictures], robot: Robot) -> list[Pictures]:
-    """Scenes in the order of the page: a held one, a free one, the rest.
-
-    The first with a departure, the second from the same posture, if there are such scenes.
-    """
+    """A held scene, better one with a departure, a free one, better of the same posture, and the rest."""
     cases = {case.name: case for case in robot.cases}
     held = [scene for scene in drawn if cases[scene.scene].is_held]
     free = [scene for scene in drawn if cases[scene.scene].is_free]

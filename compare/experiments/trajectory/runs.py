@@ -9,14 +9,13 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...core.check import About, Result
-from ...core.pictures import Pictures
 from ...core.rows import Row, column
 from ...core.text import say
 from ...engines import LABELS, Dynamics, Engine, Method, Motion, compared, methods_in
 from ...judge import run as rules
 from ...judge.rounding import NARROW, band, step_rounding
 from ...robots.case import Case
-from ..followed import Deviation, check_closest, differences
+from ..followed import Deviation, check_closest, differences, one_step
 
 STEPS_AT_MOST = 8192  # of a run that is finer than the scene's own
 MOST_ENTRIES = 2_700_000  # of all Jacobians of a run, which take the time
@@ -27,6 +26,7 @@ RECORDED = 64  # states of a run that are compared: one for each of the scene's 
 class TrajectoryRow(Row):
     """The largest difference of the engines in single steps, or in an open loop."""
 
+    SHARE = "difference_over_band"
     scene: str
     engine_integrator: str
     twin: str
@@ -43,11 +43,6 @@ class TrajectoryRow(Row):
     required: float = column("s")
     diverged_at: float | None = column("s")
     twin_diverged_at: float | None = column("s")
-
-    @property
-    def urgency(self) -> tuple[bool, bool, float]:
-        share = self.difference_over_band
-        return True, True, np.inf if share is None else -share
 
 
 class Path(NamedTuple):
@@ -124,15 +119,11 @@ class TrajectoryResult(Result):
     runs: list[Run] = field(default_factory=list)
     # of each scene whose true motion is known: the largest error of both engines, rad or m
     errors: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
-    pictures: list[Pictures] = field(default_factory=list)
 
     def run_of(self, case: Case, *schemes: str) -> Run | None:
         """The run of a case with its own step by one of these schemes."""
-        name, steps = case.name, case.steps
-        fit = (
-            run for run in self.runs if (run.case.name, run.steps) == (name, steps) and run.scheme in schemes
-        )
-        return next(fit, None)
+        of_case = [run for run in self.runs if (run.case.name, run.steps) == (case.name, case.steps)]
+        return next((run for run in of_case if run.scheme in schemes), None)
 
 
 def steps_afforded(case: Case) -> int:
@@ -189,20 +180,9 @@ def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin
     states, stepped = ([values[single] for values in pair] for pair in (states, stepped))
     of_positions = width[:, : case.coordinates.nv].max(axis=1)
     run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, of_positions)
-    widest, tolerance = (
-        rules.widest_judged(case, path.q, path.v),
-        step_rounding(stepping, tree, states[0], states[1], tau, dt),
-    )
+    widest = rules.widest_judged(case, path.q, path.v)
+    tolerance = step_rounding(stepping, tree, states[0], states[1], tau, dt)
     return Twin(run, width, widest, times[single], states, stepped, tolerance)
-
-
-def one_step(
-    dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str
-) -> list[np.ndarray]:
-    """q and v one step after each of the states."""
-    q, v = states
-    motion = dynamics.run(q, v, tau, dt, 1, method)
-    return [motion.q[:, 1], motion.v[:, 1]]
 
 
 def compare_run(result: Result, twin: Twin, dynamics: Dynamics, method: Method) -> Run:
@@ -218,10 +198,9 @@ def compare_run(result: Result, twin: Twin, dynamics: Dynamics, method: Method) 
         check_level(result, run, "one step", Deviation(coordinates, at, apart, step_tolerance))
         if (step_tolerance.min(axis=0) >= widest).any():
             result.not_judged(run.where, "one step", say(result.finding("wide_step")))
-    recorded_states = (
-        [path.q[:: run.every][:count], path.v[:: run.every][:count]] for path in (first, mujoco)
-    )
-    apart = differences(coordinates, *recorded_states)
+    last = count * run.every
+    pair = ([path.q[: last : run.every], path.v[: last : run.every]] for path in (first, mujoco))
+    apart = differences(coordinates, *pair)
     check_level(result, run, "open loop", Deviation(coordinates, times[:count], apart, width[:count]))
     check_end(result, run)
     return run
@@ -263,19 +242,13 @@ def ends_first(ends: Sequence[float | None]) -> float:
 
 
 def judged(times: np.ndarray, narrow: np.ndarray, ends: Sequence[float | None]) -> int:
-    """The number of recorded states that are judged: up to where the band is wide or a run has diverged.
-
-    narrow: whether the band still judges each movement and speed, (recorded, 2 nv).
-    """
+    """The number of recorded states up to where the band is not narrow, (recorded, 2 nv), or a run diverges."""
     alive = times < ends_first(ends)
     return max(1, int(np.argmin(np.append(narrow.all(axis=1) & alive, False))))
 
 
 def check_time_judged(result: Result, run: Run, alive: float) -> None:
-    """A run is judged for the time that its scene states, or for a tenth of it; else it is not judged.
-
-    alive: the last recorded time before one of both runs diverges, s.
-    """
+    """A run is judged for the time that its scene states, or for a tenth of it, or of `alive`, s."""
     until, least = run.judged_until, run.required or min(rules.LEAST_JUDGED * run.case.duration, alive)
     if until < least:
         reason = say(result.finding("wide", until=until, least=least))
@@ -285,10 +258,7 @@ def check_time_judged(result: Result, run: Run, alive: float) -> None:
 
 
 def check_divergence(result: Result, run: Run) -> bool:
-    """Both diverge at the same step, if the band is narrow at the first recorded state after that.
-
-    Returned: whether that is compared.
-    """
+    """Whether the steps at which both diverge are compared: if the band is narrow at the next recorded state."""
     end, steps, dt = ends_first(run.ends), run.steps, run.dt
     if end == np.inf:
         return False

@@ -33,10 +33,7 @@ def deviations(run: Run) -> dict[str, float | None]:
 
 
 def find_errors(result: TrajectoryResult, robot: Robot, references: Mapping[str, Reference]) -> None:
-    """The largest error of both engines in each scene, and where it is far above their difference.
-
-    references: by the name of the scene; the true motion of a held scene is rest.
-    """
+    """The largest errors in each scene: of a held one from rest, else from its reference, if it has one."""
     scenes = []
     for run in coarsest_runs(result, robot):
         name, reference = run.case.name, references.get(run.case.name)
@@ -96,10 +93,8 @@ def departures(run: Run, engines: Mapping[str, Engine]) -> dict[str, Any]:
     case = run.case
     dt, ((name, first), (mujoco, last)) = case.duration / case.steps, compared(engines, case).items()
     allowed = slope_rounding(METHODS["rk4"], case.tree, case.q[None], case.v[None], case.tau, dt)[2][0]
-    initial = {
-        name: first.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
-        mujoco: last.acceleration(*case.start, case.tau),
-    }
+    of_step = first.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME
+    initial = {name: of_step, mujoco: last.acceleration(*case.start, case.tau)}
     joint = int(np.argmax(np.max(np.abs([*initial.values()]), axis=0) / allowed))
     farthest, told = deviations(run), []
     for engine, acceleration in initial.items():

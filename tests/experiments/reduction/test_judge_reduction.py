@@ -7,7 +7,7 @@ from edited import XML
 from compare.engines.mujoco import parse
 from compare.experiments.followed import Deviation
 from compare.experiments.reduction import exact_motion, needs, sub_blocks, times
-from compare.experiments.reduction.records import Model, ReductionResult, SubsetRow
+from compare.experiments.reduction.records import ReductionResult, SubsetRow
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
 from compare.judge.scale import EPS
@@ -110,7 +110,7 @@ def test_the_table_has_the_times_of_each_engine_and_the_largest_gain():
         for case, of, taken in ((free, free, whole), (held, held, whole), (free, planar, small)):
             seconds[case.name, of.joints, engine] = steps * taken
     of_scenes = (free, free), (free, planar), (held, held), (held, None)
-    models = [Model(scene.name, case) for scene, case in of_scenes]
+    models = [(scene.name, case) for scene, case in of_scenes]
     result = ReductionResult("reduction", models=models, apart={(free.name, "tmt"): 1e-12})
     times.add_rows(result, ARM, seconds)
     rows = {(row.scene, row.nv, row.engine): row for row in result.rows}

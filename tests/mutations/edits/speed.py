@@ -28,7 +28,7 @@ EDITS = (
     Edit("evaluations", "costs", "row.operations / row.ns_per_state", "row.ns_per_state / row.operations", "a rate is inverted"),
     Edit("accuracy", "order_in", "clear < run.early < REGULAR", "True", "the order is measured among errors of rounding"),
     Edit("judge.order", "LEAST_ORDER", "7.0", "1.0", "order 8 need only be 1"),
-    Edit("speed.settings", "coarsest_steps", "GRID if case.controller else _1", "_1", "steps of a step response begin fine"),
+    Edit("truth.reference", "coarsest_steps", "RECORDS if case.controller else _1", "_1", "steps of a step response begin fine"),
     Edit("accuracy", "check_same_schemes", "FACTOR * scene.floor", "1e6 * scene.floor",
          "the same scheme's tolerance: 64 -> 1e6"),
     Edit("accuracy", "check_smallest_errors", "FACTOR * scene.floor", "100 * FACTOR * scene.floor", "tolerance x 100"),
