@@ -14,16 +14,9 @@ from compare.experiments.stability.servos.predicted import acting_at
 SITES = TWO.replace("<geom", '<site name="s" pos="0.1 0 0"/><geom', 1)
 
 
-def text_of(actuators='<motor joint="k"/>', tendon="", content=TWO, before="", keys=""):
-    return mjcf(content, before, TENDON.format(tendon) + f"<actuator>{actuators}</actuator>{keys}")
-
-
-def drive_of(*args, **more):
-    return read(text_of(*args, **more)).drive
-
-
-def since(text):
-    """The text, or a skip where the installed MuJoCo does not have it."""
+def text_of(actuators='<motor joint="k"/>', tendon="", content=TWO, keys=""):
+    """MJCF text, or a skip where the installed MuJoCo does not have what stands in it."""
+    text = mjcf(content, after=TENDON.format(tendon) + f"<actuator>{actuators}</actuator>{keys}")
     try:
         mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
@@ -45,7 +38,7 @@ REFUSED = {  # actuator, and a word of why it takes no part
 @pytest.mark.parametrize("text", REFUSED)
 def test_a_law_that_is_not_known_is_refused_by_name_and_the_rest_is_done(text):
     more = text.replace(" ", ' name="x" ', 1)
-    drive = read(since(text_of('<position name="p" joint="j" kp="5"/>' + more, content=SITES))).drive
+    drive = read(text_of('<position name="p" joint="j" kp="5"/>' + more, content=SITES)).drive
     assert drive.refused.keys() == {"x"} and REFUSED[text] in drive.refused["x"]
     assert [one.name for one in drive.actuators if one.is_servo] == ["p"]
 
@@ -53,7 +46,7 @@ def test_a_law_that_is_not_known_is_refused_by_name_and_the_rest_is_done(text):
 @pytest.mark.parametrize("what", ["stiffness", "damping"])
 def test_springs_and_dampers_that_are_not_linear_are_named(what):
     joint, tendon = TWO.replace('name="j"', f'name="j" {what}="1 2"'), f'{what}="1 2"'
-    drive = read(since(text_of(tendon=tendon, content=joint))).drive
+    drive = read(text_of(tendon=tendon, content=joint)).drive
     assert drive.refused.keys() == {"joint j", "tendon t"}
     assert all(what in why for why in drive.refused.values())
 
@@ -69,7 +62,7 @@ KEPT = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntyp
     (KEPT, 'act="0.3 0.2"', (0.3, None)),
 ])  # fmt: skip
 def test_a_keyframe_states_controls_activations_or_neither(actuators, key, expected):
-    controls = drive_of(actuators, keys=KEYS.format(key)).controls
+    controls = read(text_of(actuators, keys=KEYS.format(key))).drive.controls
     assert controls.get("home") == expected and "plain" not in controls
 
 
@@ -93,7 +86,7 @@ def test_armature_is_added_to_bodies_whose_inertia_never_changes():
 def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
     before = '<orientation site="s" refsite="s" kp="1"/>'
     motor = '<motor joint="j" gear="3" armature="0.1"/><position tendon="t" kp="2" gear="5"/>'
-    text = since(text_of(before + motor, content=SITES))
+    text = text_of(before + motor, content=SITES)
     reading, model = read(text), mujoco.MjModel.from_xml_string(text)
     assert [one.moment for one in reading.drive.actuators[1:]] == [(3.0, 0.0), (5.0, 10.0)]
     assert tmt.mass_matrix(np.zeros(2), reading.tree) == pytest.approx(mass_matrix(model))

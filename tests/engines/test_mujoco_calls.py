@@ -12,9 +12,7 @@ from compare.engines.mujoco.linear import transition
 from compare.robots.arm import ARM
 
 
-@pytest.mark.skipif(
-    MinimalCalls.unavailable() is not None, reason="MuJoCo's library is not beside its package"
-)
+@pytest.mark.skipif(MinimalCalls.unavailable() is not None, reason="MuJoCo's library is elsewhere")
 def test_a_loop_repeats_its_calls_at_the_current_state(mujoco, rng):
     dynamics, nothing = mujoco.of(ARM.case()), np.zeros(3)
     minimal = MinimalCalls(dynamics)

@@ -32,7 +32,7 @@ INERTIAL = """<body name="b"><frame pos="0.1 0.2 0.3" euler="10 20 30"><frame po
 <inertial pos="0.2 0 0.1" mass="1" fullinertia="0.02 0.03 0.04 0.001 0.002 0.003"/></frame></frame></body>"""
 
 TURNED = pytest.mark.skipif(
-    mujoco.mj_version() < 4_000_000, reason="MuJoCo 3.10 leaves out the rpy of an inertial"
+    mujoco.mj_version() < 4_000_000, reason="MuJoCo 3.10 leaves out an inertial's rpy"
 )
 SOURCES = [PATHS["mixed"], mjcf(FRAMES, '<compiler eulerseq="zyx"/>'), mjcf(INERTIAL), mjcf()]
 SOURCES += [pytest.param(URDF, marks=TURNED)]

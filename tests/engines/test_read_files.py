@@ -27,8 +27,6 @@ WHOLE = """<mujoco><worldbody><include file="part.xml"/></worldbody><keyframe><k
 FREE = """<mujoco><worldbody><body name="top"><freejoint name="base"/>
 <inertial pos="0.1 0 0.2" mass="2" diaginertia="0.3 0.2 0.15"/>
 </body></worldbody></mujoco>"""
-
-
 FACES = (0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)  # of a tetrahedron
 STL = [struct.pack("<12fH", 0, 0, 0, *np.eye(4, 3)[list(face)].ravel(), 0) for face in FACES]
 MESHES = """<mujoco><compiler meshdir="parts"/><asset><mesh name="m" file="m.stl"/></asset><worldbody>

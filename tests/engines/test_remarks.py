@@ -43,9 +43,7 @@ def test_what_is_off_or_changed_is_said_where_equations_differ_and_nothing_where
     ("trunk", "continuous", INERTIAL, 1, {"link": "trunk", "mass": 2.0}), ("trunk", "continuous", "", 1, None),
     ("world", "floating", INERTIAL, 4, None), ("trunk", "floating", "", 4, None), ("trunk", "planar", "", 3, None),
 ])  # fmt: skip
-def test_a_base_is_free_if_a_joint_frees_it_else_it_is_said_to_be_fixed(
-    base, kind, inertial, joints, fixed, tmp_path
-):
+def test_a_base_that_no_joint_frees_is_said_to_be_fixed(base, kind, inertial, joints, fixed, tmp_path):
     (tmp_path / "r.urdf").write_text(urdf(base, kind, inertial))
     assert len(read(tmp_path / "r.urdf").tree.joint_names) == joints
     assert said(tmp_path / "r.urdf").get("fixed_base") == fixed
@@ -54,9 +52,7 @@ def test_a_base_is_free_if_a_joint_frees_it_else_it_is_said_to_be_fixed(
 @pytest.mark.parametrize("folder, place", [
     ("robot/urdf", "robot/meshes/a.obj"), (".", "robot/meshes/a.obj"), ("mine", "mine/a.obj"), ("robot/urdf", "a.obj"),
 ])  # fmt: skip
-def test_a_mesh_of_a_package_is_found_above_the_file_or_beside_it_else_one_line_says_where_to(
-    folder, place, tmp_path
-):
+def test_a_mesh_of_a_package_is_found_above_the_file_or_beside_it(folder, place, tmp_path):
     file = tmp_path / folder / "r.urdf"
     robot = urdf("base", mesh=MESH.format("package://robot/meshes/a.obj"))
     for path, text in ((file, robot), (tmp_path / place, TETRAHEDRON)):

@@ -13,7 +13,6 @@ from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 
 ARM = Path(__file__).parents[2] / "mjcf" / "arm.xml"
-FILES = (ARM, *(PATHS[name] for name in ("arm6", "arm7", "gripper", "humanoid29", "loop")))
 SEVERAL = """<mujoco><worldbody><body pos="1 2 3" euler="10 20 30">
 <inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.2 0.25" quat="0.9 0.1 0.3 -0.2"/>
 <joint name="fixed2" type="slide" axis="1 2 0" ref="0.3" damping="0.7"/><joint axis="0 1 1" pos="0.1 0.2 -0.1" ref="20"/>
@@ -25,21 +24,13 @@ SEVERAL = """<mujoco><worldbody><body pos="1 2 3" euler="10 20 30">
 COMPILER = '<mujoco><compiler fusestatic="false" boundmass="2e-15" boundinertia="2e-15"/></mujoco>'
 
 
-@pytest.mark.parametrize("source", FILES, ids=lambda path: path.stem)
-def test_a_file(source, rng):
-    assert_the_same(source, rng)
+SOURCES = {name: PATHS[name] for name in ("arm6", "arm7", "gripper", "humanoid29", "loop")} | {"arm": ARM}
+SOURCES |= {f"random {seed}": random_tree(seed, ("hinge", "slide"), 6) for seed in range(5)}
+SOURCES["several joints in one body that carries a fixed one"] = SEVERAL
 
 
-def test_several_joints_in_one_body_that_carries_a_fixed_one(rng):
-    assert_the_same(SEVERAL, rng)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_a_random_tree(seed, rng):
-    assert_the_same(random_tree(seed, ("hinge", "slide"), 6), rng)
-
-
-def assert_the_same(source, rng, states=5):
+@pytest.mark.parametrize("source", SOURCES.values(), ids=SOURCES)
+def test_what_mujoco_reads_back_has_the_same_values(source, rng, states=5):
     reading = read(source)
     text, tree = urdf(reading.model).replace("</robot>", f"{COMPILER}</robot>"), reading.tree
     model = mujoco.MjModel.from_xml_string(text)
@@ -64,9 +55,7 @@ def assert_the_same(source, rng, states=5):
         assert (error <= FACTOR * EPS * scales.bias[state]).all()
 
 
-@pytest.mark.parametrize(
-    "name, why", [("quadruped", "root' is of type free"), ("pendulum_ball", "r' is of type ball")]
-)
+@pytest.mark.parametrize("name, why", [("quadruped", "root' is .* free"), ("pendulum_ball", "r' is .* ball")])
 def test_what_a_urdf_cannot_say_is_refused(name, why):
     with pytest.raises(ValueError, match=why):
         urdf(read(PATHS[name]).model)
