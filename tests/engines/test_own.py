@@ -48,9 +48,6 @@ def of_one(name, function, coordinates=COORDINATES):
     return OwnEquations({name: function}, coordinates, required=())
 
 
-# what they may be
-
-
 @pytest.mark.parametrize("source, is_batched", [
     (tmt.ARM, True), (tmt, True), (types.SimpleNamespace(**OF_TMT), True),
     ({name: single(function) for name, function in OF_TMT.items()}, False),
@@ -113,9 +110,6 @@ def test_a_value_may_have_further_axes_of_length_1_and_be_of_any_numbers(tree, f
     assert np.allclose(own.bias(q, v), tmt.bias(q, v, tree), rtol=1e-13, atol=1e-15)
 
 
-# what cannot be used
-
-
 class Called:
     def mass_matrix(self, q): ...
 
@@ -160,9 +154,6 @@ def test_whatever_is_raised_is_one_line_and_ctrl_c_interrupts(raised, listening,
         of_one("mass_matrix", mass_matrix).mass_matrix(states(rng)[0])
 
 
-# what can be used, with something wrong
-
-
 def raises_beyond_1(q):
     if q[0] > 1.0:
         raise ValueError("too\nfar")
@@ -205,9 +196,6 @@ def test_a_mass_matrix_that_is_not_symmetric(skew, found, rng):
     own = of_one("mass_matrix", lambda q: M)
     own.mass_matrix(states(rng)[0])
     assert len(own.problems) == found and all("symmetric" in problem.text for problem in own.problems)
-
-
-# what is missing, cases and motion
 
 
 def test_what_is_missing_is_made_of_what_is_there(rng):

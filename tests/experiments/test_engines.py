@@ -174,7 +174,7 @@ class Other(TmtDynamics):
 
 @pytest.mark.parametrize("precision", RECORDS)
 @pytest.mark.parametrize(
-    "quantity, name", (("mass_matrix", "Mbar"), ("bias", "bias"), ("acceleration", "qdd"))
+    "quantity, name", {"mass_matrix": "Mbar", "bias": "bias", "acceleration": "qdd"}.items()
 )
 def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, precision):
     """A float32 engine is allowed what its own eps allows, and no more."""

@@ -23,13 +23,7 @@ OF_MUJOCO = [  # the experiment, what is off (of a pair which), the checks of bo
     (acceleration, "inverse", {}, {"tau from TMT's qdd by mj_inverse"}),
     (acceleration, "energy", {}, {"energy"}), (acceleration, "potential_energy", {}, {"potential energy"}),
 ]  # fmt: skip
-COMPILED = {  # what each function gives, by the name of its check
-    kinematics: {"com_positions": ["x_b"], "angular_velocities": ["omega_b"], "jacobians": ["T_b", "B_b"],
-                 "convective_terms": ["v_conv", "w_conv"]},
-    mass: {"mass_matrix": ["Mbar"]},
-    gravity: {"gravity_balance": ["holding torque"]},
-    acceleration: {"bias": ["bias"], "acceleration": ["qdd"], "energy": ["energy"], "potential_energy": ["potential energy"]},
-}  # fmt: skip
+EXPERIMENTS = [kinematics, mass, gravity, acceleration]
 
 
 def off(values, place=None):
@@ -95,11 +89,12 @@ def test_accelerations_of_tmt_that_are_off_fail_their_own_checks(mujoco, monkeyp
     assert failing(acceleration, mujoco) == expected
 
 
-@pytest.mark.parametrize("experiment", COMPILED, ids=lambda module: module.__name__.rpartition(".")[2])
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda module: module.__name__.rpartition(".")[2])
 def test_an_error_of_the_compiled_functions_alone_fails_their_own_check(mujoco, experiment, monkeypatch):
     assert failing(experiment, mujoco) == set()
-    for quantity in COMPILED[experiment]:
+    checks = {(quantity, name) for of, quantity, _, names in OF_MUJOCO if of is experiment
+              for name in names & QUANTITIES.keys()}  # fmt: skip
+    for quantity in dict(checks):
         right = getattr(tmt, quantity)
         monkeypatch.setattr(tmt, quantity, lambda *given, right=right, **named: off(right(*given, **named)))
-    names = {name for of in COMPILED[experiment].values() for name in of}
-    assert failing(experiment, mujoco) == {f"{name}, compiled" for name in names}
+    assert failing(experiment, mujoco) == {f"{name}, compiled" for _, name in checks}

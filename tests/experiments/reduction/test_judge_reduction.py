@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from edited import XML
+from edited import XML, setup_of
 
-from compare.engines.mujoco import parse
 from compare.experiments.followed import Deviation
 from compare.experiments.reduction import exact_motion, needs, sub_blocks, times
 from compare.experiments.reduction.records import Model, ReductionResult, SubsetRow
-from compare.experiments.setup import Setup
-from compare.experiments.setup import engines as engines_of
 from compare.judge.scale import EPS
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
@@ -68,23 +65,19 @@ def test_errors_fall_at_the_order_of_the_method(errors, passed):
     assert list(found.values()) == passed
 
 
-def swings(engines, **scene) -> ReductionResult:
+def swings(model, **scene) -> ReductionResult:
     """Of one scene, or of all the arm's."""
     result = ReductionResult("reduction")
     cases = [ARM.case("mine", locked=("alpha", "beta"), **scene)] if scene else ARM.cases
     for case in filter(exact_motion.is_pendulum, cases):
-        exact_motion.compare_swing(result, Setup.small(ARM, engines), case)
+        exact_motion.compare_swing(result, setup_of(model), case)
     return result
 
 
-def failed(result) -> list[str]:
-    return [check.scene for check in result.checks if not check.passed]
-
-
 def test_both_engines_meet_the_elliptic_function_and_a_heavier_arm_does_not():
-    heavier = engines_of(parse(XML.replace('mass="1.5"', 'mass="1.50001"'), ARM.tree))
-    found = swings(heavier)
-    assert failed(found) == ["elbow swing, RK4, MuJoCo"] and len(found.checks) == 2
+    checks = swings(XML.replace('mass="1.5"', 'mass="1.50001"')).checks
+    passed = {check.scene: check.passed for check in checks}
+    assert passed == {"elbow swing, RK4, TMT": True, "elbow swing, RK4, MuJoCo": False}
 
 
 @pytest.mark.parametrize("scene", [
@@ -93,12 +86,9 @@ def test_both_engines_meet_the_elliptic_function_and_a_heavier_arm_does_not():
     {"posture": (90, 90, 0)},  # the forearm turns about a vertical
     {"posture": "zero", "damping": 0.1},
 ])  # fmt: skip
-def test_a_pendulum_that_shows_nothing_is_left_out(engines, scene):
-    result = swings(engines, **scene)
+def test_a_pendulum_that_shows_nothing_is_left_out(mujoco, scene):
+    result = swings(mujoco, **scene)
     assert result.checks == [] and result.swings == {}
-
-
-# whose number stands where
 
 
 def test_the_table_has_the_times_of_each_engine_and_the_largest_gain():

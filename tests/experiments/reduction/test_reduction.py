@@ -4,26 +4,19 @@ import dataclasses
 from types import SimpleNamespace
 
 import pytest
-from edited import XML, setup_of
+from edited import XML, setup_of, setup_of_file
 from models import PATHS, chain
 
 import tmt
 from compare.core.check import Result
 from compare.core.text import say
-from compare.engines.mujoco import Mujoco, engine, read
+from compare.engines.mujoco import Mujoco
 from compare.experiments import reduction
 from compare.experiments.reduction import needs, sub_blocks, times
 from compare.experiments.reduction.records import ReductionResult
-from compare.experiments.setup import Setup, engines
+from compare.experiments.setup import Setup
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
 from compare.truth.smallest import needed, reduced
-
-
-def of_file(source) -> Setup:
-    """A robot of a file, its engines, and few states."""
-    reading = read(source)
-    return Setup.small(robot_of(reading, "robot.xml"), engines(engine(reading)))
 
 
 def failed(result) -> list[str]:
@@ -57,9 +50,6 @@ def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_do
     assert log == ["computed", "quiet", "timed"]
 
 
-# locked joints
-
-
 def blocks(setup, angles=1) -> Result:
     result = Result("reduction")
     sub_blocks.compare_blocks(result, setup, angles)
@@ -74,7 +64,7 @@ def test_every_subset_agrees_and_a_wrong_lock_is_seen(mujoco):
             return mujoco.of(case.changed(posture=()) if case.locked else case)
 
     wrong = Deleted(mujoco.source, mujoco.joints, mujoco.bodies)
-    right, deleted = (blocks(Setup.small(ARM, engines(engine)), 2) for engine in (mujoco, wrong))
+    right, deleted = (blocks(setup_of(engine), 2) for engine in (mujoco, wrong))
     assert len(right.checks) == 6 * 2 * 3 and failed(right) == []
     expected = {f"{' and '.join(locked)} locked" for locked in sub_blocks.subsets(ARM.joints, 4)}
     assert {check.scene for check in deleted.checks if not check.passed} == expected
@@ -89,34 +79,30 @@ def test_each_pair_has_its_own_models_and_the_bias_is_compared_in_motion(mujoco)
             bias = (lambda q, v: dynamics.bias(q, (1.0 + 1e-9) * v)) if case.locked else dynamics.bias
             return SimpleNamespace(mass_matrix=dynamics.mass_matrix, bias=bias)
 
-    wrong = Faster(mujoco.source, mujoco.joints, mujoco.bodies)
-    off = [check for check in blocks(Setup.small(ARM, engines(wrong))).checks if not check.passed]
+    checks = blocks(setup_of(Faster(mujoco.source, mujoco.joints, mujoco.bodies))).checks
     quantities = {"bias, MuJoCo, reduced to whole", "bias, reduced, TMT to MuJoCo"}
-    assert {check.quantity for check in off} == quantities
+    assert {check.quantity for check in checks if not check.passed} == quantities
 
 
 @pytest.mark.parametrize("model, joints", [("gripper", 4), ("free_body", 4), ("pendulum_ball", 2)])
 def test_slides_balls_and_each_part_of_a_free_joint_are_locked_alike(model, joints):
-    of_blocks = blocks(of_file(PATHS[model]))
+    of_blocks = blocks(setup_of_file(PATHS[model]))
     assert len(of_blocks.checks) == (2**joints - 2) * 6 and failed(of_blocks) == []
 
 
 def test_of_many_joints_some_are_locked_each_alone():
     assert sub_blocks.subsets("abc", 1) == [("a",), ("b",), ("c",), ("a", "b"), ("a", "c"), ("b", "c")]
     assert sub_blocks.subsets("abcdefghijkl", 4) == [("a",), ("d",), ("g",), ("j",)]
-    of_many = blocks(of_file(chain(7)))
+    of_many = blocks(setup_of_file(chain(7)))
     assert len({check.scene for check in of_many.checks}) == 4 and failed(of_many) == []
-    assert not blocks(of_file(chain(60))).checks
+    assert not blocks(setup_of_file(chain(60))).checks
 
 
 def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
     body = '<body><joint axis="0 1 0"/><geom size="0.1 0.2 0.3" type="box" pos="0.1 0.2 1"/></body>'
     aligned = f'<body><freejoint align="true"/><geom size="0.1" pos="0.05 0 0"/>{body}</body>'
-    result = reduction.untimed(of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"))
+    result = reduction.untimed(setup_of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"))
     assert [note.kind for note in result.top] == ["not_lockable"] and failed(result) == []
-
-
-# what a scene needs
 
 
 def test_the_planar_arm_moves_as_the_whole_one(engines):
@@ -154,12 +140,10 @@ def test_of_a_users_own_scene_nothing_is_expected_but_agreement(engines):
 
 
 def test_a_held_posture_with_springs_needs_nothing():
-    held = next(case for case in of_file(PATHS["gripper"]).robot.cases if case.is_held)
+    held = next(case for case in setup_of_file(PATHS["gripper"]).robot.cases if case.is_held)
     assert held.tree.has_springs and needed(held).stays == held.joints
-    gravity_alone = tuple(
-        tmt.gravity_balance(held.posture, held.unlocked_tree)
-    )  # without what the springs need
-    assert needed(held.changed(torque=gravity_alone)).stays == ()
+    weight = tmt.gravity_balance(held.posture, held.unlocked_tree)  # without what the springs need
+    assert needed(held.changed(torque=tuple(weight))).stays == ()
 
 
 FALLS = """<mujoco><worldbody><body name="base"><freejoint name="base"/><geom type="box" size="0.1 0.1 0.05" mass="2"/>
@@ -169,7 +153,7 @@ FALLS = """<mujoco><worldbody><body name="base"><freejoint name="base"/><geom ty
 
 def test_a_robot_that_falls_does_not_bend_and_the_answer_says_it_last():
     """Its accelerations are 0 with 50 digits of the very numbers of the file: a sum of masses in doubles would bend it."""
-    result = reduction.rows(of_file(FALLS))
+    result = reduction.rows(setup_of_file(FALLS))
     last = result.top[-1].values
     assert last["needed"] == ("base z",) and last["stays"] == ("base x", "base y", "base turn", "hip")
     assert last["scenes"] == ["qpos0, let go"] and last["apart"] < 1e-12 and failed(result) == []

@@ -20,10 +20,8 @@ STOPPED = "smallest error of mujoco's RK4, where smaller steps gain nothing"
 
 def run_of(engine, method, error, steps=64, seconds=1e-3) -> Run:
     """A run: diverged where the error is None."""
-    errors = dict.fromkeys(("error", "worst_error", "energy_error"), error)
-    row = SpeedRow(
-        "bent, free", engine, method, 5.0 / steps, None, steps, steps, 4 * steps, seconds, **errors
-    )
+    numbers = dict.fromkeys(("error", "worst_error", "energy_error"), error) | {"seconds": seconds}
+    row = SpeedRow("bent, free", engine, method, 5.0 / steps, None, steps, steps, 4 * steps, **numbers)
     row.diverged = error is None
     return Run(Method(engine, method, 4, SCHEMES.get(method, method)), Setting(5.0, steps), error, row)
 
@@ -173,11 +171,8 @@ def test_what_is_called_is_followed_once_after_all_else_has_ended(setup, monkeyp
     known, called = run_of("tmt", "rk4", 1.0), [run_of("scipy", "RK45", 1.0, 64, s) for s in (0.014, 0.016)]
     follow = lambda *_, compiled: log.append(compiled) or (called, ["a failure"])  # noqa: E731
     take = lambda runs, calls: log.append(runs == calls == [known, called[0]])  # noqa: E731
-    for name, act in (
-        ("runs_of", follow),
-        ("prepared", lambda case, runs, engines: runs),
-        ("take_times", take),
-    ):
+    acts = {"runs_of": follow, "prepared": lambda case, runs, engines: runs, "take_times": take}
+    for name, act in acts.items():
         monkeypatch.setattr(speed, name, act)
     scene = SceneRuns(setup.robot.cases[0], None, 0.0, [known])
     assert speed.add_times(setup, [scene]) == ["a failure"]

@@ -51,9 +51,8 @@ def test_scenes_are_those_with_the_tag_and_a_users_own():
     names = [case.name for case in settings.scenes_of(MINE)]
     assert names == ["zero, free", "ball catch, free", "bent, free", "bent, damped", "my swing"]
     alone = dataclasses.replace(ARM, scenes=(OWN,))
-    assert (
-        settings.coarsest_steps(settings.scenes_of(MINE)[-1]) == 128
-    )  # of 100 steps: a multiple of the grid
+    mine = settings.scenes_of(MINE)[-1]
+    assert settings.coarsest_steps(mine) == 128  # of 100 steps: a multiple of the grid
     assert (settings.regular_of(MINE).name, settings.regular_of(alone).name) == ("bent, free", "my swing")
     sizes = {"full": names, "quick": ["bent, free", "my swing"], "small": ["zero, free", "bent, free"]}
     for size, expected in sizes.items():

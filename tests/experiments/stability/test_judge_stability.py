@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
+from edited import setup_of_file
 from judged import BOTH, INSIDE, OUTSIDE, only
 from models import PATHS
 
-from compare.engines.mujoco import reading
 from compare.experiments.stability import departure, equilibria, limits
 from compare.experiments.stability.tables import DepartureRow, LimitRow
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
 from compare.truth.linear import held
 
 
@@ -17,9 +16,7 @@ from compare.truth.linear import held
     (INSIDE * 64 * 2.0**-52 * 3.0 * 7.0 / 1e-6, 0.0, True), (OUTSIDE * 64 * 2.0**-52 * 3.0 * 7.0 / 1e-6, 0.0, False),
     (INSIDE * 1e-9 / 1e-6, 1e-9, True), (OUTSIDE * 1e-9 / 1e-6, 1e-9, False), (np.nan, 0.0, False),
 ])  # fmt: skip
-def test_amplification_within_the_rounding_of_a_difference_quotient_or_of_a_step(
-    result, off, rounded, passes
-):
+def test_amplification_within_the_rounding_of_a_quotient_or_of_a_step(result, off, rounded, passes):
     ours, q = np.diag([3.0, -7.0]), np.array([1.0, -2.0])
     equilibria.check_amplification(result, "", q, ours, ours + [[0.0, off], [0.0, 0.0]], rounded)
     assert only(result) is passes
@@ -31,14 +28,10 @@ def limit_row(predicted=0.1, observed=0.1, kind="finite", seen="finite", **more)
     return limits.Observed(row, seen, 1e-3)
 
 
-def check_limits(result, *rows):
-    limits.check_limits(result, list(rows))
-
-
 @BOTH
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_observed_limit_within_a_thousandth(result, share, passes, sign):
-    check_limits(result, limit_row(observed=0.1 * (1 + sign * share * 1e-3)))
+    limits.check_limits(result, [limit_row(observed=0.1 * (1 + sign * share * 1e-3))])
     assert only(result) is passes
 
 
@@ -47,12 +40,13 @@ def test_observed_limit_within_a_thousandth(result, share, passes, sign):
     ("always_fails", "never_fails", False), ("finite", "never_fails", False),
 ])  # fmt: skip
 def test_kind_of_limit_is_as_predicted(result, kind, seen, passes):
-    check_limits(result, limit_row(0.1 if kind == "finite" else None, None, kind, seen))
+    limits.check_limits(result, [limit_row(0.1 if kind == "finite" else None, None, kind, seen)])
     assert only(result) is passes
 
 
 def test_what_no_run_decides_is_not_checked(result):
-    check_limits(result, limit_row(), limit_row(observed=None, seen=None, method="implicit"))
+    rows = [limit_row(), limit_row(observed=None, seen=None, method="implicit")]
+    limits.check_limits(result, rows)
     assert only(result) and [row.passed for row in result.rows] == [True, None]
     assert result.notes[0].values["where"] == ["bent, TMT implicit, damping 0"]
 
@@ -73,7 +67,7 @@ def test_a_slow_mode_that_does_not_grow_by_itself_is_not_seen_in_a_short_run():
 
 
 def test_a_limit_that_runs_show_no_nearer_than_a_tenth_is_not_decided_by_them():
-    arm7 = held(robot_of(reading.read(PATHS["arm7"]), "arm7.xml"), "ready")
+    arm7 = held(setup_of_file(PATHS["arm7"]).robot, "ready")
     assert limits.is_shown(arm7, 0.0999) and not limits.is_shown(arm7, 0.1001)
 
 
@@ -82,8 +76,8 @@ def test_a_limit_is_not_decided_by_runs_in_which_a_slow_mode_is_lost_in_rounding
     """An inverted pendulum of 9.81 N m/rad that its spring just balances."""
     joint = f'<joint name="swing" axis="0 1 0" stiffness="{stiffness}"/>'
     body = f'<body>{joint}<geom type="sphere" size="0.1" pos="0 0 0.5" mass="2"/></body>'
-    robot = robot_of(reading.read(f"<mujoco><worldbody>{body}</worldbody></mujoco>"), "swing.xml")
-    assert limits.is_shown(held(robot, "qpos0"), 1e-3) is shown
+    setup = setup_of_file(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    assert limits.is_shown(held(setup.robot, "qpos0"), 1e-3) is shown
 
 
 def departure_row(observed, predicted, **more):
@@ -112,9 +106,8 @@ def test_the_linear_map_says_when_a_tenth_of_a_radian_is_reached():
     values, vectors = at.modes
     shape = size * vectors[:3, 0].real / np.abs(vectors[:3, 0]).max()
     (found,) = departure.predicted(at, "rk4", 1e-3, shape[None], np.zeros((1, 3)))
-    assert found == pytest.approx(
-        np.arccosh(0.1 / size + 1.0) / values[0].real, abs=2e-3
-    )  # cosh - 1, from rest
+    left = np.arccosh(0.1 / size + 1.0) / values[0].real  # cosh - 1, from rest
+    assert found == pytest.approx(left, abs=2e-3)
 
 
 @pytest.mark.parametrize("joints, reach, count", [(4, 2, 625), (5, 1, 243)])

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
+from edited import setup_of_file
 from servo_models import posture_of
 
-from compare.engines.mujoco import engine, reading
+from compare.engines.mujoco import reading
 from compare.engines.mujoco.linear import WholeRun
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments import stability
-from compare.experiments.setup import Setup, engines
+from compare.experiments.setup import Setup
 from compare.experiments.stability import own_run
 from compare.experiments.stability.servos.predicted import acting_at, predicted_at
-from compare.robots.file import robot_of
 
 HINGE = """<mujoco><option timestep="0.005" integrator="{integrator}" {option}/><worldbody><body>
   <joint name="swing" axis="0 1 0" {joint}/><inertial pos="0 0 -0.1" mass="0.1" diaginertia="1e-4 1e-4 1e-4"/>
@@ -71,13 +71,7 @@ def test_ten_times_the_speed_at_the_finer_step(own, finer, worse):
 def quick(monkeypatch):
     """The result of a quick run, without runs without servos, which take long."""
     monkeypatch.setattr(stability, "MOST_SPEEDS", 0)
-    return result_of
-
-
-def result_of(source, **more):
-    found = reading.read(source)
-    robot = robot_of(found, "robot.xml")
-    return stability.rows(Setup.quick(robot, engines(engine(found)), reading=found, **more))
+    return lambda source, **more: stability.rows(setup_of_file(source, Setup.quick, **more))
 
 
 def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step(quick):
@@ -120,9 +114,7 @@ def test_constraints_of_a_sparse_jacobian_and_a_pickled_model():
     at, found = posture_of(SPARSE)
     dense, _ = posture_of(SPARSE.replace("sparse", "dense"))
     assert np.array_equal(*(one.rows(one.q, 1e-3, "Euler").jacobian for one in (at, dense)))
-    assert (
-        "data" not in acting_at(found, at).__getstate__()
-    )  # one with a plugin ends the process that reads it
+    assert "data" not in acting_at(found, at).__getstate__()  # with a plugin it ends a process that reads it
 
 
 def test_a_robot_of_many_speeds_has_its_servo_limits_alone(quick):

@@ -4,17 +4,15 @@ import dataclasses
 
 import numpy as np
 import pytest
+from edited import setup_of_file
 from models import PATHS
 
 import tmt
-from compare.engines.mujoco import engine, reading
 from compare.experiments import stability
 from compare.experiments.setup import Setup
-from compare.experiments.setup import engines as engines_of
 from compare.experiments.stability import claims, departure, failure, limits, subjects
 from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
 from compare.truth.linear import held, posture_names
 
 BENT, BALL = held(ARM, "bent"), held(ARM, "ball catch")
@@ -51,31 +49,26 @@ def test_a_stable_method_has_no_limit_but_on_a_saddle(name):
     assert BENT.limit(name) == ("never_fails", None) and BALL.limit(name) == ("always_fails", None)
 
 
-def read(source):
-    found = reading.read(source)
-    return robot_of(found, "robot.xml"), reading.engine(found)
-
-
 def test_of_many_keyframes_the_first_are_looked_at():
     keys = "".join(f'<key name="k{i}" qpos="{0.3 * i}"/>' for i in range(9))
-    seen = subjects_of(read(SWING.format(keys=f"<keyframe>{keys}</keyframe>"))[0])
+    seen = subjects_of(setup_of_file(SWING.format(keys=f"<keyframe>{keys}</keyframe>")).robot)
     assert posture_names(seen.robot) == (*(f"k{i}" for i in range(MOST_POSTURES)), "rest")
     assert np.abs(held(seen.robot, "rest").tau).max() < 1e-6
-    body = read(PATHS["free_body"])[0]
+    body = setup_of_file(PATHS["free_body"]).robot
     assert not subjects_of(body).centres and held(body, "qpos0").sizes[3:].tolist() == [1.0, 1.0, 1.0]
 
 
 def test_a_limit_is_sought_about_the_predicted_one_and_found_again():
-    robot, mujoco = read(SWING.format(keys=""))
-    at, known = held(subjects_of(robot).robot, "rest"), engines_of(mujoco)
+    setup = setup_of_file(SWING.format(keys=""))
+    at, known = held(subjects_of(setup.robot).robot, "rest"), setup.engines
     predicted, rk4 = at.limit("rk4")[1], known["mujoco"].methods["RK4"]
     seen, observed = limits.observed_limit(rk4, known, at, 1000, predicted * limits.TRIED_ABOUT)
     assert seen == "finite" and observed == pytest.approx(predicted, rel=1e-3)
 
 
 def test_a_cart_with_a_pole_leaves_as_predicted_and_its_column_names_both_units(result):
-    robot, mujoco = read(CART_POLE)
-    known = engines_of(mujoco)
+    setup = setup_of_file(CART_POLE)
+    robot, known = setup.robot, setup.engines
     rows = departure.departures(1 / 512, held(robot, "qpos0"), known, (known["mujoco"].methods["RK4"],))
     assert "perturbation_m_or_rad" in rows[0].record() and "unit" not in rows[0].record()
     departure.check_departures(result, rows)
@@ -106,9 +99,7 @@ def test_predicted_and_observed_limits_agree(engines, method):
     assert kind == "finite" and row.observed_dt == pytest.approx(row.predicted_dt, rel=5e-4)
 
 
-def test_departure_is_predicted_where_no_other_mode_grows_faster_than_that_of_the_saddle(
-    engines, method, result
-):
+def test_departure_is_predicted_where_no_other_mode_grows_faster(engines, method, result):
     rows = departure.departures(5 / 64, BALL, engines, (method("tmt", "rk4"), method("mujoco", "Euler")))
     assert len({row.observed for row in rows}) > 8  # the arm left, at other times from other starts
     departure.check_departures(result, rows)
@@ -144,10 +135,8 @@ def test_a_reset_is_caught(engines):
 def test_a_small_run_fills_every_table(small):
     small = small("stability")
     assert set(small.tables) == {"departure", "stability_claims"}
-    reproduced = [
-        (note.kind, note.values["reproduced"]) for note in small.notes if note.kind.startswith("claim_")
-    ]
-    assert reproduced == [("claim_1", True), ("claim_2", "yes"), ("claim_3", "bounded")]
+    notes = {note.kind: note.values.get("reproduced") for note in small.notes}
+    assert [notes[f"claim_{k}"] for k in (1, 2, 3)] == [True, "yes", "bounded"]
     assert any("silent" in check.quantity for check in small.checks)
 
 
@@ -155,9 +144,8 @@ def test_a_small_run_fills_every_table(small):
     ("upright", "centres", ["stability_departure"]), ("hanging", "saddles", ["stability_limits"]),
 ])  # fmt: skip
 def test_what_a_robot_lacks_is_left_out_with_a_reason(engines, posture, without, drawn):
-    robot = dataclasses.replace(
-        ARM, claims=None, kinds={}, scenes=(), postures={"one": ARM.postures[posture]}
-    )
+    postures = {"one": ARM.postures[posture]}
+    robot = dataclasses.replace(ARM, claims=None, kinds={}, scenes=(), postures=postures)
     result = stability.rows(Setup.quick(robot, engines))
     assert result.checks and all(check.passed for check in result.checks)
     (examined,) = (note.values for note in result.notes if note.kind == "examined")
@@ -166,8 +154,7 @@ def test_what_a_robot_lacks_is_left_out_with_a_reason(engines, posture, without,
 
 
 def test_departures_that_may_differ_by_more_than_they_last_are_not_compared(monkeypatch):
-    found = reading.read(SWING.format(keys=""))
-    setup = Setup.quick(robot_of(found, "robot.xml"), engines_of(engine(found)))
+    setup = setup_of_file(SWING.format(keys=""), Setup.quick)
     rows = stability.rows(setup).tables["departure"]
     shortest = min(row.predicted for row in rows)
     for curved, left in ((0.99 * shortest - departure.usually_near(rows[0].dt), len(rows)), (1e6, 0)):

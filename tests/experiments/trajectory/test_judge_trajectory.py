@@ -121,9 +121,6 @@ def test_a_free_run_moves_by_a_tenth_of_a_radian(moved, passes):
     assert verdicts(check_movement, "x", moved) == {"movement": passes}
 
 
-# energy, errors, departures
-
-
 def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_one_that_from_many_digits():
     q = tmt.simulate(*FREE.start, FREE.tau, 5 / 64, 64, "rk4", FREE.tree).q
     others = [run_of(HELD, 9.0, 9.0, scheme="implicit"), run_of(HELD, 9.0, 9.0, steps=128)]

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from edited import MOON, XML
+from edited import MOON, XML, setup_of_file
 from models import chain, random_tree
 from trajectory_curves import DAMPED, FREE, HELD, run_of
 
 import tmt
-from compare.engines.mujoco import parse, reading
+from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
 from compare.experiments import trajectory
@@ -18,7 +18,6 @@ from compare.experiments.trajectory import figures_runs, runs
 from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.run import diverged_at
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
 
 LEVELS = {f"{level}, TMT to MuJoCo" for level in ("one step", "open loop")}
 
@@ -121,8 +120,7 @@ def test_what_is_kept_of_a_run_is_whose_it_says():
 
 def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the_scene_itself_has():
     """Of 40 hinges a step has 6400 entries."""
-    long = robot_of(reading.read(chain(40)), "chain.xml")
-    case = long.case("c", duration=1.0, dt=1 / 512)
+    case = setup_of_file(chain(40)).robot.case("c", duration=1.0, dt=1 / 512)
     coarse, fine = FREE, FREE.changed(dt=5 / 8193)
     assert runs.step_counts(coarse, (1, 16, 128)) == [64, 1024, 8192]
     assert runs.step_counts(fine, (1, 2)) == [8193]
@@ -160,7 +158,7 @@ def test_which_figures_there_are_follows_what_was_run():
 
 def test_a_ball_is_drawn_by_its_turn_from_the_start():
     """Times the root of 3: on this side of half a turn, and beyond it, where nothing is drawn."""
-    case = robot_of(reading.read(random_tree(2, joints=5)), "kinds.xml").case("c")
+    case = setup_of_file(random_tree(2, joints=5)).robot.case("c")
     turns = np.array([0.0, 0.1, 1.75, 1.85])
     q = case.coordinates.move(case.q, turns[:, None] * np.ones(case.coordinates.nv))
     values = figures_runs.drawable(case, "q", q)

@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
+from edited import setup_of_file
 from models import PATHS, chain
 from PIL import Image
 from trajectory_curves import CASES
 
-from compare.engines.mujoco import reading
 from compare.experiments.trajectory import figures_motion_gif as gif
 from compare.experiments.trajectory import motion
 from compare.experiments.trajectory.runs import Path, TrajectoryResult, follow
 from compare.robots.arm import landmarks
-from compare.robots.file import robot_of
 from compare.robots.stick import as_seen, stick_figure
 
 CATCH = CASES["ball catch, free"]  # in which a method of order 1 diverges
@@ -58,7 +57,7 @@ def test_between_steps_a_run_is_interpolated_until_it_has_diverged(runs):
 
 
 def test_a_free_body_is_a_cross_that_turns_with_it():
-    robot, half = robot_of(reading.read(PATHS["free_body"]), "stone.xml"), np.sqrt(0.5)
+    robot, half = setup_of_file(PATHS["free_body"]).robot, np.sqrt(0.5)
     a_quarter_about_z = np.array([[0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 2.0, half, 0.0, 0.0, half]])
     points, links = stick_figure(robot, a_quarter_about_z, crosses=True)
     before, after = points[:, -3:] - points[:, :1]
@@ -68,8 +67,7 @@ def test_a_free_body_is_a_cross_that_turns_with_it():
 
 
 def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_and_up_is_up():
-    robot = robot_of(reading.read(chain(3)), "chain.xml")
-    points, links = stick_figure(robot, np.zeros((1, 3)))
+    points, links = stick_figure(setup_of_file(chain(3)).robot, np.zeros((1, 3)))
     assert links == [(0, 1), (1, 2), (2, 3)] and points.shape == (1, 4, 3)
     right, _, up = as_seen(np.eye(3))
     assert up == pytest.approx([0.0, np.cos(np.radians(20.0))]) and right[0] > 0.9
