@@ -102,21 +102,16 @@ def test_a_flag_of_the_file_counts(flag, rng):
 
 OF_MIXED = [*KINDS, "armature", "damping", "spring", "limit", "clamp", "actuator", "keyframe"]
 LIGHT = PLAIN.replace('name="b"', 'name="b" gravcomp="1"').replace('name="j"', 'name="j" axis="0 1 0"')
+MOTORS = '<actuator><motor name="a" joint="j"/><motor name="b" joint="j" forcerange="-1 1"/></actuator>'
+EQUALITIES = '<equality><weld body1="c"/><joint joint1="j" joint2="k" active="false"/></equality>'
 MORE = {  # feature: file, names
     "contact": (mjcf(PLAIN + '<geom name="floor" type="plane" size="1 1 1"/>'), ("floor", "g")),
     "armature": (mjcf(after='<actuator><general name="a" joint="j" gear="2" armature="1"/></actuator>'), ("a",)),
     "frictionloss": (mjcf(PLAIN.replace('name="j"', 'name="j" frictionloss="1"')), ("j",)),
-    "clamp": (
-        mjcf(PLAIN.replace('name="j"', 'name="j" actuatorfrcrange="-1 1"'),
-             after='<actuator><motor name="a" joint="j"/><motor name="b" joint="j" forcerange="-1 1"/></actuator>'),
-        ("b", "j"),
-    ),
+    "clamp": (mjcf(PLAIN.replace('name="j"', 'name="j" actuatorfrcrange="-1 1"'), after=MOTORS), ("b", "j")),
     "fluid": (mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'), ("density", "viscosity")),
     "gravcomp": (mjcf(LIGHT), ("b",)),
-    "equality": (
-        mjcf(TWO, after='<equality><weld body1="c"/><joint joint1="j" joint2="k" active="false"/></equality>'),
-        ("equality 0",),
-    ),
+    "equality": (mjcf(TWO, after=EQUALITIES), ("equality 0",)),
     "unusable keyframe": (mjcf(after='<keyframe><key name="up" qpos="inf"/><key qpos="1"/></keyframe>'), ("up",)),
     "tendon": (mjcf(TWO, after=TENDON.format('stiffness="9" damping="3" springlength="0.3" range="0 1"')), ("t",)),
 }  # fmt: skip

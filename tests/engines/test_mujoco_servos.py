@@ -12,42 +12,28 @@ CLOSE = 1e-13  # of the largest speed, or of 1 rad or m
 MOVED = {"hinge": 3.0, "slide": 0.02, "ball": 0.0}  # deg, m
 MODEL = """
 <mujoco><compiler angle="radian"/><option timestep="0.002" integrator="implicitfast" solver="PGS" iterations="1"/>
-  <worldbody>
-    <body>
-      <joint name="a" axis="0 1 0" damping="0.3" armature="0.01" ref="0.2" actuatorfrcrange="-0.1 0.1"/>
-      <geom size=".1" mass="1" pos="0.1 0 0.2"/>
-      <body pos="0 0 .3">
-        <joint name="b" axis="1 0 0" stiffness="5" springref="0.3" range="-0.01 0.01"/><geom size=".1" mass=".5" pos="0 .1 .2"/>
-      </body>
-      <body pos="0 .3 0">
-        <joint name="c" type="slide" axis="1 0 0"/><joint name="d" type="slide" axis="0 1 0"/><geom size=".1" mass=".7"/>
-      </body>
-    </body>
-  </worldbody>
-  <tendon>
-    <fixed name="across"><joint joint="b" coef="0.5"/><joint joint="c" coef="-0.7"/></fixed>
-    <fixed name="along"><joint joint="c" coef="0.5"/><joint joint="d" coef="-0.7"/></fixed>
-  </tendon>
-  <actuator>{}</actuator>
-  <keyframe><key name="start" qpos="0.1 0.2 0.05 0.02" {}/></keyframe>
-</mujoco>
+  <worldbody><body><geom size=".1" mass="1" pos="0.1 0 0.2"/>
+    <joint name="a" axis="0 1 0" damping="0.3" armature="0.01" ref="0.2" actuatorfrcrange="-0.1 0.1"/>
+    <body pos="0 0 .3"><geom size=".1" mass=".5" pos="0 .1 .2"/>
+      <joint name="b" axis="1 0 0" stiffness="5" springref="0.3" range="-0.01 0.01"/></body>
+    <body pos="0 .3 0"><geom size=".1" mass=".7"/>
+      <joint name="c" type="slide" axis="1 0 0"/><joint name="d" type="slide" axis="0 1 0"/></body></body></worldbody>
+  <tendon><fixed name="across"><joint joint="b" coef="0.5"/><joint joint="c" coef="-0.7"/></fixed>
+    <fixed name="along"><joint joint="c" coef="0.5"/><joint joint="d" coef="-0.7"/></fixed></tendon>
+  <actuator>{}</actuator><keyframe><key name="start" qpos="0.1 0.2 0.05 0.02" {}/></keyframe></mujoco>
 """
+MUSCLE = '<muscle joint="a" ctrlrange="0 1" lengthrange="0 1"/><position joint="b" kp="30" kv="1"/>'
+AFFINE = '<general joint="a" gaintype="affine" gainprm="20 3 -4" biastype="affine" biasprm="0.3 -20 -3"/>'
+PUSHING = '<general joint="a" gainprm="20" biastype="affine" biasprm="0 20 -3"/><position joint="b" kp="9"/>'
 LAWS = {  # actuators, what the keyframe states, and how many take part
     "gears": ('<position joint="a" kp="50" kv="4" gear="3"/><velocity joint="b" kv="2" gear="-2"/>', 'ctrl="0.3 0.5"', 2),
     "clamps": ('<position joint="a" kp="50" kv="4" ctrlrange="-0.1 0.1" forcerange="-1 1"/>', "", 1),
-    "the law in full": (
-        '<general joint="a" gaintype="affine" gainprm="20 3 -4" biastype="affine" biasprm="0.3 -20 -3"/>', 'ctrl="0.3"', 1
-    ),
+    "the law in full": (AFFINE, 'ctrl="0.3"', 1), "a muscle beside": (MUSCLE, 'ctrl="0.7 0.1"', 1),
     "a filter": ('<position joint="a" kp="50" kv="4" timeconst="0.03"/><motor joint="c"/>', 'ctrl="0.3 2"', 2),
     "an integrator": ('<intvelocity joint="a" kp="50" kv="4" actrange="-1 1"/>', 'act="0.3"', 1),
     "a damper": ('<damper joint="a" kv="3" ctrlrange="0 1"/><position joint="b" kp="30"/>', 'ctrl="0.7 0.1"', 2),
     "tendons": ('<position tendon="across" kp="50" kv="14"/><position tendon="along" kp="50" kv="14" group="1"/>', "", 2),
-    "a muscle beside": (
-        '<muscle joint="a" ctrlrange="0 1" lengthrange="0 1"/><position joint="b" kp="30" kv="1"/>', 'ctrl="0.7 0.1"', 1
-    ),
-    "one that pushes away beside": (
-        '<general joint="a" gainprm="20" biastype="affine" biasprm="0 20 -3"/><position joint="b" kp="9"/>', "", 1
-    ),
+    "one that pushes away beside": (PUSHING, "", 1),
 }  # fmt: skip
 
 

@@ -18,6 +18,10 @@ from compare.experiments.setup import Setup
 from compare.robots.arm import ARM
 from compare.truth.smallest import needed, reduced
 
+FALLS = """<mujoco><worldbody><body name="base"><freejoint name="base"/><geom type="box" size="0.1 0.1 0.05" mass="2"/>
+<body pos="0.1 0 0"><joint name="hip" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0.1 0 -0.3" size="0.02"/></body>
+</body></worldbody></mujoco>"""
+
 
 def failed(result) -> list[str]:
     return [str(check) for check in result.checks if not check.passed]
@@ -56,14 +60,20 @@ def blocks(setup, angles=1) -> Result:
     return result
 
 
+class WrongLock(Mujoco):
+    """MuJoCo whose dynamics of a case with locked joints are wrong."""
+
+    def __init__(self, right, of_locked):
+        super().__init__(right.source, right.joints, right.bodies)
+        self.of_locked = of_locked
+
+    def of(self, case):
+        return self.of_locked(case) if case.locked else super().of(case)
+
+
 def test_every_subset_agrees_and_a_wrong_lock_is_seen(mujoco):
-    class Deleted(Mujoco):
-        """Joints that are only deleted stay at zero."""
-
-        def of(self, case):
-            return mujoco.of(case.changed(posture=()) if case.locked else case)
-
-    wrong = Deleted(mujoco.source, mujoco.joints, mujoco.bodies)
+    """Joints that are only deleted stay at zero."""
+    wrong = WrongLock(mujoco, lambda case: mujoco.of(case.changed(posture=())))
     right, deleted = (blocks(setup_of(engine), 2) for engine in (mujoco, wrong))
     assert len(right.checks) == 6 * 2 * 3 and failed(right) == []
     expected = {f"{' and '.join(locked)} locked" for locked in sub_blocks.subsets(ARM.joints, 4)}
@@ -71,15 +81,12 @@ def test_every_subset_agrees_and_a_wrong_lock_is_seen(mujoco):
 
 
 def test_each_pair_has_its_own_models_and_the_bias_is_compared_in_motion(mujoco):
-    class Faster(Mujoco):
-        """With locked joints its bias is that of speeds that are a bit larger."""
+    def faster(case):
+        dynamics = mujoco.of(case)
+        bias = lambda q, v: dynamics.bias(q, (1.0 + 1e-9) * v)  # noqa: E731
+        return SimpleNamespace(mass_matrix=dynamics.mass_matrix, bias=bias)
 
-        def of(self, case):
-            dynamics = mujoco.of(case)
-            bias = (lambda q, v: dynamics.bias(q, (1.0 + 1e-9) * v)) if case.locked else dynamics.bias
-            return SimpleNamespace(mass_matrix=dynamics.mass_matrix, bias=bias)
-
-    checks = blocks(setup_of(Faster(mujoco.source, mujoco.joints, mujoco.bodies))).checks
+    checks = blocks(setup_of(WrongLock(mujoco, faster))).checks
     quantities = {"bias, MuJoCo, reduced to whole", "bias, reduced, TMT to MuJoCo"}
     assert {check.quantity for check in checks if not check.passed} == quantities
 
@@ -117,15 +124,10 @@ def test_the_planar_arm_moves_as_the_whole_one(engines):
     assert {check.quantity for check in result.checks if not check.passed} == {"smallest model to whole"}
 
 
-def test_each_engine_is_compared_with_its_own_smaller_model(engines):
-    class Braked(Mujoco):
-        def of(self, case):
-            return engines["mujoco"].of(case.changed(damping=1e-6) if case.locked else case)
-
-    wrong, case = engines["mujoco"], ARM.cases[0]
-    wrong = Braked(wrong.source, wrong.joints, wrong.bodies)
-    result = ReductionResult("reduction")
-    needs.compare_smaller(result, case, reduced(case), Setup.small(ARM, {**engines, "mujoco": wrong}))
+def test_each_engine_is_compared_with_its_own_smaller_model(mujoco):
+    braked = WrongLock(mujoco, lambda case: mujoco.of(case.changed(damping=1e-6)))
+    case, result = ARM.cases[0], ReductionResult("reduction")
+    needs.compare_smaller(result, case, reduced(case), setup_of(braked))
     assert [check.scene.split(", ")[2] for check in result.checks if not check.passed] == ["MuJoCo"]
 
 
@@ -144,11 +146,6 @@ def test_a_held_posture_with_springs_needs_nothing():
     assert held.tree.has_springs and needed(held).stays == held.joints
     weight = tmt.gravity_balance(held.posture, held.unlocked_tree)  # without what the springs need
     assert needed(held.changed(torque=tuple(weight))).stays == ()
-
-
-FALLS = """<mujoco><worldbody><body name="base"><freejoint name="base"/><geom type="box" size="0.1 0.1 0.05" mass="2"/>
-<body pos="0.1 0 0"><joint name="hip" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0.1 0 -0.3" size="0.02"/></body>
-</body></worldbody></mujoco>"""
 
 
 def test_a_robot_that_falls_does_not_bend_and_the_answer_says_it_last():

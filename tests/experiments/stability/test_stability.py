@@ -8,6 +8,8 @@ from edited import setup_of_file
 from models import PATHS
 
 import tmt
+from compare.engines.mujoco.engine import METHODS as INTEGRATORS
+from compare.engines.tmt import Tmt
 from compare.experiments import stability
 from compare.experiments.setup import Setup
 from compare.experiments.stability import claims, departure, failure, limits, subjects
@@ -15,6 +17,7 @@ from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
 from compare.robots.arm import ARM
 from compare.truth.linear import held, posture_names
 
+METHODS = Tmt().methods
 BENT, BALL = held(ARM, "bent"), held(ARM, "ball catch")
 FREE = ARM.case("bent, free", posture="bent")
 SWING = """<mujoco><worldbody><body><joint name="swing" axis="0 1 0"/>
@@ -36,17 +39,12 @@ def test_what_each_posture_is(name, kind, rates):
     assert np.abs(values.sum()) < 1e-9  # undamped: they come in opposite pairs
 
 
-@pytest.mark.parametrize("name, limit", [
-    ("semi_implicit_euler", 2.0), ("implicit", 2.0), ("rk4", 2.0 * np.sqrt(2.0)),
-])  # fmt: skip
-def test_known_limits_of_undamped_modes(name, limit):
-    kind, dt = BENT.limit(name)
-    assert kind == "finite" and dt * np.abs(BENT.modes[0]).max() == pytest.approx(limit, rel=1e-6)
-
-
-@pytest.mark.parametrize("name", ["implicit_midpoint", "gauss_legendre_4"])
-def test_a_stable_method_has_no_limit_but_on_a_saddle(name):
-    assert BENT.limit(name) == ("never_fails", None) and BALL.limit(name) == ("always_fails", None)
+def test_known_limits_of_undamped_modes_and_of_methods_that_are_stable_but_on_a_saddle():
+    for name, limit in {"semi_implicit_euler": 2.0, "implicit": 2.0, "rk4": 2.0 * np.sqrt(2.0)}.items():
+        kind, dt = BENT.limit(name)
+        assert kind == "finite" and dt * np.abs(BENT.modes[0]).max() == pytest.approx(limit, rel=1e-6)
+    for name in ("implicit_midpoint", "gauss_legendre_4"):
+        assert BENT.limit(name) == ("never_fails", None) and BALL.limit(name) == ("always_fails", None)
 
 
 def test_of_many_keyframes_the_first_are_looked_at():
@@ -78,15 +76,9 @@ def test_a_cart_with_a_pole_leaves_as_predicted_and_its_column_names_both_units(
     assert {"rk4", "RK4", "implicit"} <= names and not {"gauss_legendre_4", "implicit_midpoint"} & names
 
 
-@pytest.fixture
-def method(engines):
-    """method(engine, name): one method of integration."""
-    return lambda engine, name: engines[engine].methods[name]
-
-
-def test_predicted_and_observed_limits_agree(engines, method):
-    ours = [method("tmt", scheme) for scheme in ("semi_implicit_euler", "implicit_midpoint")]
-    rows = limits.limit_rows(BENT, engines, (*ours, method("mujoco", "RK4")))
+def test_predicted_and_observed_limits_agree(engines):
+    ours = [METHODS[scheme] for scheme in ("semi_implicit_euler", "implicit_midpoint")]
+    rows = limits.limit_rows(BENT, engines, (*ours, INTEGRATORS["RK4"]))
     kinds = ["finite", "never_fails", "finite"]
     assert [found.kind for found in rows] == [found.row.limit for found in rows] == kinds
     for row, *_ in (rows[0], rows[2]):
@@ -95,23 +87,23 @@ def test_predicted_and_observed_limits_agree(engines, method):
     heavy = held(dataclasses.replace(ARM, tree=dataclasses.replace(tmt.ARM, mass=(1.9, 1.65))), "bent")
     assert abs(rows[2].row.observed_dt / heavy.limit("rk4")[1] - 1.0) > 2.0 * limits.LIMIT_TOLERANCE
     # growth beyond the limit is slow with little damping: 100-fold in 2000 steps comes 6 % later
-    ((row, kind, _),) = limits.limit_rows(held(ARM, "bent", 0.5), engines, (method("tmt", "explicit_euler"),))
+    ((row, kind, _),) = limits.limit_rows(held(ARM, "bent", 0.5), engines, (METHODS["explicit_euler"],))
     assert kind == "finite" and row.observed_dt == pytest.approx(row.predicted_dt, rel=5e-4)
 
 
-def test_departure_is_predicted_where_no_other_mode_grows_faster(engines, method, result):
-    rows = departure.departures(5 / 64, BALL, engines, (method("tmt", "rk4"), method("mujoco", "Euler")))
+def test_departure_is_predicted_where_no_other_mode_grows_faster(engines, result):
+    rows = departure.departures(5 / 64, BALL, engines, (METHODS["rk4"], INTEGRATORS["Euler"]))
     assert len({row.observed for row in rows}) > 8  # the arm left, at other times from other starts
     departure.check_departures(result, rows)
     assert len(result.checks) == len(rows) and all(check.passed for check in result.checks)
     # with steps of 1 s a swing grows 9.5-fold in each, what leaves 8.5-fold
-    assert departure.departures(1.0, BALL, engines, (method("tmt", "explicit_euler"),)) == []
+    assert departure.departures(1.0, BALL, engines, (METHODS["explicit_euler"],)) == []
 
 
-def test_own_bias_holds_for_ever(engines, method):
-    tau = departure.own_torque(method("mujoco", "RK4"), engines, BALL)
+def test_own_bias_holds_for_ever(engines):
+    tau = departure.own_torque(INTEGRATORS["RK4"], engines, BALL)
     assert not engines["mujoco"].of(BALL.case).run(BALL.q, np.zeros(3), tau, 5 / 64, 200, "RK4").v.any()
-    ours = method("tmt", "rk4")  # no double need be the bias of compiled code: the nearest is taken
+    ours = METHODS["rk4"]  # no double need be the bias of compiled code: the nearest is taken
     left = departure.residual(ours, engines, BALL, departure.own_torque(ours, engines, BALL)[None])
     assert np.abs(left).max() <= np.spacing(np.abs(BALL.tau).max())
 
