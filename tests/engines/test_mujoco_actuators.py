@@ -12,6 +12,18 @@ from compare.engines.mujoco.acting import Acting, add_armature
 from compare.experiments.stability.servos.predicted import acting_at
 
 SITES = TWO.replace("<geom", '<site name="s" pos="0.1 0 0"/><geom', 1)
+REFUSED = {  # actuator, and a word of why it takes no part
+    '<muscle joint="k" lengthrange="0 1"/>': "muscle", '<general joint="k" dyntype="user"/>': "user",
+    '<general joint="k" gaintype="user" biastype="user"/>': "user",
+    '<dcmotor joint="k" motorconst="0.1" resistance="1"/>': "DC",
+    '<adhesion body="b" ctrlrange="0 1" gain="2"/>': "body",
+    '<position joint="k" kp="3" delay="0.02" nsample="3"/>': "delay",
+    '<general joint="k" damping="1 2"/>': "damping", '<general tendon="t" damping="1"/>': "damping",
+    '<pid joint="k" kp="3" ki="1"/>': "pid", '<orientation site="s" refsite="s" kp="1"/>': "so3",
+}  # fmt: skip
+KEYS = '<keyframe><key name="plain" qpos="0.1 0"/><key name="home" qpos="0.2 0" {}/></keyframe>'
+PLAIN = '<position joint="j" kp="5"/><motor joint="k"/>'
+KEPT = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
 
 
 def text_of(actuators='<motor joint="k"/>', tendon="", content=TWO, keys=""):
@@ -22,17 +34,6 @@ def text_of(actuators='<motor joint="k"/>', tendon="", content=TWO, keys=""):
     except ValueError as error:
         pytest.skip(f"not in this MuJoCo: {' '.join(str(error).split())}")
     return text
-
-
-REFUSED = {  # actuator, and a word of why it takes no part
-    '<muscle joint="k" lengthrange="0 1"/>': "muscle", '<general joint="k" dyntype="user"/>': "user",
-    '<general joint="k" gaintype="user" biastype="user"/>': "user",
-    '<dcmotor joint="k" motorconst="0.1" resistance="1"/>': "DC",
-    '<adhesion body="b" ctrlrange="0 1" gain="2"/>': "body",
-    '<position joint="k" kp="3" delay="0.02" nsample="3"/>': "delay",
-    '<general joint="k" damping="1 2"/>': "damping", '<general tendon="t" damping="1"/>': "damping",
-    '<pid joint="k" kp="3" ki="1"/>': "pid", '<orientation site="s" refsite="s" kp="1"/>': "so3",
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("text", REFUSED)
@@ -49,11 +50,6 @@ def test_springs_and_dampers_that_are_not_linear_are_named(what):
     drive = read(text_of(tendon=tendon, content=joint)).drive
     assert drive.refused.keys() == {"joint j", "tendon t"}
     assert all(what in why for why in drive.refused.values())
-
-
-KEYS = '<keyframe><key name="plain" qpos="0.1 0"/><key name="home" qpos="0.2 0" {}/></keyframe>'
-PLAIN = '<position joint="j" kp="5"/><motor joint="k"/>'
-KEPT = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
 
 
 @pytest.mark.parametrize("actuators, key, expected", [

@@ -19,6 +19,30 @@ FEW = ("ant.xml", "humanoid.xml", "reacher.xml", "swimmer.xml")
 PUBLISHED = [
     pytest.param(path, marks=[pytest.mark.slow] * (path.name not in FEW)) for path in gymnasium_files()
 ]
+SOME_KINDS = st.lists(st.sampled_from(KINDS), min_size=1, max_size=3, unique=True)
+POINT = '<body name="point" pos="0.5 0 0"><inertial pos="0 0 0.1" mass="2" diaginertia="0 0 0"/></body>'
+SHEET = '<flexcomp name="f" type="grid" count="2 2 1" spacing=".1 .1 .1" dim="2" mass="1" rigid="true"/>'
+FIELDS = {"gravity": "gravity", "damper": "damping", "spring": "stiffness"}  # of the Tree, by the flag
+OF_MIXED = [*KINDS, "armature", "damping", "spring", "limit", "clamp", "actuator", "keyframe"]
+LIGHT = PLAIN.replace('name="b"', 'name="b" gravcomp="1"').replace('name="j"', 'name="j" axis="0 1 0"')
+MOTORS = '<actuator><motor name="a" joint="j"/><motor name="b" joint="j" forcerange="-1 1"/></actuator>'
+EQUALITIES = '<equality><weld body1="c"/><joint joint1="j" joint2="k" active="false"/></equality>'
+MORE = {  # feature: file, names
+    "contact": (mjcf(PLAIN + '<geom name="floor" type="plane" size="1 1 1"/>'), ("floor", "g")),
+    "armature": (mjcf(after='<actuator><general name="a" joint="j" gear="2" armature="1"/></actuator>'), ("a",)),
+    "frictionloss": (mjcf(PLAIN.replace('name="j"', 'name="j" frictionloss="1"')), ("j",)),
+    "clamp": (mjcf(PLAIN.replace('name="j"', 'name="j" actuatorfrcrange="-1 1"'), after=MOTORS), ("b", "j")),
+    "fluid": (mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'), ("density", "viscosity")),
+    "gravcomp": (mjcf(LIGHT), ("b",)), "equality": (mjcf(TWO, after=EQUALITIES), ("equality 0",)),
+    "unusable keyframe": (mjcf(after='<keyframe><key name="up" qpos="inf"/><key qpos="1"/></keyframe>'), ("up",)),
+    "tendon": (mjcf(TWO, after=TENDON.format('stiffness="9" damping="3" springlength="0.3" range="0 1"')), ("t",)),
+}  # fmt: skip
+OTHERS = {  # what is listed as other: a joint and an option of the file, and the joint of a file without
+    "dof_dampingpoly of j": ('damping="1 2 3"', "", 'damping="1"'),
+    "jnt_springyield of j": ('stiffness="10" springyield="0.1"', "", 'stiffness="10"'),
+    "flag eulerdamp": ('damping="1"', '<option><flag eulerdamp="disable"/></option>', 'damping="1"'),
+    "flag invdiscrete": ("", '<option><flag invdiscrete="enable" energy="enable"/></option>', ""),
+}
 
 
 def compared(source, rng, states=2):
@@ -52,9 +76,6 @@ def test_a_file_with_every_kind_of_joint():
     assert [f.feature for f in reading.features] == OF_MIXED
 
 
-SOME_KINDS = st.lists(st.sampled_from(KINDS), min_size=1, max_size=3, unique=True)
-
-
 @settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), SOME_KINDS, st.integers(3, 6))
 def test_a_random_tree_is_the_same_in_both(seed, kinds, joints):
@@ -66,10 +87,6 @@ def test_a_file_is_the_same_in_both_and_a_change_of_the_case_reaches_mujoco(sour
     reading = compared(source, rng)
     tree = replace(reading.tree, gravity=(0.0,) * 3, damping=np.add(reading.tree.damping, 0.4))
     assert_the_same(engine(reading).of(case_of(tree, damping=0.4, gravity=False)), tree, rng, states=1)
-
-
-POINT = '<body name="point" pos="0.5 0 0"><inertial pos="0 0 0.1" mass="2" diaginertia="0 0 0"/></body>'
-SHEET = '<flexcomp name="f" type="grid" count="2 2 1" spacing=".1 .1 .1" dim="2" mass="1" rigid="true"/>'
 
 
 @pytest.mark.parametrize("part, bodies", [(POINT, {"b", "point"}), (SHEET, {"b"})], ids=["point", "flex"])
@@ -87,9 +104,6 @@ def test_a_published_file_is_the_same_in_both_and_with_joints_locked(path, rng):
             assert np.allclose(row.stated, row.compiled, rtol=1e-6, atol=1e-12), row
 
 
-FIELDS = {"gravity": "gravity", "damper": "damping", "spring": "stiffness"}  # of the Tree, by the flag
-
-
 @pytest.mark.parametrize("flag", FIELDS)
 def test_a_flag_of_the_file_counts(flag, rng):
     text = PLAIN.replace('<joint name="j"/>', '<joint name="j" damping="1" stiffness="3"/>')
@@ -100,23 +114,6 @@ def test_a_flag_of_the_file_counts(flag, rng):
     assert_the_same(engine(reading).of(case_of(damped, damping=0.5)), damped, rng)
 
 
-OF_MIXED = [*KINDS, "armature", "damping", "spring", "limit", "clamp", "actuator", "keyframe"]
-LIGHT = PLAIN.replace('name="b"', 'name="b" gravcomp="1"').replace('name="j"', 'name="j" axis="0 1 0"')
-MOTORS = '<actuator><motor name="a" joint="j"/><motor name="b" joint="j" forcerange="-1 1"/></actuator>'
-EQUALITIES = '<equality><weld body1="c"/><joint joint1="j" joint2="k" active="false"/></equality>'
-MORE = {  # feature: file, names
-    "contact": (mjcf(PLAIN + '<geom name="floor" type="plane" size="1 1 1"/>'), ("floor", "g")),
-    "armature": (mjcf(after='<actuator><general name="a" joint="j" gear="2" armature="1"/></actuator>'), ("a",)),
-    "frictionloss": (mjcf(PLAIN.replace('name="j"', 'name="j" frictionloss="1"')), ("j",)),
-    "clamp": (mjcf(PLAIN.replace('name="j"', 'name="j" actuatorfrcrange="-1 1"'), after=MOTORS), ("b", "j")),
-    "fluid": (mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'), ("density", "viscosity")),
-    "gravcomp": (mjcf(LIGHT), ("b",)),
-    "equality": (mjcf(TWO, after=EQUALITIES), ("equality 0",)),
-    "unusable keyframe": (mjcf(after='<keyframe><key name="up" qpos="inf"/><key qpos="1"/></keyframe>'), ("up",)),
-    "tendon": (mjcf(TWO, after=TENDON.format('stiffness="9" damping="3" springlength="0.3" range="0 1"')), ("t",)),
-}  # fmt: skip
-
-
 @pytest.mark.parametrize("feature", MORE)
 def test_a_feature_is_listed_and_modelled_or_switched_off(feature, rng):
     text, names = MORE[feature]
@@ -124,14 +121,6 @@ def test_a_feature_is_listed_and_modelled_or_switched_off(feature, rng):
     row = next(row for row in reading.features if row.feature == feature)
     assert (row.count, row.names, row.treatment) == (len(names), names, REASONS[feature][0])
     assert REASONS.keys() == {*OF_MIXED, *MORE, "other"}
-
-
-OTHERS = {  # what is listed as other: a joint and an option of the file, and the joint of a file without
-    "dof_dampingpoly of j": ('damping="1 2 3"', "", 'damping="1"'),
-    "jnt_springyield of j": ('stiffness="10" springyield="0.1"', "", 'stiffness="10"'),
-    "flag eulerdamp": ('damping="1"', '<option><flag eulerdamp="disable"/></option>', 'damping="1"'),
-    "flag invdiscrete": ("", '<option><flag invdiscrete="enable" energy="enable"/></option>', ""),
-}
 
 
 @pytest.mark.parametrize("name", OTHERS)

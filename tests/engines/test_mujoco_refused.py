@@ -22,6 +22,14 @@ REFUSED = {  # a word of why, and the file
     "together": mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")), "'w x'": mjcf(BALL),
     "MJCF": "hello", "1,002 speeds": mjcf("<body><freejoint/><geom size='1'/></body>" * 167),
 }  # fmt: skip
+NUMBERS = """<mujoco><option timestep="{timestep}" gravity="0 0 {gravity}"/><worldbody><body name="b">
+  <joint name="j" axis="0 1 0" armature="{armature}" damping="{damping}" stiffness="{stiffness}"/>
+  <inertial pos="0 0 {com}" mass="{mass}" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+RANGES = {  # the last that is accepted and the first that is not
+    "timestep": [("1e-6", "9e-7"), ("5", "5.1"), ("0.002", "nan"), ("0.002", "0")], "gravity": [("-1e30", "-1.1e30")],
+    "armature": [("1e30", "1.1e30")], "damping": [("1e30", "1e300")], "stiffness": [("0", "-1e-300"), ("1e30", "1.1e30")],
+    "com": [("-1e30", "1.1e30")], "mass": [("1e30", "1.1e30"), ("1e30", "inf")],
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("why", REFUSED)
@@ -42,16 +50,6 @@ def test_a_file_that_cannot_be_read_is_named_in_one_line(why, content, tmp_path)
     with pytest.raises(ModelError, match=rf"robot\.xml.*{why}") as error:
         read(path)
     assert "\n" not in str(error.value)
-
-
-NUMBERS = """<mujoco><option timestep="{timestep}" gravity="0 0 {gravity}"/><worldbody><body name="b">
-  <joint name="j" axis="0 1 0" armature="{armature}" damping="{damping}" stiffness="{stiffness}"/>
-  <inertial pos="0 0 {com}" mass="{mass}" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
-RANGES = {  # the last that is accepted and the first that is not
-    "timestep": [("1e-6", "9e-7"), ("5", "5.1"), ("0.002", "nan"), ("0.002", "0")], "gravity": [("-1e30", "-1.1e30")],
-    "armature": [("1e30", "1.1e30")], "damping": [("1e30", "1e300")], "stiffness": [("0", "-1e-300"), ("1e30", "1.1e30")],
-    "com": [("-1e30", "1.1e30")], "mass": [("1e30", "1.1e30"), ("1e30", "inf")],
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("name, inside, outside", [(name, *pair) for name in RANGES for pair in RANGES[name]])

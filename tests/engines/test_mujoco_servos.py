@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
+from edited import setup_of_file
 from models import PATHS
 
-from compare.engines.mujoco import engine, read
 from compare.engines.tmt import Tmt
-from compare.robots.file import robot_of
 
 CLOSE = 1e-13  # of the largest speed, or of 1 rad or m
-MOVED = {"hinge": 3.0, "slide": 0.02, "ball": 0.0}  # deg, m
 MODEL = """
 <mujoco><compiler angle="radian"/><option timestep="0.002" integrator="implicitfast" solver="PGS" iterations="1"/>
   <worldbody><body><geom size=".1" mass="1" pos="0.1 0 0.2"/>
@@ -37,45 +35,25 @@ LAWS = {  # actuators, what the keyframe states, and how many take part
 }  # fmt: skip
 
 
-def differences(robot, known, dt, integrators=None):
-    """{integrator: (scheme, how far MuJoCo's run is from tmt's)} where its servos' targets are moved."""
-    tree, start = robot.tree, next(iter(robot.positions))
-    moved = tuple(MOVED[joint.kind] for joint in tree.coordinates.joints for _ in tree.axis[joint.qd])
-    case = robot.case("step", posture=start, torque="servos", targets=moved, gravity="ball" not in tree.kind)
-    ours, theirs, found = Tmt().of(case), known.of(case), {}
-    speed = np.random.default_rng(1).normal(size=len(case.v)) * 0.1
-    for name, method in known.methods_in(case).items():
-        if integrators and name not in integrators:
-            continue  # each takes its time to compile
-        one = theirs.run(case.q, speed, case.tau, dt, 20, name)
-        other = ours.run(case.q, speed, case.tau, dt, 20, method.scheme)
-        apart = np.abs(case.coordinates.difference(one.q, other.q)).max(), np.abs(one.v - other.v).max()
-        found[name] = method.scheme, max(apart[0], apart[1] / np.abs(other.v).max())
-    return case, found
-
-
-@pytest.mark.parametrize("name", ["gripper", pytest.param("quadruped", marks=pytest.mark.slow)])
-def test_a_files_servos_are_the_same_schemes_in_both(name):
-    reading = read(PATHS[name])
-    known = engine(reading)
-    _, found = differences(robot_of(reading, name), known, 1e-4)
-    other = {"Euler": "semi_implicit_euler", "RK4": known.methods["RK4"].scheme}
-    assert all(scheme == other.get(name, name) and off < CLOSE for name, (scheme, off) in found.items())
-
-
 @pytest.mark.parametrize("name", LAWS)
 def test_every_law_is_the_same_in_both(name):
+    """All integrators on a file: trajectory/test_trajectory_wrong_schemes.py."""
     *content, count = LAWS[name]
-    reading = read(MODEL.format(*content))
-    integrators = ("discrete", "implicit", "implicitfast") if name == "tendons" else ("implicitfast",)
-    case, found = differences(robot_of(reading, "laws"), engine(reading), 1e-3, integrators)
+    setup = setup_of_file(MODEL.format(*content))
+    robot, known = setup.robot, setup.engines["mujoco"]
+    case = robot.case("step", posture="start", torque="servos", targets=(3.0, 3.0, 0.02, 0.02))  # deg, m
     assert sum(u is not None for u in case.controller.controls) == count
-    assert found and all(off < CLOSE for _, off in found.values())
+    integrators = {"discrete", "implicit", "implicitfast"} if name == "tendons" else {"implicitfast"}
+    start = case.q, np.random.default_rng(1).normal(size=len(case.v)) * 0.1, case.tau, 1e-3, 20
+    for integrator in integrators & known.methods_in(case).keys():
+        theirs, ours = known.of(case).run(*start, integrator), Tmt().of(case).run(*start, integrator)
+        assert np.abs(theirs.q - ours.q).max() < CLOSE
+        assert np.abs(theirs.v - ours.v).max() < CLOSE * np.abs(ours.v).max()
 
 
 def test_actuators_act_in_their_own_scene_alone():
-    reading = read(PATHS["gripper"])
-    robot, known = robot_of(reading, "gripper"), engine(reading)
+    setup = setup_of_file(PATHS["gripper"])
+    robot, known = setup.robot, setup.engines["mujoco"]
     case = robot.case("servos", posture="open", torque="servos", targets=(6.0, 6.0, 0.02, 0.02))
     plain = robot.case("plain", posture="open")
     assert known.methods_in(plain) == known.methods and Tmt().methods_in(plain).keys() == Tmt().methods.keys()

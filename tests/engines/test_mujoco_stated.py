@@ -12,6 +12,23 @@ from compare.judge.scale import EPS
 
 SMALL = 1e-14  # relative; of a tensor up to MuJoCo 3.10: its principal moments are found to about 1e-6
 DIGITS = {"inertia": 1e-6}
+FRAMES = """<frame pos="0.1 0.2 0.3" euler="10 20 30"><body name="b" pos="1 2 3" euler="40 50 60">
+<inertial pos="0.2 0 0.1" mass="1" diaginertia="0.02 0.03 0.04" euler="10 20 30"/>
+<frame pos="0.3 0 0" euler="0 90 0"><joint name="j" axis="1 2 0" pos="0.1 0.2 0.3" damping="2" stiffness="3"/></frame>
+</body></frame>"""
+INERTIAL = """<body name="b"><frame pos="0.1 0.2 0.3" euler="10 20 30"><frame pos="0.3 0 0" euler="0 90 0">
+<joint name="j" damping="2" stiffness="3"/>
+<inertial pos="0.2 0 0.1" mass="1" fullinertia="0.02 0.03 0.04 0.001 0.002 0.003"/></frame></frame></body>"""
+TURNED = pytest.mark.skipif(mujoco.mj_version() < 4_000_000, reason="MuJoCo 3.10 leaves out the rpy")
+SOURCES = [PATHS["mixed"], mjcf(FRAMES, '<compiler eulerseq="zyx"/>'), mjcf(INERTIAL), mjcf()]
+SOURCES += [pytest.param(URDF, marks=TURNED)]
+BODY = '<body name="b"><joint name="j"/><inertial pos="0.1 0 0" mass="1" diaginertia="{}"/>{}</body>'
+OPTIONS = {  # the quantities that it changes: of a file with these principal moments and something in its body
+    'boundmass="2"': ({"mass"}, "1 1 1", ""), 'boundinertia="1.9"': ({"inertia"}, "1 1.5 2", ""),
+    'balanceinertia="true"': ({"inertia"}, "1 1 3", ""), 'settotalmass="3"': ({"mass", "inertia"}, "1 1 1", ""),
+    'inertiafromgeom="true"': ({"mass", "com", "inertia"}, "1 1 1", '<geom size="0.1" pos="0 0.2 0"/>'),
+    'springdamper="1 0.5"': ({"damping", "stiffness"}, "1 1 1", ""),
+}  # fmt: skip
 
 
 def difference(row):
@@ -21,21 +38,6 @@ def difference(row):
 
 def rows_of(text):
     return {(row.place, row.quantity): row for row in stated_numbers(Source(text))}
-
-
-FRAMES = """<frame pos="0.1 0.2 0.3" euler="10 20 30"><body name="b" pos="1 2 3" euler="40 50 60">
-<inertial pos="0.2 0 0.1" mass="1" diaginertia="0.02 0.03 0.04" euler="10 20 30"/>
-<frame pos="0.3 0 0" euler="0 90 0"><joint name="j" axis="1 2 0" pos="0.1 0.2 0.3" damping="2" stiffness="3"/></frame>
-</body></frame>"""
-INERTIAL = """<body name="b"><frame pos="0.1 0.2 0.3" euler="10 20 30"><frame pos="0.3 0 0" euler="0 90 0">
-<joint name="j" damping="2" stiffness="3"/>
-<inertial pos="0.2 0 0.1" mass="1" fullinertia="0.02 0.03 0.04 0.001 0.002 0.003"/></frame></frame></body>"""
-
-TURNED = pytest.mark.skipif(
-    mujoco.mj_version() < 4_000_000, reason="MuJoCo 3.10 leaves out an inertial's rpy"
-)
-SOURCES = [PATHS["mixed"], mjcf(FRAMES, '<compiler eulerseq="zyx"/>'), mjcf(INERTIAL), mjcf()]
-SOURCES += [pytest.param(URDF, marks=TURNED)]
 
 
 @pytest.mark.parametrize("source", SOURCES)
@@ -48,16 +50,6 @@ def test_a_file_that_asks_for_no_change_states_what_is_compiled(source):
             assert row.why == "inertia from geoms"
         else:
             assert difference(row) <= DIGITS.get(row.quantity, SMALL) and not row.why
-
-
-BODY = '<body name="b"><joint name="j"/><inertial pos="0.1 0 0" mass="1" diaginertia="{}"/>{}</body>'
-OPTIONS = {  # the quantities that it changes: of a file with these principal moments and something in its body
-    'boundmass="2"': ({"mass"}, "1 1 1", ""), 'boundinertia="1.9"': ({"inertia"}, "1 1.5 2", ""),
-    'balanceinertia="true"': ({"inertia"}, "1 1 3", ""),
-    'settotalmass="3"': ({"mass", "inertia"}, "1 1 1", ""),
-    'inertiafromgeom="true"': ({"mass", "com", "inertia"}, "1 1 1", '<geom size="0.1" pos="0 0.2 0"/>'),
-    'springdamper="1 0.5"': ({"damping", "stiffness"}, "1 1 1", ""),
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("option", OPTIONS)

@@ -23,6 +23,11 @@ from compare.robots.file import robot_of
 COORDINATES = ARM.coordinates
 TWO = Coordinates(("hip", "knee"))
 OF_TMT = {name: getattr(tmt, method) for name, method in METHOD_NAMES.items()}
+q1, q2, u1, u2 = SYMBOLS = sympy.symbols("q1 q2 u1 u2")
+M2 = sympy.Matrix([[3, sympy.cos(q2)], [sympy.cos(q2), 1]])
+h2 = sympy.Matrix([u1 * u2, sympy.sin(q2) * u1**2])
+MOVING = [*dynamicsymbols("a b"), *dynamicsymbols("a b", 1)]  # functions of time
+IN_TIME = dict(zip(SYMBOLS, MOVING))
 
 
 def single(function):
@@ -72,13 +77,6 @@ def test_a_batch_is_not_taken_where_its_values_or_its_components_are_others(rng)
     own = of_one("mass_matrix", lambda q: np.array([[3.0 + q[1], q[1]], [q[1], 1.0]]), TWO)
     assert np.array_equal(own.mass_matrix(q[:2, :2])[:, 0, 1], q[:2, 1])
     assert own.takes_batches == {"mass_matrix": False}
-
-
-q1, q2, u1, u2 = SYMBOLS = sympy.symbols("q1 q2 u1 u2")
-M2 = sympy.Matrix([[3, sympy.cos(q2)], [sympy.cos(q2), 1]])
-h2 = sympy.Matrix([u1 * u2, sympy.sin(q2) * u1**2])
-MOVING = [*dynamicsymbols("a b"), *dynamicsymbols("a b", 1)]  # functions of time
-IN_TIME = dict(zip(SYMBOLS, MOVING))
 
 
 @pytest.mark.parametrize("source", [

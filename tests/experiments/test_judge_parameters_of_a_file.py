@@ -20,6 +20,11 @@ TOTAL = """
   <body name="arm"><joint name="turn"/><inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.2 0.25"/></body>
   <body name="rod"><joint name="lift" type="slide" damping="2"/><geom size="0.1" mass="0.5"/></body>
 </worldbody></mujoco>"""
+CART = """<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"/><worldbody>
+<body name="cart"><joint name="x" type="slide" axis="1 0 0" damping="0.5"/><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
+<body name="pole" pos="0 0 0.1"><joint name="tilt" axis="0 1 0" stiffness="3" springref="0.2"/>
+<inertial pos="0 0 0.4" mass="1" diaginertia="0.1 0.2 0.3"/></body></body></worldbody>
+<actuator><motor joint="x"/></actuator></mujoco>"""
 
 
 def result_of(source, as_it_is=False):
@@ -96,13 +101,6 @@ def test_an_anchor_stated_as_0_may_be_off_by_rounding_of_the_lengths_that_lead_t
     assert anchors["alpha"].passed == anchors["beta"].passed == passes and anchors["alpha"].value > 0.0
 
 
-CART = """<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"/><worldbody>
-<body name="cart"><joint name="x" type="slide" axis="1 0 0" damping="0.5"/><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
-<body name="pole" pos="0 0 0.1"><joint name="tilt" axis="0 1 0" stiffness="3" springref="0.2"/>
-<inertial pos="0 0 0.4" mass="1" diaginertia="0.1 0.2 0.3"/></body></body></worldbody>
-<actuator><motor joint="x"/></actuator></mujoco>"""
-
-
 def beside_solution(tmp_path, text, solution=CART):
     """The parameters of a file with a text beside a solution."""
     (tmp_path / "solution.xml").write_text(solution)
@@ -112,13 +110,11 @@ def beside_solution(tmp_path, text, solution=CART):
 
 
 @pytest.mark.parametrize("old, new, causes", [
-    ('mass="2"', 'mass="3"', [("mass of cart", 2, 3)]),
-    ('axis="1 0 0"', 'axis="-1 0 0"', [("axis x of x", 1, -1)]),
+    ('mass="2"', 'mass="3"', [("mass of cart", 2, 3)]), ('axis="1 0 0"', 'axis="-1 0 0"', [("axis x of x", 1, -1)]),
     ('springref="0.2"', 'springref="0.3"', [("rest of tilt", 0.2, 0.3)]),
-    ('damping="0.5"', 'damping="0.5" frictionloss="0.1"', [("frictionloss", 0, 1)]),
-    ('<motor joint="x"/>', "", []), ('stiffness="3"', 'stiffness="3" limited="true" range="-1 1"', []),  # may be others
-    (' name="tilt"', "", []), ('"pole"', '"stick"', []),
-    ("<mujoco>", "<mujoco>", []),  # a file is its own solution
+    ('damping="0.5"', 'damping="0.5" frictionloss="0.1"', [("frictionloss", 0, 1)]), ('<motor joint="x"/>', "", []),
+    ('stiffness="3"', 'stiffness="3" limited="true" range="-1 1"', []),  # may be others
+    (' name="tilt"', "", []), ('"pole"', '"stick"', []), ("<mujoco>", "<mujoco>", []),  # a file is its own solution
 ])  # fmt: skip
 def test_a_number_that_is_another_one_than_in_the_solution_is_the_cause(tmp_path, old, new, causes):
     result = beside_solution(tmp_path, CART.replace(old, new))

@@ -20,6 +20,7 @@ from compare.robots.states import Sample
 from compare.run.examine import Setup
 
 EPS = 2.0**-52
+ITEMS = {item.item: item for item in PRINTED}
 
 
 def tolerances(module, qd) -> dict:
@@ -75,9 +76,6 @@ def test_a_mass_matrix_is_symmetric_within_the_scale_of_each_entry(share, passes
     M = np.array([[[1.0, 1.0 + off * 2.0**10], [1.0, 1.0]]])
     mass.check_symmetry(result, M, np.array([[[9e3, 1.0], [1.0, 9e3]]]) * 2.0**10)
     assert list(verdicts(result).values()) == [passes]
-
-
-ITEMS = {item.item: item for item in PRINTED}
 
 
 def of_item(name, ours=0.0, theirs=0.0, scale=0.0, exactly=0.0, printed=True):

@@ -43,22 +43,16 @@ def test_the_smallest_model_is_judged_while_the_band_is_narrow(apart, width, req
     assert found == {"smallest model to whole": within, "time judged": long_enough}
 
 
-# errors, each of half the step of the last; those below 1e-11 rad are rounding
-FALLING = {
-    "order 4.149": ([2.0**4.149 * 1e-8, 1e-8, 9e-12, 8e-12], [True]),
-    "order 4.151": ([2.0**4.151 * 1e-8, 1e-8, 9e-12, 8e-12], [False]),
-    "order 3.851": ([2.0**3.851 * 1e-8, 1e-8, 9e-12, 8e-12], [True]),
-    "order 3.849": ([2.0**3.849 * 1e-8, 1e-8, 9e-12, 8e-12], [False]),
-    "just above rounding": ([2.0**4 * 1.1e-11, 1.1e-11, 9e-12, 8e-12], [True]),
-    "of the finest steps": ([1.0, 0.9, 2.0**4 * 1e-9, 1e-9, 9e-12], [True]),
-    "not of the coarsest": ([1.0, 2.0**-4, 0.9e-9, 0.8e-9, 9e-12], [False]),
-    "rounding that grows is no error of the method": ([2.0**4 * 1e-9, 1e-9, 9e-12, 1.1e-11, 2e-11], [True]),
-    "hidden by rounding": ([2e-11, 9e-12, 1e-13, 2e-11], []),
-    "a run that ends": ([1e-3, np.nan, np.nan], [False]),
-}
+ORDERS = {4.149: True, 4.151: False, 3.851: True, 3.849: False}
+FALLING = [([2.0**order * 1e-8, 1e-8, 9e-12, 8e-12], [passes]) for order, passes in ORDERS.items()]
 
 
-@pytest.mark.parametrize("errors, passed", FALLING.values(), ids=FALLING)
+@pytest.mark.parametrize("errors, passed", [  # each of half the step of the last; those below 1e-11 rad are rounding
+    *FALLING, ([2.0**4 * 1.1e-11, 1.1e-11, 9e-12, 8e-12], [True]),  # just above rounding
+    ([1.0, 0.9, 2.0**4 * 1e-9, 1e-9, 9e-12], [True]), ([1.0, 2.0**-4, 0.9e-9, 0.8e-9, 9e-12], [False]),  # the finest count
+    ([2.0**4 * 1e-9, 1e-9, 9e-12, 1.1e-11, 2e-11], [True]),  # rounding that grows is no error of the method
+    ([2e-11, 9e-12, 1e-13, 2e-11], []), ([1e-3, np.nan, np.nan], [False]),  # hidden by rounding; a run that ends
+])  # fmt: skip
 def test_errors_fall_at_the_order_of_the_method(errors, passed):
     dt = [0.1 / 2**k for k in range(len(errors))]
     found = verdicts(exact_motion.check_falling, "swing", dt, {"tmt": errors})

@@ -89,8 +89,7 @@ def test_the_first_six_keyframes_are_run(quick):
 
 
 @pytest.mark.parametrize("source, why", [
-    (hinge(option='viscosity="1"', actuator=STIFF), "not_judged"),
-    (WELDED, "tied"),
+    (hinge(option='viscosity="1"', actuator=STIFF), "not_judged"), (WELDED, "tied"),
     (hinge('range="0 1" limited="true"', actuator=STIFF, key='<key qpos="0" ctrl="-0.5"/>'), "out_of_range"),
 ])  # fmt: skip
 def test_what_is_not_modelled_has_no_limit(quick, source, why):

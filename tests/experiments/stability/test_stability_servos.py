@@ -25,6 +25,7 @@ SWING = """<mujoco><option timestep="0.002" integrator="{integrator}"/><worldbod
   <joint name="swing" axis="0 1 0" damping="0.01"/><geom type="sphere" size="0.1" pos="{com}" mass="2"/></body></worldbody>
   <actuator>{servo}</actuator><keyframe>{key}</keyframe></mujoco>"""
 UP = '<key name="up" qpos="1"/>'
+NONE = {"limit": "none", "predicted_dt": None}
 
 
 def swing(servo=SERVO, key="", integrator="Euler", com="0 0 -0.5"):
@@ -38,9 +39,6 @@ def row(**more):
         "file_integrator": "Euler", "limiting_joint": "joint7", "stable_at_file_dt": None, "mode": None, "mode_kind": None,
     }  # fmt: skip
     return StepLimitRow(**usual | more)
-
-
-NONE = {"limit": "none", "predicted_dt": None}
 
 
 @pytest.mark.parametrize("more, kind, passed", [

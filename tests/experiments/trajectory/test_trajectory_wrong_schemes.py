@@ -21,6 +21,9 @@ from tmt.compiled.runner import runners as compiled_runs
 from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler, semi_implicit
 
 STEPS = {"one step", "open loop"}
+GEARED = PATHS["gripper"].read_text(encoding="utf-8").replace('kp="60" kv="6"', 'kp="6" kv="0.6" gear="3"')
+FOR = {"duration": 1 / 16, "dt": 1 / 256, "judged": 1 / 16}
+SHORT = Scene("step", "open", "servos", targets=(6.0, 6.0, 0.02, 0.02), **FOR)
 
 
 def failing(case, engines, *integrators) -> set:
@@ -70,11 +73,6 @@ def test_a_body_that_tumbles_tells_how_a_quaternion_is_moved(monkeypatch):
     assert failing(case, engines, "RK4") == {("RK4", level) for level in STEPS}
 
 
-GEARED = PATHS["gripper"].read_text(encoding="utf-8").replace('kp="60" kv="6"', 'kp="6" kv="0.6" gear="3"')
-FOR = {"duration": 1 / 16, "dt": 1 / 256, "judged": 1 / 16}
-SHORT = Scene("step", "open", "servos", targets=(6.0, 6.0, 0.02, 0.02), **FOR)
-
-
 @pytest.fixture(scope="module")
 def gripper():
     """A case of its servos, and the engines; its tendon pulls two fingers, its first servo has a gear."""
@@ -84,6 +82,12 @@ def gripper():
 
 def test_every_integrator_is_its_scheme_in_a_step(gripper):
     assert failing(*gripper) == set()
+
+
+@pytest.mark.slow
+def test_every_integrator_is_its_scheme_where_servos_hold_a_free_body():
+    setup = setup_of_file(PATHS["quadruped"])
+    assert failing(setup.robot.cases[-1].changed(**FOR), setup.engines) == set()
 
 
 WRONG_GAINS = {
