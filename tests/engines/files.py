@@ -23,7 +23,6 @@ URDF = """<robot name="r"><link name="base"/><link name="b"><inertial><origin xy
 
 
 def mjcf(content: str = PLAIN, before: str = "", after: str = "") -> str:
-    """MJCF text of bodies, with something before and after them."""
     return f"<mujoco>{before}<worldbody>{content}</worldbody>{after}</mujoco>"
 
 

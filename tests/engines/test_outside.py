@@ -76,7 +76,6 @@ def test_an_arm_of_two_links_under_an_oblique_gravity(engine, tmp_path):
 
 
 def dynamics_or_skip(engine, model, folder=None):
-    """Skips a test where the engine says why it cannot read the file."""
     of, robot = dynamics(engine, model, folder)
     try:
         of.reading  # noqa: B018

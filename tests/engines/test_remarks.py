@@ -21,7 +21,6 @@ def urdf(base: str, kind: str = "continuous", inertial: str = "", mesh: str = ""
 
 
 def said(source) -> dict:
-    """The values of each remark, by kind."""
     found = remarks(read(source), True)
     assert all(map(say, found))
     return {one.kind: one.values for one in found}

@@ -164,44 +164,38 @@ def test_orders_are_measured_and_what_does_not_answer_or_cannot_be_set_does_not_
     assert "gravity of Upside" in " ".join(report[1].split())  # the answer says what this program has set
 
 
-class Other(TmtDynamics):
-    """tmt as another engine; a quantity is off by a share of its tolerance with this eps."""
-
-    def __init__(self, quantity="", share=0.0, eps=0.0):
-        super().__init__(ARM.case())
-        self.quantity = quantity
-        if share:
-            self.right = getattr(self, quantity)
-            off = share * FACTOR * eps
-            setattr(self, quantity, lambda *states: self.right(*states) + off * self.size(*states))
-
-    def has(self, quantity):
-        return quantity != "bias" or self.quantity != "none"
-
-    def size(self, q, v=0.0, tau=0.0):
-        scale = Entries(self.tree, q, v)
-        if self.quantity == "acceleration":
-            return scale.acceleration(scale.force(tau), self.right(q, v, tau))
-        return getattr(scale, self.quantity)
+def other(lacking="", **functions):
+    """tmt as another engine, without a function, or with others."""
+    dynamics = TmtDynamics(ARM.case())
+    vars(dynamics).update(functions, has=lambda quantity: quantity != lacking)
+    return dynamics
 
 
 @pytest.mark.parametrize("precision", RECORDS)
+@pytest.mark.parametrize("share, fails", [(0.9, False), (1.1, True)])
 @pytest.mark.parametrize(
     "quantity, name", {"mass_matrix": "Mbar", "bias": "bias", "acceleration": "qdd"}.items()
 )
-def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, precision):
+def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, precision, share, fails):
     """A float32 engine is allowed what its own eps allows, and no more."""
-    for share, fails in ((0.9, False), (1.1, True)):
-        result, record = Result("engines"), RECORDS[precision]
-        compare_quantities(result, setup_of(), record, Other(quantity, share, record.eps))
-        assert [check.quantity for check in result.checks if not check.passed] == [f"{name} to exact"] * fails
-        assert all(check.about is About.ENGINE for check in result.checks)
-        assert [note.kind for note in result.notes] == ["cause"] * fails
+    record, right, result = RECORDS[precision], getattr(other(), quantity), Result("engines")
+
+    def wrong(*state):
+        values, scale = right(*state), Entries(ARM.tree, *state[:2])
+        size = getattr(scale, quantity)
+        if quantity == "acceleration":
+            size = scale.acceleration(scale.force(state[2]), values)
+        return values + share * FACTOR * record.eps * size
+
+    compare_quantities(result, setup_of(), record, other(**{quantity: wrong}))
+    assert [check.quantity for check in result.checks if not check.passed] == [f"{name} to exact"] * fails
+    assert all(check.about is About.ENGINE for check in result.checks)
+    assert [note.kind for note in result.notes] == ["cause"] * fails
 
 
 def test_an_engine_without_a_function_is_not_judged_by_it():
     result = Result("engines")
-    compare_quantities(result, setup_of(), RECORDS["float64"], Other("none"))
+    compare_quantities(result, setup_of(), RECORDS["float64"], other("bias"))
     assert [check.quantity for check in result.checks] == ["Mbar to exact", "qdd to exact"]
 
 

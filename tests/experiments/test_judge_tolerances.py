@@ -23,19 +23,14 @@ EPS = 2.0**-52
 ITEMS = {item.item: item for item in PRINTED}
 
 
-def tolerances(module, qd) -> dict:
-    """Of the arm at one state, zero with these rates, in units of 64 eps, by quantity."""
-    setup, zero = setup_of(make=Setup, states=1, exact_states=1), np.zeros((1, 3))
-    setup.__dict__["random"] = Sample(ARM.tree, "random states", zero, np.array([qd]), zero, 1)
-    checks = [check for check in module.rows(setup).checks if check.scene == "random states"]
-    return {check.quantity: check.tolerance / (64 * EPS) for check in checks}
-
-
 @pytest.mark.parametrize("module", [kinematics, mass, gravity, acceleration])
 def test_tolerances_are_64_eps_of_the_scale_of_an_entry_of_the_quantity(module):
-    """The scales themselves: tests/judge/test_judge_scale.py."""
-    rates = [1.0, -2.0, 8.0]
-    of, found = Entries(ARM.tree, np.zeros((1, 3)), np.array([rates])), tolerances(module, rates)
+    """Of the arm at one state, zero with these rates. The scales themselves: tests/judge/test_judge_scale.py."""
+    setup, rates, zero = setup_of(make=Setup, states=1, exact_states=1), [1.0, -2.0, 8.0], np.zeros((1, 3))
+    setup.__dict__["random"] = Sample(ARM.tree, "random states", zero, np.array([rates]), zero, 1)
+    checks = [check for check in module.rows(setup).checks if check.scene == "random states"]
+    found = {check.quantity: check.tolerance / (64 * EPS) for check in checks}
+    of = Entries(ARM.tree, zero, np.array([rates]))
     force, qdd = of.force(), tmt.acceleration(np.zeros(3), rates, np.zeros(3))[None]
     sizes = {name: getattr(of, quantity.scale) for name, quantity in QUANTITIES.items() if name in found}
     if module is acceleration:

@@ -13,7 +13,6 @@ from compare.robots.case import Coordinates
 
 
 def verdicts(check, *arguments):
-    """Whether each check that is made passes, by the name of its quantity."""
     result = ReductionResult("reduction", tables={"reduction_subsets": []})
     check(result, *arguments)
     return {check.quantity: check.passed for check in result.checks}
@@ -60,7 +59,6 @@ def test_errors_fall_at_the_order_of_the_method(errors, passed):
 
 
 def swings(model, **scene) -> ReductionResult:
-    """Of one scene, or of all the arm's."""
     result = ReductionResult("reduction")
     cases = [ARM.case("mine", locked=("alpha", "beta"), **scene)] if scene else ARM.cases
     for case in filter(exact_motion.is_pendulum, cases):

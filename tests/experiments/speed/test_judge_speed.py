@@ -37,7 +37,6 @@ def scene_of(found, floor, is_read=False) -> SceneRuns:
 
 
 def judged(check, found, floor) -> dict[str, bool]:
-    """(quantity, passed) of each check that is made of runs."""
     result = SpeedResult("speed")
     check(result, scene_of(found, floor))
     return {check.quantity: check.passed for check in result.checks}
@@ -86,7 +85,6 @@ def test_a_series_ends_where_a_run_gains_nothing(found, work, best, last, ends):
 
 
 def falling(*orders) -> list[float]:
-    """Errors that fall by these orders."""
     return [*(1e-4 / 2.0 ** np.cumsum([0.0, *orders]))]
 
 

@@ -34,11 +34,6 @@ def hinge(joint="", integrator="Euler", actuator="", option="", key='<key name="
     return HINGE.format(joint=joint, integrator=integrator, actuator=actuator, option=option, key=key)
 
 
-def of(source, **more):
-    found = reading.read(source)
-    return own_run.own_run(next(iter(found.keyframes), ""), found.dt, found.integrator, found, **more)
-
-
 @pytest.mark.parametrize("source, outcome", [
     (hinge('damping="2"', "RK4"), "worse"), (hinge('damping="0.05"'), "calm"),
     (hinge('stiffness="400"', "implicitfast"), "worse"), (hinge(), "alike"),  # nothing brakes a pendulum
@@ -51,7 +46,9 @@ def of(source, **more):
     (FREE.format(9.81), "calm"), (FREE.format(0), "alike"),  # it hovers, and falls
 ])  # fmt: skip
 def test_what_moves_on_by_its_step_alone_is_not_stable(source, outcome):
-    assert of(source).outcome == outcome
+    found = reading.read(source)
+    run = own_run.own_run(next(iter(found.keyframes), ""), found.dt, found.integrator, found)
+    assert run.outcome == outcome
 
 
 @pytest.mark.parametrize("own, finer, worse", [

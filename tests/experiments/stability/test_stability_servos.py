@@ -33,7 +33,6 @@ def swing(servo=SERVO, key="", integrator="Euler", com="0 0 -0.5"):
 
 
 def row(**more):
-    """A row of step_limits.csv."""
     usual = {
         "posture": "p", "base": "fixed", "integrator": "Euler", "limit": "finite", "predicted_dt": 0.1, "file_dt": 0.1,
         "file_integrator": "Euler", "limiting_joint": "joint7", "stable_at_file_dt": None, "mode": None, "mode_kind": None,

@@ -24,7 +24,6 @@ NARROW, AT_ONCE = np.full(11, 0.999e-3), np.array([0.0, 1e-9, *[np.inf] * 9])
 
 
 def verdicts(check, *arguments) -> dict:
-    """Whether each check that is made passes, by the name of its quantity."""
     result = TrajectoryResult("trajectory")
     check(result, *arguments)
     return {check.quantity: check.passed for check in result.checks}

@@ -97,11 +97,8 @@ def test_of_a_users_own_scene_nothing_is_expected_but_agreement(mujoco):
     case = DAMPED.changed(judged=0.0, damping=0.0, tags=("own",))
     assert judged_with(mujoco, side(case)).keys() == LEVELS
     assert judged_with(mujoco, side(FREE)).keys() == LEVELS | {"time judged", "movement"}
-
-
-def test_a_free_run_of_which_one_side_stays_tests_nothing():
     still = parse(XML.replace("0 0 -9.81", "0 0 0"), tmt.ARM)
-    assert judged_with(still, side(FREE))["movement"].value == 0.0
+    assert judged_with(still, side(FREE))["movement"].value == 0.0  # one side stays: it tests nothing
 
 
 def test_what_is_kept_of_a_run_is_whose_it_says():

@@ -19,12 +19,7 @@ BLUE, ORANGE = (0, 114, 178), (230, 159, 0)
 
 @pytest.fixture(scope="module")
 def runs(engines):
-    """Of a scene by its own steps and finer ones."""
     return follow(CATCH, engines, (1, 4)).runs
-
-
-def seen(path) -> np.ndarray:
-    return as_seen(np.array([[np.array([*point], float) for point in landmarks(q)] for q in path]))
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +31,8 @@ def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_
     run = next(run for run in runs if (run.scheme, run.steps) == ("rk4", 256))
     np.testing.assert_array_equal(drawn.t, run.t[::2])
     for name, path in run.paths.items():
-        np.testing.assert_allclose(drawn.points[name], seen(path.q[::2]), atol=1e-15)
+        points = [[np.array([*point], float) for point in landmarks(q)] for q in path.q[::2]]
+        np.testing.assert_allclose(drawn.points[name], as_seen(np.array(points)), atol=1e-15)
     apart = np.abs(run.paths["tmt"].q - run.paths["mujoco"].q).max(axis=1)
     np.testing.assert_array_equal(drawn.apart, apart[::2])
 

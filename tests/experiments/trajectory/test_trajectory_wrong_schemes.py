@@ -39,8 +39,6 @@ def failing(case, engines, *integrators) -> set:
 
 @dataclasses.dataclass(frozen=True)
 class ExplicitDamping(SemiImplicitEuler):
-    """A wrong scheme."""
-
     def held(self, tree):
         return SemiImplicitEuler.held(self, dataclasses.replace(tree, damping=(0.0, 0.0, 0.0)))
 
