@@ -75,6 +75,7 @@ class Model(ReadModel):
         m = tmt.simulate(q, v, tau, times[-1] / steps, steps, method, self.tree, tolerance)
         return np.hstack([m.q, m.qd])[:: steps // (len(times) - 1)], m.evaluations
 '''
+NAMES = {"mass_matrix": "Mbar", "bias": "bias", "acceleration": "qdd"}
 RIGHT = {"label": "Right", "precision": "float64", "wrong": "", "untold": "", "euler": "semi_implicit_euler"}
 ENGINES = {
     "again": {}, "heavy": {"label": "Heavy", "wrong": "mass=[1.0, 1.001]"},
@@ -173,9 +174,7 @@ def other(lacking="", **functions):
 
 @pytest.mark.parametrize("precision", RECORDS)
 @pytest.mark.parametrize("share, fails", [(0.9, False), (1.1, True)])
-@pytest.mark.parametrize(
-    "quantity, name", {"mass_matrix": "Mbar", "bias": "bias", "acceleration": "qdd"}.items()
-)
+@pytest.mark.parametrize("quantity, name", NAMES.items())
 def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, precision, share, fails):
     """A float32 engine is allowed what its own eps allows, and no more."""
     record, right, result = RECORDS[precision], getattr(other(), quantity), Result("engines")

@@ -1,4 +1,4 @@
-"""What is known of postures and of a step of each method, the same in runs, and the whole of it."""
+"""What is known of postures and of a step of each method, the same in runs; the run of the whole file at its own step."""
 
 import dataclasses
 
@@ -6,13 +6,18 @@ import numpy as np
 import pytest
 from edited import setup_of_file
 from models import PATHS
+from servo_models import posture_of
 
 import tmt
-from compare.engines.mujoco.engine import METHODS as INTEGRATORS
+from compare.engines.mujoco import reading
+from compare.engines.mujoco.engine import METHODS as OF_MUJOCO
+from compare.engines.mujoco.linear import WholeRun
+from compare.engines.mujoco.names import INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments import stability
 from compare.experiments.setup import Setup
-from compare.experiments.stability import claims, departure, failure, limits, subjects
+from compare.experiments.stability import claims, departure, failure, limits, own_run, subjects
+from compare.experiments.stability.servos.predicted import acting_at, predicted_at
 from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
 from compare.robots.arm import ARM
 from compare.truth.linear import held, posture_names
@@ -25,6 +30,21 @@ SWING = """<mujoco><worldbody><body><joint name="swing" axis="0 1 0"/>
 CART_POLE = """<mujoco><worldbody><body><joint name="rail" type="slide" axis="1 0 0" damping="1"/>
   <geom type="sphere" size="0.1" mass="1"/><body><joint name="pole" axis="0 1 0" damping="0.1"/>
   <geom type="sphere" size="0.1" pos="0 0 0.5" mass="2"/></body></body></worldbody></mujoco>"""
+HINGE = """<mujoco><option timestep="0.005" integrator="{integrator}" {option}/><worldbody><body>
+  <joint name="swing" axis="0 1 0" {joint}/><inertial pos="0 0 -0.1" mass="0.1" diaginertia="1e-4 1e-4 1e-4"/>
+  <geom type="box" size="0.1 0.05 0.001" pos="0.1 0 0" mass="0"/></body></worldbody>
+  <actuator>{actuator}</actuator><keyframe>{key}</keyframe></mujoco>"""
+HOVERING = """<mujoco><worldbody><body><freejoint/><geom size="0.1" mass="1"/><site name="t"/></body></worldbody>
+  <actuator><motor site="t" gear="0 0 1 0 0 0"/></actuator><keyframe><key name="go" ctrl="{}"/></keyframe></mujoco>"""
+SPARSE = """<mujoco><option jacobian="sparse"/><worldbody>
+  <body><joint name="a"/><geom size="0.1"/></body><body><joint name="b"/><geom size="0.1"/></body></worldbody>
+  <equality><joint joint1="a"/><joint joint1="a" joint2="b"/></equality>
+  <actuator><position joint="b" kp="50" kv="1"/></actuator></mujoco>"""
+WELDED = """<mujoco><worldbody><body name="a"><joint name="lift" type="slide"/><geom size="0.1"/></body>
+  <body name="b" pos="1 0 0"><freejoint/><geom size="0.1"/></body></worldbody><equality><weld body1="a" body2="b"/></equality>
+  <actuator><position joint="lift" kp="50"/></actuator></mujoco>"""
+STIFF = '<position joint="swing" kp="0.2" kv="1"/>'
+SATURATED = '<position joint="swing" kp="5" kv="0.01" forcerange="-0.1 0.1"/>'
 
 
 @pytest.mark.parametrize("name, kind, rates", [
@@ -78,7 +98,7 @@ def test_a_cart_with_a_pole_leaves_as_predicted_and_its_column_names_both_units(
 
 def test_predicted_and_observed_limits_agree(engines):
     ours = [METHODS[scheme] for scheme in ("semi_implicit_euler", "implicit_midpoint")]
-    rows = limits.limit_rows(BENT, engines, (*ours, INTEGRATORS["RK4"]))
+    rows = limits.limit_rows(BENT, engines, (*ours, OF_MUJOCO["RK4"]))
     kinds = ["finite", "never_fails", "finite"]
     assert [found.kind for found in rows] == [found.row.limit for found in rows] == kinds
     for row, *_ in (rows[0], rows[2]):
@@ -92,7 +112,7 @@ def test_predicted_and_observed_limits_agree(engines):
 
 
 def test_departure_is_predicted_where_no_other_mode_grows_faster(engines, result):
-    rows = departure.departures(5 / 64, BALL, engines, (METHODS["rk4"], INTEGRATORS["Euler"]))
+    rows = departure.departures(5 / 64, BALL, engines, (METHODS["rk4"], OF_MUJOCO["Euler"]))
     assert len({row.observed for row in rows}) > 8  # the arm left, at other times from other starts
     departure.check_departures(result, rows)
     assert len(result.checks) == len(rows) and all(check.passed for check in result.checks)
@@ -101,7 +121,7 @@ def test_departure_is_predicted_where_no_other_mode_grows_faster(engines, result
 
 
 def test_own_bias_holds_for_ever(engines):
-    tau = departure.own_torque(INTEGRATORS["RK4"], engines, BALL)
+    tau = departure.own_torque(OF_MUJOCO["RK4"], engines, BALL)
     assert not engines["mujoco"].of(BALL.case).run(BALL.q, np.zeros(3), tau, 5 / 64, 200, "RK4").v.any()
     ours = METHODS["rk4"]  # no double need be the bias of compiled code: the nearest is taken
     left = departure.residual(ours, engines, BALL, departure.own_torque(ours, engines, BALL)[None])
@@ -155,3 +175,95 @@ def test_departures_that_may_differ_by_more_than_they_last_are_not_compared(monk
         assert len(result.tables.get("departure", ())) == left
         (examined,) = (note.values for note in result.notes if note.kind == "examined")
         assert examined["saddles"] and examined["departures"] is bool(left)
+
+
+def hinge(joint="", integrator="Euler", actuator="", option="", key='<key name="aside" qpos="0.5"/>'):
+    return HINGE.format(joint=joint, integrator=integrator, actuator=actuator, option=option, key=key)
+
+
+@pytest.mark.parametrize("source, outcome", [
+    (hinge('damping="2"', "RK4"), "worse"), (hinge('damping="0.05"'), "calm"),
+    (hinge('stiffness="400"', "implicitfast"), "worse"), (hinge(), "alike"),  # nothing brakes a pendulum
+    (hinge(actuator=STIFF), "worse"), (hinge('frictionloss="0.2"', actuator=STIFF, key=""), "calm"),
+    (hinge(actuator='<dcmotor joint="swing" motorconst="0.8" resistance="0.2"/>'), "worse"),
+    (hinge(actuator='<motor joint="swing" damping="3"/>', integrator="RK4"), "worse"),
+    (hinge(option='density="1000" viscosity="80"'), "worse"),
+    (hinge(option='density="1000" viscosity="80"', integrator="implicit", key=""), "calm"),
+    (hinge(actuator='<general joint="swing" biastype="affine" biasprm="0 0 1"/>', key=""), "fails"),  # at any step
+    (HOVERING.format(9.81), "calm"), (HOVERING.format(0), "alike"),  # it hovers, and falls
+])  # fmt: skip
+def test_what_moves_on_by_its_step_alone_is_not_stable(source, outcome):
+    found = reading.read(source)
+    run = own_run.own_run(next(iter(found.keyframes), ""), found.dt, found.integrator, found)
+    assert run.outcome == outcome
+
+
+@pytest.mark.parametrize("own, finer, worse", [
+    (0.99e-3, 1e-9, False), (1.01e-3, 1e-9, True), (1.01e-3, 1.02e-4, False), (9.9, 1.0, False), (10.1, 1.0, True),
+    (np.nan, 1.0, True),
+])  # fmt: skip
+def test_ten_times_the_speed_at_the_finer_step(own, finer, worse):
+    runs = [WholeRun(np.full(4, speed), None) for speed in (own, finer)]
+    assert own_run.is_worse(*runs) is worse
+    # a motion that goes on is bounded by its fastest part
+    fast = runs[1]._replace(speeds=np.array([100.0, 1.0, 1.0, finer]))
+    assert own_run.is_worse(runs[0], fast) is (worse and (finer < 1e-3 or own != 10.1))
+    assert not own_run.is_worse(runs[0], runs[1]._replace(failed_at=1.0))
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """The result of a quick run, without runs without servos, which take long."""
+    monkeypatch.setattr(stability, "MOST_SPEEDS", 0)
+    return lambda source, **more: stability.rows(setup_of_file(source, Setup.quick, **more))
+
+
+def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step(quick):
+    failed, source = {}, hinge('damping="2"', "RK4", key="")
+    for step in (None, (1e-4, "RK4"), (0.005, "Euler"), (0.004, "RK4")):
+        failed[step] = [check.quantity for check in quick(source, step=step).checks if check.failed]
+    assert failed[None] == failed[1e-4, "RK4"] == failed[0.005, "Euler"] == [own_run.AT_OWN]
+    assert failed[0.004, "RK4"] == [own_run.AT_OWN, own_run.AT_REQUESTED]
+
+
+def test_the_first_six_keyframes_are_run(quick):
+    keys = "".join(f'<key name="k{i}" qpos="{i / 10}"/>' for i in range(7))
+    rows = quick(hinge('damping="0.05"', key=keys)).tables["own_run"]
+    assert sorted(row.start for row in rows) == [f"k{i}" for i in range(own_run.MOST_STARTS)]
+
+
+@pytest.mark.parametrize("source, why", [
+    (hinge(option='viscosity="1"', actuator=STIFF), "not_judged"), (WELDED, "tied"),
+    (hinge('range="0 1" limited="true"', actuator=STIFF, key='<key qpos="0" ctrl="-0.5"/>'), "out_of_range"),
+])  # fmt: skip
+def test_what_is_not_modelled_has_no_limit(quick, source, why):
+    result = quick(source)
+    assert {row.limit for row in result.tables["step_limits"] if row.posture != "middle"} == {why}
+
+
+def test_adhesion_acts_in_contacts_alone_and_hides_no_limit(quick):
+    grip = f'{STIFF}<adhesion body="grip" ctrlrange="0 1" gain="2"/>'
+    result = quick(hinge(actuator=grip).replace("<body>", '<body name="grip">'))
+    assert "not_judged" not in {row.limit for row in result.tables["step_limits"]}
+
+
+def test_a_servo_at_its_range_lets_a_keyframe_rest_beside_it():
+    key = '<key name="home" qpos="0.05" ctrl="0"/>'
+    at, found = posture_of(hinge(actuator=SATURATED, option='gravity="0 0 0"', key=key))
+    assert at.q == pytest.approx([0.0], abs=1e-9) and predicted_at(at.robot, "home", found).known
+
+
+def test_constraints_of_a_sparse_jacobian_and_a_pickled_model():
+    at, found = posture_of(SPARSE)
+    dense, _ = posture_of(SPARSE.replace("sparse", "dense"))
+    assert np.array_equal(*(one.rows(one.q, 1e-3, "Euler").jacobian for one in (at, dense)))
+    assert "data" not in acting_at(found, at).__getstate__()  # with a plugin it ends a process that reads it
+
+
+def test_a_robot_of_many_speeds_has_its_servo_limits_alone(quick):
+    result = quick(hinge(actuator=STIFF))
+    assert result.tables.keys() == {"own_run", "step_limits"} and not result.rows
+    aside = [row for row in result.tables["step_limits"] if row.posture == "aside"]
+    calm = {row.integrator: row.full_model_calm for row in aside}
+    assert calm == dict.fromkeys(INTEGRATORS) | {"Euler": False}
+    assert [finding.kind for finding in result.top] == ["own_run", "step", "large"]

@@ -110,16 +110,12 @@ def test_runs_show_the_predicted_limit(source, integrator):
     assert grows == [False, True]
 
 
-def errors(source, integrator, dts):
-    at, reading = posture_of(source)
-    return [response.response_error(at, integrator, reading, dt) for dt in dts]
-
-
 @pytest.mark.parametrize("source", [FORK.format(kv=5), FLOATING], ids=["fork", "floating"])
 def test_errors_fall_with_the_order_of_the_method(source):
-    coarse, fine = errors(source, "implicitfast", (1e-3, 5e-4))
+    at, reading = posture_of(source)
+    coarse, fine = (response.response_error(at, "implicitfast", reading, dt) for dt in (1e-3, 5e-4))
     assert coarse / fine == pytest.approx(2.0, rel=0.1) and 1e-6 < fine < 0.1
-    coarse, fine, finest = errors(source, "RK4", (1.6e-3, 8e-4, 1e-4))
+    coarse, fine, finest = (response.response_error(at, "RK4", reading, dt) for dt in (1.6e-3, 8e-4, 1e-4))
     assert coarse / fine == pytest.approx(16.0, rel=0.4)
     assert finest < 1e-7  # the exact response is that of MuJoCo
 
