@@ -250,9 +250,9 @@ def test_a_run_that_diverges_ends_and_its_function_is_not_asked_of_what_is_no_nu
 
 
 @pytest.mark.parametrize(
-    "off, is_same", [(0.9e-12, True), (1.1e-12, False), (-1.1e-12, False), (np.nan, False)]
+    "off, equal", [(0.9e-12, True), (1.1e-12, False), (-1.1e-12, False), (np.nan, False)]
 )
-def test_a_batch_has_the_values_of_single_states_except_for_rounding_of_the_largest(off, is_same):
+def test_a_batch_has_the_values_of_single_states_except_for_rounding_of_the_largest(off, equal):
     singles = np.array([[1e3, np.nan], [0.0, np.inf]])
-    assert same(singles + [[0.0, 0.0], [1e3 * off, 0.0]], singles) is is_same
+    assert same(singles + [[0.0, 0.0], [1e3 * off, 0.0]], singles) is equal
     assert not same(singles[0], singles)

@@ -25,14 +25,13 @@ PART = """<mujocoinclude><body name="arm"><joint name="hip" axis="0 1 0" damping
 <inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.01"/></body></body></mujocoinclude>"""
 WHOLE = """<mujoco><worldbody><include file="part.xml"/></worldbody><keyframe><key qpos="1 2"/></keyframe></mujoco>"""
 FREE = """<mujoco><worldbody><body name="top"><freejoint name="base"/>
-<inertial pos="0.1 0 0.2" mass="2" diaginertia="0.3 0.2 0.15"/>
-</body></worldbody></mujoco>"""
+<inertial pos="0.1 0 0.2" mass="2" diaginertia="0.3 0.2 0.15"/></body></worldbody></mujoco>"""
 FACES = (0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)  # of a tetrahedron
 STL = [struct.pack("<12fH", 0, 0, 0, *np.eye(4, 3)[list(face)].ravel(), 0) for face in FACES]
 MESHES = """<mujoco><compiler meshdir="parts"/><asset><mesh name="m" file="m.stl"/></asset><worldbody>
 <geom type="mesh" mesh="m"/><body><joint name="j" axis="0 1 0"/><geom type="mesh" mesh="m"/><body pos="0 0 1">
-<joint axis="1 0 0"/>
-<inertial pos="0 0 0.5" mass="2" diaginertia="0.3 0.2 0.15"/><geom type="mesh" mesh="m"/></body></body></worldbody></mujoco>"""
+<joint axis="1 0 0"/><inertial pos="0 0 0.5" mass="2" diaginertia="0.3 0.2 0.15"/><geom type="mesh" mesh="m"/>
+</body></body></worldbody></mujoco>"""
 
 
 def robot_of(path, text):

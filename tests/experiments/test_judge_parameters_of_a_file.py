@@ -15,8 +15,8 @@ from compare.experiments.setup import Setup, engines
 from compare.judge.scale import EPS
 from compare.run.reference import compared_with
 
-TOTAL = """
-<mujoco><compiler settotalmass="3"/><worldbody>
+SWITCHED_OFF = ("fluid and tendons", "actuators", "constraints and contacts")
+TOTAL = """<mujoco><compiler settotalmass="3"/><worldbody>
   <body name="arm"><joint name="turn"/><inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.2 0.25"/></body>
   <body name="rod"><joint name="lift" type="slide" damping="2"/><geom size="0.1" mass="0.5"/></body>
 </worldbody></mujoco>"""
@@ -46,9 +46,7 @@ def test_the_models_are_as_their_files_state_and_nothing_more_acts(name):
     assert result.checks and failing(result) == [] and result.causes == []
     features = [row.feature for row in result.tables["inventory"]]
     assert features == [feature.feature for feature in read(PATHS[name]).features]
-    forces = [
-        f"no forces of {what}" for what in ("fluid and tendons", "actuators", "constraints and contacts")
-    ]
+    forces = [f"no forces of {what}" for what in SWITCHED_OFF]
     assert [check.quantity for check in result.checks if check.scene == "random states"] == forces
 
 

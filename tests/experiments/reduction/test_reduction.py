@@ -25,6 +25,8 @@ from compare.truth.smallest import needed, reduced
 FALLS = """<mujoco><worldbody><body name="base"><freejoint name="base"/><geom type="box" size="0.1 0.1 0.05" mass="2"/>
 <body pos="0.1 0 0"><joint name="hip" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0.1 0 -0.3" size="0.02"/></body>
 </body></worldbody></mujoco>"""
+ORDERS = {4.149: True, 4.151: False, 3.851: True, 3.849: False}
+FALLING = [([2.0**order * 1e-8, 1e-8, 9e-12, 8e-12], [passes]) for order, passes in ORDERS.items()]
 
 
 def failed(result) -> list[str]:
@@ -197,10 +199,6 @@ def test_the_smallest_model_is_judged_while_the_band_is_narrow(apart, width, req
     deviation = Deviation(Coordinates(("alpha", "gamma")), t, off, band)
     found = verdicts(needs.check_smaller, "zero, free", deviation, required)
     assert found == {"smallest model to whole": within, "time judged": long_enough}
-
-
-ORDERS = {4.149: True, 4.151: False, 3.851: True, 3.849: False}
-FALLING = [([2.0**order * 1e-8, 1e-8, 9e-12, 8e-12], [passes]) for order, passes in ORDERS.items()]
 
 
 @pytest.mark.parametrize("errors, passed", [  # each of half the step of the last; those below 1e-11 rad are rounding

@@ -75,12 +75,10 @@ def level(difference, bar):
 
 
 @pytest.mark.parametrize("off, bar", [(0.999, 1.0), (1.001, 1.0), (np.nan, 1.0), (0.0, 0.0), (1e-300, 0.0)])
-@pytest.mark.parametrize(
-    "place, name, unit", [(0, "lift", "m"), (3, "head z", "rad"), (5, "head x", "rad/s")]
-)
-def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(place, name, unit, off, bar):
+@pytest.mark.parametrize("at, name, unit", [(0, "lift", "m"), (3, "head z", "rad"), (5, "head x", "rad/s")])
+def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(at, name, unit, off, bar):
     differences = np.zeros((3, 8))
-    differences[1, place] = off
+    differences[1, at] = off
     check, row = level(differences, bar)
     assert check.passed is (off in (0.999, 0.0)) and row.worst_difference == check.value
     if bar:
