@@ -7,18 +7,17 @@ import types
 import numpy as np
 import pytest
 import sympy
+from edited import setup_of_file
 from models import PATHS
 from sympy.physics.mechanics import dynamicsymbols
 
 import tmt
-from compare.engines.mujoco import read
 from compare.engines.own import METHOD_NAMES, QUANTITIES, Own, OwnEquations, OwnError
 from compare.engines.own.functions import same
 from compare.engines.tmt import Tmt
 from compare.process.interrupt import Now
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
-from compare.robots.file import robot_of
 
 COORDINATES = ARM.coordinates
 TWO = Coordinates(("hip", "knee"))
@@ -225,9 +224,8 @@ def test_a_case_changes_own_equations_as_it_changes_the_others(changes, rng):
 
 
 def test_it_runs_by_the_same_rk4_as_tmt_balls_too(rng):
-    reading = read(PATHS["pendulum_ball"])
-    robot = robot_of(reading, "a ball")
-    equations = OwnEquations(reading.tree, robot.coordinates, tree=reading.tree)
+    robot = setup_of_file(PATHS["pendulum_ball"]).robot
+    equations = OwnEquations(robot.tree, robot.coordinates, tree=robot.tree)
     own = Own(equations, ("rk4_mean_speed",)).of(robot.case())
     start = robot.coordinates.random(rng, 2), *rng.normal(size=(2, 2, robot.coordinates.nv))
     for method in ("rk4", "rk4_mean_speed"):

@@ -20,7 +20,6 @@ from compare.robots.case import Coordinates
 from compare.truth.reference import reference
 
 LIFT_AND_HEAD = Coordinates(("lift", "head"), ("slide", "ball"))  # four movements, and four speeds
-BY_ENGINE = pytest.mark.parametrize("engine, label", [("tmt", "TMT"), ("mujoco", "MuJoCo")])
 NARROW, AT_ONCE = np.full(11, 0.999e-3), np.array([0.0, 1e-9, *[np.inf] * 9])
 
 
@@ -137,7 +136,7 @@ def test_an_error_of_more_than_a_hundred_times_the_difference_is_far(error, far)
     assert true_motion.difference_while_judged(run) == pytest.approx(0.005)
 
 
-@BY_ENGINE
+@pytest.mark.parametrize("engine, label", [("tmt", "TMT"), ("mujoco", "MuJoCo")])
 @pytest.mark.parametrize("order, passes", [(0.851, True), (0.849, False), (1.3, True)])
 def test_the_drift_of_energy_falls_at_least_at_the_order(engine, label, order, passes):
     drifts = {"tmt": [4.0, 2.0], "mujoco": [4.0, 2.0]} | {engine: [2.0**order, 1.0]}
