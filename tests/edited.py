@@ -47,6 +47,12 @@ def setup_between(text: str, edited: str | None = None, states: int = 30, exact_
     return Setup(robot, engines(engine), states=states, exact_states=exact_states, size="small")
 
 
+def setup_of_file(source, make=Setup.small, **fields) -> Setup:
+    """What an experiment needs of the robot of a file or text."""
+    found = reading.read(source)
+    return make(robot_of(found, "robot.xml"), engines(reading.engine(found)), reading=found, **fields)
+
+
 def untimed_speed(setup: Setup) -> Result:
     """What speed judges in its regular scene, without times."""
     return speed.judged(setup, [runs.scene_runs(settings.regular_of(setup.robot), setup.engines, setup.size)])

@@ -23,7 +23,6 @@ URDF = """<robot name="r"><link name="base"/><link name="b"><inertial><origin xy
 
 
 def mjcf(content: str = PLAIN, before: str = "", after: str = "") -> str:
-    """MJCF text of bodies, with something before and after them."""
     return f"<mujoco>{before}<worldbody>{content}</worldbody>{after}</mujoco>"
 
 
@@ -40,7 +39,7 @@ def assert_the_same(dynamics, tree, rng, states=3):
     """Every quantity of MuJoCo and tmt within 64 eps of the scale of what is summed."""
 
     def same(found, expected, scale):
-        assert np.abs(np.asarray(found) - expected).max() <= 64 * EPS * scale
+        assert np.abs(np.subtract(found, expected)).max() <= 64 * EPS * scale
 
     for _ in range(states):
         q, v, tau = random_state(rng, tree)
@@ -55,12 +54,10 @@ def assert_the_same(dynamics, tree, rng, states=3):
         same(dynamics.acceleration(q, v, tau), tmt.acceleration(q, v, tau, tree), of_solution)
         same(dynamics.com_positions(q), tmt.com_positions(q, tree), reach)
         same(dynamics.angular_velocities(q, v), tmt.angular_velocities(q, v, tree), np.abs(v).sum())
-        for found, value in zip(dynamics.jacobians(q), tmt.jacobians(q, tree)):
-            same(found, value, reach)
-        for found, value in zip(dynamics.convective_terms(q, v), tmt.convective_terms(q, v, tree)):
-            same(found, value, reach * np.abs(v).sum() ** 2)
+        same(dynamics.jacobians(q), tmt.jacobians(q, tree), reach)
+        convective = tmt.convective_terms(q, v, tree)
+        same(dynamics.convective_terms(q, v), convective, reach * np.abs(v).sum() ** 2)
         energy = force * reach + largest * (v @ v)
         same(dynamics.potential_energy(q), tmt.potential_energy(q, tree), energy)
         same(dynamics.energy(q, v), tmt.energy(q, v, tree), energy)
-        for forces in dynamics.other_forces(q, v).values():
-            same(forces, 0.0, force)
+        same([*dynamics.other_forces(q, v).values()], 0.0, force)

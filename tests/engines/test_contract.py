@@ -35,7 +35,6 @@ FOLLOWED += [(method, "damped, weightless") for method in METHODS if method.sche
 
 
 def available(engines, name):
-    """The engine of that name; the test is left out where it cannot take part."""
     if reason := engines[name].unavailable():
         pytest.skip(reason)
     return engines[name]

@@ -1,36 +1,20 @@
-"""What drives a file's robot, read from its compiled model, and runs under it; its forces are in truth/test_servos.py."""
+"""What drives a file's robot, read from its compiled model, and runs under it, of each law the same in both engines."""
 
 import mujoco
 import numpy as np
 import pytest
+from edited import setup_of_file
 from files import TENDON, TWO, mjcf
+from models import PATHS
 from servo_models import FILTERED, hinge, posture_of
 
 import tmt
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting, add_armature
+from compare.engines.tmt import Tmt
 from compare.experiments.stability.servos.predicted import acting_at
 
 SITES = TWO.replace("<geom", '<site name="s" pos="0.1 0 0"/><geom', 1)
-
-
-def text_of(actuators='<motor joint="k"/>', tendon="", content=TWO, before="", keys=""):
-    return mjcf(content, before, TENDON.format(tendon) + f"<actuator>{actuators}</actuator>{keys}")
-
-
-def drive_of(*args, **more):
-    return read(text_of(*args, **more)).drive
-
-
-def since(text):
-    """The text, or a skip where the installed MuJoCo does not have it."""
-    try:
-        mujoco.MjModel.from_xml_string(text)
-    except ValueError as error:
-        pytest.skip(f"not in this MuJoCo: {' '.join(str(error).split())}")
-    return text
-
-
 REFUSED = {  # actuator, and a word of why it takes no part
     '<muscle joint="k" lengthrange="0 1"/>': "muscle", '<general joint="k" dyntype="user"/>': "user",
     '<general joint="k" gaintype="user" biastype="user"/>': "user",
@@ -40,12 +24,51 @@ REFUSED = {  # actuator, and a word of why it takes no part
     '<general joint="k" damping="1 2"/>': "damping", '<general tendon="t" damping="1"/>': "damping",
     '<pid joint="k" kp="3" ki="1"/>': "pid", '<orientation site="s" refsite="s" kp="1"/>': "so3",
 }  # fmt: skip
+KEYS = '<keyframe><key name="plain" qpos="0.1 0"/><key name="home" qpos="0.2 0" {}/></keyframe>'
+PLAIN = '<position joint="j" kp="5"/><motor joint="k"/>'
+KEPT = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
+CLOSE = 1e-13  # of the largest speed, or of 1 rad or m
+MODEL = """
+<mujoco><compiler angle="radian"/><option timestep="0.002" integrator="implicitfast" solver="PGS" iterations="1"/>
+  <worldbody><body><geom size=".1" mass="1" pos="0.1 0 0.2"/>
+    <joint name="a" axis="0 1 0" damping="0.3" armature="0.01" ref="0.2" actuatorfrcrange="-0.1 0.1"/>
+    <body pos="0 0 .3"><geom size=".1" mass=".5" pos="0 .1 .2"/>
+      <joint name="b" axis="1 0 0" stiffness="5" springref="0.3" range="-0.01 0.01"/></body>
+    <body pos="0 .3 0"><geom size=".1" mass=".7"/>
+      <joint name="c" type="slide" axis="1 0 0"/><joint name="d" type="slide" axis="0 1 0"/></body></body></worldbody>
+  <tendon><fixed name="across"><joint joint="b" coef="0.5"/><joint joint="c" coef="-0.7"/></fixed>
+    <fixed name="along"><joint joint="c" coef="0.5"/><joint joint="d" coef="-0.7"/></fixed></tendon>
+  <actuator>{}</actuator><keyframe><key name="start" qpos="0.1 0.2 0.05 0.02" {}/></keyframe></mujoco>
+"""
+MUSCLE = '<muscle joint="a" ctrlrange="0 1" lengthrange="0 1"/><position joint="b" kp="30" kv="1"/>'
+AFFINE = '<general joint="a" gaintype="affine" gainprm="20 3 -4" biastype="affine" biasprm="0.3 -20 -3"/>'
+PUSHING = '<general joint="a" gainprm="20" biastype="affine" biasprm="0 20 -3"/><position joint="b" kp="9"/>'
+LAWS = {  # actuators, what the keyframe states, and how many take part
+    "gears": ('<position joint="a" kp="50" kv="4" gear="3"/><velocity joint="b" kv="2" gear="-2"/>', 'ctrl="0.3 0.5"', 2),
+    "clamps": ('<position joint="a" kp="50" kv="4" ctrlrange="-0.1 0.1" forcerange="-1 1"/>', "", 1),
+    "the law in full": (AFFINE, 'ctrl="0.3"', 1), "a muscle beside": (MUSCLE, 'ctrl="0.7 0.1"', 1),
+    "a filter": ('<position joint="a" kp="50" kv="4" timeconst="0.03"/><motor joint="c"/>', 'ctrl="0.3 2"', 2),
+    "an integrator": ('<intvelocity joint="a" kp="50" kv="4" actrange="-1 1"/>', 'act="0.3"', 1),
+    "a damper": ('<damper joint="a" kv="3" ctrlrange="0 1"/><position joint="b" kp="30"/>', 'ctrl="0.7 0.1"', 2),
+    "tendons": ('<position tendon="across" kp="50" kv="14"/><position tendon="along" kp="50" kv="14" group="1"/>', "", 2),
+    "one that pushes away beside": (PUSHING, "", 1),
+}  # fmt: skip
+
+
+def text_of(actuators='<motor joint="k"/>', tendon="", content=TWO, keys=""):
+    """MJCF text, or a skip where the installed MuJoCo does not have what stands in it."""
+    text = mjcf(content, after=TENDON.format(tendon) + f"<actuator>{actuators}</actuator>{keys}")
+    try:
+        mujoco.MjModel.from_xml_string(text)
+    except ValueError as error:
+        pytest.skip(f"not in this MuJoCo: {' '.join(str(error).split())}")
+    return text
 
 
 @pytest.mark.parametrize("text", REFUSED)
 def test_a_law_that_is_not_known_is_refused_by_name_and_the_rest_is_done(text):
     more = text.replace(" ", ' name="x" ', 1)
-    drive = read(since(text_of('<position name="p" joint="j" kp="5"/>' + more, content=SITES))).drive
+    drive = read(text_of('<position name="p" joint="j" kp="5"/>' + more, content=SITES)).drive
     assert drive.refused.keys() == {"x"} and REFUSED[text] in drive.refused["x"]
     assert [one.name for one in drive.actuators if one.is_servo] == ["p"]
 
@@ -53,14 +76,9 @@ def test_a_law_that_is_not_known_is_refused_by_name_and_the_rest_is_done(text):
 @pytest.mark.parametrize("what", ["stiffness", "damping"])
 def test_springs_and_dampers_that_are_not_linear_are_named(what):
     joint, tendon = TWO.replace('name="j"', f'name="j" {what}="1 2"'), f'{what}="1 2"'
-    drive = read(since(text_of(tendon=tendon, content=joint))).drive
+    drive = read(text_of(tendon=tendon, content=joint)).drive
     assert drive.refused.keys() == {"joint j", "tendon t"}
     assert all(what in why for why in drive.refused.values())
-
-
-KEYS = '<keyframe><key name="plain" qpos="0.1 0"/><key name="home" qpos="0.2 0" {}/></keyframe>'
-PLAIN = '<position joint="j" kp="5"/><motor joint="k"/>'
-KEPT = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
 
 
 @pytest.mark.parametrize("actuators, key, expected", [
@@ -69,7 +87,7 @@ KEPT = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntyp
     (KEPT, 'act="0.3 0.2"', (0.3, None)),
 ])  # fmt: skip
 def test_a_keyframe_states_controls_activations_or_neither(actuators, key, expected):
-    controls = drive_of(actuators, keys=KEYS.format(key)).controls
+    controls = read(text_of(actuators, keys=KEYS.format(key))).drive.controls
     assert controls.get("home") == expected and "plain" not in controls
 
 
@@ -93,7 +111,7 @@ def test_armature_is_added_to_bodies_whose_inertia_never_changes():
 def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
     before = '<orientation site="s" refsite="s" kp="1"/>'
     motor = '<motor joint="j" gear="3" armature="0.1"/><position tendon="t" kp="2" gear="5"/>'
-    text = since(text_of(before + motor, content=SITES))
+    text = text_of(before + motor, content=SITES)
     reading, model = read(text), mujoco.MjModel.from_xml_string(text)
     assert [one.moment for one in reading.drive.actuators[1:]] == [(3.0, 0.0), (5.0, 10.0)]
     assert tmt.mass_matrix(np.zeros(2), reading.tree) == pytest.approx(mass_matrix(model))
@@ -115,3 +133,33 @@ def test_a_run_in_parts_is_the_run_that_steps_make(integrator):
     for found in np.concatenate(parts):
         mujoco.mj_step(model, data)
         assert found == pytest.approx([data.qpos[0] - at.q[0], data.act[0] - 0.4], rel=1e-12)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_every_law_is_the_same_in_both(name):
+    """All integrators on a file: trajectory/test_trajectory_wrong_schemes.py."""
+    *content, count = LAWS[name]
+    setup = setup_of_file(MODEL.format(*content))
+    robot, known = setup.robot, setup.engines["mujoco"]
+    case = robot.case("step", posture="start", torque="servos", targets=(3.0, 3.0, 0.02, 0.02))  # deg, m
+    assert sum(u is not None for u in case.controller.controls) == count
+    integrators = {"discrete", "implicit", "implicitfast"} if name == "tendons" else {"implicitfast"}
+    start = case.q, np.random.default_rng(1).normal(size=len(case.v)) * 0.1, case.tau, 1e-3, 20
+    for integrator in integrators & known.methods_in(case).keys():
+        theirs, ours = known.of(case).run(*start, integrator), Tmt().of(case).run(*start, integrator)
+        assert np.abs(theirs.q - ours.q).max() < CLOSE
+        assert np.abs(theirs.v - ours.v).max() < CLOSE * np.abs(ours.v).max()
+
+
+def test_actuators_act_in_their_own_scene_alone():
+    setup = setup_of_file(PATHS["gripper"])
+    robot, known = setup.robot, setup.engines["mujoco"]
+    case = robot.case("servos", posture="open", torque="servos", targets=(6.0, 6.0, 0.02, 0.02))
+    plain = robot.case("plain", posture="open")
+    assert known.methods_in(plain) == known.methods and Tmt().methods_in(plain).keys() == Tmt().methods.keys()
+    assert "implicitfast" in Tmt().methods_in(case) and "implicitfast" not in Tmt().methods
+    for one in (plain, case, plain):  # each keeps its own model
+        dynamics, ours = known.of(one), Tmt().of(one)
+        wanted = case.tau - np.array(case.tree.position_gain) @ case.q if one is case else 0.0
+        assert np.allclose(dynamics.other_forces(one.q, one.v)["actuators"], wanted, atol=1e-12)
+        assert np.allclose(dynamics.acceleration(*one.start, one.tau), ours.acceleration(*one.start, one.tau))

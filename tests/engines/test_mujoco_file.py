@@ -1,5 +1,6 @@
-"""From a file to MuJoCo: what is refused in one line, whose names and frames count, and what is left out of the model."""
+"""From a file to MuJoCo: what is refused, whose names and frames count, what is left out, and what is said of all that."""
 
+import os
 import pickle
 
 import mujoco
@@ -8,16 +9,18 @@ import pytest
 from crane import TREE
 from crane import XML as CRANE
 from edited import XML
+from files import PLAIN, TENDON, TWO, mjcf
+from runs import posix
 
+import compare
+from compare.core.text import say
 from compare.engines.mujoco import ModelError, Source, load, parse, read
 from compare.engines.mujoco.parameters import parameters
+from compare.engines.mujoco.remarks import remarks
 from compare.robots.arm import ARM
 
 JOINTS = 'name="gamma" type="hinge"'
-NUMBERS = [f"body_{name}" for name in ("mass", "inertia", "pos", "quat", "ipos", "iquat")] + [
-    "dof_M0",
-    "jnt_axis",
-]
+FIELDS = [f"body_{name}" for name in ("mass", "inertia", "pos", "quat", "ipos", "iquat")]
 PIXELS = 3000  # of a texture's edges: 27 MB
 STATED = '<inertial pos="0.1 0.2 0.3" mass="7" diaginertia="1 1.1 1.2"/>'
 SHAPE = '<geom type="capsule" size="0.1 0.2" pos="0.1 0.02 0.3"/>'
@@ -28,6 +31,32 @@ BODIES = f"""<worldbody><geom type="plane" size="1 1 1" material="m"/>
 <sensor><rangefinder site="s"/></sensor>"""
 ASSETS = f"""<asset><texture name="t" type="2d" builtin="flat" width="{PIXELS}" height="{PIXELS}"/>
 <material name="m" texture="t"/></asset>"""
+ALONG = '<actuator><general name="a" tendon="t" armature="1"/></actuator>'
+BALL = '<body><joint type="ball" name="w"/><geom size="0.1"/><body><joint name="w x"/><geom size="0.1"/></body></body>'
+REFUSED = {  # a word of why, and the file
+    "tendon 't'": mjcf(TWO, after=TENDON.format('armature="1"')),
+    "actuator 'a'": mjcf(TWO, after=TENDON.format("") + ALONG),
+    "flex 'soft'": mjcf(PLAIN + '<flexcomp name="soft" type="grid" count="2 2 2" spacing=".1 .1 .1" dim="3" mass="1">'
+                         '<elasticity young="1e3"/></flexcomp>'),
+    "mass": mjcf("<body><joint/></body>"),
+    "pos of 'far' is inf;": mjcf('<body name="far" pos="inf 0 0"><geom size="1"/></body>' + PLAIN),
+    "damping of 'j' is -1;": mjcf(PLAIN.replace('name="j"', 'name="j" damping="-1"')),
+    "gainprm of 's'": mjcf(after='<actuator><position name="s" joint="j" kp="nan"/></actuator>'),
+    "together": mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")), "'w x'": mjcf(BALL),
+    "MJCF": "hello", "1,002 speeds": mjcf("<body><freejoint/><geom size='1'/></body>" * 167),
+}  # fmt: skip
+NUMBERS = """<mujoco><option timestep="{timestep}" gravity="0 0 {gravity}"/><worldbody><body name="b">
+  <joint name="j" axis="0 1 0" armature="{armature}" damping="{damping}" stiffness="{stiffness}"/>
+  <inertial pos="0 0 {com}" mass="{mass}" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+RANGES = {  # the last that is accepted and the first that is not
+    "timestep": [("1e-6", "9e-7"), ("5", "5.1"), ("0.002", "nan"), ("0.002", "0")], "gravity": [("-1e30", "-1.1e30")],
+    "armature": [("1e30", "1.1e30")], "damping": [("1e30", "1e300")], "stiffness": [("0", "-1e-300"), ("1e30", "1.1e30")],
+    "com": [("-1e30", "1.1e30")], "mass": [("1e30", "1.1e30"), ("1e30", "inf")],
+}  # fmt: skip
+BODY = '<body name="b"><joint name="j" axis="0 1 0"/><inertial pos="0.1 0 0" mass="1" diaginertia="1 1.5 2"/></body>'
+INERTIAL = '<inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+MESH = '<collision><geometry><mesh filename="{}"/></geometry></collision>'
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
 
 def edited(old, new):
@@ -58,10 +87,7 @@ def test_a_body_that_no_hinge_tells_is_found_by_its_name():
         with pytest.raises(ModelError, match=f"'{name}'"):
             parse(CRANE.replace(f'name="{name}"', 'name="other"'), TREE)
     assert parse(CRANE.replace('name="boom"', 'name="other"'), TREE).bodies == [1, 2, 4, 5, 3]
-
-
-def test_bodies_whose_hinges_have_exchanged_their_names():
-    """The forearm is one of the arm's bodies: no other has mass."""
+    # hinges that have exchanged their names: the forearm is one of the arm's bodies, no other has mass
     exchanged = XML.replace('"alpha"', '"x"').replace('"gamma"', '"alpha"').replace('"x"', '"gamma"')
     assert parse(exchanged, ARM.tree).bodies == [1, 2]
 
@@ -91,7 +117,7 @@ def test_what_is_taken_out_changes_no_number_of_the_motion(compiler, option):
     complete.compiler.fusestatic = False
     whole = complete.compile()
     for lighter in (source.model, source.without({}, bare=True)):
-        for name in NUMBERS:
+        for name in (*FIELDS, "dof_M0", "jnt_axis"):
             assert np.array_equal(getattr(whole, name), getattr(lighter, name)), name
 
 
@@ -101,3 +127,100 @@ def test_the_model_that_is_read_is_small_and_has_its_contacts():
     assert mujoco.mj_sizeModel(mujoco.MjModel.from_xml_string(text)) > 3 * PIXELS**2
     assert mujoco.mj_sizeModel(reading.model) < 1e5 and len(pickle.dumps(reading)) < 2e5
     assert reading.model.ngeom == 5
+
+
+@pytest.mark.parametrize("why", REFUSED)
+def test_what_cannot_be_compared_is_refused_in_one_line(why, capfd):
+    with pytest.raises(ModelError, match=why) as error:
+        read(REFUSED[why])
+    assert "\n" not in str(error.value) and capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("why, content", [
+    ("No such file", None), ("gone.xml", b"<mujoco><include file='gone.xml'/></mujoco>"),
+    ("has names that are not UTF-8", mjcf(PLAIN.replace('"j"', '"h\xfcft"')).encode("latin-1")),
+])  # fmt: skip
+def test_a_file_that_cannot_be_read_is_named_in_one_line(why, content, tmp_path):
+    path = tmp_path / "robot.xml"
+    if content:
+        path.write_bytes(content)
+    with pytest.raises(ModelError, match=rf"robot\.xml.*{why}") as error:
+        read(path)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name, inside, outside", [(name, *pair) for name in RANGES for pair in RANGES[name]])
+def test_numbers_beyond_the_range_that_is_judged_are_refused_with_the_number(name, inside, outside):
+    good = dict.fromkeys(RANGES, "1")
+    assert read(NUMBERS.format(**good | {name: inside})).tree
+    reading = read(NUMBERS.format(**good))
+    for act in (read, lambda source: parse(source, reading.tree)):
+        with pytest.raises(ModelError, match=rf" is {float(outside):g}.*; expected from".replace("+", r"\+")):
+            act(NUMBERS.format(**good | {name: outside}))
+
+
+@posix
+@pytest.mark.parametrize("text", [
+    "", "<mujoco><include file='pipe.stl'/></mujoco>",
+    "<mujoco><compiler meshdir='sub'/><asset><mesh name='m' file='a/pipe.stl'/></asset></mujoco>",
+    "<mujoco><include file='sub/part.xml'/></mujoco>",
+])  # fmt: skip
+def test_a_pipe_is_never_waited_for(text, tmp_path):
+    (tmp_path / "sub" / "a").mkdir(parents=True)
+    for place in (tmp_path, tmp_path / "sub", tmp_path / "sub" / "a"):
+        os.mkfifo(place / "pipe.stl")
+    part = "<mujoco><asset><hfield name='h' file='pipe.stl'/></asset></mujoco>"
+    (tmp_path / "sub" / "part.xml").write_text(part)
+    (path := tmp_path / "robot.xml").write_text(text)
+    with pytest.raises(ModelError, match=r"pipe\.stl is a pipe"):
+        read(path if text else tmp_path / "pipe.stl")
+
+
+def urdf(base: str, kind: str = "continuous", inertial: str = "", mesh: str = "") -> str:
+    links = f'<link name="{base}">{inertial}</link><link name="rod">{INERTIAL}{mesh}</link>'
+    joint = f'<parent link="{base}"/><child link="rod"/><axis xyz="0 0 1"/>'
+    return f'<robot name="r">{links}<joint name="j" type="{kind}">{joint}</joint></robot>'
+
+
+def said(source) -> dict:
+    found = remarks(read(source), True)
+    assert all(map(say, found))
+    return {one.kind: one.values for one in found}
+
+
+def test_what_is_off_or_changed_is_said_where_equations_differ_and_nothing_where_they_agree():
+    text = mjcf(BODY.replace('name="b"', 'name="b" gravcomp="1"'))
+    assert list(said(text)) == ["switched_off"] and said(mjcf(BODY)) == {}
+    key = mjcf(BODY).replace("</mujoco>", '<keyframe><key name="k" qpos="nan"/></keyframe></mujoco>')
+    assert [one.feature for one in said(key)["switched_off"]["features"]] == ["unusable keyframe"]
+    total = said(mjcf(BODY, '<compiler settotalmass="3"/>'))
+    assert total["changed"] == {"why": "settotalmass", "places": {"mass": ["b"], "inertia": ["b"]}}
+    compare.assert_agrees(text, mass_matrix=[[[1.51]]], q=[[0.3]])
+    with pytest.raises(AssertionError, match="gravcomp"):
+        compare.assert_agrees(text, gravity=[[0.0]], q=[[0.3]])
+
+
+@pytest.mark.parametrize("base, kind, inertial, joints, fixed", [
+    ("trunk", "continuous", INERTIAL, 1, {"link": "trunk", "mass": 2.0}), ("trunk", "continuous", "", 1, None),
+    ("world", "floating", INERTIAL, 4, None), ("trunk", "floating", "", 4, None), ("trunk", "planar", "", 3, None),
+])  # fmt: skip
+def test_a_base_that_no_joint_frees_is_said_to_be_fixed(base, kind, inertial, joints, fixed, tmp_path):
+    (tmp_path / "r.urdf").write_text(urdf(base, kind, inertial))
+    assert len(read(tmp_path / "r.urdf").tree.joint_names) == joints
+    assert said(tmp_path / "r.urdf").get("fixed_base") == fixed
+
+
+@pytest.mark.parametrize("folder, place", [
+    ("robot/urdf", "robot/meshes/a.obj"), (".", "robot/meshes/a.obj"), ("mine", "mine/a.obj"), ("robot/urdf", "a.obj"),
+])  # fmt: skip
+def test_a_mesh_of_a_package_is_found_above_the_file_or_beside_it(folder, place, tmp_path):
+    file = tmp_path / folder / "r.urdf"
+    robot = urdf("base", mesh=MESH.format("package://robot/meshes/a.obj"))
+    for path, text in ((file, robot), (tmp_path / place, TETRAHEDRON)):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    if place != "a.obj":
+        assert read(file).model.nmesh == 1
+        return
+    with pytest.raises(ModelError, match=r"^[^\n]*NAME beside the file[^\n]*$"):
+        read(file)

@@ -1,4 +1,4 @@
-"""A file read as a Tree: MuJoCo and tmt have the same numbers, also with joints locked, and what differs is listed."""
+"""A file read as a Tree: both engines have the same numbers, also with joints locked; what is listed; what a file states."""
 
 from dataclasses import replace
 
@@ -11,14 +11,60 @@ from hypothesis import strategies as st
 from models import KINDS, PATHS, gymnasium_files, random_tree
 from trees import random_state
 
-from compare.engines.mujoco import ModelError, engine, read
+from compare.engines.mujoco import ModelError, Source, engine, read
 from compare.engines.mujoco.inventory import REASONS
 from compare.engines.mujoco.parameters import stated_numbers
+from compare.judge.scale import EPS
 
 FEW = ("ant.xml", "humanoid.xml", "reacher.xml", "swimmer.xml")
 PUBLISHED = [
     pytest.param(path, marks=[pytest.mark.slow] * (path.name not in FEW)) for path in gymnasium_files()
 ]
+SOME_KINDS = st.lists(st.sampled_from(KINDS), min_size=1, max_size=3, unique=True)
+POINT = '<body name="point" pos="0.5 0 0"><inertial pos="0 0 0.1" mass="2" diaginertia="0 0 0"/></body>'
+SHEET = '<flexcomp name="f" type="grid" count="2 2 1" spacing=".1 .1 .1" dim="2" mass="1" rigid="true"/>'
+FIELDS = {"gravity": "gravity", "damper": "damping", "spring": "stiffness"}  # of the Tree, by the flag
+OF_MIXED = [*KINDS, "armature", "damping", "spring", "limit", "clamp", "actuator", "keyframe"]
+LIGHT = PLAIN.replace('name="b"', 'name="b" gravcomp="1"').replace('name="j"', 'name="j" axis="0 1 0"')
+MOTORS = '<actuator><motor name="a" joint="j"/><motor name="b" joint="j" forcerange="-1 1"/></actuator>'
+EQUALITIES = '<equality><weld body1="c"/><joint joint1="j" joint2="k" active="false"/></equality>'
+MORE = {  # feature: file, names
+    "contact": (mjcf(PLAIN + '<geom name="floor" type="plane" size="1 1 1"/>'), ("floor", "g")),
+    "armature": (mjcf(after='<actuator><general name="a" joint="j" gear="2" armature="1"/></actuator>'), ("a",)),
+    "frictionloss": (mjcf(PLAIN.replace('name="j"', 'name="j" frictionloss="1"')), ("j",)),
+    "clamp": (mjcf(PLAIN.replace('name="j"', 'name="j" actuatorfrcrange="-1 1"'), after=MOTORS), ("b", "j")),
+    "fluid": (mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'), ("density", "viscosity")),
+    "gravcomp": (mjcf(LIGHT), ("b",)), "equality": (mjcf(TWO, after=EQUALITIES), ("equality 0",)),
+    "unusable keyframe": (mjcf(after='<keyframe><key name="up" qpos="inf"/><key qpos="1"/></keyframe>'), ("up",)),
+    "tendon": (mjcf(TWO, after=TENDON.format('stiffness="9" damping="3" springlength="0.3" range="0 1"')), ("t",)),
+}  # fmt: skip
+OTHERS = {  # what is listed as other: a joint and an option of the file, and the joint of a file without
+    "dof_dampingpoly of j": ('damping="1 2 3"', "", 'damping="1"'),
+    "jnt_springyield of j": ('stiffness="10" springyield="0.1"', "", 'stiffness="10"'),
+    "flag eulerdamp": ('damping="1"', '<option><flag eulerdamp="disable"/></option>', 'damping="1"'),
+    "flag invdiscrete": ("", '<option><flag invdiscrete="enable" energy="enable"/></option>', ""),
+}
+SMALL = 1e-14  # relative; of a tensor up to MuJoCo 3.10: its principal moments are found to about 1e-6
+DIGITS = {"inertia": 1e-6}
+FRAMES = """<frame pos="0.1 0.2 0.3" euler="10 20 30"><body name="b" pos="1 2 3" euler="40 50 60">
+<inertial pos="0.2 0 0.1" mass="1" diaginertia="0.02 0.03 0.04" euler="10 20 30"/>
+<frame pos="0.3 0 0" euler="0 90 0"><joint name="j" axis="1 2 0" pos="0.1 0.2 0.3" damping="2" stiffness="3"/></frame>
+</body></frame>"""
+INERTIAL = """<body name="b"><frame pos="0.1 0.2 0.3" euler="10 20 30"><frame pos="0.3 0 0" euler="0 90 0">
+<joint name="j" damping="2" stiffness="3"/>
+<inertial pos="0.2 0 0.1" mass="1" fullinertia="0.02 0.03 0.04 0.001 0.002 0.003"/></frame></frame></body>"""
+TURNED = pytest.mark.skipif(mujoco.mj_version() < 4_000_000, reason="MuJoCo 3.10 leaves out the rpy")
+SOURCES = [PATHS["mixed"], mjcf(FRAMES, '<compiler eulerseq="zyx"/>'), mjcf(INERTIAL), mjcf()]
+SOURCES += [pytest.param(URDF, marks=TURNED)]
+BODY = '<body name="b"><joint name="j"/><inertial pos="0.1 0 0" mass="1" diaginertia="{}"/>{}</body>'
+OPTIONS = {  # the quantities that it changes: of a file with these principal moments and something in its body
+    'boundmass="2"': ({"mass"}, "1 1 1", ""), 'boundinertia="1.9"': ({"inertia"}, "1 1.5 2", ""),
+    'balanceinertia="true"': ({"inertia"}, "1 1 3", ""), 'settotalmass="3"': ({"mass", "inertia"}, "1 1 1", ""),
+    'inertiafromgeom="true"': ({"mass", "com", "inertia"}, "1 1 1", '<geom size="0.1" pos="0 0.2 0"/>'),
+    'springdamper="1 0.5"': ({"damping", "stiffness"}, "1 1 1", ""), 'boundmass="0.5"': (set(), "1 1.5 2", ""),
+    'boundinertia="0.5"': (set(), "1 1.5 2", ""), 'settotalmass="1"': (set(), "1 1.5 2", ""),
+    'balanceinertia="true" settotalmass="1"': (set(), "1 1.5 2", ""),
+}  # fmt: skip
 
 
 def compared(source, rng, states=2):
@@ -52,9 +98,6 @@ def test_a_file_with_every_kind_of_joint():
     assert [f.feature for f in reading.features] == OF_MIXED
 
 
-SOME_KINDS = st.lists(st.sampled_from(KINDS), min_size=1, max_size=3, unique=True)
-
-
 @settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), SOME_KINDS, st.integers(3, 6))
 def test_a_random_tree_is_the_same_in_both(seed, kinds, joints):
@@ -68,10 +111,10 @@ def test_a_file_is_the_same_in_both_and_a_change_of_the_case_reaches_mujoco(sour
     assert_the_same(engine(reading).of(case_of(tree, damping=0.4, gravity=False)), tree, rng, states=1)
 
 
-def test_a_point_mass_that_is_fixed_to_a_body_counts(rng):
-    point = '<body name="point" pos="0.5 0 0"><inertial pos="0 0 0.1" mass="2" diaginertia="0 0 0"/></body>'
-    reading = compared(mjcf(PLAIN.replace("</body>", f"{point}</body>")), rng)
-    assert reading.tree.body_names == ("b", "point") and reading.tree.mass[1] == 2.0
+@pytest.mark.parametrize("part, bodies", [(POINT, {"b", "point"}), (SHEET, {"b"})], ids=["point", "flex"])
+def test_a_fixed_point_mass_counts_and_a_rigid_flex_does_not(part, bodies, rng):
+    tree = compared(mjcf(PLAIN.replace("</body>", f"{part}</body>")), rng).tree
+    assert {*tree.body_names} == bodies and tree.mass[1:] in ((), (2.0,))
 
 
 @pytest.mark.parametrize("path", PUBLISHED, ids=lambda path: path.name)
@@ -83,38 +126,14 @@ def test_a_published_file_is_the_same_in_both_and_with_joints_locked(path, rng):
             assert np.allclose(row.stated, row.compiled, rtol=1e-6, atol=1e-12), row
 
 
-@pytest.mark.parametrize(
-    "flag, field", [("gravity", "gravity"), ("damper", "damping"), ("spring", "stiffness")]
-)
-def test_a_flag_of_the_file_counts(flag, field, rng):
+@pytest.mark.parametrize("flag", FIELDS)
+def test_a_flag_of_the_file_counts(flag, rng):
     text = PLAIN.replace('<joint name="j"/>', '<joint name="j" damping="1" stiffness="3"/>')
     reading = compared(mjcf(text, f'<option><flag {flag}="disable"/></option>'), rng)
-    assert not any(getattr(reading.tree, field))
+    assert not any(getattr(reading.tree, FIELDS[flag]))
     # damping that a scene adds acts all the same
     damped = replace(reading.tree, damping=np.add(reading.tree.damping, 0.5))
     assert_the_same(engine(reading).of(case_of(damped, damping=0.5)), damped, rng)
-
-
-OF_MIXED = [*KINDS, "armature", "damping", "spring", "limit", "clamp", "actuator", "keyframe"]
-LIGHT = PLAIN.replace('name="b"', 'name="b" gravcomp="1"').replace('name="j"', 'name="j" axis="0 1 0"')
-MORE = {  # feature: file, names
-    "contact": (mjcf(PLAIN + '<geom name="floor" type="plane" size="1 1 1"/>'), ("floor", "g")),
-    "armature": (mjcf(after='<actuator><general name="a" joint="j" gear="2" armature="1"/></actuator>'), ("a",)),
-    "frictionloss": (mjcf(PLAIN.replace('name="j"', 'name="j" frictionloss="1"')), ("j",)),
-    "clamp": (
-        mjcf(PLAIN.replace('name="j"', 'name="j" actuatorfrcrange="-1 1"'),
-             after='<actuator><motor name="a" joint="j"/><motor name="b" joint="j" forcerange="-1 1"/></actuator>'),
-        ("b", "j"),
-    ),
-    "fluid": (mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'), ("density", "viscosity")),
-    "gravcomp": (mjcf(LIGHT), ("b",)),
-    "equality": (
-        mjcf(TWO, after='<equality><weld body1="c"/><joint joint1="j" joint2="k" active="false"/></equality>'),
-        ("equality 0",),
-    ),
-    "unusable keyframe": (mjcf(after='<keyframe><key name="up" qpos="inf"/><key qpos="1"/></keyframe>'), ("up",)),
-    "tendon": (mjcf(TWO, after=TENDON.format('stiffness="9" damping="3" springlength="0.3" range="0 1"')), ("t",)),
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("feature", MORE)
@@ -124,14 +143,6 @@ def test_a_feature_is_listed_and_modelled_or_switched_off(feature, rng):
     row = next(row for row in reading.features if row.feature == feature)
     assert (row.count, row.names, row.treatment) == (len(names), names, REASONS[feature][0])
     assert REASONS.keys() == {*OF_MIXED, *MORE, "other"}
-
-
-OTHERS = {  # what is listed as other: a joint and an option of the file, and the joint of a file without
-    "dof_dampingpoly of j": ('damping="1 2 3"', "", 'damping="1"'),
-    "jnt_springyield of j": ('stiffness="10" springyield="0.1"', "", 'stiffness="10"'),
-    "flag eulerdamp": ('damping="1"', '<option><flag eulerdamp="disable"/></option>', 'damping="1"'),
-    "flag invdiscrete": ("", '<option><flag invdiscrete="enable" energy="enable"/></option>', ""),
-}
 
 
 @pytest.mark.parametrize("name", OTHERS)
@@ -159,14 +170,6 @@ def test_what_has_no_name_is_called_by_its_kind_and_number_but_not_as_another():
     assert {name: q.tolist() for name, q in found.keyframes.items()} == keys
     text = mjcf(TWO.replace('name="j"', "").replace('name="k"', 'name="joint 0"'))
     assert read(text).tree.joint_names[1] == "joint 0"
-
-
-def test_a_flex_without_elasticity_is_compared(rng):
-    sheet = '<flexcomp name="f" type="grid" count="2 2 1" spacing=".1 .1 .1" dim="2" mass="1" rigid="true"/></body>'
-    assert compared(mjcf(PLAIN.replace("</body>", sheet)), rng).tree.body_names == ("b",)
-
-
-# locked joints
 
 
 @pytest.mark.parametrize("name", ["base x", "base turn", "track", "joint 2", "tail", "leg pitch"])
@@ -198,3 +201,47 @@ def test_a_free_body_aligned_with_its_inertia_is_compared_and_not_locked(rng):
     with pytest.raises(ModelError, match="free joint 'f' is aligned with the inertia of its body") as error:
         assert_locked(reading, ["f x"], rng)
     assert "\n" not in str(error.value)
+
+
+def difference(row):
+    """Of a row that states something, relative to what was compiled."""
+    return np.abs(np.subtract(row.stated, row.compiled)).max() / max(np.abs(row.compiled).max(), 1e-3)
+
+
+def rows_of(text):
+    return {(row.place, row.quantity): row for row in stated_numbers(Source(text))}
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_a_file_that_asks_for_no_change_states_what_is_compiled(source):
+    rows = rows_of(source)
+    known = {"pos", "mass", "com", "inertia", "axis", "armature", "damping", "stiffness"}
+    assert known <= {quantity for _, quantity in rows}
+    for row in rows.values():
+        if row.stated is None:
+            assert row.why == "inertia from geoms"
+        else:
+            assert difference(row) <= DIGITS.get(row.quantity, SMALL) and not row.why
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_an_option_that_asks_for_a_change_is_named_where_it_changes_something(option):
+    (quantities, *body), name = OPTIONS[option], option.split("=")[0]
+    of_joint = name == "springdamper"
+    text = BODY.format(*body).replace('name="j"', f'name="j" {option if of_joint else ""}')
+    rows = rows_of(mjcf(text, "" if of_joint else f"<compiler {option}/>"))
+    assert {row.quantity for row in rows.values() if row.why == name} == quantities
+    for row in rows.values():
+        assert row.why in ("", name) and (difference(row) > 0.1) == (row.quantity in quantities)
+
+
+def test_the_mass_of_geoms_is_stated_where_each_has_one():
+    heavy = PLAIN.replace('name="g"', 'name="g" mass="2"')
+    row = rows_of(mjcf(heavy))["b", "mass"]
+    assert (row.stated, row.compiled, row.why) == (2.0, 2.0, "")
+    assert rows_of(mjcf())["b", "mass"].stated is None
+
+
+def test_a_tensor_may_be_off_by_rounding_of_the_sum_of_its_moments():
+    row = rows_of(mjcf(BODY.format("1 1.5 2", "")))["b", "inertia"]
+    assert row.tolerance == pytest.approx(64 * EPS * 4.5)

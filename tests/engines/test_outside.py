@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import tmt
 from compare.engines import RECORDS, Setting
 from compare.engines.outside import Outside
 from compare.engines.outside.model import Unread
@@ -16,6 +17,7 @@ from compare.run.reference import compared_with
 
 ROOT = Path(__file__).parents[2]
 ENGINES = [name for name, record in RECORDS.items() if record.reads_file and not Outside(name).unavailable()]
+pytestmark = pytest.mark.parametrize("engine", ENGINES)
 ROBOTS = [ROOT / name for name in ("mjcf/arm.xml", "tests/models/arm7.xml", "tests/models/quadruped.xml")]
 BODY = '<inertial pos="{}" mass="{}" diaginertia="{}"/>'
 PENDULUM = f"""<mujoco><option gravity="0 0 -9.81"/><worldbody><body><joint name="hip" axis="0 1 0" damping="0.1"/>
@@ -41,7 +43,6 @@ def near(values, expected, engine, scale=1.0):
     return np.abs(np.subtract(values, expected)).max() <= FACTOR * RECORDS[engine].eps * scale
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 def test_a_pendulum(engine, tmp_path):
     of, _robot = dynamics(engine, PENDULUM, tmp_path)
     q, v, tau = np.array([[0.5]]), np.array([[1.5]]), np.array([[0.25]])
@@ -50,7 +51,6 @@ def test_a_pendulum(engine, tmp_path):
     assert near(of.acceleration(q, v, tau), (0.25 - 0.1 * 1.5 - moment) / inertia, engine, 100.0)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 def test_a_free_body_that_spins(engine, tmp_path):
     """Euler's equations in body axes; the linear velocity is the world's; the body is turned."""
     of, _ = dynamics_or_skip(engine, FREE_BODY, tmp_path)
@@ -64,7 +64,6 @@ def test_a_free_body_that_spins(engine, tmp_path):
     assert near(of.acceleration(q, v, tau), expected, engine, 100.0)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 def test_an_arm_of_two_links_under_an_oblique_gravity(engine, tmp_path):
     of, _ = dynamics(engine, TWO_LINKS, tmp_path)
     (a, b), (x, y) = q, v = np.array([0.4, -0.9]), np.array([1.1, -0.7])
@@ -77,7 +76,6 @@ def test_an_arm_of_two_links_under_an_oblique_gravity(engine, tmp_path):
 
 
 def dynamics_or_skip(engine, model, folder=None):
-    """Skips a test where the engine says why it cannot read the file."""
     of, robot = dynamics(engine, model, folder)
     try:
         of.reading  # noqa: B018
@@ -87,7 +85,6 @@ def dynamics_or_skip(engine, model, folder=None):
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda path: path.stem)
-@pytest.mark.parametrize("engine", ENGINES)
 def test_a_robot_against_the_exact_values(engine, robot):
     """Of doubles; a float32 engine is asked at numbers that float32 has, and its own numbers of the model are rounded."""
     of, robot = dynamics_or_skip(engine, robot)
@@ -106,7 +103,6 @@ def test_a_robot_against_the_exact_values(engine, robot):
     assert (exact.distance(of.acceleration(q, v, tau)) <= bound * size).all()
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("number", ("mass", "moments", "gravity", "armature", "damping"))
 def test_a_number_that_differs_is_named(engine, number, tmp_path):
     """A wrong number of the Tree is found in what the engine has read, where it tells; a mended one is set."""
@@ -126,13 +122,10 @@ def test_a_number_that_differs_is_named(engine, number, tmp_path):
 
 
 @pytest.mark.parametrize("damping", ["0", "0.4"])
-@pytest.mark.parametrize("engine", ENGINES)
 def test_each_integrator_falls_as_its_order_says(engine, damping, tmp_path):
     """A pendulum swings for a second: the error against a run with steps a hundred times as fine."""
     of, robot = dynamics(engine, PENDULUM.replace('damping="0.1"', f'damping="{damping}"'), tmp_path)
     start, engine = (np.array([1.0]), np.array([0.5]), np.array([0.25])), Outside(engine)
-    import tmt
-
     end = tmt.simulate(*start, 1e-4, 10_000, "dopri8", robot.tree).q[-1]
     floor = 1e-5 if engine.record.precision == "float32" else 1e-11
     for method in engine.methods.values():

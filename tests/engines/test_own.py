@@ -7,22 +7,26 @@ import types
 import numpy as np
 import pytest
 import sympy
+from edited import setup_of_file
 from models import PATHS
 from sympy.physics.mechanics import dynamicsymbols
 
 import tmt
-from compare.engines.mujoco import read
 from compare.engines.own import METHOD_NAMES, QUANTITIES, Own, OwnEquations, OwnError
 from compare.engines.own.functions import same
 from compare.engines.tmt import Tmt
 from compare.process.interrupt import Now
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
-from compare.robots.file import robot_of
 
 COORDINATES = ARM.coordinates
 TWO = Coordinates(("hip", "knee"))
 OF_TMT = {name: getattr(tmt, method) for name, method in METHOD_NAMES.items()}
+q1, q2, u1, u2 = SYMBOLS = sympy.symbols("q1 q2 u1 u2")
+M2 = sympy.Matrix([[3, sympy.cos(q2)], [sympy.cos(q2), 1]])
+h2 = sympy.Matrix([u1 * u2, sympy.sin(q2) * u1**2])
+MOVING = [*dynamicsymbols("a b"), *dynamicsymbols("a b", 1)]  # functions of time
+IN_TIME = dict(zip(SYMBOLS, MOVING))
 
 
 def single(function):
@@ -46,9 +50,6 @@ def asked(own, name, state):
 def of_one(name, function, coordinates=COORDINATES):
     """Own equations that have nothing but this function."""
     return OwnEquations({name: function}, coordinates, required=())
-
-
-# what they may be
 
 
 @pytest.mark.parametrize("source, is_batched", [
@@ -75,13 +76,6 @@ def test_a_batch_is_not_taken_where_its_values_or_its_components_are_others(rng)
     own = of_one("mass_matrix", lambda q: np.array([[3.0 + q[1], q[1]], [q[1], 1.0]]), TWO)
     assert np.array_equal(own.mass_matrix(q[:2, :2])[:, 0, 1], q[:2, 1])
     assert own.takes_batches == {"mass_matrix": False}
-
-
-q1, q2, u1, u2 = SYMBOLS = sympy.symbols("q1 q2 u1 u2")
-M2 = sympy.Matrix([[3, sympy.cos(q2)], [sympy.cos(q2), 1]])
-h2 = sympy.Matrix([u1 * u2, sympy.sin(q2) * u1**2])
-MOVING = [*dynamicsymbols("a b"), *dynamicsymbols("a b", 1)]  # functions of time
-IN_TIME = dict(zip(SYMBOLS, MOVING))
 
 
 @pytest.mark.parametrize("source", [
@@ -111,9 +105,6 @@ def test_a_value_may_have_further_axes_of_length_1_and_be_of_any_numbers(tree, f
     q, v = rng.uniform(-2.0, 2.0, (2, 7, len(tree.axis)))
     assert np.allclose(own.mass_matrix(q), tmt.mass_matrix(q, tree), rtol=1e-14, atol=1e-15)
     assert np.allclose(own.bias(q, v), tmt.bias(q, v, tree), rtol=1e-13, atol=1e-15)
-
-
-# what cannot be used
 
 
 class Called:
@@ -160,9 +151,6 @@ def test_whatever_is_raised_is_one_line_and_ctrl_c_interrupts(raised, listening,
         of_one("mass_matrix", mass_matrix).mass_matrix(states(rng)[0])
 
 
-# what can be used, with something wrong
-
-
 def raises_beyond_1(q):
     if q[0] > 1.0:
         raise ValueError("too\nfar")
@@ -207,9 +195,6 @@ def test_a_mass_matrix_that_is_not_symmetric(skew, found, rng):
     assert len(own.problems) == found and all("symmetric" in problem.text for problem in own.problems)
 
 
-# what is missing, cases and motion
-
-
 def test_what_is_missing_is_made_of_what_is_there(rng):
     springs = {"stiffness": (1.0, 0.0, 2.0), "rest": (0.1, 0.0, 0.2)}
     tree = dataclasses.replace(tmt.ARM, damping=(0.1, 0.2, 0.3), **springs)
@@ -239,9 +224,8 @@ def test_a_case_changes_own_equations_as_it_changes_the_others(changes, rng):
 
 
 def test_it_runs_by_the_same_rk4_as_tmt_balls_too(rng):
-    reading = read(PATHS["pendulum_ball"])
-    robot = robot_of(reading, "a ball")
-    equations = OwnEquations(reading.tree, robot.coordinates, tree=reading.tree)
+    robot = setup_of_file(PATHS["pendulum_ball"]).robot
+    equations = OwnEquations(robot.tree, robot.coordinates, tree=robot.tree)
     own = Own(equations, ("rk4_mean_speed",)).of(robot.case())
     start = robot.coordinates.random(rng, 2), *rng.normal(size=(2, 2, robot.coordinates.nv))
     for method in ("rk4", "rk4_mean_speed"):
@@ -264,9 +248,9 @@ def test_a_run_that_diverges_ends_and_its_function_is_not_asked_of_what_is_no_nu
 
 
 @pytest.mark.parametrize(
-    "off, is_same", [(0.9e-12, True), (1.1e-12, False), (-1.1e-12, False), (np.nan, False)]
+    "off, equal", [(0.9e-12, True), (1.1e-12, False), (-1.1e-12, False), (np.nan, False)]
 )
-def test_a_batch_has_the_values_of_single_states_except_for_rounding_of_the_largest(off, is_same):
+def test_a_batch_has_the_values_of_single_states_except_for_rounding_of_the_largest(off, equal):
     singles = np.array([[1e3, np.nan], [0.0, np.inf]])
-    assert same(singles + [[0.0, 0.0], [1e3 * off, 0.0]], singles) is is_same
+    assert same(singles + [[0.0, 0.0], [1e3 * off, 0.0]], singles) is equal
     assert not same(singles[0], singles)

@@ -1,14 +1,21 @@
-"""Files for engines that read them: URDF, includes and names; and what acts in Drake's runs."""
+"""Files for engines that read them: URDF, includes and names; the URDF text of a compiled model; what acts in Drake's runs."""
 
 import struct
+from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
+from models import PATHS, random_tree
 
 import tmt
 from compare.engines import RECORDS, Setting
+from compare.engines.mujoco import read
+from compare.engines.mujoco.urdf import urdf
 from compare.engines.outside import Outside
 from compare.engines.outside.mjcf_text import whole_text
+from compare.judge.entries import Entries
+from compare.judge.scale import EPS, FACTOR
 from compare.robots.states import Sample
 from compare.run.reference import compared_with
 
@@ -25,16 +32,28 @@ PART = """<mujocoinclude><body name="arm"><joint name="hip" axis="0 1 0" damping
 <inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.01"/></body></body></mujocoinclude>"""
 WHOLE = """<mujoco><worldbody><include file="part.xml"/></worldbody><keyframe><key qpos="1 2"/></keyframe></mujoco>"""
 FREE = """<mujoco><worldbody><body name="top"><freejoint name="base"/>
-<inertial pos="0.1 0 0.2" mass="2" diaginertia="0.3 0.2 0.15"/>
-</body></worldbody></mujoco>"""
-
-
+<inertial pos="0.1 0 0.2" mass="2" diaginertia="0.3 0.2 0.15"/></body></worldbody></mujoco>"""
 FACES = (0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)  # of a tetrahedron
 STL = [struct.pack("<12fH", 0, 0, 0, *np.eye(4, 3)[list(face)].ravel(), 0) for face in FACES]
 MESHES = """<mujoco><compiler meshdir="parts"/><asset><mesh name="m" file="m.stl"/></asset><worldbody>
 <geom type="mesh" mesh="m"/><body><joint name="j" axis="0 1 0"/><geom type="mesh" mesh="m"/><body pos="0 0 1">
-<joint axis="1 0 0"/>
-<inertial pos="0 0 0.5" mass="2" diaginertia="0.3 0.2 0.15"/><geom type="mesh" mesh="m"/></body></body></worldbody></mujoco>"""
+<joint axis="1 0 0"/><inertial pos="0 0 0.5" mass="2" diaginertia="0.3 0.2 0.15"/><geom type="mesh" mesh="m"/>
+</body></body></worldbody></mujoco>"""
+ARM = Path(__file__).parents[2] / "mjcf" / "arm.xml"
+SEVERAL = """<mujoco><worldbody><body pos="1 2 3" euler="10 20 30">
+<inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.2 0.25" quat="0.9 0.1 0.3 -0.2"/>
+<joint name="fixed2" type="slide" axis="1 2 0" ref="0.3" damping="0.7"/><joint axis="0 1 1" pos="0.1 0.2 -0.1" ref="20"/>
+<joint name="c" axis="1 0 0.2" pos="-0.1 0.1 0" ref="-70" damping="0.2"/>
+<body pos="0 0.2 0" euler="0 90 0"><inertial pos="0 0 0.1" mass="2" diaginertia="0.2 0.1 0.15"/>
+<body pos="0.1 0 0" euler="40 0 -90"><inertial pos="0 0.2 0" mass="0.5" diaginertia="0.02 0.01 0.015"/>
+<joint name="d" axis="0 0 1" pos="0 0 0.5"/></body></body></body></worldbody></mujoco>"""
+# intermediate links have no mass, which MuJoCo takes only with a bound, here far below rounding; it would fuse fixed bodies
+COMPILER = '<mujoco><compiler fusestatic="false" boundmass="2e-15" boundinertia="2e-15"/></mujoco>'
+
+
+SOURCES = {name: PATHS[name] for name in ("arm6", "arm7", "gripper", "humanoid29", "loop")} | {"arm": ARM}
+SOURCES |= {f"random {seed}": random_tree(seed, ("hinge", "slide"), 6) for seed in range(5)}
+SOURCES["several joints in one body that carries a fixed one"] = SEVERAL
 
 
 def robot_of(path, text):
@@ -82,3 +101,35 @@ def test_what_acts_in_drakes_runs(text, tmp_path):
     motion, exact = read(run()), tmt.simulate(q, v, tau, 0.5 / 1024, 1024, "dopri8", robot.tree)
     assert np.abs(robot.coordinates.difference(motion.q[-1], exact.q[-1])).max() < 1e-10
     assert np.abs(motion.v[-1] - exact.qd[-1]).max() < 1e-10
+
+
+@pytest.mark.parametrize("source", SOURCES.values(), ids=SOURCES)
+def test_what_mujoco_reads_back_has_the_same_values(source, rng, states=5):
+    reading = read(source)
+    text, tree = urdf(reading.model).replace("</robot>", f"{COMPILER}</robot>"), reading.tree
+    model = mujoco.MjModel.from_xml_string(text)
+    model.opt.gravity = tree.gravity
+    numbers = [model.joint(name).id for name in tree.joint_names]
+    assert (model.dof_damping[numbers] == tree.damping).all()
+    data, dense = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    q = reading.qpos0 + rng.uniform(-3.0, 3.0, (states, model.nv))
+    v = rng.uniform(-3.0, 3.0, q.shape)
+    scales = Entries(tree, q, v)
+    expected, of_tree = mujoco.MjData(reading.model), np.zeros_like(dense)
+    reading.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    for state in range(states):
+        data.qpos[numbers], data.qvel[numbers] = q[state], v[state]
+        expected.qpos[:], expected.qvel[:] = q[state], v[state]
+        for m, d, M in ((model, data, dense), (reading.model, expected, of_tree)):
+            mujoco.mj_forward(m, d)
+            mujoco.mj_fullM(m, d, M)
+        M = dense[np.ix_(numbers, numbers)] + np.diag(tree.armature)
+        assert (np.abs(M - of_tree) <= FACTOR * EPS * scales.mass_matrix[state]).all()
+        error = np.abs(data.qfrc_bias[numbers] - expected.qfrc_bias)
+        assert (error <= FACTOR * EPS * scales.bias[state]).all()
+
+
+@pytest.mark.parametrize("name, why", [("quadruped", "root' is .* free"), ("pendulum_ball", "r' is .* ball")])
+def test_what_a_urdf_cannot_say_is_refused(name, why):
+    with pytest.raises(ValueError, match=why):
+        urdf(read(PATHS[name]).model)

@@ -75,6 +75,7 @@ class Model(ReadModel):
         m = tmt.simulate(q, v, tau, times[-1] / steps, steps, method, self.tree, tolerance)
         return np.hstack([m.q, m.qd])[:: steps // (len(times) - 1)], m.evaluations
 '''
+NAMES = {"mass_matrix": "Mbar", "bias": "bias", "acceleration": "qdd"}
 RIGHT = {"label": "Right", "precision": "float64", "wrong": "", "untold": "", "euler": "semi_implicit_euler"}
 ENGINES = {
     "again": {}, "heavy": {"label": "Heavy", "wrong": "mass=[1.0, 1.001]"},
@@ -84,6 +85,22 @@ ENGINES = {
     "later": {"label": "Later", "euler": "explicit_euler"}, "blind": {"label": "Blind", "wrong": "**{}[0]"},
     "slow": {"label": "Slow", "wrong": "mass=__import__('time').sleep(60.0)"},
 }  # fmt: skip
+ASKED = """import numpy as np
+from compare.engines import outside
+from compare.run.reference import compared_with
+
+if __name__ == "__main__":  # processes of engines begin with this file
+    case, q = compared_with("model", "robot.xml").robot.case(), np.array([[0.3, 0.4]])
+    dies, other = (outside.Outside(name).of(case) for name in ("mortal", "again"))
+    readings = set()  # by the seconds that they took
+    for _ in range(2):
+        readings.add(other.ask(outside.answers.reading)["seconds"])
+        print(dies.bias(q, q).shape, other.mass_matrix(q).shape, len(readings))
+        try:
+            dies.mass_matrix(q)
+        except outside.EngineError as error:
+            print(error)
+"""
 
 
 @pytest.fixture(scope="module")
@@ -109,8 +126,7 @@ def report(tmp_path_factory):
 
 
 def table(folder, name):
-    with open(folder / "tables" / f"{name}.csv", newline="") as file:
-        return list(csv.DictReader(file))
+    return list(csv.DictReader((folder / "tables" / f"{name}.csv").read_text().splitlines()))
 
 
 def test_each_seeded_error_fails_its_own_checks_and_no_others(report):
@@ -137,11 +153,8 @@ def test_what_is_read_differently_is_a_row_and_says_whether_it_was_set(report):
     assert {engine for engine, *_ in rows} == {"Upside", "Heavy", "Blind"}
 
 
-def test_an_engine_that_does_not_answer_is_left_out(report):
+def test_orders_are_measured_and_what_does_not_answer_or_cannot_be_set_does_not_run(report):
     assert "Slow: no answer within 6 s" in (report[0] / "report.md").read_text()
-
-
-def test_orders_are_measured_and_what_cannot_be_set_does_not_run(report):
     rows = table(report[0], "engines_methods")
     assert {row["engine"] for row in rows} == {"Right", "Tilted", "Upside", "Bare", "Later", "MuJoCo", "TMT"}
     errors = {row["dt_s"]: float(row["worst_error_rad"]) for row in rows
@@ -151,44 +164,36 @@ def test_orders_are_measured_and_what_cannot_be_set_does_not_run(report):
     assert "gravity of Upside" in " ".join(report[1].split())  # the answer says what this program has set
 
 
-class Other(TmtDynamics):
-    """tmt as another engine; a quantity is off by a share of its tolerance with this eps."""
-
-    def __init__(self, quantity="", share=0.0, eps=0.0):
-        super().__init__(ARM.case())
-        self.quantity = quantity
-        if share:
-            self.right = getattr(self, quantity)
-            off = share * FACTOR * eps
-            setattr(self, quantity, lambda *states: self.right(*states) + off * self.size(*states))
-
-    def has(self, quantity):
-        return quantity != "bias" or self.quantity != "none"
-
-    def size(self, q, v=0.0, tau=0.0):
-        scale = Entries(self.tree, q, v)
-        if self.quantity == "acceleration":
-            return scale.acceleration(scale.force(tau), self.right(q, v, tau))
-        return getattr(scale, self.quantity)
+def other(lacking="", **functions):
+    """tmt as another engine, without a function, or with others."""
+    dynamics = TmtDynamics(ARM.case())
+    vars(dynamics).update(functions, has=lambda quantity: quantity != lacking)
+    return dynamics
 
 
 @pytest.mark.parametrize("precision", RECORDS)
-@pytest.mark.parametrize(
-    "quantity, name", (("mass_matrix", "Mbar"), ("bias", "bias"), ("acceleration", "qdd"))
-)
-def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, precision):
+@pytest.mark.parametrize("share, fails", [(0.9, False), (1.1, True)])
+@pytest.mark.parametrize("quantity, name", NAMES.items())
+def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, precision, share, fails):
     """A float32 engine is allowed what its own eps allows, and no more."""
-    for share, fails in ((0.9, False), (1.1, True)):
-        result, record = Result("engines"), RECORDS[precision]
-        compare_quantities(result, setup_of(), record, Other(quantity, share, record.eps))
-        assert [check.quantity for check in result.checks if not check.passed] == [f"{name} to exact"] * fails
-        assert all(check.about is About.ENGINE for check in result.checks)
-        assert [note.kind for note in result.notes] == ["cause"] * fails
+    record, right, result = RECORDS[precision], getattr(other(), quantity), Result("engines")
+
+    def wrong(*state):
+        values, scale = right(*state), Entries(ARM.tree, *state[:2])
+        size = getattr(scale, quantity)
+        if quantity == "acceleration":
+            size = scale.acceleration(scale.force(state[2]), values)
+        return values + share * FACTOR * record.eps * size
+
+    compare_quantities(result, setup_of(), record, other(**{quantity: wrong}))
+    assert [check.quantity for check in result.checks if not check.passed] == [f"{name} to exact"] * fails
+    assert all(check.about is About.ENGINE for check in result.checks)
+    assert [note.kind for note in result.notes] == ["cause"] * fails
 
 
 def test_an_engine_without_a_function_is_not_judged_by_it():
     result = Result("engines")
-    compare_quantities(result, setup_of(), RECORDS["float64"], Other("none"))
+    compare_quantities(result, setup_of(), RECORDS["float64"], other("bias"))
     assert [check.quantity for check in result.checks] == ["Mbar to exact", "qdd to exact"]
 
 
@@ -207,24 +212,6 @@ def test_a_number_as_read_just_inside_and_just_outside(number):
         failed = [f"{number} as read"] * (differs and number in ("mass", "moments"))
         assert [check.quantity for check in result.checks if not check.passed] == failed
         assert [row.number for row in result.tables["engines_read"][:1]] == [number] * differs
-
-
-ASKED = """import numpy as np
-from compare.engines import outside
-from compare.run.reference import compared_with
-
-if __name__ == "__main__":  # processes of engines begin with this file
-    case, q = compared_with("model", "robot.xml").robot.case(), np.array([[0.3, 0.4]])
-    dies, other = (outside.Outside(name).of(case) for name in ("mortal", "again"))
-    readings = set()  # by the seconds that they took
-    for _ in range(2):
-        readings.add(other.ask(outside.answers.reading)["seconds"])
-        print(dies.bias(q, q).shape, other.mass_matrix(q).shape, len(readings))
-        try:
-            dies.mass_matrix(q)
-        except outside.EngineError as error:
-            print(error)
-"""
 
 
 def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_again(report):

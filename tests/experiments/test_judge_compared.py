@@ -1,15 +1,22 @@
-"""Each quantity is compared with what the other engine and the compiled code say of it: one that is off fails its own checks."""
+"""What is compared at states and with printed numbers: tolerances written out, and what is off fails its own checks."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from edited import setup_of
+from edited import MOON, setup_of
+from judged import BOTH, verdicts
 
 import tmt
 from compare.core.check import Result
-from compare.experiments import acceleration, gravity, kinematics, mass
+from compare.engines.mujoco import parse
+from compare.experiments import acceleration, gravity, kinematics, mass, published
+from compare.experiments.parameters.numbers import check_forces
 from compare.experiments.quantities import QUANTITIES, check_wide
+from compare.judge.entries import Entries
+from compare.robots.arm import ARM, PRINTED
+from compare.robots.states import Sample
 from compare.run.examine import Setup
 from tmt import literal
 
@@ -23,13 +30,9 @@ OF_MUJOCO = [  # the experiment, what is off (of a pair which), the checks of bo
     (acceleration, "inverse", {}, {"tau from TMT's qdd by mj_inverse"}),
     (acceleration, "energy", {}, {"energy"}), (acceleration, "potential_energy", {}, {"potential energy"}),
 ]  # fmt: skip
-COMPILED = {  # what each function gives, by the name of its check
-    kinematics: {"com_positions": ["x_b"], "angular_velocities": ["omega_b"], "jacobians": ["T_b", "B_b"],
-                 "convective_terms": ["v_conv", "w_conv"]},
-    mass: {"mass_matrix": ["Mbar"]},
-    gravity: {"gravity_balance": ["holding torque"]},
-    acceleration: {"bias": ["bias"], "acceleration": ["qdd"], "energy": ["energy"], "potential_energy": ["potential energy"]},
-}  # fmt: skip
+EXPERIMENTS = [kinematics, mass, gravity, acceleration]
+EPS = 2.0**-52
+ITEMS = {item.item: item for item in PRINTED}
 
 
 def off(values, place=None):
@@ -95,11 +98,115 @@ def test_accelerations_of_tmt_that_are_off_fail_their_own_checks(mujoco, monkeyp
     assert failing(acceleration, mujoco) == expected
 
 
-@pytest.mark.parametrize("experiment", COMPILED, ids=lambda module: module.__name__.rpartition(".")[2])
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda module: module.__name__.rpartition(".")[2])
 def test_an_error_of_the_compiled_functions_alone_fails_their_own_check(mujoco, experiment, monkeypatch):
     assert failing(experiment, mujoco) == set()
-    for quantity in COMPILED[experiment]:
+    checks = {(quantity, name) for of, quantity, _, names in OF_MUJOCO if of is experiment
+              for name in names & QUANTITIES.keys()}  # fmt: skip
+    for quantity in dict(checks):
         right = getattr(tmt, quantity)
         monkeypatch.setattr(tmt, quantity, lambda *given, right=right, **named: off(right(*given, **named)))
-    names = {name for of in COMPILED[experiment].values() for name in of}
-    assert failing(experiment, mujoco) == {f"{name}, compiled" for name in names}
+    assert failing(experiment, mujoco) == {f"{name}, compiled" for _, name in checks}
+
+
+@pytest.mark.parametrize("module", [kinematics, mass, gravity, acceleration])
+def test_tolerances_are_64_eps_of_the_scale_of_an_entry_of_the_quantity(module):
+    """Of the arm at one state, zero with these rates. The scales themselves: tests/judge/test_judge_scale.py."""
+    setup, rates, zero = setup_of(make=Setup, states=1, exact_states=1), [1.0, -2.0, 8.0], np.zeros((1, 3))
+    setup.__dict__["random"] = Sample(ARM.tree, "random states", zero, np.array([rates]), zero, 1)
+    checks = [check for check in module.rows(setup).checks if check.scene == "random states"]
+    found = {check.quantity: check.tolerance / (64 * EPS) for check in checks}
+    of = Entries(ARM.tree, zero, np.array([rates]))
+    force, qdd = of.force(), tmt.acceleration(np.zeros(3), rates, np.zeros(3))[None]
+    sizes = {name: getattr(of, quantity.scale) for name, quantity in QUANTITIES.items() if name in found}
+    if module is acceleration:
+        closing = of.closing(force, qdd)
+        sizes |= {name: closing for name in found if name.startswith("tau from")}
+        sizes["qdd"] = of.acceleration(force, qdd)
+        sizes |= {name: closing @ np.abs(rates) for name in found if name.startswith("dE/dt")}
+        assert len(sizes) == 8
+    assert sizes and all(np.isclose(found[name], size, rtol=1e-9).any() for name, size in sizes.items())
+
+
+@pytest.mark.parametrize("least, passes", [(1.01, True), (0.99, False), (-1.0, False)])
+def test_a_mass_matrix_is_definite_by_more_than_rounding(least, passes):
+    result, small = Result("mass"), least * 64 * EPS
+    # in units of its diagonal: eigenvalues 1 - c and 1 + c of ((1, c), (c, 1)), whatever the units
+    c, units = (1 - small) / (1 + small), np.sqrt([1e-9, 1.0])
+    M = np.array([[1.0, c], [c, 1.0]]) * np.outer(units, units)
+    mass.check_definiteness(result, "TMT", np.array([np.eye(2), M]))  # the worst state decides
+    mass.check_definiteness(result, "of the other sign", np.array([-np.eye(2)]))
+    assert list(verdicts(result).values()) == [passes, False]
+
+
+def test_forces_that_the_equations_lack_are_zero_except_for_rounding_of_what_is_subtracted():
+    tree, state = dataclasses.replace(ARM.tree, damping=(0.5, 0.5, 0.5)), np.array([[0.1, 0.2, 0.3]])
+    least, forces = 64 * EPS * 0.5 * 4.0, {"actuators": 0.0, "constraints and contacts": 1e-300}
+    other_forces = lambda q, qd: {source: np.array([[force]]) for source, force in forces.items()}  # noqa: E731
+    sample = Sample(tree, "random states", state, np.array([[1.0, -4.0, 2.0]]), state, 0)
+    dynamics = SimpleNamespace(other_forces=other_forces)
+    for share, passed in ((0.99, [True, False, True]), (1.01, [True, False, False])):
+        forces["fluid and tendons"], result = share * least, Result("parameters")
+        check_forces(result, sample, tree, dynamics, [])
+        assert list(verdicts(result).values()) == passed
+
+
+@pytest.mark.parametrize("share, passes", [(0.99, True), (1.01, False)])
+def test_a_mass_matrix_is_symmetric_within_the_scale_of_each_entry(share, passes):
+    result, off = Result("mass"), share * 64 * EPS
+    M = np.array([[[1.0, 1.0 + off * 2.0**10], [1.0, 1.0]]])
+    mass.check_symmetry(result, M, np.array([[[9e3, 1.0], [1.0, 9e3]]]) * 2.0**10)
+    assert list(verdicts(result).values()) == [passes]
+
+
+def of_item(name, ours=0.0, theirs=0.0, scale=0.0, exactly=0.0, printed=True):
+    """The verdicts on an item: each answer is so far from what is printed, or from the exact value."""
+    item, result = ITEMS[name], Result("published")
+    value = np.array(item.values)
+    truth = value + exactly if printed else np.zeros_like(value)
+    answer = published.Answer(truth.astype(object), truth + ours, truth + theirs, scale)
+    published.check_answer(result, item, answer, ARM.joints)
+    return verdicts(result)
+
+
+@pytest.mark.parametrize("name", ["c", "f1", "g", "h"])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@BOTH
+def test_four_decimals_are_met_to_half_a_unit_of_the_last(name, share, passes, sign):
+    what, off = ITEMS[name].quantity + " - printed", sign * share * 0.5e-4
+    labels = [f"{label}: {what}" for label in ("TMT", "MuJoCo", "exact")]
+    assert of_item(name, ours=off) == dict(zip(labels, (passes, True, True)))
+    assert of_item(name, theirs=off) == dict(zip(labels, (True, passes, True)))
+
+
+@pytest.mark.parametrize("name", ["f2", "f3", "f4"])
+@pytest.mark.parametrize("share, inside", [(0.99, True), (1.01, False)])
+def test_what_is_zero_but_for_rounding_is_met_to_64_eps_of_its_scale(name, share, inside):
+    away = share * 64 * EPS * 1e5
+    for off, verdict in (({"ours": away}, (inside, True)), ({"theirs": away}, (True, inside))):
+        found = of_item(name, scale=1e5, printed=False, **off)
+        assert (found["TMT: qdd - exact"], found["MuJoCo: qdd - exact"]) == verdict
+
+
+@pytest.mark.parametrize("off, inside", [(0.49e-18, True), (0.51e-18, False)])
+def test_the_printed_digits_of_f2_and_f3_are_met_to_half_a_unit_of_the_last(off, inside):
+    assert of_item("f3", ours=off)["TMT: qdd - printed"] is inside
+    assert of_item("f3", exactly=off)["exact: qdd - printed"] is inside
+    assert of_item("f2", exactly=off)["exact: |qdd_alpha| - |printed|"] is inside
+
+
+def test_each_column_is_whose_it_says_and_f4_is_asked_under_the_torque_of_c():
+    of_moon = published.rows(setup_of(MOON)).rows
+    moon = {(row.item, row.component): row for row in of_moon}
+    ours, M = tmt.gravity_balance(np.zeros(3)), tmt.mass_matrix(ARM.posture("hanging"))
+    least, *_, largest = np.linalg.eigvalsh(M)
+    theirs = parse(MOON, tmt.ARM).of(ARM.case()).gravity_balance(np.zeros(3))
+    assert [moon["c", name].tmt for name in ARM.joints] == list(ours)
+    assert [moon["c", name].mujoco for name in ARM.joints] == list(theirs)
+    of_alpha = moon["c", "alpha"]
+    assert of_alpha.exact == pytest.approx(-2.20725) and of_alpha.tolerance == pytest.approx(0.5e-4, rel=1e-6)
+    for name in ("tmt", "exact"):
+        assert max(abs(float(getattr(row, name))) for row in of_moon if row.item == "f4") < 1e-12
+    allowed = 64 * EPS * (largest / least + 1.0) / least * 9.4176
+    assert moon["f2", "alpha"].tolerance == pytest.approx(allowed, rel=1e-9)
+    assert published.scales(ARM.tree, ARM.posture("hanging"))["mass_matrix"] == np.abs(M).max()

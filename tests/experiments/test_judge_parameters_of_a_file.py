@@ -3,33 +3,37 @@
 import mujoco
 import numpy as np
 import pytest
-from edited import XML, setup_of
+from edited import XML, setup_of, setup_of_file
 from models import PATHS
 
 from compare.core.check import Result
-from compare.engines.mujoco import engine, read
+from compare.engines.mujoco import read
 from compare.engines.mujoco.parameters import Stated, row_of
 from compare.experiments import parameters
 from compare.experiments.parameters.numbers import compare_number
 from compare.experiments.setup import Setup, engines
 from compare.judge.scale import EPS
-from compare.robots.file import robot_of
 from compare.run.reference import compared_with
 
-TOTAL = """
-<mujoco><compiler settotalmass="3"/><worldbody>
+SWITCHED_OFF = ("fluid and tendons", "actuators", "constraints and contacts")
+TOTAL = """<mujoco><compiler settotalmass="3"/><worldbody>
   <body name="arm"><joint name="turn"/><inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.2 0.25"/></body>
   <body name="rod"><joint name="lift" type="slide" damping="2"/><geom size="0.1" mass="0.5"/></body>
 </worldbody></mujoco>"""
+CART = """<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"/><worldbody>
+<body name="cart"><joint name="x" type="slide" axis="1 0 0" damping="0.5"/><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
+<body name="pole" pos="0 0 0.1"><joint name="tilt" axis="0 1 0" stiffness="3" springref="0.2"/>
+<inertial pos="0 0 0.4" mass="1" diaginertia="0.1 0.2 0.3"/></body></body></worldbody>
+<actuator><motor joint="x"/></actuator></mujoco>"""
 
 
 def result_of(source, as_it_is=False):
     """The result of a small run on a file; as it is: nothing in it is switched off."""
-    reading = read(source)
-    robot, mujoco = robot_of(reading, "robot.xml"), engine(reading)
+    setup = setup_of_file(source)
     if as_it_is:
-        mujoco.bare, mujoco.model = False, reading.model
-    return parameters.rows(Setup.small(robot, engines(mujoco), reading=reading))
+        mujoco = setup.engines["mujoco"]
+        mujoco.bare, mujoco.model = False, setup.reading.model
+    return parameters.rows(setup)
 
 
 def failing(result):
@@ -42,10 +46,8 @@ def test_the_models_are_as_their_files_state_and_nothing_more_acts(name):
     assert result.checks and failing(result) == [] and result.causes == []
     features = [row.feature for row in result.tables["inventory"]]
     assert features == [feature.feature for feature in read(PATHS[name]).features]
-    forces = [check.quantity for check in result.checks if check.scene == "random states"]
-    assert forces == [
-        f"no forces of {what}" for what in ("fluid and tendons", "actuators", "constraints and contacts")
-    ]
+    forces = [f"no forces of {what}" for what in SWITCHED_OFF]
+    assert [check.quantity for check in result.checks if check.scene == "random states"] == forces
 
 
 def test_a_force_of_what_is_switched_off_is_a_failed_check():
@@ -80,10 +82,8 @@ def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none()
     (cause,) = compare_number(Result("parameters"), Stated("arm", "mass", 2.0, 2.5), "")
     assert (cause["rank"], cause["place"], cause["stated"], cause["found"]) == (2, "mass of arm", 2.0, 2.5)
     result, vector = Result("parameters"), Stated("arm", "com", np.zeros(3), np.array([0.0, 1e-30, np.nan]))
-    assert [cause["place"] for cause in compare_number(result, vector, "")] == [
-        "com y of arm",
-        "com z of arm",
-    ]
+    places = [cause["place"] for cause in compare_number(result, vector, "")]
+    assert places == ["com y of arm", "com z of arm"]
     assert failing(result) == ["com"]
 
 
@@ -99,36 +99,25 @@ def test_an_anchor_stated_as_0_may_be_off_by_rounding_of_the_lengths_that_lead_t
     assert anchors["alpha"].passed == anchors["beta"].passed == passes and anchors["alpha"].value > 0.0
 
 
-# beside a solution
-
-CART = """<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"/><worldbody>
-<body name="cart"><joint name="x" type="slide" axis="1 0 0" damping="0.5"/><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
-<body name="pole" pos="0 0 0.1"><joint name="tilt" axis="0 1 0" stiffness="3" springref="0.2"/>
-<inertial pos="0 0 0.4" mass="1" diaginertia="0.1 0.2 0.3"/></body></body></worldbody>
-<actuator><motor joint="x"/></actuator></mujoco>"""
-
-
-def beside_solution(tmp_path, text, solution=CART, experiment=parameters):
-    """What an experiment finds of a file with a text beside a solution."""
+def beside_solution(tmp_path, text, solution=CART):
+    """The parameters of a file with a text beside a solution."""
     (tmp_path / "solution.xml").write_text(solution)
     (tmp_path / "file.xml").write_text(text)
     known = compared_with(str(tmp_path / "solution.xml"), str(tmp_path / "file.xml"))
-    return experiment.rows(Setup.small(known.robot, engines(known.mujoco), reading=known.reading))
+    return parameters.rows(Setup.small(known.robot, engines(known.mujoco), reading=known.reading))
 
 
 @pytest.mark.parametrize("old, new, causes", [
-    ('mass="2"', 'mass="3"', [("mass of cart", 2, 3)]),
-    ('axis="1 0 0"', 'axis="-1 0 0"', [("axis x of x", 1, -1)]),
+    ('mass="2"', 'mass="3"', [("mass of cart", 2, 3)]), ('axis="1 0 0"', 'axis="-1 0 0"', [("axis x of x", 1, -1)]),
     ('springref="0.2"', 'springref="0.3"', [("rest of tilt", 0.2, 0.3)]),
-    ('damping="0.5"', 'damping="0.5" frictionloss="0.1"', [("frictionloss", 0, 1)]),
-    ('<motor joint="x"/>', "", []), ('stiffness="3"', 'stiffness="3" limited="true" range="-1 1"', []),  # may be others
-    (' name="tilt"', "", []), ('"pole"', '"stick"', []),
-    ("<mujoco>", "<mujoco>", []),  # a file is its own solution
+    ('damping="0.5"', 'damping="0.5" frictionloss="0.1"', [("frictionloss", 0, 1)]), ('<motor joint="x"/>', "", []),
+    ('stiffness="3"', 'stiffness="3" limited="true" range="-1 1"', []),  # may be others
+    (' name="tilt"', "", []), ('"pole"', '"stick"', []), ("<mujoco>", "<mujoco>", []),  # a file is its own solution
 ])  # fmt: skip
 def test_a_number_that_is_another_one_than_in_the_solution_is_the_cause(tmp_path, old, new, causes):
     result = beside_solution(tmp_path, CART.replace(old, new))
-    known = result.causes
-    assert [(c["place"], c["stated"], pytest.approx(c["found"])) for c in known] == causes
+    found = [(cause["place"], cause["stated"], pytest.approx(cause["found"])) for cause in result.causes]
+    assert found == causes
     assert len(failing(result)) == len(causes) and len(result.checks) > 20
 
 

@@ -1,29 +1,32 @@
-"""The whole experiment: a small run, joints that are locked in both engines, what each scene needs."""
+"""Reduction: a small run, joints locked in both engines, what each scene needs; its rules just inside and just outside."""
 
 import dataclasses
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
-from edited import XML, setup_of
+from edited import XML, setup_of, setup_of_file
 from models import PATHS, chain
 
 import tmt
 from compare.core.check import Result
 from compare.core.text import say
-from compare.engines.mujoco import Mujoco, engine, read
+from compare.engines.mujoco import Mujoco
 from compare.experiments import reduction
-from compare.experiments.reduction import needs, sub_blocks, times
-from compare.experiments.reduction.records import ReductionResult
-from compare.experiments.setup import Setup, engines
+from compare.experiments.followed import Deviation
+from compare.experiments.reduction import exact_motion, needs, sub_blocks, times
+from compare.experiments.reduction.records import ReductionResult, SubsetRow
+from compare.experiments.setup import Setup
+from compare.judge.scale import EPS
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
+from compare.robots.case import Coordinates
 from compare.truth.smallest import needed, reduced
 
-
-def of_file(source) -> Setup:
-    """A robot of a file, its engines, and few states."""
-    reading = read(source)
-    return Setup.small(robot_of(reading, "robot.xml"), engines(engine(reading)))
+FALLS = """<mujoco><worldbody><body name="base"><freejoint name="base"/><geom type="box" size="0.1 0.1 0.05" mass="2"/>
+<body pos="0.1 0 0"><joint name="hip" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0.1 0 -0.3" size="0.02"/></body>
+</body></worldbody></mujoco>"""
+ORDERS = {4.149: True, 4.151: False, 3.851: True, 3.849: False}
+FALLING = [([2.0**order * 1e-8, 1e-8, 9e-12, 8e-12], [passes]) for order, passes in ORDERS.items()]
 
 
 def failed(result) -> list[str]:
@@ -57,66 +60,62 @@ def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_do
     assert log == ["computed", "quiet", "timed"]
 
 
-# locked joints
-
-
 def blocks(setup, angles=1) -> Result:
     result = Result("reduction")
     sub_blocks.compare_blocks(result, setup, angles)
     return result
 
 
+class WrongLock(Mujoco):
+    """MuJoCo whose dynamics of a case with locked joints are wrong."""
+
+    def __init__(self, right, of_locked):
+        super().__init__(right.source, right.joints, right.bodies)
+        self.of_locked = of_locked
+
+    def of(self, case):
+        return self.of_locked(case) if case.locked else super().of(case)
+
+
 def test_every_subset_agrees_and_a_wrong_lock_is_seen(mujoco):
-    class Deleted(Mujoco):
-        """Joints that are only deleted stay at zero."""
-
-        def of(self, case):
-            return mujoco.of(case.changed(posture=()) if case.locked else case)
-
-    wrong = Deleted(mujoco.source, mujoco.joints, mujoco.bodies)
-    right, deleted = (blocks(Setup.small(ARM, engines(engine)), 2) for engine in (mujoco, wrong))
+    """Joints that are only deleted stay at zero."""
+    wrong = WrongLock(mujoco, lambda case: mujoco.of(case.changed(posture=())))
+    right, deleted = (blocks(setup_of(engine), 2) for engine in (mujoco, wrong))
     assert len(right.checks) == 6 * 2 * 3 and failed(right) == []
     expected = {f"{' and '.join(locked)} locked" for locked in sub_blocks.subsets(ARM.joints, 4)}
     assert {check.scene for check in deleted.checks if not check.passed} == expected
 
 
 def test_each_pair_has_its_own_models_and_the_bias_is_compared_in_motion(mujoco):
-    class Faster(Mujoco):
-        """With locked joints its bias is that of speeds that are a bit larger."""
+    def faster(case):
+        dynamics = mujoco.of(case)
+        bias = lambda q, v: dynamics.bias(q, (1.0 + 1e-9) * v)  # noqa: E731
+        return SimpleNamespace(mass_matrix=dynamics.mass_matrix, bias=bias)
 
-        def of(self, case):
-            dynamics = mujoco.of(case)
-            bias = (lambda q, v: dynamics.bias(q, (1.0 + 1e-9) * v)) if case.locked else dynamics.bias
-            return SimpleNamespace(mass_matrix=dynamics.mass_matrix, bias=bias)
-
-    wrong = Faster(mujoco.source, mujoco.joints, mujoco.bodies)
-    off = [check for check in blocks(Setup.small(ARM, engines(wrong))).checks if not check.passed]
+    checks = blocks(setup_of(WrongLock(mujoco, faster))).checks
     quantities = {"bias, MuJoCo, reduced to whole", "bias, reduced, TMT to MuJoCo"}
-    assert {check.quantity for check in off} == quantities
+    assert {check.quantity for check in checks if not check.passed} == quantities
 
 
 @pytest.mark.parametrize("model, joints", [("gripper", 4), ("free_body", 4), ("pendulum_ball", 2)])
 def test_slides_balls_and_each_part_of_a_free_joint_are_locked_alike(model, joints):
-    of_blocks = blocks(of_file(PATHS[model]))
+    of_blocks = blocks(setup_of_file(PATHS[model]))
     assert len(of_blocks.checks) == (2**joints - 2) * 6 and failed(of_blocks) == []
 
 
 def test_of_many_joints_some_are_locked_each_alone():
     assert sub_blocks.subsets("abc", 1) == [("a",), ("b",), ("c",), ("a", "b"), ("a", "c"), ("b", "c")]
     assert sub_blocks.subsets("abcdefghijkl", 4) == [("a",), ("d",), ("g",), ("j",)]
-    of_many = blocks(of_file(chain(7)))
+    of_many = blocks(setup_of_file(chain(7)))
     assert len({check.scene for check in of_many.checks}) == 4 and failed(of_many) == []
-    assert not blocks(of_file(chain(60))).checks
+    assert not blocks(setup_of_file(chain(60))).checks
 
 
 def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
     body = '<body><joint axis="0 1 0"/><geom size="0.1 0.2 0.3" type="box" pos="0.1 0.2 1"/></body>'
     aligned = f'<body><freejoint align="true"/><geom size="0.1" pos="0.05 0 0"/>{body}</body>'
-    result = reduction.untimed(of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"))
+    result = reduction.untimed(setup_of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"))
     assert [note.kind for note in result.top] == ["not_lockable"] and failed(result) == []
-
-
-# what a scene needs
 
 
 def test_the_planar_arm_moves_as_the_whole_one(engines):
@@ -131,15 +130,10 @@ def test_the_planar_arm_moves_as_the_whole_one(engines):
     assert {check.quantity for check in result.checks if not check.passed} == {"smallest model to whole"}
 
 
-def test_each_engine_is_compared_with_its_own_smaller_model(engines):
-    class Braked(Mujoco):
-        def of(self, case):
-            return engines["mujoco"].of(case.changed(damping=1e-6) if case.locked else case)
-
-    wrong, case = engines["mujoco"], ARM.cases[0]
-    wrong = Braked(wrong.source, wrong.joints, wrong.bodies)
-    result = ReductionResult("reduction")
-    needs.compare_smaller(result, case, reduced(case), Setup.small(ARM, {**engines, "mujoco": wrong}))
+def test_each_engine_is_compared_with_its_own_smaller_model(mujoco):
+    braked = WrongLock(mujoco, lambda case: mujoco.of(case.changed(damping=1e-6)))
+    case, result = ARM.cases[0], ReductionResult("reduction")
+    needs.compare_smaller(result, case, reduced(case), setup_of(braked))
     assert [check.scene.split(", ")[2] for check in result.checks if not check.passed] == ["MuJoCo"]
 
 
@@ -154,22 +148,15 @@ def test_of_a_users_own_scene_nothing_is_expected_but_agreement(engines):
 
 
 def test_a_held_posture_with_springs_needs_nothing():
-    held = next(case for case in of_file(PATHS["gripper"]).robot.cases if case.is_held)
+    held = next(case for case in setup_of_file(PATHS["gripper"]).robot.cases if case.is_held)
     assert held.tree.has_springs and needed(held).stays == held.joints
-    gravity_alone = tuple(
-        tmt.gravity_balance(held.posture, held.unlocked_tree)
-    )  # without what the springs need
-    assert needed(held.changed(torque=gravity_alone)).stays == ()
-
-
-FALLS = """<mujoco><worldbody><body name="base"><freejoint name="base"/><geom type="box" size="0.1 0.1 0.05" mass="2"/>
-<body pos="0.1 0 0"><joint name="hip" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0.1 0 -0.3" size="0.02"/></body>
-</body></worldbody></mujoco>"""
+    weight = tmt.gravity_balance(held.posture, held.unlocked_tree)  # without what the springs need
+    assert needed(held.changed(torque=tuple(weight))).stays == ()
 
 
 def test_a_robot_that_falls_does_not_bend_and_the_answer_says_it_last():
     """Its accelerations are 0 with 50 digits of the very numbers of the file: a sum of masses in doubles would bend it."""
-    result = reduction.rows(of_file(FALLS))
+    result = reduction.rows(setup_of_file(FALLS))
     last = result.top[-1].values
     assert last["needed"] == ("base z",) and last["stays"] == ("base x", "base y", "base turn", "hip")
     assert last["scenes"] == ["qpos0, let go"] and last["apart"] < 1e-12 and failed(result) == []
@@ -182,3 +169,93 @@ def test_what_takes_too_long_to_decide_is_neither_needed_nor_locked(monkeypatch)
     (answer,) = reduction.answers(result, ARM)
     assert answer.values["undecided"] == ARM.joints
     assert answer.values["needed"] == answer.values["stays"] == ()
+
+
+def verdicts(check, *arguments):
+    result = ReductionResult("reduction", tables={"reduction_subsets": []})
+    check(result, *arguments)
+    return {check.quantity: check.passed for check in result.checks}
+
+
+@pytest.mark.parametrize("apart, passes", [(63.0, True), (65.0, False), (np.nan, False), (np.inf, False)])
+def test_sub_blocks_agree_within_64_eps(apart, passes):
+    scale = np.array([2.0, 1e-3, 5.0])
+    off = np.array([0.0, apart * EPS * 1e-3, 0.0])  # in the state with the small scale
+    row = SubsetRow(locked="beta", quantity="Mbar", parties="reduced, TMT to MuJoCo", unit="kg m2")
+    found = verdicts(sub_blocks.check_blocks, "beta locked", row, off, scale)
+    assert found == {"Mbar, reduced, TMT to MuJoCo": passes}
+
+
+@pytest.mark.parametrize("apart, width, required, within, long_enough", [
+    (0.99e-9, 1e-9, 5.0, True, True), (1.01e-9, 1e-9, 5.0, False, True), (np.nan, 1e-9, 5.0, False, True),
+    (1e-300, 0.0, 5.0, False, True), (0.0, 0.99e-3, 5.0, True, True),
+    (1.0, 1.01e-3, 3.0, True, True),  # too wide from 4 s on: then nothing is judged there
+    (0.0, 1.01e-3, 3.01, True, False),
+])  # fmt: skip
+def test_the_smallest_model_is_judged_while_the_band_is_narrow(apart, width, required, within, long_enough):
+    t = np.arange(6.0)
+    off, band = np.zeros((6, 4)), np.full((6, 4), 1e-9)
+    off[4, 1], band[4, 1] = apart, width
+    deviation = Deviation(Coordinates(("alpha", "gamma")), t, off, band)
+    found = verdicts(needs.check_smaller, "zero, free", deviation, required)
+    assert found == {"smallest model to whole": within, "time judged": long_enough}
+
+
+@pytest.mark.parametrize("errors, passed", [  # each of half the step of the last; those below 1e-11 rad are rounding
+    *FALLING, ([2.0**4 * 1.1e-11, 1.1e-11, 9e-12, 8e-12], [True]),  # just above rounding
+    ([1.0, 0.9, 2.0**4 * 1e-9, 1e-9, 9e-12], [True]), ([1.0, 2.0**-4, 0.9e-9, 0.8e-9, 9e-12], [False]),  # the finest count
+    ([2.0**4 * 1e-9, 1e-9, 9e-12, 1.1e-11, 2e-11], [True]),  # rounding that grows is no error of the method
+    ([2e-11, 9e-12, 1e-13, 2e-11], []), ([1e-3, np.nan, np.nan], [False]),  # hidden by rounding; a run that ends
+])  # fmt: skip
+def test_errors_fall_at_the_order_of_the_method(errors, passed):
+    dt = [0.1 / 2**k for k in range(len(errors))]
+    found = verdicts(exact_motion.check_falling, "swing", dt, {"tmt": errors})
+    assert list(found.values()) == passed
+
+
+def swings(model, **scene) -> ReductionResult:
+    result = ReductionResult("reduction")
+    cases = [ARM.case("mine", locked=("alpha", "beta"), **scene)] if scene else ARM.cases
+    for case in filter(exact_motion.is_pendulum, cases):
+        exact_motion.compare_swing(result, setup_of(model), case)
+    return result
+
+
+def test_both_engines_meet_the_elliptic_function_and_a_heavier_arm_does_not():
+    checks = swings(XML.replace('mass="1.5"', 'mass="1.50001"')).checks
+    passed = {check.scene: check.passed for check in checks}
+    assert passed == {"elbow swing, RK4, TMT": True, "elbow swing, RK4, MuJoCo": False}
+
+
+@pytest.mark.parametrize("scene", [
+    {"posture": "zero", "speed": (0, 0, 2000)},  # it turns over
+    {"posture": (0, 0, 89)},  # it hardly moves
+    {"posture": (90, 90, 0)},  # the forearm turns about a vertical
+    {"posture": "zero", "damping": 0.1},
+])  # fmt: skip
+def test_a_pendulum_that_shows_nothing_is_left_out(mujoco, scene):
+    result = swings(mujoco, **scene)
+    assert result.checks == [] and result.swings == {}
+
+
+def test_the_table_has_the_times_of_each_engine_and_the_largest_gain():
+    """Of a scene with a smaller model and of one that needs no run."""
+    cases, seconds = {case.name: case for case in ARM.cases}, {}
+    free, held = cases["zero, free"], cases["bent, held"]
+    planar = cases["elbow swing"]  # stands for the smaller model
+    for engine, steps, whole, small in (("tmt", 1024, 300e-9, 100e-9), ("mujoco", 128, 6000e-9, 4000e-9)):
+        for case, of, taken in ((free, free, whole), (held, held, whole), (free, planar, small)):
+            seconds[case.name, of.joints, engine] = steps * taken
+    of_scenes = (free, free), (free, planar), (held, held), (held, None)
+    models = [(scene.name, case) for scene, case in of_scenes]
+    result = ReductionResult("reduction", models=models, apart={(free.name, "tmt"): 1e-12})
+    times.add_rows(result, ARM, seconds)
+    rows = {(row.scene, row.nv, row.engine): row for row in result.rows}
+    for engine, whole, small in (("tmt", 300.0, 100.0), ("mujoco", 6000.0, 4000.0)):
+        of_whole, of_small = rows[free.name, 3, engine], rows[free.name, 1, engine]
+        assert (of_whole.ns_per_step, of_whole.speedup) == pytest.approx((whole, 1.0))
+        assert (of_small.ns_per_step, of_small.speedup) == pytest.approx((small, whole / small))
+        assert rows[held.name, 0, engine].ns_per_step is None
+    assert [rows[free.name, nv, "tmt"].max_difference for nv in (1, 3)] == [1e-12, None]
+
+    assert times.largest_gain(result.rows, 3) is rows[free.name, 1, "tmt"]

@@ -20,10 +20,8 @@ STOPPED = "smallest error of mujoco's RK4, where smaller steps gain nothing"
 
 def run_of(engine, method, error, steps=64, seconds=1e-3) -> Run:
     """A run: diverged where the error is None."""
-    errors = dict.fromkeys(("error", "worst_error", "energy_error"), error)
-    row = SpeedRow(
-        "bent, free", engine, method, 5.0 / steps, None, steps, steps, 4 * steps, seconds, **errors
-    )
+    numbers = dict.fromkeys(("error", "worst_error", "energy_error"), error) | {"seconds": seconds}
+    row = SpeedRow("bent, free", engine, method, 5.0 / steps, None, steps, steps, 4 * steps, **numbers)
     row.diverged = error is None
     return Run(Method(engine, method, 4, SCHEMES.get(method, method)), Setting(5.0, steps), error, row)
 
@@ -39,7 +37,6 @@ def scene_of(found, floor, is_read=False) -> SceneRuns:
 
 
 def judged(check, found, floor) -> dict[str, bool]:
-    """(quantity, passed) of each check that is made of runs."""
     result = SpeedResult("speed")
     check(result, scene_of(found, floor))
     return {check.quantity: check.passed for check in result.checks}
@@ -88,7 +85,6 @@ def test_a_series_ends_where_a_run_gains_nothing(found, work, best, last, ends):
 
 
 def falling(*orders) -> list[float]:
-    """Errors that fall by these orders."""
     return [*(1e-4 / 2.0 ** np.cumsum([0.0, *orders]))]
 
 
@@ -173,11 +169,8 @@ def test_what_is_called_is_followed_once_after_all_else_has_ended(setup, monkeyp
     known, called = run_of("tmt", "rk4", 1.0), [run_of("scipy", "RK45", 1.0, 64, s) for s in (0.014, 0.016)]
     follow = lambda *_, compiled: log.append(compiled) or (called, ["a failure"])  # noqa: E731
     take = lambda runs, calls: log.append(runs == calls == [known, called[0]])  # noqa: E731
-    for name, act in (
-        ("runs_of", follow),
-        ("prepared", lambda case, runs, engines: runs),
-        ("take_times", take),
-    ):
+    acts = {"runs_of": follow, "prepared": lambda case, runs, engines: runs, "take_times": take}
+    for name, act in acts.items():
         monkeypatch.setattr(speed, name, act)
     scene = SceneRuns(setup.robot.cases[0], None, 0.0, [known])
     assert speed.add_times(setup, [scene]) == ["a failure"]

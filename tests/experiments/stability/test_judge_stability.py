@@ -1,25 +1,28 @@
-"""Checks of amplification, limits, growth, departures: a row just inside of each tolerance and one just outside; no runs."""
+"""Checks of limits, growth, departures, claims: a row just inside of each tolerance and one just outside; no runs."""
 
 import numpy as np
 import pytest
+from edited import setup_of_file
 from judged import BOTH, INSIDE, OUTSIDE, only
 from models import PATHS
 
-from compare.engines.mujoco import reading
-from compare.experiments.stability import departure, equilibria, limits
-from compare.experiments.stability.tables import DepartureRow, LimitRow
+from compare.engines.mujoco.engine import METHODS as INTEGRATORS
+from compare.engines.tmt import Tmt
+from compare.experiments.stability import claims, departure, equilibria, failure, limits
+from compare.experiments.stability.tables import DepartureRow, FinerRow, KeptRow, LimitRow, TorqueRow
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
 from compare.truth.linear import held
+
+RK4 = (Tmt().methods["rk4"], INTEGRATORS["RK4"])
+NAMES = (*(f"{claims.VARIANT} {k}" for k in range(1, 28)), claims.NEAREST, *claims.CLEAR_TORQUES)
+FREE = ARM.case("bent, free", posture="bent")
 
 
 @pytest.mark.parametrize("off, rounded, passes", [
     (INSIDE * 64 * 2.0**-52 * 3.0 * 7.0 / 1e-6, 0.0, True), (OUTSIDE * 64 * 2.0**-52 * 3.0 * 7.0 / 1e-6, 0.0, False),
     (INSIDE * 1e-9 / 1e-6, 1e-9, True), (OUTSIDE * 1e-9 / 1e-6, 1e-9, False), (np.nan, 0.0, False),
 ])  # fmt: skip
-def test_amplification_within_the_rounding_of_a_difference_quotient_or_of_a_step(
-    result, off, rounded, passes
-):
+def test_amplification_within_the_rounding_of_a_quotient_or_of_a_step(result, off, rounded, passes):
     ours, q = np.diag([3.0, -7.0]), np.array([1.0, -2.0])
     equilibria.check_amplification(result, "", q, ours, ours + [[0.0, off], [0.0, 0.0]], rounded)
     assert only(result) is passes
@@ -31,14 +34,10 @@ def limit_row(predicted=0.1, observed=0.1, kind="finite", seen="finite", **more)
     return limits.Observed(row, seen, 1e-3)
 
 
-def check_limits(result, *rows):
-    limits.check_limits(result, list(rows))
-
-
 @BOTH
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_observed_limit_within_a_thousandth(result, share, passes, sign):
-    check_limits(result, limit_row(observed=0.1 * (1 + sign * share * 1e-3)))
+    limits.check_limits(result, [limit_row(observed=0.1 * (1 + sign * share * 1e-3))])
     assert only(result) is passes
 
 
@@ -47,12 +46,13 @@ def test_observed_limit_within_a_thousandth(result, share, passes, sign):
     ("always_fails", "never_fails", False), ("finite", "never_fails", False),
 ])  # fmt: skip
 def test_kind_of_limit_is_as_predicted(result, kind, seen, passes):
-    check_limits(result, limit_row(0.1 if kind == "finite" else None, None, kind, seen))
+    limits.check_limits(result, [limit_row(0.1 if kind == "finite" else None, None, kind, seen)])
     assert only(result) is passes
 
 
 def test_what_no_run_decides_is_not_checked(result):
-    check_limits(result, limit_row(), limit_row(observed=None, seen=None, method="implicit"))
+    rows = [limit_row(), limit_row(observed=None, seen=None, method="implicit")]
+    limits.check_limits(result, rows)
     assert only(result) and [row.passed for row in result.rows] == [True, None]
     assert result.notes[0].values["where"] == ["bent, TMT implicit, damping 0"]
 
@@ -73,7 +73,7 @@ def test_a_slow_mode_that_does_not_grow_by_itself_is_not_seen_in_a_short_run():
 
 
 def test_a_limit_that_runs_show_no_nearer_than_a_tenth_is_not_decided_by_them():
-    arm7 = held(robot_of(reading.read(PATHS["arm7"]), "arm7.xml"), "ready")
+    arm7 = held(setup_of_file(PATHS["arm7"]).robot, "ready")
     assert limits.is_shown(arm7, 0.0999) and not limits.is_shown(arm7, 0.1001)
 
 
@@ -82,8 +82,8 @@ def test_a_limit_is_not_decided_by_runs_in_which_a_slow_mode_is_lost_in_rounding
     """An inverted pendulum of 9.81 N m/rad that its spring just balances."""
     joint = f'<joint name="swing" axis="0 1 0" stiffness="{stiffness}"/>'
     body = f'<body>{joint}<geom type="sphere" size="0.1" pos="0 0 0.5" mass="2"/></body>'
-    robot = robot_of(reading.read(f"<mujoco><worldbody>{body}</worldbody></mujoco>"), "swing.xml")
-    assert limits.is_shown(held(robot, "qpos0"), 1e-3) is shown
+    setup = setup_of_file(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    assert limits.is_shown(held(setup.robot, "qpos0"), 1e-3) is shown
 
 
 def departure_row(observed, predicted, **more):
@@ -112,9 +112,8 @@ def test_the_linear_map_says_when_a_tenth_of_a_radian_is_reached():
     values, vectors = at.modes
     shape = size * vectors[:3, 0].real / np.abs(vectors[:3, 0]).max()
     (found,) = departure.predicted(at, "rk4", 1e-3, shape[None], np.zeros((1, 3)))
-    assert found == pytest.approx(
-        np.arccosh(0.1 / size + 1.0) / values[0].real, abs=2e-3
-    )  # cosh - 1, from rest
+    left = np.arccosh(0.1 / size + 1.0) / values[0].real  # cosh - 1, from rest
+    assert found == pytest.approx(left, abs=2e-3)
 
 
 @pytest.mark.parametrize("joints, reach, count", [(4, 2, 625), (5, 1, 243)])
@@ -124,3 +123,85 @@ def test_torques_within_some_ulps_are_bounded_in_number(joints, reach, count):
     assert found.shape == (count, joints) and (found[count // 2] == tau).all()
     away = np.abs(found - tau) / np.spacing(np.abs(tau))
     assert len({tuple(row) for row in found}) == count and (away.max(axis=0) == reach).all()
+
+
+def torque_rows(times=(4.7, 4.7), moved=0.0, sides=(1, 1), clear=(1, 1), leaving=27):
+    """Rows of claims.holding_torques, for TMT and for MuJoCo; leaving: how many of TMT's variants do."""
+    rows = []
+    for method, time, side, away in zip(RK4, times, sides, clear):
+        for k, name in enumerate(NAMES):
+            stays = method.engine == "tmt" and leaving <= k < 27
+            rows.append(TorqueRow(
+                scene="ball catch", engine=method.engine, method=method.name, dt=5 / 64, torque=name,
+                push=1e-14 * (away if "ulps" in name else 1), predicted=time, observed=None if stays else time,
+                direction=None if stays else side, moved=moved if "own" in name else 1.0,
+            ))  # fmt: skip
+    return rows
+
+
+@pytest.mark.parametrize("changed, reproduced, passes", [
+    ({"times": (5.49, 3.51)}, True, True), ({"times": (5.51, 4.7)}, False, True), ({"times": (4.7, 3.49)}, False, True),
+    ({"leaving": 14}, True, True), ({"leaving": 13}, False, True),  # more than half leave
+    ({"moved": 1e-17}, False, False), ({"clear": (1, -1)}, False, False),  # against its push
+    ({"sides": (1, None)}, False, False),
+])  # fmt: skip
+def test_claim_1(result, changed, reproduced, passes):
+    result.check("elsewhere", "a check that is not of this claim", 2.0, 1.0, "")
+    claims.check_torques(result, ARM, torque_rows(**changed))
+    assert result.notes[-1].values["reproduced"] is reproduced
+    assert all(check.passed for check in result.checks[1:]) is passes
+
+
+@pytest.mark.parametrize("to, found", [(0.3, 1), (-0.3, -1), (np.nan, None)])
+def test_the_side_to_which_a_posture_is_left(to, found):
+    path = np.array([[1.0, 0.0, 0.0], [1.0 + to / 3, 0.0, 0.0], [1.0 + to, 9.0, 9.0]])
+    assert claims.side(path, 0.2, 0.1) == found and claims.side(path, None, 0.1) is None
+
+
+def finer_rows(moved=0.0, directions=(1, -1), times=(5.0, 6.0)):
+    return [
+        FinerRow(scene="ball catch", engine=method.engine, method=method.name, dt=5 / count, ulps=sign,
+                 observed=time, direction=side, moved=away, step=1e-17, half_ulp=5e-17)
+        for method in RK4 for sign in (1, -1)
+        for count, time, side, away in ((64, times[0], directions[0], 1.0), (128, times[1], directions[1], 1.0),
+                                        (4096, None, None, moved))
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("changed, word, passes", [
+    ({}, "yes", True), ({"directions": (1, 1)}, "in part", True), ({"moved": 1e-17}, "in part", False),
+    ({"directions": (None, None), "times": (None, None)}, "no", True),
+])  # fmt: skip
+def test_claim_2(result, changed, word, passes):
+    claims.check_finer_steps(result, ARM, finer_rows(**changed))
+    assert result.notes[-1].values["reproduced"] == word
+    assert [check.passed for check in result.checks] == 4 * [passes]
+
+
+def kept_runs(observed=None, largest=0.06, acceleration=50.0):
+    rows = [
+        KeptRow(scene="bent", engine=method.engine, method=method.name, dt=dt, torque=claims.ONE_ULP,
+                observed=observed if dt < 0.31 else None, diverged_at=None, moved=away, run=1000.0)
+        for method in RK4 for dt, away in ((0.3, 1e-9), (0.35, largest))
+    ]  # fmt: skip
+    engines = [method.engine for method in RK4]
+    return claims.KeptRuns(rows, 0.3108, 9.1, dict.fromkeys(engines, np.array([0.0, -acceleration, 0.0])))
+
+
+@pytest.mark.parametrize("changed, word, failing", [
+    ({}, "bounded", 0), ({"observed": 999.0}, "no", 2), ({"largest": 1.01e-3}, "bounded", 0),
+    ({"largest": 0.99e-3}, "no", 0), ({"acceleration": 1.01}, "bounded", 0), ({"acceleration": 0.99}, "yes", 2),
+])  # fmt: skip
+def test_claim_3(result, changed, word, failing):
+    claims.check_kept(result, ARM, kept_runs(**changed))
+    assert result.notes[0].values["reproduced"] == word
+    assert sum(not check.passed for check in result.checks) == failing and len(result.checks) == 4
+
+
+@pytest.mark.parametrize("reset, caught, passes", [
+    (1.0, 1.0 + 0.999 * 5 / 64, [True]), (1.0, 1.0 + 1.001 * 5 / 64, [False]), (1.0, None, [False]), (None, None, []),
+])  # fmt: skip
+def test_a_reset_is_caught_within_a_step(result, reset, caught, passes):
+    run = failure.OwnReset(5.0, int(reset is not None), reset, True, 0, caught)
+    failure.check_reset(result, FREE, run)
+    assert [check.passed for check in result.checks] == passes

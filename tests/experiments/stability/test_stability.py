@@ -1,22 +1,28 @@
-"""What is known of postures and of a step of each method, the same in runs, and the whole of it."""
+"""What is known of postures and of a step of each method, the same in runs; the run of the whole file at its own step."""
 
 import dataclasses
 
 import numpy as np
 import pytest
+from edited import setup_of_file
 from models import PATHS
+from servo_models import posture_of
 
 import tmt
-from compare.engines.mujoco import engine, reading
+from compare.engines.mujoco import reading
+from compare.engines.mujoco.engine import METHODS as OF_MUJOCO
+from compare.engines.mujoco.linear import WholeRun
+from compare.engines.mujoco.names import INTEGRATORS
+from compare.engines.tmt import Tmt
 from compare.experiments import stability
 from compare.experiments.setup import Setup
-from compare.experiments.setup import engines as engines_of
-from compare.experiments.stability import claims, departure, failure, limits, subjects
+from compare.experiments.stability import claims, departure, failure, limits, own_run, subjects
+from compare.experiments.stability.servos.predicted import acting_at, predicted_at
 from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
 from compare.truth.linear import held, posture_names
 
+METHODS = Tmt().methods
 BENT, BALL = held(ARM, "bent"), held(ARM, "ball catch")
 FREE = ARM.case("bent, free", posture="bent")
 SWING = """<mujoco><worldbody><body><joint name="swing" axis="0 1 0"/>
@@ -24,6 +30,21 @@ SWING = """<mujoco><worldbody><body><joint name="swing" axis="0 1 0"/>
 CART_POLE = """<mujoco><worldbody><body><joint name="rail" type="slide" axis="1 0 0" damping="1"/>
   <geom type="sphere" size="0.1" mass="1"/><body><joint name="pole" axis="0 1 0" damping="0.1"/>
   <geom type="sphere" size="0.1" pos="0 0 0.5" mass="2"/></body></body></worldbody></mujoco>"""
+HINGE = """<mujoco><option timestep="0.005" integrator="{integrator}" {option}/><worldbody><body>
+  <joint name="swing" axis="0 1 0" {joint}/><inertial pos="0 0 -0.1" mass="0.1" diaginertia="1e-4 1e-4 1e-4"/>
+  <geom type="box" size="0.1 0.05 0.001" pos="0.1 0 0" mass="0"/></body></worldbody>
+  <actuator>{actuator}</actuator><keyframe>{key}</keyframe></mujoco>"""
+HOVERING = """<mujoco><worldbody><body><freejoint/><geom size="0.1" mass="1"/><site name="t"/></body></worldbody>
+  <actuator><motor site="t" gear="0 0 1 0 0 0"/></actuator><keyframe><key name="go" ctrl="{}"/></keyframe></mujoco>"""
+SPARSE = """<mujoco><option jacobian="sparse"/><worldbody>
+  <body><joint name="a"/><geom size="0.1"/></body><body><joint name="b"/><geom size="0.1"/></body></worldbody>
+  <equality><joint joint1="a"/><joint joint1="a" joint2="b"/></equality>
+  <actuator><position joint="b" kp="50" kv="1"/></actuator></mujoco>"""
+WELDED = """<mujoco><worldbody><body name="a"><joint name="lift" type="slide"/><geom size="0.1"/></body>
+  <body name="b" pos="1 0 0"><freejoint/><geom size="0.1"/></body></worldbody><equality><weld body1="a" body2="b"/></equality>
+  <actuator><position joint="lift" kp="50"/></actuator></mujoco>"""
+STIFF = '<position joint="swing" kp="0.2" kv="1"/>'
+SATURATED = '<position joint="swing" kp="5" kv="0.01" forcerange="-0.1 0.1"/>'
 
 
 @pytest.mark.parametrize("name, kind, rates", [
@@ -38,44 +59,34 @@ def test_what_each_posture_is(name, kind, rates):
     assert np.abs(values.sum()) < 1e-9  # undamped: they come in opposite pairs
 
 
-@pytest.mark.parametrize("name, limit", [
-    ("semi_implicit_euler", 2.0), ("implicit", 2.0), ("rk4", 2.0 * np.sqrt(2.0)),
-])  # fmt: skip
-def test_known_limits_of_undamped_modes(name, limit):
-    kind, dt = BENT.limit(name)
-    assert kind == "finite" and dt * np.abs(BENT.modes[0]).max() == pytest.approx(limit, rel=1e-6)
-
-
-@pytest.mark.parametrize("name", ["implicit_midpoint", "gauss_legendre_4"])
-def test_a_stable_method_has_no_limit_but_on_a_saddle(name):
-    assert BENT.limit(name) == ("never_fails", None) and BALL.limit(name) == ("always_fails", None)
-
-
-def read(source):
-    found = reading.read(source)
-    return robot_of(found, "robot.xml"), reading.engine(found)
+def test_known_limits_of_undamped_modes_and_of_methods_that_are_stable_but_on_a_saddle():
+    for name, limit in {"semi_implicit_euler": 2.0, "implicit": 2.0, "rk4": 2.0 * np.sqrt(2.0)}.items():
+        kind, dt = BENT.limit(name)
+        assert kind == "finite" and dt * np.abs(BENT.modes[0]).max() == pytest.approx(limit, rel=1e-6)
+    for name in ("implicit_midpoint", "gauss_legendre_4"):
+        assert BENT.limit(name) == ("never_fails", None) and BALL.limit(name) == ("always_fails", None)
 
 
 def test_of_many_keyframes_the_first_are_looked_at():
     keys = "".join(f'<key name="k{i}" qpos="{0.3 * i}"/>' for i in range(9))
-    seen = subjects_of(read(SWING.format(keys=f"<keyframe>{keys}</keyframe>"))[0])
+    seen = subjects_of(setup_of_file(SWING.format(keys=f"<keyframe>{keys}</keyframe>")).robot)
     assert posture_names(seen.robot) == (*(f"k{i}" for i in range(MOST_POSTURES)), "rest")
     assert np.abs(held(seen.robot, "rest").tau).max() < 1e-6
-    body = read(PATHS["free_body"])[0]
+    body = setup_of_file(PATHS["free_body"]).robot
     assert not subjects_of(body).centres and held(body, "qpos0").sizes[3:].tolist() == [1.0, 1.0, 1.0]
 
 
 def test_a_limit_is_sought_about_the_predicted_one_and_found_again():
-    robot, mujoco = read(SWING.format(keys=""))
-    at, known = held(subjects_of(robot).robot, "rest"), engines_of(mujoco)
+    setup = setup_of_file(SWING.format(keys=""))
+    at, known = held(subjects_of(setup.robot).robot, "rest"), setup.engines
     predicted, rk4 = at.limit("rk4")[1], known["mujoco"].methods["RK4"]
     seen, observed = limits.observed_limit(rk4, known, at, 1000, predicted * limits.TRIED_ABOUT)
     assert seen == "finite" and observed == pytest.approx(predicted, rel=1e-3)
 
 
 def test_a_cart_with_a_pole_leaves_as_predicted_and_its_column_names_both_units(result):
-    robot, mujoco = read(CART_POLE)
-    known = engines_of(mujoco)
+    setup = setup_of_file(CART_POLE)
+    robot, known = setup.robot, setup.engines
     rows = departure.departures(1 / 512, held(robot, "qpos0"), known, (known["mujoco"].methods["RK4"],))
     assert "perturbation_m_or_rad" in rows[0].record() and "unit" not in rows[0].record()
     departure.check_departures(result, rows)
@@ -85,15 +96,9 @@ def test_a_cart_with_a_pole_leaves_as_predicted_and_its_column_names_both_units(
     assert {"rk4", "RK4", "implicit"} <= names and not {"gauss_legendre_4", "implicit_midpoint"} & names
 
 
-@pytest.fixture
-def method(engines):
-    """method(engine, name): one method of integration."""
-    return lambda engine, name: engines[engine].methods[name]
-
-
-def test_predicted_and_observed_limits_agree(engines, method):
-    ours = [method("tmt", scheme) for scheme in ("semi_implicit_euler", "implicit_midpoint")]
-    rows = limits.limit_rows(BENT, engines, (*ours, method("mujoco", "RK4")))
+def test_predicted_and_observed_limits_agree(engines):
+    ours = [METHODS[scheme] for scheme in ("semi_implicit_euler", "implicit_midpoint")]
+    rows = limits.limit_rows(BENT, engines, (*ours, OF_MUJOCO["RK4"]))
     kinds = ["finite", "never_fails", "finite"]
     assert [found.kind for found in rows] == [found.row.limit for found in rows] == kinds
     for row, *_ in (rows[0], rows[2]):
@@ -102,25 +107,23 @@ def test_predicted_and_observed_limits_agree(engines, method):
     heavy = held(dataclasses.replace(ARM, tree=dataclasses.replace(tmt.ARM, mass=(1.9, 1.65))), "bent")
     assert abs(rows[2].row.observed_dt / heavy.limit("rk4")[1] - 1.0) > 2.0 * limits.LIMIT_TOLERANCE
     # growth beyond the limit is slow with little damping: 100-fold in 2000 steps comes 6 % later
-    ((row, kind, _),) = limits.limit_rows(held(ARM, "bent", 0.5), engines, (method("tmt", "explicit_euler"),))
+    ((row, kind, _),) = limits.limit_rows(held(ARM, "bent", 0.5), engines, (METHODS["explicit_euler"],))
     assert kind == "finite" and row.observed_dt == pytest.approx(row.predicted_dt, rel=5e-4)
 
 
-def test_departure_is_predicted_where_no_other_mode_grows_faster_than_that_of_the_saddle(
-    engines, method, result
-):
-    rows = departure.departures(5 / 64, BALL, engines, (method("tmt", "rk4"), method("mujoco", "Euler")))
+def test_departure_is_predicted_where_no_other_mode_grows_faster(engines, result):
+    rows = departure.departures(5 / 64, BALL, engines, (METHODS["rk4"], OF_MUJOCO["Euler"]))
     assert len({row.observed for row in rows}) > 8  # the arm left, at other times from other starts
     departure.check_departures(result, rows)
     assert len(result.checks) == len(rows) and all(check.passed for check in result.checks)
     # with steps of 1 s a swing grows 9.5-fold in each, what leaves 8.5-fold
-    assert departure.departures(1.0, BALL, engines, (method("tmt", "explicit_euler"),)) == []
+    assert departure.departures(1.0, BALL, engines, (METHODS["explicit_euler"],)) == []
 
 
-def test_own_bias_holds_for_ever(engines, method):
-    tau = departure.own_torque(method("mujoco", "RK4"), engines, BALL)
+def test_own_bias_holds_for_ever(engines):
+    tau = departure.own_torque(OF_MUJOCO["RK4"], engines, BALL)
     assert not engines["mujoco"].of(BALL.case).run(BALL.q, np.zeros(3), tau, 5 / 64, 200, "RK4").v.any()
-    ours = method("tmt", "rk4")  # no double need be the bias of compiled code: the nearest is taken
+    ours = METHODS["rk4"]  # no double need be the bias of compiled code: the nearest is taken
     left = departure.residual(ours, engines, BALL, departure.own_torque(ours, engines, BALL)[None])
     assert np.abs(left).max() <= np.spacing(np.abs(BALL.tau).max())
 
@@ -144,10 +147,8 @@ def test_a_reset_is_caught(engines):
 def test_a_small_run_fills_every_table(small):
     small = small("stability")
     assert set(small.tables) == {"departure", "stability_claims"}
-    reproduced = [
-        (note.kind, note.values["reproduced"]) for note in small.notes if note.kind.startswith("claim_")
-    ]
-    assert reproduced == [("claim_1", True), ("claim_2", "yes"), ("claim_3", "bounded")]
+    notes = {note.kind: note.values.get("reproduced") for note in small.notes}
+    assert [notes[f"claim_{k}"] for k in (1, 2, 3)] == [True, "yes", "bounded"]
     assert any("silent" in check.quantity for check in small.checks)
 
 
@@ -155,9 +156,8 @@ def test_a_small_run_fills_every_table(small):
     ("upright", "centres", ["stability_departure"]), ("hanging", "saddles", ["stability_limits"]),
 ])  # fmt: skip
 def test_what_a_robot_lacks_is_left_out_with_a_reason(engines, posture, without, drawn):
-    robot = dataclasses.replace(
-        ARM, claims=None, kinds={}, scenes=(), postures={"one": ARM.postures[posture]}
-    )
+    postures = {"one": ARM.postures[posture]}
+    robot = dataclasses.replace(ARM, claims=None, kinds={}, scenes=(), postures=postures)
     result = stability.rows(Setup.quick(robot, engines))
     assert result.checks and all(check.passed for check in result.checks)
     (examined,) = (note.values for note in result.notes if note.kind == "examined")
@@ -166,8 +166,7 @@ def test_what_a_robot_lacks_is_left_out_with_a_reason(engines, posture, without,
 
 
 def test_departures_that_may_differ_by_more_than_they_last_are_not_compared(monkeypatch):
-    found = reading.read(SWING.format(keys=""))
-    setup = Setup.quick(robot_of(found, "robot.xml"), engines_of(engine(found)))
+    setup = setup_of_file(SWING.format(keys=""), Setup.quick)
     rows = stability.rows(setup).tables["departure"]
     shortest = min(row.predicted for row in rows)
     for curved, left in ((0.99 * shortest - departure.usually_near(rows[0].dt), len(rows)), (1e6, 0)):
@@ -176,3 +175,95 @@ def test_departures_that_may_differ_by_more_than_they_last_are_not_compared(monk
         assert len(result.tables.get("departure", ())) == left
         (examined,) = (note.values for note in result.notes if note.kind == "examined")
         assert examined["saddles"] and examined["departures"] is bool(left)
+
+
+def hinge(joint="", integrator="Euler", actuator="", option="", key='<key name="aside" qpos="0.5"/>'):
+    return HINGE.format(joint=joint, integrator=integrator, actuator=actuator, option=option, key=key)
+
+
+@pytest.mark.parametrize("source, outcome", [
+    (hinge('damping="2"', "RK4"), "worse"), (hinge('damping="0.05"'), "calm"),
+    (hinge('stiffness="400"', "implicitfast"), "worse"), (hinge(), "alike"),  # nothing brakes a pendulum
+    (hinge(actuator=STIFF), "worse"), (hinge('frictionloss="0.2"', actuator=STIFF, key=""), "calm"),
+    (hinge(actuator='<dcmotor joint="swing" motorconst="0.8" resistance="0.2"/>'), "worse"),
+    (hinge(actuator='<motor joint="swing" damping="3"/>', integrator="RK4"), "worse"),
+    (hinge(option='density="1000" viscosity="80"'), "worse"),
+    (hinge(option='density="1000" viscosity="80"', integrator="implicit", key=""), "calm"),
+    (hinge(actuator='<general joint="swing" biastype="affine" biasprm="0 0 1"/>', key=""), "fails"),  # at any step
+    (HOVERING.format(9.81), "calm"), (HOVERING.format(0), "alike"),  # it hovers, and falls
+])  # fmt: skip
+def test_what_moves_on_by_its_step_alone_is_not_stable(source, outcome):
+    found = reading.read(source)
+    run = own_run.own_run(next(iter(found.keyframes), ""), found.dt, found.integrator, found)
+    assert run.outcome == outcome
+
+
+@pytest.mark.parametrize("own, finer, worse", [
+    (0.99e-3, 1e-9, False), (1.01e-3, 1e-9, True), (1.01e-3, 1.02e-4, False), (9.9, 1.0, False), (10.1, 1.0, True),
+    (np.nan, 1.0, True),
+])  # fmt: skip
+def test_ten_times_the_speed_at_the_finer_step(own, finer, worse):
+    runs = [WholeRun(np.full(4, speed), None) for speed in (own, finer)]
+    assert own_run.is_worse(*runs) is worse
+    # a motion that goes on is bounded by its fastest part
+    fast = runs[1]._replace(speeds=np.array([100.0, 1.0, 1.0, finer]))
+    assert own_run.is_worse(runs[0], fast) is (worse and (finer < 1e-3 or own != 10.1))
+    assert not own_run.is_worse(runs[0], runs[1]._replace(failed_at=1.0))
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """The result of a quick run, without runs without servos, which take long."""
+    monkeypatch.setattr(stability, "MOST_SPEEDS", 0)
+    return lambda source, **more: stability.rows(setup_of_file(source, Setup.quick, **more))
+
+
+def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step(quick):
+    failed, source = {}, hinge('damping="2"', "RK4", key="")
+    for step in (None, (1e-4, "RK4"), (0.005, "Euler"), (0.004, "RK4")):
+        failed[step] = [check.quantity for check in quick(source, step=step).checks if check.failed]
+    assert failed[None] == failed[1e-4, "RK4"] == failed[0.005, "Euler"] == [own_run.AT_OWN]
+    assert failed[0.004, "RK4"] == [own_run.AT_OWN, own_run.AT_REQUESTED]
+
+
+def test_the_first_six_keyframes_are_run(quick):
+    keys = "".join(f'<key name="k{i}" qpos="{i / 10}"/>' for i in range(7))
+    rows = quick(hinge('damping="0.05"', key=keys)).tables["own_run"]
+    assert sorted(row.start for row in rows) == [f"k{i}" for i in range(own_run.MOST_STARTS)]
+
+
+@pytest.mark.parametrize("source, why", [
+    (hinge(option='viscosity="1"', actuator=STIFF), "not_judged"), (WELDED, "tied"),
+    (hinge('range="0 1" limited="true"', actuator=STIFF, key='<key qpos="0" ctrl="-0.5"/>'), "out_of_range"),
+])  # fmt: skip
+def test_what_is_not_modelled_has_no_limit(quick, source, why):
+    result = quick(source)
+    assert {row.limit for row in result.tables["step_limits"] if row.posture != "middle"} == {why}
+
+
+def test_adhesion_acts_in_contacts_alone_and_hides_no_limit(quick):
+    grip = f'{STIFF}<adhesion body="grip" ctrlrange="0 1" gain="2"/>'
+    result = quick(hinge(actuator=grip).replace("<body>", '<body name="grip">'))
+    assert "not_judged" not in {row.limit for row in result.tables["step_limits"]}
+
+
+def test_a_servo_at_its_range_lets_a_keyframe_rest_beside_it():
+    key = '<key name="home" qpos="0.05" ctrl="0"/>'
+    at, found = posture_of(hinge(actuator=SATURATED, option='gravity="0 0 0"', key=key))
+    assert at.q == pytest.approx([0.0], abs=1e-9) and predicted_at(at.robot, "home", found).known
+
+
+def test_constraints_of_a_sparse_jacobian_and_a_pickled_model():
+    at, found = posture_of(SPARSE)
+    dense, _ = posture_of(SPARSE.replace("sparse", "dense"))
+    assert np.array_equal(*(one.rows(one.q, 1e-3, "Euler").jacobian for one in (at, dense)))
+    assert "data" not in acting_at(found, at).__getstate__()  # with a plugin it ends a process that reads it
+
+
+def test_a_robot_of_many_speeds_has_its_servo_limits_alone(quick):
+    result = quick(hinge(actuator=STIFF))
+    assert result.tables.keys() == {"own_run", "step_limits"} and not result.rows
+    aside = [row for row in result.tables["step_limits"] if row.posture == "aside"]
+    calm = {row.integrator: row.full_model_calm for row in aside}
+    assert calm == dict.fromkeys(INTEGRATORS) | {"Euler": False}
+    assert [finding.kind for finding in result.top] == ["own_run", "step", "large"]

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from edited import setup_of_file
 from models import PATHS
 from servo_models import FILTERED, FLOATING, FORK, INERTIA, hinge, posture_of
 
 from compare.core.check import AT_OWN_STEP
-from compare.engines.mujoco import reading
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments.setup import Setup
-from compare.experiments.setup import engines as engines_of
 from compare.experiments.stability import servos
 from compare.experiments.stability.servos import figures_step, observed, predicted, response
 from compare.experiments.stability.servos.findings import verdict
@@ -20,13 +19,13 @@ from compare.experiments.stability.servos.observed import grows_in_runs
 from compare.experiments.stability.servos.predicted import acting_at
 from compare.experiments.stability.tables import StabilityResult, StepLimitRow
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
 
 SERVO = '<position name="servo" joint="swing" kp="50" kv="4"/>'
 SWING = """<mujoco><option timestep="0.002" integrator="{integrator}"/><worldbody><body>
   <joint name="swing" axis="0 1 0" damping="0.01"/><geom type="sphere" size="0.1" pos="{com}" mass="2"/></body></worldbody>
   <actuator>{servo}</actuator><keyframe>{key}</keyframe></mujoco>"""
 UP = '<key name="up" qpos="1"/>'
+NONE = {"limit": "none", "predicted_dt": None}
 
 
 def swing(servo=SERVO, key="", integrator="Euler", com="0 0 -0.5"):
@@ -34,15 +33,11 @@ def swing(servo=SERVO, key="", integrator="Euler", com="0 0 -0.5"):
 
 
 def row(**more):
-    """A row of step_limits.csv."""
     usual = {
         "posture": "p", "base": "fixed", "integrator": "Euler", "limit": "finite", "predicted_dt": 0.1, "file_dt": 0.1,
         "file_integrator": "Euler", "limiting_joint": "joint7", "stable_at_file_dt": None, "mode": None, "mode_kind": None,
     }  # fmt: skip
     return StepLimitRow(**usual | more)
-
-
-NONE = {"limit": "none", "predicted_dt": None}
 
 
 @pytest.mark.parametrize("more, kind, passed", [
@@ -115,16 +110,12 @@ def test_runs_show_the_predicted_limit(source, integrator):
     assert grows == [False, True]
 
 
-def errors(source, integrator, dts):
-    at, reading = posture_of(source)
-    return [response.response_error(at, integrator, reading, dt) for dt in dts]
-
-
 @pytest.mark.parametrize("source", [FORK.format(kv=5), FLOATING], ids=["fork", "floating"])
 def test_errors_fall_with_the_order_of_the_method(source):
-    coarse, fine = errors(source, "implicitfast", (1e-3, 5e-4))
+    at, reading = posture_of(source)
+    coarse, fine = (response.response_error(at, "implicitfast", reading, dt) for dt in (1e-3, 5e-4))
     assert coarse / fine == pytest.approx(2.0, rel=0.1) and 1e-6 < fine < 0.1
-    coarse, fine, finest = errors(source, "RK4", (1.6e-3, 8e-4, 1e-4))
+    coarse, fine, finest = (response.response_error(at, "RK4", reading, dt) for dt in (1.6e-3, 8e-4, 1e-4))
     assert coarse / fine == pytest.approx(16.0, rel=0.4)
     assert finest < 1e-7  # the exact response is that of MuJoCo
 
@@ -164,25 +155,20 @@ def test_what_is_above_the_cap_or_below_the_floor_is_named():
     assert not lifts_of(hinge(2000.0, 5.0), 0.03)["kv"]
 
 
-def read(source, make=Setup.quick, **more):
-    found = reading.read(source)
-    robot = robot_of(found, "robot.xml")
-    return make(robot, engines_of(reading.engine(found)), reading=found, **more)
-
-
-def done(setup):
+def done(source):
+    setup = setup_of_file(source, Setup.quick)
     result = StabilityResult("stability")
     servos.add(result, setup, servos.begin(setup))
     return result
 
 
 def at_qpos0(source=None):
-    setup = read(source or swing())
+    setup = setup_of_file(source or swing())
     return setup, predicted.predicted_at(setup.robot, "qpos0", setup.reading)
 
 
 def test_a_quick_run_has_every_limit_and_observes_the_files_own_integrator_and_euler_at_one_posture():
-    result = done(read(swing(SERVO.replace('"4"', '"10"'), UP, "implicitfast")))
+    result = done(swing(SERVO.replace('"4"', '"10"'), UP, "implicitfast"))
     rows = result.tables["step_limits"]
     places = [(row.posture, row.base, row.integrator) for row in rows]
     assert places == [(posture, "fixed", name) for posture in ("up", "qpos0") for name in INTEGRATORS]
@@ -198,7 +184,7 @@ def test_a_quick_run_has_every_limit_and_observes_the_files_own_integrator_and_e
 
 def test_a_full_run_observes_every_integrator_and_draws_curves(result):
     for alone in (True, False):
-        setup = read(swing(key=UP), Setup.small, alone=alone)
+        setup = setup_of_file(swing(key=UP), alone=alone)
         work = servos.begin(setup)
         # every integrator at the first posture with a limit; `stability` alone the file's, which is Euler, at the other
         assert [one.name for one, *_ in work.observed[0]] == ["up"] * len(INTEGRATORS) + ["qpos0"] * alone
@@ -212,7 +198,7 @@ def test_a_full_run_observes_every_integrator_and_draws_curves(result):
 
 
 def test_a_file_that_is_not_stable_at_its_own_step_fails_a_check_and_is_told_what_helps():
-    result = done(read(swing(SERVO.replace('"4"', '"800"'))))
+    result = done(swing(SERVO.replace('"4"', '"800"')))
     failed = [(check.quantity, check.scene) for check in result.checks if not check.passed]
     assert result.top[0].values["own"]["stable"] is False and failed == [(AT_OWN_STEP, "qpos0")]
     (changes,) = (note.values for note in result.notes if note.kind == "changes")
@@ -235,9 +221,8 @@ def test_a_saddle_has_a_rate_and_neither_a_joint_that_limits_nor_an_answer():
 def test_runs_have_the_weight_and_the_cuts_of_the_rest():
     at, found = posture_of(FLOATING)
     assert not predicted.acting_at(found, at).model.opt.gravity.any()
-    at, found = posture_of(
-        swing('<position name="s" joint="swing" kp="1000" forcerange="-1 1"/>', com="0.5 0 0")
-    )
+    clamped = '<position name="s" joint="swing" kp="1000" forcerange="-1 1"/>'
+    at, found = posture_of(swing(clamped, com="0.5 0 0"))
     assert predicted.acting_at(found, at).model.actuator_biasprm[0, 0] == pytest.approx(-1.0)
 
 

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from judged import verdicts
 from trajectory_curves import CASES, FREE, HELD, run_of
 
 import tmt
@@ -19,15 +20,7 @@ from compare.robots.case import Coordinates
 from compare.truth.reference import reference
 
 LIFT_AND_HEAD = Coordinates(("lift", "head"), ("slide", "ball"))  # four movements, and four speeds
-BY_ENGINE = pytest.mark.parametrize("engine, label", [("tmt", "TMT"), ("mujoco", "MuJoCo")])
 NARROW, AT_ONCE = np.full(11, 0.999e-3), np.array([0.0, 1e-9, *[np.inf] * 9])
-
-
-def verdicts(check, *arguments) -> dict:
-    """Whether each check that is made passes, by the name of its quantity."""
-    result = TrajectoryResult("trajectory")
-    check(result, *arguments)
-    return {check.quantity: check.passed for check in result.checks}
 
 
 def test_a_run_is_judged_while_its_band_is_narrow_and_nothing_has_diverged():
@@ -81,12 +74,10 @@ def level(difference, bar):
 
 
 @pytest.mark.parametrize("off, bar", [(0.999, 1.0), (1.001, 1.0), (np.nan, 1.0), (0.0, 0.0), (1e-300, 0.0)])
-@pytest.mark.parametrize(
-    "place, name, unit", [(0, "lift", "m"), (3, "head z", "rad"), (5, "head x", "rad/s")]
-)
-def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(place, name, unit, off, bar):
+@pytest.mark.parametrize("at, name, unit", [(0, "lift", "m"), (3, "head z", "rad"), (5, "head x", "rad/s")])
+def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(at, name, unit, off, bar):
     differences = np.zeros((3, 8))
-    differences[1, place] = off
+    differences[1, at] = off
     check, row = level(differences, bar)
     assert check.passed is (off in (0.999, 0.0)) and row.worst_difference == check.value
     if bar:
@@ -112,16 +103,16 @@ def test_what_a_scene_asks_for_depends_on_the_scheme_and_the_step():
 def test_both_diverge_at_the_same_step_while_the_band_is_narrow(ours, theirs, width, found):
     """In a second with 100 steps, of which each tenth is recorded."""
     case = FREE.changed(duration=1.0, dt=0.1)
-    run = replace(run_of(case, ended=(ours, theirs), steps=100), band=width)
-    assert [*verdicts(runs.check_divergence, run).values()] == found
+    result = TrajectoryResult("trajectory")
+    runs.check_divergence(result, replace(run_of(case, ended=(ours, theirs), steps=100), band=width))
+    assert [check.passed for check in result.checks] == found
 
 
 @pytest.mark.parametrize("moved, passes", [(0.1001, True), (0.0999, False), (np.nan, False)])
 def test_a_free_run_moves_by_a_tenth_of_a_radian(moved, passes):
-    assert verdicts(check_movement, "x", moved) == {"movement": passes}
-
-
-# energy, errors, departures
+    result = TrajectoryResult("trajectory")
+    check_movement(result, "x", moved)
+    assert verdicts(result) == {"movement": passes}
 
 
 def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_one_that_from_many_digits():
@@ -145,14 +136,14 @@ def test_an_error_of_more_than_a_hundred_times_the_difference_is_far(error, far)
     assert true_motion.difference_while_judged(run) == pytest.approx(0.005)
 
 
-@BY_ENGINE
+@pytest.mark.parametrize("engine, label", [("tmt", "TMT"), ("mujoco", "MuJoCo")])
 @pytest.mark.parametrize("order, passes", [(0.851, True), (0.849, False), (1.3, True)])
 def test_the_drift_of_energy_falls_at_least_at_the_order(engine, label, order, passes):
     drifts = {"tmt": [4.0, 2.0], "mujoco": [4.0, 2.0]} | {engine: [2.0**order, 1.0]}
     result = Result("trajectory")
     energy.check_order(result, FREE, "x", 1, drifts)
-    verdict = {check.scene: check.passed for check in result.checks}
-    assert verdict == {"x, TMT, 1 s": True, "x, MuJoCo, 1 s": True} | {f"x, {label}, 1 s": passes}
+    passed = {check.scene: check.passed for check in result.checks}
+    assert passed == {"x, TMT, 1 s": True, "x, MuJoCo, 1 s": True} | {f"x, {label}, 1 s": passes}
 
 
 def test_no_order_is_measured_where_both_engines_drift_by_rounding_alone():

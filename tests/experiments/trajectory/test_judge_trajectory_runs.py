@@ -1,26 +1,30 @@
-"""A scene followed by both engines: each level by its own bound, what is kept, and in figures whose number stands where."""
+"""A scene followed by both engines: each level by its own bound, what is kept, whose number and motion a figure shows."""
 
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from edited import MOON, XML
-from models import chain, random_tree
-from trajectory_curves import DAMPED, FREE, HELD, run_of
+from edited import MOON, XML, setup_of_file
+from models import PATHS, chain, random_tree
+from PIL import Image
+from trajectory_curves import CASES, DAMPED, FREE, HELD, run_of
 
 import tmt
-from compare.engines.mujoco import parse, reading
+from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
 from compare.experiments import trajectory
-from compare.experiments.trajectory import figures_runs, runs
-from compare.experiments.trajectory.runs import TrajectoryResult
+from compare.experiments.trajectory import figures_motion_gif as gif
+from compare.experiments.trajectory import figures_runs, motion, runs
+from compare.experiments.trajectory.runs import Path, TrajectoryResult
 from compare.judge.run import diverged_at
-from compare.robots.arm import ARM
-from compare.robots.file import robot_of
+from compare.robots.arm import ARM, landmarks
+from compare.robots.stick import as_seen, stick_figure
 
 LEVELS = {f"{level}, TMT to MuJoCo" for level in ("one step", "open loop")}
+CATCH = CASES["ball catch, free"]  # in which a method of order 1 diverges
+BLUE, ORANGE = (0, 114, 178), (230, 159, 0)
 
 
 def side(case) -> runs.Twin:
@@ -98,11 +102,8 @@ def test_of_a_users_own_scene_nothing_is_expected_but_agreement(mujoco):
     case = DAMPED.changed(judged=0.0, damping=0.0, tags=("own",))
     assert judged_with(mujoco, side(case)).keys() == LEVELS
     assert judged_with(mujoco, side(FREE)).keys() == LEVELS | {"time judged", "movement"}
-
-
-def test_a_free_run_of_which_one_side_stays_tests_nothing():
     still = parse(XML.replace("0 0 -9.81", "0 0 0"), tmt.ARM)
-    assert judged_with(still, side(FREE))["movement"].value == 0.0
+    assert judged_with(still, side(FREE))["movement"].value == 0.0  # one side stays: it tests nothing
 
 
 def test_what_is_kept_of_a_run_is_whose_it_says():
@@ -121,8 +122,7 @@ def test_what_is_kept_of_a_run_is_whose_it_says():
 
 def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the_scene_itself_has():
     """Of 40 hinges a step has 6400 entries."""
-    long = robot_of(reading.read(chain(40)), "chain.xml")
-    case = long.case("c", duration=1.0, dt=1 / 512)
+    case = setup_of_file(chain(40)).robot.case("c", duration=1.0, dt=1 / 512)
     coarse, fine = FREE, FREE.changed(dt=5 / 8193)
     assert runs.step_counts(coarse, (1, 16, 128)) == [64, 1024, 8192]
     assert runs.step_counts(fine, (1, 2)) == [8193]
@@ -160,7 +160,7 @@ def test_which_figures_there_are_follows_what_was_run():
 
 def test_a_ball_is_drawn_by_its_turn_from_the_start():
     """Times the root of 3: on this side of half a turn, and beyond it, where nothing is drawn."""
-    case = robot_of(reading.read(random_tree(2, joints=5)), "kinds.xml").case("c")
+    case = setup_of_file(random_tree(2, joints=5)).robot.case("c")
     turns = np.array([0.0, 0.1, 1.75, 1.85])
     q = case.coordinates.move(case.q, turns[:, None] * np.ones(case.coordinates.nv))
     values = figures_runs.drawable(case, "q", q)
@@ -170,3 +170,72 @@ def test_a_ball_is_drawn_by_its_turn_from_the_start():
             assert np.isnan(values[3, joint.qd]).all()
         else:
             assert values[:, joint.qd] == pytest.approx(q[:, joint.q])
+
+
+@pytest.fixture(scope="module")
+def followed(engines):
+    return runs.follow(CATCH, engines, (1, 4)).runs
+
+
+@pytest.fixture(scope="module")
+def drawn(followed):
+    return motion.pictures_of(CATCH, followed)
+
+
+def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_of_it(drawn, followed):
+    run = next(run for run in followed if (run.scheme, run.steps) == ("rk4", 256))
+    np.testing.assert_array_equal(drawn.t, run.t[::2])
+    for name, path in run.paths.items():
+        points = [[np.array([*point], float) for point in landmarks(q)] for q in path.q[::2]]
+        np.testing.assert_allclose(drawn.points[name], as_seen(np.array(points)), atol=1e-15)
+    apart = np.abs(run.paths["tmt"].q - run.paths["mujoco"].q).max(axis=1)
+    np.testing.assert_array_equal(drawn.apart, apart[::2])
+
+
+def test_between_steps_a_run_is_interpolated_until_it_has_diverged(followed):
+    coarse = next(run for run in followed if (run.scheme, run.steps) == ("rk4", 64))
+    path = coarse.paths["tmt"]
+    for ended, last in ((None, 5.0), (2.5, 2.5 - 5 / 64), (5 / 64, 0.0)):
+        times, q = motion.frames(CATCH, coarse.t, path._replace(ended=ended))
+        np.testing.assert_allclose(times, np.linspace(0.0, 5.0, 129))
+        assert (np.isfinite(q).all(axis=1) == (times <= last)).all()
+        alive = times[::2] <= last
+        np.testing.assert_allclose(q[::2][alive], path.q[alive])
+    t = np.linspace(0.0, 5.0, 65)  # a cubic is itself
+    cubic = Path(t[:, None] ** [1, 2, 3], [1, 2, 3] * t[:, None] ** [0, 1, 2])
+    times, q = motion.frames(CATCH, t, cubic)
+    np.testing.assert_allclose(q, times[:, None] ** [1, 2, 3], atol=1e-12)
+
+
+def test_a_free_body_is_a_cross_that_turns_with_it():
+    robot, half = setup_of_file(PATHS["free_body"]).robot, np.sqrt(0.5)
+    a_quarter_about_z = np.array([[0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 2.0, half, 0.0, 0.0, half]])
+    points, links = stick_figure(robot, a_quarter_about_z, crosses=True)
+    before, after = points[:, -3:] - points[:, :1]
+    assert links[-3:] == [(0, 2), (0, 3), (0, 4)] and np.abs(before).max() > 0.1
+    turn = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    np.testing.assert_allclose(after, before @ turn, atol=1e-15)
+
+
+def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_and_up_is_up():
+    points, links = stick_figure(setup_of_file(chain(3)).robot, np.zeros((1, 3)))
+    assert links == [(0, 1), (1, 2), (2, 3)] and points.shape == (1, 4, 3)
+    right, _, up = as_seen(np.eye(3))
+    assert up == pytest.approx([0.0, np.cos(np.radians(20.0))]) and right[0] > 0.9
+
+
+def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(drawn, tmp_path):
+    left = np.array([[-1.0, 1.0], [-1.0, 1.5], [-1.0, 2.0]])
+    right = left[:, ::-1]
+    points = {"tmt": np.stack([left] * 3), "mujoco": np.stack([right, left, np.nan * right])}
+    scene = drawn._replace(t=drawn.t[:3], apart=drawn.apart[:3], points=points)
+    name, figure, _ = gif.draw_motion(TrajectoryResult("trajectory", pictures=[scene]))
+    figure.savefig(tmp_path / f"{name}{figure.suffix}")
+    found = []
+    with Image.open(tmp_path / "motion.gif") as image:
+        for k in range(image.n_frames):
+            image.seek(k)
+            pixels = np.asarray(image.convert("RGB"), int)[gif.TOP : -gif.BOTTOM]  # below the names
+            columns = [np.nonzero(np.abs(pixels - colour).max(axis=2) < 8)[1] for colour in (BLUE, ORANGE)]
+            found.append([of.mean() // (gif.PIXELS[0] / 2) if len(of) > 100 else None for of in columns])
+    assert found == [[0, 1], [0, 0], [0, None]]  # in the left half, in the right one, nowhere

@@ -6,23 +6,24 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from edited import setup_of_file
 from models import PATHS
 from trajectory_curves import CASES
 
-from compare.engines.mujoco import reading
 from compare.engines.own import Own
-from compare.experiments.setup import engines as engines_of
 from compare.experiments.trajectory import within_time
 from compare.experiments.trajectory.runs import follow
 from compare.judge.scale import EPS
 from compare.robots.case import Case, Scene
-from compare.robots.file import robot_of
 from tmt.compiled import store
 from tmt.compiled.machine import Library
 from tmt.compiled.runner import runners as compiled_runs
-from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler, semi_implicit
+from tmt.methods import METHODS, SemiImplicitEuler, semi_implicit
 
 STEPS = {"one step", "open loop"}
+GEARED = PATHS["gripper"].read_text(encoding="utf-8").replace('kp="60" kv="6"', 'kp="6" kv="0.6" gear="3"')
+FOR = {"duration": 1 / 16, "dt": 1 / 256, "judged": 1 / 16}
+SHORT = Scene("step", "open", "servos", targets=(6.0, 6.0, 0.02, 0.02), **FOR)
 
 
 def failing(case, engines, *integrators) -> set:
@@ -38,19 +39,16 @@ def failing(case, engines, *integrators) -> set:
 
 @dataclasses.dataclass(frozen=True)
 class ExplicitDamping(SemiImplicitEuler):
-    """A wrong scheme."""
-
     def held(self, tree):
         return SemiImplicitEuler.held(self, dataclasses.replace(tree, damping=(0.0, 0.0, 0.0)))
 
 
-RK4 = {"order": 4, "A": METHODS["rk4"].A, "b": METHODS["rk4"].b, "c": METHODS["rk4"].c}
-HASTY = np.array(RK4["b"]) + 1e6 * EPS * np.array([1.0, 0.0, 0.0, -1.0])
+HASTY = METHODS["rk4"].b + 1e6 * EPS * np.array([1.0, 0.0, 0.0, -1.0])
 NO_BIAS, EVERY_GAIN = SemiImplicitEuler(implicit_bias=False), SemiImplicitEuler(False, implicit_gains=True)
 WRONG_SCHEMES = {
     "damping explicit": ("semi_implicit_euler", ExplicitDamping(False), "bent, damped", "Euler"),
     "derivative of the bias dropped": ("implicit", NO_BIAS, "bent, free", "implicit"),
-    "weights off by 1e6 ulp": ("rk4", RungeKutta(**RK4 | {"b": HASTY}), "bent, free", "RK4"),
+    "weights off by 1e6 ulp": ("rk4", dataclasses.replace(METHODS["rk4"], b=HASTY), "bent, free", "RK4"),
 }
 
 
@@ -63,46 +61,35 @@ def test_a_wrong_scheme_leaves_the_band(scheme, wrong, scene, integrator, engine
 
 def test_a_body_that_tumbles_tells_how_a_quaternion_is_moved(monkeypatch):
     """RK4 that turns it by the mean of its speeds, as MuJoCo did up to 3.17, or the other way round."""
-    read = reading.read(PATHS["free_body"])
-    engines, robot = engines_of(reading.engine(read)), robot_of(read, "free_body.xml")
-    speed = (0.0, 0.0, 0.0, 200.0, 300.0, -100.0)
+    setup = setup_of_file(PATHS["free_body"])
+    engines, speed = setup.engines, (0.0, 0.0, 0.0, 200.0, 300.0, -100.0)
     scene = Scene("tumbling", speed=speed, duration=0.125, dt=1 / 64, judged=0.0)
-    case, scheme = Case(robot, scene), engines["mujoco"].methods["RK4"].scheme
+    case, scheme = Case(setup.robot, scene), engines["mujoco"].methods["RK4"].scheme
     assert failing(case, engines, "RK4") == set()
     monkeypatch.setitem(METHODS, scheme, METHODS["rk4_mean_speed" if scheme == "rk4" else "rk4"])
     assert failing(case, engines, "RK4") == {("RK4", level) for level in STEPS}
 
 
-# servos
-
-GEARED = PATHS["gripper"].read_text(encoding="utf-8").replace('kp="60" kv="6"', 'kp="6" kv="0.6" gear="3"')
-FOR = {"duration": 1 / 16, "dt": 1 / 256, "judged": 1 / 16}
-SHORT = Scene("step", "open", "servos", targets=(6.0, 6.0, 0.02, 0.02), **FOR)
-
-
 @pytest.fixture(scope="module")
 def gripper():
-    """Its robot and the engines; its tendon pulls two fingers, its first servo has a gear."""
-    found = reading.read(GEARED)
-    return robot_of(found, "gripper.xml"), engines_of(reading.engine(found))
-
-
-def case_of(robot):
-    return dataclasses.replace(robot, scenes=(SHORT,)).cases[0]
+    """A case of its servos, and the engines; its tendon pulls two fingers, its first servo has a gear."""
+    setup = setup_of_file(GEARED)
+    return Case(setup.robot, SHORT), setup.engines
 
 
 def test_every_integrator_is_its_scheme_in_a_step(gripper):
-    assert failing(case_of(gripper[0]), gripper[1]) == set()
+    assert failing(*gripper) == set()
+
+
+@pytest.mark.slow
+def test_every_integrator_is_its_scheme_where_servos_hold_a_free_body():
+    setup = setup_of_file(PATHS["quadruped"])
+    assert failing(setup.robot.cases[-1].changed(**FOR), setup.engines) == set()
 
 
 WRONG_GAINS = {
     "velocity gains implicit": (METHODS, "semi_implicit_euler", EVERY_GAIN, "Euler"),
-    "a tendon's cross terms": (
-        vars(semi_implicit),
-        "on_one_path",
-        lambda _: [[True] * 4] * 4,
-        "implicitfast",
-    ),
+    "a tendon's cross term": (vars(semi_implicit), "on_one_path", lambda _: [[True] * 4] * 4, "implicitfast"),
     "position gains explicit": (METHODS, "discrete", METHODS["implicitfast"], "discrete"),
 }
 
@@ -114,14 +101,14 @@ def test_wrong_gains_leave_the_band(of, name, wrong, integrator, gripper, monkey
     monkeypatch.setitem(of, name, wrong)
     monkeypatch.setattr(store, "library", lambda source, *what: Library(source()))
     compiled_runs.clear()
-    found = failing(case_of(gripper[0]), gripper[1], integrator)
+    found = failing(*gripper, integrator)
     compiled_runs.clear()
     assert found == {(integrator, level) for level in STEPS}
 
 
 def test_equations_of_ones_own_have_no_servos(gripper):
     own = Own(SimpleNamespace(has=lambda name: True, times={"acceleration": (1e-6,)}))
-    cases, setup = gripper[0].cases, SimpleNamespace(engines={"own": own}, size="full")
+    cases, setup = gripper[0].robot.cases, SimpleNamespace(engines={"own": own}, size="full")
     able, said = within_time(setup, cases)
     assert [case.name for case in able] == ["open, held", "open, let go", "open, let go, damped"]
     assert len(said) == 1
