@@ -68,7 +68,7 @@ def skipped(robot: Robot) -> Finding | None:
 
 def claim_values(robot: Robot) -> dict[str, object]:
     """The scale of a holding torque, and the items whose printed digits are rounding errors."""
-    noise = [item.item for item in robot.printed if item.is_rounding and any(item.values)]
+    noise = [item.item for item in robot.printed if item.is_rounding and np.any(item.values)]
     return {"weight": gravity_scale(robot.tree), "rounding": noise}
 
 
@@ -89,7 +89,7 @@ def answer(item: Printed, robot: Robot, dynamics: Mapping[str, Any]) -> Answer:
         tau = dynamics["tmt"].gravity_balance(robot.posture(held.posture))
     arguments = (q, rest, tau) if function == "acceleration" else (q,)
     of_tmt, of_mujoco = (getattr(dynamics[engine], function)(*arguments) for engine in ("tmt", "mujoco"))
-    values = getattr(exact(robot.tree, q, rest, tau), function)
+    values = getattr(exact(robot.tree, q.tolist(), rest.tolist(), tau.tolist()), function)
     return Answer(values, of_tmt, of_mujoco, scales(robot.tree, q)[function])
 
 

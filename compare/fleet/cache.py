@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..core.errors import ROOT, Refused
 from ..process import interrupt
-from ..report.folder import fcntl, lock, what_is_wrong  # type: ignore[attr-defined]  # fcntl: None on Windows
+from ..report.folder import fcntl, lock, what_is_wrong  # fcntl: None on Windows
 from ..report.provenance import installed
 from .models import unpacked
 

@@ -32,7 +32,7 @@ def slope_rounding(
     the force is as small as that, or nearly so.
     """
     dynamics = Differentiated()
-    slope = stepping.slope(tree, list(q.T), list(qd.T), tau, dt, dynamics)
+    slope = stepping.slope(tree, list(q.T), list(qd.T), list(tau), dt, dynamics)
     a = np.stack([np.broadcast_to(component, q.shape[:1]) for component in slope], axis=-1)
     A, total = dynamics.system
     force = motion_scale(tree, q, qd) + Entries(tree, q).force(tau) + np.array(tree.damping) * np.abs(qd)

@@ -79,7 +79,8 @@ def at_one_state(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray)
     paths[0][0, 0], paths[1][0, 0] = q, qd
 
     def steps(count: int) -> None:
-        run(*(path[:, : min(count, most) + 1].copy() for path in paths), tau[None], 1e-4, 0.0, 1)
+        positions, speeds = (path[:, : min(count, most) + 1].copy() for path in paths)
+        run(positions, speeds, tau[None], 1e-4, 0.0, 1)
 
     waiting = EvaluationRow(FORWARD, "compiled, each waits for the last", operations=compiled.operations)
     return [
@@ -93,7 +94,7 @@ def at_many_states(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarra
     """The ways of tmt over many states, (N, nq) and (N, nv)."""
     count, run, compiled = len(qd), runner_of(tree, "rk4").follow, evaluator(tree, "acceleration")
     out = np.empty((count, compiled.size))
-    paths = [np.stack([part, part], axis=1) for part in (q, qd)]
+    positions, speeds = (np.stack([part, part], axis=1) for part in (q, qd))
     one_by_one = EvaluationRow(FORWARD, ONE_BY_ONE, count, operations=compiled.operations)
     side_by_side = EvaluationRow(FORWARD, SIDE_BY_SIDE, count, operations=compiled.operations)
     called = EvaluationRow(FORWARD, CALLED, count, cores())
@@ -102,7 +103,7 @@ def at_many_states(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarra
         Loop(one_by_one, repeated(lambda: compiled.fill(False, out, q, qd, tau))),
         Loop(side_by_side, repeated(lambda: compiled.fill(True, out, q, qd, tau))),
         Loop(called, repeated(lambda: tmt.acceleration(q, qd, tau, tree))),
-        Loop(step, repeated(lambda: run(*paths, tau, 1e-3, 0.0, 1))),
+        Loop(step, repeated(lambda: run(positions, speeds, tau, 1e-3, 0.0, 1))),
     ]
 
 
