@@ -21,7 +21,8 @@ class Edit:
     module: a file by the end of its dotted name, "verdict" or "trajectory.rows", or the name of a folder of files;
     where: a function, Class.method, function.inner function, or a name that is assigned in the module or a class.
     old: an expression, a keyword argument (name=value) or a statement; new: what replaces it.
-    In both _1, _2 stand for any expression (on a line of its own: statement), *_1 at the end of a call for all other arguments.
+    In both _1, _2 stand for any expression (on a line of its own: statement), *_1 at the end of a call for all other arguments;
+    in new _0 is all that stood there.
     nth: which one, from 1, if there are several. breaks: what the edited program does.
     """
 
@@ -79,7 +80,7 @@ def applied(project: Path, edit: Edit) -> Place:
         what = f"{len(hits)} times {edit.old} in {edit.where}"
         raise DoesNotApply(f"{edit.name}: {what}; one is expected, or nth")
     path, node, holes = hits[(edit.nth or 1) - 1]
-    new = filled(read(edit.new), holes)
+    new = filled(read(edit.new), holes | {"_0": node})
     if isinstance(node, ast.keyword):
         new = as_keyword(new)
     elif isinstance(node, ast.stmt) and isinstance(new, ast.expr):
