@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import mpmath
 import numpy as np
+from models.made import random_turn
 
 from tmt import Tree
 from tmt.exact.values import DIGITS
+
+UNIT = np.eye(3)
 
 
 def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free"), most=2) -> Tree:
@@ -31,7 +34,7 @@ def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free"), most=
     n, nv = len(parent), len(axis)
     rest = []
     for name in kind:
-        rest += list(unit_quaternion(rng)) if name == "ball" else [rng.uniform(-0.5, 0.5)]
+        rest += list(random_turn(rng)) if name == "ball" else [rng.uniform(-0.5, 0.5)]
     return Tree(
         joint_names=[f"{name}{i}" for i, name in enumerate(kind)], parent=parent, offset=offset, axis=axis,
         damping=rng.uniform(0.0, 0.5, nv), **random_bodies(rng, body_joint, inertias), kind=kind, rest=rest,
@@ -58,13 +61,22 @@ def small_tree() -> Tree:
     return replace(tree, stiffness=(1.0, 2.0, 3.0), position_gain=gains[0], speed_gain=gains[1])
 
 
+def one_body(axis, kind=(), com=(0.0, 0.0, 0.0), inertia=UNIT, **more) -> Tree:
+    """A body of 1 kg on joints in a row through one point, hinges by default; `more`: other fields of a Tree."""
+    n = len(kind or axis)
+    fields = {
+        "joint_names": tuple("abcdefgh"[:n]), "parent": range(-1, n - 1), "offset": np.zeros((n, 3)),
+        "damping": np.zeros(len(axis)), "body_names": ["body"], "body_joint": [n - 1], "mass": [1.0],
+        "gravity": (0.0, 0.0, -9.81),
+    }  # fmt: skip
+    return Tree(axis=axis, kind=kind or ["hinge"] * n, com=[com], inertia=[inertia], **fields | more)
+
+
 def wrist() -> Tree:
     """Three hinges through one point, z y z: Mbar is singular where the second is at zero."""
-    return Tree(
-        joint_names=("a", "b", "c"), parent=(-1, 0, 1), offset=np.zeros((3, 3)), axis=((0, 0, 1), (0, 1, 0), (0, 0, 1)),
-        damping=(0.0,) * 3, body_names=["hand"], body_joint=[2], mass=[1.0], com=[(0.1, 0.0, 0.2)],
-        inertia=[np.diag([0.01, 0.02, 0.025])], gravity=(0, 0, -9.81),
-    )  # fmt: skip
+    return one_body(
+        np.eye(3)[[2, 1, 2]], (), (0.1, 0.0, 0.2), np.diag([0.01, 0.02, 0.025]), body_names=["hand"]
+    )
 
 
 def possible_tensor(rng) -> np.ndarray:
@@ -80,17 +92,11 @@ def random_bodies(rng, body_joint, inertias) -> dict:
     return numbers | {"body_names": [f"body{b}" for b in range(count)], "body_joint": body_joint}
 
 
-def unit_quaternion(rng) -> np.ndarray:
-    """A random turn, w first."""
-    p = rng.normal(size=4)
-    return p / np.linalg.norm(p)
-
-
 def random_state(rng, tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A random q (nq,), and qd and tau (nv,)."""
     q, most = [], {"hinge": 3.0, "slide": 1.0}
     for kind in tree.kind:
-        q += list(unit_quaternion(rng)) if kind == "ball" else [rng.uniform(-most[kind], most[kind])]
+        q += list(random_turn(rng)) if kind == "ball" else [rng.uniform(-most[kind], most[kind])]
     return np.array(q), *rng.uniform(-3.0, 3.0, (2, len(tree.axis)))
 
 

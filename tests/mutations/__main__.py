@@ -27,15 +27,17 @@ from .edits import EDITS
 
 PROJECT = Path(__file__).resolve().parents[2]
 NOT_COPIED = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "latest")
-BLIND = (
-    "test_mutations.py",
-    "test_structure.py",
-    "test_interrupt.py",
-)  # they see any edit, or no edit of a judge
-# the files of tests run in parts, the nearest first: most edits are caught by the first
-SLICES = 0, 4, 16, 1000
-# s that a part may take, and for each of its files: then an edit counts as an endless run
-PATIENCE, PATIENCE_WITH_FILE = 90.0, 20.0
+BLIND = ("test_mutations.py", "test_structure.py", "test_interrupt.py")  # they see any edit, or none
+SLICES = (
+    0,
+    4,
+    16,
+    1000,
+)  # the files of tests run in parts, the nearest first: most edits are caught by the first
+PATIENCE, PATIENCE_WITH_FILE = (
+    90.0,
+    20.0,
+)  # s of a part, and for each of its files: then a run counts as endless
 STATUS = """exit status: 0 no edit survives; 1 some do; 2 an edit does not apply to the sources, or a test that caught one fails
 without it too"""
 

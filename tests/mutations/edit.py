@@ -59,9 +59,7 @@ class Place(NamedTuple):
         statement = next(part for part in parsed(self.path).body if self.old in ast.walk(part))
         start = min(part.lineno for part in (statement, *getattr(statement, "decorator_list", ())))
         lines = self.before.splitlines(keepends=True)
-        edited = copy.deepcopy(
-            statement, {id(self.old): self.new}
-        )  # what is copied already is taken as it is
+        edited = copy.deepcopy(statement, {id(self.old): self.new})  # the new node passes for a copy
         return "".join([*lines[: start - 1], ast.unparse(edited), "\n", *lines[statement.end_lineno :]])
 
 
@@ -73,12 +71,12 @@ def applied(project: Path, edit: Edit) -> Place:
     if not holding:
         raise DoesNotApply(f"{edit.name}: there is no {edit.where} below {' or '.join(PACKAGES)}")
     old = read(edit.old)
-    hits = [
-        (path, *hit) for path in holding for scope in scopes(path, edit.where) for hit in matches(scope, old)
-    ]
+    places = [(path, scope) for path in holding for scope in scopes(path, edit.where)]
+    hits = [(path, *hit) for path, scope in places for hit in matches(scope, old)]
     if not 1 <= (edit.nth or 1) <= len(hits) or (edit.nth is None and len(hits) > 1):
-        what = f"{len(hits)} times {edit.old} in {edit.where}"
-        raise DoesNotApply(f"{edit.name}: {what}; one is expected, or nth")
+        raise DoesNotApply(
+            f"{edit.name}: {len(hits)} times {edit.old} in {edit.where}; one is expected, or nth"
+        )
     path, node, holes = hits[(edit.nth or 1) - 1]
     new = filled(read(edit.new), holes | {"_0": node})
     if isinstance(node, ast.keyword):

@@ -150,18 +150,7 @@ def test_the_distance_from_many_digits_is_that_of_all_digits():
 
 DIGITS = 150
 TINY = mpmath.mpf(10) ** -35  # errors: of order TINY^2, and 10^-DIGITS / TINY^2
-NUMBERS = [
-    "offset",
-    "axis",
-    "mass",
-    "com",
-    "inertia",
-    "gravity",
-    "armature",
-    "stiffness",
-    "rest",
-    "reference",
-]
+NUMBERS = "offset", "axis", "mass", "com", "inertia", "gravity", "armature", "stiffness", "rest", "reference"
 mp = np.vectorize(mpmath.mpf, otypes=[object])
 IDENTITY = mp(np.eye(3))
 

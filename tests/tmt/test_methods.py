@@ -18,9 +18,8 @@ BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
 EPS = np.finfo(float).eps
 FIXED = [name for name, stepping in METHODS.items() if not stepping.adaptive]
-ORDERS = {name: METHODS[name].order for name in FIXED} | {
-    "rk4_mean_speed": 4
-}  # of hinges; with balls see below
+ORDERS = {name: METHODS[name].order for name in FIXED}
+ORDERS["rk4_mean_speed"] = 4  # of hinges; with balls see below
 IMPLICIT = [name for name, stepping in METHODS.items() if stepping.solves_stages]
 SMALL = small_tree()
 
@@ -39,10 +38,8 @@ def test_the_coefficients_of_dop853_are_those_of_scipy():
     assert len(dop853.A) == DOP853.n_stages
     assert all(np.array_equal(row, DOP853.A[i, :i]) for i, row in enumerate(dop853.A))
     assert np.array_equal(dop853.B, DOP853.B) and np.array_equal(dop853.C, DOP853.C)
-    for weights, theirs in ((dop853.ERROR_5, DOP853.E5), (dop853.ERROR_3, DOP853.E3)):
-        assert np.array_equal(
-            [*weights, 0.0], theirs
-        )  # SciPy's have one for the slope at the end of the step too
+    assert np.array_equal([*dop853.ERROR_5, 0.0], DOP853.E5)  # with one of the slope at the end of the step
+    assert np.array_equal([*dop853.ERROR_3, 0.0], DOP853.E3)
 
 
 @pytest.mark.parametrize("name", FIXED)
@@ -95,8 +92,7 @@ def test_every_evaluation_of_an_implicit_method_is_counted():
 
     def slope(q, qd):
         nonlocal counted
-        # else it is for the Jacobian, which belongs to an evaluation
-        counted += all(isinstance(x, float) for x in (*q, *qd))
+        counted += all(isinstance(x, float) for x in (*q, *qd))  # else it is for the Jacobian of one
         return stepping.slope(tmt.ARM, q, qd, [0.0] * 3, 0.1)
 
     for _ in range(4):
@@ -157,11 +153,10 @@ def test_which_gains_are_implicit(name, speed, position):
     force -= dt * (k + position) @ qd
     dynamics = derivatives.Differentiated()
     (a,) = np.array(stepping.slope(DRIVEN, list(q[:, None]), list(qd[:, None]), list(tau), dt, dynamics)).T
-    assert np.allclose(dynamics.system[0][0], matrix, atol=1e-13)
-    assert np.allclose(dynamics.system[1][0], force, atol=1e-13)
-    assert np.allclose(a, np.linalg.solve(matrix, force), atol=1e-11)
-    slope = stepping.slope(DRIVEN, list(q), list(qd), list(tau), dt)
-    assert np.allclose(slope, np.linalg.solve(matrix, force), atol=1e-11)
+    for found, expected in zip(dynamics.system, (matrix, force)):
+        assert np.allclose(found[0], expected, atol=1e-13)
+    for slope in (a, stepping.slope(DRIVEN, list(q), list(qd), list(tau), dt)):
+        assert np.allclose(slope, np.linalg.solve(matrix, force), atol=1e-11)
 
 
 def test_a_controller_adds_to_the_torque(rng):

@@ -39,9 +39,7 @@ class Plain:
         return Midpoint().step(slope, q, qd, dt)
 
 
-@pytest.mark.parametrize(
-    "own, order", [(Midpoint(), 2), (Plain(), 1)], ids=["made from Method", "of no known kind"]
-)
+@pytest.mark.parametrize("own, order", [(Midpoint(), 2), (Plain(), 1)], ids=["of Method", "of no known kind"])
 def test_a_method_of_ones_own(own, order, rng, monkeypatch):
     monkeypatch.setitem(METHODS, "mine", own)
     monkeypatch.setitem(METHODS, "tableau", RungeKutta(2, ((), (0.5,)), (0.0, 1.0), (0.0, 0.5)))

@@ -61,9 +61,8 @@ def assert_right(symbols, tree, rng, states=100):
         variables = symbols.q + symbols.qd if name == "bias" else symbols.q
         columns = [*q.T, *qd.T][: len(variables)]
         numbers = {symbol: row.value for symbol, row in symbols.parameters.items()}
-        values = sympy.lambdify(variables, list(symbols.entries[name].subs(numbers)), "numpy", cse=True)(
-            *columns
-        )
+        function = sympy.lambdify(variables, list(symbols.entries[name].subs(numbers)), "numpy", cse=True)
+        values = function(*columns)
         expected = getattr(tmt, name)(*state, tree)
         found = np.stack([np.broadcast_to(value, states) for value in values], axis=-1)
         found = found.reshape(expected.shape)
@@ -243,9 +242,8 @@ def test_what_is_printed_in_latex_and_on_the_page_has_the_values(tree, rtol, rng
     expected |= {("h", i + 1, 1): h[i] for i in range(n)} | {("G", i + 1, 1): G[i] for i in range(n)}
     assert {key for key in expected if key[0] != "M" or key[2] >= key[1]} <= found.keys()
     for key, formula in found.items():
-        assert value_of(formula, known) == pytest.approx(expected[key], abs=1e-13 + rtol, rel=1e-13 + rtol), (
-            key
-        )
+        near = pytest.approx(expected[key], abs=1e-13 + rtol, rel=1e-13 + rtol)
+        assert value_of(formula, known) == near, key
 
 
 def test_symbols_of_names_that_are_alike_are_different(tmp_path):
