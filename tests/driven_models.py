@@ -47,11 +47,9 @@ def robot(rng, text: str, flags: dict | None) -> tuple[ET.Element, list[str]]:
     return root, sites
 
 
-def add_tendons(
-    rng, root, joints: list[str], sites: list[str], stiffness=30.0, damping=3.0, dead=0.0
-) -> None:
-    """A fixed tendon across two joints and a rope between two sites, with springs, dead bands and dampers."""
-    tendons = ET.SubElement(root, "tendon")
+def add_tendons(rng, root, joints: list[str], sites: list[str], spring=(30.0, 3.0, 0.0)) -> None:
+    """A fixed tendon across two joints and a rope between two sites; `spring`: stiffness, damping, dead band."""
+    tendons, (stiffness, damping, dead) = ET.SubElement(root, "tendon"), spring
     given = {"stiffness": numbers(stiffness), "damping": numbers(damping)}
     given["springlength"] = numbers([0.1, 0.1 + dead])
     across = ET.SubElement(tendons, "fixed", name="across", **given)
@@ -74,7 +72,7 @@ def with_drive(seed: int, transmissions=TRANSMISSIONS, flags: dict | None = None
     single = [one for one in every if one.get("type", "hinge") in ("hinge", "slide") and one.tag == "joint"]
     turning = [one.get("name") for one in every if one not in single]
     names = [joint.get("name") for joint in single]
-    add_tendons(rng, root, names, sites, rng.uniform(0, 20), rng.uniform(0, 3), rng.uniform(0, 0.5))
+    add_tendons(rng, root, names, sites, rng.uniform(0, [20, 3, 0.5]))
     actuators = ET.SubElement(root, "actuator")
     for kind, (tag, given) in laws(rng).items():
         where = str(rng.choice(transmissions))

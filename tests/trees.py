@@ -74,9 +74,8 @@ def one_body(axis, kind=(), com=(0.0, 0.0, 0.0), inertia=UNIT, **more) -> Tree:
 
 def wrist() -> Tree:
     """Three hinges through one point, z y z: Mbar is singular where the second is at zero."""
-    return one_body(
-        np.eye(3)[[2, 1, 2]], (), (0.1, 0.0, 0.2), np.diag([0.01, 0.02, 0.025]), body_names=["hand"]
-    )
+    inertia = np.diag([0.01, 0.02, 0.025])
+    return one_body(UNIT[[2, 1, 2]], (), (0.1, 0.0, 0.2), inertia, body_names=["hand"])
 
 
 def possible_tensor(rng) -> np.ndarray:

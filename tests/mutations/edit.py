@@ -74,9 +74,8 @@ def applied(project: Path, edit: Edit) -> Place:
     places = [(path, scope) for path in holding for scope in scopes(path, edit.where)]
     hits = [(path, *hit) for path, scope in places for hit in matches(scope, old)]
     if not 1 <= (edit.nth or 1) <= len(hits) or (edit.nth is None and len(hits) > 1):
-        raise DoesNotApply(
-            f"{edit.name}: {len(hits)} times {edit.old} in {edit.where}; one is expected, or nth"
-        )
+        what = f"{len(hits)} times {edit.old} in {edit.where}"
+        raise DoesNotApply(f"{edit.name}: {what}; one is expected, or nth")
     path, node, holes = hits[(edit.nth or 1) - 1]
     new = filled(read(edit.new), holes | {"_0": node})
     if isinstance(node, ast.keyword):

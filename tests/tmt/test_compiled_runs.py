@@ -14,6 +14,7 @@ from tmt.methods import METHODS, one_step
 
 SMALL = small_tree()
 FREE = replace(SMALL, position_gain=(), speed_gain=())  # without a controller
+LARGER = ("implicit", SMALL), ("implicit", FREE), ("implicit_midpoint", SMALL)
 
 
 def starts(count) -> list[np.ndarray]:
@@ -60,9 +61,7 @@ def test_runs_together_have_the_bits_of_each_alone(name, counts):
         assert_is_the_step(name, batch.q, batch.qd, tau, dt)
 
 
-@pytest.mark.parametrize(
-    "name, tree", [("implicit", SMALL), ("implicit", FREE), ("implicit_midpoint", SMALL)]
-)
+@pytest.mark.parametrize("name, tree", LARGER)
 def test_the_code_of_larger_trees_does_the_same(name, tree, folder, monkeypatch):
     """Linear systems and derivatives by calls, articulated bodies, no lines in the place of a call, lines cut into parts."""
     for module, field in ((forms, "DENSE"), (forms, "FEW"), (forms, "MANY"), (runs, "INLINED")):

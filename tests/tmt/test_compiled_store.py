@@ -19,6 +19,7 @@ from tmt.compiled.machine import object_code
 from tmt.methods import METHODS
 
 ROOT = Path(__file__).resolve().parents[2]
+GROUPS = ("root", ["root"], True), ("root", ["eve"], False), ("staff", [], False)
 posix = pytest.mark.skipif(os.name != "posix", reason="rights are bits on POSIX only")
 TEXT = "define double @f(double %x) {{\n  %y = fmul double %x, {}\n  ret double %y\n}}\n"
 
@@ -127,9 +128,7 @@ def test_others_may_read_the_folder_and_not_write_nor_exchange_it(folder, place,
 
 
 @pytest.mark.skipif(getattr(os, "geteuid", str)() != 0, reason="only root can say who is in a group")
-@pytest.mark.parametrize(
-    "name, members, accepted", [("root", ["root"], 1), ("root", ["eve"], 0), ("staff", [], 0)]
-)
+@pytest.mark.parametrize("name, members, accepted", GROUPS)
 def test_a_group_of_the_user_alone_may_write(folder, name, members, accepted, monkeypatch):
     """With the mask 002 that many systems set, a folder is the group's too, and the group is the user's own."""
     grp = pytest.importorskip("grp")

@@ -83,11 +83,8 @@ def test_what_a_flag_switches_off_is_off(stage, rng):
 CUT = {  # a drive whose ranges cut at the posture (0.3, -0.4) under controls of 1, and the forces that are cut
     "a force": (arm('<position joint="a" kp="30" kv="2" forcerange="-5 5"/>'), {0: 5.0}),
     "no force": (arm('<position joint="a" kp="30" kv="2" forcerange="-21.001 21.001"/>'), {}),  # just inside
-    "by the joint": (
-        arm('<position joint="a" kp="30" gear="-2"/>', joint='actuatorfrcrange="-20 9"'),
-        {0: 10.0},
-    ),
-}
+    "by the joint": (arm('<position joint="a" kp="30" gear="-2"/>', joint='actuatorfrcrange="-20 9"'), {0: 10.0}),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("text, forces", CUT.values(), ids=CUT)
