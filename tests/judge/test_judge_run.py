@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from judged import BOTH, INSIDE, OUTSIDE
+from servo_models import spring
 from trees import one_body
 
 import tmt
-from compare.engines.mujoco import reading
 from compare.judge.run import (
     departure,
     deviation,
@@ -19,7 +19,6 @@ from compare.robots import Robot
 from compare.robots.actuators import Actuator, Drive
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
-from compare.robots.file import robot_of
 from compare.truth.reference import has_no_reference
 
 CASES = {case.name: case for case in ARM.cases}
@@ -106,21 +105,14 @@ def test_a_quaternion_and_its_negative_are_the_same_turn():
     assert movement_unit(Coordinates(("a", "b"), ("slide", "ball"))) == "rad or m"
 
 
-def with_rate(rate):
-    """A robot of one spring."""
-    spring = f"""<mujoco><worldbody><body><joint name="swing" axis="0 1 0" stiffness="{rate**2!r}"/>
-      <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
-    return robot_of(reading.read(spring), "spring.xml")
-
-
 @BOTH
 def test_a_rate_that_leaves_no_digits_after_two_steps(share, passes):
     dt = 1.0 / 8192
-    robot = with_rate(share * (1e-3 / 64 / 2.0**-52) ** 0.25 / dt)
+    robot = spring((share * (1e-3 / 64 / 2.0**-52) ** 0.25 / dt) ** 2)
     assert np.isclose(robot.cases[0].scene.dt, dt)
     assert (leaves_no_digits(robot) is None) is passes
 
 
 def test_a_reference_in_doubles_is_not_asked_of_a_rate_with_which_it_diverges():
-    assert has_no_reference(with_rate(1e3)) is None and has_no_reference(with_rate(3e6)) is not None
+    assert has_no_reference(spring(1e6)) is None and has_no_reference(spring(9e12)) is not None
     assert leaves_no_digits(ARM) is None and has_no_reference(ARM) is None

@@ -105,9 +105,6 @@ def test_every_evaluation_of_an_implicit_method_is_counted():
     assert evaluations == counted
 
 
-# the Jacobian of a step
-
-
 @pytest.mark.parametrize("name", [name for name in METHODS if name != "gauss_legendre_4"])  # which takes long
 def test_the_jacobian_of_a_step_is_that_of_small_movements(name, monkeypatch):
     """By the derivatives of its linear system, in parts, and by dual numbers through the solution."""
@@ -126,8 +123,6 @@ def test_the_jacobian_of_a_step_is_that_of_small_movements(name, monkeypatch):
     monkeypatch.setattr(derivatives, "FEW_SPEEDS", nv)
     assert amplification(stepping, SMALL, q, qd, tau, dt) == pytest.approx(J, rel=1e-10, abs=1e-10)
 
-
-# the gains of a linear controller
 
 FORK = dataclasses.replace(  # a hinge that carries two more on branches of their own
     tmt.ARM, parent=(-1, 0, 0), damping=(0.1, 0.0, 0.2), stiffness=(0.0, 3.0, 0.0), armature=(0.0, 0.1, 0.0),

@@ -5,13 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from models import PATHS, random_tree
+from servo_models import robot
 from trees import exact_swing, random_state, tree_of_kinds
 
 import tmt
-from compare.engines.mujoco import read
 from compare.robots.arm import ARM
 from compare.robots.coordinates import floats
-from compare.robots.file import robot_of
 from compare.truth.linear import Held, held, posture_names
 from compare.truth.pendulum import pendulum, swing
 from compare.truth.rest import holding, moving, slopes, spring_slope, weight
@@ -31,10 +30,6 @@ def stiffness(tree, q):
     """d(holding torque)/dq by dual numbers."""
     moved = moving(tree, q, np.eye(tree.coordinates.nv))
     return np.array(slopes(moved, holding(tree, moved)))
-
-
-def robot(source):
-    return robot_of(read(source), "robot.xml")
 
 
 @pytest.fixture(scope="module")

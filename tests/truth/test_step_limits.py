@@ -8,16 +8,13 @@ from compare.truth.step_limits import POLE_RK4, Small
 EVERY = ("Euler", "implicitfast", "implicit", "discrete", "RK4")
 
 
-def small(M, K, D, damping=None, springs=None, on_path=None, poles=()):
+def small(M, K, D, damping=0.0, springs=0.0, on_path=True, poles=()):
     """Small deviations of plain numbers; implicit: nothing by Euler, all by the others, but where something else is said."""
     M, K, D = (np.atleast_2d(np.asarray(x, float)) for x in (M, K, D))
-    n = len(M)
+    names, damping = [f"joint{k}" for k in range(len(M))], np.zeros(len(M)) + damping
     return Small(
-        names=tuple(f"joint{k}" for k in range(n)), M=M, K=K, D=D,
-        damping=np.zeros(n) if damping is None else np.asarray(damping, float),
-        springs=np.zeros_like(K) if springs is None else np.atleast_2d(np.asarray(springs, float)), brakes=D,
-        on_path=np.ones((n, n), bool) if on_path is None else on_path, poles=poles,
-    )  # fmt: skip
+        tuple(names), M, K, D, damping, 0.0 * K + springs, D, np.ones(K.shape, bool) & on_path, poles
+    )
 
 
 def alone(K, D, **more):
