@@ -123,18 +123,6 @@ def test_names_that_are_pieces_of_programs_stay_in_comments_and_texts(tmp_path):
         compile_in(tmp_path, "-x c -include header -c c")
 
 
-@pytest.mark.parametrize(("given", "why"), [
-    ({"language": "fortran"}, "language"), ({"language": None}, "language"), ({"quantities": []}, "quantity"),
-    ({"quantities": ["mass"]}, "mass"), ({"quantities": "energie"}, "energie"), ({"name": "2"}, "name"),
-    ({"name": "_x"}, "name"), ({"name": "while"}, "name"), ({"name": "energy"}, "name"), ({"name": None}, "name"),
-    ({"language": "python", "single": True}, "single"), ({"model": "arm"}, "model"),
-    ({"language": "latex", "quantities": ["jacobians"]}, "jacobians"),
-])  # fmt: skip
-def test_what_is_wrong_is_a_value_error(given, why):
-    with pytest.raises(ValueError, match=why):
-        tmt.equations(**given)
-
-
 @pytest.mark.parametrize("name", QUANTITIES)
 @pytest.mark.parametrize("tree", [TREES["arm"], TREES["kinds"]], ids=["arm", "kinds"])
 def test_the_exact_values_of_many_states_are_those_of_single_ones(tree, name):

@@ -24,16 +24,6 @@ IMPLICIT = [name for name, stepping in METHODS.items() if stepping.solves_stages
 SMALL = small_tree()
 
 
-@pytest.mark.parametrize("name, changes, word", [
-    ("rk4", {"b": (1.0, 0.5, 0.0, 0.0)}, "1.5"), ("rk4", {"c": (0.0, 0.5, 0.4, 1.0)}, "row 2 of A"),
-    ("rk4", {"A": ((), (0.5, 0.5), (0.0, 0.5), (0.0, 0.0, 1.0))}, "entries"),
-    ("implicit_midpoint", {"A": ((),)}, "square"),
-])  # fmt: skip
-def test_a_wrong_tableau_cannot_be_built(name, changes, word):
-    with pytest.raises(ValueError, match=word):
-        dataclasses.replace(METHODS[name], **changes)
-
-
 def test_the_coefficients_of_dop853_are_those_of_scipy():
     assert len(dop853.A) == DOP853.n_stages
     assert all(np.array_equal(row, DOP853.A[i, :i]) for i, row in enumerate(dop853.A))
