@@ -51,7 +51,7 @@ class Place(NamedTuple):
 
     @property
     def before(self) -> str:
-        return text_of(self.path)
+        return self.path.read_text(encoding="utf-8")
 
     @property
     def after(self) -> str:
@@ -93,13 +93,8 @@ def sources(project: Path) -> dict[Path, str]:
 
 
 @cache
-def text_of(path: Path) -> str:
-    return path.read_text(encoding="utf-8")
-
-
-@cache
 def parsed(path: Path) -> ast.Module:
-    return ast.parse(text_of(path))
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 @cache
