@@ -20,7 +20,6 @@ EPS = np.finfo(float).eps
 FIXED = [name for name, stepping in METHODS.items() if not stepping.adaptive]
 ORDERS = {name: METHODS[name].order for name in FIXED}
 ORDERS["rk4_mean_speed"] = 4  # of hinges; with balls see below
-IMPLICIT = [name for name, stepping in METHODS.items() if stepping.solves_stages]
 SMALL = small_tree()
 
 
@@ -35,7 +34,9 @@ def test_the_coefficients_of_dop853_are_those_of_scipy():
 @pytest.mark.parametrize("name", FIXED)
 def test_order(name):
     """One step against two halves: what they differ by falls with dt to the power of order + 1."""
-    implicit = name in IMPLICIT  # those take long in many digits, and doubles will do at larger steps
+    implicit = METHODS[
+        name
+    ].solves_stages  # those take long in many digits, and doubles will do at larger steps
     number, large = (float, 0.04) if implicit else (mpmath.mpf, mpmath.mpf("0.01"))
     rest, start = [number(0)] * 3, [number(float(a)) for a in BENT]
 

@@ -1,7 +1,5 @@
 """Methods of integration of a user's own."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,6 @@ BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
 
 
-@dataclasses.dataclass(frozen=True)
 class Midpoint(Method):
     """The explicit midpoint rule, made from Method."""
 
@@ -55,7 +52,6 @@ def test_a_method_of_ones_own(own, order, rng, monkeypatch):
     assert not np.allclose(tmt.simulate(q, qd, tau, 0.01, 20, "mine").q, same.q, rtol=0, atol=1e-6)
 
 
-@dataclasses.dataclass(frozen=True)
 class Longer(RungeKutta):
     """A step that is another than the tableau says."""
 
@@ -63,7 +59,6 @@ class Longer(RungeKutta):
         return super().step(slope, q, qd, 2.0 * dt, *joints)
 
 
-@dataclasses.dataclass(frozen=True)
 class Weaker(RungeKutta):
     """Half the accelerations."""
 
