@@ -17,23 +17,14 @@ XML = """
   <compiler angle="radian"/>
   <option gravity="0 0 -9.81"><flag contact="disable" constraint="disable" autoreset="disable"/></option>
   <worldbody>
-    <body name="foot">
-      <inertial pos="0 0.1 -0.5" mass="4.0" diaginertia="0.2 0.2 0.3"/>
-    </body>
-    <body name="boom">
-      <joint name="swing" axis="1 0 0"/>
-      <joint name="lift" axis="0 1 0"/>
+    <body name="foot"><inertial pos="0 0.1 -0.5" mass="4.0" diaginertia="0.2 0.2 0.3"/></body>
+    <body name="boom"><joint name="swing" axis="1 0 0"/><joint name="lift" axis="0 1 0"/>
       <inertial pos="0.02 0 -0.2" mass="2.0" diaginertia="0.03 0.028 0.004"/>
-      <body name="weight" pos="0 0 0.3">
-        <joint name="twist" axis="0.6 0 0.8"/>
-        <inertial pos="0 0.05 -0.08" mass="0.5" diaginertia="0.002 0.0018 0.0009"/>
-      </body>
-      <body name="jib" pos="0 0 -0.4">
-        <joint name="bend" axis="0 1 0"/>
+      <body name="weight" pos="0 0 0.3"><joint name="twist" axis="0.6 0 0.8"/>
+        <inertial pos="0 0.05 -0.08" mass="0.5" diaginertia="0.002 0.0018 0.0009"/></body>
+      <body name="jib" pos="0 0 -0.4"><joint name="bend" axis="0 1 0"/>
         <inertial pos="0 0.01 -0.15" mass="1.2" diaginertia="0.012 0.011 0.002"/>
-        <body name="hook">
-          <inertial pos="0.03 0 -0.3" mass="0.3" diaginertia="0.001 0.0012 0.0009"/>
-        </body>
+        <body name="hook"><inertial pos="0.03 0 -0.3" mass="0.3" diaginertia="0.001 0.0012 0.0009"/></body>
       </body>
     </body>
   </worldbody>

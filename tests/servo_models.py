@@ -30,6 +30,19 @@ FLOATING = """<mujoco><option timestep="0.002"/><worldbody><body name="trunk"><f
 FILTERED = """<general name="servo" joint="turn" dyntype="{kind}" dynprm="{constant}" gainprm="20" biastype="affine"
   biasprm="0 -20 -2"/>"""
 
+SPRING = """<mujoco><worldbody><body><joint name="swing" axis="0 1 0" stiffness="{}"/>
+  <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+
+
+def robot(source):
+    """The robot of a file or text."""
+    return robot_of(read(source), "robot.xml")
+
+
+def spring(stiffness: float):
+    """A robot of 1 kg m2 on one spring."""
+    return robot(SPRING.format(stiffness))
+
 
 def hinge(kp: float = 20.0, kv: float = 0.0, joint: str = "", option: str = "", actuator: str = "") -> str:
     """The hinge with a position servo, or with other actuators."""

@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import mpmath
 import numpy as np
+from models.made import random_turn
 
 from tmt import Tree
 from tmt.exact.values import DIGITS
+
+UNIT = np.eye(3)
 
 
 def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free"), most=2) -> Tree:
@@ -27,14 +30,17 @@ def tree_of_kinds(rng, bodies=4, kinds=("hinge", "slide", "ball", "free"), most=
             frame *= np.linalg.det(frame)
             axis += list(frame) if name == "ball" else [np.eye(3)[len(axis)] if is_free else frame[0]]
         body_joint.append(before)
-        inertias.append(possible_tensor(rng))
+        points = rng.uniform(-0.1, 0.1, (6, 3))  # with masses, so that a body can have the tensor
+        inertias.append(sum(np.dot(r, r) * UNIT - np.outer(r, r) for r in points))
     n, nv = len(parent), len(axis)
     rest = []
     for name in kind:
-        rest += list(unit_quaternion(rng)) if name == "ball" else [rng.uniform(-0.5, 0.5)]
+        rest += list(random_turn(rng)) if name == "ball" else [rng.uniform(-0.5, 0.5)]
     return Tree(
         joint_names=[f"{name}{i}" for i, name in enumerate(kind)], parent=parent, offset=offset, axis=axis,
-        damping=rng.uniform(0.0, 0.5, nv), **random_bodies(rng, body_joint, inertias), kind=kind, rest=rest,
+        damping=rng.uniform(0.0, 0.5, nv), body_names=[f"body{b}" for b in range(bodies)], body_joint=body_joint,
+        mass=rng.uniform(0.5, 2.0, bodies), com=rng.uniform(-0.3, 0.3, (bodies, 3)), inertia=inertias,
+        gravity=5.0 * rng.normal(size=3), kind=kind, rest=rest,
         armature=rng.uniform(0.0, 0.1, nv) * rng.integers(0, 2, nv),
         stiffness=rng.uniform(0.0, 3.0, n) * rng.integers(0, 2, n),
         reference=[0.0 if name == "ball" else rng.uniform(-0.5, 0.5) for name in kind],
@@ -58,39 +64,28 @@ def small_tree() -> Tree:
     return replace(tree, stiffness=(1.0, 2.0, 3.0), position_gain=gains[0], speed_gain=gains[1])
 
 
+def one_body(axis, kind=(), com=(0.0, 0.0, 0.0), inertia=UNIT, **more) -> Tree:
+    """A body of 1 kg on joints in a row through one point, hinges by default; `more`: other fields of a Tree."""
+    n = len(kind or axis)
+    fields = {
+        "joint_names": tuple("abcdefgh"[:n]), "parent": range(-1, n - 1), "offset": np.zeros((n, 3)),
+        "damping": np.zeros(len(axis)), "body_names": ["body"], "body_joint": [n - 1], "mass": [1.0],
+        "gravity": (0.0, 0.0, -9.81),
+    }  # fmt: skip
+    return Tree(axis=axis, kind=kind or ["hinge"] * n, com=[com], inertia=[inertia], **fields | more)
+
+
 def wrist() -> Tree:
     """Three hinges through one point, z y z: Mbar is singular where the second is at zero."""
-    return Tree(
-        joint_names=("a", "b", "c"), parent=(-1, 0, 1), offset=np.zeros((3, 3)), axis=((0, 0, 1), (0, 1, 0), (0, 0, 1)),
-        damping=(0.0,) * 3, body_names=["hand"], body_joint=[2], mass=[1.0], com=[(0.1, 0.0, 0.2)],
-        inertia=[np.diag([0.01, 0.02, 0.025])], gravity=(0, 0, -9.81),
-    )  # fmt: skip
-
-
-def possible_tensor(rng) -> np.ndarray:
-    """A tensor that a body can have: that of six point masses."""
-    return sum(np.dot(r, r) * np.eye(3) - np.outer(r, r) for r in rng.uniform(-0.1, 0.1, (6, 3)))
-
-
-def random_bodies(rng, body_joint, inertias) -> dict:
-    """What a Tree says of bodies on these joints, and gravity."""
-    count = len(body_joint)
-    mass, com = rng.uniform(0.5, 2.0, count), rng.uniform(-0.3, 0.3, (count, 3))
-    numbers = {"mass": mass, "com": com, "inertia": inertias, "gravity": rng.normal(size=3) * 5.0}
-    return numbers | {"body_names": [f"body{b}" for b in range(count)], "body_joint": body_joint}
-
-
-def unit_quaternion(rng) -> np.ndarray:
-    """A random turn, w first."""
-    p = rng.normal(size=4)
-    return p / np.linalg.norm(p)
+    inertia = np.diag([0.01, 0.02, 0.025])
+    return one_body(UNIT[[2, 1, 2]], (), (0.1, 0.0, 0.2), inertia, body_names=["hand"])
 
 
 def random_state(rng, tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A random q (nq,), and qd and tau (nv,)."""
     q, most = [], {"hinge": 3.0, "slide": 1.0}
     for kind in tree.kind:
-        q += list(unit_quaternion(rng)) if kind == "ball" else [rng.uniform(-most[kind], most[kind])]
+        q += list(random_turn(rng)) if kind == "ball" else [rng.uniform(-most[kind], most[kind])]
     return np.array(q), *rng.uniform(-3.0, 3.0, (2, len(tree.axis)))
 
 

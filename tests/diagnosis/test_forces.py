@@ -34,15 +34,11 @@ FORCES = {  # what acts besides: rank, place, and what explains it
 }
 
 
-def is_named(cause, rank, place, explains):
-    found = cause.explains if isinstance(explains, str) else pytest.approx(cause.explains)
-    return (cause.rank, cause.place) == (rank, place) and found == explains
-
-
 @pytest.mark.parametrize("force, rank, place, explains", FORCES.values(), ids=FORCES)
 def test_what_acts_besides_is_named(force, rank, place, explains):
     (cause,) = causes(force)
-    assert is_named(cause, rank, place, explains)
+    assert (cause.rank, cause.place) == (rank, place)
+    assert cause.explains == (explains if isinstance(explains, str) else pytest.approx(explains))
 
 
 def test_neither_a_damper_nor_friction_below_zero_is_named():

@@ -35,8 +35,7 @@ def test_a_check_passes_within_its_tolerance_only(rule, inside, outside):
         for value in values:
             check = Result("mass").check("zero", "Mbar", value, 1.0, "kg m2", rounding=True, rule=rule)
             assert check.passed is check.record()["passed"] is passes
-            assert check.record()["rule"] == rule
-            assert check.over_tolerance == check.value
+            assert check.record()["rule"] == rule and check.over_tolerance == check.value
             assert (check.value is None) == (value is None or not np.isfinite(value))
 
 
@@ -116,14 +115,7 @@ def test_the_difference_closest_to_its_tolerance(difference, tolerance, place):
 
 
 def test_a_scale_of_each_entry_may_be_the_same_for_all_states_or_bodies():
-    differences = np.arange(12.0).reshape(2, 3, 2)
+    differences = -np.arange(12.0).reshape(2, 3, 2)
     for scale in ([[[1.0, 4.0]]], np.broadcast_to([1.0, 4.0], (5, 3, 2))):
         assert np.array_equal(worst_of_each(differences, np.array(scale)), [[4.0, 10.0], [1.0, 1.0]])
     assert np.array_equal(worst_of_each(differences, np.array([2.0, 3.0, 9.0])), [[5.0, 11.0], [2.0, 3.0]])
-
-
-def test_every_component_of_a_state_is_compared():
-    for place in ((0, 0), (1, 2), (2, 2)):
-        values = np.zeros((4, 3, 3))
-        values[(2, *place)] = -3.0
-        assert worst_of_each(values, 1.0)[0].tolist() == [0.0, 0.0, 3.0, 0.0]

@@ -36,25 +36,26 @@ def test_fewer_runs_than_are_needed_give_no_order():
     assert measured_order(STEPS[:3], errors(4.0, 4.0), 4) is None
 
 
+def checked(*order):
+    """The check of a measured order."""
+    result = Result("test")
+    check_order(result, "pendulum", *order)
+    return result.checks[0]
+
+
 @pytest.mark.parametrize("error", [math.nan, 0.0])
 def test_an_error_that_is_no_number_or_zero_fails(error):
     order, *_ = measured_order(STEPS[:2], [1.0, error])
-    result = Result("test")
-    check_order(result, "pendulum", 4, order)
-    assert result.checks[0].failed
+    assert checked(4, order).failed
 
 
 @BOTH
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_a_measured_order_is_that_of_the_method(share, passes, side):
-    result = Result("test")
-    check_order(result, "pendulum", 4, 4.0 + side * share * ORDER_MARGIN, "error of the swing", "4.15")
-    assert result.checks[0].passed == passes
-    assert result.checks[0].quantity == "deviation from order 4: error of the swing"
+    check = checked(4, 4.0 + side * share * ORDER_MARGIN, "error of the swing", "4.15")
+    assert check.passed == passes and check.quantity == "deviation from order 4: error of the swing"
 
 
 @pytest.mark.parametrize(("order", "passes"), [(7.01, True), (6.99, False), (9.5, True)])
 def test_of_order_8_only_a_least_order_is_known(order, passes):
-    result = Result("test")
-    check_order(result, "pendulum", 8, order)
-    assert result.checks[0].passed == passes
+    assert checked(8, order).passed == passes

@@ -5,6 +5,7 @@ import dataclasses
 import mpmath
 import numpy as np
 import pytest
+from trees import one_body
 
 import tmt
 from compare.engines.mujoco import engine, reading
@@ -18,12 +19,8 @@ from tmt.methods import METHODS, amplification
 
 EPS = 2.0**-52
 EULER = METHODS["semi_implicit_euler"]
-TURN = tmt.Tree(  # one hinge without gravity: a linear system, and nothing but a sum of roundings
-    joint_names=("turn",), parent=(-1,), offset=((0.0, 0.0, 0.0),), axis=((0.0, 0.0, 1.0),), damping=(0.0,),
-    body_names=("disc",), body_joint=(0,), mass=(1.0,),
-    com=((0.0, 0.0, 0.0),), inertia=(((1.0, 0, 0), (0, 1.0, 0), (0, 0, 2.0)),),
-    gravity=(0.0, 0.0, 0.0),
-)  # fmt: skip
+# one hinge without gravity: a linear system, and nothing but a sum of roundings
+TURN = one_body([(0.0, 0.0, 1.0)], inertia=np.diag([1.0, 1.0, 2.0]), gravity=(0.0, 0.0, 0.0))
 TORQUE = np.array([3.0])
 
 
@@ -46,14 +43,11 @@ def test_the_bound_of_discrete_with_servos_has_the_force_that_mujoco_leaves_out(
     text = f"<mujoco><worldbody><body>{joint}</body></worldbody><actuator>{servo}</actuator></mujoco>"
     found = reading.read(text)
     case = next(case for case in robot_of(found, "disc.xml").cases if case.controller)
-    q, mujoco = (
-        np.array([(case.tau - share * LEFT_OUT) / 50.0]),
-        engine(found).of(case),
-    )  # the force is that share
+    q = np.array([(case.tau - share * LEFT_OUT) / 50.0])  # the force is that share
     a, _, bound = slope_rounding(METHODS[name], case.tree, q, 0.0 * q, case.tau, 1e-3)
     assert bool(bound[0, 0] > LEFT_OUT / 2.1) is left_out
     if name in INTEGRATORS:
-        qdd = mujoco.run(q[0], [0.0], case.tau, 1e-3, 1, name).v[1] / 1e-3
+        qdd = engine(found).of(case).run(q[0], [0.0], case.tau, 1e-3, 1, name).v[1] / 1e-3
         assert np.abs(qdd - a[0]).max() <= bound[0, 0]
 
 
@@ -114,8 +108,7 @@ def test_the_band_is_the_sum_of_what_each_step_adds_carried_to_the_present(every
 def test_growth_at_rest_on_a_saddle_is_that_of_the_powers_of_its_step():
     """Upright, held: every step has the same Jacobian, so a small difference grows as the norm of its powers."""
     q, steps, dt = np.radians([180.0, 0.0, 90.0]), 64, 0.01
-    path = np.tile(q, (steps + 1, 1))
-    tau = tmt.gravity_balance(q)
+    path, tau = np.tile(q, (steps + 1, 1)), tmt.gravity_balance(q)
     (J,) = amplification(METHODS["rk4"], tmt.ARM, q[None], np.zeros((1, 3)), tau, dt)
     grown = growth(METHODS["rk4"], tmt.ARM, path, 0.0 * path, tau, dt, every=16)
     expected = [np.log10(np.linalg.norm(np.linalg.matrix_power(J, k), 2)) for k in range(0, steps + 1, 16)]

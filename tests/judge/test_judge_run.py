@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from judged import BOTH, INSIDE, OUTSIDE
+from servo_models import spring
+from trees import one_body
 
 import tmt
-from compare.engines.mujoco import reading
 from compare.judge.run import (
     departure,
     deviation,
@@ -18,17 +19,14 @@ from compare.robots import Robot
 from compare.robots.actuators import Actuator, Drive
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
-from compare.robots.file import robot_of
 from compare.truth.reference import has_no_reference
 
 CASES = {case.name: case for case in ARM.cases}
+T = np.array([0.0, 0.5])
 ENDS = (
     (INSIDE, None),
     (OUTSIDE, 0.5),
-)  # shares of the energy that can be gained, and when a run of two states diverges
-T = np.array([0.0, 0.5])
-
-
+)  # shares of the energy that can be gained, and when a run over T diverges
 MOVED = ("bent, free", 0.0), ("ball catch, held", [0.1, -0.2, 0.3]), ("thrown, no gravity", 0.0)
 
 
@@ -68,11 +66,8 @@ def test_an_arm_has_left_at_a_tenth_of_a_radian():
 def alone(kind, **more) -> tmt.Tree:
     """A ball of 2 kg with inertia 0.5 kg m2 on a slide along z or on a ball joint, its centre in the origin."""
     axis = np.eye(3) if kind == "ball" else [(0.0, 0.0, 1.0)]
-    given = {"gravity": (0.0, 0.0, 0.0), "damping": (0.0,) * len(axis)} | more
-    return tmt.Tree(
-        joint_names=("joint",), parent=(-1,), offset=((0.0, 0.0, 0.0),), axis=axis, body_names=("ball",), body_joint=(0,),
-        mass=(2.0,), com=((0.0, 0.0, 0.0),), inertia=(np.eye(3) * 0.5,), kind=(kind,), **given,
-    )  # fmt: skip
+    fields = {"gravity": (0.0, 0.0, 0.0), "mass": [2.0], "inertia": np.eye(3) * 0.5}
+    return one_body(axis, (kind,), **fields | more)
 
 
 @pytest.mark.parametrize("tree, scene", [
@@ -101,33 +96,23 @@ def test_a_servo_gives_no_more_than_it_has_stored(start):
         assert diverged_at(case, T, np.array([case.q, case.q + 0.2]), speeds) == ends
 
 
-def unit(*values) -> tuple:
-    return tuple(np.array(values) / np.linalg.norm(values))
-
-
 def test_a_quaternion_and_its_negative_are_the_same_turn():
     coordinates = Coordinates(("head",), ("ball",))
-    q = np.array([unit(1.0, 0.0, 0.0, 0.0), unit(-1.0, 0.0, 0.0, -0.049), unit(1.0, 0.0, 0.0, 0.051)])
+    q = np.array([(1.0, 0.0, 0.0, 0.0), (-1.0, 0.0, 0.0, -0.049), (1.0, 0.0, 0.0, 0.051)])
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
     assert deviation(q[:2], q[0], coordinates) == pytest.approx(2.0 * np.arctan(0.049))
     assert departure(np.arange(3.0), q, coordinates) == 2.0
     assert movement_unit(Coordinates(("a", "b"), ("slide", "ball"))) == "rad or m"
 
 
-def with_rate(rate):
-    """A robot of one spring."""
-    spring = f"""<mujoco><worldbody><body><joint name="swing" axis="0 1 0" stiffness="{rate**2!r}"/>
-      <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
-    return robot_of(reading.read(spring), "spring.xml")
-
-
 @BOTH
 def test_a_rate_that_leaves_no_digits_after_two_steps(share, passes):
     dt = 1.0 / 8192
-    robot = with_rate(share * (1e-3 / 64 / 2.0**-52) ** 0.25 / dt)
+    robot = spring((share * (1e-3 / 64 / 2.0**-52) ** 0.25 / dt) ** 2)
     assert np.isclose(robot.cases[0].scene.dt, dt)
     assert (leaves_no_digits(robot) is None) is passes
 
 
 def test_a_reference_in_doubles_is_not_asked_of_a_rate_with_which_it_diverges():
-    assert has_no_reference(with_rate(1e3)) is None and has_no_reference(with_rate(3e6)) is not None
+    assert has_no_reference(spring(1e6)) is None and has_no_reference(spring(9e12)) is not None
     assert leaves_no_digits(ARM) is None and has_no_reference(ARM) is None

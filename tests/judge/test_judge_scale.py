@@ -107,11 +107,8 @@ def test_energies_have_the_springs():
 
 
 def test_errors_go_through_the_inverse_entry_by_entry():
-    M, force, qdd = (
-        tmt.mass_matrix(Q, TREE)[0],
-        OF.force(1.0),
-        np.array([[1.0, -2.0, 3.0, -4.0, 5.0, -6.0]] * 2),
-    )
+    M, force = tmt.mass_matrix(Q, TREE)[0], OF.force(1.0)
+    qdd = np.array([[1.0, -2.0, 3.0, -4.0, 5.0, -6.0]] * 2)
     root = np.sqrt(np.diag(M))
     residual = (OF.added[0] + np.outer(root, root)) @ np.abs(qdd[0]) + force[0]
     assert np.allclose(OF.acceleration(force, qdd)[0], np.abs(np.linalg.inv(M)) @ residual, rtol=1e-12)

@@ -10,11 +10,8 @@ from compare.core import timing
 def test_what_is_compared_is_called_in_turns_and_the_first_call_is_not_counted(monkeypatch):
     now, order = [0.0], []
     monkeypatch.setattr(time, "perf_counter", lambda: now[0])
-    left = {
-        "a": [3.9e-3, 0.014, 6e-3, 2e-3],
-        "b": [0.2],
-        "c": [0.013, 0.018],
-    }  # a long call is made less often
+    # a long call is made less often
+    left = {"a": [3.9e-3, 0.014, 6e-3, 2e-3], "b": [0.2], "c": [0.013, 0.018]}
 
     def call(name):
         now[0] += left[name].pop(0)

@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 KINDS = ("hinge", "slide", "ball", "free")
-
+RANGES = {"armature": (0.005, 0.05), "damping": (0.05, 0.5), "stiffness": (1, 20), "ref": (-0.8, 0.8)}
 # two joints in one body, in this order, that no posture makes singular
 PAIRS = {("hinge", "hinge"), ("slide", "hinge"), ("hinge", "slide"), ("slide", "slide"), ("slide", "ball")}
 
@@ -18,9 +18,8 @@ def chain(n: int, seed: int = 0) -> str:
     rng = np.random.default_rng(seed)
     root, body = empty_model(f"chain {n}, seed {seed}")
     for number in range(1, n + 1):
-        body = turned_body(
-            body, f"body{number}", rng, pos=[*rng.uniform(-0.1, 0.1, 2), 0.2 if number > 1 else 0.0]
-        )
+        place = [*rng.uniform(-0.1, 0.1, 2), 0.2 if number > 1 else 0.0]
+        body = turned_body(body, f"body{number}", rng, place)
         add_element(body, "joint", name=f"joint{number}", axis=oblique_axis(rng))
     return mjcf_of(root)
 
@@ -72,12 +71,7 @@ def add_joint(body, name: str, kind: str, rng, across=None):
     values = {"axis": axis} if axis is not None else {}
     if kind != "slide":
         values["pos"] = rng.uniform(-0.1, 0.1, 3)
-    for what, *ends in (
-        ("armature", 0.005, 0.05),
-        ("damping", 0.05, 0.5),
-        ("stiffness", 1, 20),
-        ("ref", -0.8, 0.8),
-    ):
+    for what, ends in RANGES.items():
         if (what != "ref" or kind != "ball") and rng.random() < 0.5:
             values[what] = rng.uniform(*ends)
             if what == "stiffness" and kind != "ball":

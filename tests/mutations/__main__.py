@@ -27,24 +27,18 @@ from .edits import EDITS
 
 PROJECT = Path(__file__).resolve().parents[2]
 NOT_COPIED = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "latest")
-BLIND = (
-    "test_mutations.py",
-    "test_structure.py",
-    "test_interrupt.py",
-)  # they see any edit, or no edit of a judge
-# the files of tests run in parts, the nearest first: most edits are caught by the first
-SLICES = 0, 4, 16, 1000
-# s that a part may take, and for each of its files: then an edit counts as an endless run
-PATIENCE, PATIENCE_WITH_FILE = 90.0, 20.0
-STATUS = """exit status: 0 no edit survives; 1 some do; 2 an edit does not apply to the sources, or a test that caught one fails
-without it too"""
+BLIND = ("test_mutations.py", "test_structure.py", "test_interrupt.py")  # they see any edit, or none
+SLICES = 0, 4, 16, 1000  # parts of the list of test files: most edits are caught by the first
+PATIENCE, PATIENCE_WITH_FILE = 90.0, 20.0  # s of a part, and for each of its files: then a run has no end
+STATUS = (
+    "exit status: 0 no edit survives; 1 some do; 2 an edit does not apply, or a test fails without it too"
+)
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; the exit status."""
     parser = argparse.ArgumentParser("python -m tests.mutations", description=__doc__, epilog=STATUS)
-    words = "only edits that have one of these in their name"
-    parser.add_argument("words", nargs="*", metavar="WORD", help=words)
+    parser.add_argument("words", nargs="*", metavar="WORD", help="only edits with one of these in their name")
     parser.add_argument("--list", action="store_true", help="list the edits, run nothing")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="runs side by side (%(default)s)")
     options = parser.parse_args(arguments)
@@ -60,7 +54,9 @@ def main(arguments: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     caught_by, survived = set(), 0
     with TemporaryDirectory(prefix="edits-") as folder:
-        copies = [copied(Path(folder, str(number))) for number in range(options.jobs)]
+        copies = [Path(folder, str(number)) for number in range(options.jobs)]
+        for copy in copies:
+            shutil.copytree(PROJECT, copy, ignore=NOT_COPIED)
         with closing(outcomes(places, copies)) as tried:
             for edit, seconds, caught in tried:
                 outcome = f"caught by {caught}" if caught else "SURVIVED"
@@ -75,10 +71,6 @@ def main(arguments: list[str] | None = None) -> int:
             print(f"fails without an edit: {failed}")
             return 2
     return 1 if survived else 0
-
-
-def copied(folder: Path) -> Path:
-    return Path(shutil.copytree(PROJECT, folder, ignore=NOT_COPIED))
 
 
 def outcomes(places: dict[Edit, Place], copies: list[Path]) -> Iterator[tuple[Edit, float, str]]:
@@ -117,7 +109,7 @@ def first_failed(copy: Path, tests: list[str]) -> str:
     """The first of these tests (files or names) that fails in a copy of the project, empty if none does."""
     command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-rfE", *tests]
     own = {"PYTHONPATH": copy, "TMT_CACHE": copy.parent / "store", "TMPDIR": copy.parent, "COLUMNS": "200"}
-    own["PYTHONDONTWRITEBYTECODE"] = ""  # or each run would compile all sources again
+    own["PYTHONDONTWRITEBYTECODE"] = ""  # else each run compiles all sources
     limit, log = PATIENCE + PATIENCE_WITH_FILE * len(tests), copy.with_suffix(".log")
     with log.open("w") as output:
         streams = {"stdin": subprocess.DEVNULL, "stdout": output, "stderr": output}

@@ -21,7 +21,8 @@ class Edit:
     module: a file by the end of its dotted name, "verdict" or "trajectory.rows", or the name of a folder of files;
     where: a function, Class.method, function.inner function, or a name that is assigned in the module or a class.
     old: an expression, a keyword argument (name=value) or a statement; new: what replaces it.
-    In both _1, _2 stand for any expression (on a line of its own: statement), *_1 at the end of a call for all other arguments.
+    In both _1, _2 stand for any expression (on a line of its own: statement), *_1 at the end of a call for all other arguments;
+    in new _0 is all that stood there.
     nth: which one, from 1, if there are several. breaks: what the edited program does.
     """
 
@@ -50,7 +51,7 @@ class Place(NamedTuple):
 
     @property
     def before(self) -> str:
-        return text_of(self.path)
+        return self.path.read_text(encoding="utf-8")
 
     @property
     def after(self) -> str:
@@ -58,9 +59,7 @@ class Place(NamedTuple):
         statement = next(part for part in parsed(self.path).body if self.old in ast.walk(part))
         start = min(part.lineno for part in (statement, *getattr(statement, "decorator_list", ())))
         lines = self.before.splitlines(keepends=True)
-        edited = copy.deepcopy(
-            statement, {id(self.old): self.new}
-        )  # what is copied already is taken as it is
+        edited = copy.deepcopy(statement, {id(self.old): self.new})  # the new node passes for a copy
         return "".join([*lines[: start - 1], ast.unparse(edited), "\n", *lines[statement.end_lineno :]])
 
 
@@ -72,14 +71,13 @@ def applied(project: Path, edit: Edit) -> Place:
     if not holding:
         raise DoesNotApply(f"{edit.name}: there is no {edit.where} below {' or '.join(PACKAGES)}")
     old = read(edit.old)
-    hits = [
-        (path, *hit) for path in holding for scope in scopes(path, edit.where) for hit in matches(scope, old)
-    ]
+    places = [(path, scope) for path in holding for scope in scopes(path, edit.where)]
+    hits = [(path, *hit) for path, scope in places for hit in matches(scope, old)]
     if not 1 <= (edit.nth or 1) <= len(hits) or (edit.nth is None and len(hits) > 1):
         what = f"{len(hits)} times {edit.old} in {edit.where}"
         raise DoesNotApply(f"{edit.name}: {what}; one is expected, or nth")
     path, node, holes = hits[(edit.nth or 1) - 1]
-    new = filled(read(edit.new), holes)
+    new = filled(read(edit.new), holes | {"_0": node})
     if isinstance(node, ast.keyword):
         new = as_keyword(new)
     elif isinstance(node, ast.stmt) and isinstance(new, ast.expr):
@@ -95,13 +93,8 @@ def sources(project: Path) -> dict[Path, str]:
 
 
 @cache
-def text_of(path: Path) -> str:
-    return path.read_text(encoding="utf-8")
-
-
-@cache
 def parsed(path: Path) -> ast.Module:
-    return ast.parse(text_of(path))
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 @cache

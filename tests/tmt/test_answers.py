@@ -9,7 +9,7 @@ from inspect import signature
 
 import numpy as np
 import pytest
-from trees import random_states, small_tree, wrist
+from trees import one_body, random_states, small_tree, wrist
 
 import tmt
 from tmt import answers, literal
@@ -40,15 +40,13 @@ def test_machine_code_answers_what_the_literal_form_returns(quantity, rng):
     tree, states = compiled(SMALL, quantity), random_states(rng, SMALL, 21)
     given = states[: len(takes)]
     expected, every = (in_parts(call(*given, tree)) for call in (getattr(literal, quantity), function))
-    condition = (
-        np.linalg.cond(literal.mass_matrix(states[0], tree)).max() if quantity == "acceleration" else 1.0
-    )
+    M = literal.mass_matrix(states[0], tree)
+    condition = np.linalg.cond(M).max() if quantity == "acceleration" else 1.0
     truth = exact(SMALL, *(rows[0] for rows in states))
     for field, values, bits in zip(FIELDS[quantity], expected, every, strict=True):
         allowed = 64 * EPS * condition * max(1.0, np.abs(values).max())
         assert np.abs(bits - values).max() <= allowed >= distance(bits[0], getattr(truth, field)).max()
-    # so it was machine code
-    assert quantity == "spring_torque" or not all(map(np.array_equal, every, expected))
+    assert quantity == "spring_torque" or not all(map(np.array_equal, every, expected))  # it was machine code
     for batch in ((), (21,), (3, 7), (2, 0)):
         size = int(np.prod(batch))
         some = [rows[:size].reshape(*batch, rows.shape[1]) for rows in given]
@@ -96,9 +94,8 @@ def test_threads_change_no_bit(monkeypatch, rng):
     monkeypatch.undo()
 
     def ask(k):
-        return all(
-            np.array_equal(tmt.acceleration(*(x[k] for x in states), tree), alone[k]) for _ in range(100)
-        )
+        state = [x[k] for x in states]
+        return all(np.array_equal(tmt.acceleration(*state, tree), alone[k]) for _ in range(100))
 
     with ThreadPoolExecutor(8) as pool:
         assert all(pool.map(ask, range(8)))
@@ -114,10 +111,7 @@ def test_numbers_in_any_form_are_taken(convert):
     assert np.array_equal(tmt.acceleration(convert(q[0]), convert(qd[0]), tau[0]), expected[0])
 
 
-BALL = tmt.Tree(
-    joint_names=("ball",), parent=(-1,), offset=((0, 0, 0),), axis=np.eye(3), damping=(0, 0, 0), body_names=("body",),
-    body_joint=(0,), mass=(1,), com=((0, 0, 0.1),), inertia=(np.eye(3),), gravity=(0, 0, -9.81), kind=("ball",),
-)  # fmt: skip
+BALL = one_body(np.eye(3), ["ball"], com=(0, 0, 0.1))
 WRIST, Z = dataclasses.replace(wrist(), inertia=[np.eye(3)]), np.zeros(3)
 TURNS = np.array([[1.0, 0.0, 0.0, 0.0]] * 10)
 WRONG = {
@@ -154,7 +148,7 @@ def test_what_is_within_a_millionth_of_a_unit_quaternion_is_one():
 @pytest.mark.filterwarnings("error")
 def test_numbers_beyond_the_largest_double():
     compiled(tmt.ARM, "mass_matrix", "energy")
-    slide = dataclasses.replace(BALL, axis=[(0, 0, 1)], damping=(0,), kind=("slide",), rest=(), armature=())
+    slide = one_body([(0, 0, 1)], ["slide"], com=(0, 0, 0.1))
     compiled(slide, "potential_energy")
     for q in (np.array([1.7e308]), np.full((2, 1), 1.7e308)):  # its energy is infinite, and nothing is NaN
         with pytest.raises(ValueError, match="largest double"):
@@ -175,7 +169,5 @@ def test_who_cannot_wait_has_it_prepared(monkeypatch):
 
 
 def test_a_short_question_never_waits_for_a_compiler():
-    program = (
-        "import sys, tmt; tmt.acceleration([0.1] * 3, [0.0] * 3, [0.0] * 3); print('llvmlite' in sys.modules)"
-    )
+    program = "import sys, tmt; tmt.acceleration(*[[0.1] * 3] * 3); print('llvmlite' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout == "False\n"

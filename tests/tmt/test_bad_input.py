@@ -35,7 +35,24 @@ def refused(call, *arguments) -> str:
     return message
 
 
+def with_field(of, name):
+    return lambda value: dataclasses.replace(of, **{name: value})
+
+
+RK4, TABLE = METHODS["rk4"], ((), (0.5, 0.5), (0.0, 0.5), (0.0, 0.0, 1.0))
+EQUATIONS = [  # arguments of equations, and the word
+    ({"language": "fortran"}, "language"), ({"language": None}, "language"), ({"quantities": []}, "quantity"),
+    ({"quantities": ["mass"]}, "mass"), ({"quantities": "energie"}, "energie"), ({"model": "arm"}, "model"),
+    *(({"name": name}, "name") for name in ("2", "_x", "while", "energy", None)),
+    ({"language": "python", "single": True}, "single"), ({"language": "latex", "quantities": ["jacobians"]}, "jacobians"),
+]  # fmt: skip
 SAID = [  # calls that are refused, and a word of what is said
+    *((partial(tmt.equations, **given), word) for given, word in EQUATIONS),
+    (partial(with_field(RK4, "b"), (1.0, 0.5, 0.0, 0.0)), "1.5"), (partial(with_field(RK4, "A"), TABLE), "entries"),
+    (partial(with_field(RK4, "c"), (0.0, 0.5, 0.4, 1.0)), "row 2 of A"),
+    (partial(with_field(METHODS["implicit_midpoint"], "A"), ((),)), "square"),
+    (partial(tmt.ARM.lock, {"wrist": 0.0}), "no joint 'wrist'"),
+    (partial(tmt.ARM.lock, dict.fromkeys(tmt.ARM.joint_names, 0.0)), "at least one must be free"),
     (lambda: tmt.mass_matrix(np.zeros((2, 4))), "(2, 4)"),
     (lambda: tmt.mass_matrix([0.0, np.inf, 0.0]), "not finite"),
     (lambda: tmt.bias(np.zeros((2, 3)), np.zeros((4, 3))), "q (2, 3), qd (4, 3)"),
@@ -75,10 +92,6 @@ NONSENSE = [
     [MASKED], [np.ma.masked, 1, 2], np.zeros(0), np.zeros((3, 2)), np.datetime64("2020"), np.array(["2020"] * 3, "M8[D]"),
     [Decimal(1)] * 3, ..., np.zeros(3, [("a", float)]), np.full(3, np.longdouble("1e4000")), "no such name", "two\nlines",
 ]  # fmt: skip
-
-
-def with_field(of, name):
-    return lambda value: dataclasses.replace(of, **{name: value})
 
 
 PLACES = {

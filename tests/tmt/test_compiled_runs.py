@@ -14,6 +14,7 @@ from tmt.methods import METHODS, one_step
 
 SMALL = small_tree()
 FREE = replace(SMALL, position_gain=(), speed_gain=())  # without a controller
+LARGER = ("implicit", SMALL), ("implicit", FREE), ("implicit_midpoint", SMALL)
 
 
 def starts(count) -> list[np.ndarray]:
@@ -60,20 +61,12 @@ def test_runs_together_have_the_bits_of_each_alone(name, counts):
         assert_is_the_step(name, batch.q, batch.qd, tau, dt)
 
 
-@pytest.mark.parametrize(
-    "name, tree", [("implicit", SMALL), ("implicit", FREE), ("implicit_midpoint", SMALL)]
-)
+@pytest.mark.parametrize("name, tree", LARGER)
 def test_the_code_of_larger_trees_does_the_same(name, tree, folder, monkeypatch):
     """Linear systems and derivatives by calls, articulated bodies, no lines in the place of a call, lines cut into parts."""
-    sizes = (
-        (forms, "DENSE", 0),
-        (forms, "FEW", 0),
-        (forms, "MANY", 0),
-        (runs, "INLINED", 0),
-        (straight, "LONGEST", 50),
-    )
-    for module, field, size in sizes:
-        monkeypatch.setattr(module, field, size)
+    for module, field in ((forms, "DENSE"), (forms, "FEW"), (forms, "MANY"), (runs, "INLINED")):
+        monkeypatch.setattr(module, field, 0)
+    monkeypatch.setattr(straight, "LONGEST", 50)
     q, qd, tau = starts(9)
     (q, qd), other = paths_from(q, qd, 3), paths_from(q[4:5], qd[4:5], 3)
     for paths, torque in (((q, qd), tau), (other, tau[4:5])):
@@ -85,11 +78,11 @@ def test_the_code_of_larger_trees_does_the_same(name, tree, folder, monkeypatch)
 def test_several_cores_give_the_bits_of_one(monkeypatch):
     q, qd, tau = starts(75)
     qd[40] = 1e200
+    monkeypatch.setattr(runner, "SPREAD", 0)
     for name in ("rk4", "implicit_midpoint"):
         monkeypatch.setattr(runner, "cores", lambda: 1)
         one = tmt.simulate(q, qd, tau, 0.02, 6, name, SMALL)
         monkeypatch.setattr(runner, "cores", lambda: 3)
-        monkeypatch.setattr(runner, "SPREAD", 0)
         three = tmt.simulate(q, qd, tau, 0.02, 6, name, SMALL)
         assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, three)) and one.ended[40]
         assert one.evaluations == three.evaluations and np.array_equal(one.ended, three.ended)

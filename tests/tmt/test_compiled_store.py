@@ -19,6 +19,7 @@ from tmt.compiled.machine import object_code
 from tmt.methods import METHODS
 
 ROOT = Path(__file__).resolve().parents[2]
+GROUPS = ("root", ["root"], True), ("root", ["eve"], False), ("staff", [], False)
 posix = pytest.mark.skipif(os.name != "posix", reason="rights are bits on POSIX only")
 TEXT = "define double @f(double %x) {{\n  %y = fmul double %x, {}\n  ret double %y\n}}\n"
 
@@ -92,11 +93,8 @@ print(first, sources.own_sources(), len(list(store.cache_folder().glob("*.o"))))
 def test_what_is_compiled_is_kept_under_the_name_of_what_was_imported(change, kept, folder, tmp_path):
     """Of sources that are others by now, or gone, nothing is kept: the next process would run another version's code."""
     shutil.copytree(ROOT / "tmt", tmp_path / "tmt", ignore=shutil.ignore_patterns("__pycache__"))
-    command, environment = (
-        [sys.executable, "-c", COPIED, f"import os\n{change}"],
-        os.environ | {"PYTHONPATH": "."},
-    )
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment)
+    command, own = [sys.executable, "-c", COPIED, f"import os\n{change}"], {"PYTHONPATH": "."}
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=os.environ | own)
     first, later, count = done.stdout.split()
     assert len(first) == 64 and later == (first if kept else "None") and int(count) == kept
 
@@ -130,9 +128,7 @@ def test_others_may_read_the_folder_and_not_write_nor_exchange_it(folder, place,
 
 
 @pytest.mark.skipif(getattr(os, "geteuid", str)() != 0, reason="only root can say who is in a group")
-@pytest.mark.parametrize(
-    "name, members, accepted", [("root", ["root"], 1), ("root", ["eve"], 0), ("staff", [], 0)]
-)
+@pytest.mark.parametrize("name, members, accepted", GROUPS)
 def test_a_group_of_the_user_alone_may_write(folder, name, members, accepted, monkeypatch):
     """With the mask 002 that many systems set, a folder is the group's too, and the group is the user's own."""
     grp = pytest.importorskip("grp")
@@ -193,22 +189,14 @@ def test_processes_share_what_they_compile(tmp_path):
     """In any path, where Python takes every text for ASCII, and nothing is left elsewhere; a refusal is a line on stderr."""
     folder, home = tmp_path / os.fsdecode("Zwischenlager für Übersetztes".encode()), tmp_path / "home"
     home.mkdir()
-    ascii_only = {
-        "LC_ALL": "C",
-        "PYTHONUTF8": "0",
-        "PYTHONCOERCECLOCALE": "0",
-        "PYTHONDONTWRITEBYTECODE": "1",
-    }
-    places = {
-        "PYTHONPATH": str(ROOT),
-        "TMT_CACHE": str(folder),
-        "HOME": str(home),
-        "PATH": os.environ["PATH"],
-    }
+    environment = {
+        "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONDONTWRITEBYTECODE": "1",
+        "PYTHONPATH": str(ROOT), "TMT_CACHE": str(folder), "HOME": str(home), "PATH": os.environ["PATH"],
+    }  # fmt: skip
 
     def output(program):
         command = [sys.executable, "-c", program]
-        run = subprocess.run(command, env=ascii_only | places, cwd=home, capture_output=True, text=True)
+        run = subprocess.run(command, env=environment, cwd=home, capture_output=True, text=True)
         return run.stdout, run.stderr
 
     first, errors = output(PROGRAM)

@@ -15,7 +15,6 @@ from tmt.exact.values import distance, exact
 
 EPS = np.finfo(float).eps
 STEP = 1e-5  # of central differences, which are right to about 1e-8 of what is differenced
-few = settings(max_examples=20)
 
 
 @st.composite
@@ -27,7 +26,9 @@ def drawn_trees(draw):
     return tree, *random_state(rng, tree), rng
 
 
-of_trees = given(drawn_trees())
+def of_trees(test):
+    """The test, at 20 drawn trees."""
+    return settings(max_examples=20)(given(drawn_trees())(test))
 
 
 def along(tree, function, q, u):
@@ -45,7 +46,6 @@ def assert_close(found, expected, scale=1.0, digits=1e-7):
     assert np.abs(found - expected).max() <= digits * (scale + np.abs(expected).max())
 
 
-@few
 @of_trees
 def test_the_mass_matrix_gives_the_kinetic_energy_and_the_acceleration_which_changes_it(drawn):
     """By the power of the torque less what dampers take."""
@@ -62,7 +62,6 @@ def test_the_mass_matrix_gives_the_kinetic_energy_and_the_acceleration_which_cha
     assert_close((ends[0] - ends[1]) / (2.0 * STEP), power, np.abs(ends).max() + np.abs(qdd).max() ** 2)
 
 
-@few
 @of_trees
 def test_gravity_and_springs_are_the_slope_of_the_potential_energy(drawn):
     tree, q, qd, *_ = drawn
@@ -72,7 +71,6 @@ def test_gravity_and_springs_are_the_slope_of_the_potential_energy(drawn):
     assert_close(tmt.bias(q, 0.0 * qd, tree), tmt.gravity_balance(q, tree), 100.0, 64 * EPS)
 
 
-@few
 @of_trees
 def test_jacobians_and_convective_terms_are_derivatives_of_what_moves(drawn):
     tree, q, qd, *_ = drawn
@@ -91,7 +89,6 @@ def test_jacobians_and_convective_terms_are_derivatives_of_what_moves(drawn):
         assert_close(found, expected, np.abs(qd).sum() ** 2)
 
 
-@few
 @of_trees
 def test_composite_and_articulated_bodies_give_the_numbers_of_the_literal_sums(drawn):
     tree, *state, _ = drawn
@@ -106,7 +103,6 @@ def test_composite_and_articulated_bodies_give_the_numbers_of_the_literal_sums(d
     assert_close(M @ qdd, force, np.abs(M).max() * np.abs(qdd).max(), 1e-12)
 
 
-@few
 @of_trees
 def test_the_rates_of_the_bias_are_its_derivatives_by_the_speeds(drawn):
     """The bias has squares of the speeds, of which central differences of any step are exact."""
@@ -116,7 +112,7 @@ def test_the_rates_of_the_bias_are_its_derivatives_by_the_speeds(drawn):
     assert_close(method.bias_rates(tree, q.tolist(), qd.tolist()), expected, np.abs(ends).max(), 256 * EPS)
 
 
-@few
+@settings(max_examples=20)
 @given(drawn_trees(), st.data())
 def test_a_locked_tree_is_the_sub_block_of_the_whole(drawn, data):
     tree, q, qd, *_ = drawn
@@ -150,18 +146,7 @@ def test_the_distance_from_many_digits_is_that_of_all_digits():
 
 DIGITS = 150
 TINY = mpmath.mpf(10) ** -35  # errors: of order TINY^2, and 10^-DIGITS / TINY^2
-NUMBERS = [
-    "offset",
-    "axis",
-    "mass",
-    "com",
-    "inertia",
-    "gravity",
-    "armature",
-    "stiffness",
-    "rest",
-    "reference",
-]
+NUMBERS = "offset", "axis", "mass", "com", "inertia", "gravity", "armature", "stiffness", "rest", "reference"
 mp = np.vectorize(mpmath.mpf, otypes=[object])
 IDENTITY = mp(np.eye(3))
 

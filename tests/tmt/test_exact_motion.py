@@ -7,9 +7,8 @@ import mpmath
 import numpy as np
 import pytest
 from models import PATHS
-from trees import exact_swing, random_state, small_tree, tree_of_kinds
+from trees import exact_swing, one_body, random_state, small_tree, tree_of_kinds
 
-import tmt
 from compare.engines.mujoco import read
 from tmt.derivation import composite
 from tmt.derivation.method import acceleration
@@ -18,10 +17,6 @@ from tmt.exact.motion import trajectory, truth
 from tmt.exact.tree import exact_tree, of_length_1
 
 DIGITS, COLUMNS = 45, 9  # of the extrapolation: order 18
-ONE_HINGE = tmt.Tree(
-    joint_names=["swing"], parent=[-1], offset=[(0.0, 0.0, 0.0)], axis=[(0.0, 1.0, 0.0)], damping=[0.0], body_names=["bob"],
-    body_joint=[0], mass=[1.0], com=[(0.0, 0.0, -0.5)], inertia=[np.diag([1.0, 0.75, 0.5])], gravity=(0.0, 0.0, -8.0),
-)  # fmt: skip
 
 
 def off(path, expected, record=-1):
@@ -63,8 +58,7 @@ def short_run(tree, q, qd, tau, duration) -> list:
 def test_a_pendulum_is_its_elliptic_function(axis, arm, form):
     """Pulled along its arm each is that of frequency 2 per second, after many turns; of one axis no double has the direction."""
     square, arm = sum(x * x for x in arm), tuple(map(float, arm))
-    tree = dataclasses.replace(ONE_HINGE, axis=[axis], com=[arm], inertia=[square * np.eye(3)])
-    tree = dataclasses.replace(tree, gravity=tuple(8.0 * x for x in arm))
+    tree = one_body([axis], (), arm, square * np.eye(3), gravity=tuple(8.0 * x for x in arm))
     assert (sum(Fraction(x) ** 2 for x in tree.axis[0]) != 1) == (axis == (1, 2, 2))
     path = trajectory(tree, [200.0], [1.5], [0.0], 0.375, 8, form=form)
     expected = exact_swing(0.375 * np.arange(9), 200.0, 1.5, 0.0, 2.0)
@@ -109,7 +103,7 @@ def test_a_symmetric_free_body_precesses_about_its_angular_momentum():
 
 def test_times_are_exact_multiples_of_the_step():
     """A slide without force moves by speed times time: 0.1, 0.3, 0.7 are not what their doubles are."""
-    tree = dataclasses.replace(ONE_HINGE, kind=["slide"], gravity=(0.0, 0.0, 0.0))
+    tree = one_body([(0.0, 1.0, 0.0)], ["slide"], gravity=(0.0, 0.0, 0.0))
     path = trajectory(tree, [0.3], [0.7], [0.0], 0.1, 21, every=3)
     assert path.high.shape == (8, 2) and path.steps == 1
     for k, (high, low) in enumerate(zip(path.high[:, 0].tolist(), path.low[:, 0].tolist())):

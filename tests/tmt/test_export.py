@@ -8,22 +8,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from trees import random_tree, tree_of_kinds
+from trees import random_states, random_tree, tree_of_kinds
 
 import tmt
 from tmt.compiled import straight
 from tmt.derivation.quantities import QUANTITIES
+from tmt.exact.many import Pairs, exact_of_many
+from tmt.exact.values import FIELDS, exact
 from tmt.export.statements import Syntax, Writer
 
 HAS_C = bool(shutil.which("gcc"))
 
 
-def states_of(tree, count=5, seed=1):
-    rng, coordinates = np.random.default_rng(seed), tree.coordinates
-    q = rng.uniform(-1.0, 1.0, (count, coordinates.nq))
-    for joint in coordinates.balls:
-        q[:, joint.q] /= np.linalg.norm(q[:, joint.q], axis=1, keepdims=True)
-    return q, *rng.uniform(-1.0, 1.0, (2, count, coordinates.nv))
+def states_of(tree, count=5):
+    return random_states(np.random.default_rng(1), tree, count)
 
 
 def module(tree, *quantities):
@@ -125,42 +123,23 @@ def test_names_that_are_pieces_of_programs_stay_in_comments_and_texts(tmp_path):
         compile_in(tmp_path, "-x c -include header -c c")
 
 
-@pytest.mark.parametrize(("given", "why"), [
-    ({"language": "fortran"}, "language"), ({"language": None}, "language"), ({"quantities": []}, "quantity"),
-    ({"quantities": ["mass"]}, "mass"), ({"quantities": "energie"}, "energie"), ({"name": "2"}, "name"),
-    ({"name": "_x"}, "name"), ({"name": "while"}, "name"), ({"name": "energy"}, "name"), ({"name": None}, "name"),
-    ({"language": "python", "single": True}, "single"), ({"model": "arm"}, "model"),
-    ({"language": "latex", "quantities": ["jacobians"]}, "jacobians"),
-])  # fmt: skip
-def test_what_is_wrong_is_a_value_error(given, why):
-    with pytest.raises(ValueError, match=why):
-        tmt.equations(**given)
-
-
 @pytest.mark.parametrize("name", QUANTITIES)
 @pytest.mark.parametrize("tree", [TREES["arm"], TREES["kinds"]], ids=["arm", "kinds"])
 def test_the_exact_values_of_many_states_are_those_of_single_ones(tree, name):
-    from tmt.exact.many import exact_of_many
-    from tmt.exact.values import FIELDS, exact
-
     q, qd, tau = states_of(tree, 2)
     high, low = exact_of_many(tree, name, q, qd, tau)
     truth = exact(tree, q[1], qd[1], tau[1])
-    fields = FIELDS[name]
-    parts = [(high[1], low[1])] if len(fields) == 1 else list(zip(high[1], low[1]))
-    for field, (h, l) in zip(fields, parts, strict=True):
-        expected = getattr(truth, field)
-        off = np.abs((np.asarray(h).astype(object) - expected) + l)
+    parts = [(high[1], low[1])] if len(FIELDS[name]) == 1 else list(zip(high[1], low[1]))
+    for field, (h, l) in zip(FIELDS[name], parts, strict=True):
+        off = np.abs((np.asarray(h).astype(object) - getattr(truth, field)) + l)
         assert np.max(off) <= 1e-28 * max(1.0, float(np.max(np.abs(h))))
 
 
 def test_the_distance_from_exact_values_has_all_their_digits():
-    from tmt.exact.many import Pairs
-
-    exact = Pairs(np.array([[1.0, 1.0], [2.0, 3.0]]), np.array([[1e-20, -2e-20], [0.0, 4e-20]]))
-    assert exact.distance(exact.high).tolist() == [[1e-20, 2e-20], [0.0, 4e-20]]
-    assert exact.distance(exact.high - 1.0).tolist() == [[1.0, 1.0], [1.0, 1.0]]
+    pairs = Pairs(np.array([[1.0, 1.0], [2.0, 3.0]]), np.array([[1e-20, -2e-20], [0.0, 4e-20]]))
+    assert pairs.distance(pairs.high).tolist() == [[1e-20, 2e-20], [0.0, 4e-20]]
+    assert pairs.distance(pairs.high - 1.0).tolist() == [[1.0, 1.0], [1.0, 1.0]]
     near = 1.0 + 2.0**-52  # its distance is not a double plus the low part of the other sign
-    assert exact.distance(np.full((2, 2), near))[0].tolist() == [2.0**-52 - 1e-20, 2.0**-52 + 2e-20]
-    assert exact.part(1).distance(exact.high[:, 1]).tolist() == [2e-20, 4e-20] and exact.part(None) is exact
-    assert np.isnan(exact.distance(np.full((2, 2), np.nan))).all()
+    assert pairs.distance(np.full((2, 2), near))[0].tolist() == [2.0**-52 - 1e-20, 2.0**-52 + 2e-20]
+    assert pairs.part(1).distance(pairs.high[:, 1]).tolist() == [2e-20, 4e-20] and pairs.part(None) is pairs
+    assert np.isnan(pairs.distance(np.full((2, 2), np.nan))).all()

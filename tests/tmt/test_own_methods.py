@@ -1,7 +1,5 @@
 """Methods of integration of a user's own."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,6 @@ BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
 
 
-@dataclasses.dataclass(frozen=True)
 class Midpoint(Method):
     """The explicit midpoint rule, made from Method."""
 
@@ -39,9 +36,7 @@ class Plain:
         return Midpoint().step(slope, q, qd, dt)
 
 
-@pytest.mark.parametrize(
-    "own, order", [(Midpoint(), 2), (Plain(), 1)], ids=["made from Method", "of no known kind"]
-)
+@pytest.mark.parametrize("own, order", [(Midpoint(), 2), (Plain(), 1)], ids=["of Method", "of no known kind"])
 def test_a_method_of_ones_own(own, order, rng, monkeypatch):
     monkeypatch.setitem(METHODS, "mine", own)
     monkeypatch.setitem(METHODS, "tableau", RungeKutta(2, ((), (0.5,)), (0.0, 1.0), (0.0, 0.5)))
@@ -57,7 +52,6 @@ def test_a_method_of_ones_own(own, order, rng, monkeypatch):
     assert not np.allclose(tmt.simulate(q, qd, tau, 0.01, 20, "mine").q, same.q, rtol=0, atol=1e-6)
 
 
-@dataclasses.dataclass(frozen=True)
 class Longer(RungeKutta):
     """A step that is another than the tableau says."""
 
@@ -65,7 +59,6 @@ class Longer(RungeKutta):
         return super().step(slope, q, qd, 2.0 * dt, *joints)
 
 
-@dataclasses.dataclass(frozen=True)
 class Weaker(RungeKutta):
     """Half the accelerations."""
 

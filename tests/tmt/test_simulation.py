@@ -62,12 +62,9 @@ def test_a_singular_state_between_those_that_are_kept_is_found():
     tree, none = wrist(), np.zeros((1, 2), int)
     (each,) = reasons(tree, q.copy(), qd.copy(), none, 0.1, 1e-9)
     assert singular_in(tree, q[0], qd[0])[0] == 4 and each.startswith("at t = 0.4 s: ") and "'a', 'c'" in each
-    kept, between = (
-        (q[:, ::3].copy(), qd[:, ::3].copy()),
-        lambda run, k: [x[run, 3 * k : 3 * k + 4] for x in (q, qd)],
-    )
+    kept = q[:, ::3].copy(), qd[:, ::3].copy()  # 8 is no multiple of 3: after 0, 3 and 6 steps
+    between = lambda run, k: [x[run, 3 * k : 3 * k + 4] for x in (q, qd)]  # noqa: E731
     (third,) = reasons(tree, *kept, none, 0.1, 1e-9, 3, between)
-    # 8 is no multiple of 3: the records are those after 0, 3 and 6 steps
     assert third == each and np.isfinite(kept[0][0, :, 0]).tolist() == [True, True, False]
 
 

@@ -61,9 +61,8 @@ def assert_right(symbols, tree, rng, states=100):
         variables = symbols.q + symbols.qd if name == "bias" else symbols.q
         columns = [*q.T, *qd.T][: len(variables)]
         numbers = {symbol: row.value for symbol, row in symbols.parameters.items()}
-        values = sympy.lambdify(variables, list(symbols.entries[name].subs(numbers)), "numpy", cse=True)(
-            *columns
-        )
+        function = sympy.lambdify(variables, list(symbols.entries[name].subs(numbers)), "numpy", cse=True)
+        values = function(*columns)
         expected = getattr(tmt, name)(*state, tree)
         found = np.stack([np.broadcast_to(value, states) for value in values], axis=-1)
         found = found.reshape(expected.shape)
@@ -85,9 +84,8 @@ def test_the_numbers_are_those_of_the_tree(make, named, rng):
 
 def test_a_double_pendulum_has_the_form_of_textbooks():
     symbols = symbolic(planar(2))
-    m1, m2, l1, c1, c2, I1, I2, q2, qd1, qd2 = sympy.symbols(
-        "m_link0 m_link1 l_1 c_link0 c_link1 I_link0_yy I_link1_yy q_joint1 qd_joint0 qd_joint1"
-    )
+    names = "m_link0 m_link1 l_1 c_link0 c_link1 I_link0_yy I_link1_yy q_joint1 qd_joint0 qd_joint1"
+    m1, m2, l1, c1, c2, I1, I2, q2, qd1, qd2 = sympy.symbols(names)
     M, h = symbols.entries["mass_matrix"], symbols.entries["bias"] - symbols.entries["gravity_balance"]
     assert M[0] == m1 * c1**2 + I1 + I2 + m2 * (l1**2 + c2**2 + 2 * l1 * c2 * sympy.cos(q2))
     assert h[0] == -m2 * l1 * c2 * sympy.sin(q2) * (2 * qd1 * qd2 + qd2**2)
@@ -106,10 +104,8 @@ def test_a_cart_pole_has_no_term_that_vanishes():
 def test_rounding_of_a_compiled_model_makes_no_terms(rng):
     """Axes and offsets that are a few eps off."""
     tree, clean = planar(3), symbolic(planar(3))
-    noisy = Tree(
-        tree.joint_names, tree.parent, np.array(tree.offset) * (1 + 2 * EPS) + 1e-17, np.array(tree.axis) + [1e-16, 0, -3e-16],
-        tree.damping, tree.body_names, tree.body_joint, tree.mass, np.array(tree.com) + 1e-17, tree.inertia, tree.gravity,
-    )  # fmt: skip
+    offset, axis = np.array(tree.offset) * (1 + 2 * EPS) + 1e-17, np.array(tree.axis) + [1e-16, 0, -3e-16]
+    noisy = replace(tree, offset=offset, axis=axis, com=np.array(tree.com) + 1e-17)
     symbols = symbolic(noisy)
     assert symbols.entries == clean.entries and symbols.parameters == clean.parameters
     assert_right(symbols, noisy, rng)
@@ -192,37 +188,16 @@ def entries_in_page(text) -> dict:
 
 
 def value_of(formula, known) -> float:
-    """The value of a formula, {symbol of LaTeX: value}."""
-    formula = [*formula, ")"]
-
-    def power(text):
-        base, _, exponent = text.partition("^")
-        return base, int(exponent.strip("{}") or 1)
-
-    def factor():
-        base, exponent = power(formula.pop(0))
-        if base == "(":
-            value = total()
-            return value ** power(formula.pop(0))[1]
-        if base in ("\\sin", "\\cos"):
-            return getattr(np, base[1:])(factor()) ** exponent
-        return (known[base] if base in known else float(base)) ** exponent
-
-    def product():
-        value = factor()
-        while formula[0] not in ("+", "-") and not formula[0].startswith(")"):
-            if formula[0] == "\\cdot":
-                formula.pop(0)
-            value *= factor()
-        return value
-
-    def total():
-        value = -product() if formula[0] == "-" and formula.pop(0) else product()
-        while formula[0] in ("+", "-"):
-            value += product() if formula.pop(0) == "+" else -product()
-        return value
-
-    return total()
+    """The value of a formula, {symbol of LaTeX: value}, by Python, with * between its factors."""
+    text = re.sub(r"\\(sin|cos)(\S*) (\( [^()]* \)|\S+)", r"\1( \3 )\2", " ".join(formula))
+    code = "("
+    for token in re.sub(r"\^\{?(-?\d+)\}?", r"**\1", text).replace("\\cdot ", "").split():
+        base, *power = token.split("**")
+        begins_factor = token not in ("+", "-") and not token.startswith(")")
+        if begins_factor and not code.endswith(("(", "+", "-")):
+            code += "*"
+        code += "**".join([f"known[{base!r}]" if base in known else base, *power])
+    return eval(code + ")", {"known": known, "sin": np.sin, "cos": np.cos})
 
 
 OBLIQUE = replace(planar(2), axis=((0, 0, 1), (1, 0, 2e-5)))
@@ -243,9 +218,8 @@ def test_what_is_printed_in_latex_and_on_the_page_has_the_values(tree, rtol, rng
     expected |= {("h", i + 1, 1): h[i] for i in range(n)} | {("G", i + 1, 1): G[i] for i in range(n)}
     assert {key for key in expected if key[0] != "M" or key[2] >= key[1]} <= found.keys()
     for key, formula in found.items():
-        assert value_of(formula, known) == pytest.approx(expected[key], abs=1e-13 + rtol, rel=1e-13 + rtol), (
-            key
-        )
+        near = pytest.approx(expected[key], abs=1e-13 + rtol, rel=1e-13 + rtol)
+        assert value_of(formula, known) == near, key
 
 
 def test_symbols_of_names_that_are_alike_are_different(tmp_path):

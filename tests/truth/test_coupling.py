@@ -42,8 +42,7 @@ def test_the_limit_is_where_steps_and_runs_of_mujoco_with_its_equalities_begin_t
     for integrator, limit in one.limits.items():
         if limit.limit == "finite":
             finite += 1
-            at = one.there[integrator]
-            acting = acting_at(reading, at)
+            at, acting = one.there[integrator], acting_at(reading, one.there[integrator])
             if integrator not in ("RK4", "discrete"):
                 steps = [acting.transition(at.q, at.u, by * limit.dt, integrator) for by in (0.995, 1.005)]
                 below, above = np.abs(np.linalg.eigvals(steps)).max(axis=1)
@@ -65,13 +64,11 @@ def test_a_mimic_has_the_modes_of_both_masses_and_a_lower_limit_than_a_rigid_one
 
 
 def test_a_floating_base_turns_with_the_constraints_that_it_carries():
-    source = FOUR_BARS.replace(
-        "<worldbody>", '<worldbody><body><freejoint/><geom fromto="0 0 0 0.2 0 0" mass="3"/>'
-    )
-    source = source.replace("</worldbody>", "</body></worldbody>").replace(
-        "</actuator>",
-        '<position joint="rocker" kp="20" kv="1"/></actuator><keyframe><key ctrl="0.4 -0.4"/></keyframe>',
-    )  # the servos load the loop
+    base = '<worldbody><body><freejoint/><geom fromto="0 0 0 0.2 0 0" mass="3"/>'
+    servo = '<position joint="rocker" kp="20" kv="1"/></actuator>'
+    loads = servo + '<keyframe><key ctrl="0.4 -0.4"/></keyframe>'  # the servos load the loop
+    source = FOUR_BARS.replace("<worldbody>", base).replace("</worldbody>", "</body></worldbody>")
+    source = source.replace("</actuator>", loads)
     one = predicted(source)[0]
     assert one.at.small.names == ("crank", "coupler", "rocker") and "discrete" not in one.known
     assert "Euler" in one.known and "discrete" in predicted(FOUR_BARS)[0].known
@@ -87,7 +84,6 @@ def test_constraints_at_rest_carry_what_mujoco_says_and_are_stiff_by_turning():
     assert force == pytest.approx(data.qfrc_constraint, abs=1e-8) and np.abs(force).max() > 0.01
     K = springs + turning
     for j, step in enumerate(1e-7 * np.eye(len(K))):
-        ahead, behind = (
-            constraint_terms(rows, coordinates, coordinates.move(at.q, s * step))[0] for s in (1, -1)
-        )
+        ends = (coordinates.move(at.q, sign * step) for sign in (1, -1))
+        ahead, behind = (constraint_terms(rows, coordinates, q)[0] for q in ends)
         assert -(ahead - behind) / 2e-7 == pytest.approx(K[:, j], rel=1e-3, abs=1e-3 * np.abs(K).max())

@@ -11,9 +11,7 @@ from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments.stability.servos.predicted import acting_at
 
 STEPPED = [name for name in INTEGRATORS if name != "RK4"]  # whose step MuJoCo differentiates
-LINEAR = {
-    "discrete": 1e-3
-}  # what the linear map of a step may differ by; of the others 1e-8: central differences
+LINEAR = {"discrete": 1e-3}  # what the map of a step may differ by; of the others 1e-8: central differences
 NOISE = 2e-4  # of a spectral radius of 1 in differences: a free base has it twice
 at = lru_cache(maxsize=128)(posture_of)
 

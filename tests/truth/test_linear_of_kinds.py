@@ -5,13 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from models import PATHS, random_tree
+from servo_models import robot
 from trees import exact_swing, random_state, tree_of_kinds
 
 import tmt
-from compare.engines.mujoco import read
 from compare.robots.arm import ARM
 from compare.robots.coordinates import floats
-from compare.robots.file import robot_of
 from compare.truth.linear import Held, held, posture_names
 from compare.truth.pendulum import pendulum, swing
 from compare.truth.rest import holding, moving, slopes, spring_slope, weight
@@ -33,10 +32,6 @@ def stiffness(tree, q):
     return np.array(slopes(moved, holding(tree, moved)))
 
 
-def robot(source):
-    return robot_of(read(source), "robot.xml")
-
-
 @pytest.fixture(scope="module")
 def robots():
     sources = {name: PATHS[name] for name in ("gripper", "pendulum_ball", "free_body", "loop")}
@@ -53,14 +48,18 @@ def on_servos(robots):
         left = case.tau - np.array(holding(case.tree, list(end)), float)
         end = end + np.linalg.solve(stiffness(case.tree, end), left)
     assert np.abs(left).max() < 1e-9
-    return Held(
-        SimpleNamespace(tree=case.tree, q=end, tau=case.tau, coordinates=case.coordinates, scene=case.scene)
-    )
+    fields = {name: getattr(case, name) for name in ("tree", "tau", "coordinates", "scene")}
+    return Held(SimpleNamespace(q=end, **fields))
+
+
+@pytest.fixture
+def at(robots, on_servos, name):
+    """The posture of a test that has the name of a robot."""
+    return on_servos if name == "on servos" else held(robots[name], posture_names(robots[name])[0])
 
 
 @pytest.mark.parametrize("name", ["gripper", "pendulum_ball", "random", "on servos"])
-def test_the_matrix_is_the_derivative_of_the_acceleration_by_movements(robots, on_servos, name):
-    at = on_servos if name == "on servos" else held(robots[name], posture_names(robots[name])[0])
+def test_the_matrix_is_the_derivative_of_the_acceleration_by_movements(at):
     n, nudge, ends = at.nv, 1e-6 * np.eye(at.nv), []
     for sign in (1.0, -1.0):
         by_q = tmt.acceleration(at.moved(sign * nudge), np.zeros((n, n)), np.tile(at.tau, (n, 1)), at.tree)
@@ -68,16 +67,13 @@ def test_the_matrix_is_the_derivative_of_the_acceleration_by_movements(robots, o
         ends.append(np.concatenate([by_q, by_v]))
     differenced = (ends[0] - ends[1]).T / 2e-6
     assert np.abs(at.matrix[n:] - differenced).max() < 1e-7 * np.abs(at.matrix).max()
-    assert (
-        np.abs(at.mass_matrix @ at.matrix[n:, :n] + stiffness(at.tree, at.q)).max()
-        < 1e-9 * np.abs(at.matrix).max()
-    )
+    left = at.mass_matrix @ at.matrix[n:, :n] + stiffness(at.tree, at.q)
+    assert np.abs(left).max() < 1e-9 * np.abs(at.matrix).max()
 
 
 @pytest.mark.parametrize("name", ["gripper", "pendulum_ball", "on servos"])
 @pytest.mark.parametrize("method", FIXED)
-def test_a_step_is_the_amplification_of_the_methods_own_step(robots, on_servos, name, method):
-    at = on_servos if name == "on servos" else held(robots[name], posture_names(robots[name])[0])
+def test_a_step_is_the_amplification_of_the_methods_own_step(robots, at, name, method):
     if METHODS[method].solves_stages and at.tree.coordinates.balls:
         at = held(robots["pendulum"], "qpos0")
     dt = {"gripper": 0.05}.get(name, 0.02)
@@ -95,15 +91,12 @@ def test_a_spherical_pendulum_swings_alike_to_both_sides_and_spins_freely(robots
     assert at.kind == "marginal" and at.stays and at.without_stiffness.sum() == 2
 
 
-@pytest.mark.parametrize(
-    "method, limit", [("rk4", 2.785293563), ("explicit_euler", 2), ("semi_implicit_euler", None)]
-)
-def test_the_limit_of_a_mode_that_only_decays_is_that_of_its_rate(robots, method, limit):
+def test_the_limit_of_a_mode_that_only_decays_is_that_of_its_rate(robots):
     """Where damping is implicit there is none."""
-    kind, dt = held(robots["cart"], "qpos0").limit(method)
-    assert (kind, dt) == (
-        ("never_fails", None) if limit is None else ("finite", pytest.approx(limit / 3.0, rel=1e-6))
-    )
+    at = held(robots["cart"], "qpos0")
+    for method, limit in (("rk4", 2.785293563), ("explicit_euler", 2.0)):
+        assert at.limit(method) == ("finite", pytest.approx(limit / 3.0, rel=1e-6))
+    assert at.limit("semi_implicit_euler") == ("never_fails", None)
 
 
 def test_a_free_body_is_held_without_gravity_and_no_mode_of_it_grows(robots):
@@ -118,11 +111,8 @@ def test_downhill_a_robot_comes_to_a_posture_that_needs_no_torque_and_stays(robo
     loop = robots["loop"]
     start = loop.posture("qpos0")
     q = at_rest(loop.tree, start)
-    assert (
-        np.abs(tmt.gravity_balance(q, loop.tree)).max()
-        < 1e-8
-        < np.abs(tmt.gravity_balance(start, loop.tree)).max()
-    )
+    held_there, held_first = (np.abs(tmt.gravity_balance(at, loop.tree)).max() for at in (q, start))
+    assert held_there < 1e-8 < held_first
     assert np.linalg.eigvalsh(stiffness(loop.tree, q)).min() > 0.0
     lift = robot(CART.format(-9.81))
     assert at_rest(lift.tree, lift.posture("qpos0")) is None  # it falls for ever

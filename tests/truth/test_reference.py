@@ -2,24 +2,17 @@
 
 import numpy as np
 import pytest
+from servo_models import spring
 
 import tmt
-from compare.engines.mujoco import read
 from compare.experiments.speed.runs import floor
 from compare.experiments.speed.settings import scenes_of
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
 from compare.truth import reference
 from tmt.exact import motion as reference_run
 
 BENT = next(case for case in scenes_of(ARM) if case.name == "bent, free")
 SHORT = BENT.changed(name="short", duration=0.02, dt=0.005)
-SPRING = """<mujoco><worldbody><body><joint name="swing" axis="0 1 0" stiffness="{}"/>
-  <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
-
-
-def spring(stiffness):
-    return robot_of(read(SPRING.format(stiffness)), "spring.xml")
 
 
 def test_a_scene_is_known_to_1e_30_times_the_growth_and_errors_are_taken_from_both_halves(engines):

@@ -13,11 +13,8 @@ from compare.engines.mujoco.actuators import control_of
 from compare.robots.file import robot_of
 from compare.truth.servos import Driven
 
-ROUNDING, DIFFERENCED = (
-    1e-12,
-    1e-6,
-)  # of the largest force; of the largest derivative, by central differences of NUDGE
-NUDGE = 1e-5
+# of the largest force; of the largest derivative, by central differences of NUDGE
+ROUNDING, DIFFERENCED, NUDGE = 1e-12, 1e-6, 1e-5
 
 ARM = """<mujoco><compiler angle="radian"/>
 <option gravity="0 0 {gravity}"><flag contact="disable" constraint="disable"/></option>
@@ -56,18 +53,16 @@ def assert_the_same(text, rng, q=None, u=None):
     """Forces to rounding, and K and D beside central differences of MuJoCo's forces."""
     driven, model = driven_of(text)
     n, every = model.nv, driven.drive.actuators
-    if q is None:
-        q = driven.coordinates.move(model.qpos0, rng.uniform(-0.6, 0.6, n))
+    q = driven.coordinates.move(model.qpos0, rng.uniform(-0.6, 0.6, n)) if q is None else q
     u = rng.uniform(-1.0, 1.0, len(every)) if u is None else u
     u = np.array([one.clamped(x) for one, x in zip(every, u)])
     force, size = driven.forces(q, u)
     assert np.abs(force - of_mujoco(driven, model, q, np.zeros(n), u)).max() <= ROUNDING * max(1.0, size)
     K, D = np.zeros((2, n, n))
     for k, step in enumerate(NUDGE * np.eye(n)):
-        by_q = [
-            of_mujoco(driven, model, driven.coordinates.move(q, sign * step), 0.0, u) for sign in (-1.0, 1.0)
-        ]
-        by_qd = [of_mujoco(driven, model, q, sign * step, u) for sign in (-1.0, 1.0)]
+        steps, move = (-step, step), driven.coordinates.move
+        by_q = [of_mujoco(driven, model, move(q, change), 0.0, u) for change in steps]
+        by_qd = [of_mujoco(driven, model, q, change, u) for change in steps]
         K[:, k], D[:, k] = ((low - high) / (2.0 * NUDGE) for low, high in (by_q, by_qd))
     slopes = driven.slopes(q, u)
     for ours, theirs in ((slopes.K, K), (slopes.D, D)):
@@ -88,16 +83,12 @@ def test_what_a_flag_switches_off_is_off(stage, rng):
 CUT = {  # a drive whose ranges cut at the posture (0.3, -0.4) under controls of 1, and the forces that are cut
     "a force": (arm('<position joint="a" kp="30" kv="2" forcerange="-5 5"/>'), {0: 5.0}),
     "no force": (arm('<position joint="a" kp="30" kv="2" forcerange="-21.001 21.001"/>'), {}),  # just inside
-    "by the joint": (
-        arm('<position joint="a" kp="30" gear="-2"/>', joint='actuatorfrcrange="-20 9"'),
-        {0: 10.0},
-    ),
-}
+    "by the joint": (arm('<position joint="a" kp="30" gear="-2"/>', joint='actuatorfrcrange="-20 9"'), {0: 10.0}),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CUT)
-def test_what_a_range_cuts_has_neither_stiffness_nor_damping(name, rng):
-    text, forces = CUT[name]
+@pytest.mark.parametrize("text, forces", CUT.values(), ids=CUT)
+def test_what_a_range_cuts_has_neither_stiffness_nor_damping(text, forces, rng):
     u = np.ones(text.count("<motor") + text.count("<position"))
     _, _, cut = assert_the_same(text, rng, np.array([0.3, -0.4]), u)
     assert cut == pytest.approx(forces)
@@ -125,10 +116,8 @@ def test_what_only_rounding_leaves_is_a_rest():
     servo = '<general joint="{}" gainprm="0.7" biastype="affine" biasprm="0.1 -0.3 0"/>'
     driven, _ = driven_of(arm(servo.format("a") + servo.format("b"), gravity=0.0))
     q = np.array([0.1, 0.7])
-    assert (
-        driven.at_rest(q, np.array([one.target(angle) for one, angle in zip(driven.drive.actuators, q)]))[1]
-        == 0.0
-    )
+    u = np.array([actuator.target(angle) for actuator, angle in zip(driven.drive.actuators, q)])
+    assert driven.at_rest(q, u)[1] == 0.0
     rod = '<body euler="0.3 0 0"><joint axis="0 1 0" ref="0.1"/><geom size="0.1" pos="0.1 0 0.7"/></body>'
     driven, _ = driven_of(f'<mujoco><compiler angle="radian"/><worldbody>{rod}</worldbody></mujoco>')
     assert driven.at_rest(np.array([0.1 - np.arctan(0.1 / 0.7)]), np.zeros(0))[1] == 0.0

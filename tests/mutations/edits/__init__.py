@@ -1,8 +1,7 @@
-"""The edits, by what they break."""
+"""The edits, by what they break; a row of a module has the fields of an Edit in their order."""
 
+from ..edit import Edit
 from . import checks, engines, fleet, motion, own, parameters, report, rules, servos, speed, stability, tmt
 
-EDITS = (
-    *rules.EDITS, *checks.EDITS, *parameters.EDITS, *motion.EDITS, *own.EDITS, *speed.EDITS, *stability.EDITS, *servos.EDITS,
-    *report.EDITS, *tmt.EDITS, *fleet.EDITS, *engines.EDITS,
-)  # fmt: skip
+MODULES = rules, checks, parameters, motion, own, speed, stability, servos, report, tmt, fleet, engines
+EDITS = tuple(Edit(*row) for module in MODULES for row in module.EDITS)

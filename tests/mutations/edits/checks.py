@@ -1,21 +1,17 @@
 """Checks that always pass, one for each that the experiments make, and some with a tolerance that is far too wide."""
 
-from ..edit import Edit
-
 # module, function, quantity: as written in the call of `check`, _1, _2 for what is filled in
 CHECKS = (
     ("parameters", "compare_number", "quantity"), ("parameters", "check_forces", 'f"no forces of {_1}"'),
     ("published", "check_answer", "printed_digits"), ("published", "check_answer", "from_exact"),
     ("published", "check_answer", "every_digit"), ("published", "check_answer", "size"),
     ("mass", "check_symmetry", "what"), ("mass", "check_definiteness", "what"),
-    ("accuracy", "check_same_schemes", "quantity"),
-    ("accuracy", "check_stopped", "quantity"), ("accuracy", "check_smallest_errors", "quantity"),
-    ("needs", "check_smaller", '"time judged"'), ("reduction", "add_not_lockable", "quantity"),
-    ("sub_blocks", "check_blocks", "name"), ("trajectory", "check_time_judged", '"time judged"'),
-    ("trajectory", "check_divergence", "what"),
+    ("accuracy", "check_same_schemes", "quantity"), ("accuracy", "check_stopped", "quantity"),
+    ("accuracy", "check_smallest_errors", "quantity"), ("needs", "check_smaller", '"time judged"'),
+    ("reduction", "add_not_lockable", "quantity"), ("sub_blocks", "check_blocks", "name"),
+    ("trajectory", "check_time_judged", '"time judged"'), ("trajectory", "check_divergence", "what"),
     ("judge.run", "check_movement", '"movement"'), ("followed", "check_closest", "quantity"),
-    ("energy", "check_order", "name"),
-    ("stability.limits", "check_limits", "what"),
+    ("energy", "check_order", "name"), ("stability.limits", "check_limits", "what"),
     ("stability.limits", "check_limits", "quantity"), ("departure", "check_row", "quantity"),
     ("claims", "check_torques", "text"), ("claims", "check_torques", "quantity"),
     ("claims", "check_finer_steps", "quantity"), ("claims", "check_kept", "what"),
@@ -30,19 +26,19 @@ AGREEMENTS = (
 )  # fmt: skip
 EDITS = (
     *(
-        Edit(module, where, f"result.check(_3, {quantity}, _4, _5, *_6)", f"result.check(_3, {quantity}, _5, _5, *_6)",
-             f"{quantity} always passes")
+        (module, where, f"result.check(_3, {quantity}, _4, _5, *_6)", f"result.check(_3, {quantity}, _5, _5, *_6)",
+         f"{quantity} always passes")
         for module, where, quantity in CHECKS
     ),
     *(
-        Edit(module, where, f"comparison.agree({quantity}, _3, _4, _5, _6)",
-             f"comparison.agree({quantity}, _3, _5, _5, _6)", f"{quantity} is compared with itself")
+        (module, where, f"comparison.agree({quantity}, _3, _4, _5, _6)",
+         f"comparison.agree({quantity}, _3, _5, _5, _6)", f"{quantity} is compared with itself")
         for module, where, quantity in AGREEMENTS
     ),
     *(
-        Edit("quantities", "Comparison.compare", "Compared(_1, _2, values, mujoco_values, *_3)",
-             f"Compared(_1, _2, values, values if name == {quantity!r} else mujoco_values, *_3)",
-             f"{quantity} is compared with itself")
+        ("quantities", "Comparison.compare", "Compared(_1, _2, values, mujoco_values, *_3)",
+         f"Compared(_1, _2, values, values if name == {quantity!r} else mujoco_values, *_3)",
+         f"{quantity} is compared with itself")
         for quantity in ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv", "Mbar", "holding torque", "bias", "qdd", "energy")
     ),
 )  # fmt: skip

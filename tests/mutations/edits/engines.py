@@ -1,19 +1,16 @@
 """Edits of the comparison with other engines."""
 
-from ..edit import Edit
-
 EDITS = (
-    Edit("remarks", "remarks", "feature.treatment in (OFF, OPEN, LEFT_OUT)", "feature.treatment in (OFF, OPEN)",
-         "a keyframe that is left out is not told"),
-    Edit("experiments.engines", "compare_quantity", "FACTOR * eps * size", "100 * FACTOR * eps * size", "tolerance x 100"),
-    Edit("experiments.engines", "compare_quantity", "record.eps", "1.2e-07", "every engine is judged as float32"),
-    Edit("experiments.engines", "compare_numbers", "FACTOR * record.eps", "1e9 * record.eps",
-         "numbers as read: 64 -> 1e9"),
-    Edit("experiments.engines", "OF_BODIES", "('mass', 'moments')", "('moments',)", "a mass that is read wrongly is only listed"),
-    Edit("engines.integrators", "compare_steps", "_1 * record.eps / EPS", "_1 * 1e9", "one step: tolerance x 1e9"),
-    Edit("engines.integrators", "order_of", "max(CLEAR, EARLY / dt)", "CLEAR", "the rounding of each step is regular"),
-    Edit("engines.outside", "read", "model.mend(number, stated[number])", "True", "nothing is set, and it is said to be"),
-    Edit("engines.outside", "OutsideDynamics.acceleration", "tau - passive(self.tree, q, v)", "tau", "damping is forgotten"),
-    Edit("outside", "OutsideDynamics.ask", "WorkerEnded", "KeyError", "an engine whose process ends breaks the experiment"),
-    Edit("engines.outside.model", "combined", "m * (d @ d * np.eye(3) - np.outer(d, d))", "0.0", "Steiner's part is forgotten"),
+    ("remarks", "remarks", "feature.treatment in (OFF, OPEN, LEFT_OUT)", "feature.treatment in (OFF, OPEN)",
+     "a keyframe that is left out is not told"),
+    ("experiments.engines", "compare_quantity", "FACTOR * eps * size", "100 * FACTOR * eps * size", "tolerance x 100"),
+    ("experiments.engines", "compare_quantity", "record.eps", "1.2e-07", "every engine is judged as float32"),
+    ("experiments.engines", "compare_numbers", "FACTOR * record.eps", "1e9 * record.eps", "numbers as read: 64 -> 1e9"),
+    ("experiments.engines", "OF_BODIES", "('mass', 'moments')", "('moments',)", "a wrong mass is only listed"),
+    ("engines.integrators", "compare_steps", "_1 * record.eps / EPS", "_1 * 1e9", "one step: tolerance x 1e9"),
+    ("engines.integrators", "order_of", "max(CLEAR, EARLY / dt)", "CLEAR", "the rounding of each step is regular"),
+    ("engines.outside", "read", "model.mend(number, stated[number])", "True", "nothing is set, and it is said to be"),
+    ("engines.outside", "OutsideDynamics.acceleration", "tau - passive(*_1)", "tau", "damping is forgotten"),
+    ("outside", "OutsideDynamics.ask", "WorkerEnded", "KeyError", "an engine whose process ends breaks the experiment"),
+    ("engines.outside.model", "combined", "m * (_1 - np.outer(d, d))", "0.0", "Steiner's part is forgotten"),
 )  # fmt: skip
