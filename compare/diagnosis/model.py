@@ -6,8 +6,8 @@ imaginary change of 1e-100, exact to rounding.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields
 from functools import cached_property
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy import ndarray
 
 import tmt
 from tmt.derivation import method
+from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.vectors import ZERO, Matrix
 
 from ..judge.entries import Entries
@@ -54,12 +55,13 @@ class Entry(NamedTuple):
 
     def named(self, speeds: Sequence[str]) -> str:
         """Its name: "M[hip][knee]", "h[hip]", "h[hip], gravity", "h[hip], coefficient of hip' knee'"."""
-        first, *others = names = [speeds[i] for i in self.at]
+        names = [speeds[i] for i in self.at]
         if self.kind == "gravity":
-            return f"h[{first}], gravity"
+            return f"h[{names[0]}], gravity"
         if self.kind == "velocity":
-            rates = f"{others[0]}'^2" if others[0] == others[1] else f"{others[0]}' {others[1]}'"
-            return f"h[{first}], coefficient of {rates}"
+            first, second = names[1:]
+            rates = f"{first}'^2" if first == second else f"{first}' {second}'"
+            return f"h[{names[0]}], coefficient of {rates}"
         return self.kind + "".join(f"[{name}]" for name in names)
 
 
@@ -95,8 +97,8 @@ class Equations:
     def terms(self) -> dict[str, ndarray]:
         """What each term of all bodies adds, (bodies, states, entries)."""
         terms = {}
-        for term, fields in FIELDS_OF_TERMS.items():
-            absent = {name: nothing for name, nothing in NOTHING.items() if name not in fields}
+        for term, needed in FIELDS_OF_TERMS.items():
+            absent = {name: nothing for name, nothing in NOTHING.items() if name not in needed}
             gravity = self.tree.gravity if term == "gravity" else ZERO
             terms[term] = np.stack([self.summed([b._replace(**absent)], gravity)[0] for b in self.bodies])
             terms[term][..., self.in_h if term in BODY_TERMS[:2] else self.in_M] = 0.0
@@ -120,18 +122,20 @@ class Equations:
 
     def values(self, changes: Changes) -> ndarray:
         """Mbar and h with numbers of the tree changed, (changes, states, entries); axes are normalized."""
-        numbers = {name: value.tolist() for name, value in self.stated.items()}
+        numbers: dict[str, Any] = {field.name: getattr(self.tree, field.name) for field in fields(Mechanism)}
+        numbers |= {name: value.tolist() for name, value in self.stated.items()}
         for path, added in changes.items():
             row, (*places, last) = numbers[path.field], path.at
             for place in places:
                 row = row[place]
             row[last] = row[last] + np.asarray(added)[:, None]
         for k in {path.at[0] for path in changes if path.field == "axis"}:
-            numbers["axis"][k] = unit_direction(*numbers["axis"][k])
-        structure = ("parent", "coordinates", "body_joint", "moves")
-        changed = SimpleNamespace(**numbers, **{name: getattr(self.tree, name) for name in structure})
-        bodies = method.bodies(changed, list(self.q.T), list(self.qd.T))
-        return self.summed(bodies, changed.gravity, changed.armature)
+            x, y, z = numbers["axis"][k]
+            length = np.sqrt(x * x + y * y + z * z)
+            length = np.where(length == 0.0, 1.0, length)  # of a change that leaves no direction
+            numbers["axis"][k] = [x / length, y / length, z / length]
+        bodies = method.bodies(Mechanism(**numbers), list(self.q.T), list(self.qd.T))
+        return self.summed(bodies, numbers["gravity"], numbers["armature"])
 
     def with_bias(self, h: ndarray) -> ndarray:
         """The right values with another h (states, nv)."""
@@ -212,10 +216,3 @@ def coefficients_of(bias: Callable[[ndarray], ndarray], nv: int) -> dict[Entry, 
     for pair, values in (even | mixed).items():
         found |= {Entry("velocity", (i, *pair)): values[:, i] for i in range(nv)}
     return found
-
-
-def unit_direction(x: ndarray, y: ndarray, z: ndarray) -> list[ndarray]:
-    """A direction at length 1."""
-    length = np.sqrt(x * x + y * y + z * z)
-    length = np.where(length == 0.0, 1.0, length)  # of a change that leaves no direction
-    return [x / length, y / length, z / length]

@@ -52,7 +52,8 @@ def diagnose(
             both = ("coefficient", "part")
             places = [place for place in places if place.entry != ALL or place.kind not in both]
         search = Search(equations.values, places, given, tolerance, time.monotonic() + seconds)
-        return Explanations(equations, search, Compared(equations, search, bias), stated, seconds).diagnosis()
+        compared = Compared(equations, given, search.tolerance, bias)
+        return Explanations(equations, search, compared, stated, seconds).diagnosis()
 
 
 class Explanations(NamedTuple):
