@@ -6,6 +6,7 @@ of the same source: zero if nothing else acts.
 
 from collections.abc import Iterator
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy import ndarray
@@ -60,10 +61,8 @@ class LeftOver:
         if np.abs(search.off).max() <= 1.0:
             return ()
         causes = search.explained(self.options())
-        if not causes:
-            causes = [fit.cause for fit in search.singles() if fit.explains]
-        if not causes:
-            causes = [fit.cause for fit in search.pairs(("number",)) if fit.explains]
+        causes = causes or [fit.cause for fit in search.singles() if fit.explains]
+        causes = causes or [fit.cause for fit in search.pairs(("number",)) if fit.explains]
         return ranked(causes)
 
     def sentence(self) -> str:
@@ -72,13 +71,11 @@ class LeftOver:
 
     def options(self) -> Iterator[tuple[Cause, ndarray]]:
         """Each option, and the force that is left over with it."""
-        for place, stated, term in (
-            ("torque in the acceleration", "tau", -self.tau),
-            ("bias in the acceleration", "- h", self.values.bias),
-            ("damping in the acceleration", "- D qd", self.damping),
-            ("springs in the acceleration", "- k (q - rest)", self.springs),
-        ):
-            for explains, factor in (("left out", -1.0), ("of the other sign", -2.0), ("twice", 1.0)):
+        terms = {"torque": ("tau", -self.tau), "bias": ("- h", self.values.bias)}
+        terms |= {"damping": ("- D qd", self.damping), "springs": ("- k (q - rest)", self.springs)}
+        factors = {"left out": -1.0, "of the other sign": -2.0, "twice": 1.0}
+        for (name, (stated, term)), explains in product(terms.items(), factors):
+            place = f"{name} in the acceleration"
+            if term.any():
                 cause = Cause(rank=1, kind="option", place=place, stated=stated, explains=explains)
-                if term.any():
-                    yield cause, factor * term
+                yield cause, factors[explains] * term

@@ -22,10 +22,10 @@ def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
         added = np.stack([equations.summed([b], gravity)[0] for b in changed]) - parts
         variants, in_M_alone = [], []
         for body, numbers in bodies.items():
-            values = right + added[numbers].sum(axis=0)
-            variants.append(slip(name.format(body), "no", "", values))
+            values, place = right + added[numbers].sum(axis=0), name.format(body)
+            variants.append(slip(place, "no", "", values))
             values = np.hstack([values[:, equations.in_M], right[:, in_h]])
-            in_M_alone.append(slip(f"{name.format(body)} in M alone", "no", "", values))
+            in_M_alone.append(slip(f"{place} in M alone", "no", "", values))
         count = len(parts)  # of single bodies
         yield [variants[:count], variants[count:], in_M_alone[:count], in_M_alone[count:]]
     if "ball" not in equations.tree.kind:
@@ -56,19 +56,18 @@ def changed_bodies(
     yield "inertia of {} not turned to the inertial frame", world
     wrong_way = [b._replace(inertia=R.transposed @ b.inertia @ R) for b, R in zip(world, turns)]
     yield "R' I R for R I R' of {}", wrong_way
-    again = with_field("inertia", [b.inertia + more for b, more in zip(bodies, moved)])
-    yield "inertia of {} about its joint and mass counted again", again
-    less = with_field("inertia", [b.inertia - more for b, more in zip(bodies, moved)])
-    yield "parallel-axis term m (c'c 1 - c c') of {} left out", less
-    products = "products of different rates in {} of {{}} {}"
-    yield products.format("v_conv", "left out"), with_field("v_conv", v)
-    half = with_field("v_conv", [(squares + b.v_conv) * 0.5 for b, squares in zip(bodies, v)])
-    yield products.format("v_conv", "once for twice"), half
+    again, less = zip(*((b.inertia + more, b.inertia - more) for b, more in zip(bodies, moved)))
+    yield "inertia of {} about its joint and mass counted again", with_field("inertia", again)
+    yield "parallel-axis term m (c'c 1 - c c') of {} left out", with_field("inertia", less)
+    products, without = "products of different rates in {} of {{}} {}", with_field("v_conv", v)
+    yield products.format("v_conv", "left out"), without
+    half = [(squares + b.v_conv) * 0.5 for b, squares in zip(bodies, v)]
+    yield products.format("v_conv", "once for twice"), with_field("v_conv", half)
     yield products.format("w_conv", "left out"), with_field("w_conv", w)
-    both = [b._replace(v_conv=of_v, w_conv=of_w) for b, of_v, of_w in zip(bodies, v, w)]
+    both = [b._replace(w_conv=of_w) for b, of_w in zip(without, w)]
     yield products.format("v_conv and w_conv", "left out"), both
-    squares_left_out = with_field("v_conv", [b.v_conv - squares for b, squares in zip(bodies, v)])
-    yield "squares of rates in v_conv of {} left out", squares_left_out
+    others = [b.v_conv - squares for b, squares in zip(bodies, v)]
+    yield "squares of rates in v_conv of {} left out", with_field("v_conv", others)
 
 
 def turned(body: method.Body, R: Matrix) -> method.Body:

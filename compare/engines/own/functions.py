@@ -43,9 +43,7 @@ QUANTITIES = {
     "com_positions": Quantity(1, ("bodies", 3)),
     "jacobians": Quantity(1, (2, "bodies", 3, "nv")),
 }
-METHOD_NAMES = {
-    name: "gravity_balance" if name == "gravity" else name for name in QUANTITIES
-}  # of engines and tmt
+METHOD_NAMES = {name: name for name in QUANTITIES} | {"gravity": "gravity_balance"}  # of engines and tmt
 QUICK = 1e-3  # s per state: functions that are as fast as this are called some hundred times more
 SAME = 1e-12  # of the largest value: values of a batch and of single states are equal except for rounding
 MOST_SHOWN = 8  # numbers of a state in a message
@@ -193,8 +191,16 @@ class Problem(NamedTuple):
     """An error in equations that can still be used."""
 
     quantity: str
+    what: str
     state: str  # the first at which it occurs, in the function's own joints
-    text: str  # one line
+    states: set[int]  # hashes of all
+
+    @property
+    def text(self) -> str:
+        """In one line."""
+        more = len(self.states) - 1
+        others = f", and at {more} more state{'s' * (more > 1)}" if more else ""
+        return f"{self.what} at {self.state}{others}"
 
 
 def in_words(shape: Shape) -> str:

@@ -43,9 +43,7 @@ def own_object(stated: str) -> object:
             value = part_of(module_of_file(place) if is_file else module_named(place), place, name)
             return value() if inspect.isclass(value) else value
     finally:
-        sys.path.reverse()
-        sys.path.remove(folder)
-        sys.path.reverse()
+        del sys.path[-1 - sys.path[::-1].index(folder)]  # the last of its name, added above
 
 
 def module_of_file(place: str) -> ModuleType:
