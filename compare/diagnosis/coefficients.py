@@ -175,10 +175,7 @@ def sums(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
 
 
 def right_terms(forms: Sequence[Terms], right: ndarray, size: float) -> dict[str, float]:
-    """An expression (states,) as a sum of terms, in the form that has fewer.
-
-    size: of yours; less than its rounding is 0.
-    """
+    """An expression (states,) as a sum of terms, in the form with fewer; what rounding yours leaves is 0."""
     fits = []
     for form in forms:
         x = np.linalg.lstsq(np.array(list(form.values())).T, right, rcond=None)[0]

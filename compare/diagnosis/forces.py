@@ -24,6 +24,7 @@ from .cause import TEMPLATE, ranked
 from .fit import Search
 from .model import Values
 from .places import forces
+from .variants import Variant, option
 
 SHARPER = 4.0  # times the tolerance: accelerations are rounded before Mbar is multiplied by them
 
@@ -69,7 +70,7 @@ class LeftOver:
         """The causes in words; "" if there is none."""
         return say(Finding(TEMPLATE, "forces", {"list": self.causes})) if self.causes else ""
 
-    def options(self) -> Iterator[tuple[Cause, ndarray]]:
+    def options(self) -> Iterator[Variant]:
         """Each option, and the force that is left over with it."""
         terms = {"torque": ("tau", -self.tau), "bias": ("- h", self.values.bias)}
         terms |= {"damping": ("- D qd", self.damping), "springs": ("- k (q - rest)", self.springs)}
@@ -77,5 +78,4 @@ class LeftOver:
         for (name, (stated, term)), explains in product(terms.items(), factors):
             place = f"{name} in the acceleration"
             if term.any():
-                cause = Cause(rank=1, kind="option", place=place, stated=stated, explains=explains)
-                yield cause, factors[explains] * term
+                yield option(place, stated, explains, factors[explains] * term)

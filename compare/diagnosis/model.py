@@ -201,8 +201,7 @@ class Values(NamedTuple):
 
 
 def coefficients_of(bias: Callable[[ndarray], ndarray], nv: int) -> dict[Entry, ndarray]:
-    """Coefficients of h, (states,) each: "gravity" (i,), and "velocity" (i, j, k) of qd_j qd_k, j <= k, in
-    h_i.
+    """Coefficients of h_i, (states,) each: "gravity" (i,), and "velocity" (i, j, k) of qd_j qd_k, j <= k.
 
     bias: speeds (nv,) -> h (states, nv), of which the part that is even in the speeds is taken.
     """

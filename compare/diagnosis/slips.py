@@ -8,10 +8,9 @@ import numpy as np
 from tmt.derivation import method
 from tmt.derivation.vectors import IDENTITY, Matrix, total_vector
 
-from ..core.cause import Cause
 from .model import TINY, Equations
 from .places import groups
-from .variants import Variant
+from .variants import Variant, slip
 
 
 def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
@@ -30,10 +29,6 @@ def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
         yield [variants[:count], variants[count:], in_M_alone[:count], in_M_alone[count:]]
     if "ball" not in equations.tree.kind:
         yield [list(lagrange(equations))]
-
-
-def slip(place: str, stated: str, explains: str, values: np.ndarray) -> Variant:
-    return Cause(rank=2, kind="slip", place=place, stated=stated, explains=explains), values
 
 
 def changed_bodies(

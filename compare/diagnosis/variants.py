@@ -6,6 +6,7 @@ A variant is a cause with Mbar and h as they would be, as `Equations.values` has
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations, permutations, product
 from typing import NamedTuple
 
@@ -26,14 +27,17 @@ MOST_TURNED = 4  # joints whose order and senses are tried together
 Variant = tuple[Cause, np.ndarray]  # the values: (states, entries)
 
 
+def variant(rank: int, kind: str, place: str, stated: str, explains: str, values: np.ndarray) -> Variant:
+    return Cause(rank=rank, kind=kind, place=place, stated=stated, explains=explains), values
+
+
+option, slip = partial(variant, 1, "option"), partial(variant, 2, "slip")
+
+
 def program_options(equations: Equations) -> Iterator[Variant]:
     """What an option or a convention of the whole file or program changes."""
     tree, q, qd, h = equations.tree, equations.q, equations.qd, equations.right[:, equations.in_h]
     with_bias, terms = equations.with_bias, equations.terms
-
-    def option(place: str, stated: str, explains: str, values: np.ndarray) -> Variant:
-        return Cause(rank=1, kind="option", place=place, stated=stated, explains=explains), values
-
     weight = terms["gravity"].sum(axis=0)
     of_speeds = np.sum([terms[name] for name in VELOCITY_TERMS], axis=(0, 1))
     yield option("gravity", "on", "off", equations.right - weight)
