@@ -15,7 +15,7 @@ from tmt.model.values import shown
 from ..core.text import say
 from ..engines.own import METHOD_NAMES, QUANTITIES, OwnEquations
 from ..engines.own.functions import converted, in_shape, in_words, is_function, numbers_of, state_in_words
-from ..judge.agree import over
+from ..judge.agree import share_of
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..robots.file import robot_of
@@ -52,8 +52,7 @@ class Compared(NamedTuple):
     @property
     def ratio(self) -> np.ndarray:
         """Of the difference to the tolerance; 0 if both are 0, inf if the user's value is not finite."""
-        off = np.abs(self.yours - self.right)
-        return over(np.where(np.isfinite(off), off, np.inf), self.tolerance)
+        return share_of(np.abs(self.yours - self.right), self.tolerance)
 
     @property
     def fails(self) -> bool:

@@ -17,7 +17,7 @@ from tmt import literal
 from ..core.cause import Cause
 from ..core.finding import Finding
 from ..core.text import say
-from ..judge.agree import over
+from ..judge.agree import share_of
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from .cause import TEMPLATE, ranked
@@ -48,8 +48,7 @@ class LeftOver:
     @property
     def ratio(self) -> float:
         """Of the force to its tolerance, the largest; inf if one is not a number."""
-        force = np.abs(np.where(np.isfinite(self.force), self.force, np.inf))
-        return float(over(force, self.tolerance).max())
+        return float(share_of(np.abs(self.force), self.tolerance).max())
 
     @cached_property
     def causes(self) -> tuple[Cause, ...]:

@@ -94,7 +94,7 @@ def source_name(source: object) -> str:
 
 def names_of(source: object) -> Sequence[str] | None:
     """The joints that the source states, in its own order; None if it states none."""
-    names: Any = source.joint_names if isinstance(source, tmt.Tree) else attribute(source, "joint_names")
+    names: Any = attribute(source, "joint_names")
     try:
         return names if names is None or isinstance(names, str) else list(names)
     except TypeError:
@@ -134,10 +134,7 @@ def function_of(name: str, value: Any, symbols: object, coordinates: Coordinates
 
 
 def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Coordinates) -> Function:
-    """The function of a SymPy matrix or expression.
-
-    given_symbols: of q, or of q and qd, or of q, qd and tau, in order.
-    """
+    """The function of a SymPy matrix or expression; its symbols are those of q, q and qd, or q, qd and tau."""
     import sympy
 
     def flat(value: Any) -> list[Any]:

@@ -37,8 +37,7 @@ EDITS = (
     Edit("joint_map", "costs_of", "OF_PLACE * apart", "0.0 * apart", "joints are matched wherever they are"),
     Edit("joint_map", "costs_of", "OF_DEPTH * _1", "0.0 * _1", "joints are matched whatever carries them"),
     # the comparison
-    Edit("agreement.comparison", "Compared.ratio", "np.where(np.isfinite(off), off, np.inf)",
-         "np.where(np.isfinite(off), off, 0.0)",
+    Edit("agreement.comparison", "Compared.ratio", "share_of(_1, _2)", "share_of(np.where(np.isfinite(_1), _1, 0.0), _2)",
          "NaN agrees"),
     Edit("agreement.comparison", "Comparison.__init__", "FACTOR * EPS + float(rtol)", "FACTOR * EPS",
          "rtol is not added"),
