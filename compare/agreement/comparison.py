@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from itertools import product
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -193,10 +194,8 @@ class Comparison:
     def entries(self, name: str) -> dict[tuple[int, ...], str]:
         """The names of the entries of a quantity, by their place."""
         names = [self.coordinates.speeds[i] for i in self.joints.v]
-        symbol = SYMBOLS[name]
-        if name == "mass_matrix":
-            return {(i, j): f"{symbol}[{a}][{b}]" for i, a in enumerate(names) for j, b in enumerate(names)}
-        return {(i,): f"{symbol}[{a}]" for i, a in enumerate(names)}
+        places = product(range(len(names)), repeat=len(QUANTITIES[name].shape))
+        return {place: SYMBOLS[name] + "".join(f"[{names[i]}]" for i in place) for place in places}
 
     @property
     def fails(self) -> bool:

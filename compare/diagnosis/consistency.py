@@ -16,15 +16,14 @@ from numpy import ndarray
 from ..core.finding import Finding
 from ..core.text import say
 from ..judge.agree import closest
-from ..judge.scale import EPS, FACTOR
 from ..robots.coordinates import Coordinates
 from .cause import TEMPLATE
+from .model import ROUNDED
 
 STEP = 2e-3  # rad or m, or s along a motion of about one rad/s
 SAFETY = 8.0  # times the error or the noise that is estimated
 CLOSE_BY = 1e-4  # rad or m, between the points at which noise is measured
 ORDER = 6
-ROUNDED = FACTOR * EPS
 CONDITIONS = {  # names and units, by the macros that say what is wrong
     "symmetric": ("M is symmetric", "kg m2"), "gradient": ("h at rest is a gradient", "N m/rad"),
     "even": ("h is even in the rates", "N m"), "quadratic": ("h is quadratic in the rates", "N m"),
@@ -72,7 +71,7 @@ def conditions(
     factors = np.divide(doubled, velocity, out=np.full(odd.shape, np.inf), where=velocity != 0.0)
     even = nearest("even", odd, allowed, names, value=odd, unit=units)
     quadratic = nearest("quadratic", np.abs(doubled - 4.0 * velocity), 4.0 * allowed, names, factor=factors)
-    of_weight = gradient_at_rest(lambda q: bias(q, 0.0 * qd), coordinates, q, of_h)
+    of_weight = gradient(lambda q: bias(q, 0.0 * qd), coordinates, q, of_h)
     tested = [symmetric(M, of_M, names), definite(M, of_M), *of_weight, even, quadratic]
     if tested[0].is_met:
         tested.append(power_balance(mass_matrix, coordinates, q, qd, velocity, of_M, rounding))
@@ -120,9 +119,7 @@ def definite(M: ndarray, allowed: ndarray) -> Condition:
     return Condition("M is positive definite", float(least[s]), float(floor), "", wrong, "at least")
 
 
-def gradient_at_rest(
-    weight: OfPositions, coordinates: Coordinates, q: ndarray, floor: float
-) -> list[Condition]:
+def gradient(weight: OfPositions, coordinates: Coordinates, q: ndarray, floor: float) -> list[Condition]:
     """dh_i/dq_j at rest is symmetric, in hinges and slides; [] where there is one of them at most."""
     straight = [joint.qd.start for joint in coordinates.places.joints if joint.kind != "ball"]
     if len(straight) < 2:

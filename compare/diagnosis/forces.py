@@ -19,10 +19,9 @@ from ..core.finding import Finding
 from ..core.text import say
 from ..judge.agree import share_of
 from ..judge.entries import Entries
-from ..judge.scale import EPS, FACTOR
 from .cause import TEMPLATE, ranked
 from .fit import Search
-from .model import Values
+from .model import ROUNDED, Values
 from .places import forces
 from .variants import Variant, option
 
@@ -35,9 +34,7 @@ class LeftOver:
     force, tolerance: (states, nv). rounding: of the scale of an entry.
     """
 
-    def __init__(
-        self, tree: tmt.Tree, values: Values, tau: ndarray, qdd: ndarray, rounding: float = FACTOR * EPS
-    ):
+    def __init__(self, tree: tmt.Tree, values: Values, tau: ndarray, qdd: ndarray, rounding: float = ROUNDED):
         self.tree, self.values, self.tau = tree, values, tau
         q, qd, M, h, _ = values
         self.damping, self.springs = np.array(tree.damping) * qd, literal.spring_torque(q, tree)

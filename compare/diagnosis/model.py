@@ -38,6 +38,8 @@ FIELDS_OF_TERMS = {  # of a body, on which a term depends
 }  # fmt: skip
 MOST_SPEEDS = 8  # with more, coefficients of products of speeds are not compared: there are nv^2 (nv + 1) / 2
 TINY = 1e-100  # an imaginary change, whose square vanishes
+ROUNDED = FACTOR * EPS  # of the scale of an entry
+Bodies = Sequence[method.Body]
 
 
 class Path(NamedTuple):
@@ -141,9 +143,7 @@ class Equations:
         """The right values with another h (states, nv)."""
         return np.concatenate([self.right[:, self.in_M], h], axis=1)
 
-    def summed(
-        self, bodies: Sequence[method.Body], gravity: Iterable[Any], armature: Sequence[Any] = ()
-    ) -> ndarray:
+    def summed(self, bodies: Bodies, gravity: Iterable[Any], armature: Sequence[Any] = ()) -> ndarray:
         """Mbar and h of some bodies, (changes, states, entries)."""
         M, h = method.mass_matrix(bodies), method.bias(bodies, gravity)
         for i, rotor in enumerate(armature):
@@ -178,7 +178,7 @@ class Values(NamedTuple):
     @classmethod
     def of(
         cls, tree: tmt.Tree, q: ndarray, qd: ndarray, mass_matrix: ndarray | None, bias: ndarray | None,
-        rounding: float = FACTOR * EPS,
+        rounding: float = ROUNDED,
     ) -> "Values":  # fmt: skip
         """With the tolerances of judge.entries. None: not given; rounding: of the scale of an entry."""
         scale, shape = Entries(tree, q, qd), (*qd.shape, qd.shape[1])

@@ -146,10 +146,9 @@ def numbers(equations: Equations) -> Iterator[Place]:
             place = number(f"inertia {name} of {body}", "kg m2", size, path, 0.0 if i == j else -np.inf)
             yield place if i == j else place._replace(moves=((path, 1.0), (mirrored, 1.0)))
     for i, (name, joint) in enumerate(zip(tree.joint_names, tree.coordinates.joints)):
-        offsets = triple(f"offset {{}} of {name}", "m", length, "offset", i)
         carried = [("com", b) for b, of_joint in enumerate(tree.body_joint) if of_joint == i]
         carried += [("offset", j) for j, parent in enumerate(tree.parent) if parent == i]
-        for k, place in enumerate(offsets):
+        for k, place in enumerate(triple(f"offset {{}} of {name}", "m", length, "offset", i)):
             yield place
             if joint.kind != "slide":
                 stays = [(Path(field, (index, k)), -1.0) for field, index in carried]
@@ -236,11 +235,10 @@ def coefficients(equations: Equations) -> Iterator[Place]:
     for name, part in {"M": equations.in_M, "h": equations.in_h, "M and h": ALL}.items():
         yield factor("coefficient", f"all of {name}", right[:, part], part)
     rows = [Entry("h", (i,)).named(speeds) for i in range(nv)]
-    at_rest = {}
+    at_rest = [equations.coefficients[Entry("gravity", (i,))] for i in range(nv)]
     for entry, column in equations.coefficients.items():
         i, *pair = entry.at
         if entry.kind == "gravity":
-            at_rest[i] = column
             yield factor("coefficient", f"{rows[i]} at rest", column, first_h + i)
         elif entry.kind == "velocity":
             rates = np.prod(equations.qd[:, pair], axis=1)

@@ -12,12 +12,11 @@ import numpy as np
 from tmt import Tree
 
 from ..core.cause import Cause
-from ..judge.scale import EPS, FACTOR
 from ..robots.joint_map import Joint, JointMap, within_a_turn
 from .cause import LEAST_STATES, Diagnosis, ranked
 from .coefficients import Bias, Compared
 from .fit import Fitted, Search
-from .model import Equations, Values
+from .model import ROUNDED, Equations, Values
 from .places import ALL, OF_ZERO, all_places, is_common
 from .slips import slips
 from .variants import conventions, program_options, values_in
@@ -45,7 +44,7 @@ def diagnose(
     given, tolerance = values.packed, values.packed_tolerance
     with np.errstate(all="ignore"):  # values may be no numbers, or beyond the largest
         equations = Equations(tree, values.q, values.qd)
-        rounded = np.fmax(tolerance, FACTOR * EPS * np.abs(given))  # large values are rounded too
+        rounded = np.fmax(tolerance, ROUNDED * np.abs(given))  # large values are rounded too
         tolerance = np.where(tolerance > 0.0, rounded, 0.0)
         places = all_places(equations)
         if not np.isfinite(given).any(axis=0).all():  # M or h alone

@@ -17,7 +17,7 @@ def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
     """For each slip: in single bodies; in all; these in M alone. The first list that explains is meant."""
     right, in_h, bodies = equations.right, equations.in_h, groups(equations.tree)
     gravity, parts = equations.tree.gravity, np.sum(list(equations.terms.values()), axis=0)
-    for name, changed in changed_bodies(equations, equations.bodies):
+    for name, changed in changed_bodies(equations):
         added = np.stack([equations.summed([b], gravity)[0] for b in changed]) - parts
         variants, in_M_alone = [], []
         for body, numbers in bodies.items():
@@ -31,11 +31,9 @@ def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
         yield [list(lagrange(equations))]
 
 
-def changed_bodies(
-    equations: Equations, bodies: Sequence[method.Body]
-) -> Iterator[tuple[str, list[method.Body]]]:
+def changed_bodies(equations: Equations) -> Iterator[tuple[str, list[method.Body]]]:
     """Each slip by its name, made in every body."""
-    tree, q, qd = equations.tree, list(equations.q.T), equations.qd
+    tree, q, qd, bodies = equations.tree, list(equations.q.T), equations.qd, equations.bodies
     frames = method.joint_frames(tree, q)
     turns = [frames[joint].turn if joint >= 0 else IDENTITY for joint in tree.body_joint]
     world = [turned(b, R) for b, R in zip(bodies, turns)]
