@@ -61,7 +61,7 @@ class Search:
     """
 
     def __init__(
-        self, computed: Callable[[Changes], ndarray], places: Sequence[Place], given: ndarray,
+        self, computed: Callable[[Changes], ndarray], places: Iterable[Place], given: ndarray,
         tolerance: ndarray, end: float = np.inf,
     ):  # fmt: skip
         self.computed, self.places, self.given, self.end = computed, list(places), given, end

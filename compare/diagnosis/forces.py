@@ -52,8 +52,7 @@ class LeftOver:
         """What explains the force: all causes of the first rank that has one."""
         if not (np.isfinite(self.force).all() and np.isfinite(self.tolerance).all()):
             return ()
-        places = list(forces(self.tree, self.values.q, self.values.qd))
-        nothing = np.zeros((1, *self.force.shape))
+        places, nothing = forces(self.tree, self.values.q, self.values.qd), np.zeros((1, *self.force.shape))
         search = Search(lambda changes: nothing, places, self.force, self.tolerance)
         if np.abs(search.off).max() <= 1.0:
             return ()

@@ -134,7 +134,7 @@ def function_of(name: str, value: Any, symbols: object, coordinates: Coordinates
 
 
 def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Coordinates) -> Function:
-    """The function of a SymPy matrix or expression; its symbols are those of q, q and qd, or q, qd and tau."""
+    """The function of a SymPy matrix or expression of these symbols, in order."""
     import sympy
 
     def flat(value: Any) -> list[Any]:
@@ -145,7 +145,7 @@ def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Co
     except Exception as error:  # whatever SymPy makes of what is given
         raise OwnError(f"{name} is {shown(matrix)}; expected a SymPy matrix ({shown(str(error))})") from None
     nq, nv = coordinates.nq, coordinates.nv
-    counts = [nq, nq + nv, nq + 2 * nv]
+    counts = [nq, nq + nv, nq + 2 * nv]  # of the symbols of q, of q and qd, of q, qd and tau
     if len(symbols) not in counts or len(set(symbols)) < len(symbols):
         listed = ", ".join(map(str, symbols))
         wanted = f"{nq} of q, or {counts[1]} of q and qd in order, each once"
@@ -163,21 +163,18 @@ def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Co
     axes = QUANTITIES[name].shape_for(nv)
     shape = tuple(axis if isinstance(axis, int) else -1 for axis in axes)
     if name == "jacobians" or (-1 not in shape and len(entries) != prod(shape)):
-        expected = in_words(axes)
-        raise OwnError(f"{name} is a SymPy object of {len(entries)} entries; expected shape {expected}")
+        raise OwnError(f"{name} is a SymPy object of {len(entries)} entries; expected shape {in_words(axes)}")
     try:
-        evaluated = sympy.lambdify(plain, entries, "numpy", cse=True)
+        evaluated = sympy.lambdify(plain[:taken], entries, "numpy", cse=True)
     except Exception as error:  # of expressions that have no numbers, such as zoo
         listed = ", ".join(map(str, plain))
         raise OwnError(f"{name} cannot be evaluated as a function of {listed}: {error!r}") from None
 
     def function(*states: np.ndarray) -> np.ndarray:
         columns = [column for state in states for column in np.moveaxis(state, -1, 0)][: len(plain)]
-        columns += [np.zeros_like(columns[0])] * (len(plain) - len(columns))  # nothing depends on these
         values = np.broadcast_arrays(*evaluated(*columns), columns[0])[:-1]
         return np.stack(values, axis=-1).reshape((*states[0].shape[:-1], *shape))
 
-    function.__name__ = name
     return function
 
 

@@ -66,11 +66,10 @@ def module_of_file(place: str) -> ModuleType:
 def module_named(name: str) -> ModuleType:
     if not all(part.isidentifier() for part in name.split(".")):
         raise OwnFileError(f"{name!r} is not the name of a module; expected {FORMS_OF_REFERENCE}")
-    with raised_in(name):  # by a package that it is in
-        try:
-            spec = importlib.util.find_spec(name)
-        except ModuleNotFoundError:
-            spec = None
+    try:
+        spec = importlib.util.find_spec(name)  # which imports a package that it is in
+    except ModuleNotFoundError:
+        spec = None
     if spec is None:
         neighbours = [file.stem for file in Path().glob("*.py")]
         raise OwnFileError(f"{name}: no such module{close_names(name, neighbours)}")
