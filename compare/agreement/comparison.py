@@ -107,23 +107,21 @@ class Comparison:
         for name, value, least in (("states", states, 1), ("seed", seed, 0)):
             if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
                 raise ValueError(f"{name} is {shown(value)}; expected a whole number of at least {least}")
-        sample = random(self.robot, states, 0, seed)
+        sample, equations = random(self.robot, states, 0, seed), self.equations
         for note in sample.notes:
             warnings.warn(say(note), stacklevel=4)
-        assert self.equations is not None  # all that was brought are functions
-        self.equations.try_at(sample.q, sample.qd, sample.tau)
-        count = self.equations.affordable(len(sample.q), OWN_SECONDS)
+        assert equations is not None  # all that was brought are functions
+        equations.try_at(sample.q, sample.qd, sample.tau)
+        count = equations.affordable(len(sample.q), OWN_SECONDS)
         if count < len(sample.q):
-            seconds = self.equations.seconds
-            text = f"{count} states instead of {states}: your functions take {seconds:.2g} s per state"
-            warnings.warn(text, stacklevel=4)
+            time = f"{equations.seconds:.2g} s per state"
+            warnings.warn(f"{count} states instead of {states}: your functions take {time}", stacklevel=4)
         self.q, self.qd, self.tau = sample.q[:count], sample.qd[:count], sample.tau[:count]
 
     def take_states(self, q: Any, qd: Any, tau: Any) -> None:
         """The given states, in the user's joints."""
-        nv = self.coordinates.nv
         self.q = self.joints.positions(rows_given("q", q, ("states", self.coordinates.nq)))
-        shape, others = (len(self.q), nv), {"qd": qd, "tau": tau}
+        shape, others = (len(self.q), self.coordinates.nv), {"qd": qd, "tau": tau}
         for name, value in others.items():
             needed = [quantity for quantity in self.brought if name in QUANTITIES[quantity].state]
             if value is None and needed:

@@ -27,12 +27,9 @@ class Own:
     name = "own"
 
     def __init__(self, equations: OwnEquations, schemes: Iterable[str] = ()):
-        self.equations, self.schemes = equations, set(schemes) | {"rk4"}
-
-    @property
-    def methods(self) -> Mapping[str, Method]:
-        names = [name for name in RK4_SCHEMES if name in self.schemes]
-        return {name: Method(self.name, name, tmt.METHODS[name].order, name) for name in names}
+        self.equations, needed = equations, {*schemes, "rk4"}
+        names = [name for name in RK4_SCHEMES if name in needed]
+        self.methods = {name: Method(self.name, name, tmt.METHODS[name].order, name) for name in names}
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         """None if a robot's own actuators act: the equations do not have them."""
