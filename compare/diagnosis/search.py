@@ -113,12 +113,12 @@ class Explanations(NamedTuple):
         """The conventions of the joints that leave nothing. They may be many: a few states come first."""
         equations, explained, causes = self.equations, self.search.explained, []
         variants = list(conventions(equations))
-        every = values_in(equations, [variant.joints for variant in variants], FEW) if variants else ()
-        for variant, few in zip(variants, every):
-            if explained([(variant.cause, few)]):
-                (values,) = values_in(equations, [variant.joints], len(equations.q))
-                for cause in explained([(variant.cause, values)]):
-                    causes += self.restated(cause, variant.joints)
+        every = values_in(equations, [joints for _, joints in variants], FEW) if variants else ()
+        for (cause, joints), few in zip(variants, every):
+            if explained([(cause, few)]):
+                (values,) = values_in(equations, [joints], len(equations.q))
+                for complete in explained([(cause, values)]):
+                    causes += self.restated(complete, joints)
         return causes
 
     def causes(self, fits: Sequence[Fitted]) -> list[Cause]:

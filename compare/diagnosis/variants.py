@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations, permutations, product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +24,7 @@ MOST_PERMUTED = 6  # joints: with more, only the sense and the unit of one are t
 MOST_TURNED = 4  # joints whose order and senses are tried together
 
 Variant = tuple[Cause, np.ndarray]  # the values: (states, entries)
+Convention = tuple[Cause, JointMap]  # the joints of equations that have it
 
 
 def variant(rank: int, kind: str, place: str, stated: str, explains: str, values: np.ndarray) -> Variant:
@@ -78,13 +78,6 @@ def absolute_angles(tree: tmt.Tree) -> np.ndarray | None:
     return turns if (turns != np.eye(len(turns))).any() else None
 
 
-class Convention(NamedTuple):
-    """A convention of the joints, and the joints of equations that have it."""
-
-    cause: Cause
-    joints: JointMap
-
-
 def conventions(equations: Equations) -> Iterator[Convention]:
     """Order, senses and units of the joints; the order and the senses of a few together, rank 3."""
     coordinates, names = equations.coordinates, equations.coordinates.names
@@ -96,7 +89,7 @@ def conventions(equations: Equations) -> Iterator[Convention]:
 
     def convention(kind: str, place: str, stated: str, explains: str, joints: Iterable[Joint]) -> Convention:
         cause = Cause(rank=1, kind=kind, place=place, stated=stated, explains=explains)
-        return Convention(cause, JointMap(coordinates, list(joints)))
+        return cause, JointMap(coordinates, list(joints))
 
     orders = list(permutations(names))[1:] if len(names) <= MOST_PERMUTED else []
     for order in orders:
@@ -114,8 +107,8 @@ def conventions(equations: Equations) -> Iterator[Convention]:
         yield convention("unit", f"unit of {place}", "rad", unit, in_unit.values())
     for order, chosen in product(orders, senses) if len(names) <= MOST_TURNED else ():
         both, place = [turned(chosen)[name] for name in order], "order and senses of the joints"
-        alone = convention("order", place, in_order, ", ".join(map(str, both)), both)
-        yield alone._replace(cause=replace(alone.cause, rank=3))
+        cause, joints = convention("order", place, in_order, ", ".join(map(str, both)), both)
+        yield replace(cause, rank=3), joints
 
 
 def values_in(equations: Equations, maps: Sequence[JointMap], states: int) -> Iterator[np.ndarray]:
