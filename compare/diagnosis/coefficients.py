@@ -137,9 +137,9 @@ class Compared:
 
 def products(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
     """Products of one function of each joint, the simplest first, (states,) each."""
-    functions = []  # of each joint: degree, name, values
+    functions, ones = [], np.ones(len(x))  # of each joint: degree, name, values
     for name, kind, p in zip(names, kinds, x.T):
-        of_joint = [(0, "", np.ones(len(x)))]
+        of_joint = [(0, "", ones)]
         if kind == "slide":
             of_joint += [(1, name, p), (2, f"{name}^2", p**2)]
         else:
@@ -150,7 +150,7 @@ def products(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
     terms = {}
     for factors in sorted(product(*functions), key=lambda factors: sum(degree for degree, *_ in factors)):
         name = " ".join(name for _, name, _ in factors if name)
-        terms[name or "1"] = np.prod([values for *_, values in factors], axis=0)
+        terms[name or "1"] = np.prod([ones, *(values for *_, values in factors)], axis=0)
     return terms
 
 
@@ -158,9 +158,7 @@ def sums(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
     """Sines and cosines of sums of the angles, each up to twice, times powers of the slides."""
     slides = [k for k, kind in enumerate(kinds) if kind == "slide"]
     hinges = [k for k, kind in enumerate(kinds) if kind != "slide"]
-    powers = {"1": np.ones(len(x))}
-    if slides:
-        powers = products([names[k] for k in slides], ["slide"] * len(slides), x[:, slides])
+    powers = products([names[k] for k in slides], ["slide"] * len(slides), x[:, slides])
     terms = dict(powers)
     for times in sorted(product(range(-2, 3), repeat=len(hinges)), key=lambda times: sum(map(abs, times))):
         if next((k for k in times if k), 0) > 0:  # the others are the same

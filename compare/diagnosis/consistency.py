@@ -133,8 +133,7 @@ def gradient(weight: OfPositions, coordinates: Coordinates, q: ndarray, floor: f
     rounding = (ROUNDED * sizes.max(axis=(1, 2)) + floor) / STEP
     allowed = SAFETY * (errors + np.swapaxes(errors, 1, 2)) + rounding[:, None, None]
     names, mirrored = [coordinates.speeds[k] for k in straight], np.swapaxes(slopes, 1, 2)
-    curl = np.abs(slopes - mirrored)
-    return [nearest("gradient", curl, allowed, names, value=slopes, mirrored=mirrored)]
+    return [nearest("gradient", np.abs(slopes - mirrored), allowed, names, value=slopes, mirrored=mirrored)]
 
 
 def power_balance(

@@ -236,9 +236,8 @@ def in_shape(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray | None:
 
 def same(together: np.ndarray, singles: np.ndarray) -> bool:
     """Whether a batch has the values of single states."""
-    size = np.abs(singles[np.isfinite(singles)]).max(initial=0.0)
-    is_close = partial(np.allclose, rtol=0.0, atol=SAME * size, equal_nan=True)
-    return together.shape == singles.shape and bool(is_close(together, singles))
+    allowed = SAME * np.abs(singles[np.isfinite(singles)]).max(initial=0.0)
+    return together.shape == singles.shape and np.allclose(together, singles, 0.0, allowed, equal_nan=True)
 
 
 def state_in_words(state: Sequence[Sequence[float] | np.ndarray]) -> str:
