@@ -197,11 +197,10 @@ def message(comparison: Comparison) -> str:
 
 
 def rounded(comparison: Comparison) -> float | None:
-    """The rtol to state if the constants are rounded; None if an entry is off by more than that, or is not
-    finite.
+    """The rtol to state if the constants are rounded; None if an entry is off by more, or is not finite.
 
-    Nor may a quantity be off by more than that of its own largest entry: terms far from the origin are large,
-    and a slip is small compared with them.
+    Nor may a quantity be off by more than that of its own largest entry: a slip is small compared with terms
+    far from the origin.
     """
     worst = of_largest = 0.0
     for compared in comparison.compared.values():

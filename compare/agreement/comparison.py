@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from itertools import product
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -15,7 +16,7 @@ from tmt.model.values import shown
 from ..core.text import say
 from ..engines.own import METHOD_NAMES, QUANTITIES, OwnEquations
 from ..engines.own.functions import converted, in_shape, in_words, is_function, numbers_of, state_in_words
-from ..judge.agree import over
+from ..judge.agree import share_of
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..robots.file import robot_of
@@ -52,8 +53,7 @@ class Compared(NamedTuple):
     @property
     def ratio(self) -> np.ndarray:
         """Of the difference to the tolerance; 0 if both are 0, inf if the user's value is not finite."""
-        off = np.abs(self.yours - self.right)
-        return over(np.where(np.isfinite(off), off, np.inf), self.tolerance)
+        return share_of(np.abs(self.yours - self.right), self.tolerance)
 
     @property
     def fails(self) -> bool:
@@ -107,23 +107,21 @@ class Comparison:
         for name, value, least in (("states", states, 1), ("seed", seed, 0)):
             if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
                 raise ValueError(f"{name} is {shown(value)}; expected a whole number of at least {least}")
-        sample = random(self.robot, states, 0, seed)
+        sample, equations = random(self.robot, states, 0, seed), self.equations
         for note in sample.notes:
             warnings.warn(say(note), stacklevel=4)
-        assert self.equations is not None  # all that was brought are functions
-        self.equations.try_at(sample.q, sample.qd, sample.tau)
-        count = self.equations.affordable(len(sample.q), OWN_SECONDS)
+        assert equations is not None  # all that was brought are functions
+        equations.try_at(sample.q, sample.qd, sample.tau)
+        count = equations.affordable(len(sample.q), OWN_SECONDS)
         if count < len(sample.q):
-            seconds = self.equations.seconds
-            text = f"{count} states instead of {states}: your functions take {seconds:.2g} s per state"
-            warnings.warn(text, stacklevel=4)
+            time = f"{equations.seconds:.2g} s per state"
+            warnings.warn(f"{count} states instead of {states}: your functions take {time}", stacklevel=4)
         self.q, self.qd, self.tau = sample.q[:count], sample.qd[:count], sample.tau[:count]
 
     def take_states(self, q: Any, qd: Any, tau: Any) -> None:
         """The given states, in the user's joints."""
-        nv = self.coordinates.nv
         self.q = self.joints.positions(rows_given("q", q, ("states", self.coordinates.nq)))
-        shape, others = (len(self.q), nv), {"qd": qd, "tau": tau}
+        shape, others = (len(self.q), self.coordinates.nv), {"qd": qd, "tau": tau}
         for name, value in others.items():
             needed = [quantity for quantity in self.brought if name in QUANTITIES[quantity].state]
             if value is None and needed:
@@ -194,10 +192,8 @@ class Comparison:
     def entries(self, name: str) -> dict[tuple[int, ...], str]:
         """The names of the entries of a quantity, by their place."""
         names = [self.coordinates.speeds[i] for i in self.joints.v]
-        symbol = SYMBOLS[name]
-        if name == "mass_matrix":
-            return {(i, j): f"{symbol}[{a}][{b}]" for i, a in enumerate(names) for j, b in enumerate(names)}
-        return {(i,): f"{symbol}[{a}]" for i, a in enumerate(names)}
+        places = product(range(len(names)), repeat=len(QUANTITIES[name].shape))
+        return {place: SYMBOLS[name] + "".join(f"[{names[i]}]" for i in place) for place in places}
 
     @property
     def fails(self) -> bool:

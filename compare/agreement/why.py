@@ -39,11 +39,10 @@ def cause_of(comparison: Comparison) -> Why:
     values = Values.of(tree, q, qd, M, h, rounding)
     if failing == ["acceleration"]:
         return of_accelerations(comparison, values, tau, yours["acceleration"])
+    of_h = values
     if "gravity" in yours and ("bias" not in yours or ("gravity" in failing and "bias" not in failing)):
-        at_rest = Values.of(tree, q, np.zeros_like(qd), M, yours["gravity"], rounding)
-        why = of_equations(comparison, at_rest)
-    else:
-        why = of_equations(comparison, values)
+        of_h = Values.of(tree, q, np.zeros_like(qd), M, yours["gravity"], rounding)
+    why = of_equations(comparison, of_h)
     if "acceleration" not in failing or not why.is_found or M is None or h is None:
         return why
     return why._replace(text=f"{why.text} {beside(comparison, values, tau, yours['acceleration'])}".rstrip())
@@ -70,8 +69,7 @@ def of_equations(comparison: Comparison, values: Values) -> Why:
     if not diagnosis.differs:
         return Why("", False)
     broken = []
-    is_known = equations is not None and equations.has("mass_matrix") and values.are_finite
-    if equations is not None and is_known and not diagnosis.causes:
+    if equations is not None and equations.has("mass_matrix") and values.are_finite and not diagnosis.causes:
         tested = conditions(equations.mass_matrix, equations.bias, coordinates, values.q, values.qd)
         broken = [condition.text for condition in tested if not condition.is_met]
     return Why(" ".join([*broken[:1], diagnosis.sentence()]), bool(diagnosis.causes))

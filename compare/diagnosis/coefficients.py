@@ -7,6 +7,7 @@ such as sin(hip) cos(knee) and sums such as sin(hip + knee).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, product
 from typing import NamedTuple
@@ -19,7 +20,6 @@ from ..core.finding import Finding
 from ..core.text import apart, say
 from ..core.words import listed
 from .cause import TEMPLATE, Detail
-from .fit import Search
 from .model import MOST_SPEEDS, Entry, Equations, coefficients_of
 
 MOST_JOINTS = 3  # whose terms are tried
@@ -41,7 +41,6 @@ class Coefficient(NamedTuple):
     """One entry of Mbar or gravity, or the coefficient of a product of speeds in h, (states,) each."""
 
     entry: Entry
-    name: str
     yours: ndarray
     right: ndarray
     tolerance: ndarray
@@ -51,42 +50,34 @@ class Coefficient(NamedTuple):
         return self.yours - self.right
 
 
+@dataclass
 class Compared:
-    """The coefficients of given values that differ from the right ones.
+    """The coefficients of given values that differ from the right ones."""
 
-    search: for these values. bias: your h at these positions and other speeds; None: only values are given.
-    """
-
-    def __init__(self, equations: Equations, search: Search, bias: Bias | None):
-        self.equations, self.given, self.tolerance, self.bias = (
-            equations,
-            search.given,
-            search.tolerance,
-            bias,
-        )
+    equations: Equations
+    given: ndarray  # (states, entries), as its tolerance
+    tolerance: ndarray
+    bias: Bias | None  # your h at these positions and other speeds; None: only values are given
 
     @cached_property
     def differing(self) -> list[Coefficient]:
-        equations, right, of_h = self.equations, self.equations.coefficients, self.of_h
+        equations, right = self.equations, self.equations.coefficients
         tolerances = dict.fromkeys(right, ROUNDING * self.tolerance[:, equations.in_h].max(axis=1))
         tolerances |= dict(zip(equations.entries, self.tolerance[:, equations.in_M].T))
-        yours = dict(zip(equations.entries, self.given[:, equations.in_M].T)) | of_h
-        compared = [
-            Coefficient(entry, entry.named(equations.speeds), values, right[entry], tolerances[entry])
-            for entry, values in yours.items() if np.isfinite(values).all()
-        ]  # fmt: skip
+        yours = dict(zip(equations.entries, self.given[:, equations.in_M].T)) | self.of_h
+        finite = [entry for entry, values in yours.items() if np.isfinite(values).all()]
+        compared = [Coefficient(entry, yours[entry], right[entry], tolerances[entry]) for entry in finite]
         return [entry for entry in compared if (np.abs(entry.off) > entry.tolerance).any()]
 
     @property
     def of_h(self) -> dict[Entry, ndarray]:
         """Your coefficients of h, as far as they are known."""
-        nv, states = self.equations.nv, len(self.given)
+        nv, bias, states = self.equations.nv, self.bias, len(self.given)
         if not self.equations.qd.any():
             at_rest = self.given[:, self.equations.in_h].T
             return {Entry("gravity", (i,)): column for i, column in enumerate(at_rest)}
-        if self.bias is None or nv > MOST_SPEEDS:
+        if bias is None or nv > MOST_SPEEDS:
             return {}
-        bias = self.bias
         return coefficients_of(lambda speeds: np.asarray(bias(np.tile(speeds, (states, 1)))), nv)
 
     @property
@@ -128,7 +119,7 @@ class Compared:
             at = tuple(f"{name} = {value:.6g}" for name, value in zip(names[:SHOWN], self.equations.q[k]))
             numbers = coefficient.yours[k], coefficient.right[k]
             yours, right = (x if abs(x) > coefficient.tolerance[k] else 0.0 for x in numbers)
-            details.append(Detail(coefficient.name, terms, yours, right, at))
+            details.append(Detail(coefficient.entry.named(self.equations.speeds), terms, yours, right, at))
         return tuple(details)
 
     def causes(self, most: int) -> list[Cause]:
@@ -138,18 +129,17 @@ class Compared:
         kinds = {pair for terms in self.terms for pair in terms}
         if len(kinds) > most:
             return []
-        details = [Detail("", terms) for terms in self.terms]
-        texts = dict.fromkeys(say(Finding(TEMPLATE, "details", {"detail": detail})) for detail in details)
-        names = listed([coefficient.name for coefficient in self.differing])
-        rank, explains = 1 + len(kinds), "; ".join(texts)
-        return [Cause(rank=rank, kind="term", place=names, stated="right", explains=explains)]
+        findings = [Finding(TEMPLATE, "details", {"detail": Detail("", terms)}) for terms in self.terms]
+        names = listed([coefficient.entry.named(self.equations.speeds) for coefficient in self.differing])
+        explains = "; ".join(dict.fromkeys(map(say, findings)))
+        return [Cause(rank=1 + len(kinds), kind="term", place=names, stated="right", explains=explains)]
 
 
 def products(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
     """Products of one function of each joint, the simplest first, (states,) each."""
-    functions = []  # of each joint: degree, name, values
+    functions, ones = [], np.ones(len(x))  # of each joint: degree, name, values
     for name, kind, p in zip(names, kinds, x.T):
-        of_joint = [(0, "", np.ones(len(x)))]
+        of_joint = [(0, "", ones)]
         if kind == "slide":
             of_joint += [(1, name, p), (2, f"{name}^2", p**2)]
         else:
@@ -160,7 +150,7 @@ def products(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
     terms = {}
     for factors in sorted(product(*functions), key=lambda factors: sum(degree for degree, *_ in factors)):
         name = " ".join(name for _, name, _ in factors if name)
-        terms[name or "1"] = np.prod([values for *_, values in factors], axis=0)
+        terms[name or "1"] = np.prod([ones, *(values for *_, values in factors)], axis=0)
     return terms
 
 
@@ -168,9 +158,7 @@ def sums(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
     """Sines and cosines of sums of the angles, each up to twice, times powers of the slides."""
     slides = [k for k, kind in enumerate(kinds) if kind == "slide"]
     hinges = [k for k, kind in enumerate(kinds) if kind != "slide"]
-    powers = {"1": np.ones(len(x))}
-    if slides:
-        powers = products([names[k] for k in slides], ["slide"] * len(slides), x[:, slides])
+    powers = products([names[k] for k in slides], ["slide"] * len(slides), x[:, slides])
     terms = dict(powers)
     for times in sorted(product(range(-2, 3), repeat=len(hinges)), key=lambda times: sum(map(abs, times))):
         if next((k for k in times if k), 0) > 0:  # the others are the same
@@ -185,10 +173,7 @@ def sums(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
 
 
 def right_terms(forms: Sequence[Terms], right: ndarray, size: float) -> dict[str, float]:
-    """An expression (states,) as a sum of terms, in the form that has fewer.
-
-    size: of yours; less than its rounding is 0.
-    """
+    """An expression (states,) as a sum of terms, in the form with fewer; what rounding yours leaves is 0."""
     fits = []
     for form in forms:
         x = np.linalg.lstsq(np.array(list(form.values())).T, right, rcond=None)[0]

@@ -16,15 +16,19 @@ from numpy import ndarray
 from ..core.finding import Finding
 from ..core.text import say
 from ..judge.agree import closest
-from ..judge.scale import EPS, FACTOR
 from ..robots.coordinates import Coordinates
 from .cause import TEMPLATE
+from .model import ROUNDED
 
 STEP = 2e-3  # rad or m, or s along a motion of about one rad/s
 SAFETY = 8.0  # times the error or the noise that is estimated
 CLOSE_BY = 1e-4  # rad or m, between the points at which noise is measured
 ORDER = 6
-ROUNDED = FACTOR * EPS
+CONDITIONS = {  # names and units, by the macros that say what is wrong
+    "symmetric": ("M is symmetric", "kg m2"), "gradient": ("h at rest is a gradient", "N m/rad"),
+    "even": ("h is even in the rates", "N m"), "quadratic": ("h is quadratic in the rates", "N m"),
+    "power": ("h belongs to M: qd'(h - h at rest) = qd' Mdot qd / 2", "W"),
+}  # fmt: skip
 
 OfPositions = Callable[[ndarray], ndarray]  # of q (states, nq) -> (states, ...)
 OfStates = Callable[[ndarray, ndarray], ndarray]  # of q (states, nq), qd (states, nv) -> (states, nv)
@@ -52,8 +56,7 @@ class Condition(NamedTuple):
 def conditions(
     mass_matrix: OfPositions, bias: OfStates, coordinates: Coordinates, q: ndarray, qd: ndarray
 ) -> list[Condition]:
-    """The conditions on mass_matrix(q) (states, nv, nv) and bias(q, qd) (states, nv), at states q (states,
-    nq), qd (states, nv).
+    """The conditions on mass_matrix(q) (states, nv, nv) and bias(q, qd) (states, nv).
 
     The power is evaluated only for a symmetric M, and without the part of h that is linear in the speeds.
     """
@@ -66,32 +69,24 @@ def conditions(
     odd, allowed = np.abs(h[1.0] - h[-1.0]) / 2.0, rounding[:, None]
     units = np.broadcast_to(np.where(np.array(coordinates.units) == "m", "N", "N m"), odd.shape)
     factors = np.divide(doubled, velocity, out=np.full(odd.shape, np.inf), where=velocity != 0.0)
-    even = nearest("h is even in the rates", odd, allowed, "N m", "even", names, value=odd, unit=units)
-    name, off = "h is quadratic in the rates", np.abs(doubled - 4.0 * velocity)
-    quadratic = nearest(name, off, 4.0 * allowed, "N m", "quadratic", names, factor=factors)
-    of_weight = gradient_at_rest(lambda q: bias(q, 0.0 * qd), coordinates, q, of_h)
+    even = nearest("even", odd, allowed, names, value=odd, unit=units)
+    quadratic = nearest("quadratic", np.abs(doubled - 4.0 * velocity), 4.0 * allowed, names, factor=factors)
+    of_weight = gradient(lambda q: bias(q, 0.0 * qd), coordinates, q, of_h)
     tested = [symmetric(M, of_M, names), definite(M, of_M), *of_weight, even, quadratic]
     if tested[0].is_met:
         tested.append(power_balance(mass_matrix, coordinates, q, qd, velocity, of_M, rounding))
     return tested
 
 
-def nearest(
-    name: str,
-    off: ndarray,
-    allowed: ndarray,
-    units: str,
-    kind: str,
-    names: Sequence[str] = (),
-    **values: ndarray,
-) -> Condition:
+def nearest(kind: str, off: ndarray, allowed: ndarray, names: Sequence[str], **values: ndarray) -> Condition:
     """A condition on differences, off (states, ...), where it is nearest to being broken.
 
-    kind: the macro that says it, with the values there and the names of the entry.
+    kind: of CONDITIONS; its macro takes the values there and the names of the entry.
     """
+    name, unit = CONDITIONS[kind]
     at, allowed = closest(off, allowed), np.broadcast_to(allowed, off.shape)
     there = {"names": [names[i] for i in at[1:]], **{key: array[at] for key, array in values.items()}}
-    return Condition(name, float(off[at]), float(allowed[at]), units, Finding(TEMPLATE, kind, there))
+    return Condition(name, float(off[at]), float(allowed[at]), unit, Finding(TEMPLATE, kind, there))
 
 
 def noise(function: OfPositions, coordinates: Coordinates, q: ndarray) -> float:
@@ -109,7 +104,7 @@ def symmetric(M: ndarray, allowed: ndarray, names: Sequence[str]) -> Condition:
     """allowed: (states,)."""
     mirrored = np.swapaxes(M, 1, 2)
     off, allowed = np.abs(M - mirrored), allowed[:, None, None]
-    return nearest("M is symmetric", off, allowed, "kg m2", "symmetric", names, value=M, mirrored=mirrored)
+    return nearest("symmetric", off, allowed, names, value=M, mirrored=mirrored)
 
 
 def definite(M: ndarray, allowed: ndarray) -> Condition:
@@ -124,9 +119,7 @@ def definite(M: ndarray, allowed: ndarray) -> Condition:
     return Condition("M is positive definite", float(least[s]), float(floor), "", wrong, "at least")
 
 
-def gradient_at_rest(
-    weight: OfPositions, coordinates: Coordinates, q: ndarray, floor: float
-) -> list[Condition]:
+def gradient(weight: OfPositions, coordinates: Coordinates, q: ndarray, floor: float) -> list[Condition]:
     """dh_i/dq_j at rest is symmetric, in hinges and slides; [] where there is one of them at most."""
     straight = [joint.qd.start for joint in coordinates.places.joints if joint.kind != "ball"]
     if len(straight) < 2:
@@ -135,14 +128,12 @@ def gradient_at_rest(
     def along(direction: ndarray) -> tuple[ndarray, ...]:
         return derivative(lambda t: weight(coordinates.move(q, t * direction))[:, straight])
 
-    of_each = map(along, np.eye(coordinates.nv)[straight])
-    slopes, errors, sizes = (np.stack(part, axis=2) for part in zip(*of_each))  # (states, i, j)
+    derivatives = map(along, np.eye(coordinates.nv)[straight])
+    slopes, errors, sizes = (np.stack(part, axis=2) for part in zip(*derivatives))  # (states, i, j)
     rounding = (ROUNDED * sizes.max(axis=(1, 2)) + floor) / STEP
     allowed = SAFETY * (errors + np.swapaxes(errors, 1, 2)) + rounding[:, None, None]
-
     names, mirrored = [coordinates.speeds[k] for k in straight], np.swapaxes(slopes, 1, 2)
-    curl, values = np.abs(slopes - mirrored), {"value": slopes, "mirrored": mirrored}
-    return [nearest("h at rest is a gradient", curl, allowed, "N m/rad", "gradient", names, **values)]
+    return [nearest("gradient", np.abs(slopes - mirrored), allowed, names, value=slopes, mirrored=mirrored)]
 
 
 def power_balance(
@@ -164,11 +155,9 @@ def power_balance(
     power, total = np.einsum("si,si->s", rates, velocity) / largest**2, np.abs(rates).sum(axis=1)
     allowed = SAFETY * error + total**2 * of_M / STEP + 2.0 * total * of_h / largest**2
     watts = largest**3
-
-    name = "h belongs to M: qd'(h - h at rest) = qd' Mdot qd / 2"
     values = {"yours": power * watts, "right": slope * watts}
     values["balls"] = np.broadcast_to(coordinates.has_balls, watts.shape)
-    return nearest(name, np.abs(power - slope) * watts, allowed * watts, "W", "power", **values)
+    return nearest("power", np.abs(power - slope) * watts, allowed * watts, (), **values)
 
 
 def derivative(function: Callable[[float], ndarray]) -> tuple[ndarray, ndarray, ndarray]:

@@ -61,7 +61,7 @@ class Search:
     """
 
     def __init__(
-        self, computed: Callable[[Changes], ndarray], places: Sequence[Place], given: ndarray,
+        self, computed: Callable[[Changes], ndarray], places: Iterable[Place], given: ndarray,
         tolerance: ndarray, end: float = np.inf,
     ):  # fmt: skip
         self.computed, self.places, self.given, self.end = computed, list(places), given, end
@@ -162,8 +162,7 @@ class Search:
     def singles(self) -> list[Fitted]:
         """Each place alone, the smallest remainder first.
 
-        Where the values are quadratic in its change, the best one is the root of a cubic. The few best of
-        these are fitted; all directions and zeros are fitted from several starts.
+        Of places with a quadratic influence the few best are fitted; directions and zeros from several starts.
         """
         nearest, promising, starts = nearest_changes(*self.expansion, self.off), [], []
         for k, place in enumerate(self.places):
@@ -181,8 +180,7 @@ class Search:
     def expansion(self) -> tuple[ndarray, ndarray]:
         """First and second coefficients of the values in each place's change over its size, in tolerances.
 
-        (places, states, entries) each; exact where the values are quadratic: for all except directions and
-        zeros.
+        (places, states, entries) each; exact for all places except directions and zeros.
         """
         numbers, size = np.arange(len(self.places))[:, None], self.sizes[:, None]
         up, down = (self.values(numbers, sign * size) for sign in (1.0, -1.0))

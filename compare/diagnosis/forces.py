@@ -6,6 +6,7 @@ of the same source: zero if nothing else acts.
 
 from collections.abc import Iterator
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy import ndarray
@@ -16,13 +17,13 @@ from tmt import literal
 from ..core.cause import Cause
 from ..core.finding import Finding
 from ..core.text import say
-from ..judge.agree import over
+from ..judge.agree import share_of
 from ..judge.entries import Entries
-from ..judge.scale import EPS, FACTOR
 from .cause import TEMPLATE, ranked
 from .fit import Search
-from .model import Values
+from .model import ROUNDED, Values
 from .places import forces
+from .variants import Variant, option
 
 SHARPER = 4.0  # times the tolerance: accelerations are rounded before Mbar is multiplied by them
 
@@ -33,9 +34,7 @@ class LeftOver:
     force, tolerance: (states, nv). rounding: of the scale of an entry.
     """
 
-    def __init__(
-        self, tree: tmt.Tree, values: Values, tau: ndarray, qdd: ndarray, rounding: float = FACTOR * EPS
-    ):
+    def __init__(self, tree: tmt.Tree, values: Values, tau: ndarray, qdd: ndarray, rounding: float = ROUNDED):
         self.tree, self.values, self.tau = tree, values, tau
         q, qd, M, h, _ = values
         self.damping, self.springs = np.array(tree.damping) * qd, literal.spring_torque(q, tree)
@@ -46,39 +45,32 @@ class LeftOver:
     @property
     def ratio(self) -> float:
         """Of the force to its tolerance, the largest; inf if one is not a number."""
-        force = np.abs(np.where(np.isfinite(self.force), self.force, np.inf))
-        return float(over(force, self.tolerance).max())
+        return float(share_of(np.abs(self.force), self.tolerance).max())
 
     @cached_property
     def causes(self) -> tuple[Cause, ...]:
         """What explains the force: all causes of the first rank that has one."""
         if not (np.isfinite(self.force).all() and np.isfinite(self.tolerance).all()):
             return ()
-        places = list(forces(self.tree, self.values.q, self.values.qd))
-        nothing = np.zeros((1, *self.force.shape))
+        places, nothing = forces(self.tree, self.values.q, self.values.qd), np.zeros((1, *self.force.shape))
         search = Search(lambda changes: nothing, places, self.force, self.tolerance)
         if np.abs(search.off).max() <= 1.0:
             return ()
         causes = search.explained(self.options())
-        if not causes:
-            causes = [fit.cause for fit in search.singles() if fit.explains]
-        if not causes:
-            causes = [fit.cause for fit in search.pairs(("number",)) if fit.explains]
+        causes = causes or [fit.cause for fit in search.singles() if fit.explains]
+        causes = causes or [fit.cause for fit in search.pairs(("number",)) if fit.explains]
         return ranked(causes)
 
     def sentence(self) -> str:
         """The causes in words; "" if there is none."""
         return say(Finding(TEMPLATE, "forces", {"list": self.causes})) if self.causes else ""
 
-    def options(self) -> Iterator[tuple[Cause, ndarray]]:
+    def options(self) -> Iterator[Variant]:
         """Each option, and the force that is left over with it."""
-        for place, stated, term in (
-            ("torque in the acceleration", "tau", -self.tau),
-            ("bias in the acceleration", "- h", self.values.bias),
-            ("damping in the acceleration", "- D qd", self.damping),
-            ("springs in the acceleration", "- k (q - rest)", self.springs),
-        ):
-            for explains, factor in (("left out", -1.0), ("of the other sign", -2.0), ("twice", 1.0)):
-                cause = Cause(rank=1, kind="option", place=place, stated=stated, explains=explains)
-                if term.any():
-                    yield cause, factor * term
+        terms = {"torque": ("tau", -self.tau), "bias": ("- h", self.values.bias)}
+        terms |= {"damping": ("- D qd", self.damping), "springs": ("- k (q - rest)", self.springs)}
+        factors = {"left out": -1.0, "of the other sign": -2.0, "twice": 1.0}
+        for (name, (stated, term)), explains in product(terms.items(), factors):
+            place = f"{name} in the acceleration"
+            if term.any():
+                yield option(place, stated, explains, factors[explains] * term)

@@ -6,8 +6,8 @@ imaginary change of 1e-100, exact to rounding.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields
 from functools import cached_property
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy import ndarray
 
 import tmt
 from tmt.derivation import method
+from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.vectors import ZERO, Matrix
 
 from ..judge.entries import Entries
@@ -37,6 +38,8 @@ FIELDS_OF_TERMS = {  # of a body, on which a term depends
 }  # fmt: skip
 MOST_SPEEDS = 8  # with more, coefficients of products of speeds are not compared: there are nv^2 (nv + 1) / 2
 TINY = 1e-100  # an imaginary change, whose square vanishes
+ROUNDED = FACTOR * EPS  # of the scale of an entry
+Bodies = Sequence[method.Body]
 
 
 class Path(NamedTuple):
@@ -54,12 +57,13 @@ class Entry(NamedTuple):
 
     def named(self, speeds: Sequence[str]) -> str:
         """Its name: "M[hip][knee]", "h[hip]", "h[hip], gravity", "h[hip], coefficient of hip' knee'"."""
-        first, *others = names = [speeds[i] for i in self.at]
+        names = [speeds[i] for i in self.at]
         if self.kind == "gravity":
-            return f"h[{first}], gravity"
+            return f"h[{names[0]}], gravity"
         if self.kind == "velocity":
-            rates = f"{others[0]}'^2" if others[0] == others[1] else f"{others[0]}' {others[1]}'"
-            return f"h[{first}], coefficient of {rates}"
+            first, second = names[1:]
+            rates = f"{first}'^2" if first == second else f"{first}' {second}'"
+            return f"h[{names[0]}], coefficient of {rates}"
         return self.kind + "".join(f"[{name}]" for name in names)
 
 
@@ -95,8 +99,8 @@ class Equations:
     def terms(self) -> dict[str, ndarray]:
         """What each term of all bodies adds, (bodies, states, entries)."""
         terms = {}
-        for term, fields in FIELDS_OF_TERMS.items():
-            absent = {name: nothing for name, nothing in NOTHING.items() if name not in fields}
+        for term, needed in FIELDS_OF_TERMS.items():
+            absent = {name: nothing for name, nothing in NOTHING.items() if name not in needed}
             gravity = self.tree.gravity if term == "gravity" else ZERO
             terms[term] = np.stack([self.summed([b._replace(**absent)], gravity)[0] for b in self.bodies])
             terms[term][..., self.in_h if term in BODY_TERMS[:2] else self.in_M] = 0.0
@@ -120,26 +124,26 @@ class Equations:
 
     def values(self, changes: Changes) -> ndarray:
         """Mbar and h with numbers of the tree changed, (changes, states, entries); axes are normalized."""
-        numbers = {name: value.tolist() for name, value in self.stated.items()}
+        numbers: dict[str, Any] = {field.name: getattr(self.tree, field.name) for field in fields(Mechanism)}
+        numbers |= {name: value.tolist() for name, value in self.stated.items()}
         for path, added in changes.items():
             row, (*places, last) = numbers[path.field], path.at
             for place in places:
                 row = row[place]
             row[last] = row[last] + np.asarray(added)[:, None]
         for k in {path.at[0] for path in changes if path.field == "axis"}:
-            numbers["axis"][k] = unit_direction(*numbers["axis"][k])
-        structure = ("parent", "coordinates", "body_joint", "moves")
-        changed = SimpleNamespace(**numbers, **{name: getattr(self.tree, name) for name in structure})
-        bodies = method.bodies(changed, list(self.q.T), list(self.qd.T))
-        return self.summed(bodies, changed.gravity, changed.armature)
+            x, y, z = numbers["axis"][k]
+            length = np.sqrt(x * x + y * y + z * z)
+            length = np.where(length == 0.0, 1.0, length)  # of a change that leaves no direction
+            numbers["axis"][k] = [x / length, y / length, z / length]
+        bodies = method.bodies(Mechanism(**numbers), list(self.q.T), list(self.qd.T))
+        return self.summed(bodies, numbers["gravity"], numbers["armature"])
 
     def with_bias(self, h: ndarray) -> ndarray:
         """The right values with another h (states, nv)."""
         return np.concatenate([self.right[:, self.in_M], h], axis=1)
 
-    def summed(
-        self, bodies: Sequence[method.Body], gravity: Iterable[Any], armature: Sequence[Any] = ()
-    ) -> ndarray:
+    def summed(self, bodies: Bodies, gravity: Iterable[Any], armature: Sequence[Any] = ()) -> ndarray:
         """Mbar and h of some bodies, (changes, states, entries)."""
         M, h = method.mass_matrix(bodies), method.bias(bodies, gravity)
         for i, rotor in enumerate(armature):
@@ -174,7 +178,7 @@ class Values(NamedTuple):
     @classmethod
     def of(
         cls, tree: tmt.Tree, q: ndarray, qd: ndarray, mass_matrix: ndarray | None, bias: ndarray | None,
-        rounding: float = FACTOR * EPS,
+        rounding: float = ROUNDED,
     ) -> "Values":  # fmt: skip
         """With the tolerances of judge.entries. None: not given; rounding: of the scale of an entry."""
         scale, shape = Entries(tree, q, qd), (*qd.shape, qd.shape[1])
@@ -197,8 +201,7 @@ class Values(NamedTuple):
 
 
 def coefficients_of(bias: Callable[[ndarray], ndarray], nv: int) -> dict[Entry, ndarray]:
-    """Coefficients of h, (states,) each: "gravity" (i,), and "velocity" (i, j, k) of qd_j qd_k, j <= k, in
-    h_i.
+    """Coefficients of h_i, (states,) each: "gravity" (i,), and "velocity" (i, j, k) of qd_j qd_k, j <= k.
 
     bias: speeds (nv,) -> h (states, nv), of which the part that is even in the speeds is taken.
     """
@@ -212,10 +215,3 @@ def coefficients_of(bias: Callable[[ndarray], ndarray], nv: int) -> dict[Entry, 
     for pair, values in (even | mixed).items():
         found |= {Entry("velocity", (i, *pair)): values[:, i] for i in range(nv)}
     return found
-
-
-def unit_direction(x: ndarray, y: ndarray, z: ndarray) -> list[ndarray]:
-    """A direction at length 1."""
-    length = np.sqrt(x * x + y * y + z * z)
-    length = np.where(length == 0.0, 1.0, length)  # of a change that leaves no direction
-    return [x / length, y / length, z / length]

@@ -5,7 +5,7 @@ entries of Mbar or h. The zero of a joint is a convention and has rank 1; the ot
 """
 
 from collections.abc import Iterator
-from itertools import combinations_with_replacement, product
+from itertools import chain, combinations_with_replacement, product
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +30,7 @@ MOST_HINGES = 3  # whose single terms of Mbar are tried
 OF_ZERO = "zero position"  # the kind of a place
 FIT_ROUNDING = 1e-11  # of the size of a number: what a fit leaves of a number that is 0
 ALL = slice(None)  # entries of a state
+OF_FORCES = ("N m s/rad", "N m/rad", "N m")  # units of damping, stiffness and a force
 OF_SLIDES = {"N m s/rad": "N s/m", "N m/rad": "N/m", "N m": "N", "kg m2": "kg", "rad": "m"}  # units
 
 
@@ -66,10 +67,8 @@ class Place(NamedTuple):
 
     def cause(self, change: float) -> Cause:
         """The change as a cause."""
-        stated, explains = float(self.stated), self.value(change)
-        return Cause(
-            rank=self.rank, kind=self.kind, place=self.name, stated=stated, explains=explains, unit=self.unit
-        )
+        rank, kind, stated, explains = self.rank, self.kind, float(self.stated), self.value(change)
+        return Cause(rank=rank, kind=kind, place=self.name, stated=stated, explains=explains, unit=self.unit)
 
 
 def factor(kind: str, name: str, column: np.ndarray, entry: int | slice, stated: float = 1.0) -> Place:
@@ -90,7 +89,7 @@ def is_common(factor: float) -> bool:
 def all_places(equations: Equations) -> list[Place]:
     """The places that have an influence at some state, as far as that is known beforehand."""
     kinds = numbers, terms, coefficients, forces_in_bias, parts_of_terms
-    places = [place for places_of in kinds for place in places_of(equations)]
+    places = chain.from_iterable(places_of(equations) for places_of in kinds)
     return [place for place in places if place.column is None or place.column.any()]
 
 
@@ -109,8 +108,7 @@ def forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Place]:
         return Place("number", name, stated, unit, 1.0, column=force, least=least)
 
     for i, joint in enumerate(tree.coordinates.joints):
-        units = [unit_of(unit, joint.kind) for unit in ("N m s/rad", "N m/rad", "N m")]
-        of_damping, of_stiffness, of_force = units
+        of_damping, of_stiffness, of_force = (unit_of(unit, joint.kind) for unit in OF_FORCES)
         for v in range(joint.qd.start, joint.qd.stop):
             speed, at_joint = qd[:, v : v + 1], np.eye(qd.shape[1])[v]
             yield place(f"damping of {names[v]}", of_damping, tree.damping[v], speed * at_joint)
@@ -148,10 +146,9 @@ def numbers(equations: Equations) -> Iterator[Place]:
             place = number(f"inertia {name} of {body}", "kg m2", size, path, 0.0 if i == j else -np.inf)
             yield place if i == j else place._replace(moves=((path, 1.0), (mirrored, 1.0)))
     for i, (name, joint) in enumerate(zip(tree.joint_names, tree.coordinates.joints)):
-        offsets = triple(f"offset {{}} of {name}", "m", length, "offset", i)
         carried = [("com", b) for b, of_joint in enumerate(tree.body_joint) if of_joint == i]
         carried += [("offset", j) for j, parent in enumerate(tree.parent) if parent == i]
-        for k, place in enumerate(offsets):
+        for k, place in enumerate(triple(f"offset {{}} of {name}", "m", length, "offset", i)):
             yield place
             if joint.kind != "slide":
                 stays = [(Path(field, (index, k)), -1.0) for field, index in carried]
@@ -180,8 +177,7 @@ def terms(equations: Equations) -> Iterator[Place]:
 def parts_of_terms(equations: Equations) -> Iterator[Place]:
     """The factor of each part of a term of a body in an entry of M, in M, and in M and h, for a few hinges.
 
-    T is a sum over the offsets of the joints that carry the body and its CoM, T' m T over pairs of these
-    lengths.
+    T is a sum over the offsets that carry the body and its CoM, T' m T over pairs of these lengths.
     """
     tree, in_M = equations.tree, equations.in_M
     if set(tree.kind) != {"hinge"} or equations.nv > MOST_HINGES:
@@ -189,7 +185,7 @@ def parts_of_terms(equations: Equations) -> Iterator[Place]:
     entries = [entry.named(equations.speeds) for entry in equations.entries[in_M]]
     for name, column in parts_of_bodies(equations).items():
         active = np.abs(column).max(axis=0) > FIT_ROUNDING * np.abs(column).max()
-        in_entries = [k for k in range(len(entries)) if active[k]]
+        in_entries = np.flatnonzero(active[in_M]).tolist()
         for k in in_entries:
             yield factor("part", f"{name} in {entries[k]}", column[:, k], k)
         if name.startswith("mass") and len(in_entries) > 1:  # `terms` has those of B' I B
@@ -239,11 +235,10 @@ def coefficients(equations: Equations) -> Iterator[Place]:
     for name, part in {"M": equations.in_M, "h": equations.in_h, "M and h": ALL}.items():
         yield factor("coefficient", f"all of {name}", right[:, part], part)
     rows = [Entry("h", (i,)).named(speeds) for i in range(nv)]
-    at_rest = {}
+    at_rest = [equations.coefficients[Entry("gravity", (i,))] for i in range(nv)]
     for entry, column in equations.coefficients.items():
         i, *pair = entry.at
         if entry.kind == "gravity":
-            at_rest[i] = column
             yield factor("coefficient", f"{rows[i]} at rest", column, first_h + i)
         elif entry.kind == "velocity":
             rates = np.prod(equations.qd[:, pair], axis=1)

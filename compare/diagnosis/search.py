@@ -12,12 +12,11 @@ import numpy as np
 from tmt import Tree
 
 from ..core.cause import Cause
-from ..judge.scale import EPS, FACTOR
 from ..robots.joint_map import Joint, JointMap, within_a_turn
 from .cause import LEAST_STATES, Diagnosis, ranked
 from .coefficients import Bias, Compared
 from .fit import Fitted, Search
-from .model import Equations, Values
+from .model import ROUNDED, Equations, Values
 from .places import ALL, OF_ZERO, all_places, is_common
 from .slips import slips
 from .variants import conventions, program_options, values_in
@@ -45,14 +44,15 @@ def diagnose(
     given, tolerance = values.packed, values.packed_tolerance
     with np.errstate(all="ignore"):  # values may be no numbers, or beyond the largest
         equations = Equations(tree, values.q, values.qd)
-        rounded = np.fmax(tolerance, FACTOR * EPS * np.abs(given))  # large values are rounded too
+        rounded = np.fmax(tolerance, ROUNDED * np.abs(given))  # large values are rounded too
         tolerance = np.where(tolerance > 0.0, rounded, 0.0)
         places = all_places(equations)
         if not np.isfinite(given).any(axis=0).all():  # M or h alone
             both = ("coefficient", "part")
             places = [place for place in places if place.entry != ALL or place.kind not in both]
         search = Search(equations.values, places, given, tolerance, time.monotonic() + seconds)
-        return Explanations(equations, search, Compared(equations, search, bias), stated, seconds).diagnosis()
+        compared = Compared(equations, given, search.tolerance, bias)
+        return Explanations(equations, search, compared, stated, seconds).diagnosis()
 
 
 class Explanations(NamedTuple):
@@ -113,12 +113,12 @@ class Explanations(NamedTuple):
         """The conventions of the joints that leave nothing. They may be many: a few states come first."""
         equations, explained, causes = self.equations, self.search.explained, []
         variants = list(conventions(equations))
-        every = values_in(equations, [variant.joints for variant in variants], FEW) if variants else ()
-        for variant, few in zip(variants, every):
-            if explained([(variant.cause, few)]):
-                (values,) = values_in(equations, [variant.joints], len(equations.q))
-                for cause in explained([(variant.cause, values)]):
-                    causes += self.restated(cause, variant.joints)
+        every = values_in(equations, [joints for _, joints in variants], FEW) if variants else ()
+        for (cause, joints), few in zip(variants, every):
+            if explained([(cause, few)]):
+                (values,) = values_in(equations, [joints], len(equations.q))
+                for complete in explained([(cause, values)]):
+                    causes += self.restated(complete, joints)
         return causes
 
     def causes(self, fits: Sequence[Fitted]) -> list[Cause]:

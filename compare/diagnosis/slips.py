@@ -8,39 +8,32 @@ import numpy as np
 from tmt.derivation import method
 from tmt.derivation.vectors import IDENTITY, Matrix, total_vector
 
-from ..core.cause import Cause
 from .model import TINY, Equations
 from .places import groups
-from .variants import Variant
+from .variants import Variant, slip
 
 
 def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
     """For each slip: in single bodies; in all; these in M alone. The first list that explains is meant."""
     right, in_h, bodies = equations.right, equations.in_h, groups(equations.tree)
     gravity, parts = equations.tree.gravity, np.sum(list(equations.terms.values()), axis=0)
-    for name, changed in changed_bodies(equations, equations.bodies):
+    for name, changed in changed_bodies(equations):
         added = np.stack([equations.summed([b], gravity)[0] for b in changed]) - parts
         variants, in_M_alone = [], []
         for body, numbers in bodies.items():
-            values = right + added[numbers].sum(axis=0)
-            variants.append(slip(name.format(body), "no", "", values))
+            values, place = right + added[numbers].sum(axis=0), name.format(body)
+            variants.append(slip(place, "no", "", values))
             values = np.hstack([values[:, equations.in_M], right[:, in_h]])
-            in_M_alone.append(slip(f"{name.format(body)} in M alone", "no", "", values))
+            in_M_alone.append(slip(f"{place} in M alone", "no", "", values))
         count = len(parts)  # of single bodies
         yield [variants[:count], variants[count:], in_M_alone[:count], in_M_alone[count:]]
     if "ball" not in equations.tree.kind:
         yield [list(lagrange(equations))]
 
 
-def slip(place: str, stated: str, explains: str, values: np.ndarray) -> Variant:
-    return Cause(rank=2, kind="slip", place=place, stated=stated, explains=explains), values
-
-
-def changed_bodies(
-    equations: Equations, bodies: Sequence[method.Body]
-) -> Iterator[tuple[str, list[method.Body]]]:
+def changed_bodies(equations: Equations) -> Iterator[tuple[str, list[method.Body]]]:
     """Each slip by its name, made in every body."""
-    tree, q, qd = equations.tree, list(equations.q.T), equations.qd
+    tree, q, qd, bodies = equations.tree, list(equations.q.T), equations.qd, equations.bodies
     frames = method.joint_frames(tree, q)
     turns = [frames[joint].turn if joint >= 0 else IDENTITY for joint in tree.body_joint]
     world = [turned(b, R) for b, R in zip(bodies, turns)]
@@ -56,19 +49,18 @@ def changed_bodies(
     yield "inertia of {} not turned to the inertial frame", world
     wrong_way = [b._replace(inertia=R.transposed @ b.inertia @ R) for b, R in zip(world, turns)]
     yield "R' I R for R I R' of {}", wrong_way
-    again = with_field("inertia", [b.inertia + more for b, more in zip(bodies, moved)])
-    yield "inertia of {} about its joint and mass counted again", again
-    less = with_field("inertia", [b.inertia - more for b, more in zip(bodies, moved)])
-    yield "parallel-axis term m (c'c 1 - c c') of {} left out", less
-    products = "products of different rates in {} of {{}} {}"
-    yield products.format("v_conv", "left out"), with_field("v_conv", v)
-    half = with_field("v_conv", [(squares + b.v_conv) * 0.5 for b, squares in zip(bodies, v)])
-    yield products.format("v_conv", "once for twice"), half
+    again, less = zip(*((b.inertia + more, b.inertia - more) for b, more in zip(bodies, moved)))
+    yield "inertia of {} about its joint and mass counted again", with_field("inertia", again)
+    yield "parallel-axis term m (c'c 1 - c c') of {} left out", with_field("inertia", less)
+    products, without = "products of different rates in {} of {{}} {}", with_field("v_conv", v)
+    yield products.format("v_conv", "left out"), without
+    half = [(squares + b.v_conv) * 0.5 for b, squares in zip(bodies, v)]
+    yield products.format("v_conv", "once for twice"), with_field("v_conv", half)
     yield products.format("w_conv", "left out"), with_field("w_conv", w)
-    both = [b._replace(v_conv=of_v, w_conv=of_w) for b, of_v, of_w in zip(bodies, v, w)]
+    both = [b._replace(w_conv=of_w) for b, of_w in zip(without, w)]
     yield products.format("v_conv and w_conv", "left out"), both
-    squares_left_out = with_field("v_conv", [b.v_conv - squares for b, squares in zip(bodies, v)])
-    yield "squares of rates in v_conv of {} left out", squares_left_out
+    others = [b.v_conv - squares for b, squares in zip(bodies, v)]
+    yield "squares of rates in v_conv of {} left out", with_field("v_conv", others)
 
 
 def turned(body: method.Body, R: Matrix) -> method.Body:

@@ -4,9 +4,10 @@ derivation.
 A variant is a cause with Mbar and h as they would be, as `Equations.values` has them.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
 from itertools import combinations, permutations, product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,16 +24,20 @@ MOST_PERMUTED = 6  # joints: with more, only the sense and the unit of one are t
 MOST_TURNED = 4  # joints whose order and senses are tried together
 
 Variant = tuple[Cause, np.ndarray]  # the values: (states, entries)
+Convention = tuple[Cause, JointMap]  # the joints of equations that have it
+
+
+def variant(rank: int, kind: str, place: str, stated: str, explains: str, values: np.ndarray) -> Variant:
+    return Cause(rank=rank, kind=kind, place=place, stated=stated, explains=explains), values
+
+
+option, slip = partial(variant, 1, "option"), partial(variant, 2, "slip")
 
 
 def program_options(equations: Equations) -> Iterator[Variant]:
     """What an option or a convention of the whole file or program changes."""
     tree, q, qd, h = equations.tree, equations.q, equations.qd, equations.right[:, equations.in_h]
     with_bias, terms = equations.with_bias, equations.terms
-
-    def option(place: str, stated: str, explains: str, values: np.ndarray) -> Variant:
-        return Cause(rank=1, kind="option", place=place, stated=stated, explains=explains), values
-
     weight = terms["gravity"].sum(axis=0)
     of_speeds = np.sum([terms[name] for name in VELOCITY_TERMS], axis=(0, 1))
     yield option("gravity", "on", "off", equations.right - weight)
@@ -73,48 +78,37 @@ def absolute_angles(tree: tmt.Tree) -> np.ndarray | None:
     return turns if (turns != np.eye(len(turns))).any() else None
 
 
-class Convention(NamedTuple):
-    """A convention of the joints, and the joints of equations that have it."""
-
-    cause: Cause
-    joints: JointMap
-
-
 def conventions(equations: Equations) -> Iterator[Convention]:
     """Order, senses and units of the joints; the order and the senses of a few together, rank 3."""
-    coordinates = equations.coordinates
-    names, kinds = coordinates.names, dict(zip(coordinates.names, coordinates.all_kinds))
-    in_order = ", ".join(names)
+    coordinates, names = equations.coordinates, equations.coordinates.names
+    kinds, in_order = dict(zip(names, coordinates.all_kinds)), ", ".join(names)
+    right = {name: Joint(name, slides=kinds[name] == "slide") for name in names}
 
-    def joints(
-        order: Sequence[str] = names, turned: Sequence[str] = (), of_unit: Sequence[str] = (), unit: str = ""
-    ) -> list[Joint]:
-        senses, units = dict.fromkeys(turned, -1.0), dict.fromkeys(of_unit, unit)
-        slides = {name: kind == "slide" for name, kind in kinds.items()}
-        return [Joint(name, senses.get(name, 1.0), 0.0, units.get(name, ""), slides[name]) for name in order]
+    def turned(joints: Sequence[str]) -> dict[str, Joint]:
+        return right | {name: right[name]._replace(sign=-1.0) for name in joints}
 
-    def convention(
-        kind: str, place: str, stated: str, explains: str, joints: Sequence[Joint], rank: int = 1
-    ) -> Convention:
-        cause = Cause(rank=rank, kind=kind, place=place, stated=stated, explains=explains)
-        return Convention(cause, JointMap(coordinates, joints))
+    def convention(kind: str, place: str, stated: str, explains: str, joints: Iterable[Joint]) -> Convention:
+        cause = Cause(rank=1, kind=kind, place=place, stated=stated, explains=explains)
+        return cause, JointMap(coordinates, list(joints))
 
     orders = list(permutations(names))[1:] if len(names) <= MOST_PERMUTED else []
     for order in orders:
-        yield convention("order", "order of the joints", in_order, ", ".join(order), joints(order))
+        in_other = [right[name] for name in order]
+        yield convention("order", "order of the joints", in_order, ", ".join(order), in_other)
     straight = [name for name in names if kinds[name] != "ball"]
     most = len(straight) if len(straight) <= MOST_PERMUTED else 1
-    senses = [turned for count in range(1, most + 1) for turned in combinations(straight, count)]
-    for turned in senses:
-        yield convention("sign", f"sense of {listed(turned)}", "+", "-", joints(turned=turned))
-    hinges = tuple(name for name in straight if kinds[name] == "hinge")
-    for some in filter(None, dict.fromkeys((*((name,) for name in hinges), hinges))):
-        place = f"unit of {some[0] if len(some) == 1 else 'all hinges'}"
-        for unit in filter(None, PER_UNIT):
-            yield convention("unit", place, "rad", unit, joints(of_unit=some, unit=unit))
-    for order, turned in product(orders, senses) if len(names) <= MOST_TURNED else ():
-        both, place = joints(order, turned), "order and senses of the joints"
-        yield convention("order", place, in_order, ", ".join(map(str, both)), both, rank=3)
+    senses = [chosen for count in range(1, most + 1) for chosen in combinations(straight, count)]
+    for chosen in senses:
+        yield convention("sign", f"sense of {listed(chosen)}", "+", "-", turned(chosen).values())
+    hinges = [name for name in straight if kinds[name] == "hinge"]
+    places = {name: [name] for name in hinges} | ({"all hinges": hinges} if len(hinges) > 1 else {})
+    for (place, those), unit in product(places.items(), filter(None, PER_UNIT)):
+        in_unit = right | {name: right[name]._replace(unit=unit) for name in those}
+        yield convention("unit", f"unit of {place}", "rad", unit, in_unit.values())
+    for order, chosen in product(orders, senses) if len(names) <= MOST_TURNED else ():
+        both, place = [turned(chosen)[name] for name in order], "order and senses of the joints"
+        cause, joints = convention("order", place, in_order, ", ".join(map(str, both)), both)
+        yield replace(cause, rank=3), joints
 
 
 def values_in(equations: Equations, maps: Sequence[JointMap], states: int) -> Iterator[np.ndarray]:

@@ -1,6 +1,7 @@
 """A user's equations as an engine, integrated by the same RK4 as tmt's."""
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 
 import numpy as np
 from numpy import ndarray
@@ -26,12 +27,9 @@ class Own:
     name = "own"
 
     def __init__(self, equations: OwnEquations, schemes: Iterable[str] = ()):
-        self.equations, self.schemes = equations, set(schemes) | {"rk4"}
-
-    @property
-    def methods(self) -> Mapping[str, Method]:
-        names = [name for name in RK4_SCHEMES if name in self.schemes]
-        return {name: Method(self.name, name, tmt.METHODS[name].order, name) for name in names}
+        self.equations, needed = equations, {*schemes, "rk4"}
+        names = [name for name in RK4_SCHEMES if name in needed]
+        self.methods = {name: Method(self.name, name, tmt.METHODS[name].order, name) for name in names}
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         """None if a robot's own actuators act: the equations do not have them."""
@@ -54,35 +52,27 @@ class OwnDynamics:
     def __init__(self, equations: OwnEquations, case: Case):
         self.equations, self.case, self.coordinates = equations, case, case.coordinates
         self.tree = case.tree  # for its damping and springs only
-        every = case.robot.coordinates
-        free = [place for name, place in zip(every.names, every.places.joints) if name in case.joints]
-        self.free_q = [i for place in free for i in range(place.q.start, place.q.stop)]
-        self.free_v = [i for place in free for i in range(place.qd.start, place.qd.stop)]
-        self.still_q = np.array(case.posture if case.locked else np.zeros(every.nq), float)
-        self.still_v = np.zeros(every.nv)
+        self.free, self.all_q = case.indices("qd"), case.positions_of_all
 
     def has(self, name: str) -> bool:
         return self.equations.has(name)
 
-    def all_q(self, q: ArrayLike) -> ndarray:
-        """The positions of all joints, those of the locked ones too, (..., nq)."""
-        return inserted(self.still_q, self.free_q, q)
-
-    def all_v(self, v: ArrayLike) -> ndarray:
+    def all_v(self, v: ndarray) -> ndarray:
         """The speeds of all joints, zero for the locked ones, (..., nv)."""
-        return inserted(self.still_v, self.free_v, v)
+        speeds = np.zeros((*np.shape(v)[:-1], self.equations.coordinates.nv))
+        speeds[..., self.free] = v
+        return speeds
 
-    def mass_matrix(self, q: ArrayLike) -> ndarray:
-        return self.equations.mass_matrix(self.all_q(q))[..., self.free_v, :][..., self.free_v]
+    def mass_matrix(self, q: ndarray) -> ndarray:
+        return self.equations.mass_matrix(self.all_q(q))[..., self.free, :][..., self.free]
 
-    def bias(self, q: ArrayLike, v: ArrayLike) -> ndarray:
+    def bias(self, q: ndarray, v: ndarray) -> ndarray:
         q, v = self.all_q(q), self.all_v(v)
         h = self.equations.bias(q, v)
-        return (h if self.case.scene.gravity else h - self.equations.gravity_balance(q))[..., self.free_v]
+        return (h if self.case.scene.gravity else h - self.equations.gravity_balance(q))[..., self.free]
 
-    def gravity_balance(self, q: ArrayLike) -> ndarray:
-        weight = self.equations.gravity_balance(self.all_q(q))
-        return weight[..., self.free_v] * self.case.scene.gravity
+    def gravity_balance(self, q: ndarray) -> ndarray:
+        return self.equations.gravity_balance(self.all_q(q))[..., self.free] * self.case.scene.gravity
 
     def acceleration(self, q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
         case, equations = self.case, self.equations
@@ -92,19 +82,19 @@ class OwnDynamics:
         lifted = 0.0 if case.scene.gravity else equations.gravity_balance(q)
         return equations.acceleration(q, v, np.asarray(tau) - case.added_damping * v + lifted)
 
-    def energy(self, q: ArrayLike, v: ArrayLike) -> ndarray:
+    def energy(self, q: ndarray, v: ndarray) -> ndarray:
         return self.equations.energy(self.all_q(q), self.all_v(v))
 
-    def potential_energy(self, q: ArrayLike) -> ndarray:
+    def potential_energy(self, q: ndarray) -> ndarray:
         """The energy at rest, J, (...), from the zero of the equations."""
         return self.energy(q, np.zeros(self.coordinates.nv))
 
-    def com_positions(self, q: ArrayLike) -> ndarray:
+    def com_positions(self, q: ndarray) -> ndarray:
         return self.equations.com_positions(self.all_q(q))
 
-    def jacobians(self, q: ArrayLike) -> tuple[ndarray, ndarray]:
+    def jacobians(self, q: ndarray) -> tuple[ndarray, ndarray]:
         T, B = self.equations.jacobians(self.all_q(q))
-        return T[..., self.free_v], B[..., self.free_v]
+        return T[..., self.free], B[..., self.free]
 
     def run(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4",
@@ -135,21 +125,10 @@ class OwnDynamics:
         return Motion(t, paths[..., :nq], paths[..., nq:], 4 * steps * len(q), ended, steps)
 
     def prepare(self, q: ndarray, v: ndarray, tau: ndarray, setting: Setting, method: str) -> Prepared:
-        steps, every = setting.steps or 0, setting.every
-
-        def run() -> Motion:
-            return self.run(q, v, tau, setting.duration / steps, steps, method, setting.tolerance)
+        every, steps = setting.every, setting.every * GRID
+        dt, t = setting.duration / steps, np.linspace(0.0, setting.duration, GRID + 1)
 
         def read(motion: Motion) -> Motion:
-            t = np.linspace(0.0, setting.duration, GRID + 1)
             return motion._replace(t=t, q=motion.q[::every].copy(), v=motion.v[::every].copy())
 
-        return run, read
-
-
-def inserted(still: ndarray, free: list[int], values: ArrayLike) -> ndarray:
-    """The numbers of all joints, (..., n), of which the free ones have these values."""
-    values = np.asarray(values, float)
-    every = np.broadcast_to(still, (*values.shape[:-1], len(still))).copy()
-    every[..., free] = values
-    return every
+        return partial(self.run, q, v, tau, dt, steps, method, setting.tolerance), read

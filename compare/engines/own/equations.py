@@ -3,7 +3,7 @@
 import time
 import warnings
 from collections.abc import Sequence
-from typing import NamedTuple
+from contextlib import suppress
 
 import numpy as np
 from numpy import ndarray
@@ -23,17 +23,7 @@ from .functions import QUANTITIES, STATE, OwnError, Problem, call, state_in_word
 SKEW = 1e-9  # of the largest entry: a mass matrix with a larger asymmetry is reported as not symmetric
 DIVERGED = 2.0**49  # rad etc.: beyond it a run has diverged, and errors are not those of the equations
 
-States = Sequence[
-    ndarray
-]  # q (states, nq), and qd and tau (states, nv) where they are needed; or of one state (nq,) ...
-
-
-class Noted(NamedTuple):
-    """An error at some states."""
-
-    state: str  # the first
-    text: str
-    states: set[int]  # hashes of all
+States = Sequence[ndarray]  # q (states, nq), and qd and tau (states, nv) if needed; or of one state (nq,) ...
 
 
 class OwnEquations:
@@ -66,7 +56,7 @@ class OwnEquations:
         # of each function that was called
         self.takes_batches: dict[str, bool] = {}
         self.times: dict[str, tuple[float, float]] = {}  # of one state, alone and in a batch, s
-        self.errors: dict[tuple[str, str], Noted] = {}  # by the quantity and what is wrong
+        self.errors: dict[tuple[str, str], Problem] = {}  # by the quantity and what is wrong
 
     def has(self, name: str) -> bool:
         return name in self.functions
@@ -74,12 +64,7 @@ class OwnEquations:
     @property
     def problems(self) -> list[Problem]:
         """The errors so far, each once."""
-        problems = []
-        for (quantity, _), (state, text, states) in self.errors.items():
-            more = len(states) - 1
-            others = f", and at {more} more state{'s' * (more > 1)}" if more else ""
-            problems.append(Problem(quantity, state, f"{text} at {state}{others}"))
-        return problems
+        return list(self.errors.values())
 
     @property
     def seconds(self) -> float:
@@ -175,10 +160,8 @@ class OwnEquations:
         """Values (states, ...) at states in the user's joints, NaN where it raised; and where it raised."""
         raised = np.zeros(len(states[0]), bool)
         if self.takes_batches.get(name) and len(raised):
-            try:
+            with suppress(OwnError):  # it is located state by state
                 return self.called(name, states, len(raised)), raised
-            except OwnError:  # it is located state by state
-                pass
         shape = [axis if isinstance(axis, int) else 0 for axis in self.shapes[name]]
         values = np.full((len(raised), *shape), np.nan)
         for i in range(len(raised)):
@@ -208,21 +191,14 @@ class OwnEquations:
         self.times[name] = min(times), min(times)
         if len(singles) == count:
             started = time.perf_counter()
-            together = self.tried_together(name, [part[:count] for part in states])
-            if together is not None and functions.same(together, np.array(singles)):
-                self.takes_batches[name] = True
-                self.times[name] = min(times), (time.perf_counter() - started) / count
+            with suppress(OwnError), warnings.catch_warnings(), np.errstate(all="ignore"):
+                warnings.simplefilter("ignore")
+                together = self.called(name, [part[:count] for part in states], count, is_trial=True)
+                if functions.same(together, np.array(singles)):
+                    self.takes_batches[name] = True
+                    self.times[name] = min(times), (time.perf_counter() - started) / count
         if len(states[0]) > 1:  # else another time
             self.takes_batches.setdefault(name, False)
-
-    def tried_together(self, name: str, states: States) -> ndarray | None:
-        """Values of several states at once; None if it does not take batches, which is no error."""
-        try:
-            with warnings.catch_warnings(), np.errstate(all="ignore"):
-                warnings.simplefilter("ignore")
-                return self.called(name, states, len(states[0]), is_trial=True)
-        except OwnError:
-            return None
 
     def called(self, name: str, states: States, count: int | None = None, is_trial: bool = False) -> ndarray:
         """The value of a function at one state, or at count of them; OwnError if it is none."""
@@ -261,9 +237,9 @@ class OwnEquations:
         if where.any():
             first = state_in_words([part[np.argmax(where)] for part in states])
             text = what if what.startswith(name) else f"{name} {what}"
-            noted = self.errors.setdefault((name, what), Noted(first, text, set()))
+            problem = self.errors.setdefault((name, what), Problem(name, text, first, set()))
             rows = np.concatenate([part[where] for part in states], axis=1)
-            noted.states.update(hash(row.tobytes()) for row in rows)
+            problem.states.update(hash(row.tobytes()) for row in rows)
 
 
 def passive(tree: tmt.Tree, q: ndarray, v: ndarray) -> ndarray:

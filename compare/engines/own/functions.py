@@ -43,9 +43,7 @@ QUANTITIES = {
     "com_positions": Quantity(1, ("bodies", 3)),
     "jacobians": Quantity(1, (2, "bodies", 3, "nv")),
 }
-METHOD_NAMES = {
-    name: "gravity_balance" if name == "gravity" else name for name in QUANTITIES
-}  # of engines and tmt
+METHOD_NAMES = {name: name for name in QUANTITIES} | {"gravity": "gravity_balance"}  # of engines and tmt
 QUICK = 1e-3  # s per state: functions that are as fast as this are called some hundred times more
 SAME = 1e-12  # of the largest value: values of a batch and of single states are equal except for rounding
 MOST_SHOWN = 8  # numbers of a state in a message
@@ -96,7 +94,7 @@ def source_name(source: object) -> str:
 
 def names_of(source: object) -> Sequence[str] | None:
     """The joints that the source states, in its own order; None if it states none."""
-    names: Any = source.joint_names if isinstance(source, tmt.Tree) else attribute(source, "joint_names")
+    names: Any = attribute(source, "joint_names")
     try:
         return names if names is None or isinstance(names, str) else list(names)
     except TypeError:
@@ -136,10 +134,7 @@ def function_of(name: str, value: Any, symbols: object, coordinates: Coordinates
 
 
 def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Coordinates) -> Function:
-    """The function of a SymPy matrix or expression.
-
-    given_symbols: of q, or of q and qd, or of q, qd and tau, in order.
-    """
+    """The function of a SymPy matrix or expression of these symbols, in order."""
     import sympy
 
     def flat(value: Any) -> list[Any]:
@@ -150,7 +145,7 @@ def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Co
     except Exception as error:  # whatever SymPy makes of what is given
         raise OwnError(f"{name} is {shown(matrix)}; expected a SymPy matrix ({shown(str(error))})") from None
     nq, nv = coordinates.nq, coordinates.nv
-    counts = [nq, nq + nv, nq + 2 * nv]
+    counts = [nq, nq + nv, nq + 2 * nv]  # of the symbols of q, of q and qd, of q, qd and tau
     if len(symbols) not in counts or len(set(symbols)) < len(symbols):
         listed = ", ".join(map(str, symbols))
         wanted = f"{nq} of q, or {counts[1]} of q and qd in order, each once"
@@ -168,21 +163,18 @@ def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Co
     axes = QUANTITIES[name].shape_for(nv)
     shape = tuple(axis if isinstance(axis, int) else -1 for axis in axes)
     if name == "jacobians" or (-1 not in shape and len(entries) != prod(shape)):
-        expected = in_words(axes)
-        raise OwnError(f"{name} is a SymPy object of {len(entries)} entries; expected shape {expected}")
+        raise OwnError(f"{name} is a SymPy object of {len(entries)} entries; expected shape {in_words(axes)}")
     try:
-        evaluated = sympy.lambdify(plain, entries, "numpy", cse=True)
+        evaluated = sympy.lambdify(plain[:taken], entries, "numpy", cse=True)
     except Exception as error:  # of expressions that have no numbers, such as zoo
         listed = ", ".join(map(str, plain))
         raise OwnError(f"{name} cannot be evaluated as a function of {listed}: {error!r}") from None
 
     def function(*states: np.ndarray) -> np.ndarray:
         columns = [column for state in states for column in np.moveaxis(state, -1, 0)][: len(plain)]
-        columns += [np.zeros_like(columns[0])] * (len(plain) - len(columns))  # nothing depends on these
         values = np.broadcast_arrays(*evaluated(*columns), columns[0])[:-1]
         return np.stack(values, axis=-1).reshape((*states[0].shape[:-1], *shape))
 
-    function.__name__ = name
     return function
 
 
@@ -193,8 +185,16 @@ class Problem(NamedTuple):
     """An error in equations that can still be used."""
 
     quantity: str
+    what: str
     state: str  # the first at which it occurs, in the function's own joints
-    text: str  # one line
+    states: set[int]  # hashes of all
+
+    @property
+    def text(self) -> str:
+        """In one line."""
+        more = len(self.states) - 1
+        others = f", and at {more} more state{'s' * (more > 1)}" if more else ""
+        return f"{self.what} at {self.state}{others}"
 
 
 def in_words(shape: Shape) -> str:
@@ -236,9 +236,8 @@ def in_shape(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray | None:
 
 def same(together: np.ndarray, singles: np.ndarray) -> bool:
     """Whether a batch has the values of single states."""
-    size = np.abs(singles[np.isfinite(singles)]).max(initial=0.0)
-    is_close = partial(np.allclose, rtol=0.0, atol=SAME * size, equal_nan=True)
-    return together.shape == singles.shape and bool(is_close(together, singles))
+    allowed = SAME * np.abs(singles[np.isfinite(singles)]).max(initial=0.0)
+    return together.shape == singles.shape and np.allclose(together, singles, 0.0, allowed, equal_nan=True)
 
 
 def state_in_words(state: Sequence[Sequence[float] | np.ndarray]) -> str:

@@ -43,9 +43,7 @@ def own_object(stated: str) -> object:
             value = part_of(module_of_file(place) if is_file else module_named(place), place, name)
             return value() if inspect.isclass(value) else value
     finally:
-        sys.path.reverse()
-        sys.path.remove(folder)
-        sys.path.reverse()
+        del sys.path[-1 - sys.path[::-1].index(folder)]  # the last of its name, added above
 
 
 def module_of_file(place: str) -> ModuleType:
@@ -68,11 +66,10 @@ def module_of_file(place: str) -> ModuleType:
 def module_named(name: str) -> ModuleType:
     if not all(part.isidentifier() for part in name.split(".")):
         raise OwnFileError(f"{name!r} is not the name of a module; expected {FORMS_OF_REFERENCE}")
-    with raised_in(name):  # by a package that it is in
-        try:
-            spec = importlib.util.find_spec(name)
-        except ModuleNotFoundError:
-            spec = None
+    try:
+        spec = importlib.util.find_spec(name)  # which imports a package that it is in
+    except ModuleNotFoundError:
+        spec = None
     if spec is None:
         neighbours = [file.stem for file in Path().glob("*.py")]
         raise OwnFileError(f"{name}: no such module{close_names(name, neighbours)}")

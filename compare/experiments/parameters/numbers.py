@@ -13,6 +13,7 @@ from tmt import literal
 
 from ...core.check import Result
 from ...core.rows import Row, column
+from ...diagnosis.places import unit_of as unit_of_joint
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.parameters import ABSENT as FIELDS
 from ...engines.mujoco.parameters import STATED_FLAGS, Stated
@@ -34,7 +35,6 @@ UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gra
     "mass": "kg", "com": "m", "inertia": "kg m2", "rest": "rad", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
     "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
-OF_SLIDES = {"rad": "m", "N m s/rad": "N s/m", "kg m2": "kg", "N m/rad": "N/m", "N m": "N"}  # units
 COMPONENTS = {1: [""], 3: [*"xyz"], 9: [row + of_row for row in "xyz" for of_row in "xyz"]}  # by their number
 
 
@@ -81,8 +81,7 @@ class ParametersResult(Result):
 
 def unit_of(quantity: str, slides: bool) -> str:
     """The unit of a number of a body, or of a joint that turns or slides."""
-    unit = UNITS[quantity]
-    return OF_SLIDES.get(unit, unit) if slides and quantity not in OF_BODIES else unit
+    return unit_of_joint(UNITS[quantity], "slide" if slides and quantity not in OF_BODIES else "hinge")
 
 
 def rows_of(number: Stated, unit: str, asked_by: str | None = None) -> list[NumberRow]:

@@ -24,7 +24,8 @@ EDITS = (
     ("joint_map", "costs_of", "OF_PLACE * apart", "0.0 * apart", "joints are matched wherever they are"),
     ("joint_map", "costs_of", "OF_DEPTH * _1", "0.0 * _1", "joints are matched whatever carries them"),
     # the comparison
-    ("comparison", "Compared.ratio", "np.where(_1, off, np.inf)", "np.where(_1, off, 0.0)", "NaN agrees"),
+    ("agreement.comparison", "Compared.ratio", "share_of(_1, _2)", "share_of(np.where(np.isfinite(_1), _1, 0.0), _2)",
+     "NaN agrees"),
     ("agreement.comparison", "Comparison.__init__", "FACTOR * EPS + float(rtol)", "FACTOR * EPS", "rtol is not added"),
     ("comparison", "Comparison.__init__", "FACTOR * EPS + _1", "max(FACTOR, 96) * EPS + _1", "64 eps become 96"),
     ("agreement.comparison", "Compared.fails", "self.ratio > 1.0", "self.ratio > 2.0", "twice the tolerance agrees"),
