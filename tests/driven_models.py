@@ -19,10 +19,8 @@ def laws(rng) -> dict[str, tuple[str, dict]]:
     def some(low, high, size=None):
         return numbers(rng.uniform(low, high, size))
 
-    bias = {
-        "biastype": "affine",
-        "biasprm": numbers([rng.uniform(-1, 1), rng.uniform(-9, 1), rng.uniform(-1, 1)]),
-    }
+    terms = [rng.uniform(-1, 1), rng.uniform(-9, 1), rng.uniform(-1, 1)]
+    bias = {"biastype": "affine", "biasprm": numbers(terms)}
     affine = {"gaintype": "affine", "gainprm": numbers([rng.uniform(1, 5), *rng.uniform(-3, 3, 2)])} | bias
     return {
         "motor": ("motor", {}), "position": ("position", {"kp": some(5, 50), "kv": some(0, 5)}),
@@ -39,9 +37,8 @@ def laws(rng) -> dict[str, tuple[str, dict]]:
 def robot(rng, text: str, flags: dict | None) -> tuple[ET.Element, list[str]]:
     """A random tree without contacts, some bodies lighter than they are or falling upwards; and a site in each body."""
     root, sites = ET.fromstring(text), []
-    ET.SubElement(
-        root.find("option"), "flag", {"contact": "disable", "constraint": "disable"} | (flags or {})
-    )
+    stages_off = {"contact": "disable", "constraint": "disable"}
+    ET.SubElement(root.find("option"), "flag", stages_off | (flags or {}))
     for body in root.iter("body"):
         sites.append(f"site of {body.get('name')}")
         place = {"pos": numbers(rng.uniform(-0.3, 0.3, 3)), "euler": numbers(rng.uniform(-1, 1, 3))}
@@ -51,16 +48,11 @@ def robot(rng, text: str, flags: dict | None) -> tuple[ET.Element, list[str]]:
     return root, sites
 
 
-def add_tendons(
-    rng, root, joints: list[str], sites: list[str], stiffness: float, damping: float, dead: float
-) -> None:
+def add_tendons(rng, root, joints: list, sites: list, stiffness: float, damping: float, dead: float) -> None:
     """A fixed tendon across two joints and a rope between two sites, with springs, dead bands and dampers."""
     tendons = ET.SubElement(root, "tendon")
-    given = {
-        "stiffness": numbers(stiffness),
-        "damping": numbers(damping),
-        "springlength": numbers([0.1, 0.1 + dead]),
-    }
+    given = {"stiffness": numbers(stiffness), "damping": numbers(damping)}
+    given["springlength"] = numbers([0.1, 0.1 + dead])
     across = ET.SubElement(tendons, "fixed", name="across", **given)
     rope = ET.SubElement(tendons, "spatial", name="rope", **given)
     for joint in rng.choice(joints, 2, replace=False):
@@ -87,15 +79,12 @@ def with_drive(seed: int, transmissions=TRANSMISSIONS, flags: dict | None = None
         where = str(rng.choice(transmissions))
         two = list(map(str, rng.choice(sites, 2, replace=False)))
         place = {
-            "joint": {"joint": str(rng.choice(names))},
-            "jointinparent": {"jointinparent": str(rng.choice(names))},
+            "joint": {"joint": str(rng.choice(names))}, "jointinparent": {"jointinparent": str(rng.choice(names))},
             "ball": {str(rng.choice(["joint", "jointinparent"])): str(rng.choice(turning))},
-            "tendon": {"tendon": "across"},
-            "spatial": {"tendon": "rope"},
-            "site": {"site": two[0]},
-            "refsite": {"site": two[0], "refsite": two[1]},
+            "tendon": {"tendon": "across"}, "spatial": {"tendon": "rope"},
+            "site": {"site": two[0]}, "refsite": {"site": two[0], "refsite": two[1]},
             "slidercrank": {"cranksite": two[0], "slidersite": two[1], "cranklength": "2.5"},
-        }[where]
+        }[where]  # fmt: skip
         gear = rng.uniform(-2, 2, 6 if where in ("ball", "site", "refsite") else 1)
         if kind != "damper" and rng.random() < 0.3:
             given |= {"ctrllimited": "true", "ctrlrange": numbers([-rng.uniform(0, 1), rng.uniform(0, 1)])}
@@ -120,9 +109,8 @@ def with_servos(seed: int, floats: bool = False, flags: dict | None = None) -> s
         kp, kind = 10.0 ** rng.uniform(1.5, 3.5), joint.get("type")
         kv = kp / 100 * rng.choice([0, 0.5, 5, 50, 500])
         for gear in ("1 0 0", "0 1 0", "0 0 1") if kind == "ball" else (str(rng.choice([1, 1, 3, -2])),):
-            ET.SubElement(
-                actuators, "position", joint=joint.get("name"), kp=numbers(kp), kv=numbers(kv), gear=gear
-            )
+            gains = {"kp": numbers(kp), "kv": numbers(kv), "gear": gear}
+            ET.SubElement(actuators, "position", joint=joint.get("name"), **gains)
         names += [joint.get("name")] * (kind != "ball")
     add_tendons(rng, root, names, sites, 30.0, 3.0, 0.0)
     kp, kv = 10 ** rng.uniform(1, 3), rng.choice([0, 5, 50])

@@ -95,11 +95,8 @@ def started(*arguments, cwd, env=None):
     def hearing():  # a shell starts what runs in its background deaf to Ctrl-C
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    environment = ENVIRONMENT | (env or {})
-    return subprocess.Popen(
-        arguments, cwd=cwd, env=environment, start_new_session=True, preexec_fn=hearing, **pipes
-    )
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
+    return subprocess.Popen(arguments, cwd=cwd, env=ENVIRONMENT | (env or {}), preexec_fn=hearing, **options)
 
 
 def ended(run, name):

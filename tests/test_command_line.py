@@ -7,8 +7,7 @@ from argparse import ArgumentTypeError
 
 import pandas as pd
 import pytest
-from in_process import runs_in_this_process as runs_in_this_process
-from in_process import without_workers
+from in_process import answered, without_workers
 from models import PATHS
 from runs import ROOT, on_terminal, readable_lines, words
 
@@ -207,11 +206,7 @@ def test_a_bad_request_gets_one_line_and_status_2(arguments, capsys, monkeypatch
     monkeypatch.chdir(tmp_path)
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
-    try:
-        status = main(arguments.split())
-    except SystemExit as stop:
-        status = stop.code
-    out, err = capsys.readouterr()
+    status, out, err = answered(arguments.split(), capsys)
     assert (status, out, len(err.splitlines())) == (2, "", 1) and WRONG[arguments] in err, err
     assert err.startswith("python -m compare: ")
     assert {path.name for path in tmp_path.iterdir()} == FILES.keys()

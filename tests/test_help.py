@@ -8,7 +8,7 @@ from pathlib import Path
 
 import own_equations
 import pytest
-from in_process import runs_in_this_process as runs_in_this_process
+from in_process import answered
 from runs import ENVIRONMENT
 from shown import blocks, command_lines
 
@@ -30,13 +30,6 @@ def com_positions(q):
     upper = np.array([-np.sin(hip), 0.0, -np.cos(hip)])
     return np.array([upper / 2, upper + np.array([-np.sin(knee), 0.0, -np.cos(knee)]) / 2])
 """
-
-
-def answered(arguments, capsys):
-    """Exit status, stdout and stderr of a request that runs nothing."""
-    with pytest.raises(SystemExit) as stop:
-        main(arguments)
-    return stop.value.code, *capsys.readouterr()
 
 
 @pytest.mark.parametrize("arguments, expected", [

@@ -19,9 +19,8 @@ from compare.run.examine import Setup, new_causes
 ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge"' for name in ("alpha", "beta", "gamma"))
 FOREARM = '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>'
 STAGES_OFF = 'contact="disable" constraint="disable"'
-ON_THE_WORLD = XML.replace('<body name="fore', '</body><body name="fore').replace(
-    "</body>\n    </body>", "</body>"
-)
+BESIDE = XML.replace('<body name="fore', '</body><body name="fore')
+ON_THE_WORLD = BESIDE.replace("</body>\n    </body>", "</body>")
 GEOM = '<geom size="0.001" pos="0.2 0.2 0.2"/>'
 TOUCHING = XML.replace("</worldbody>", f"{GEOM}</worldbody>").replace(FOREARM, FOREARM + GEOM)
 TABLE = '<body pos="1 0 0"><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/></body></worldbody>'
@@ -112,12 +111,8 @@ def without_some_joints(setup) -> Result:
 
 
 STATES = {name: module(name).rows for name in ("published", "kinematics", "mass", "gravity", "acceleration")}
-RUNS = {
-    "trajectory": follow,
-    "speed": untimed_speed,
-    "stability": linearise,
-    "reduction": without_some_joints,
-}
+RUNS = {"trajectory": follow, "speed": untimed_speed, "stability": linearise}
+RUNS["reduction"] = without_some_joints
 SLOW = pytest.param(RUNS, marks=pytest.mark.slow)
 TRIED = [name for name, (*_, unseen) in EDITS.items() if unseen is not None]
 

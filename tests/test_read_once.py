@@ -5,7 +5,6 @@ from xml.etree import ElementTree
 
 import mujoco
 import pytest
-from in_process import runs_in_this_process as runs_in_this_process
 from models import PATHS
 
 from compare.__main__ import main
@@ -26,12 +25,10 @@ def counts(monkeypatch):
 
         monkeypatch.setattr(owner, name, wrap(counted))
 
-    for owner, names in (
-        (mujoco.MjSpec, "from_file from_string"),
-        (mujoco.MjModel, "from_xml_path from_xml_string"),
-    ):
-        for name in names.split():
-            count(owner, name, staticmethod)
+    for name in ("from_file", "from_string"):
+        count(mujoco.MjSpec, name, staticmethod)
+    for name in ("from_xml_path", "from_xml_string"):
+        count(mujoco.MjModel, name, staticmethod)
     count(mujoco.MjSpec, "compile")
     count(ElementTree, "iterparse")
     return counts

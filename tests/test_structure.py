@@ -35,6 +35,7 @@ LIBRARIES = {
     "matplotlib": ("compare.report.style",), "PIL": ("compare.report.images",),
     "distributed": ("compare.fleet.executors",), "rich": ("compare.report.terminal",),
 }  # fmt: skip
+SHARED = tuple(f"compare.experiments.{name}" for name in ("figures", "followed", "quantities", "setup"))
 DRAWING = ("matplotlib", "PIL")  # for modules whose name begins with figures, too
 PUBLIC = {"compare", "tmt"}  # whose __init__ gathers public names: nodes of their own
 FOR_DOCSTRINGS = {("tmt.export", "tmt")}  # exported functions have those of the public ones
@@ -59,11 +60,10 @@ def part(module) -> str:
 
 def test_tmt_imports_three_libraries_alone():
     """And its symbolic equations SymPy, which need not be installed."""
-    allowed = {*sys.stdlib_module_names, "tmt", "numpy", "llvmlite", "mpmath"}
+    always = {*sys.stdlib_module_names, "tmt", "numpy", "llvmlite", "mpmath"}
     for path in OF_TMT:
-        assert (
-            not libraries(path) - allowed - ({"sympy"} if dotted(path).startswith("tmt.export.") else set())
-        ), path
+        allowed = always | {"sympy"} if dotted(path).startswith("tmt.export.") else always
+        assert not libraries(path) - allowed, path
 
 
 def test_imports_keep_their_directions():
@@ -74,10 +74,7 @@ def test_imports_keep_their_directions():
         for name in modules_of_compare(path):
             said = f"{dotted(path)} imports {name}"
             assert part(name) in allowed, said
-            shared = tuple(
-                f"compare.experiments.{name}" for name in ("figures", "followed", "quantities", "setup")
-            )
-            is_free = name.startswith(shared) or name.split(".")[:3] == own
+            is_free = name.startswith(SHARED) or name.split(".")[:3] == own
             assert is_free or not name.startswith("compare.experiments."), said
         assert "tmt" not in libraries(path) or "tmt" in allowed, path
         for library in libraries(path) & LIBRARIES.keys():

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import runs
+from in_process import answered
 from toy import soon
 
 from compare.__main__ import main
@@ -70,9 +71,8 @@ def test_the_status_is_1_where_a_file_differs_and_what_has_changed_is_said(folde
     said, words = [], ["fleet", "m/x", "--only", "mass", "--out", "out", "--workers", "1"]
 
     def carry_out(self, progress):
-        self.rows += [
-            FileRow(file=model.shown, verdict=said[-1], reason="no reason") for model in self.models
-        ]
+        (model,) = self.models
+        self.rows.append(FileRow(file=model.shown, verdict=said[-1], reason="no reason"))
 
     monkeypatch.setattr("compare.fleet.run.Run.carry_out", carry_out)
     statuses = {"agree": 0, "self-consistent": 0, "refused": 0, "unconfirmed": 1, "broke": 1, "differ": 1}
@@ -92,11 +92,7 @@ def test_the_status_is_1_where_a_file_differs_and_what_has_changed_is_said(folde
     (["fleet", "m", "--since", "nowhere"], "nowhere/fleet.csv"), (["fleet", "m", "--out", "m/part.xml"], "m/part.xml"),
 ])  # fmt: skip
 def test_what_cannot_be_carried_out_gets_status_2_and_one_line(arguments, word, folder, capsys):
-    try:
-        status = main(arguments)
-    except SystemExit as stop:
-        status = stop.code
-    out, err = capsys.readouterr()
+    status, out, err = answered(arguments, capsys)
     assert (status, out, len(err.splitlines())) == (2, "", 1) and word in err
     assert not (folder / "reports").exists()
 

@@ -13,17 +13,7 @@ import pytest
 from compare.core.check import AT_OWN_STEP, ENDS, About, Result
 from compare.fleet import table
 from compare.fleet.models import place_of_report
-from compare.fleet.table import (
-    AGREE,
-    BROKE,
-    DIFFER,
-    FLEET_COLUMNS,
-    ITSELF,
-    NOT_JUDGED,
-    REFUSED,
-    UNCONFIRMED,
-    FileRow,
-)
+from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, NOT_JUDGED, REFUSED, UNCONFIRMED, FileRow
 from compare.report.verdict import Section
 from compare.run.reference import Reference
 
@@ -86,9 +76,8 @@ def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
 
 
 def limit(dt, stable, integrator="Euler", kind="finite"):
-    return SimpleNamespace(
-        integrator=integrator, file_integrator="Euler", limit=kind, predicted_dt=dt, stable_at_file_dt=stable
-    )
+    of_file = {"file_integrator": "Euler", "stable_at_file_dt": stable}
+    return SimpleNamespace(integrator=integrator, limit=kind, predicted_dt=dt, **of_file)
 
 
 @pytest.mark.parametrize("limits, stable, least", [
@@ -179,7 +168,7 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
     with (tmp_path / "fleet.csv").open(newline="") as file:
         found = list(csv.DictReader(file))
     assert [row["file"] for row in found] == ["b.xml", "d.xml", "c.xml", "a b.xml"]
-    assert tuple(found[0]) == FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
+    assert tuple(found[0]) == table.FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
     text = (tmp_path / "index.html").read_text()
     parts = "early.xml", "the command", '<a href="files/c.xml/index.html">d.xml</a>'
     assert all(part in text for part in parts)

@@ -182,9 +182,7 @@ def test_an_answer_has_what_its_experiment_adds():
 
 # the headline of each experiment
 
-OFF = NumberRow(
-    of="forearm", quantity="com", component="x", stated=2.0, compiled=2.5, difference=0.5, unit="m"
-)
+OFF = NumberRow(of="forearm", quantity="com", component="x", stated=2.0, compiled=2.5, difference=0.5, unit="m")  # fmt: skip
 SAME = replace(OFF, compiled=2.0, difference=0.0)
 STEP = LimitRow(scene="s", engine="tmt", method="rk4", damping=0.0, mode=9.0, limit="finite", predicted_dt=0.1,
                 observed_dt=0.1001, passed=True)  # fmt: skip
@@ -222,26 +220,17 @@ def marks(experiment, result, robot=ARM):
     """What is marked in the first panel of the picture of an experiment: (mark, colour, x) of every point."""
     ((_, figure, _),) = (call() for call in module(experiment).overview({experiment: result}, robot))
     lines = [line for line in figure.axes[0].get_lines() if line.get_marker() not in (None, "None", "")]
-    return {
-        (line.get_marker(), to_hex(line.get_color()), float(x)) for line in lines for x in line.get_xdata()
-    }
+    points = [(line, float(x)) for line in lines for x in line.get_xdata()]
+    return {(line.get_marker(), to_hex(line.get_color()), x) for line, x in points}
 
 
 def test_the_agreement_is_the_largest_of_all_rows_of_a_quantity_and_its_picture_says_whose_distance_is_whose():
     near = replace(AGREED, mujoco_from_exact=None)
-    rows = [
-        near,
-        replace(near, difference=7.0, from_exact=None),
-        replace(AGREED, quantity="other", difference=9.0),
-    ]
+    rows = [near, replace(near, difference=7.0, from_exact=None)]
+    rows.append(replace(AGREED, quantity="other", difference=9.0))
     (found,) = figures_overview.agreements({"mass": Result("mass", rows=rows)})
-    assert found == {
-        "name": "mass matrix M",
-        "difference": 7.0,
-        "from_exact": 1.0,
-        "mujoco_from_exact": None,
-        "passed": True,
-    }
+    distances = {"difference": 7.0, "from_exact": 1.0, "mujoco_from_exact": None}
+    assert found == {"name": "mass matrix M", "passed": True} | distances
     _, _, caption = figures_overview.draw_agreement({"mass": Result("mass", rows=rows)})
     assert "Maximum difference: 7 eps" in say(caption)
     rows.append(replace(AGREED, difference=float("nan"), passed=False))
