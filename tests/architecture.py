@@ -1,7 +1,4 @@
-"""The imports of the project, and the diagram of them: `python -m tests.architecture` writes it into ARCHITECTURE.md.
-
-test_structure asserts the directions of these imports, and that the diagram shows all of them.
-"""
+"""The imports of the project, for test_structure; `python -m tests.architecture` draws them anew in ARCHITECTURE.md."""
 
 import ast
 import re
@@ -17,7 +14,6 @@ DIAGRAM = re.compile(r"(?<=```mermaid\n).*?(?=```)", re.DOTALL)
 
 
 def dotted(path) -> str:
-    """The name of a file as a module."""
     parts = path.relative_to(ROOT).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 

@@ -1,7 +1,6 @@
 """A second robot, of four hinges: nothing in compare knows it.
 
 Its hinges branch, and stand in another order in the file; one body is fixed to the world, and two are on one hinge.
-For test_second_robot, small_runs and the tests that import it.
 """
 
 from pathlib import Path
@@ -17,9 +16,7 @@ XML = """
   <compiler angle="radian"/>
   <option gravity="0 0 -9.81"><flag contact="disable" constraint="disable" autoreset="disable"/></option>
   <worldbody>
-    <body name="foot">
-      <inertial pos="0 0.1 -0.5" mass="4.0" diaginertia="0.2 0.2 0.3"/>
-    </body>
+    <body name="foot"><inertial pos="0 0.1 -0.5" mass="4.0" diaginertia="0.2 0.2 0.3"/></body>
     <body name="boom">
       <joint name="swing" axis="1 0 0"/>
       <joint name="lift" axis="0 1 0"/>
@@ -31,16 +28,14 @@ XML = """
       <body name="jib" pos="0 0 -0.4">
         <joint name="bend" axis="0 1 0"/>
         <inertial pos="0 0.01 -0.15" mass="1.2" diaginertia="0.012 0.011 0.002"/>
-        <body name="hook">
-          <inertial pos="0.03 0 -0.3" mass="0.3" diaginertia="0.001 0.0012 0.0009"/>
-        </body>
+        <body name="hook"><inertial pos="0.03 0 -0.3" mass="0.3" diaginertia="0.001 0.0012 0.0009"/></body>
       </body>
     </body>
   </worldbody>
 </mujoco>
 """
-MOMENTS = ((0.2, 0.2, 0.3), (0.03, 0.028, 0.004), (0.012, 0.011, 0.002), (0.001, 0.0012, 0.0009))
-MOMENTS += ((0.002, 0.0018, 0.0009),)
+MOMENTS = [(0.2, 0.2, 0.3), (0.03, 0.028, 0.004), (0.012, 0.011, 0.002), (0.001, 0.0012, 0.0009)]
+MOMENTS.append((0.002, 0.0018, 0.0009))
 TREE = tmt.Tree(
     joint_names=("swing", "lift", "bend", "twist"),  # the file has twist before bend
     parent=(-1, 0, 1, 1), offset=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -0.4), (0.0, 0.0, 0.3)),

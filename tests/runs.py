@@ -1,11 +1,7 @@
-"""Runs of the command line as a user starts them: in a pipe, on a terminal, and ended by a signal.
-
-For test_command_line, test_help, and the tests of fleet, process and report.
-"""
+"""Runs of the command line as a user starts them, for tests of whole runs: in a pipe, on a terminal, ended by a signal."""
 
 import os
 import re
-import select
 import signal
 import struct
 import subprocess
@@ -57,7 +53,6 @@ def on_terminal(arguments, columns, term, cwd, interrupt_at=None):
     os.close(theirs)
     output, pressed = b"", False
     while True:
-        select.select([ours], [], [], 60)
         try:
             new = os.read(ours, 65536)
         except OSError:  # the other side is closed

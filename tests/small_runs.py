@@ -1,8 +1,4 @@
-"""Small runs that several tests look at, which the fixture `shared` computes once.
-
-Used by conftest.py (`small`), test_own_reference, test_second_robot, report/test_verdict and
-experiments/diagnosis/test_judge_diagnosis.
-"""
+"""Small runs that several tests look at, which the fixtures `shared` and `small` of conftest.py compute once."""
 
 from functools import cache
 from pathlib import Path

@@ -43,9 +43,6 @@ def message_of(**brought):
     return str(error.value)
 
 
-# what may be brought
-
-
 def test_a_path_text_and_a_compiled_model_are_compared_at_the_same_states(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("pendulum.xml").write_text(PENDULUM)
@@ -71,9 +68,6 @@ def test_values_as_arrays_at_the_given_states(given):
     agrees(mass_matrix=M[..., None], bias=h[..., None].astype(object), **states)
     agrees(mass_matrix=sympy.Matrix(M[0]), bias=sympy.Matrix(h[0]), **first)
     agrees(mass_matrix=M.reshape(12, 4), bias=h, **states)  # as in the rows of a file
-
-
-# the tolerance
 
 
 @pytest.mark.parametrize("rtol", [0.0, 1e-6])
@@ -162,8 +156,6 @@ def test_a_structural_zero_has_the_scale_of_its_diagonal(share, within):
     assert worst.ratio == pytest.approx(share, rel=1e-2) and (worst.cause == "") is within
 
 
-# joints
-
 STATED = ["-knee+90deg in deg", "hip"]
 
 
@@ -200,9 +192,6 @@ def test_the_message_says_how_to_state_the_joints(stated, right):
     text = message_of(**functions, joints=stated)
     told = text.partition("state it as joints=")[2].partition(")")[0].partition("]")[0] + "]"
     agrees(**functions, joints=eval(told))
-
-
-# the cause
 
 
 def changing(q):
@@ -245,8 +234,6 @@ def test_the_cause_is_sought_where_there_are_values():
     assert "give mass_matrix and bias" in message_of(acceleration=values, q=q, qd=qd, tau=tau)
 
 
-# what cannot be compared
-
 TURNED = np.tile(read(PATHS["pendulum_ball"]).qpos0, (3, 1)) * np.array([1.0, 1.1, 1.0])[:, None]
 THREE = np.zeros((3, 2))
 
@@ -268,9 +255,6 @@ def test_what_cannot_be_compared_is_one_line(brought, word):
         with pytest.raises(ValueError, match=word) as error:
             function(**{"mjcf": PENDULUM} | brought)
         assert "\n" not in str(error.value)
-
-
-# states and time
 
 
 def test_states_that_are_not_compared_are_warned_of(monkeypatch):

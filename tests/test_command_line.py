@@ -28,9 +28,6 @@ def results_in(folder):
     return json.loads((folder / "results.json").read_text(encoding="utf-8"))
 
 
-# one report, of which all of this is asked
-
-
 def quick_run(folder):
     folder.mkdir()
     return on_terminal(["all", "--quick"], 80, "xterm", folder)
@@ -112,9 +109,6 @@ def test_results_have_their_fields(report):
     assert list(ended.values()) == sorted(ended.values())
 
 
-# other runs
-
-
 def test_a_wrong_file_differs_from_the_stated_numbers_and_not_from_its_own(inside, tmp_path, capsys):
     path, out = tmp_path / "two.xml", tmp_path / "out"
     path.write_text(XML.replace('mass="1.5"', 'mass="1.6"').replace("-9.81", "-9.8"))
@@ -162,8 +156,6 @@ def test_a_requested_step_that_is_not_stable_fails(inside, tmp_path, capsys):
         assert failed == ["stable in its run", "stable at the requested step"] * status
     assert "is not stable in its run at 3 ms" in capsys.readouterr().out
 
-
-# bad requests
 
 ARM7, MIXED = (str(PATHS[name]) for name in ("arm7", "mixed"))
 WRONG = {  # arguments, each with what is in its line

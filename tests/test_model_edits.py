@@ -1,7 +1,6 @@
 """A wrong model fails wherever it matters: edits of the MJCF x experiments, each must be seen or cannot be, with the reason.
 
-Every experiment in its smallest setting, in one process. In that of parameters each number that differs fails its own check and
-is the cause.
+In the experiment of parameters each number that differs fails its own check and is the cause.
 """
 
 from dataclasses import replace
@@ -129,8 +128,6 @@ def test_a_wrong_model_fails_wherever_it_matters(name, experiments):
     failing = {each for each in checks if not all(check.passed for check in checks[each])}
     assert failing == experiments.keys() - set(unseen.split())
 
-
-# the cause, by the experiment of parameters
 
 OF_A_SOLUTION = "rest"  # compared with a solution alone
 BODY = '<body name="forearm" pos="0 0 -0.3"'

@@ -51,9 +51,6 @@ def examined(folder, asked, names, mjcf="double.xml", joints=None, states=30, wo
     return SimpleNamespace(sections=sections, causes=causes, robot=robot, failed=failed)
 
 
-# what is compared
-
-
 @pytest.mark.parametrize("asked, joints", [
     ("mine.py:Object", None), ("mine:inside.also", None), ("mine.py:named", None), ("mine.py:swapped", "knee,hip"),
 ])  # fmt: skip
@@ -138,8 +135,6 @@ def test_a_report_has_what_can_be_compared_and_the_rest_gets_status_2(inside, fo
     assert results["reference"] == {"kind": "own", "name": "mine.py:Object"} and not results["passed"]
     assert {path.name for path in folder.iterdir()} == {"double.xml", "mine.py", "numbers_beside.py", "out"}
 
-
-# bad references
 
 BROKEN = "x = 1\ndef mass_matrix(q:\n"
 

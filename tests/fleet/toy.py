@@ -40,10 +40,9 @@ def soon(question):
 # function, arguments, its value, words of the reason why there is none
 FAULTS = {
     "hangs": (time.sleep, (600,), None, "5 s"), "raises": (divmod, (1, 0), None, "ZeroDivisionError"),
-    "exits": (os._exit, (3,), None, "status 3"), "crashes": (os.abort, (), None, "SIGABRT"),
+    "exits": (os._exit, (3,), None, "status 3"), "crashes": (os.abort, (), None, "SIGABRT"), "returns": (abs, (-4,), 4, ""),
     "reads elsewhere": (signal.raise_signal, (signal.SIGSEGV,), None, "SIGSEGV"),
     "eats": (bytearray, (4 * 10**12,), None, "out of memory"), "prints": (print, ("no answer",), None, ""),
-    "returns": (abs, (-4,), 4, ""),
 }  # fmt: skip
 
 

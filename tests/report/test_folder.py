@@ -69,8 +69,6 @@ def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch):
     assert files(tmp_path) == OLD and names_in(tmp_path) == {"results.json", "tables"}
 
 
-# a run that is killed, or asked to end, at each moment of the exchange
-
 RUN = """
 import json, os, sys
 from compare.process import interrupt

@@ -131,9 +131,6 @@ def test_the_script_draws_each_engine_where_it_is(tmp_path):
     assert all(part in run.stdout for part in parts)
 
 
-# figures
-
-
 def pixels(source):
     with Image.open(source) as image:
         return np.asarray(image.convert("RGB"), dtype=int)

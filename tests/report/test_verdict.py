@@ -146,9 +146,6 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
     assert len(said) == 2 and " 7 explained" in said[0] and said[1].startswith("  FAIL mass: what")
 
 
-# the answers to the questions of the assignment
-
-
 def answer_of(*sections) -> dict:
     """The answers by their part."""
     return {part: answer for part, _, _, answer in answers(sections, ARM).values}
@@ -180,8 +177,6 @@ def test_an_answer_has_what_its_experiment_adds():
     assert "with 64 steps: a: 1 rad and 2 rad; b: 3 rad and diverged" in answer_of(of)["i"]
 
 
-# the headline of each experiment
-
 OFF = NumberRow(of="forearm", quantity="com", component="x", stated=2.0, compiled=2.5, difference=0.5, unit="m")  # fmt: skip
 SAME = replace(OFF, compiled=2.0, difference=0.0)
 STEP = LimitRow(scene="s", engine="tmt", method="rk4", damping=0.0, mode=9.0, limit="finite", predicted_dt=0.1,
@@ -207,9 +202,6 @@ def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, 
     said = headline(section_with(name, of.result, ARM))
     found = re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]\d+)?", said.replace(" m2", ""))
     assert found == numbers.split() and named in said, said
-
-
-# the pictures
 
 
 def timed(engine, method, seconds, error, **more):
