@@ -28,8 +28,7 @@ def fill(work, text):
 def files(folder):
     """What is in a folder; of results.json only the text of `fill`."""
     found = {p.relative_to(folder).as_posix(): p.read_text() for p in folder.rglob("*") if p.is_file()}
-    of_results = {name: json.loads(found[name])["text"] for name in found if name == "results.json"}
-    return found | of_results
+    return found | {"results.json": json.loads(found["results.json"])["text"]}
 
 
 def old_report(out):

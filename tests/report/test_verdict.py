@@ -28,6 +28,7 @@ from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.run.examine import say_outcome, section_with
 
+CAUSE = {"rank": 2, "experiment": "parameters", "text": "mass of forearm: stated 1"}
 OWN_STEP = ("stable at its own step", 0.002, 0.00111, "at most", False, About.STEP)
 
 
@@ -58,13 +59,9 @@ def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
 def test_what_does_not_agree_is_named_with_its_first_cause_and_nothing_else():
     sections = [section("mass", GOOD, BAD), section("gravity", GOOD), section("diagnosis", BAD)]
     text = verdict(sections, 10, [{"text": f"number {k}"} for k in range(3)])
-    assert "3 of 10 experiments" in text and " mass." in text and "gravity" not in text
-    assert "diagnosis" not in text
-    assert "2 of 4" in text and "number 0; 2 more" in text and "number 2" not in text
+    assert all(part in text for part in ("3 of 10 experiments", " mass.", "2 of 4", "number 0; 2 more"))
+    assert not any(part in text for part in ("gravity", "diagnosis", "number 2"))
     assert "First failing check: mass: Mbar" in verdict(sections, 10)
-
-
-CAUSE = {"rank": 2, "experiment": "parameters", "text": "mass of forearm: stated 1"}
 
 
 def test_the_verdict_counts_what_the_cause_explains_what_states_it_and_what_stands():
@@ -92,13 +89,10 @@ def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagr
         assert "1 of 2 checks" in verdict([of], 1)
         assert differs in verdict([of, section("gravity", BAD)], 2)
         said.add(standing(of)[1])
-    assert len(said) == 4 and standing(section("mass", GOOD))[0] is True
-    assert standing(section("mass"))[0] is None
+    assert len(said) == 4
+    assert (standing(section("mass", GOOD))[0], standing(section("mass"))[0]) == (True, None)
     assert counts(section("trajectory", ("open loop", None, 1.0, "at most", True)))[0] == 1  # it diverged
     assert passed([section("stability", (*OWN_STEP[:2], 0.002, *OWN_STEP[3:]))])  # just stable
-    text = verdict([section("stability", GOOD, OWN_STEP)], 1, robot="dog")
-    # the run comes before the equations
-    assert text.startswith("dog is not stable") and text.index("agree in") > 0
 
 
 def test_an_experiment_alone_is_named_and_a_step_that_is_not_stable_comes_first():
@@ -134,13 +128,12 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
     say_outcome(said, section("mass", GOOD, ("a", 0.25, 1.0, "at most", True)), 1.25, [])
     assert len(said) == 1 and said[0].split()[:4] == ["mass", "ok", "2", "checks"] and " 50 %" in said[0]
     of = section("mass", *[BAD] * 7, GOOD)
-    say_outcome(said, of, 1.0, [{"text": "mass of forearm: stated 1"}])
+    say_outcome(said, of, 1.0, [CAUSE])
     assert said[1].split()[1:5] == ["7", "FAILED", "8", "checks"]
     assert said[2] == "  CAUSE mass of forearm: stated 1"
     assert [line.startswith("  FAIL mass: Mbar, zero: 2 kg m2") for line in said[3:]] == [True] * 4 + [False]
-    wrong = ("what", 2.0, 1.0, "at most", False, About.PROGRAM)
     del said[:]
-    of = section("mass", *[BAD] * 7, wrong)
+    of = section("mass", *[BAD] * 7, ("what", 2.0, 1.0, "at most", False, About.PROGRAM))
     of.explained = of.result.checks[:7]
     say_outcome(said, of, 1.0, [], True)
     assert len(said) == 2 and " 7 explained" in said[0] and said[1].startswith("  FAIL mass: what")
