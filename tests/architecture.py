@@ -18,7 +18,8 @@ def dotted(path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-MODULES = {dotted(file) for file in [*FILES, *OF_TMT]}
+TMT = {dotted(file) for file in OF_TMT}
+MODULES = {dotted(file) for file in FILES} | TMT
 
 
 @cache
@@ -46,7 +47,6 @@ def parsed(path) -> ast.Module:
 
 @cache
 def modules_imported(path, for_types=True) -> set[str]:
-    """The modules of compare and tmt that a file imports."""
     names = imports(path, for_types)
     return {name if name in MODULES else name.rpartition(".")[0] for name in names} & MODULES - {dotted(path)}
 
@@ -57,7 +57,6 @@ def folder(module: str) -> str:
 
 
 def folder_imports() -> dict[tuple[str, str], int]:
-    """How many imports there are from a folder to another."""
     pairs = [(path, name) for path in [*FILES, *OF_TMT] for name in modules_imported(path)]
     counts = Counter((folder(dotted(path)), folder(name)) for path, name in pairs)
     return {pair: count for pair, count in counts.items() if pair[0] != pair[1]}

@@ -27,11 +27,10 @@ from tmt.derivation.composite import mass_matrix_and_bias
 ARM6 = Path(__file__).parent / "models" / "arm6.xml"
 SECONDS = 20.0  # of one search: what else the machine does must not change the outcome
 SLIPS = {
-    "R for R'": "R for R' in the angular velocity of {}",
+    "R for R'": "R for R' in the angular velocity of {}", "turned the wrong way": "R' I R for R I R' of {}",
     "not turned": "inertia of {} not turned to the inertial frame",
-    "turned the wrong way": "R' I R for R I R' of {}",
     "about the joint": "inertia of {} about its joint and mass counted again",
-}
+}  # fmt: skip
 
 
 class Fault(NamedTuple):

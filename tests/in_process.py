@@ -33,7 +33,6 @@ class InProcess:
 
 @contextmanager
 def without_workers():
-    """In this block runs start no further processes."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(command, "start_workers", contextmanager(lambda: iter([InProcess()])))
         yield

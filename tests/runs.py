@@ -24,7 +24,6 @@ def command(*arguments):
 
 
 def compare(*arguments, cwd, env=None, **options):
-    """A run in pipes."""
     options = {"capture_output": True, "text": True} | options
     return subprocess.run(command(*arguments), cwd=cwd, env=ENVIRONMENT | (env or {}), **options)
 

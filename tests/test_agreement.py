@@ -1,7 +1,12 @@
-"""Every experiment agrees with MuJoCo on the arm."""
+"""Every experiment agrees with MuJoCo on the arm, and on a robot of four hinges, which nothing in compare knows."""
+
+import json
+import re
 
 import numpy as np
 import pytest
+from crane import TREE
+from small_runs import of_crane
 
 import tmt
 from compare.experiments import EXPERIMENTS, skipped
@@ -23,3 +28,16 @@ def test_states_move_and_engines_do_not_have_the_same_bits(setup):
     ours, theirs = setup.compared().values()
     assert np.abs(ours.mass_matrix(q) - theirs.mass_matrix(q)).max() > 0.0
     assert np.abs(ours.bias(q, qd) - theirs.bias(q, qd)).max() > 0.0 and np.abs(ours.bias(q, qd)).mean() > 1.0
+
+
+@pytest.mark.slow
+def test_all_experiments_pass_and_draw_and_the_report_is_of_this_robot(shared):
+    made = shared(of_crane)
+    assert [name for name in made.reasons if name != "engines"] == ["published"]
+    for section in made.sections:
+        assert section.name == "diagnosis" or section.result.checks
+        assert [str(check) for check in section.result.checks if not check.passed] == []
+        assert all(made.sizes[figure] > 5000 and caption for figure, caption in section.figures)
+    text, results = made.texts["report.md"], json.loads(made.texts["results.json"])
+    assert not re.search(r"alpha|gamma|forearm|ball catch|assignment|α", text)
+    assert all(joint in text for joint in TREE.joint_names) and results["passed"]

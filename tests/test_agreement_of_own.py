@@ -112,7 +112,6 @@ def test_differences_are_every_entry_with_the_largest_ratio_first(given):
 
 
 def advised(mjcf=PENDULUM, **brought):
-    """The rtol that is advised, None if none is."""
     with pytest.raises(AssertionError) as raised:
         compare.assert_agrees(mjcf, **brought)
     _, found, rtol = str(raised.value).partition("state rtol=")
@@ -160,7 +159,6 @@ STATED = ["-knee+90deg in deg", "hip"]
 
 
 def in_joints(of):
-    """The right equations of one state, in other joints: mass matrix and bias."""
     functions = {"mass_matrix": lambda q: of.own_mass_matrix(mass_matrix(of.positions(q)))}
     return functions | {"bias": lambda q, v: of.own_forces(bias(of.positions(q), of.speeds(v)))}
 

@@ -80,7 +80,6 @@ def copy(tmp_path_factory):
 
 
 def output(root, *arguments):
-    """The output of a command in the copy; it must succeed."""
     run = compare(*arguments, cwd=root, env={"PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"})
     assert run.returncode == 0, run.stdout + run.stderr
     return run.stdout

@@ -34,7 +34,6 @@ def made(monkeypatch, name, **functions):
 
 
 def only(monkeypatch, *names):
-    """These are all experiments that there are."""
     for module in (command, command_line, experiment):
         records = {name: EXPERIMENTS.get(name, Experiment()) for name in names}
         monkeypatch.setattr(module, "EXPERIMENTS", records)

@@ -104,7 +104,6 @@ def linearise(setup) -> Result:
 
 
 def without_some_joints(setup) -> Result:
-    """Of the scenes with fewer joints."""
     scenes = tuple(scene for scene in setup.robot.scenes if scene.name in ("zero, free", "elbow swing"))
     return reduction.untimed(replace(setup, robot=replace(setup.robot, scenes=scenes)))[0]
 
@@ -135,7 +134,6 @@ SERVO = EDITS["no forces of actuators"][:2]
 
 
 def found(text):
-    """What the experiment finds of a model in MJCF text."""
     result = parameters.rows(setup_of(text, make=Setup, states=20))
     failed = {check.quantity for check in result.checks if not check.passed}
     assert bool(failed) == bool(result.causes)

@@ -1,19 +1,17 @@
 """The edits that test the judge apply to the sources as they are."""
 
 from ast import dump
-from pathlib import Path
 
+from architecture import ROOT
 from mutations.edit import DoesNotApply, applied
 from mutations.edits import EDITS
-
-PROJECT = Path(__file__).resolve().parent.parent
 
 
 def test_every_edit_applies_and_says_what_it_breaks():
     lost = []
     for edit in EDITS:
         try:
-            place = applied(PROJECT, edit)
+            place = applied(ROOT, edit)
             assert dump(place.old) != dump(place.new)
         except DoesNotApply as error:
             lost.append(str(error))

@@ -27,7 +27,6 @@ STATIC = ["mass", "gravity", "acceleration"]
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A user's folder, in which one works."""
     before = set(sys.modules)
     own_equations.write(tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -13,7 +13,6 @@ from compare.robots.arm import ARM
 
 @pytest.fixture
 def counts(monkeypatch):
-    """How often files are parsed and models are compiled."""
     counts = Counter()
 
     def count(owner, name, wrap=lambda function: function):

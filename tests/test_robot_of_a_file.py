@@ -22,7 +22,6 @@ ONLY = (Feature("hinge", ("one",), "modelled", ""),)
 
 
 def file_of(tree, **changes):
-    """The numbers of a file with a tree."""
     ranges, zero = (None,) * len(tree.kind), np.array(tree.zero)
     return replace(RobotFile("", None, tree, ONLY, {}, zero, ranges, "Euler", 0.002, Drive()), **changes)
 

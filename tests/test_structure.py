@@ -50,10 +50,6 @@ def libraries(path) -> set[str]:
     return {name.split(".")[0] for name in imports(path)}
 
 
-def modules_of_compare(path) -> set[str]:
-    return {name for name in modules_imported(path) if name.startswith("compare")}
-
-
 def part(module) -> str:
     return (module.split(".") + [""])[1]
 
@@ -71,7 +67,7 @@ def test_imports_keep_their_directions():
     for path in FILES:
         mine, own = part(dotted(path)), dotted(path).split(".")[:3]
         allowed = {mine, *DIRECTIONS.get(mine, "").split()}
-        for name in modules_of_compare(path):
+        for name in modules_imported(path) - architecture.TMT:
             said = f"{dotted(path)} imports {name}"
             assert part(name) in allowed, said
             is_free = name.startswith(SHARED) or name.split(".")[:3] == own
@@ -85,14 +81,13 @@ def test_imports_keep_their_directions():
 @pytest.mark.parametrize("of_folders", [False, True])
 def test_there_is_no_circle(of_folders):
     """Of files, imports for annotations left out; and of folders, whatever they import."""
-    paths = [*FILES, *OF_TMT]
-    pairs = {(dotted(path), name) for path in paths for name in modules_imported(path, for_types=of_folders)}
-    graph = {}
+    graph = TopologicalSorter()
+    pairs = {(dotted(path), name) for path in FILES + OF_TMT for name in modules_imported(path, of_folders)}
     for pair in pairs - FOR_DOCSTRINGS:
         importing, imported = (node_of(module, of_folders) for module in pair)
         if importing != imported:
-            graph.setdefault(importing, set()).add(imported)
-    TopologicalSorter(graph).prepare()
+            graph.add(importing, imported)
+    graph.prepare()
 
 
 def node_of(module: str, of_folders: bool) -> str:
@@ -102,7 +97,6 @@ def node_of(module: str, of_folders: bool) -> str:
 
 
 def annotations(path):
-    """The parameters and fields of a file with their annotations."""
     for node in ast.walk(architecture.parsed(path)):
         if isinstance(node, ast.arg) and node.annotation:
             yield node.arg, node.annotation

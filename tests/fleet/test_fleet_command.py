@@ -128,14 +128,12 @@ WORDS = ("fleet", *FILES, *OPTIONS)
 
 @pytest.fixture
 def temporary(tmp_path, monkeypatch):
-    """A folder for the temporary files of a fleet."""
     (tmp_path / "temporary").mkdir()
     monkeypatch.setitem(runs.ENVIRONMENT, "TMPDIR", str(tmp_path / "temporary"))
     return tmp_path / "temporary"
 
 
 def is_left_at_work(temporary):
-    """Whether a process is in a folder of the temporary files."""
     for cwd in Path("/proc").glob("[0-9]*/cwd"):
         with suppress(OSError):  # it has ended meanwhile
             if str(temporary) in os.readlink(cwd):

@@ -11,7 +11,6 @@ SOON = 60.0  # s, far more than anything here takes
 
 
 def waits(folder, opened):
-    """Waits until a file is there."""
     (Path(folder) / f"{time.time_ns()}").write_text("")
     soon(Path(opened).exists)
     return 4
@@ -30,7 +29,6 @@ def kills_its_worker():
 
 
 def soon(question):
-    """Whether something holds before long."""
     until = time.monotonic() + SOON
     while not (answer := question()) and time.monotonic() < until:
         time.sleep(0.01)
@@ -47,7 +45,6 @@ FAULTS = {
 
 
 def check_all(executor):
-    """Make all calls and check their outcomes."""
     futures = {name: executor.submit(function, *given) for name, (function, given, *_) in FAULTS.items()}
     for name, future in futures.items():
         future.exception()  # wait

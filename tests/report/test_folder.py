@@ -18,7 +18,6 @@ OLD = {"tables/mass.csv": "old", "results.json": "old"}
 
 
 def fill(work, text):
-    """A small report that lists its files."""
     (work / "tables").mkdir()
     (work / "tables" / "mass.csv").write_text(text)
     listed = ["report.md", "results.json", "tables/mass.csv"]

@@ -140,7 +140,6 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
 
 
 def answer_of(*sections) -> dict:
-    """The answers by their part."""
     return {part: answer for part, _, _, answer in answers(sections, ARM).values}
 
 
