@@ -7,6 +7,7 @@ import struct
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -50,16 +51,13 @@ def on_terminal(arguments, columns, term, cwd, interrupt_at=None):
     environment = ENVIRONMENT | {"TERM": term}
     run = subprocess.Popen(command(*arguments), cwd=cwd, env=environment, preexec_fn=own_terminal, **streams)
     os.close(theirs)
-    output, pressed = b"", False
-    while True:
-        try:
-            new = os.read(ours, 65536)
-        except OSError:  # the other side is closed
-            break
-        output += new
-        if interrupt_at and not pressed and interrupt_at in output:
-            os.write(ours, b"\x03")
-            pressed = True
+    output = b""
+    with suppress(OSError):  # the other side is closed
+        while True:
+            output += os.read(ours, 65536)
+            if interrupt_at and interrupt_at in output:
+                os.write(ours, b"\x03")
+                interrupt_at = None
     status = run.wait(timeout=60)
     os.close(ours)
     return SimpleNamespace(status=status, output=output.decode(), columns=columns)
@@ -100,12 +98,8 @@ def ended(run, name):
     status = run.wait(timeout=60)
     seconds = time.perf_counter() - sent
     lines = run.communicate()[1].splitlines()
-    for _ in range(500):
-        try:
+    with pytest.raises(ProcessLookupError):  # in the end no process is there
+        for _ in range(500):
             os.killpg(run.pid, 0)
-        except ProcessLookupError:
-            break
-        time.sleep(0.01)
-    else:
-        raise AssertionError("a process is still there")
+            time.sleep(0.01)
     return SimpleNamespace(status=status, lines=lines, seconds=seconds)

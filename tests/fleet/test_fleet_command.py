@@ -2,13 +2,11 @@
 
 import csv
 import json
-import os
 import re
 import shutil
 import sys
-from contextlib import suppress
-from pathlib import Path
 
+import psutil
 import pytest
 import runs
 from in_process import answered
@@ -134,11 +132,8 @@ def temporary(tmp_path, monkeypatch):
 
 
 def is_left_at_work(temporary):
-    for cwd in Path("/proc").glob("[0-9]*/cwd"):
-        with suppress(OSError):  # it has ended meanwhile
-            if str(temporary) in os.readlink(cwd):
-                return True
-    return False
+    folders = (process.info["cwd"] or "" for process in psutil.process_iter(["cwd"]))
+    return any(str(temporary) in folder for folder in folders)
 
 
 def test_the_key_ctrl_c(temporary, tmp_path):

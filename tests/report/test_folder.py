@@ -4,6 +4,7 @@ import json
 import signal
 import subprocess
 import sys
+from inspect import getsource
 from types import SimpleNamespace
 
 import pytest
@@ -67,11 +68,12 @@ def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch):
     assert files(tmp_path) == OLD and names_in(tmp_path) == {"results.json", "tables"}
 
 
-RUN = """
+RUN = f"""
 import json, os, sys
 from compare.process import interrupt
 from compare.report.folder import new_report
 
+{getsource(fill)}
 out, number, at = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 renamed = 0
 
@@ -86,11 +88,8 @@ def hook(event, _):
 
 interrupt.listen()
 with new_report(out) as work:
-    (work / "tables").mkdir()
-    (work / "tables" / "mass.csv").write_text("new")
+    fill(work, "new")
     (work / "report.md").write_text("new")
-    listed = ["report.md", "results.json", "tables/mass.csv"]
-    (work / "results.json").write_text(json.dumps({"provenance": {"files": listed}, "text": "new"}))
     sys.addaudithook(hook)
 print(renamed)
 """
