@@ -62,10 +62,7 @@ def add_tendons(rng, root, joints: list, sites: list, stiffness: float, damping:
 
 
 def with_drive(seed: int, transmissions=TRANSMISSIONS, flags: dict | None = None) -> str:
-    """A random robot with an actuator of every law, each at a random place of one of the transmissions.
-
-    Some have ranges of controls and forces, some are in a group that is disabled.
-    """
+    """A random robot with an actuator of every law at a random place, some with ranges, some in a disabled group."""
     rng = np.random.default_rng(seed)
     root, sites = robot(rng, random_tree(seed, joints=6), flags)
     root.find("option").set("actuatorgroupdisable", str(SWITCHED_OFF))
@@ -97,10 +94,7 @@ def with_drive(seed: int, transmissions=TRANSMISSIONS, flags: dict | None = None
 
 
 def with_servos(seed: int, floats: bool = False, flags: dict | None = None) -> str:
-    """A random robot whose joints are all held by position servos, soft and stiff, with kv none to far too large.
-
-    Beside them a fixed and a spatial tendon with springs, dampers and servos, a motor, a velocity servo and a filter.
-    """
+    """A random robot whose joints are all held by position servos, soft and stiff, with kv none to far too large; and more."""
     rng = np.random.default_rng(seed)
     kinds = ("hinge", "slide", "ball", *["free"] * floats)
     root, sites = robot(rng, random_tree(seed, kinds, joints=5), flags)

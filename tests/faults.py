@@ -1,7 +1,6 @@
 """Made faults that the diagnosis must name: `python -m tests.faults [COUNT]` prints outcomes; exit 1 if one is wrong.
 
-Each fault is one number, term, slip in the derivation or convention of a joint. Wrong values come from tmt's
-composite form, or from its literal Jacobians and convective terms, summed here. Outcomes: "named" (alone or among others that
+Each fault is one number, term, slip in the derivation or convention of a joint. Outcomes: "named" (alone or among others that
 explain as much); "tied" (only other causes, no less simple, and again at further states); "none"; "invisible"; "wrong".
 """
 

@@ -40,10 +40,10 @@ def larger(joints):
     repeated = ("offset", "axis", "damping", "mass", "com", "inertia")
     many = {name: getattr(tree, name) * joints for name in repeated}
     names = {"joint_names": [f"h{i}" for i in range(n)], "body_names": [f"b{i}" for i in range(2 * joints)]}
-    hinges = {"parent": range(-1, n - 1), "body_joint": [3 * k + i for k in range(joints) for i in (1, 2)]}
+    many |= {"parent": range(-1, n - 1), "body_joint": [3 * k + i for k in range(joints) for i in (1, 2)]}
     rest = dict.fromkeys(("kind", "armature", "stiffness", "rest", "reference"), ())
     postures = {f"p{i}": (float(i),) * n for i in range(4)}
-    tree = dataclasses.replace(tree, **many, **names, **{k: tuple(v) for k, v in hinges.items()}, **rest)
+    tree = dataclasses.replace(tree, **many, **names, **rest)
     return dataclasses.replace(ARM, tree=tree, postures=postures)
 
 

@@ -10,26 +10,26 @@ from models import PATHS
 from compare.__main__ import main
 from compare.robots.arm import ARM
 
+OWNERS = {mujoco.MjSpec: "from_file from_string compile", mujoco.MjModel: "from_xml_path from_xml_string"}
+OWNERS[ElementTree] = "iterparse"
+
 
 @pytest.fixture
 def counts(monkeypatch):
     counts = Counter()
 
-    def count(owner, name, wrap=lambda function: function):
+    def count(owner, name):
         function = getattr(owner, name)
 
         def counted(*arguments, **options):
             counts[name] += 1
             return function(*arguments, **options)
 
-        monkeypatch.setattr(owner, name, wrap(counted))
+        monkeypatch.setattr(owner, name, counted)
 
-    for name in ("from_file", "from_string"):
-        count(mujoco.MjSpec, name, staticmethod)
-    for name in ("from_xml_path", "from_xml_string"):
-        count(mujoco.MjModel, name, staticmethod)
-    count(mujoco.MjSpec, "compile")
-    count(ElementTree, "iterparse")
+    for owner, names in OWNERS.items():
+        for name in names.split():
+            count(owner, name)
     return counts
 
 

@@ -74,9 +74,8 @@ def test_both_engines_start_every_scene_alike(name):
 def test_three_slides_and_a_ball_in_one_place_are_free_and_float(before, shift, free, floating):
     tree = tmt.Tree(
         [*"hxyzb"], (-1, before, 1, 2, 3), [(0, 0, 0)] * 2 + [(shift, 0, 0)] + [(0, 0, 0)] * 2,
-        [(0, 1, 0), *np.eye(3), *np.eye(3)],
-        [0.0] * 7, ("arm", "stone"), (0, 4), (1.0, 1.0), [(0.1, 0, 0)] * 2, [np.eye(3)] * 2, (0, 0, 0),
-        ("hinge", "slide", "slide", "slide", "ball"),
+        [(0, 1, 0), *np.eye(3), *np.eye(3)], [0.0] * 7, ("arm", "stone"), (0, 4), (1.0, 1.0), [(0.1, 0, 0)] * 2,
+        [np.eye(3)] * 2, (0, 0, 0), ("hinge", "slide", "slide", "slide", "ball"),
     )  # fmt: skip
     assert (free_joints(tree), floats(tree)) == (free, floating)
 
