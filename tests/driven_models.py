@@ -24,8 +24,7 @@ def laws(rng) -> dict[str, tuple[str, dict]]:
     affine = {"gaintype": "affine", "gainprm": numbers([rng.uniform(1, 5), *rng.uniform(-3, 3, 2)])} | bias
     return {
         "motor": ("motor", {}), "position": ("position", {"kp": some(5, 50), "kv": some(0, 5)}),
-        "velocity": ("velocity", {"kv": some(0, 5)}),
-        "damper": ("damper", {"kv": some(0, 5), "ctrlrange": "0 2"}),
+        "velocity": ("velocity", {"kv": some(0, 5)}), "damper": ("damper", {"kv": some(0, 5), "ctrlrange": "0 2"}),
         "general": ("general", {"gainprm": some(1, 5)} | bias), "affine": ("general", affine),
         "intvelocity": ("intvelocity", {"kp": some(5, 50), "kv": some(0, 2), "actrange": "-3 3"}),
         "cylinder": ("cylinder", {"area": some(0.5, 2), "timeconst": some(0.1, 1), "bias": some(-1, 1, 3)}),

@@ -158,29 +158,23 @@ def test_a_requested_step_that_is_not_stable_fails(inside, tmp_path, capsys):
 
 
 ARM7, MIXED = (str(PATHS[name]) for name in ("arm7", "mixed"))
-WRONG = {  # arguments, each with what is in its line
-    # words
+WRONG = {
     "mas --version": "did you mean mass?", "help": "did you mean --help?", "xyz": f"{', '.join(EXPERIMENTS)} or all",
     "mass -quick": "did you mean --quick?", "mass --xyz": " ".join(command_line.OPTIONS), "mass gravity": "'gravity'",
     "--mjcf robot.xml": "all --mjcf robot.xml", "mass --reference modle": "did you mean model?",
-    "--quick fleet x": "fleet must come first",
-    "mass --reference my.py": "FILE.py:OBJECT", "mass --out": "--out: expected one argument",
-    # values, and options that do not go together
-    "mass --mjcf=": "--mjcf: the name is empty", "stability --dt nan": "'nan'",
-    "stability --dt=-0.5": "'-0.5'", "MASS": "did you mean mass?",
+    "--quick fleet x": "fleet must come first", "mass --reference my.py": "FILE.py:OBJECT",
+    "mass --out": "--out: expected one argument", "mass --mjcf=": "--mjcf: the name is empty",
+    "stability --dt nan": "'nan'", "stability --dt=-0.5": "'-0.5'", "MASS": "did you mean mass?",
     "stability --dt 5.1": "'5.1'", "stability --dt 9e-7": "'9e-7'", "mass --scenes my.toml": "mass",
-    "mass --dask tcp://x:1": "--dask",
-    "diagnosis": "--mjcf", "diagnosis --mjcf arm.xml --workers 2": "--workers",
+    "mass --dask tcp://x:1": "--dask", "diagnosis": "--mjcf", "diagnosis --mjcf arm.xml --workers 2": "--workers",
     "all --integrator Euler": "--integrator", "mass --joints hip,knee --reference model": "--joints",
-    # what is found only when it is looked for
     "speed --scenes my.toml": "my.toml", "mass --mjcf missing.xml": "missing.xml", f"mass --mjcf {ROOT}": "directory",
     f"mass --out {ROOT / 'pyproject.toml'}": "pyproject.toml", f"mass --reference arm --mjcf {ARM7}": "joint3 (hinge)",
     f"published --mjcf {ARM7}": "arm7", "stability --dt 0.1": "arm",
     f"stability --integrator euler --mjcf {ARM7}": "expected one of Euler",
-    f"trajectory --mjcf {MIXED} --scenes wrong.toml": "17",
-    # files
-    "gravity --mjcf cut.xml": "cut.xml", "gravity --mjcf empty.xml": "empty", "gravity --mjcf mesh.xml": "none.stl",
-    "all --mjcf still.xml": "joint", "gravity --mjcf light.xml": "mass", "gravity --mjcf heavy.xml": "inf kg",
+    f"trajectory --mjcf {MIXED} --scenes wrong.toml": "17", "gravity --mjcf cut.xml": "cut.xml",
+    "gravity --mjcf empty.xml": "empty", "gravity --mjcf mesh.xml": "none.stl", "all --mjcf still.xml": "joint",
+    "gravity --mjcf light.xml": "mass", "gravity --mjcf heavy.xml": "inf kg",
 }  # fmt: skip
 BODY = '<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/>{}</body></worldbody></mujoco>'
 MESH = '<asset><mesh name="m" file="none.stl"/></asset>'

@@ -182,8 +182,7 @@ AGREED = AgreementRow(engine="TMT", scene="zero", quantity="Mbar", unit="kg m2",
 
 
 @pytest.mark.parametrize("name, rows, numbers, named", [
-    ("parameters", [SAME, OFF], "1 2", "all as stated"),
-    ("published", [replace(PRINTED, mujoco=0.8)], "0 1", ""),
+    ("parameters", [SAME, OFF], "1 2", "all as stated"), ("published", [replace(PRINTED, mujoco=0.8)], "0 1", ""),
     ("gravity", [AGREED, replace(AGREED, quantity="other", worst_difference=1.0, difference_over_bar=0.05)], "2e-16 10", "Mbar"),
     ("trajectory", [SimpleNamespace(scene="a", difference_over_band=share) for share in (0.04, 12.0)], "1 12", ""),
     ("stability", [STEP, replace(STEP, observed_dt=0.0995)], "2 0.5", ""),
@@ -209,9 +208,8 @@ def marks(experiment, result, robot=ARM):
 
 
 def test_the_agreement_is_the_largest_of_all_rows_of_a_quantity_and_its_picture_says_whose_distance_is_whose():
-    near = replace(AGREED, mujoco_from_exact=None)
-    rows = [near, replace(near, difference=7.0, from_exact=None)]
-    rows.append(replace(AGREED, quantity="other", difference=9.0))
+    near, other = replace(AGREED, mujoco_from_exact=None), replace(AGREED, quantity="other", difference=9.0)
+    rows = [near, replace(near, difference=7.0, from_exact=None), other]
     (found,) = figures_overview.agreements({"mass": Result("mass", rows=rows)})
     distances = {"difference": 7.0, "from_exact": 1.0, "mujoco_from_exact": None}
     assert found == {"name": "mass matrix M", "passed": True} | distances
@@ -245,16 +243,14 @@ def test_limits_are_counted_and_drawn_where_they_are_predicted_and_observed():
     mujoco = replace(row, engine="mujoco", method="RK4", observed_dt=0.0995, passed=False)
     rows = [row, mujoco, replace(row, scene="saddle")]
     result = StabilityResult("stability", rows=rows, centres=("s",), schemes=schemes)
-    counts = {"limits": 2, "known": 2, "wrong": 1, "off": pytest.approx(0.005)}
-    assert stability.headline(result).values == counts
+    values = stability.headline(result).values
+    assert values == {"limits": 2, "known": 2, "wrong": 1, "off": pytest.approx(0.005)}
     assert {("o", to_hex(BLUE), 0.1001), ("X", to_hex(RED), 0.0995)} <= marks("stability", result)
 
 
 def test_where_the_robot_has_servos_the_limits_with_them_are_drawn():
-    row = StepLimitRow(
-        posture="s", base="fixed", integrator="Euler", limit="finite", predicted_dt=0.1, file_dt=0.002,
-        file_integrator="Euler", stable_at_file_dt=True, limiting_joint="j", mode=9.0, mode_kind="real",
-    )  # fmt: skip
+    row = StepLimitRow(posture="s", base="fixed", integrator="Euler", limit="finite", predicted_dt=0.1, file_dt=0.002, mode=9.0,
+                       file_integrator="Euler", stable_at_file_dt=True, limiting_joint="j", mode_kind="real")  # fmt: skip
     rows = [replace(row, observed_dt=dt) for dt in (None, 0.1009, 0.1011)] + [replace(row, limit="saddle")]
     result = StabilityResult("stability", rows=[STEP], centres=("s",), tables={"step_limits": rows})
     robot = replace(ARM, drive=robot_of(read(PATHS["arm7"]), "arm7.xml").drive)
