@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import numpy
 import own_equations
 import pytest
-from in_process import answered
+from in_process import InProcess, answered
 from models import PATHS
-from small_runs import InProcess, Lines
+from small_runs import Lines
 
 from compare.__main__ import main
 from compare.core.text import say
