@@ -13,7 +13,6 @@ from in_process import InProcess, answered
 from models import PATHS
 from small_runs import Lines
 
-from compare.__main__ import main
 from compare.core.text import say
 from compare.engines.own.own_file import OwnFileError, own_object
 from compare.experiments import EXPERIMENTS, skipped
@@ -124,12 +123,10 @@ def test_a_report_has_what_can_be_compared_and_the_rest_gets_status_2(inside, fo
     robot = compared_with("mine.py:", "double.xml").robot
     assert [name for name in EXPERIMENTS if (reason := skipped(name, robot)) and say(reason)] == OTHERS
     asked = ["--quick", "--mjcf", "double.xml", "--reference", "mine.py:Object", "--out", "out"]
-    assert main(["speed", *asked]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and "speed does not apply to double" in err.splitlines()[-1]
-    assert main(["gravity", "--joints=-hip,knee", *asked]) == 1
-    out, err = capsys.readouterr()
-    assert out.startswith("reference: own; double.xml ") and err == "a user's file may print\n"
+    status, out, err = answered(["speed", *asked], capsys)
+    assert (status, out) == (2, "") and "speed does not apply to double" in err.splitlines()[-1]
+    status, out, err = answered(["gravity", "--joints=-hip,knee", *asked], capsys)
+    assert (status, err) == (1, "a user's file may print\n") and out.startswith("reference: own; double.xml ")
     results = json.loads((folder / "out" / "results.json").read_text(encoding="utf-8"))
     assert results["reference"] == {"kind": "own", "name": "mine.py:Object"} and not results["passed"]
     assert {path.name for path in folder.iterdir()} == {"double.xml", "mine.py", "numbers_beside.py", "out"}
