@@ -1,4 +1,4 @@
-"""The imports of the project, for test_structure; `python -m tests.architecture` draws them anew in ARCHITECTURE.md."""
+"""The imports of the project, for test_structure; run as a module, this draws them anew in ARCHITECTURE.md."""
 
 import ast
 import re

@@ -61,7 +61,7 @@ def add_tendons(rng, root, joints: list, sites: list, stiffness: float, damping:
 
 
 def with_drive(seed: int, transmissions=TRANSMISSIONS, flags: dict | None = None) -> str:
-    """A random robot with an actuator of every law at a random place, some with ranges, some in a disabled group."""
+    """A random robot with an actuator of every law somewhere, some with ranges, some in a disabled group."""
     rng = np.random.default_rng(seed)
     root, sites = robot(rng, random_tree(seed, joints=6), flags)
     root.find("option").set("actuatorgroupdisable", str(SWITCHED_OFF))
@@ -93,7 +93,7 @@ def with_drive(seed: int, transmissions=TRANSMISSIONS, flags: dict | None = None
 
 
 def with_servos(seed: int, floats: bool = False, flags: dict | None = None) -> str:
-    """A random robot whose joints are all held by position servos, soft and stiff, with kv none to far too large; and more."""
+    """A random robot whose joints are all held by position servos, soft and stiff, kv none to far too large."""
     rng = np.random.default_rng(seed)
     kinds = ("hinge", "slide", "ball", *["free"] * floats)
     root, sites = robot(rng, random_tree(seed, kinds, joints=5), flags)

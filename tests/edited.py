@@ -1,4 +1,4 @@
-"""Models with an edited file, for the tests of experiments: the arm, a cart with a slide, a hinge and a ball, a free stone."""
+"""Models with an edited file, for the tests of experiments: the arm; a cart, an arm and a ball; a stone."""
 
 from models import PATHS
 

@@ -1,4 +1,4 @@
-"""A run of the command line without its two further processes, which take 2.5 s to start: for tests of whole runs."""
+"""For tests of whole runs: the command line without its further processes, which take 2.5 s to start."""
 
 from concurrent.futures import Future
 from contextlib import contextmanager

@@ -1,4 +1,4 @@
-"""Runs of the command line as a user starts them, for tests of whole runs: in a pipe, on a terminal, ended by a signal."""
+"""For tests of whole runs: the command line in a pipe, on a terminal, and ended by a signal."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Small runs that several tests look at, which the fixture `small` of conftest.py computes once; and a terminal for them."""
+"""Small runs, for the fixture `small` of conftest.py; a terminal for tests that look at what is said."""
 
 from functools import cache
 

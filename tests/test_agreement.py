@@ -1,4 +1,4 @@
-"""Every experiment agrees with MuJoCo on the arm, and on a robot of four hinges, which nothing in compare knows."""
+"""Every experiment agrees with MuJoCo on the arm, and on a second robot, which nothing in compare knows."""
 
 import json
 import re
@@ -20,7 +20,7 @@ from compare.run.examine import Setup, engines, examine
 
 @pytest.mark.parametrize("experiment", [name for name in EXPERIMENTS if not skipped(name, ARM)])
 def test_experiment_agrees(experiment, small):
-    """Every path of a full run, with few states and steps. "parameters" ties the numbers of tmt/arm.py to mjcf/arm.xml."""
+    """With few states and steps. "parameters" ties the numbers of tmt/arm.py to those of mjcf/arm.xml."""
     result = small(experiment)
     assert result.checks
     assert [str(check) for check in result.checks if not check.passed] == []

@@ -37,7 +37,7 @@ def test_positions_are_equation_1_and_angular_velocities_the_stated_B(assignment
 
 
 def test_lagrange_from_equation_1_and_energies_alone(assignment, rng):
-    """Energies from (1) and R, 50 digits: no B, no convective terms. That of a turn is tr(Rd J Rd') / 2, J = tr(I)/2 - I."""
+    """No B, no convective terms, 50 digits; a turn has the energy tr(Rd J Rd') / 2 with J = tr(I)/2 - I."""
     q, qd = assignment.q, assignment.qd
     m, I, grav = sympy.symbols("m1 m2"), sympy.symbols("I11 I12 I13 I21 I22 I23"), sympy.Symbol("grav")
 
