@@ -1,7 +1,4 @@
-"""The imports of the project, and the diagram of them: `python -m tests.architecture` writes it into ARCHITECTURE.md.
-
-test_structure asserts the directions of these imports, and that the diagram shows all of them.
-"""
+"""The imports of the project, for test_structure; run as a module, this draws them anew in ARCHITECTURE.md."""
 
 import ast
 import re
@@ -17,12 +14,12 @@ DIAGRAM = re.compile(r"(?<=```mermaid\n).*?(?=```)", re.DOTALL)
 
 
 def dotted(path) -> str:
-    """The name of a file as a module."""
     parts = path.relative_to(ROOT).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-MODULES = {dotted(file) for file in [*FILES, *OF_TMT]}
+TMT = {dotted(file) for file in OF_TMT}
+MODULES = {dotted(file) for file in FILES} | TMT
 
 
 @cache
@@ -50,7 +47,6 @@ def parsed(path) -> ast.Module:
 
 @cache
 def modules_imported(path, for_types=True) -> set[str]:
-    """The modules of compare and tmt that a file imports."""
     names = imports(path, for_types)
     return {name if name in MODULES else name.rpartition(".")[0] for name in names} & MODULES - {dotted(path)}
 
@@ -61,7 +57,6 @@ def folder(module: str) -> str:
 
 
 def folder_imports() -> dict[tuple[str, str], int]:
-    """How many imports there are from a folder to another."""
     pairs = [(path, name) for path in [*FILES, *OF_TMT] for name in modules_imported(path)]
     counts = Counter((folder(dotted(path)), folder(name)) for path, name in pairs)
     return {pair: count for pair, count in counts.items() if pair[0] != pair[1]}

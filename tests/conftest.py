@@ -5,12 +5,14 @@ import pickle
 import signal
 import tempfile
 from collections import defaultdict
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from filelock import FileLock
 from hypothesis import settings
+from in_process import without_workers
 from small_runs import of_arm
 
 from compare.engines.mujoco import load
@@ -26,7 +28,6 @@ if hasattr(signal, "SIGHUP"):
 settings.register_profile("project", database=None, derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("project")
 
-HERE = Path(__file__).resolve().parent
 BUDGET = {  # s of processor time of the default run, for each folder, from an empty store
     "tests": 90, "diagnosis": 15, "engines": 18, "experiments": 65, "export": 8, "fleet": 16, "judge": 2, "process": 5,
     "report": 12, "tmt": 28, "truth": 13,
@@ -102,14 +103,14 @@ def engines(mujoco):
 @pytest.fixture(scope="session")
 def small(shared):
     """small(name): the result of an experiment in a small run, every path with few states and steps."""
-    results = {}
+    return cache(partial(shared, of_arm))
 
-    def result(name):
-        if name not in results:
-            results[name] = shared(of_arm, name)
-        return results[name]
 
-    return result
+@pytest.fixture
+def inside():
+    """A run of the command line starts no further processes."""
+    with without_workers():
+        yield
 
 
 @pytest.fixture

@@ -1,7 +1,4 @@
-"""Models with an edited file: what experiments are given to see whether they notice. For the tests of many experiments.
-
-The arm; a cart with a slide, a hinge and a ball on it; a free stone.
-"""
+"""Models with an edited file, for the tests of experiments: the arm; a cart, an arm and a ball; a stone."""
 
 from models import PATHS
 

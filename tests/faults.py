@@ -1,7 +1,6 @@
 """Made faults that the diagnosis must name: `python -m tests.faults [COUNT]` prints outcomes; exit 1 if one is wrong.
 
-Each fault is one number, term, slip in the derivation or convention of a joint. Wrong values come from tmt's
-composite form, or from its literal Jacobians and convective terms, summed here. Outcomes: "named" (alone or among others that
+Each fault is one number, term, slip in the derivation or convention of a joint. Outcomes: "named" (alone or among others that
 explain as much); "tied" (only other causes, no less simple, and again at further states); "none"; "invisible"; "wrong".
 """
 
@@ -27,11 +26,10 @@ from tmt.derivation.composite import mass_matrix_and_bias
 ARM6 = Path(__file__).parent / "models" / "arm6.xml"
 SECONDS = 20.0  # of one search: what else the machine does must not change the outcome
 SLIPS = {
-    "R for R'": "R for R' in the angular velocity of {}",
+    "R for R'": "R for R' in the angular velocity of {}", "turned the wrong way": "R' I R for R I R' of {}",
     "not turned": "inertia of {} not turned to the inertial frame",
-    "turned the wrong way": "R' I R for R I R' of {}",
     "about the joint": "inertia of {} about its joint and mass counted again",
-}
+}  # fmt: skip
 
 
 class Fault(NamedTuple):
@@ -154,8 +152,7 @@ def random_tree(rng: np.random.Generator) -> tmt.Tree:
         joint_names=tuple(f"j{i}" for i in range(n)),
         kind=("hinge", *(str(kind) for kind in rng.choice(["hinge", "slide"], n - 1, p=[0.75, 0.25]))),
         parent=(-1, *(i - 1 if rng.random() < 0.8 else int(rng.integers(-1, i)) for i in range(1, n))),
-        offset=rng.uniform(-0.5, 0.5, (n, 3)).tolist(), axis=rng.normal(size=(n, 3)).tolist(),
-        damping=(0.0,) * n,
+        offset=rng.uniform(-0.5, 0.5, (n, 3)).tolist(), axis=rng.normal(size=(n, 3)).tolist(), damping=(0.0,) * n,
         body_names=tuple(f"b{i}" for i in range(n)), body_joint=tuple(range(n)),
         mass=(10.0 ** rng.uniform(-1.0, 1.0, n)).tolist(), com=rng.uniform(-0.3, 0.3, (n, 3)).tolist(),
         inertia=inertia.tolist(), gravity=rng.uniform(-10.0, 10.0, 3).tolist(),

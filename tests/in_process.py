@@ -1,11 +1,11 @@
-"""A run of the command line without its two further processes, which take 2.5 s to start: for test_command_line, test_help,
-test_examine, test_own_reference and test_random_mjcf."""
+"""For tests of whole runs: the command line without its further processes, which take 2.5 s to start."""
 
 from concurrent.futures import Future
 from contextlib import contextmanager
 
 import pytest
 
+from compare.__main__ import main
 from compare.process.workers import Clock
 from compare.run import command
 
@@ -33,13 +33,15 @@ class InProcess:
 
 @contextmanager
 def without_workers():
-    """In this block runs start no further processes."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(command, "start_workers", contextmanager(lambda: iter([InProcess()])))
         yield
 
 
-@pytest.fixture(name="inside")
-def runs_in_this_process():
-    with without_workers():
-        yield
+def answered(arguments, capsys) -> tuple[int, str, str]:
+    """Exit status, stdout and stderr of a command line."""
+    try:
+        status = main(arguments)
+    except SystemExit as stop:
+        status = stop.code
+    return status, *capsys.readouterr()

@@ -85,7 +85,6 @@ swapped, named = changed(**SWAPPED), changed(**SWAPPED, joint_names=["knee", "hi
 
 
 def write(folder):
-    """The files of a user's folder."""
     mine = Path(__file__).read_text(encoding="utf-8") + PRINTS
     for name, text in (("double.xml", XML), ("mine.py", mine), ("numbers_beside.py", "g = 9.81\n")):
         (folder / name).write_text(text, encoding="utf-8")

@@ -1,16 +1,13 @@
-"""Runs of the command line as a user starts them: in a pipe, on a terminal, and ended by a signal.
-
-For test_command_line, test_help, and the tests of fleet, process and report.
-"""
+"""For tests of whole runs: the command line in a pipe, on a terminal, and ended by a signal."""
 
 import os
 import re
-import select
 import signal
 import struct
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -28,7 +25,6 @@ def command(*arguments):
 
 
 def compare(*arguments, cwd, env=None, **options):
-    """A run in pipes."""
     options = {"capture_output": True, "text": True} | options
     return subprocess.run(command(*arguments), cwd=cwd, env=ENVIRONMENT | (env or {}), **options)
 
@@ -55,17 +51,13 @@ def on_terminal(arguments, columns, term, cwd, interrupt_at=None):
     environment = ENVIRONMENT | {"TERM": term}
     run = subprocess.Popen(command(*arguments), cwd=cwd, env=environment, preexec_fn=own_terminal, **streams)
     os.close(theirs)
-    output, pressed = b"", False
-    while True:
-        select.select([ours], [], [], 60)
-        try:
-            new = os.read(ours, 65536)
-        except OSError:  # the other side is closed
-            break
-        output += new
-        if interrupt_at and not pressed and interrupt_at in output:
-            os.write(ours, b"\x03")
-            pressed = True
+    output = b""
+    with suppress(OSError):  # the other side is closed
+        while True:
+            output += os.read(ours, 65536)
+            if interrupt_at and interrupt_at in output:
+                os.write(ours, b"\x03")
+                interrupt_at = None
     status = run.wait(timeout=60)
     os.close(ours)
     return SimpleNamespace(status=status, output=output.decode(), columns=columns)
@@ -95,11 +87,8 @@ def started(*arguments, cwd, env=None):
     def hearing():  # a shell starts what runs in its background deaf to Ctrl-C
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    environment = ENVIRONMENT | (env or {})
-    return subprocess.Popen(
-        arguments, cwd=cwd, env=environment, start_new_session=True, preexec_fn=hearing, **pipes
-    )
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
+    return subprocess.Popen(arguments, cwd=cwd, env=ENVIRONMENT | (env or {}), preexec_fn=hearing, **options)
 
 
 def ended(run, name):
@@ -109,12 +98,8 @@ def ended(run, name):
     status = run.wait(timeout=60)
     seconds = time.perf_counter() - sent
     lines = run.communicate()[1].splitlines()
-    for _ in range(500):
-        try:
+    with pytest.raises(ProcessLookupError):  # in the end no process is there
+        for _ in range(500):
             os.killpg(run.pid, 0)
-        except ProcessLookupError:
-            break
-        time.sleep(0.01)
-    else:
-        raise AssertionError("a process is still there")
+            time.sleep(0.01)
     return SimpleNamespace(status=status, lines=lines, seconds=seconds)

@@ -19,12 +19,10 @@ def section(name="mass", *checks, rows=(), figures=(), kind=Result, **tables):
 
 
 def row_of(**values) -> Row:
-    """A Row with these columns."""
     return make_dataclass("AnyRow", values, bases=(Row,), kw_only=True)(**values)
 
 
 def typed(rows) -> list:
-    """Rows, those that are dictionaries as Rows."""
     return [row_of(**row) if isinstance(row, dict) else row for row in rows]
 
 

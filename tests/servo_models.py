@@ -45,7 +45,6 @@ def spring(stiffness: float):
 
 
 def hinge(kp: float = 20.0, kv: float = 0.0, joint: str = "", option: str = "", actuator: str = "") -> str:
-    """The hinge with a position servo, or with other actuators."""
     servo = actuator or f'<position name="servo" joint="turn" kp="{kp}" kv="{kv}"/>'
     return HINGE.format(joint=joint, option=option, actuator=servo)
 

@@ -17,7 +17,6 @@ COMPARE = re.compile(r"(?:\.venv/bin/)?python -m compare\b *([^`\n]*)")
 
 
 def language(text: str) -> str:
-    """The language of an indented block of a help."""
     first = text.splitlines()[0]
     known = {"python -m ": "sh", "[[": "toml", "import ": "python"}
     return next((name for start, name in known.items() if first.startswith(start)), "text")

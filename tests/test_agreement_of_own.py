@@ -37,13 +37,10 @@ def given_states():
     return {"q": q, "qd": qd, "tau": tau}, dict(zip(RIGHT, values))
 
 
-def message_of(**brought):
+def message_of(mjcf=PENDULUM, **brought):
     with pytest.raises(AssertionError) as error:
-        agrees(**brought)
+        compare.assert_agrees(mjcf, **brought)
     return str(error.value)
-
-
-# what may be brought
 
 
 def test_a_path_text_and_a_compiled_model_are_compared_at_the_same_states(tmp_path, monkeypatch):
@@ -71,9 +68,6 @@ def test_values_as_arrays_at_the_given_states(given):
     agrees(mass_matrix=M[..., None], bias=h[..., None].astype(object), **states)
     agrees(mass_matrix=sympy.Matrix(M[0]), bias=sympy.Matrix(h[0]), **first)
     agrees(mass_matrix=M.reshape(12, 4), bias=h, **states)  # as in the rows of a file
-
-
-# the tolerance
 
 
 @pytest.mark.parametrize("rtol", [0.0, 1e-6])
@@ -118,25 +112,21 @@ def test_differences_are_every_entry_with_the_largest_ratio_first(given):
 
 
 def advised(mjcf=PENDULUM, **brought):
-    """The rtol that is advised, None if none is."""
-    with pytest.raises(AssertionError) as raised:
-        compare.assert_agrees(mjcf, **brought)
-    _, found, rtol = str(raised.value).partition("state rtol=")
+    _, found, rtol = message_of(mjcf, **brought).partition("state rtol=")
     return float(rtol.split()[0].rstrip(".")) if found else None
 
 
-@pytest.mark.parametrize(
-    "height, share, rounds", [(0, 0.98e-6, True), (0, 1.02e-6, False), (20, 1e-3, False)]
-)
+@pytest.mark.parametrize("height, share, rounds", [(0, 0.98e-6, 1), (0, 1.02e-6, 0), (20, 1e-3, 0)])
 def test_constants_rounded_to_six_digits_get_an_rtol_however_far_away(height, share, rounds, monkeypatch):
     """Far away the terms of each entry are large, and a slip is small compared with them."""
     monkeypatch.setattr("compare.agreement.why.SECONDS_OF_CAUSE", 0.0)
     aloft = PENDULUM.replace("<worldbody>", f'<worldbody><body pos="0 0 {height}">')
     scaled = {"mass_matrix": lambda q: mass_matrix(q) * (1.0 + share)}
     aloft = aloft.replace("</worldbody>", "</body></worldbody>")
-    assert (advised(aloft, **scaled) is not None) is rounds
+    rtol = advised(aloft, **scaled)
+    assert (rtol is not None) == rounds
     if rounds:
-        compare.assert_agrees(aloft, **scaled, rtol=advised(aloft, **scaled))
+        compare.assert_agrees(aloft, **scaled, rtol=rtol)
 
 
 def test_no_rtol_is_advised_beside_a_cause_or_another_rtol_or_without_numbers(given):
@@ -163,27 +153,21 @@ def test_a_structural_zero_has_the_scale_of_its_diagonal(share, within):
     assert worst.ratio == pytest.approx(share, rel=1e-2) and (worst.cause == "") is within
 
 
-# joints
-
 STATED = ["-knee+90deg in deg", "hip"]
 
 
-def in_model(of, q, v, tau):
-    return of.positions(q), of.speeds(v), of.forces(tau)
-
-
-def in_joints(stated):
-    """The right equations of one state, in other joints, and these."""
-    of = joint_map(ROBOT.coordinates, stated)
-    return {
-        "mass_matrix": lambda q: of.own_mass_matrix(mass_matrix(of.positions(q))),
-        "bias": lambda q, v: of.own_forces(bias(of.positions(q), of.speeds(v))),
-        "acceleration": lambda *state: of.own_forces(acceleration(*in_model(of, *state))),
-    }, of
+def in_joints(of):
+    functions = {"mass_matrix": lambda q: of.own_mass_matrix(mass_matrix(of.positions(q)))}
+    return functions | {"bias": lambda q, v: of.own_forces(bias(of.positions(q), of.speeds(v)))}
 
 
 def test_functions_and_arrays_in_stated_joints(given):
-    functions, of = in_joints(STATED)
+    of = joint_map(ROBOT.coordinates, STATED)
+
+    def follows(q, v, tau):
+        return of.own_forces(acceleration(of.positions(q), of.speeds(v), of.forces(tau)))
+
+    functions = in_joints(of) | {"acceleration": follows}
     (q, qd, tau), values = given[0].values(), given[1]
     states = {"q": of.own_positions(q), "qd": of.own_speeds(qd), "tau": of.own_forces(tau)}
     arrays = {name: of.own_forces(value) for name, value in values.items()}
@@ -200,14 +184,10 @@ def test_functions_and_arrays_in_stated_joints(given):
     (["hip", "-knee"], ["hip", "knee"]),
 ])  # fmt: skip
 def test_the_message_says_how_to_state_the_joints(stated, right):
-    functions, _ = in_joints(right)
-    del functions["acceleration"]
+    functions = in_joints(joint_map(ROBOT.coordinates, right))
     text = message_of(**functions, joints=stated)
     told = text.partition("state it as joints=")[2].partition(")")[0].partition("]")[0] + "]"
     agrees(**functions, joints=eval(told))
-
-
-# the cause
 
 
 def changing(q):
@@ -250,8 +230,6 @@ def test_the_cause_is_sought_where_there_are_values():
     assert "give mass_matrix and bias" in message_of(acceleration=values, q=q, qd=qd, tau=tau)
 
 
-# what cannot be compared
-
 TURNED = np.tile(read(PATHS["pendulum_ball"]).qpos0, (3, 1)) * np.array([1.0, 1.1, 1.0])[:, None]
 THREE = np.zeros((3, 2))
 
@@ -273,9 +251,6 @@ def test_what_cannot_be_compared_is_one_line(brought, word):
         with pytest.raises(ValueError, match=word) as error:
             function(**{"mjcf": PENDULUM} | brought)
         assert "\n" not in str(error.value)
-
-
-# states and time
 
 
 def test_states_that_are_not_compared_are_warned_of(monkeypatch):

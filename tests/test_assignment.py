@@ -37,10 +37,7 @@ def test_positions_are_equation_1_and_angular_velocities_the_stated_B(assignment
 
 
 def test_lagrange_from_equation_1_and_energies_alone(assignment, rng):
-    """Kinetic energy from (1) and from R, potential energy from (1): no B, no convective terms, 50 digits.
-
-    The rotational energy is tr(Rd J Rd') / 2 with J = tr(I)/2 - I, from the rotation matrix itself.
-    """
+    """No B, no convective terms, 50 digits; a turn has the energy tr(Rd J Rd') / 2 with J = tr(I)/2 - I."""
     q, qd = assignment.q, assignment.qd
     m, I, grav = sympy.symbols("m1 m2"), sympy.symbols("I11 I12 I13 I21 I22 I23"), sympy.Symbol("grav")
 
@@ -51,8 +48,7 @@ def test_lagrange_from_equation_1_and_energies_alone(assignment, rng):
     for k, (x, R) in enumerate(zip(assignment.x, assignment.R)):
         moments = sympy.diag(*I[3 * k : 3 * k + 3])
         J = moments.trace() / 2 * sympy.eye(3) - moments
-        Rd = rate(R)
-        T += m[k] * rate(x).dot(rate(x)) / 2 + (Rd * J * Rd.T).trace() / 2
+        T += m[k] * rate(x).dot(rate(x)) / 2 + (rate(R) * J * rate(R).T).trace() / 2
         V += m[k] * grav * x[2]
     p = [T.diff(v) for v in qd]
     M = [[pi.diff(v) for v in qd] for pi in p]

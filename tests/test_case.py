@@ -14,13 +14,11 @@ from compare.robots.case import Case, Scene
 from compare.robots.validation import WrongField
 
 
-def refused(robot=ARM, **fields) -> WrongField | None:
-    """The error with which a scene is refused; None if it is one."""
-    try:
+def refused(robot=ARM, **fields) -> WrongField:
+    """The error with which a scene is refused."""
+    with pytest.raises(WrongField) as error:
         robot.case(**{"name": "mine"} | fields)
-    except WrongField as error:
-        return error
-    return None
+    return error.value
 
 
 @pytest.mark.parametrize("field, value, more", [

@@ -7,8 +7,7 @@ from argparse import ArgumentTypeError
 
 import pandas as pd
 import pytest
-from in_process import runs_in_this_process as runs_in_this_process
-from in_process import without_workers
+from in_process import answered, without_workers
 from models import PATHS
 from runs import ROOT, on_terminal, readable_lines, words
 
@@ -27,9 +26,6 @@ FIELDS = {"experiment", "scene", "quantity", "rule", "value", "tolerance", "unit
 
 def results_in(folder):
     return json.loads((folder / "results.json").read_text(encoding="utf-8"))
-
-
-# one report, of which all of this is asked
 
 
 def quick_run(folder):
@@ -113,9 +109,6 @@ def test_results_have_their_fields(report):
     assert list(ended.values()) == sorted(ended.values())
 
 
-# other runs
-
-
 def test_a_wrong_file_differs_from_the_stated_numbers_and_not_from_its_own(inside, tmp_path, capsys):
     path, out = tmp_path / "two.xml", tmp_path / "out"
     path.write_text(XML.replace('mass="1.5"', 'mass="1.6"').replace("-9.81", "-9.8"))
@@ -164,32 +157,24 @@ def test_a_requested_step_that_is_not_stable_fails(inside, tmp_path, capsys):
     assert "is not stable in its run at 3 ms" in capsys.readouterr().out
 
 
-# bad requests
-
 ARM7, MIXED = (str(PATHS[name]) for name in ("arm7", "mixed"))
-WRONG = {  # arguments, each with what is in its line
-    # words
+WRONG = {
     "mas --version": "did you mean mass?", "help": "did you mean --help?", "xyz": f"{', '.join(EXPERIMENTS)} or all",
     "mass -quick": "did you mean --quick?", "mass --xyz": " ".join(command_line.OPTIONS), "mass gravity": "'gravity'",
     "--mjcf robot.xml": "all --mjcf robot.xml", "mass --reference modle": "did you mean model?",
-    "--quick fleet x": "fleet must come first",
-    "mass --reference my.py": "FILE.py:OBJECT", "mass --out": "--out: expected one argument",
-    # values, and options that do not go together
-    "mass --mjcf=": "--mjcf: the name is empty", "stability --dt nan": "'nan'",
-    "stability --dt=-0.5": "'-0.5'", "MASS": "did you mean mass?",
+    "--quick fleet x": "fleet must come first", "mass --reference my.py": "FILE.py:OBJECT",
+    "mass --out": "--out: expected one argument", "mass --mjcf=": "--mjcf: the name is empty",
+    "stability --dt nan": "'nan'", "stability --dt=-0.5": "'-0.5'", "MASS": "did you mean mass?",
     "stability --dt 5.1": "'5.1'", "stability --dt 9e-7": "'9e-7'", "mass --scenes my.toml": "mass",
-    "mass --dask tcp://x:1": "--dask",
-    "diagnosis": "--mjcf", "diagnosis --mjcf arm.xml --workers 2": "--workers",
+    "mass --dask tcp://x:1": "--dask", "diagnosis": "--mjcf", "diagnosis --mjcf arm.xml --workers 2": "--workers",
     "all --integrator Euler": "--integrator", "mass --joints hip,knee --reference model": "--joints",
-    # what is found only when it is looked for
     "speed --scenes my.toml": "my.toml", "mass --mjcf missing.xml": "missing.xml", f"mass --mjcf {ROOT}": "directory",
     f"mass --out {ROOT / 'pyproject.toml'}": "pyproject.toml", f"mass --reference arm --mjcf {ARM7}": "joint3 (hinge)",
     f"published --mjcf {ARM7}": "arm7", "stability --dt 0.1": "arm",
     f"stability --integrator euler --mjcf {ARM7}": "expected one of Euler",
-    f"trajectory --mjcf {MIXED} --scenes wrong.toml": "17",
-    # files
-    "gravity --mjcf cut.xml": "cut.xml", "gravity --mjcf empty.xml": "empty", "gravity --mjcf mesh.xml": "none.stl",
-    "all --mjcf still.xml": "joint", "gravity --mjcf light.xml": "mass", "gravity --mjcf heavy.xml": "inf kg",
+    f"trajectory --mjcf {MIXED} --scenes wrong.toml": "17", "gravity --mjcf cut.xml": "cut.xml",
+    "gravity --mjcf empty.xml": "empty", "gravity --mjcf mesh.xml": "none.stl", "all --mjcf still.xml": "joint",
+    "gravity --mjcf light.xml": "mass", "gravity --mjcf heavy.xml": "inf kg",
 }  # fmt: skip
 BODY = '<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/>{}</body></worldbody></mujoco>'
 MESH = '<asset><mesh name="m" file="none.stl"/></asset>'
@@ -207,11 +192,7 @@ def test_a_bad_request_gets_one_line_and_status_2(arguments, capsys, monkeypatch
     monkeypatch.chdir(tmp_path)
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
-    try:
-        status = main(arguments.split())
-    except SystemExit as stop:
-        status = stop.code
-    out, err = capsys.readouterr()
+    status, out, err = answered(arguments.split(), capsys)
     assert (status, out, len(err.splitlines())) == (2, "", 1) and WRONG[arguments] in err, err
     assert err.startswith("python -m compare: ")
     assert {path.name for path in tmp_path.iterdir()} == FILES.keys()

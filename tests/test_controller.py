@@ -67,9 +67,6 @@ def test_which_actuators_take_part(changes, takes_part):
     assert (found.controls != (None,)) is takes_part
 
 
-# scenes
-
-
 @pytest.mark.parametrize("changes, field", [
     ({"targets": 2.0}, "targets"), ({"targets": (2.0,)}, "targets"), ({"targets": (2.0, np.nan, 0.0, 0.0)}, "targets"),
     ({"locked": ("wrist",)}, "locked"),

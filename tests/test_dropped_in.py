@@ -2,17 +2,13 @@
 
 import csv
 import json
-import os
 import shutil
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from runs import ROOT, compare
 
-ROOT = Path(__file__).resolve().parent.parent
 PENDULUM = """<mujoco model="pendulum"><worldbody><body><joint name="hip" axis="0 1 0" damping="0.3"/>
 <inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.02"/></body></worldbody></mujoco>"""
 ENGINE = '''"""TMT's RK4 under another name."""
@@ -84,10 +80,7 @@ def copy(tmp_path_factory):
 
 
 def output(root, *arguments):
-    """The output of a command in the copy; it must succeed."""
-    environment = os.environ | {"PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-m", "compare", *arguments]
-    run = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True)
+    run = compare(*arguments, cwd=root, env={"PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"})
     assert run.returncode == 0, run.stdout + run.stderr
     return run.stdout
 
@@ -97,9 +90,8 @@ def test_help_names_a_dropped_experiment(copy):
 
 
 @pytest.mark.slow
-def test_all_runs_them_and_the_report_and_the_chart_of_speed_have_them(copy):
-    printed = output(copy, "all", "--quick", "--mjcf", "models/pendulum.xml", "--out", "report")
-    assert "trace" in printed
+def test_all_and_a_fleet_run_them_and_the_report_the_chart_of_speed_and_the_table_have_them(copy):
+    assert "trace" in output(copy, "all", "--quick", "--mjcf", "models/pendulum.xml", "--out", "report")
     checks = json.loads((copy / "report/results.json").read_text())["checks"]
     values = [check["value"] for check in checks if check["experiment"] == "trace"]
     assert values == pytest.approx([0.5e-9], rel=1e-3)
@@ -109,10 +101,6 @@ def test_all_runs_them_and_the_report_and_the_chart_of_speed_have_them(copy):
         assert {row["engine"] for row in csv.DictReader(file)} == {"mujoco", "tmt", "twin"}
     colours = imread(copy / "report/figures/overview_times.png")[..., :3].reshape(-1, 3)
     assert (abs(colours - np.array([0x12, 0x34, 0x56]) / 255.0) < 1e-3).all(axis=1).any()
-
-
-@pytest.mark.slow
-def test_the_table_of_a_fleet_has_a_dropped_experiment(copy):
     output(copy, "fleet", "models", "--only", "trace", "--out", "fleet", "--workers", "1")
     with open(copy / "fleet/fleet.csv", newline="") as file:
         (row,) = csv.DictReader(file)

@@ -34,7 +34,6 @@ def made(monkeypatch, name, **functions):
 
 
 def only(monkeypatch, *names):
-    """These are all experiments that there are."""
     for module in (command, command_line, experiment):
         records = {name: EXPERIMENTS.get(name, Experiment()) for name in names}
         monkeypatch.setattr(module, "EXPERIMENTS", records)
@@ -126,9 +125,6 @@ def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsy
     assert len(capsys.readouterr().err.splitlines()) == 1 and list(tmp_path.iterdir()) == []
 
 
-# what is drawn, and when
-
-
 class Writing(InProcess):
     """Draws in this process at once, and writes down when that is asked for."""
 
@@ -144,10 +140,6 @@ def plot(result, name):
     return name, Figure(), "A caption."
 
 
-def plot_other(result, name):
-    return plot(result, name)
-
-
 def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, monkeypatch):
     names, log = ["mass", "speed", "stability", "reduction"], []
 
@@ -156,9 +148,7 @@ def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, m
         return Result(name)
 
     def figures(name, result, robot):
-        yield partial(plot, result, f"{name}_first")
-        yield partial(plot_other, result, f"{name}_other")
-        yield partial(plot, result, f"{name}_second")
+        yield from (partial(plot, result, f"{name}_{k}") for k in range(3))
 
     for name in names:
         made(monkeypatch, name, rows=partial(rows, name), figures=partial(figures, name))
@@ -169,8 +159,8 @@ def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, m
         ("rows", "reduction"), ("figures", "speed"), ("figures", "reduction"),
     ]  # fmt: skip
     assert [section.name for section in sections] == names and (causes, skipped) == ([], {})
-    of_each = [sorted(figure.file for figure in one.figures) for one in sections]
-    assert of_each == [[f"{name}_first", f"{name}_other", f"{name}_second"] for name in names]
+    for section_of_name, name in zip(sections, names):
+        assert [figure.file for figure in section_of_name.figures] == [f"{name}_{k}" for k in range(3)]
 
 
 def test_figures_whose_names_differ_in_capitals_are_two_files(tmp_path, monkeypatch):

@@ -9,7 +9,7 @@ import pytest
 from runs import ENVIRONMENT, ROOT
 
 EXAMPLES = sorted((ROOT / "tests" / "examples").glob("*.py"))
-SLOW = ("many_files", "stable_step")  # which start runs
+SLOW = dict.fromkeys(("many_files", "stable_step"), pytest.mark.slow)  # which start runs
 TABLE = ROOT / "reports" / "example" / "tables" / "speed.csv"
 # what is printed, and the files that are left
 EXPECTED = {
@@ -21,11 +21,7 @@ EXPECTED = {
     "stable_step": (r"0\.01 s: not stable \(status 1\)\n.*Euler: 0\.00\d+ s, elbow\n.*fast: 0\.0[56]", {"robot.xml", "report"}),
     "time_against_error": ("6 methods", {"time_against_error.png"}),
 }  # fmt: skip
-
-
-CASES = [
-    pytest.param(path, marks=[pytest.mark.slow] * (path.stem in SLOW), id=path.stem) for path in EXAMPLES
-]
+CASES = [pytest.param(path, marks=SLOW.get(path.stem, ()), id=path.stem) for path in EXAMPLES]
 
 
 @pytest.mark.parametrize("path", CASES)

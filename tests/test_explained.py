@@ -6,14 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from sections import BAD, section
 from small_runs import Lines
 from test_own_reference import IDLE, examined
 from test_own_reference import folder as folder
 
-from compare.core.check import Result
 from compare.engines.mujoco.dynamics import MujocoDynamics
 from compare.experiments.setup import Setup, engines
-from compare.report.verdict import Section
 from compare.run.examine import examine
 from compare.run.explained import explained, lifted_less_work
 from compare.run.reference import compared_with
@@ -101,23 +100,15 @@ def test_a_wrong_number_of_a_file_explains_no_error_of_an_engine(tmp_path, monke
     assert sections[2].name == "mass" and sections[2].explained
 
 
-def section_of(name, *checks):
-    """A section with failing checks: (quantity, value)."""
-    result = Result(name)
-    for quantity, value in checks:
-        result.check("home", quantity, value, 1.0, "")
-    return Section(name, "", "", "", result)
-
-
 def test_what_no_cause_explains(tmp_path, monkeypatch):
     """A stated robot's own numbers, a file with another tree, what is no number, and the potential energy of balls."""
     setup = setup_of_heavy(tmp_path)
-    printed = section_of("published", ("TMT, torque", 2.0), ("MuJoCo, torque", 2.0))
+    printed = section("published", ("TMT, torque", *BAD[1:]), ("MuJoCo, torque", *BAD[1:]))
     assert [check.quantity for check in explained(setup, printed)] == ["MuJoCo, torque"]
     other = replace(setup.robot, tree=replace(setup.robot.tree, parent=(-1, 0, 0)))
     assert explained(replace(setup, robot=other), printed) == []
     monkeypatch.setattr("compare.run.explained.what_follows", lambda setup: {"equations": True})
     own = SimpleNamespace(robot=SimpleNamespace(own=("mass_matrix",)))
-    assert [check.value for check in explained(own, section_of("mass", ("M", None), ("M", 2.0)))] == [2.0]
+    assert [check.value for check in explained(own, section("mass", ("M", None, *BAD[2:]), BAD))] == [2.0]
     balls = SimpleNamespace(coordinates=SimpleNamespace(has_balls=True))
     assert np.isnan(lifted_less_work(balls, np.zeros((2, 4)))).all()

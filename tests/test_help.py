@@ -8,7 +8,7 @@ from pathlib import Path
 
 import own_equations
 import pytest
-from in_process import runs_in_this_process as runs_in_this_process
+from in_process import answered
 from runs import ENVIRONMENT
 from shown import blocks, command_lines
 
@@ -30,13 +30,6 @@ def com_positions(q):
     upper = np.array([-np.sin(hip), 0.0, -np.cos(hip)])
     return np.array([upper / 2, upper + np.array([-np.sin(knee), 0.0, -np.cos(knee)]) / 2])
 """
-
-
-def answered(arguments, capsys):
-    """Exit status, stdout and stderr of a request that runs nothing."""
-    with pytest.raises(SystemExit) as stop:
-        main(arguments)
-    return stop.value.code, *capsys.readouterr()
 
 
 @pytest.mark.parametrize("arguments, expected", [
@@ -88,6 +81,15 @@ def test_a_command_line_that_is_shown_can_be_given(line, capsys):
         assert request(words).experiment == words[0]
 
 
+FILES_OF_ARM = [
+    "robot.urdf",
+    "my_arm.xml",
+    "my_robot.xml",
+    "solution.xml",
+    "models/a.xml",
+    "class/a.xml",
+    "submissions/a.xml",
+]
 IN_SECONDS = "equations --out arm_c", "mass --out /tmp/mass", "parameters --mjcf my_arm.xml --reference arm"
 
 
@@ -105,18 +107,13 @@ def test_a_command_line_that_is_shown_runs(inside, line, tmp_path, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     own_equations.write(tmp_path)
     servo = '<actuator><position joint="hip" kp="20" kv="1"/></actuator></mujoco>'
-    Path("robot.xml").write_text(own_equations.XML.replace("</mujoco>", servo), encoding="utf-8")
-    mine = Path("mine.py").read_text(encoding="utf-8")
-    Path("my_equations.py").write_text(mine + POSITIONS, encoding="utf-8")
-    Path("my.toml").write_text(blocks("toml")[0], encoding="utf-8")
-    assert read_scenes("my.toml", ARM)[0].name in blocks("toml")[0]
-    text = ARM.mjcf.read_text(encoding="utf-8")
-    for folder in ("models", "class", "submissions"):
-        Path(folder).mkdir()
-    robots = ["robot.urdf", *(f"{name}.xml" for name in ("my_arm", "my_robot", "solution"))]
-    for name in (*robots, "models/a.xml", "class/a.xml", "submissions/a.xml"):
+    mine, arm = (path.read_text(encoding="utf-8") for path in (Path("mine.py"), ARM.mjcf))
+    files = dict.fromkeys(FILES_OF_ARM, arm) | {"submissions/b.xml": arm.replace('mass="1.5"', 'mass="1.6"')}
+    files |= {"robot.xml": own_equations.XML.replace("</mujoco>", servo), "my_equations.py": mine + POSITIONS}
+    for name, text in (files | {"my.toml": blocks("toml")[0]}).items():
+        Path(name).parent.mkdir(exist_ok=True)
         Path(name).write_text(text, encoding="utf-8")
-    Path("submissions/b.xml").write_text(text.replace('mass="1.5"', 'mass="1.6"'), encoding="utf-8")
+    assert read_scenes("my.toml", ARM)[0].name in blocks("toml")[0]
     words = shlex.split(line.replace("/tmp/mass", "mass"))
     quick = [] if words[0] in ("fleet", "equations") or "--quick" in words else ["--quick"]
     status = main([*words, *quick])

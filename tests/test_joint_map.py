@@ -54,9 +54,7 @@ def test_what_does_not_fit_is_one_line(coordinates, stated, word):
 
 
 @pytest.mark.parametrize("first", ["hip,knee-0.1rad,rail+0.2m", "-knee+170deg,-hip+0.3rad,-rail+5m"])
-@pytest.mark.parametrize(
-    "second", ["rail-7m,-knee+20deg,hip", "-hip in deg,knee+90deg in deg (rad/s),-rail+3m"]
-)
+@pytest.mark.parametrize("second", ["rail-7m,-knee+20deg,hip", "-hip in deg,knee+90deg in deg (rad/s),-rail+3m"])  # fmt: skip
 def test_two_maps_one_after_the_other_are_one(first, second, rng):
     inner, outer = joint_map(ARM, first.split(",")), joint_map(ARM, second.split(","))
     both, q, v = outer.after(inner, ARM), ARM.random(rng, 20), rng.normal(size=(20, 3))

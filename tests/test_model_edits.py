@@ -1,7 +1,6 @@
 """A wrong model fails wherever it matters: edits of the MJCF x experiments, each must be seen or cannot be, with the reason.
 
-Every experiment in its smallest setting, in one process. In that of parameters each number that differs fails its own check and
-is the cause.
+In the experiment of parameters each number that differs fails its own check and is the cause.
 """
 
 from dataclasses import replace
@@ -19,9 +18,8 @@ from compare.run.examine import Setup, new_causes
 ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge"' for name in ("alpha", "beta", "gamma"))
 FOREARM = '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>'
 STAGES_OFF = 'contact="disable" constraint="disable"'
-ON_THE_WORLD = XML.replace('<body name="fore', '</body><body name="fore').replace(
-    "</body>\n    </body>", "</body>"
-)
+BESIDE = XML.replace('<body name="fore', '</body><body name="fore')
+ON_THE_WORLD = BESIDE.replace("</body>\n    </body>", "</body>")
 GEOM = '<geom size="0.001" pos="0.2 0.2 0.2"/>'
 TOUCHING = XML.replace("</worldbody>", f"{GEOM}</worldbody>").replace(FOREARM, FOREARM + GEOM)
 TABLE = '<body pos="1 0 0"><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/></body></worldbody>'
@@ -106,18 +104,13 @@ def linearise(setup) -> Result:
 
 
 def without_some_joints(setup) -> Result:
-    """Of the scenes with fewer joints."""
     scenes = tuple(scene for scene in setup.robot.scenes if scene.name in ("zero, free", "elbow swing"))
     return reduction.untimed(replace(setup, robot=replace(setup.robot, scenes=scenes)))[0]
 
 
 STATES = {name: module(name).rows for name in ("published", "kinematics", "mass", "gravity", "acceleration")}
-RUNS = {
-    "trajectory": follow,
-    "speed": untimed_speed,
-    "stability": linearise,
-    "reduction": without_some_joints,
-}
+RUNS = {"trajectory": follow, "speed": untimed_speed, "stability": linearise}
+RUNS["reduction"] = without_some_joints
 SLOW = pytest.param(RUNS, marks=pytest.mark.slow)
 TRIED = [name for name, (*_, unseen) in EDITS.items() if unseen is not None]
 
@@ -135,15 +128,12 @@ def test_a_wrong_model_fails_wherever_it_matters(name, experiments):
     assert failing == experiments.keys() - set(unseen.split())
 
 
-# the cause, by the experiment of parameters
-
 OF_A_SOLUTION = "rest"  # compared with a solution alone
 BODY = '<body name="forearm" pos="0 0 -0.3"'
 SERVO = EDITS["no forces of actuators"][:2]
 
 
 def found(text):
-    """What the experiment finds of a model in MJCF text."""
     result = parameters.rows(setup_of(text, make=Setup, states=20))
     failed = {check.quantity for check in result.checks if not check.passed}
     assert bool(failed) == bool(result.causes)

@@ -5,35 +5,31 @@ from xml.etree import ElementTree
 
 import mujoco
 import pytest
-from in_process import runs_in_this_process as runs_in_this_process
 from models import PATHS
 
 from compare.__main__ import main
 from compare.robots.arm import ARM
 
+OWNERS = {mujoco.MjSpec: "from_file from_string compile", mujoco.MjModel: "from_xml_path from_xml_string"}
+OWNERS[ElementTree] = "iterparse"
+
 
 @pytest.fixture
 def counts(monkeypatch):
-    """How often files are parsed and models are compiled."""
     counts = Counter()
 
-    def count(owner, name, wrap=lambda function: function):
+    def count(owner, name):
         function = getattr(owner, name)
 
         def counted(*arguments, **options):
             counts[name] += 1
             return function(*arguments, **options)
 
-        monkeypatch.setattr(owner, name, wrap(counted))
+        monkeypatch.setattr(owner, name, counted)
 
-    for owner, names in (
-        (mujoco.MjSpec, "from_file from_string"),
-        (mujoco.MjModel, "from_xml_path from_xml_string"),
-    ):
+    for owner, names in OWNERS.items():
         for name in names.split():
-            count(owner, name, staticmethod)
-    count(mujoco.MjSpec, "compile")
-    count(ElementTree, "iterparse")
+            count(owner, name)
     return counts
 
 

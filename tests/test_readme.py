@@ -19,14 +19,6 @@ PENDULUM = """<mujoco><worldbody><body><joint name="hip" axis="0 1 0"/><inertial
 NUMBER = re.compile(r"(?<![\w])[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
 
 
-def run(text, folder, monkeypatch):
-    """The names that a Python block defines, run in a folder that has nothing but what its tests read."""
-    monkeypatch.chdir(folder)
-    names = {"__name__": "readme"}
-    exec(compile(text, "what is shown", "exec"), names)
-    return names
-
-
 def test_it_is_short_and_has_all_that_it_links():
     assert BLOCKS and {language for language, _ in BLOCKS} <= {"python", "sh", "text", "toml"}
     assert len(BLOCKS) == README.count("\n```") / 2 and len(README.splitlines()) <= 150
@@ -41,14 +33,13 @@ def table(name):
 
 
 def largest(rows, **where):
-    """The largest difference in the rows of a table with these values."""
     return max(float(row["largest_difference"]) for row in rows if where.items() <= row.items())
 
 
 def test_its_figures_are_those_of_the_example():
     results = json.loads((EXAMPLE / "results.json").read_text(encoding="utf-8"))
-    assert results["provenance"]["command"].endswith("-m compare all --out reports/example")
-    assert results["passed"]
+    command = results["provenance"]["command"]
+    assert results["passed"] and command.endswith("-m compare all --out reports/example")
     rows = [row for row in table("stability") if row["predicted_dt_s"] and row["observed_dt_s"]]
     off = [float(row["observed_dt_s"]) / float(row["predicted_dt_s"]) - 1.0 for row in rows]
     text = (EXAMPLE / "report.md").read_text(encoding="utf-8")
@@ -91,12 +82,13 @@ def cheapest(row):
 def test_python_runs_as_it_is_printed(text, tmp_path, monkeypatch):
     """A block that fails does so with the message that the next block shows."""
     following = next((after for block, after in pairwise(BLOCKS) if block[1] == text), ("", ""))
+    names = {"__name__": "readme"}
+    monkeypatch.chdir(tmp_path)  # which has nothing but what the block's tests read
     try:
-        names = run(text, tmp_path, monkeypatch)
+        exec(compile(text, "what is shown", "exec"), names)
     except AssertionError as error:
         printed = "".join(traceback.format_exception_only(error))
-        assert following[0] == "text"
-        assert same(printed, following[1]), printed
+        assert following[0] == "text" and same(printed, following[1]), printed
         return
     assert not following[1].startswith("AssertionError")
     assert os.listdir() == []

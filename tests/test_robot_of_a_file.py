@@ -11,33 +11,19 @@ from servo_models import INERTIA, hinge
 import tmt
 from compare.engines.mujoco import engine, read
 from compare.experiments.speed.settings import scenes_of as scenes_of_speed
-from compare.robots import Feature
+from compare.robots import Feature, file
 from compare.robots.actuators import Drive
 from compare.robots.coordinates import floats, free_joints
-from compare.robots.file import (
-    COARSER,
-    DURATION,
-    SERVOS_ACT,
-    RobotFile,
-    added_damping,
-    coarsest,
-    robot_of,
-    scenes_from,
-)
+from compare.robots.file import COARSER, DURATION, SERVOS_ACT, RobotFile, robot_of, scenes_from
 
 FOREARM = tmt.ARM.lock({"alpha": 0.0, "beta": 0.0})
 ONE = replace(FOREARM, gravity=(0.0, 0.0, 0.0))  # one hinge, its inertia 0.0527 kg m2
-
-
 ONLY = (Feature("hinge", ("one",), "modelled", ""),)
 
 
 def file_of(tree, **changes):
-    """The numbers of a file with a tree."""
-    file = RobotFile(
-        "", None, tree, ONLY, {}, np.array(tree.zero), (None,) * len(tree.kind), "Euler", 0.002, Drive()
-    )
-    return replace(file, **changes)
+    ranges, zero = (None,) * len(tree.kind), np.array(tree.zero)
+    return replace(RobotFile("", None, tree, ONLY, {}, zero, ranges, "Euler", 0.002, Drive()), **changes)
 
 
 def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
@@ -53,15 +39,12 @@ def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
     alone = robot_of(file_of(arm), "my.xml")
     assert list(alone.poses) == ["qpos0"] and alone.scenes[0].posture == "qpos0" and alone.is_read
     keys = {name: np.full(3, 0.1 * k) for k, name in enumerate(["qpos0", "key qpos0"], start=1)}
-    assert [*robot_of(file_of(arm, keyframes=keys), "my.xml").poses] == [
-        "key key qpos0",
-        "key qpos0",
-        "qpos0",
-    ]
+    robot = robot_of(file_of(arm, keyframes=keys), "my.xml")
+    assert list(robot.poses) == ["key key qpos0", "key qpos0", "qpos0"]
     reading = read(PATHS["pendulum_ball"])  # quaternions of one turn are one posture
     turned = replace(reading, keyframes={"turned": -reading.qpos0})
     ranged = replace(reading, keyframes={}, ranges=((0.0, 1.0),) * 2)  # a ball's range is not of q
-    assert [[*robot_of(file, "p.xml").poses] for file in (turned, ranged)] == [["turned"], ["qpos0"]]
+    assert [[*robot_of(one, "p.xml").poses] for one in (turned, ranged)] == [["turned"], ["qpos0"]]
 
 
 @pytest.mark.parametrize("name", [*PATHS, 0, 1])
@@ -88,14 +71,11 @@ def test_both_engines_start_every_scene_alike(name):
 @pytest.mark.parametrize("before, shift, free, floating", [
     (-1, 0.0, [1], True), (0, 0.0, [1], False), (-1, 0.1, [], False),
 ])  # fmt: skip
-def test_three_slides_and_a_ball_in_one_place_are_free_and_float_if_not_carried(
-    before, shift, free, floating
-):
+def test_three_slides_and_a_ball_in_one_place_are_free_and_float(before, shift, free, floating):
     tree = tmt.Tree(
         [*"hxyzb"], (-1, before, 1, 2, 3), [(0, 0, 0)] * 2 + [(shift, 0, 0)] + [(0, 0, 0)] * 2,
-        [(0, 1, 0), *np.eye(3), *np.eye(3)],
-        [0.0] * 7, ("arm", "stone"), (0, 4), (1.0, 1.0), [(0.1, 0, 0)] * 2, [np.eye(3)] * 2, (0, 0, 0),
-        ("hinge", "slide", "slide", "slide", "ball"),
+        [(0, 1, 0), *np.eye(3), *np.eye(3)], [0.0] * 7, ("arm", "stone"), (0, 4), (1.0, 1.0), [(0.1, 0, 0)] * 2,
+        [np.eye(3)] * 2, (0, 0, 0), ("hinge", "slide", "slide", "slide", "ball"),
     )  # fmt: skip
     assert (free_joints(tree), floats(tree)) == (free, floating)
 
@@ -134,7 +114,7 @@ def test_methods_are_compared_with_servos_that_8192_steps_follow(share, passes):
 def test_added_damping_lets_every_joint_decay_at_one_rate():
     inverse = np.array([[4.0, 1.0], [1.0, 0.25]])
     for accelerations, rate in (([0.0, 0.0], 2.0), ([1.0, -1.0], 2.0), ([4.0, -16.0], 8.0)):
-        damping = added_damping(inverse, np.array(accelerations))
+        damping = file.added_damping(inverse, np.array(accelerations))
         np.testing.assert_allclose(np.diag(inverse) * damping, rate)
 
 
@@ -144,7 +124,7 @@ def test_steps_are_four_of_the_files_own_and_no_longer_than_the_fastest_rate():
 
     def count(dt, rate=0.0, swing=0.0, added=()):
         tree = replace(ONE, damping=(rate * inertia,), stiffness=(swing**2 * inertia,))
-        return coarsest(tree, inverse, dt, added)
+        return file.coarsest(tree, inverse, dt, added)
 
     assert count(1.0) == 64 and count(DURATION / 64 / COARSER) == 64
     assert count(0.99 * DURATION / 64 / COARSER) == 128 and count(1e-9) == 8192

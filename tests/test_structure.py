@@ -17,26 +17,22 @@ from compare.experiments import Functions
 # what each part of compare may import of the others; of its own part: anything that makes no circle
 DIRECTIONS = {
     "": "agreement core", "core": "", "process": "core", "robots": "tmt core", "judge": "tmt core robots",
-    "agreement": "tmt core diagnosis engines judge robots",
-    "engines": "tmt core robots judge process", "truth": "tmt core robots", "diagnosis": "tmt core robots judge",
-    "report": "core process robots",
+    "agreement": "tmt core diagnosis engines judge robots", "engines": "tmt core robots judge process",
+    "truth": "tmt core robots", "diagnosis": "tmt core robots judge", "report": "core process robots",
     "experiments": "tmt core robots engines truth judge diagnosis report",
     "run": "tmt core robots engines judge process report experiments", "cli": "core experiments process report",
     "fleet": "tmt core robots engines judge process report experiments run cli",
     "export": "tmt core robots engines judge process report experiments run cli",
     "__main__": "tmt core robots engines judge process report experiments run cli fleet export",
 }  # fmt: skip
-# the modules, or beginnings of their names, that may import a library
+# the modules of compare, or beginnings of their names, that may import a library
 LIBRARIES = {
-    "mujoco": ("compare.engines.mujoco", "compare.engines.mjx"),
-    "mujoco_warp": ("compare.engines.warp",), "warp": ("compare.engines.newton", "compare.engines.warp"),
-    "jax": ("compare.engines.mjx",), "heyoka": ("compare.engines.heyoka",),
-    "dartpy": ("compare.engines.dart",), "pybullet": ("compare.engines.pybullet",),
-    "newton": ("compare.engines.newton",), "pinocchio": ("compare.engines.pinocchio",),
-    "pydrake": ("compare.engines.drake",), "pandas": ("compare.report",),
-    "matplotlib": ("compare.report.style",), "PIL": ("compare.report.images",),
-    "distributed": ("compare.fleet.executors",), "rich": ("compare.report.terminal",),
+    "mujoco": "engines.mujoco engines.mjx", "mujoco_warp": "engines.warp", "warp": "engines.newton engines.warp",
+    "jax": "engines.mjx", "heyoka": "engines.heyoka", "dartpy": "engines.dart", "pybullet": "engines.pybullet",
+    "newton": "engines.newton", "pinocchio": "engines.pinocchio", "pydrake": "engines.drake", "pandas": "report",
+    "matplotlib": "report.style", "PIL": "report.images", "distributed": "fleet.executors", "rich": "report.terminal",
 }  # fmt: skip
+SHARED = tuple(f"compare.experiments.{name}" for name in ("figures", "followed", "quantities", "setup"))
 DRAWING = ("matplotlib", "PIL")  # for modules whose name begins with figures, too
 PUBLIC = {"compare", "tmt"}  # whose __init__ gathers public names: nodes of their own
 FOR_DOCSTRINGS = {("tmt.export", "tmt")}  # exported functions have those of the public ones
@@ -51,21 +47,16 @@ def libraries(path) -> set[str]:
     return {name.split(".")[0] for name in imports(path)}
 
 
-def modules_of_compare(path) -> set[str]:
-    return {name for name in modules_imported(path) if name.startswith("compare")}
-
-
 def part(module) -> str:
     return (module.split(".") + [""])[1]
 
 
 def test_tmt_imports_three_libraries_alone():
     """And its symbolic equations SymPy, which need not be installed."""
-    allowed = {*sys.stdlib_module_names, "tmt", "numpy", "llvmlite", "mpmath"}
+    always = {*sys.stdlib_module_names, "tmt", "numpy", "llvmlite", "mpmath"}
     for path in OF_TMT:
-        assert (
-            not libraries(path) - allowed - ({"sympy"} if dotted(path).startswith("tmt.export.") else set())
-        ), path
+        allowed = always | {"sympy"} if dotted(path).startswith("tmt.export.") else always
+        assert not libraries(path) - allowed, path
 
 
 def test_imports_keep_their_directions():
@@ -73,31 +64,28 @@ def test_imports_keep_their_directions():
     for path in FILES:
         mine, own = part(dotted(path)), dotted(path).split(".")[:3]
         allowed = {mine, *DIRECTIONS.get(mine, "").split()}
-        for name in modules_of_compare(path):
+        for name in modules_imported(path) - architecture.TMT:
             said = f"{dotted(path)} imports {name}"
             assert part(name) in allowed, said
-            shared = tuple(
-                f"compare.experiments.{name}" for name in ("figures", "followed", "quantities", "setup")
-            )
-            is_free = name.startswith(shared) or name.split(".")[:3] == own
+            is_free = name.startswith(SHARED) or name.split(".")[:3] == own
             assert is_free or not name.startswith("compare.experiments."), said
         assert "tmt" not in libraries(path) or "tmt" in allowed, path
         for library in libraries(path) & LIBRARIES.keys():
             drawn = library in DRAWING and path.stem.startswith("figures")
-            assert drawn or dotted(path).startswith(LIBRARIES[library]), f"{dotted(path)} imports {library}"
+            homes = tuple(f"compare.{home}" for home in LIBRARIES[library].split())
+            assert drawn or dotted(path).startswith(homes), f"{dotted(path)} imports {library}"
 
 
 @pytest.mark.parametrize("of_folders", [False, True])
 def test_there_is_no_circle(of_folders):
     """Of files, imports for annotations left out; and of folders, whatever they import."""
-    paths = [*FILES, *OF_TMT]
-    pairs = {(dotted(path), name) for path in paths for name in modules_imported(path, for_types=of_folders)}
-    graph = {}
+    graph = TopologicalSorter()
+    pairs = {(dotted(path), name) for path in FILES + OF_TMT for name in modules_imported(path, of_folders)}
     for pair in pairs - FOR_DOCSTRINGS:
         importing, imported = (node_of(module, of_folders) for module in pair)
         if importing != imported:
-            graph.setdefault(importing, set()).add(imported)
-    TopologicalSorter(graph).prepare()
+            graph.add(importing, imported)
+    graph.prepare()
 
 
 def node_of(module: str, of_folders: bool) -> str:
@@ -107,7 +95,6 @@ def node_of(module: str, of_folders: bool) -> str:
 
 
 def annotations(path):
-    """The parameters and fields of a file with their annotations."""
     for node in ast.walk(architecture.parsed(path)):
         if isinstance(node, ast.arg) and node.annotation:
             yield node.arg, node.annotation

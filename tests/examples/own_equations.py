@@ -32,7 +32,6 @@ def test_my_equations():
 if __name__ == "__main__":
     test_my_equations()
     worst = compare.differences(CART_POLE, bias=lambda q, qd: [bias(q, qd)[0], -bias(q, qd)[1]])[0]
-    print(
-        f"the equations agree; with a wrong sign {worst.entry} is {worst.yours:.3g}, not {worst.mujoco:.3g}"
-    )
+    wrong = f"{worst.entry} is {worst.yours:.3g}, not {worst.mujoco:.3g}"
+    print(f"the equations agree; with a wrong sign {wrong}")
     print(f"probable cause: {worst.cause}")

@@ -30,9 +30,6 @@ for check in results["checks"]:
         print(f"step of the file, {check['value']} s: {answer} (status {status})")
 with open("report/tables/step_limits.csv", encoding="utf-8", newline="") as file:
     for row in csv.DictReader(file):
-        limit = (
-            f"{float(row['predicted_dt_s']):.4f} s, {row['limiting_joint']}"
-            if row["predicted_dt_s"]
-            else "none"
-        )
+        dt = row["predicted_dt_s"]
+        limit = f"{float(dt):.4f} s, {row['limiting_joint']}" if dt else "none"
         print(f"limit with {row['integrator']}: {limit}")

@@ -2,15 +2,14 @@
 
 import csv
 import json
-import os
 import re
 import shutil
 import sys
-from contextlib import suppress
-from pathlib import Path
 
+import psutil
 import pytest
 import runs
+from in_process import answered
 from toy import soon
 
 from compare.__main__ import main
@@ -70,9 +69,8 @@ def test_the_status_is_1_where_a_file_differs_and_what_has_changed_is_said(folde
     said, words = [], ["fleet", "m/x", "--only", "mass", "--out", "out", "--workers", "1"]
 
     def carry_out(self, progress):
-        self.rows += [
-            FileRow(file=model.shown, verdict=said[-1], reason="no reason") for model in self.models
-        ]
+        (model,) = self.models
+        self.rows.append(FileRow(file=model.shown, verdict=said[-1], reason="no reason"))
 
     monkeypatch.setattr("compare.fleet.run.Run.carry_out", carry_out)
     statuses = {"agree": 0, "self-consistent": 0, "refused": 0, "unconfirmed": 1, "broke": 1, "differ": 1}
@@ -86,25 +84,20 @@ def test_the_status_is_1_where_a_file_differs_and_what_has_changed_is_said(folde
 
 
 @pytest.mark.parametrize("arguments, word", [
-    (["fleet", "m", "--onyl=mass"], "did you mean --only?"), (["fleet", "m", "--reference", "my.py:"], "FILE.xml"),
-    (["fleet", "m", "--limit", "nan"], "--limit: 'nan'"), (["fleet", "m", "--only", "speed"], "--timing"),
-    (["fleet", "m", "--dask", "x", "--workers", "2"], "--workers"), (["fleet", "m", "--timing", "--workers", "2"], "--workers"),
-    (["fleet", "m", "--since", "nowhere"], "nowhere/fleet.csv"), (["fleet", "m", "--out", "m/part.xml"], "m/part.xml"),
+    ("--onyl=mass", "did you mean --only?"), ("--reference my.py:", "FILE.xml"), ("--limit nan", "--limit: 'nan'"),
+    ("--only speed", "--timing"), ("--dask x --workers 2", "--workers"), ("--timing --workers 2", "--workers"),
+    ("--since nowhere", "nowhere/fleet.csv"), ("--out m/part.xml", "m/part.xml"),
 ])  # fmt: skip
 def test_what_cannot_be_carried_out_gets_status_2_and_one_line(arguments, word, folder, capsys):
-    try:
-        status = main(arguments)
-    except SystemExit as stop:
-        status = stop.code
-    out, err = capsys.readouterr()
+    status, out, err = answered(["fleet", "m", *arguments.split()], capsys)
     assert (status, out, len(err.splitlines())) == (2, "", 1) and word in err
     assert not (folder / "reports").exists()
 
 
 @pytest.mark.parametrize("words, asked", [
-    (["--workers", "3", "--limit", "7"], ("Pool", 3, 7.0, True)),
-    (["--dask", "tcp://x:1", "--full"], ("Cluster", "tcp://x:1", 1800.0, None, False)),
-    (["--dask", "tcp://x:1", "--timing"], ("Cluster", "tcp://x:1", 1800.0, "timing", True)),
+    ("--workers 3 --limit 7", ("Pool", 3, 7.0, True)),
+    ("--dask tcp://x:1 --full", ("Cluster", "tcp://x:1", 1800.0, None, False)),
+    ("--dask tcp://x:1 --timing", ("Cluster", "tcp://x:1", 1800.0, "timing", True)),
 ])  # fmt: skip
 def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, capsys):
     seen = []
@@ -119,7 +112,7 @@ def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, cap
         made = {"__init__": start, "close": lambda self: None}
         monkeypatch.setattr(f"compare.fleet.executors.{name}", type(name, (), made))
     monkeypatch.setattr("compare.fleet.run.Run", run)
-    assert main(["fleet", "m", "--only", "gravity,mass", "--out", "asked", *words]) == 2
+    assert main(["fleet", "m", "--only", "gravity,mass", "--out", "asked", *words.split()]) == 2
     assert tuple(seen) == asked and "seen" in capsys.readouterr().err
 
 
@@ -132,19 +125,14 @@ WORDS = ("fleet", *FILES, *OPTIONS)
 
 @pytest.fixture
 def temporary(tmp_path, monkeypatch):
-    """A folder for the temporary files of a fleet."""
     (tmp_path / "temporary").mkdir()
     monkeypatch.setitem(runs.ENVIRONMENT, "TMPDIR", str(tmp_path / "temporary"))
     return tmp_path / "temporary"
 
 
 def is_left_at_work(temporary):
-    """Whether a process is in a folder of the temporary files."""
-    for cwd in Path("/proc").glob("[0-9]*/cwd"):
-        with suppress(OSError):  # it has ended meanwhile
-            if str(temporary) in os.readlink(cwd):
-                return True
-    return False
+    folders = (process.info["cwd"] or "" for process in psutil.process_iter(["cwd"]))
+    return any(str(temporary) in folder for folder in folders)
 
 
 def test_the_key_ctrl_c(temporary, tmp_path):

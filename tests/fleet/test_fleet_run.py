@@ -4,7 +4,9 @@ import json
 import os
 import pickle
 from concurrent.futures import Future
+from contextlib import chdir
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 
 import pytest
@@ -43,15 +45,11 @@ class Inside:
         function, arguments = future.result()
         if self.answer:
             return self.answer(*arguments)
-        before, place = os.getcwd(), self.folder / f"{len(list(self.folder.iterdir()))}"
-        place.mkdir()
-        os.chdir(place)
-        try:
-            return Outcome(function(*arguments), "")
-        except Exception as error:
-            return Outcome(None, described(error))
-        finally:
-            os.chdir(before)
+        with TemporaryDirectory(dir=self.folder) as place, chdir(place):
+            try:
+                return Outcome(function(*arguments), "")
+            except Exception as error:
+                return Outcome(None, described(error))
 
     def check(self):
         """Always there."""
@@ -74,7 +72,8 @@ def fleet(tmp_path, monkeypatch):
         of = Run(found_models(paths)[0], options, executor, tmp_path / "out", sent)
         of.carry_out(lambda rows: None)
         rows = {os.path.basename(row.file): row for row in of.rows}
-        return SimpleNamespace(of=of, executor=executor, rows=rows)
+        verdicts = {name: row.verdict for name, row in rows.items()}
+        return SimpleNamespace(of=of, executor=executor, rows=rows, verdicts=verdicts)
 
     return run
 
@@ -83,15 +82,11 @@ def report(tmp_path, name):
     return tmp_path / "out" / place_of_report(f"m/{name}")
 
 
-def verdicts(found):
-    return {name: row.verdict for name, row in found.rows.items()}
-
-
 def test_files_agree_or_are_refused_with_the_reason(fleet, tmp_path):
     found = fleet({
         "good.xml": PENDULUM.format(0.1), "broken.xml": "<mujoco><worldbody>", "none.xml": "<mujoco/>",
     }, ["parameters"])  # fmt: skip
-    assert verdicts(found) == {"good.xml": ITSELF, "broken.xml": REFUSED, "none.xml": REFUSED}
+    assert found.verdicts == {"good.xml": ITSELF, "broken.xml": REFUSED, "none.xml": REFUSED}
     assert "joint" in found.rows["none.xml"].reason and len(found.rows["broken.xml"].sha256) == 64
     assert found.rows["good.xml"].joints == 1 and found.rows["good.xml"].seconds > 0.0 and found.of.is_good
     assert (report(tmp_path, "good.xml") / "index.html").is_file() and not found.rows["none.xml"].has_report
@@ -105,8 +100,7 @@ def agrees(shown, *_):
 
 def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
     first, second = fleet(TWO, answer=agrees), fleet(TWO, answer=agrees)
-    assert len(first.executor.calls) == 2 and second.executor.calls == []
-    assert second.rows == first.rows
+    assert len(first.executor.calls) == 2 and second.executor.calls == [] and second.rows == first.rows
     third = fleet({"b.xml": PENDULUM.format(0.3), "b/a.xml": PENDULUM.format(0.4)}, answer=agrees)
     assert set(third.executor.calls) == {"m/b.xml", "m/b/a.xml"}
     (report(tmp_path, "b.xml") / ".fleet").write_bytes(b"damaged")
@@ -132,8 +126,7 @@ def test_what_lies_in_the_folder_of_a_report_is_data_and_a_row_or_computed_anew(
     key, row = json.loads(mark.read_text())
     assert fleet({}, answer=agrees).executor.calls == []
     wrong = {"verdict": "fine"}, {"worst_ratio": "1"}, {"reason": [1]}, {"other": 1}
-    others = [*(row | more for more in wrong), [row]]
-    poisons = [json.dumps((key, other)).encode() for other in others]
+    poisons = [json.dumps((key, other)).encode() for other in ([row], *(row | more for more in wrong))]
     for poison in (*poisons, pickle.dumps((key, Touch()))):
         mark.write_bytes(poison)
         assert fleet({}, answer=agrees).executor.calls == ["m/a.xml"], poison
@@ -156,8 +149,7 @@ def test_a_file_that_breaks_off_keeps_its_earlier_report_and_is_tried_again(flee
     fleet(ONE, answer=agrees)
     found = fleet({"a.xml": PENDULUM.format(0.2)}, answer=lambda *_: Outcome(None, "killed by SIGKILL"))
     row = found.rows["a.xml"]
-    assert row.verdict == BROKE and "SIGKILL" in row.reason
-    assert not row.has_report and not found.of.is_good
+    assert row.verdict == BROKE and "SIGKILL" in row.reason and not row.has_report and not found.of.is_good
     assert (report(tmp_path, "a.xml") / "index.html").read_bytes() == b"all"
     assert fleet({}, answer=agrees).executor.calls == ["m/a.xml"]
 
@@ -167,22 +159,20 @@ def test_few_models_are_in_memory_at_a_time(fleet):
     assert found.executor.most == AHEAD * Inside.workers and len(found.rows) == 20
 
 
-SOLUTION = PENDULUM.format(0.1)
-HEAVY = SOLUTION.replace("mass='1'", "mass='2'")
-CLASS = {
-    "heavy.xml": HEAVY, "renamed.xml": SOLUTION.replace("name='j' ", ""),
-    "slide.xml": SOLUTION.replace("axis", "type='slide' axis"), "right.xml": SOLUTION,
-}  # fmt: skip
-
-
 def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_matched(fleet, tmp_path):
-    (tmp_path / "solution.xml").write_text(SOLUTION)
-    found = fleet(CLASS, ["parameters"], reference="solution.xml")
+    right = PENDULUM.format(0.1)
+    (tmp_path / "solution.xml").write_text(right)
+    files = {
+        "heavy.xml": right.replace("mass='1'", "mass='2'"),
+        "renamed.xml": right.replace("name='j' ", ""),
+    }
+    files |= {"slide.xml": right.replace("axis", "type='slide' axis"), "right.xml": right}
+    found = fleet(files, ["parameters"], reference="solution.xml")
     named = {
         "heavy.xml": (DIFFER, "mass of b: stated 1 kg, compiled 2 kg"),
         "renamed.xml": (AGREE, "joint 0 as j"), "slide.xml": (DIFFER, "solution.xml"), "right.xml": (AGREE, ""),
     }  # fmt: skip
-    assert verdicts(found) == {name: verdict for name, (verdict, _) in named.items()}
+    assert found.verdicts == {name: verdict for name, (verdict, _) in named.items()}
     assert all(word in found.rows[name].reason for name, (_, word) in named.items())
     assert [name for name, row in found.rows.items() if not row.has_report] == ["slide.xml"]
     text = (report(tmp_path, "renamed.xml") / "report.md").read_text()

@@ -5,6 +5,7 @@ import dataclasses
 import html
 import random
 import re
+from functools import partial
 from types import SimpleNamespace
 from urllib.parse import unquote
 
@@ -13,17 +14,7 @@ import pytest
 from compare.core.check import AT_OWN_STEP, ENDS, About, Result
 from compare.fleet import table
 from compare.fleet.models import place_of_report
-from compare.fleet.table import (
-    AGREE,
-    BROKE,
-    DIFFER,
-    FLEET_COLUMNS,
-    ITSELF,
-    NOT_JUDGED,
-    REFUSED,
-    UNCONFIRMED,
-    FileRow,
-)
+from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, NOT_JUDGED, REFUSED, UNCONFIRMED, FileRow
 from compare.report.verdict import Section
 from compare.run.reference import Reference
 
@@ -34,19 +25,18 @@ STILL = "motion", None, 0.0, "nothing moves", "not judged", About.MODELS
 OWN = AT_OWN_STEP, 0.002, 0.001, "with Euler", "at most", About.STEP
 
 
-def good(share=0.5):
-    return "M", share, 1.0, "", "at most", About.MODELS
-
-
 ROW = FileRow(file="a b.xml", sha256="1", verdict=AGREE, joints=3, worst_ratio=0.123456, file_integrator="Euler", file_dt=0.002,
               stable_at_file_dt=True, limit=0.01, seconds=1.26, has_report=True, reference="arm")  # fmt: skip
 
 
-def row(**fields):
-    return dataclasses.replace(ROW, **fields)
+row = partial(dataclasses.replace, ROW)
 
 
-def judged(*checks, limits=(), runs=(), causes=(), lost=(), reference=("arm",)):
+def good(share=0.5):
+    return "M", share, 1.0, "", "at most", About.MODELS
+
+
+def judged(*checks, limits=(), runs=(), causes=(), lost=(), reference="arm"):
     """The row of one section with checks: (quantity, value, tolerance, note, rule, about)."""
     result = Result("stability", tables={"step_limits": list(limits), "own_run": list(runs)})
     for quantity, value, tolerance, note, rule, about in checks:
@@ -54,25 +44,19 @@ def judged(*checks, limits=(), runs=(), causes=(), lost=(), reference=("arm",)):
             result.not_judged("home", quantity, note)
             continue
         result.check("home", quantity, value, tolerance, "s", note, about == About.MODELS, rule, about)
-    kind, *renamed = reference
-    section = Section("stability", "", "", "", result)
-    judged_row = row()
-    table.judge(judged_row, [section], causes, lost, Reference(kind, "a.xml", renamed=tuple(renamed)))
+    section, judged_row = Section("stability", "", "", "", result), row()
+    table.judge(judged_row, [section], causes, lost, Reference(reference, "a.xml"))
     return judged_row
 
 
 @pytest.mark.parametrize("verdict, checks, more, named", [
-    (AGREE, [good(1.0)], {}, ""),
+    (AGREE, [good(1.0)], {}, ""), (ITSELF, [good()], {"reference": "model"}, ""),
     (AGREE, [good(), OWN], {}, "2 ms"),  # its own step is not stable: the reason says so
-    (ITSELF, [good()], {"reference": ("model",)}, ""),
-    (NOT_JUDGED, [good(), STILL], {}, "nothing moves"),
-    (DIFFER, [good(2.0), STILL], {"causes": CAUSES}, "mass of upper"),
+    (NOT_JUDGED, [good(), STILL], {}, "nothing moves"), (DIFFER, [good(2.0), STILL], {"causes": CAUSES}, "mass of upper"),
     (DIFFER, [good(1.0 + 1e-9), OWN, OFF], {"causes": CAUSES}, "mass of upper"),
     (DIFFER, [good(1.0 + 1e-9), BROKEN], {"causes": CAUSES, "lost": ["the table"]}, "SIGKILL, 4 times, and 1 more"),
-    (BROKE, [good(), BROKEN, OWN, OFF], {}, "SIGKILL, 4 times"),
-    (BROKE, [good()], {"lost": ["the table"]}, "the table"),
-    (UNCONFIRMED, [good(), OFF, OWN], {}, "0.01"),
-    (REFUSED, [], {}, "no comparison"),
+    (BROKE, [good(), BROKEN, OWN, OFF], {}, "SIGKILL, 4 times"), (BROKE, [good()], {"lost": ["the table"]}, "the table"),
+    (UNCONFIRMED, [good(), OFF, OWN], {}, "0.01"), (REFUSED, [], {}, "no comparison"),
 ])  # fmt: skip
 def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, named):
     row = judged(*checks, **more)
@@ -86,9 +70,8 @@ def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
 
 
 def limit(dt, stable, integrator="Euler", kind="finite"):
-    return SimpleNamespace(
-        integrator=integrator, file_integrator="Euler", limit=kind, predicted_dt=dt, stable_at_file_dt=stable
-    )
+    of_file = {"file_integrator": "Euler", "stable_at_file_dt": stable}
+    return SimpleNamespace(integrator=integrator, limit=kind, predicted_dt=dt, **of_file)
 
 
 @pytest.mark.parametrize("limits, stable, least", [
@@ -118,9 +101,6 @@ def test_what_needs_a_look_comes_first():
     rows = [row(**dict(zip(fields, values))) for values in right]
     for seed in range(20):
         assert sorted(random.Random(seed).sample(rows, len(rows)), key=lambda row: row.order) == rows
-
-
-# what has changed since an earlier fleet
 
 
 @pytest.mark.parametrize("before, now, named", [
@@ -179,8 +159,7 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
     with (tmp_path / "fleet.csv").open(newline="") as file:
         found = list(csv.DictReader(file))
     assert [row["file"] for row in found] == ["b.xml", "d.xml", "c.xml", "a b.xml"]
-    assert tuple(found[0]) == FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
+    assert tuple(found[0]) == table.FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
     text = (tmp_path / "index.html").read_text()
-    parts = "early.xml", "the command", '<a href="files/c.xml/index.html">d.xml</a>'
-    assert all(part in text for part in parts)
+    assert all(part in text for part in ("early.xml", "the command", '"files/c.xml/index.html">d.xml</a>'))
     assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")

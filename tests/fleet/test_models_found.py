@@ -101,12 +101,8 @@ def test_reports_of_two_files_are_never_in_one_folder(tmp_path):
     places = [place_of_report(shown) for shown in asked]
     assert len({place.casefold() for place in places}) == len(asked) and places[0] == "files/a/b.xml"
     assert not any(other.startswith(f"{place}/") for place in places for other in places)
-    for place in places:
-        whole = (tmp_path / place).resolve()
-        assert whole.is_relative_to(tmp_path / "files")
+    assert all((tmp_path / place).resolve().is_relative_to(tmp_path / "files") for place in places)
 
-
-# what a file needs beside itself is sent along
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 GEOM, MESH = "<geom type='mesh' mesh='m'/>", "<mesh name='m' file='{}'/>"
@@ -124,18 +120,16 @@ def collection(here):
     Image.linear_gradient("L").save(image, "PNG")
     hand = robot(MESH.format("finger.obj"), more="<compiler meshdir='shapes'/>")
     defaults = "<default><geom density='500'/></default><include file='deeper/settings.xml'/>"
-    assets = MESH.format("../../../shared/meshes/above.obj")
-    assets += (
-        "<hfield name='h' file='ground.png' size='1 1 0.1 0.1'/><model name='hand' file='hand/hand.xml'/>"
-    )
+    assets = MESH.format("../../../shared/meshes/above.obj") + "<model name='hand' file='hand/hand.xml'/>"
+    assets += "<hfield name='h' file='ground.png' size='1 1 0.1 0.1'/>"
     assets += "<texture name='c' type='cube' fileup='up.png'/>"
     more = "<compiler meshdir='assets' texturedir='pictures'/><include file='parts/defaults.xml'/>"
     files = {
         "shared/meshes/above.obj": TETRAHEDRON.format(1), "robots/r/assets/ground.png": image.getvalue(),
-        "robots/r/pictures/up.png": image.getvalue(),
+        "robots/r/pictures/up.png": image.getvalue(), "robots/r/hand/hand.xml": hand,
         "robots/r/parts/defaults.xml": f"<mujocoinclude>{defaults}</mujocoinclude>",
         "robots/r/deeper/settings.xml": "<mujocoinclude><option timestep='0.003'/></mujocoinclude>",
-        "robots/r/hand/hand.xml": hand, "robots/r/hand/shapes/finger.obj": TETRAHEDRON.format(4),
+        "robots/r/hand/shapes/finger.obj": TETRAHEDRON.format(4),
         "robots/r/r.xml": robot(assets, f"{GEOM}<attach model='hand' body='b' prefix='h_'/>", more),
     }  # fmt: skip
     for name, content in files.items():
@@ -147,8 +141,7 @@ def collection(here):
 def test_everything_that_a_model_needs_is_sent_and_compiles_elsewhere(collection, here, tmp_path):
     (model,) = found_models(["robots/r/r.xml"])[0]
     files = bundle(model)
-    assert set(files) == set(collection)
-    assert next(iter(files)) == "robots/r/r.xml"
+    assert set(files) == set(collection) and next(iter(files)) == "robots/r/r.xml"
     assert all(content == Path(name).read_bytes() for name, content in files.items())
     before = MjModel.from_xml_path("robots/r/r.xml")
     os.rename("robots", "gone")

@@ -6,12 +6,11 @@ import signal
 import time
 from pathlib import Path
 
-MEMORY, LIMIT = 10**9, 5.0  # bytes, s: limits of a call
+LIMIT = 5.0  # s, of a call
 SOON = 60.0  # s, far more than anything here takes
 
 
 def waits(folder, opened):
-    """Waits until a file is there."""
     (Path(folder) / f"{time.time_ns()}").write_text("")
     soon(Path(opened).exists)
     return 4
@@ -30,7 +29,6 @@ def kills_its_worker():
 
 
 def soon(question):
-    """Whether something holds before long."""
     until = time.monotonic() + SOON
     while not (answer := question()) and time.monotonic() < until:
         time.sleep(0.01)
@@ -40,15 +38,13 @@ def soon(question):
 # function, arguments, its value, words of the reason why there is none
 FAULTS = {
     "hangs": (time.sleep, (600,), None, "5 s"), "raises": (divmod, (1, 0), None, "ZeroDivisionError"),
-    "exits": (os._exit, (3,), None, "status 3"), "crashes": (os.abort, (), None, "SIGABRT"),
+    "exits": (os._exit, (3,), None, "status 3"), "crashes": (os.abort, (), None, "SIGABRT"), "returns": (abs, (-4,), 4, ""),
     "reads elsewhere": (signal.raise_signal, (signal.SIGSEGV,), None, "SIGSEGV"),
     "eats": (bytearray, (4 * 10**12,), None, "out of memory"), "prints": (print, ("no answer",), None, ""),
-    "returns": (abs, (-4,), 4, ""),
 }  # fmt: skip
 
 
 def check_all(executor):
-    """Make all calls and check their outcomes."""
     futures = {name: executor.submit(function, *given) for name, (function, given, *_) in FAULTS.items()}
     for name, future in futures.items():
         future.exception()  # wait

@@ -1,7 +1,7 @@
 """Where POSIX is missing, as on Windows: every module is imported, and runs, a fleet and an interrupt end as they do elsewhere.
 
-Each process of a run executes `sitecustomize.py` at its start, which takes away what Windows does not have. What stays:
-paths and processes of POSIX, and SIGKILL, which Python itself needs to end a process here.
+Each process of a run executes `sitecustomize.py` at its start, which takes away what Windows does not have.
+SIGKILL, which Python itself needs here, and the paths of POSIX stay.
 """
 
 import json

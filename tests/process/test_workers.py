@@ -14,7 +14,6 @@ SOON = 60.0  # s, far more than anything here takes
 
 
 def busy(seconds):
-    """Use the processor for these seconds."""
     began = time.process_time()
     while time.process_time() - began < seconds:
         pass

@@ -4,6 +4,7 @@ import json
 import signal
 import subprocess
 import sys
+from inspect import getsource
 from types import SimpleNamespace
 
 import pytest
@@ -18,7 +19,6 @@ OLD = {"tables/mass.csv": "old", "results.json": "old"}
 
 
 def fill(work, text):
-    """A small report that lists its files."""
     (work / "tables").mkdir()
     (work / "tables" / "mass.csv").write_text(text)
     listed = ["report.md", "results.json", "tables/mass.csv"]
@@ -28,8 +28,7 @@ def fill(work, text):
 def files(folder):
     """What is in a folder; of results.json only the text of `fill`."""
     found = {p.relative_to(folder).as_posix(): p.read_text() for p in folder.rglob("*") if p.is_file()}
-    of_results = {name: json.loads(found[name])["text"] for name in found if name == "results.json"}
-    return found | of_results
+    return found | {"results.json": json.loads(found["results.json"])["text"]}
 
 
 def old_report(out):
@@ -69,13 +68,12 @@ def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch):
     assert files(tmp_path) == OLD and names_in(tmp_path) == {"results.json", "tables"}
 
 
-# a run that is killed, or asked to end, at each moment of the exchange
-
-RUN = """
+RUN = f"""
 import json, os, sys
 from compare.process import interrupt
 from compare.report.folder import new_report
 
+{getsource(fill)}
 out, number, at = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 renamed = 0
 
@@ -90,11 +88,8 @@ def hook(event, _):
 
 interrupt.listen()
 with new_report(out) as work:
-    (work / "tables").mkdir()
-    (work / "tables" / "mass.csv").write_text("new")
+    fill(work, "new")
     (work / "report.md").write_text("new")
-    listed = ["report.md", "results.json", "tables/mass.csv"]
-    (work / "results.json").write_text(json.dumps({"provenance": {"files": listed}, "text": "new"}))
     sys.addaudithook(hook)
 print(renamed)
 """

@@ -115,9 +115,8 @@ def test_a_large_robot_has_fewer_pictures_and_then_fewer_scenes(rng):
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="there is no Chromium to run the script")
 def test_the_script_draws_each_engine_where_it_is(tmp_path):
     values = {"title": "", "good": True, "links": (), "script": motion.SCRIPT}
-    # as if nothing were escaped
     attack = "<img src=x onerror=document.title=1><script>document.title=1</script>"
-    values["body"] = Markup(page_of(drawn(apart=0.3)) + attack)
+    values["body"] = Markup(page_of(drawn(apart=0.3)) + attack)  # as if nothing were escaped
     text = environment().get_template("page.html.jinja").render(values)  # whose policy allows the script
     script = text.index("<script")
     page = tmp_path / "page.html"
@@ -129,9 +128,6 @@ def test_the_script_draws_each_engine_where_it_is(tmp_path):
         assert f'class="{name}" d="{motion.outline(pictures[-1], [(0, 1), (1, 2)])}"' in run.stdout, name
     parts = "5.00 s", "0.3 rad", '<div class="controls">', "<title></title>"
     assert all(part in run.stdout for part in parts)
-
-
-# figures
 
 
 def pixels(source):
