@@ -35,21 +35,18 @@ def parameters(dynamics: MujocoDynamics) -> dict[str, Any]:
     """
     m, d, bodies = dynamics.model, dynamics.data, dynamics.bodies
     dynamics.forward(m.qpos0[dynamics.qpos])
-    joints, turns = dynamics.joints.tolist(), dynamics.turns(d.ximat)
+    joints, dofs, turns = dynamics.joints.tolist(), dynamics.dofs, dynamics.turns(d.ximat)
     in_force = on(m, "CONTACT") and on(m, "CONSTRAINT")
-    before = {
-        j: j - 1 if j > m.body_jntadr[body] else last_hinge(m, m.body_parentid[body])
-        for j, body in zip(joints, m.jnt_bodyid[joints])
-    }
+    before = {}
+    for j, body in zip(joints, m.jnt_bodyid[joints]):
+        before[j] = j - 1 if j > m.body_jntadr[body] else last_hinge(m, m.body_parentid[body])
     is_order = all(before[j] in (-1, *joints[:i]) for i, j in enumerate(joints))
     places = joints if is_order else sorted(joints)  # each after its parent
     origins = dict(zip(joints, d.xanchor[joints])) | {-1: np.zeros(3)}
     numbers = {name: float(on(m, flag)) for name, flag in STATED_FLAGS.items()}
     numbers |= {name: float(np.abs(getattr(m, field, np.zeros(1))).sum()) for name, field in ABSENT.items()}
     return numbers | {
-        **{
-            name: getattr(m, f"dof_{name}")[dynamics.dofs] for name in ("damping", "armature", "frictionloss")
-        },
+        **{name: getattr(m, f"dof_{name}")[dofs] for name in ("damping", "armature", "frictionloss")},
         **{name: getattr(m, f"jnt_{name}")[joints].astype(float) for name in ("stiffness", "limited")},
         **{name: getattr(m, f"body_{name}")[bodies] for name in ("mass", "gravcomp")},
         **{name: getattr(m.opt, name) for name in ("gravity", "density", "viscosity")},
