@@ -143,9 +143,8 @@ class Model(ReadModel):
         self.model.joint_stiffness.assign(stiffness)
         damped = [damping[dof] for _, dof, centre in self.turns if centre is not None]
         if any(damped) or any(stiffness[dof] for _, dof, _ in self.turns):
-            raise Unread(
-                "the Featherstone solver has no springs of ball joints and no damping of free joints"
-            )
+            missing = "no springs of ball joints and no damping of free joints"
+            raise Unread(f"the Featherstone solver has {missing}")
 
     def run(self, course: Course) -> tuple[Array, int]:
         self.prepare(course)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 
-from ..outside.model import together
+from ..outside.model import combined
 from .inventory import switch_off
 from .names import INTEGRATORS, bit, joint_places, matrix, rotors, tensor
 from .reading import carriers
@@ -67,7 +67,7 @@ class Bare:
             if carrier[body] >= 0:
                 inertia = turn @ tensor(matrix(m.body_iquat[body]), m.body_inertia[body]) @ turn.T
                 carried[carrier[body]].append((m.body_mass[body], at + turn @ m.body_ipos[body], inertia))
-        mass, moments = zip(*map(together, carried))
-        numbers = {"mass": np.array(mass), "moments": np.array(moments)}
+        mass, _, inertias = map(np.array, zip(*map(combined, carried)))
+        numbers = {"mass": mass, "moments": np.linalg.eigvalsh(inertias)}
         numbers |= {"armature": m.dof_armature[self.dofs], "damping": m.dof_damping[self.dofs]}
         return numbers | {"stiffness": m.jnt_stiffness[m.dof_jntid][self.dofs]}

@@ -12,9 +12,8 @@ from .model import File, Numbers
 class Order(NamedTuple):
     q: Array  # the place in the Tree's q of each of the engine's numbers
     v: Array  # (nv,) the same in v
-    turned: tuple[
-        tuple[slice, slice], ...
-    ]  # of each free body: speeds of the engine, the quaternion in the Tree's q
+    # of each free body: speeds of the engine, the quaternion in the Tree's q
+    turned: tuple[tuple[slice, slice], ...]
     # those speeds are in world axes where the Tree's are in body axes; False: the other way round
     in_world: bool
 

@@ -93,12 +93,12 @@ def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> 
     anchors, _, _ = places_of(tree)
     places = [tree.coordinates.joints[j] for j in joints]
     counts = [place.q.stop - place.q.start for place in places]
-    positions = np.concatenate([np.arange(place.q.start, place.q.stop) for place in places])
-    speeds = np.concatenate([np.arange(place.qd.start, place.qd.stop) for place in places])
-    chosen = dict.fromkeys(("reference", "stiffness"), np.array(joints)) | {"rest": positions}
+    positions, speeds = np.r_[tuple(place.q for place in places)], np.r_[tuple(place.qd for place in places)]
+    chosen: dict[str, Any] = dict.fromkeys(("reference", "stiffness"), np.array(joints))
+    chosen["rest"] = positions
     chosen |= dict.fromkeys(("axis", "damping", "armature"), speeds)
     chosen |= dict.fromkeys(("mass", "com", "inertia"), np.array(bodies))
-    numbers = {name: np.array(getattr(tree, name))[indices] for name, indices in chosen.items()}
+    numbers = {name: np.array(getattr(tree, name))[at] for name, at in chosen.items()}
     numbers["rest"] = numbers["rest"] * np.repeat(numbers["stiffness"] > 0.0, counts)
     number_of_joint = {-1: -1} | {j: i for i, j in enumerate(joints)}
     parents = np.array([number_of_joint[tree.parent[j]] for j in joints])

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -68,10 +68,7 @@ class FeatureRow(Row):
 
     @classmethod
     def of(cls, feature: Feature) -> "FeatureRow":
-        names, why = ";".join(feature.names), feature.reason
-        return cls(
-            feature=feature.feature, count=feature.count, names=names, treatment=feature.treatment, reason=why
-        )
+        return cls(**asdict(feature) | {"count": feature.count, "names": ";".join(feature.names)})
 
 
 @dataclass
@@ -148,10 +145,8 @@ def check_forces(
     largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(sample.q, tree)).max()
     for source, force in dynamics.other_forces(sample.q, sample.qd).items():
         allowed = FACTOR * EPS * float(largest) if source == "fluid and tendons" else 0.0
-        most, is_rounding = float(np.abs(force).max()), allowed > 0.0
-        check = result.check(
-            sample.name, f"no forces of {source}", most, allowed, "N m", rounding=is_rounding
-        )
+        most, name = float(np.abs(force).max()), f"no forces of {source}"
+        check = result.check(sample.name, name, most, allowed, "N m", rounding=allowed > 0.0)
         if check.failed and not any(cause["quantity"] in OF_FORCES for cause in causes):
             place = f"forces of {source}"
             if source == "actuators":
