@@ -32,7 +32,7 @@ class Model(OfCompiled):
     def __init__(self, file: File, precision: str):
         from mujoco import mjx
 
-        from .mujoco.bare import Bare
+        from .mujoco.handed_on import Bare
 
         self.bare, self.precision = Bare(file.path, file.names), precision
         put = partial(mjx.put_model, impl="jax")

@@ -123,9 +123,8 @@ class Model(ReadModel):
     def bias(self, q: Array, v: Array) -> Array:
         S, c = self.set_state(q, v)
         weight, rest = self.model.state().joint_qd, self.model.state().joint_qd
-        self.newton.eval_inverse_dynamics_passive(
-            self.model, self.state, gravity_force=weight, coriolis_force=rest
-        )
+        forces = {"gravity_force": weight, "coriolis_force": rest}
+        self.newton.eval_inverse_dynamics_passive(self.model, self.state, **forces)
         return S.T @ (weight.numpy().astype(float) + rest.numpy() + self.own_mass_matrix() @ c)
 
     def acceleration(self, q: Array, v: Array, force: Array) -> Array:

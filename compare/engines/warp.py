@@ -35,7 +35,7 @@ class Model(OfCompiled):
         warp.set_device("cpu")
         import mujoco_warp
 
-        from .mujoco.bare import Bare
+        from .mujoco.handed_on import Bare
 
         self.bare = Bare(file.path, file.names, rotors_in_joints=True)
         self.bare.model.opt.iterations = 0  # of its solver of constraints

@@ -6,7 +6,7 @@ from files import mjcf
 import compare
 from compare.core.text import say
 from compare.engines.mujoco import ModelError, read
-from compare.engines.mujoco.remarks import remarks
+from compare.engines.mujoco.parameters import remarks
 
 BODY = '<body name="b"><joint name="j" axis="0 1 0"/><inertial pos="0.1 0 0" mass="1" diaginertia="1 1.5 2"/></body>'
 INERTIAL = '<inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'

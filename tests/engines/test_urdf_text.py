@@ -8,7 +8,7 @@ import pytest
 from models import PATHS, random_tree
 
 from compare.engines.mujoco import read
-from compare.engines.mujoco.urdf import urdf
+from compare.engines.mujoco.handed_on import urdf
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 

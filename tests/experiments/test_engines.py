@@ -218,7 +218,7 @@ if __name__ == "__main__":  # processes of engines begin with this file
     dies, other = (outside.Outside(name).of(case) for name in ("mortal", "again"))
     readings = set()  # by the seconds that they took
     for _ in range(2):
-        readings.add(other.ask(outside.answers.reading)["seconds"])
+        readings.add(other.ask(outside.attrgetter("reading"))["seconds"])
         print(dies.bias(q, q).shape, other.mass_matrix(q).shape, len(readings))
         try:
             dies.mass_matrix(q)

@@ -20,10 +20,7 @@ from .names import (
 )
 from .source import Source
 
-WITH_LENGTH = [
-    *OF_A_JOINT,
-    *(getattr(mujoco.mjtTrn, f"mjTRN_{name}") for name in ("SLIDERCRANK", "TENDON", "SITE")),
-]
+WITH_LENGTH = "JOINT", "JOINTINPARENT", "SLIDERCRANK", "TENDON", "SITE"  # transmissions
 GAINS = {"FIXED": 1, "AFFINE": 3}  # how many numbers of its law each kind has
 BIASES = {"NONE": 0, "AFFINE": 3}
 DYNAMICS = {"NONE": "none", "INTEGRATOR": "integrator", "FILTER": "filter", "FILTEREXACT": "filterexact"}
@@ -98,9 +95,9 @@ def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inpu
         return f"{inputs} controls"
     if np.any(getattr(m, "actuator_delay", np.zeros(i + 1))[i]):
         return "a delay"
-    transmission = mujoco.mjtTrn(m.actuator_trntype[i])
+    transmission = kind(mujoco.mjtTrn, m.actuator_trntype[i])
     if transmission not in WITH_LENGTH:
-        return f"a transmission of type {transmission.name.removeprefix('mjTRN_').lower()}"
+        return f"a transmission of type {transmission.lower()}"
     damping = [getattr(m, f"actuator_{name}", np.zeros(i + 1))[i] for name in ("damping", "dampingpoly")]
     return "damping of its own" if any(map(np.any, damping)) else ""
 
@@ -143,12 +140,11 @@ def tendon_moment(m: mujoco.MjModel, i: int) -> np.ndarray | None:
 
 def tendon_of(m: mujoco.MjModel, i: int) -> Tendon:
     """The spring and the damper of a tendon."""
-    moment = tendon_moment(m, i)
-    low, high = map(float, m.tendon_lengthspring[i])
+    moment, name = tendon_moment(m, i), element_name(m, "tendon", i)
     stiffness, damping = m.tendon_stiffness[i] * on(m, "SPRING"), m.tendon_damping[i] * on(m, "DAMPER")
-    at_all_postures = None if moment is None else tuple(moment.tolist())
+    everywhere = None if moment is None else tuple(moment.tolist())
     return Tendon(
-        element_name(m, "tendon", i), i, at_all_postures, float(stiffness), float(damping), low, high
+        name, i, everywhere, float(stiffness), float(damping), *map(float, m.tendon_lengthspring[i])
     )
 
 

@@ -14,6 +14,7 @@ A process of its own keeps an engine's threads, its precision and a crash away f
 import importlib
 from collections.abc import Callable, Mapping
 from functools import cache, cached_property
+from operator import attrgetter
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
@@ -70,7 +71,7 @@ class OutsideDynamics(OneByOne):
 
     @cached_property
     def reading(self) -> Reading:
-        return self.ask(answers.reading)
+        return self.ask(attrgetter("reading"))
 
     def ask(self, act: Callable[..., T], *arguments: Any) -> T:
         """What a function of answers.py returns in the engine's process; EngineError if it fails or the process ends.

@@ -3,7 +3,7 @@
 from ..edit import Edit
 
 EDITS = (
-    Edit("remarks", "remarks", "feature.treatment in (OFF, OPEN, LEFT_OUT)", "feature.treatment in (OFF, OPEN)",
+    Edit("mujoco.parameters", "remarks", "feature.treatment in (OFF, OPEN, LEFT_OUT)", "feature.treatment in (OFF, OPEN)",
          "a keyframe that is left out is not told"),
     Edit("experiments.engines", "compare_quantity", "FACTOR * eps * size", "100 * FACTOR * eps * size", "tolerance x 100"),
     Edit("experiments.engines", "compare_quantity", "record.eps", "1.2e-07", "every engine is judged as float32"),

@@ -38,7 +38,7 @@ EDITS = (
          "what pushes away takes part, as another scheme"),
     Edit("engine", "methods_for", "lone or tree.has_gains", "lone",
          "velocity gains are thought explicit in implicitfast"),
-    Edit("mujoco.dynamics", "MujocoDynamics.applied", "tau - self.constant", "tau", "the torque of servos acts twice"),
+    Edit("mujoco.dynamics", "MujocoDynamics.runner", "tau - self.constant", "tau", "the torque of servos acts twice"),
     Edit("run", "LEAST_JUDGED", "0.1", "0.0", "a run of a file that is judged until 0 s agrees"),
     Edit("run", "widths", "np.minimum(_1, most)", "0.0 * _1 + most", "a band wider than the movement judges it"),
     Edit("run", "widths", "largest >= STILL * of_unit", "True",

@@ -41,7 +41,7 @@ EDITS = (
     Edit("parameters.numbers", "check_forces", "np.abs(force).max()", "0.0 * np.abs(force).max()", "no force is seen"),
     Edit("reference", "compared_with", "path is None or has_hinges(source, ARM.joints)", "True",
          "any file is that of the arm"),
-    Edit("mujoco.remarks", "remarks", "feature.treatment in (OFF, OPEN, LEFT_OUT)", "feature.treatment == OFF",
+    Edit("mujoco.parameters", "remarks", "feature.treatment in (OFF, OPEN, LEFT_OUT)", "feature.treatment == OFF",
          "an open tree is not said"),
     Edit("mujoco.parameters", "row_of", "is_on and not is_same", "is_on", "an option without effect is said to change numbers"),
     Edit("engines.mujoco.dynamics", "MujocoDynamics.other_forces", "d.qfrc_actuator[_1]", "0 * d.qfrc_actuator[_1]",
