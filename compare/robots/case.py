@@ -214,10 +214,10 @@ class Case:
     @property
     def locked(self) -> Mapping[str, float | tuple[float, ...]]:
         """The positions of the locked joints by name, rad or m; of a ball its quaternion."""
-        by_name, posture = self.robot.coordinates.by_name, self.posture
-        positions = {name: posture[by_name[name].q].tolist() for name in self.robot.joints}
-        locked = {name: q for name, q in positions.items() if name in self.scene.locked}
-        return {name: tuple(q) if len(q) > 1 else q[0] for name, q in locked.items()}
+        joints = [name for name in self.robot.joints if name in self.scene.locked]
+        by_name, posture = self.robot.coordinates.by_name, self.posture.tolist()
+        positions = {name: posture[by_name[name].q] for name in joints}
+        return {name: tuple(q) if len(q) > 1 else q[0] for name, q in positions.items()}
 
     @cached_property
     def tree(self) -> tmt.Tree:

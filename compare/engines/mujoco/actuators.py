@@ -7,17 +7,7 @@ import mujoco
 import numpy as np
 
 from ...robots.actuators import Actuator, Drive, Tendon
-from .names import (
-    OF_A_JOINT,
-    control_of,
-    element_name,
-    joint_name,
-    kind_of,
-    names_where,
-    number_of_actuators,
-    on,
-    output_of,
-)
+from .names import OF_A_JOINT, control_of, element_name, names_where, number_of_actuators, on, output_of
 from .source import Source
 
 WITH_LENGTH = "JOINT", "JOINTINPARENT", "SLIDERCRANK", "TENDON", "SITE"  # transmissions
@@ -34,10 +24,7 @@ NOT_LINEAR = {
 
 
 def drive_of(source: Source, bodies: Sequence[int], keys: Mapping[int, str]) -> Drive:
-    """Actuators, tendons and gravity compensation of a compiled model.
-
-    bodies: of the Tree, by number; keys: names of keyframes.
-    """
+    """What drives a compiled model. bodies: of the Tree, by number; keys: names of keyframes."""
     model = source.model
     passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
     tendons = [tendon_of(model, i) for i in range(model.ntendon)]
@@ -117,13 +104,13 @@ def moment_of(m: mujoco.MjModel, i: int) -> tuple[str, tuple[float, ...] | None]
     transmission, target = mujoco.mjtTrn(m.actuator_trntype[i]), int(m.actuator_trnid[i, 0])
     joint, moment = "", None
     if transmission in OF_A_JOINT:
-        joint = joint_name(m, target)
-        if kind_of(m, target) in ("hinge", "slide"):
+        joint = element_name(m, "joint", target)
+        if kind(mujoco.mjtJoint, m.jnt_type[target]) in ("HINGE", "SLIDE"):
             moment = np.eye(m.nv)[m.jnt_dofadr[target]]
     elif transmission == mujoco.mjtTrn.mjTRN_TENDON:
         moment = tendon_moment(m, target)
         if moment is not None and moment.any():
-            joint = joint_name(m, m.dof_jntid[np.flatnonzero(moment)[0]])
+            joint = element_name(m, "joint", m.dof_jntid[np.flatnonzero(moment)[0]])
     gear = m.actuator_gear[output_of(m, i), 0]
     return joint, None if moment is None else tuple((gear * moment).tolist())
 
