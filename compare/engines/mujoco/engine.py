@@ -51,6 +51,7 @@ def methods_for(tree: Tree | None = None) -> dict[str, Method]:
     return {name: Method("mujoco", name, orders[name], scheme) for name, scheme in known.items()}
 
 
+METHODS = methods_for()
 MODELS = 16  # most models of cases that an engine keeps
 UNLIMITED = (
     "actuator_ctrllimited", "actuator_forcelimited", "actuator_actlimited", "jnt_actfrclimited", "tendon_actfrclimited",
@@ -67,7 +68,7 @@ class Mujoco(Engine):
     """
 
     name = "mujoco"
-    methods = methods_for()
+    methods = METHODS
 
     def __init__(self, source: Source, bodies: Sequence[int], tree: Tree | None = None) -> None:
         self.source, self.model, self.bodies = source, source.model, list(bodies)
