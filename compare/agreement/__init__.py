@@ -180,7 +180,7 @@ def rows(comparison: Comparison, cause: str) -> list[Difference]:
 
 def message(comparison: Comparison) -> str:
     """Which entries are off, the worst of each quantity, the probable cause, and what can be stated."""
-    from ..engines.mujoco.remarks import remarks  # here, so that `import compare` need not wait for it
+    from ..engines.mujoco.parameters import remarks  # here, so that `import compare` need not wait for it
 
     why = cause_of(comparison) if comparison.fails else Why()
     failing: dict[str, list[Difference]] = {}

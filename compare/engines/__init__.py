@@ -56,10 +56,8 @@ class EngineRecord:
         return float(np.finfo(self.precision).eps)
 
 
-RECORDS = {
-    name: replace(record, extra=record.extra or name)
-    for name, record in records_in(Path(__file__).parent, "ENGINE", EngineRecord).items()
-}
+_records = records_in(Path(__file__).parent, "ENGINE", EngineRecord)
+RECORDS = {name: replace(record, extra=record.extra or name) for name, record in _records.items()}
 LABELS = {name: record.label for name, record in RECORDS.items()}
 WHOSE = {name: record.possessive or f"{record.label}'s" for name, record in RECORDS.items()}
 COLOURS = {name: record.colour for name, record in RECORDS.items()}

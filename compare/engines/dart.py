@@ -60,11 +60,8 @@ class Model(OfUrdf):
         numbers = {joint.getName(): k for k, joint in self.joints.items()}
         links = []
         for node in self.skeleton.getBodyNodes():
-            R, inertia, parent = (
-                node.getWorldTransform().rotation(),
-                node.getInertia(),
-                node.getParentBodyNode(),
-            )
+            R, inertia = node.getWorldTransform().rotation(), node.getInertia()
+            parent = node.getParentBodyNode()
             body = Body(inertia.getMass(), node.getCOM(), R @ inertia.getMoment() @ R.T)
             joint = numbers.get(node.getParentJoint().getName())
             links.append(Link(node.getName(), parent and parent.getName(), joint, body))

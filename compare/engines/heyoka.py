@@ -63,16 +63,10 @@ class HeyokaDynamics(ScipyDynamics):
 def integrator(tree: Tree, tau: tuple[float, ...], tolerance: float) -> Any:
     import heyoka
 
-    q, qd = variables(tree, "q", "qd")
-    qdd = acceleration(tree, q, qd, list(tau), composite.mass_matrix_and_bias)
-    rates = tree.coordinates.component_rates(q, qd)
-    return heyoka.taylor_adaptive([*zip(q, rates), *zip(qd, qdd)], [0.0] * (len(q) + len(qd)), tol=tolerance)
-
-
-def variables(tree: Tree, *names: str) -> list[list[Any]]:
-    import heyoka
-
     for function, own in ((sin, heyoka.sin), (cos, heyoka.cos), (sqrt, heyoka.sqrt), (arctan, heyoka.atan)):
         function.register(heyoka.expression, own)
     sizes = {"q": tree.coordinates.nq, "qd": tree.coordinates.nv}
-    return [[heyoka.make_vars(f"{name}{i}") for i in range(sizes[name])] for name in names]
+    q, qd = ([heyoka.make_vars(f"{name}{i}") for i in range(size)] for name, size in sizes.items())
+    qdd = acceleration(tree, q, qd, list(tau), composite.mass_matrix_and_bias)
+    rates = tree.coordinates.component_rates(q, qd)
+    return heyoka.taylor_adaptive([*zip(q, rates), *zip(qd, qdd)], [0.0] * (len(q) + len(qd)), tol=tolerance)

@@ -32,7 +32,7 @@ class Model(OfCompiled):
     def __init__(self, file: File, precision: str):
         from mujoco import mjx
 
-        from .mujoco.bare import Bare
+        from .mujoco.handed_on import Bare
 
         self.bare, self.precision = Bare(file.path, file.names), precision
         put = partial(mjx.put_model, impl="jax")
@@ -83,9 +83,8 @@ class Model(OfCompiled):
         return self.values(q, v, force)[2]
 
     def run(self, course: Course) -> tuple[Array, int]:
-        model = self.models[course.method].tree_replace(
-            {"opt.timestep": np.asarray(course.dt, self.precision)}
-        )
+        dt = np.asarray(course.dt, self.precision)
+        model = self.models[course.method].tree_replace({"opt.timestep": dt})
         start = self.placed(course.q, course.v, course.tau)
         path = functions()["path"](model, self.data, *start, course.every, records=len(course.times) - 1)
         qpos, qvel = map(np.asarray, path)

@@ -123,9 +123,8 @@ class Model(ReadModel):
     def bias(self, q: Array, v: Array) -> Array:
         S, c = self.set_state(q, v)
         weight, rest = self.model.state().joint_qd, self.model.state().joint_qd
-        self.newton.eval_inverse_dynamics_passive(
-            self.model, self.state, gravity_force=weight, coriolis_force=rest
-        )
+        forces = {"gravity_force": weight, "coriolis_force": rest}
+        self.newton.eval_inverse_dynamics_passive(self.model, self.state, **forces)
         return S.T @ (weight.numpy().astype(float) + rest.numpy() + self.own_mass_matrix() @ c)
 
     def acceleration(self, q: Array, v: Array, force: Array) -> Array:
@@ -143,9 +142,8 @@ class Model(ReadModel):
         self.model.joint_stiffness.assign(stiffness)
         damped = [damping[dof] for _, dof, centre in self.turns if centre is not None]
         if any(damped) or any(stiffness[dof] for _, dof, _ in self.turns):
-            raise Unread(
-                "the Featherstone solver has no springs of ball joints and no damping of free joints"
-            )
+            missing = "no springs of ball joints and no damping of free joints"
+            raise Unread(f"the Featherstone solver has {missing}")
 
     def run(self, course: Course) -> tuple[Array, int]:
         self.prepare(course)

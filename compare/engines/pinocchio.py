@@ -26,7 +26,9 @@ class Model(ReadModel):
     drops = ("damping", "stiffness")  # aba applies no damping, and its model has no springs
 
     def __init__(self, file: File, precision: str):
-        self.file, self.model = file, built(file.path)
+        import pinocchio
+
+        self.pinocchio, self.file, self.model = pinocchio, file, built(file.path)
         self.last: dict[int, int] = {}  # the number in the Tree of the last joint of each of Pinocchio's
         starts, circles, q = {}, [], 0  # where each joint begins; which angles are continuous
         for number, (name, joint) in enumerate(zip(self.model.names, self.model.joints)):
@@ -66,10 +68,8 @@ class Model(ReadModel):
         return {"gravity": gravity, "armature": armature, "damping": damping, "stiffness": stiffness}
 
     def bodies(self) -> list[list[Body]]:
-        import pinocchio
-
         bodies: list[list[Body]] = [[] for _ in self.file.names]
-        pinocchio.forwardKinematics(self.model, self.data, *self.own(self.stated["reference"]))
+        self.pinocchio.forwardKinematics(self.model, self.data, *self.own(self.stated["reference"]))
         for number, k in self.last.items():
             body, place = self.model.inertias[number], self.data.oMi[number]
             inertia = place.rotation @ body.inertia @ place.rotation.T
@@ -77,8 +77,6 @@ class Model(ReadModel):
         return bodies
 
     def mend(self, name: str, values: Array) -> bool:
-        import pinocchio
-
         if name == "gravity":
             self.model.gravity.linear = values
         elif name == "armature":
@@ -90,14 +88,12 @@ class Model(ReadModel):
                     place = self.data.oMi[number]
                     inertia = place.rotation.T @ stated["inertia"][k] @ place.rotation
                     com = place.actInv(stated["com"][k])
-                    self.model.inertias[number] = pinocchio.Inertia(stated["mass"][k], com, inertia)
+                    self.model.inertias[number] = self.pinocchio.Inertia(stated["mass"][k], com, inertia)
             return bool(near(self.numbers()[name], values).all())
         return True
 
     def mass_matrix(self, q: Array) -> Array:
-        import pinocchio
-
-        upper = np.triu(pinocchio.crba(self.model, self.data, *self.own(q)))
+        upper = np.triu(self.pinocchio.crba(self.model, self.data, *self.own(q)))
         return self.order.tree_matrix(q, upper + np.triu(upper, 1).T)
 
     def turning(self, v: Array) -> Array:
@@ -108,16 +104,14 @@ class Model(ReadModel):
         return turning
 
     def bias(self, q: Array, v: Array) -> Array:
-        import pinocchio
-
         q_own, v_own = self.own(q, v)
-        return self.order.tree(q, pinocchio.rnea(self.model, self.data, q_own, v_own, self.turning(v_own)))
+        return self.order.tree(
+            q, self.pinocchio.rnea(self.model, self.data, q_own, v_own, self.turning(v_own))
+        )
 
     def acceleration(self, q: Array, v: Array, force: Array) -> Array:
-        import pinocchio
-
         q_own, v_own, force = self.own(q, v, force)
-        a_own = pinocchio.aba(self.model, self.data, q_own, v_own, force) - self.turning(v_own)
+        a_own = self.pinocchio.aba(self.model, self.data, q_own, v_own, force) - self.turning(v_own)
         return self.order.tree(q, a_own)
 
 

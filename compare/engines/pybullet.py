@@ -39,9 +39,8 @@ class Model(OfUrdf):
             (Path(folder) / "robot.urdf").write_text(text)
             flags = self.bullet.URDF_USE_INERTIA_FROM_FILE
             self.robot = self.bullet.loadURDF(f"{folder}/robot.urdf", useFixedBase=True, flags=flags)
-        numbers = range(
-            self.bullet.getNumJoints(self.robot)
-        )  # of the links, and of the joints that move them
+        # of the links, and of the joints that move them
+        numbers = range(self.bullet.getNumJoints(self.robot))
         self.infos = [self.bullet.getJointInfo(self.robot, link) for link in numbers]
         by_name = {info[1].decode(): info for info in self.infos}
         self.links = [by_name[name][0] for name in file.names]

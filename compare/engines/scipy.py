@@ -65,9 +65,8 @@ class ScipyDynamics(TmtQuantities, OneByOne):
 
         def run(times: Array = t) -> Any:  # SciPy's result, or NotFinite
             try:
-                return solve_ivp(
-                    slope, (0.0, times[-1]), course.start, course.method, t_eval=times, **options
-                )
+                span = 0.0, times[-1]
+                return solve_ivp(slope, span, course.start, course.method, t_eval=times, **options)
             except NotFinite as error:
                 return error
 

@@ -46,8 +46,7 @@ class Tmt(Engine):
         return TmtDynamics(case)
 
 
-def engine(schemes: Iterable[str]) -> Tmt:
-    return Tmt(schemes)
+engine = Tmt
 
 
 class TmtQuantities:

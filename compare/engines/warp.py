@@ -35,8 +35,9 @@ class Model(OfCompiled):
         warp.set_device("cpu")
         import mujoco_warp
 
-        from .mujoco.bare import Bare
+        from .mujoco.handed_on import Bare
 
+        self.warp, self.engine = warp, mujoco_warp
         self.bare = Bare(file.path, file.names, rotors_in_joints=True)
         self.bare.model.opt.iterations = 0  # of its solver of constraints
         try:
@@ -47,7 +48,9 @@ class Model(OfCompiled):
         self.graphs: dict[tuple[str, int], Any] = {}
 
     def held(self, name: str) -> Array:
-        return shared(getattr(self.models["Euler"], name))
+        field = getattr(self.models["Euler"], name)
+        values: Array = field.numpy()
+        return values[0] if field.ndim > 1 else values  # all worlds share the first
 
     def gravity(self) -> Array:
         return np.array(self.models["Euler"].opt.gravity.numpy()[0])
@@ -61,19 +64,15 @@ class Model(OfCompiled):
     @cached_property
     def model(self) -> Any:
         """The model without damping and stiffness, which are part of the force."""
-        import warp
-
         model = self.models["RK4"]
-        none = [warp.zeros_like(field) for field in (model.dof_damping, model.jnt_stiffness)]
+        none = [self.warp.zeros_like(field) for field in (model.dof_damping, model.jnt_stiffness)]
         return replace(model, dof_damping=none[0], jnt_stiffness=none[1])
 
     def at(self, q: Array, v: Array, force: Array) -> Any:
         """Data of as many worlds as there are states, at these states (worlds, n)."""
-        import mujoco_warp
-
         if len(q) not in self.worlds:
             # njmax=0 is possible, but then Euler and implicitfast do not accelerate
-            self.worlds[len(q)] = mujoco_warp.make_data(self.bare.model, len(q), nconmax=0, njmax=1)
+            self.worlds[len(q)] = self.engine.make_data(self.bare.model, len(q), nconmax=0, njmax=1)
         data = self.worlds[len(q)]
         for field, values in ((data.qpos, q), (data.qvel, v), (data.qfrc_applied, force)):
             placed = np.zeros(field.shape, np.float32)
@@ -83,21 +82,17 @@ class Model(OfCompiled):
 
     def replay(self, name: str, call: Callable[[Any], object], data: Any) -> Callable[[], None]:
         """A function that repeats a call for these data; the kernels that it launches are recorded once."""
-        import warp
-
         if (name, data.nworld) not in self.graphs:
             call(data)  # compiles
-            with warp.ScopedCapture() as capture:
+            with self.warp.ScopedCapture() as capture:
                 call(data)
             self.graphs[name, data.nworld] = capture.graph
-        return lambda: warp.capture_launch(self.graphs[name, data.nworld])
+        return lambda: self.warp.capture_launch(self.graphs[name, data.nworld])
 
     def forward(self, q: Array, v: Array, force: Array) -> Any:
         """Data after forward dynamics at states (worlds, n)."""
-        from mujoco_warp import forward
-
         data = self.at(q, v, force)
-        self.replay("forward", lambda data: forward(self.model, data), data)()
+        self.replay("forward", lambda data: self.engine.forward(self.model, data), data)()
         return data
 
     def mass_matrix(self, q: Array) -> Array:
@@ -114,13 +109,11 @@ class Model(OfCompiled):
         return self.forward(q[None], v[None], force[None]).qacc.numpy()[0, self.bare.dofs]
 
     def run(self, course: Course) -> tuple[Array, int]:
-        from mujoco_warp import step
-
         model, path = self.models[course.method], [course.start]
         start = course.q[None], course.v[None], course.tau[None]
         data = self.at(*start)
         model.opt.timestep.fill_(course.dt)
-        advance = self.replay(course.method, lambda data: step(model, data), data)
+        advance = self.replay(course.method, lambda data: self.engine.step(model, data), data)
         self.at(*start)  # the recording has moved them
         for _ in course.times[1:]:
             for _ in range(course.every):
@@ -138,9 +131,3 @@ def silently(call: Callable[[], object]) -> None:
         call()
     finally:
         os.dup2(kept, 2)
-
-
-def shared(field: Any) -> Array:
-    """The numbers of a field that all worlds share."""
-    values: Array = field.numpy()
-    return values[0] if field.ndim > 1 else values

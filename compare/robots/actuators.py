@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 Range = tuple[float, float]  # (low, high)
+Posture = str | tuple[float, ...]  # its name, or numbers
 ON_EDGE = 1e-9  # m or rad, distance from the edge of a dead band that counts as on the edge
 
 
@@ -177,7 +178,7 @@ def reason(actuator: Actuator, u: float) -> str:
 
 
 def controller(
-    drive: Drive, posture: str | tuple[float, ...], q: np.ndarray, targets: np.ndarray | float = 0.0
+    drive: Drive, posture: Posture, q: np.ndarray, targets: np.ndarray | float = 0.0
 ) -> Controller:
     """The controller at a posture: its torque is sum of J' ((g0 u + b0) + (g1 u + b1) J q + (g2 u + b2) J qd), l = J q.
 

@@ -19,6 +19,7 @@ POSTURES = {  # deg, (alpha, beta, gamma); the assignment's named postures
     "ball catch": (-70, 70, -30),
     "bent": (30, 20, 60),
 }
+THROWN = (100.0, 200.0, -150.0)  # deg/s
 SCENES = (
     Scene("zero, free", "zero", "free", tags=("full only", "speed")),
     Scene("ball catch, free", "ball catch", "free", tags=("speed",)),
@@ -26,14 +27,7 @@ SCENES = (
     Scene("ball catch, held", "ball catch", "hold", judged=2.5),  # unstable: rounding grows fast
     Scene("bent, held", "bent", "hold"),
     Scene("bent, damped", "bent", "free", damping=0.5, tags=("full only", "speed")),
-    Scene(
-        "thrown, no gravity",
-        "bent",
-        speed=(100.0, 200.0, -150.0),
-        gravity=False,
-        judged=4.5,
-        tags=("full only",),
-    ),
+    Scene("thrown, no gravity", "bent", speed=THROWN, gravity=False, judged=4.5, tags=("full only",)),
     Scene("elbow swing", "zero", "free", locked=("alpha", "beta"), tags=("full only",)),
 )
 PRINTED = (

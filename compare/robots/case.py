@@ -44,9 +44,7 @@ class Scene:
     # "hold": balance of gravity and springs at the start; "servos": own actuators; or N m
     torque: str | tuple[float, ...] = "free"
     speed: tuple[float, ...] = ()  # deg/s (m/s) at the start; (): at rest
-    damping: float | tuple[float, ...] = (
-        0.0  # N m s/rad (N s/m), added to that of all joints, or of each speed
-    )
+    damping: float | tuple[float, ...] = 0.0  # N m s/rad (N s/m), added: of all joints, or of each speed
     targets: float | tuple[float, ...] = 0.0  # deg (m), shift of the targets of the servos, all or each speed
     gravity: bool = True  # that of the model, or none
     locked: tuple[str, ...] = ()  # names of joints that keep their position
@@ -216,10 +214,10 @@ class Case:
     @property
     def locked(self) -> Mapping[str, float | tuple[float, ...]]:
         """The positions of the locked joints by name, rad or m; of a ball its quaternion."""
-        by_name, posture = self.robot.coordinates.by_name, self.posture
-        positions = {name: posture[by_name[name].q].tolist() for name in self.robot.joints}
-        locked = {name: q for name, q in positions.items() if name in self.scene.locked}
-        return {name: tuple(q) if len(q) > 1 else q[0] for name, q in locked.items()}
+        joints = [name for name in self.robot.joints if name in self.scene.locked]
+        by_name, posture = self.robot.coordinates.by_name, self.posture.tolist()
+        positions = {name: posture[by_name[name].q] for name in joints}
+        return {name: tuple(q) if len(q) > 1 else q[0] for name, q in positions.items()}
 
     @cached_property
     def tree(self) -> tmt.Tree:
@@ -266,10 +264,9 @@ class Case:
         """The damping that the scene adds to the unlocked joints, N m s/rad, (nv,)."""
         return np.broadcast_to(self.scene.damping, self.robot.coordinates.nv)[self.indices("qd")]
 
-    def indices(self, of: Literal["q", "qd"]) -> list[int]:
+    def indices(self, of: Literal["q", "qd"]) -> np.ndarray:
         """The indices of the unlocked joints in q or v of all joints."""
-        slices: list[slice] = [getattr(joint, of) for joint in self.unlocked]
-        return [i for place in slices for i in range(place.start, place.stop)]
+        return np.r_[tuple(getattr(joint, of) for joint in self.unlocked)]
 
     def positions_of_all(self, q: np.ndarray) -> np.ndarray:
         """Positions of all joints, (..., nq), from those of the unlocked joints, (..., nq)."""

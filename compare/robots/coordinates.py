@@ -137,12 +137,12 @@ class Coordinates(NamedTuple):
 
 def free_joints(tree: Tree) -> list[int]:
     """The first joint of each free joint: three slides and a ball, each at the one before."""
-    return [
-        i
-        for i in range(len(tree.kind) - 3)
-        if tree.kind[i : i + 4] == FREE
-        and all(tree.parent[k + 1] == k and not any(tree.offset[k + 1]) for k in range(i, i + 3))
-    ]
+    free = []
+    for i in range(len(tree.kind) - 3):
+        in_place = all(tree.parent[k + 1] == k and not any(tree.offset[k + 1]) for k in range(i, i + 3))
+        if tree.kind[i : i + 4] == FREE and in_place:
+            free.append(i)
+    return free
 
 
 def floats(tree: Tree) -> bool:

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-import tmt
-from tmt import literal
+from tmt import Tree, literal
 from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
 from tmt.model.tree import GAINS
 
@@ -17,6 +16,7 @@ from .case import Scene
 from .coordinates import Coordinates, fastest_rates, free_joints
 from .robot import Feature, Range, Robot
 
+Array = np.ndarray
 DURATION = 1.0  # s; longer free motions are chaotic
 MIN_STEPS, MAX_STEPS_OF_A_FILE = 64, 8192  # of a scene, with its largest step
 COARSER = 4  # largest step / step of the file
@@ -35,10 +35,10 @@ class RobotFile:
 
     name: str  # of the model, "": it has none that can be printed in a line
     path: Path | None  # None: the model is a text, or was compiled elsewhere
-    tree: tmt.Tree
+    tree: Tree
     features: tuple[Feature, ...]  # in a fixed order
-    keyframes: Mapping[str, np.ndarray]  # positions of the Tree, (nq,), by the key's name or `key 0`
-    qpos0: np.ndarray  # (nq,)
+    keyframes: Mapping[str, Array]  # positions of the Tree, (nq,), by the key's name or `key 0`
+    qpos0: Array  # (nq,)
     ranges: tuple[Range, ...]  # of each joint; a ball's of the angle of its turn
     integrator: str  # by MuJoCo's name
     dt: float  # s
@@ -100,9 +100,7 @@ def named_positions(file: RobotFile, names: Mapping[str, str]) -> dict[str, tupl
     return positions
 
 
-def scenes_from(
-    tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Drive | None = None
-) -> tuple[Scene, ...]:
+def scenes_from(tree: Tree, start: str, q: Array, dt: float, drive: Drive) -> tuple[Scene, ...]:
     """The scenes of a robot: held, let go, let go with damping; a free body is thrown too; with servos see servo_scenes.
 
     Only agreement is expected, as long as rounding allows. A robot that would stay at rest gets an initial speed. Methods are
@@ -135,12 +133,10 @@ def scenes_from(
     scenes.append(let_go(how, tags=tags))
     longest = DURATION / coarsest(tree, inverse, dt, damping)
     scenes.append(let_go(f"{how}, damped", damping=damping, tags=("own", "full only"), dt=longest))
-    return (*scenes, *servo_scenes(tree, start, q, dt, drive or Drive(), inverse))
+    return (*scenes, *servo_scenes(tree, start, q, dt, drive, inverse))
 
 
-def servo_scenes(
-    tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Drive, inverse: np.ndarray
-) -> list[Scene]:
+def servo_scenes(tree: Tree, start: str, q: Array, dt: float, drive: Drive, inverse: Array) -> list[Scene]:
     """The scenes with the robot's own servos, if it has some: held, and step response.
 
     A robot with a free body has no gravity in them. If a servo is too fast for MAX_STEPS_OF_A_FILE, methods are not compared.
@@ -160,7 +156,7 @@ def servo_scenes(
     return [held, replace(held, name=f"{start}, step of the servos", targets=moved, tags=tags)]
 
 
-def added_damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float, ...]:
+def added_damping(inverse: Array, accelerations: Array) -> tuple[float, ...]:
     """Damping of each speed, (nv,) N m s/rad or N s/m, with which a robot sinks without swinging.
 
     Every joint, with its inertia 1 / (Mbar^-1)_ii, decays at the same rate: twice the frequency of a swing of 1 rad or 1 m with
@@ -171,7 +167,7 @@ def added_damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float
 
 
 def coarsest(
-    tree: tmt.Tree, inverse: np.ndarray, dt: float, added: Sequence[float] = (), duration: float = DURATION
+    tree: Tree, inverse: Array, dt: float, added: Sequence[float] = (), duration: float = DURATION
 ) -> int:
     """The number of steps of a scene, 64, 128 ... 8192: about four times the step of the file.
 
@@ -184,7 +180,7 @@ def coarsest(
     return count
 
 
-def thrown(tree: tmt.Tree) -> tuple[float, ...]:
+def thrown(tree: Tree) -> tuple[float, ...]:
     """Speeds, (nv,) m/s and deg/s, of tumbling free bodies; zero of all else."""
     speed = np.zeros(tree.coordinates.nv)
     for i in free_joints(tree):

@@ -17,9 +17,8 @@ from ..core.words import listed, some_of
 from .coordinates import Coordinates
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}
-STATED = re.compile(
-    r"(?P<name>.+?)(?P<offset>[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<measure>deg|rad|m)"
-)
+NUMBER = r"[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+STATED = re.compile(rf"(?P<name>.+?)(?P<offset>{NUMBER})(?P<measure>deg|rad|m)")
 FORMS = '"knee", "-knee", "knee+90deg" or "knee in deg"'
 
 
@@ -56,14 +55,13 @@ class JointMap:
     def __init__(self, coordinates: Coordinates, joints: Sequence[Joint]) -> None:
         self.joints = tuple(joints)
         places = [coordinates.by_name[joint.name] for joint in joints]
-        self.q = np.concatenate([np.arange(place.q.start, place.q.stop) for place in places])
-        self.v = np.concatenate([np.arange(place.qd.start, place.qd.stop) for place in places])
+        self.q = np.r_[tuple(place.q for place in places)]
+        self.v = np.r_[tuple(place.qd for place in places)]
         positions = [place.q.stop - place.q.start for place in places]
         speeds = [place.qd.stop - place.qd.start for place in places]
         # a ball has no sign, zero or unit
-        stated = [
-            joint if place.kind != "ball" else Joint(joint.name) for joint, place in zip(joints, places)
-        ]
+        pairs = zip(joints, places)
+        stated = [Joint(joint.name) if place.kind == "ball" else joint for joint, place in pairs]
         signs, units = [joint.sign for joint in stated], [PER_UNIT[joint.unit] for joint in stated]
         self.sign, self.sense = np.repeat(signs, positions), np.repeat(signs, speeds)
         self.zero = np.repeat([joint.zero for joint in stated], positions)

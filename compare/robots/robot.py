@@ -74,9 +74,8 @@ class Feature:
 class Robot:
     """A robot: a file for MuJoCo, the numbers that are compared with it, and scenes.
 
-    Tags of scenes: "full only": not in a quick run;
-    "speed": every method is run; "regular": errors are regular from large steps on; "falls": a free body
-    falls and nothing else moves; "own": of a user or a file, only agreement is expected.
+    Tags of scenes: "full only": not in a quick run; "speed": every method is run; "regular": errors are regular from large steps
+    on; "falls": a free body falls and nothing else moves; "own": of a user or a file, only agreement is expected.
     """
 
     name: str
@@ -88,9 +87,8 @@ class Robot:
     ranges: tuple[Range, ...] = ()  # of each joint; (): no ranges
     described: str = ""  # in a sentence: "a human arm"
     symbols: Mapping[str, str] = field(default_factory=dict)  # of joints, for figures
-    kinds: Mapping[str, str] = field(
-        default_factory=dict
-    )  # posture of a centre, a saddle, a marginal equilibrium
+    # posture of a centre, a saddle, a marginal equilibrium
+    kinds: Mapping[str, str] = field(default_factory=dict)
     # q (times, n) rad -> points, m, drawn as a chain; None: origins of the joints
     landmarks: Callable[[np.ndarray], list[Any]] | None = None
     sketched: tuple[str, ...] = ()  # postures of the sketch; (): the first two

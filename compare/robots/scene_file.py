@@ -59,9 +59,7 @@ def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
 
 def scene_of(where: str, entry: dict[str, Any], robot: Robot) -> Scene:
     """One entry as a scene of the robot."""
-    values: dict[str, Any] = {
-        key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()
-    }
+    values = dict(entry)
 
     def refused(key: str, accepted: str) -> SceneError:
         value = in_toml(entry.get(key, values.get(key)))

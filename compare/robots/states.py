@@ -32,9 +32,8 @@ class Sample:
     exact_states: int
     states: tuple[str, ...] = ()  # their names, if they have any
     notes: tuple[Finding, ...] = ()  # about what is left out
-    exact_values: dict[str, "Pairs"] = field(
-        default_factory=dict, repr=False
-    )  # as far as they were asked for
+    # as far as they were asked for
+    exact_values: dict[str, "Pairs"] = field(default_factory=dict, repr=False)
 
     def exact(self, function: str, part: int | None = None) -> "Pairs":
         """The exact values of a function of tmt, or of one of its arrays, at the first states."""

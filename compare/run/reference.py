@@ -11,7 +11,7 @@ from ..core.words import in_one_line
 from ..engines import Engine
 from ..engines.mujoco import ModelError, Mujoco, Reading, Source, engine, has_hinges, parse, read
 from ..engines.mujoco.names import integrator_by_name
-from ..engines.mujoco.remarks import of_source, remarks
+from ..engines.mujoco.parameters import of_source, remarks
 from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import OwnFileError, aside, own_object, raised_in
 from ..robots import Robot
@@ -23,6 +23,7 @@ from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, match
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 SOLUTION = "solution"  # the kind of reference that is another file
+Text = str | None  # None: not given
 
 
 class JointsDiffer(ModelError):
@@ -80,11 +81,7 @@ class Compared(NamedTuple):
 
 
 def compared_with(
-    reference: str | None,
-    path: str | None,
-    joints: str | None = None,
-    shown: str | None = None,
-    solution: str | None = None,
+    reference: Text, path: Text, joints: Text = None, shown: Text = None, solution: Text = None
 ) -> Compared:
     """A file (None: the arm's) and a reference (None: the arm, if the file has exactly its hinges, else the compiled model).
 
@@ -110,9 +107,8 @@ def compared_with(
         # its actuators do not act: those of the file may differ
         stated = replace(stated, tree=replace(stated.tree, joint_names=names), drive=Drive())
         robot = robot_of_solution(reading, shown, stated, of_file.source)
-        return Compared(
-            of_file._replace(kind=SOLUTION, renamed=renamed), robot, engine(reading, stated), reading
-        )
+        of_file = of_file._replace(kind=SOLUTION, renamed=renamed)
+        return Compared(of_file, robot, engine(reading, stated), reading)
     robot, mujoco = robot_of(reading, shown), engine(reading)
     if reference in (None, "model"):
         return Compared(of_file._replace(source=""), robot, mujoco, reading)

@@ -21,6 +21,8 @@ from .names import INTEGRATORS, bit, control_of, kind_of, output_of
 DRIVES = ("body_gravcomp", "tendon_stiffness", "tendon_damping")
 # it is implicit in the constraints' springs and dampers
 DISCRETE = getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", None)
+Values = Mapping[int, float]  # by the number of an actuator or of a speed
+NONE: Values = MappingProxyType({})
 
 
 class Acting:
@@ -30,13 +32,7 @@ class Acting:
     integrator by MuJoCo's name, dt in s.
     """
 
-    def __init__(
-        self,
-        model: mujoco.MjModel,
-        drive: Drive,
-        cut: Mapping[int, float] = MappingProxyType({}),
-        weightless: bool = False,
-    ):
+    def __init__(self, model: mujoco.MjModel, drive: Drive, cut: Values = NONE, weightless: bool = False):
         self.model, self.drive = mujoco.MjModel.__copy__(model), drive
         m = self.model
         for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "AUTORESET"):
@@ -100,9 +96,8 @@ class Acting:
         less = 1.0 + (dt * damping + dt * dt * stiffness) * discrete
         jacobian = np.zeros((data.nefc, model.nv))
         if mujoco.mj_isSparse(model):
-            mujoco.mju_sparse2dense(
-                jacobian, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
-            )
+            places = data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
+            mujoco.mju_sparse2dense(jacobian, data.efc_J, *places)
         else:
             jacobian[:] = data.efc_J.reshape(jacobian.shape)
         return Rows(
@@ -169,14 +164,12 @@ class Acting:
             start = positions[1] if self.is_coupled else q
             yield np.hstack([self.coordinates.difference(positions[0], start), activations[:, filters]])
 
-    def changed(
-        self, damping: Mapping[int, float] | None = None, armature: Mapping[int, float] | None = None
-    ) -> "Acting":
+    def changed(self, damping: Values = NONE, armature: Values = NONE) -> "Acting":
         """A copy with other speed gains kv of actuators, by number, and more armature of speeds, kg m2 or kg."""
         other = deepcopy(self)
-        for i, kv in (damping or {}).items():
+        for i, kv in damping.items():
             other.model.actuator_biasprm[i, 2] = -kv
-        for k, more in (armature or {}).items():
+        for k, more in armature.items():
             add_armature(other.model, [k], more)
         return other
 

@@ -7,23 +7,10 @@ import mujoco
 import numpy as np
 
 from ...robots.actuators import Actuator, Drive, Tendon
-from .names import (
-    OF_A_JOINT,
-    control_of,
-    element_name,
-    joint_name,
-    kind_of,
-    names_where,
-    number_of_actuators,
-    on,
-    output_of,
-)
+from .names import OF_A_JOINT, control_of, element_name, names_where, number_of_actuators, on, output_of
 from .source import Source
 
-WITH_LENGTH = [
-    *OF_A_JOINT,
-    *(getattr(mujoco.mjtTrn, f"mjTRN_{name}") for name in ("SLIDERCRANK", "TENDON", "SITE")),
-]
+WITH_LENGTH = "JOINT", "JOINTINPARENT", "SLIDERCRANK", "TENDON", "SITE"  # transmissions
 GAINS = {"FIXED": 1, "AFFINE": 3}  # how many numbers of its law each kind has
 BIASES = {"NONE": 0, "AFFINE": 3}
 DYNAMICS = {"NONE": "none", "INTEGRATOR": "integrator", "FILTER": "filter", "FILTEREXACT": "filterexact"}
@@ -37,10 +24,7 @@ NOT_LINEAR = {
 
 
 def drive_of(source: Source, bodies: Sequence[int], keys: Mapping[int, str]) -> Drive:
-    """Actuators, tendons and gravity compensation of a compiled model.
-
-    bodies: of the Tree, by number; keys: names of keyframes.
-    """
+    """What drives a compiled model. bodies: of the Tree, by number; keys: names of keyframes."""
     model = source.model
     passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
     tendons = [tendon_of(model, i) for i in range(model.ntendon)]
@@ -98,9 +82,9 @@ def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inpu
         return f"{inputs} controls"
     if np.any(getattr(m, "actuator_delay", np.zeros(i + 1))[i]):
         return "a delay"
-    transmission = mujoco.mjtTrn(m.actuator_trntype[i])
+    transmission = kind(mujoco.mjtTrn, m.actuator_trntype[i])
     if transmission not in WITH_LENGTH:
-        return f"a transmission of type {transmission.name.removeprefix('mjTRN_').lower()}"
+        return f"a transmission of type {transmission.lower()}"
     damping = [getattr(m, f"actuator_{name}", np.zeros(i + 1))[i] for name in ("damping", "dampingpoly")]
     return "damping of its own" if any(map(np.any, damping)) else ""
 
@@ -120,13 +104,13 @@ def moment_of(m: mujoco.MjModel, i: int) -> tuple[str, tuple[float, ...] | None]
     transmission, target = mujoco.mjtTrn(m.actuator_trntype[i]), int(m.actuator_trnid[i, 0])
     joint, moment = "", None
     if transmission in OF_A_JOINT:
-        joint = joint_name(m, target)
-        if kind_of(m, target) in ("hinge", "slide"):
+        joint = element_name(m, "joint", target)
+        if kind(mujoco.mjtJoint, m.jnt_type[target]) in ("HINGE", "SLIDE"):
             moment = np.eye(m.nv)[m.jnt_dofadr[target]]
     elif transmission == mujoco.mjtTrn.mjTRN_TENDON:
         moment = tendon_moment(m, target)
         if moment is not None and moment.any():
-            joint = joint_name(m, m.dof_jntid[np.flatnonzero(moment)[0]])
+            joint = element_name(m, "joint", m.dof_jntid[np.flatnonzero(moment)[0]])
     gear = m.actuator_gear[output_of(m, i), 0]
     return joint, None if moment is None else tuple((gear * moment).tolist())
 
@@ -143,12 +127,11 @@ def tendon_moment(m: mujoco.MjModel, i: int) -> np.ndarray | None:
 
 def tendon_of(m: mujoco.MjModel, i: int) -> Tendon:
     """The spring and the damper of a tendon."""
-    moment = tendon_moment(m, i)
-    low, high = map(float, m.tendon_lengthspring[i])
+    moment, name = tendon_moment(m, i), element_name(m, "tendon", i)
     stiffness, damping = m.tendon_stiffness[i] * on(m, "SPRING"), m.tendon_damping[i] * on(m, "DAMPER")
-    at_all_postures = None if moment is None else tuple(moment.tolist())
+    everywhere = None if moment is None else tuple(moment.tolist())
     return Tendon(
-        element_name(m, "tendon", i), i, at_all_postures, float(stiffness), float(damping), low, high
+        name, i, everywhere, float(stiffness), float(damping), *map(float, m.tendon_lengthspring[i])
     )
 
 

@@ -52,9 +52,8 @@ class MinimalCalls:
         def run(*names: str) -> Run:
             loop = repeated(path, names)
 
-            def repeat(
-                count: int,
-            ) -> None:  # of self: what the addresses point to must live as long as the call
+            # of self: what the addresses point to must live as long as the call
+            def repeat(count: int) -> None:
                 structures = self.model._address, self.data._address
                 loop(*structures, self.force.ctypes.data, self.solution.ctypes.data, count)
 

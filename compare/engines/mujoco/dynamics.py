@@ -15,10 +15,11 @@ from mujoco.rollout import rollout
 from numpy.typing import ArrayLike
 
 from ...robots.case import Case
-from .. import GRID, Motion, Prepared, Setting, as_far_as_it_goes, rows_of_states
+from .. import GRID, Motion, Prepared, Setting, Tolerance, as_far_as_it_goes, rows_of_states
 from .names import EVALUATIONS, INTEGRATORS, bit, element_name, joint_places, moving, number_of_actuators
 
 Array = np.ndarray | float
+Pair = tuple[np.ndarray, np.ndarray]
 Read = Callable[[mujoco.MjData], ArrayLike]  # a quantity of a state
 
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
@@ -70,7 +71,7 @@ class MujocoDynamics:
         """Angular velocities in body axes, rad/s, (..., m, 3): R' times the angular part of cvel."""
         return self._each(lambda d: self._to_body(d.cvel[self.bodies, :3]), q, v)
 
-    def jacobians(self, q: Array) -> tuple[np.ndarray, np.ndarray]:
+    def jacobians(self, q: Array) -> Pair:
         """T_b and B_b, (..., m, 3, nv): mj_jacBodyCom, its rotational part turned into body axes."""
 
         def both(d: mujoco.MjData) -> np.ndarray:
@@ -79,7 +80,7 @@ class MujocoDynamics:
         pairs = self._each(both, q)
         return pairs[..., 0, :, :, :], pairs[..., 1, :, :, :]
 
-    def convective_terms(self, q: Array, v: Array) -> tuple[np.ndarray, np.ndarray]:
+    def convective_terms(self, q: Array, v: Array) -> Pair:
         """v_conv, world, and w_conv, body axes, (..., m, 3): mj_jacDot times qvel."""
 
         def terms(d: mujoco.MjData) -> np.ndarray:
@@ -115,7 +116,7 @@ class MujocoDynamics:
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> np.ndarray:
         """a, rad/s2, (..., nv): qacc."""
-        return self._each(lambda d: d.qacc[self.dofs], q, v, self.applied(tau))
+        return self._each(lambda d: d.qacc[self.dofs], q, v, tau - self.constant)
 
     def inverse(self, q: Array, v: Array, a: Array) -> np.ndarray:
         """The torque for which a is the acceleration, N m, (..., nv): mj_inverse."""
@@ -162,14 +163,7 @@ class MujocoDynamics:
         return self._each(energies, q, v)
 
     def run(
-        self,
-        q: Array,
-        v: Array,
-        tau: Array,
-        dt: float,
-        steps: int,
-        method: str,
-        tolerance: float | None = None,
+        self, q: Array, v: Array, tau: Array, dt: float, steps: int, method: str, tolerance: Tolerance = None
     ) -> Motion:
         """Motion under constant torque: q (..., steps + 1, nq), v (..., steps + 1, nv), NaN from where a run diverges."""
         batch = np.broadcast_shapes(*(np.shape(value)[:-1] for value in (q, v, tau)))
@@ -192,9 +186,7 @@ class MujocoDynamics:
 
         return run, read
 
-    def path(
-        self, starts: np.ndarray, states: np.ndarray, dt: float
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def path(self, starts: np.ndarray, states: np.ndarray, dt: float) -> tuple[np.ndarray, ...]:
         """q and v of runs (runs, steps + 1, ...), NaN from where one diverges, and why it does, or None."""
         states = np.concatenate([starts[:, None], states], axis=1)
         stands = np.diff(states[:, :, 0], axis=1, prepend=-dt) <= 0.0  # MuJoCo does not step from there
@@ -205,7 +197,7 @@ class MujocoDynamics:
         return states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs], ended
 
     def runner(
-        self, state: tuple[Array, Array, Array], dt: float, steps: int, method: str, tolerance: float | None
+        self, state: tuple[Array, Array, Array], dt: float, steps: int, method: str, tolerance: Tolerance
     ) -> tuple[np.ndarray, Callable[[], np.ndarray]]:
         """The first states, time first, and a call that runs MuJoCo's C loop from them; it returns (runs, steps, ...)."""
         if tolerance is not None:
@@ -213,7 +205,7 @@ class MujocoDynamics:
         model, data = self.own_copy(dt, method)
         model.opt.disableflags |= bit("AUTORESET")  # a reset would hide the divergence
         q, v, tau = state
-        rows, spec = rows_of_states(q, v, self.applied(tau))[1], mujoco.mjtState.mjSTATE_FULLPHYSICS
+        rows, spec = rows_of_states(q, v, tau - self.constant)[1], mujoco.mjtState.mjSTATE_FULLPHYSICS
         runs = len(rows[0])
         starts = np.zeros((runs, mujoco.mj_stateSize(model, spec)))
         # rollout zeroes qfrc_applied unless it is the control, and leaves out the initial state
@@ -240,13 +232,9 @@ class MujocoDynamics:
         """A copy of the model with this step and integrator, and data at one state."""
         model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
         model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
-        data.qpos[self.qpos], data.qvel[self.dofs], data.qfrc_applied[self.dofs] = q, v, self.applied(tau)
+        data.qpos[self.qpos], data.qvel[self.dofs], data.qfrc_applied[self.dofs] = q, v, tau - self.constant
         data.ctrl[:], data.act[:] = self.data.ctrl, self.data.act
         return model, data
-
-    def applied(self, tau: Array) -> Array:
-        """The part of torques that actuators do not exert."""
-        return tau - self.constant
 
     def _each(self, read: Read, q: Array, v: Array = 0.0, tau: Array = 0.0) -> np.ndarray:
         """read(data) after mj_forward at each state, stacked to the batch shape of the states."""
@@ -278,16 +266,14 @@ class MujocoDynamics:
         return np.stack([T, self._to_body(B)])
 
 
-def convective_accelerations(
-    dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def convective_accelerations(dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray) -> Pair:
     """v_conv, world, and w_conv, body axes, (states, m, 3): accelerations of the bodies at qacc = 0 without gravity.
 
     By mj_objectAcceleration, not mj_jacDot as MujocoDynamics.convective_terms. q (states, nq), v (states, nv).
     """
     model, gravity = dynamics.model, dynamics.model.opt.gravity.copy()
 
-    def terms(d: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    def terms(d: mujoco.MjData) -> Pair:
         both = np.zeros((len(dynamics.bodies), 6))
         d.qacc[:] = 0.0
         mujoco.mj_rnePostConstraint(model, d)

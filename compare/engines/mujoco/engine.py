@@ -61,25 +61,18 @@ ACTING, IDLE = 0, 1  # groups of actuators
 
 
 class Mujoco(Engine):
-    """MuJoCo with one compiled model of given joints.
+    """MuJoCo with one compiled model.
 
-    bodies: their numbers in the model. bare: all that a Tree does not have is switched off, see inventory. tree: its methods are
-    those for a Tree, see methods_for.
+    bodies: their numbers in the model. tree: all that this Tree does not have is switched off, see inventory, and the methods
+    are those for it, see methods_for.
     """
 
     name = "mujoco"
     methods = METHODS
 
-    def __init__(
-        self,
-        source: Source,
-        joints: Sequence[str],
-        bodies: Sequence[int],
-        bare: bool = False,
-        tree: Tree | None = None,
-    ) -> None:
-        self.source, self.model, self.joints, self.bodies = source, source.model, tuple(joints), list(bodies)
-        self.methods, self.bare = methods_for(tree), bare
+    def __init__(self, source: Source, bodies: Sequence[int], tree: Tree | None = None) -> None:
+        self.source, self.model, self.bodies = source, source.model, list(bodies)
+        self.methods, self.bare = methods_for(tree), tree is not None
         self.cache: dict[tuple[object, ...], MujocoDynamics] = {}
 
     def __getstate__(self) -> dict[str, Any]:

@@ -11,8 +11,6 @@ from .names import bit, control_of, element_name, kind_of, names_where, number_o
 
 KINDS = ("hinge", "slide", "ball", "free")
 MODELLED, OFF, OPEN, LEFT_OUT = "modelled", "switched_off", "open_tree", "left_out"
-
-
 REASONS = {
     "hinge": (MODELLED, "a joint of the equations: an angle"),
     "slide": (MODELLED, "a joint of the equations: a length"),
@@ -181,10 +179,8 @@ def refuse(m: mujoco.MjModel) -> None:
     for body in np.flatnonzero(m.body_plugin >= 0):
         raise ValueError(f"a plugin acts on body {element_name(m, 'body', body)!r}; its forces are unknown")
     for tendon in np.flatnonzero(m.tendon_armature):
-        name = element_name(m, "tendon", tendon)
-        raise ValueError(
-            f"tendon {name!r} has armature, which couples joints; only that of joints is compared"
-        )
+        why = "has armature, which couples joints; only that of joints is compared"
+        raise ValueError(f"tendon {element_name(m, 'tendon', tendon)!r} {why}")
     refuse_numbers(m)
 
 

@@ -14,9 +14,7 @@ STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
 BAD = [int(getattr(mujoco.mjtWarning, f"mjWARN_BADQ{what}")) for what in ("POS", "VEL", "ACC")]
 
 
-def transition(
-    dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str
-) -> np.ndarray:
+def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: Array, dt: float, integrator: str) -> np.ndarray:
     """d(q, qd)+/d(q, qd) of one step of MuJoCo at rest, positions as movements, (2nv, 2nv), by central differences.
 
     q: (nq,) rad, m; tau: (nv,) N m.
@@ -48,9 +46,7 @@ class WholeRun(NamedTuple):
     """A run of a file's model as it is."""
 
     speeds: np.ndarray  # root mean square of all speeds in each part, rad/s and m/s; NaN from where it fails
-    failed_at: (
-        float | None
-    )  # s: MuJoCo warns of a bad number, resets it where it may; None: it runs to its end
+    failed_at: float | None  # s: MuJoCo warns of a bad number, resets it where it may; None: it runs on
 
 
 def start_of(model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray) -> np.ndarray:

@@ -9,8 +9,6 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tmt.derivation.coordinates import KINDS as NUMBERS  # of a joint in qpos and in qvel: MuJoCo has the same
-
 from ...robots.coordinates import FREE, Coordinates
 
 Integer = int | np.integer[Any]
@@ -89,23 +87,21 @@ def parts_of(name: str) -> list[str]:
 
 def joint_places(m: mujoco.MjModel) -> dict[str, Place]:
     """The joints of a Tree by name, in the order of the file."""
-    names: list[str] = []
-    places: list[Place] = []
+    joints: list[tuple[str, str, int]] = []
     for number in range(m.njnt):
         name, kind = joint_name(m, number), kind_of(m, number)
         is_free = kind == "free"
-        names += parts_of(name) if is_free else [name]
-        q, v = int(m.jnt_qposadr[number]), int(m.jnt_dofadr[number])
-        for part in FREE if is_free else (kind,):
-            nq, nv = NUMBERS[part]
-            places.append(Place(part, number, range(q, q + nq), range(v, v + nv)))
-            q, v = q + nq, v + nv
-    coordinates = Coordinates(tuple(names), tuple(place.kind for place in places))
+        joints += zip(parts_of(name), FREE, [number] * 4) if is_free else [(name, kind, number)]
+    names, kinds, numbers = zip(*joints)
+    coordinates = Coordinates(names, kinds)
     for columns in (coordinates.names, coordinates.positions, coordinates.speeds):
         if twice := sorted({name for name in columns if columns.count(name) > 1}):
             parts = "a ball w has the speeds w x, w y, w z, and a free joint the parts w x, w y, w z, w turn"
             raise ValueError(f"two of its joints are called {twice[0]!r}; {parts}")
-    return dict(zip(names, places))
+    places = {}  # MuJoCo's vectors have the same order
+    for name, number, joint in zip(names, numbers, coordinates.places.joints):
+        places[name] = Place(joint.kind, number, range(joint.q.start, joint.q.stop), joint.speeds)
+    return places
 
 
 def moving(m: mujoco.MjModel) -> np.ndarray:
@@ -147,9 +143,8 @@ def rotors(m: mujoco.MjModel) -> np.ndarray:
     for i in map(int, np.flatnonzero(getattr(m, "actuator_armature", np.zeros(0)))):
         if mujoco.mjtTrn(m.actuator_trntype[i]) not in OF_A_JOINT:
             name = element_name(m, "actuator", i)
-            raise ValueError(
-                f"actuator {name!r} has armature and acts on no joint; only that of joints is compared"
-            )
+            why = "has armature and acts on no joint; only that of joints is compared"
+            raise ValueError(f"actuator {name!r} {why}")
         added = m.actuator_armature[i] * m.actuator_gear[output_of(m, i), 0] ** 2
         diagonal[m.dof_jntid == m.actuator_trnid[i, 0]] += added
     return diagonal

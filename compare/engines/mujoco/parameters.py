@@ -1,9 +1,10 @@
 """Parameters: the compiled model in the project's symbols, and what the file states compared with it.
 
 Stated numbers are converted: nested frames, angles, axes of length 1, tensors in the axes of the body. Where the file asks the
-compiler to change a number, the option is named.
+compiler to change a number, the option is named. Remarks tell a user of it, and of what is fixed or switched off.
 """
 
+import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -11,11 +12,13 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...core.finding import Finding
 from ...judge.scale import EPS, FACTOR
 from .dynamics import MujocoDynamics
 from .engine import FROM_4
-from .inventory import contact_pairs
-from .names import aligns, element_name, joint_name, kind_of, matrix, on, tensor
+from .inventory import LEFT_OUT, OFF, OPEN, contact_pairs
+from .names import aligns, element_name, joint_name, kind_of, matrix, moving, on, tensor
+from .reading import Reading
 from .source import FROM_GEOMS, Source
 
 # of the equations of motion
@@ -35,21 +38,18 @@ def parameters(dynamics: MujocoDynamics) -> dict[str, Any]:
     """
     m, d, bodies = dynamics.model, dynamics.data, dynamics.bodies
     dynamics.forward(m.qpos0[dynamics.qpos])
-    joints, turns = dynamics.joints.tolist(), dynamics.turns(d.ximat)
+    joints, dofs, turns = dynamics.joints.tolist(), dynamics.dofs, dynamics.turns(d.ximat)
     in_force = on(m, "CONTACT") and on(m, "CONSTRAINT")
-    before = {
-        j: j - 1 if j > m.body_jntadr[body] else last_hinge(m, m.body_parentid[body])
-        for j, body in zip(joints, m.jnt_bodyid[joints])
-    }
+    before = {}
+    for j, body in zip(joints, m.jnt_bodyid[joints]):
+        before[j] = j - 1 if j > m.body_jntadr[body] else last_hinge(m, m.body_parentid[body])
     is_order = all(before[j] in (-1, *joints[:i]) for i, j in enumerate(joints))
     places = joints if is_order else sorted(joints)  # each after its parent
     origins = dict(zip(joints, d.xanchor[joints])) | {-1: np.zeros(3)}
     numbers = {name: float(on(m, flag)) for name, flag in STATED_FLAGS.items()}
     numbers |= {name: float(np.abs(getattr(m, field, np.zeros(1))).sum()) for name, field in ABSENT.items()}
     return numbers | {
-        **{
-            name: getattr(m, f"dof_{name}")[dynamics.dofs] for name in ("damping", "armature", "frictionloss")
-        },
+        **{name: getattr(m, f"dof_{name}")[dofs] for name in ("damping", "armature", "frictionloss")},
         **{name: getattr(m, f"jnt_{name}")[joints].astype(float) for name in ("stiffness", "limited")},
         **{name: getattr(m, f"body_{name}")[bodies] for name in ("mass", "gravcomp")},
         **{name: getattr(m.opt, name) for name in ("gravity", "density", "viscosity")},
@@ -84,6 +84,9 @@ def last_hinge(m: mujoco.MjModel, body: int) -> int:
     return int(m.body_jntadr[body] + m.body_jntnum[body] - 1) if body else -1
 
 
+Options = Mapping[str, bool]  # of the file, and whether they are in force
+
+
 class Stated(NamedTuple):
     """One number, or a vector or tensor, of a body, a joint or the world."""
 
@@ -108,24 +111,16 @@ def stated_numbers(source: Source) -> list[Stated]:
     return rows
 
 
-def row_of(
-    place: str,
-    quantity: str,
-    stated: ArrayLike,
-    compiled: ArrayLike,
-    options: Mapping[str, bool],
-    size: float | None = None,
-    precision: float = 0.0,
-) -> Stated:
+def row_of(number: Stated, options: Options, size: float | None = None, precision: float = 0.0) -> Stated:
     """A row; of the options that are in force those count that may have changed a number that is not the stated one.
 
     size: the sum of what is added in the number, None: its largest entry; precision: relative, of the compiler.
     """
-    size = float(np.abs(stated).max()) if size is None else size
-    tolerance = max(FACTOR * EPS, precision) * size
-    is_same = np.abs(np.subtract(stated, compiled)).max() <= tolerance
+    stated = np.asarray(number.stated, float)
+    tolerance = max(FACTOR * EPS, precision) * (float(np.abs(stated).max()) if size is None else size)
+    is_same = np.abs(stated - number.compiled).max() <= tolerance
     why = ", ".join(name for name, is_on in options.items() if is_on and not is_same)
-    return Stated(place, quantity, stated, compiled, why, tolerance)
+    return number._replace(why=why, tolerance=tolerance)
 
 
 def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody, number: int) -> list[Stated]:
@@ -137,7 +132,7 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody, nu
     mass, com = float(model.body_mass[number]), model.body_ipos[number].copy()
     inertia = tensor(matrix(model.body_iquat[number]), model.body_inertia[number])
     pos, _, length = in_frames(body.pos, body.frame)
-    place = row_of(name, "pos", pos, model.body_pos[number].copy(), aligned, length)
+    place = row_of(Stated(name, "pos", pos, model.body_pos[number].copy()), aligned, length)
     if body.explicitinertial:
         stated_com, stated_inertia, length = stated_inertial(spec, body, com, inertia)
         moments = float(np.trace(stated_inertia))
@@ -146,9 +141,9 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody, nu
         of_inertia = from_geoms | aligned | total | bounds
         return [
             place,
-            row_of(name, "mass", float(body.mass), mass, of_mass),
-            row_of(name, "com", stated_com, com, from_geoms | aligned, length),
-            row_of(name, "inertia", stated_inertia, inertia, of_inertia, moments, precision),
+            row_of(Stated(name, "mass", float(body.mass), mass), of_mass),
+            row_of(Stated(name, "com", stated_com, com), from_geoms | aligned, length),
+            row_of(Stated(name, "inertia", stated_inertia, inertia), of_inertia, moments, precision),
         ]
     low, high = compiler.inertiagrouprange
     masses = [geom.mass for geom in body.geoms if low <= geom.group <= high]
@@ -156,7 +151,8 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody, nu
     rows = [Stated(name, quantity, None, value, "inertia from geoms") for quantity, value in numbers.items()]
     if masses and np.isfinite(masses).all():
         stated = float(np.sum(masses))
-        rows[0] = row_of(name, "mass", stated, mass, total | {"boundmass": stated < compiler.boundmass})
+        options = total | {"boundmass": stated < compiler.boundmass}
+        rows[0] = row_of(Stated(name, "mass", stated, mass), options)
     return [place, *rows]
 
 
@@ -166,14 +162,14 @@ def of_joint(model: mujoco.MjModel, joint: mujoco.MjsJoint, number: int) -> list
     pos, turn, length = in_frames(joint.pos, joint.frame)
     axis, rows = turn @ joint.axis / np.linalg.norm(joint.axis), []
     if kind in ("hinge", "ball"):
-        rows.append(row_of(name, "anchor", pos, model.jnt_pos[number].copy(), {}, length))
+        rows.append(row_of(Stated(name, "anchor", pos, model.jnt_pos[number].copy()), {}, length))
     if kind in ("hinge", "slide"):
-        rows.append(row_of(name, "axis", axis, model.jnt_axis[number].copy(), {}))
+        rows.append(row_of(Stated(name, "axis", axis, model.jnt_axis[number].copy()), {}))
     numbers = {"armature": model.dof_armature[dof], "damping": model.dof_damping[dof]}
     for quantity, compiled in (numbers | {"stiffness": model.jnt_stiffness[number]}).items():
         stated = float(np.ravel(getattr(joint, quantity))[0])  # the linear coefficient
         options = {} if quantity == "armature" else chosen
-        rows.append(row_of(name, quantity, stated, float(compiled), options))
+        rows.append(row_of(Stated(name, quantity, stated, float(compiled)), options))
     return rows
 
 
@@ -218,3 +214,29 @@ def stated_inertial(
         return float(np.abs(candidate[0] - com).max() + np.abs(candidate[1] - inertia).max() / scale)
 
     return min(candidates, key=distance)
+
+
+def remarks(reading: Reading, has_scenes: bool) -> list[Finding]:
+    """Findings, a line each. has_scenes: servos act in some of them."""
+    findings = of_source(reading.source)
+    if off := [feature for feature in reading.features if feature.treatment in (OFF, OPEN, LEFT_OUT)]:
+        driven = has_scenes and bool(reading.drive.actuators)
+        findings.append(Finding("remarks", "switched_off", {"features": off, "driven": driven}))
+    return findings
+
+
+def of_source(source: Source) -> list[Finding]:
+    """What is fixed of a URDF; for each option by which the compiler changed stated numbers, where it did, by quantity."""
+    model, findings = source.model, []
+    root = re.search(r"<(robot|mujoco)\b", source.text)
+    fixed = [body for body in range(1, model.nbody) if model.body_mass[body] and not moving(model)[body]]
+    if root and root[1] == "robot" and '"world"' not in source.text and fixed:
+        values = {"link": element_name(model, "body", fixed[0]), "mass": float(model.body_mass[fixed].sum())}
+        findings.append(Finding("remarks", "fixed_base", values))
+    changed: dict[str, dict[str, list[str]]] = {}
+    for number in stated_numbers(source):
+        if number.why and number.stated is not None:
+            changed.setdefault(number.why, {}).setdefault(number.quantity, []).append(number.place)
+    for why, places in changed.items():
+        findings.append(Finding("remarks", "changed", {"why": why, "places": places}))
+    return findings

@@ -53,9 +53,8 @@ def read(origin: Source | Path | str | mujoco.MjModel) -> Reading:
         raise ModelError(f"cannot compare {source}: {error}") from None
     name = bytes(model.names).partition(b"\0")[0].decode("utf-8", "replace").strip()
     keys = {k: element_name(model, "key", k) for k in np.flatnonzero(usable_keys(model)).tolist()}
-    ranges = [
-        tuple(limits) if on else None for limits, on in zip(model.jnt_range.tolist(), model.jnt_limited)
-    ]
+    limited = zip(model.jnt_range.tolist(), model.jnt_limited)
+    ranges = [tuple(limits) if is_limited else None for limits, is_limited in limited]
     integrator = mujoco.mjtIntegrator(model.opt.integrator)
     names_of_members = {member: name for name, member in MEMBERS.items()}
     return Reading(
@@ -90,11 +89,8 @@ def tree_of(compiled: mujoco.MjModel, joints: Mapping[str, Place], bodies: Seque
     mujoco.mj_kinematics(model, data)
     parents, anchors, axes, reference = [], [], [], []
     for i, place in enumerate(places):
-        body, first, is_free = (
-            model.jnt_bodyid[place.joint],
-            model.jnt_dofadr[place.joint],
-            place.joint in free,
-        )
+        body, first = model.jnt_bodyid[place.joint], model.jnt_dofadr[place.joint]
+        is_free = place.joint in free
         is_first = model.body_dofadr[body] == place.dofs.start
         parents.append(carrier[model.body_parentid[body]] if is_first else i - 1)
         anchors.append(np.zeros(3) if is_free else data.xanchor[place.joint])
@@ -147,7 +143,7 @@ def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
     """
     tree = (solution or reading).tree
     bodies = bodies_as_in(solution, reading) if solution else reading.bodies
-    return Mujoco(reading.source, tree.joint_names, bodies, bare=True, tree=tree)
+    return Mujoco(reading.source, bodies, tree)
 
 
 def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
@@ -207,4 +203,4 @@ def parse(origin: Source | Path | str, tree: tmt.Tree) -> Mujoco:
     of_hinges = sorted(set(model.jnt_bodyid.tolist()))
     if len(set(bodies)) < len(bodies) == len(of_hinges):  # hinges of two bodies have exchanged their names
         bodies = of_hinges
-    return Mujoco(source, hinges, bodies)
+    return Mujoco(source, bodies)

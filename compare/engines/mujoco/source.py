@@ -54,9 +54,8 @@ class Source:
             self.origin, self.text = origin, text_of(origin) if isinstance(origin, Path) else origin
             self.compile(origin)
         else:
-            raise ModelError(
-                f"cannot read a {type(origin).__name__}; expected a path, MJCF text or an MjModel"
-            )
+            kind = type(origin).__name__
+            raise ModelError(f"cannot read a {kind}; expected a path, MJCF text or an MjModel")
 
     def compile(self, origin: Path | str) -> None:
         if not self.text.strip():
@@ -203,7 +202,8 @@ def compiled_without(spec: mujoco.MjSpec, positions: Positions, bare: bool) -> m
                 joint.set_frame(body.add_frame())
                 joint.pos, joint.axis = (data.xanchor[i] - data.xpos[number]) @ axes, data.xaxis[i] @ axes
             elif kind_of(model, i) == "free":
-                add_parts(body, joint, model, model.jnt_dofadr[i], positions, axes)
+                armature = model.dof_armature + rotors(model)  # of actuators too, which are deleted
+                add_parts(body, joint, float(armature[model.jnt_dofadr[i]]), positions, axes)
     clear(spec, removed, bare)
     smaller = spec.compile()
     # of springdamper the compiler chooses both by the inertia
@@ -216,18 +216,12 @@ def compiled_without(spec: mujoco.MjSpec, positions: Positions, bare: bool) -> m
 
 
 def add_parts(
-    body: mujoco.MjsBody,
-    free: mujoco.MjsJoint,
-    model: mujoco.MjModel,
-    dof: int,
-    locked: Positions,
-    axes: np.ndarray,
+    body: mujoco.MjsBody, free: mujoco.MjsJoint, armature: float, locked: Positions, axes: np.ndarray
 ) -> None:
-    """Add the parts of a free joint that are not locked. dof: its first speed; axes: of the body, as columns."""
+    """Add the parts of a free joint that are not locked. axes: of the body, as columns."""
     if aligns(free):
         why = "is aligned with the inertia of its body: none of its parts can be locked"
         raise ValueError(f"free joint {free.name!r} {why}")
-    armature = float(model.dof_armature[dof] + rotors(model)[dof])  # of actuators too, which are deleted
     no_defaults = {"ref": 0.0, "springdamper": np.zeros(2), "limited": mujoco.mjtLimited.mjLIMITED_FALSE}
     for name, kind, axis in zip(parts_of(free.name), PARTS_OF_FREE, [*axes, axes[2]]):
         if name not in locked:
@@ -237,12 +231,10 @@ def add_parts(
 def clear(spec: mujoco.MjSpec, removed: set[str], bare: bool) -> None:
     """Delete what refers to joints of these names, then the joints: the other way round MuJoCo crashes."""
     elements = [*spec.keys, *spec.sensors]
-    elements += [
-        equality for equality in spec.equalities if bare or {equality.name1, equality.name2} & removed
-    ]
-    elements += [
-        motor for motor in spec.actuators if motor.target in removed or (bare and not motor.armature)
-    ]
+    elements += [tie for tie in spec.equalities if bare or {tie.name1, tie.name2} & removed]
+    for actuator in spec.actuators:
+        if actuator.target in removed or (bare and not actuator.armature):
+            elements.append(actuator)
     if bare:
         elements += [*spec.tendons, *spec.tuples, *spec.pairs]
         for body in spec.bodies:

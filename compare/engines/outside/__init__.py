@@ -14,6 +14,7 @@ A process of its own keeps an engine's threads, its precision and a crash away f
 import importlib
 from collections.abc import Callable, Mapping
 from functools import cache, cached_property
+from operator import attrgetter
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
@@ -45,10 +46,8 @@ class Outside(Engine):
         return self.named(self.module.METHODS)
 
     def named(self, methods: Mapping[str, tuple[int | None, str]]) -> dict[str, Method]:
-        return {
-            name: Method(self.name, name, order, scheme, adaptive=order is None)
-            for name, (order, scheme) in methods.items()
-        }
+        kinds = methods.items()
+        return {name: Method(self.name, name, *kind, adaptive=kind[0] is None) for name, kind in kinds}
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         """None where joints are locked or the robot's own actuators act."""
@@ -72,7 +71,7 @@ class OutsideDynamics(OneByOne):
 
     @cached_property
     def reading(self) -> Reading:
-        return self.ask(answers.reading)
+        return self.ask(attrgetter("reading"))
 
     def ask(self, act: Callable[..., T], *arguments: Any) -> T:
         """What a function of answers.py returns in the engine's process; EngineError if it fails or the process ends.
@@ -89,9 +88,8 @@ class OutsideDynamics(OneByOne):
 
     def rows(self, quantity: str, *values: Array) -> Array:
         """A quantity at many states, (states, ...)."""
-        return self.ask(
-            answers.each, quantity, *(np.atleast_2d(np.asarray(value, float)) for value in values)
-        )
+        states = [np.atleast_2d(np.asarray(value, float)) for value in values]
+        return self.ask(answers.each, quantity, *states)
 
     def mass_matrix(self, q: Array) -> Array:
         return self.rows("mass_matrix", q)
@@ -117,10 +115,8 @@ class OutsideDynamics(OneByOne):
             return self.ask(answers.ran, course)
 
         def read(run: answers.Run) -> Motion:
-            motion = course.motion(run.states, run.why)
-            return motion._replace(
-                evaluations=run.evaluations, seconds=run.seconds, steps=course.steps or None
-            )
+            motion, steps = course.motion(run.states, run.why), course.steps or None
+            return motion._replace(evaluations=run.evaluations, seconds=run.seconds, steps=steps)
 
         return run, read
 

@@ -14,7 +14,7 @@ from ...core.errors import described
 from ...core.words import in_one_line
 from ...judge.scale import FACTOR
 from .. import RECORDS, Array, Course
-from .model import EngineError, File, Reading, ReadModel, Unread, numbers_of, size_of
+from .model import EngineError, File, ReadModel, Unread, numbers_of, size_of
 
 LIMIT = 120.0  # s, of an answer: compiling a large model may take hours
 QUANTITIES = "mass_matrix", "bias", "acceleration"
@@ -68,10 +68,6 @@ def gives(model: ReadModel, quantity: str) -> bool:
     """Whether the class of a model computes a quantity, for this robot too."""
     is_defined = getattr(type(model), quantity) is not getattr(ReadModel, quantity)
     return is_defined and quantity not in model.lacks
-
-
-def reading(model: ReadModel) -> Reading:
-    return model.reading
 
 
 def each(model: ReadModel, quantity: str, *values: Array) -> Array:

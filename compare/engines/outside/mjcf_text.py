@@ -8,12 +8,8 @@ import numpy as np
 from .model import Unread
 
 FROM_FILES = "mesh", "hfield"  # of geoms
-FIELDS = {
-    "pos": "ipos",
-    "quat": "iquat",
-    "mass": "mass",
-    "diaginertia": "inertia",
-}  # of a body in the compiled model
+# of a body in the compiled model
+FIELDS = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}
 
 
 def whole_text(path: Path) -> str:

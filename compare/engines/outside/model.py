@@ -171,10 +171,10 @@ def numbers_of(tree: tmt.Tree) -> dict[str, Array]:
 
 def size_of(stated: Numbers, number: str) -> float:
     """The size of what is added where an engine reads a number: it may keep inertias about the origin of a joint."""
-    size = np.abs(stated[number]).max(initial=0.0)
-    return float(
-        size + (stated["about_origin"].max(initial=0.0) if number in ("moments", "inertia") else 0.0)
-    )
+    sizes = [np.abs(stated[number]).max(initial=0.0)]
+    if number in ("moments", "inertia"):
+        sizes.append(stated["about_origin"].max(initial=0.0))
+    return float(sum(sizes))
 
 
 def carried(links: Iterable[Link], joints: int) -> list[list[Body]]:
@@ -187,12 +187,6 @@ def carried(links: Iterable[Link], joints: int) -> list[list[Body]]:
         if joint is not None:
             bodies[joint].append(link.body)
     return bodies
-
-
-def together(bodies: Iterable[tuple[float, Array, Array]]) -> tuple[float, Array]:
-    """The mass of bodies that move as one, and the moments of inertia about their centre of mass, ascending, (3,)."""
-    mass, _, inertia = combined(bodies)
-    return mass, np.linalg.eigvalsh(inertia)
 
 
 def combined(bodies: Iterable[tuple[float, Array, Array]]) -> Body:

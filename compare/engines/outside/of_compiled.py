@@ -10,7 +10,7 @@ from .. import GRID, Array, Course
 from .model import Numbers, ReadModel
 
 if TYPE_CHECKING:
-    from ..mujoco.bare import Bare
+    from ..mujoco.handed_on import Bare
 
 METHODS = {"Euler": (1, "semi_implicit_euler"), "implicitfast": (1, "semi_implicit_euler"), "RK4": (4, "rk4")}
 STAGES = {"Euler": 1, "implicitfast": 1, "RK4": 4}

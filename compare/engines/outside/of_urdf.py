@@ -14,9 +14,9 @@ class OfUrdf(ReadModel):
     has_free_bodies = False
 
     def __init__(self, file: File, precision: str):
+        from ..mujoco.handed_on import urdf
         from ..mujoco.names import joint_places
         from ..mujoco.source import Source
-        from ..mujoco.urdf import urdf
 
         try:
             model = Source(file.path).model

@@ -8,13 +8,15 @@ import numpy as np
 from .. import Array
 from .model import File, Numbers
 
+Places = Sequence[int]
+Starts = Mapping[int, tuple[int, int]]
+
 
 class Order(NamedTuple):
     q: Array  # the place in the Tree's q of each of the engine's numbers
     v: Array  # (nv,) the same in v
-    turned: tuple[
-        tuple[slice, slice], ...
-    ]  # of each free body: speeds of the engine, the quaternion in the Tree's q
+    # of each free body: speeds of the engine, the quaternion in the Tree's q
+    turned: tuple[tuple[slice, slice], ...]
     # those speeds are in world axes where the Tree's are in body axes; False: the other way round
     in_world: bool
 
@@ -54,12 +56,7 @@ class Order(NamedTuple):
 
 
 def order_of(
-    file: File,
-    starts: Mapping[int, tuple[int, int]],
-    free_q: Sequence[int],
-    free_v: Sequence[int],
-    in_world: bool,
-    ball_q: Sequence[int] = (0, 1, 2, 3),
+    file: File, starts: Starts, free_q: Places, free_v: Places, in_world: bool, ball_q: Places = (0, 1, 2, 3)
 ) -> Order:
     """The order of an engine.
 

@@ -20,7 +20,7 @@ from ...robots.joint_map import places_of
 from .. import Experiment
 from ..setup import Setup
 from . import numbers
-from .numbers import ABSENT, OF_BODIES, UNITS, FeatureRow, NumberRow, ParametersResult
+from .numbers import ABSENT, OF_BODIES, UNITS, Cause, FeatureRow, NumberRow, ParametersResult
 
 EXPERIMENT = Experiment(order=10, serves_own=False, states_causes=True)
 SHOWN = ["of", "quantity", "component", "stated", "compiled", "unit"]
@@ -49,7 +49,7 @@ def rows(setup: Setup) -> ParametersResult:
             result.causes += numbers.compare_number(result, number, unit, words)
     if robot.stated_in:
         result.causes += compare_features(result, robot)
-    forces = numbers.check_forces(result, setup.random, robot.tree, dynamics, result.causes)
+    forces = numbers.check_forces(result, setup.random, dynamics)
     if not robot.is_read:
         result.causes += forces
     if is_of_file:
@@ -58,7 +58,7 @@ def rows(setup: Setup) -> ParametersResult:
     if robot.is_read:
         result.tables["inventory"] = [FeatureRow.of(feature) for feature in robot.features]
 
-    def order(cause: dict[str, Any]) -> tuple[int, bool, float]:
+    def order(cause: Cause) -> tuple[int, bool, float]:
         return cause["rank"], cause["quantity"] in AT_TIMES, -cause["size"]
 
     result.causes = sorted(result.causes, key=order)
@@ -93,12 +93,12 @@ def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> 
     anchors, _, _ = places_of(tree)
     places = [tree.coordinates.joints[j] for j in joints]
     counts = [place.q.stop - place.q.start for place in places]
-    positions = np.concatenate([np.arange(place.q.start, place.q.stop) for place in places])
-    speeds = np.concatenate([np.arange(place.qd.start, place.qd.stop) for place in places])
-    chosen = dict.fromkeys(("reference", "stiffness"), np.array(joints)) | {"rest": positions}
+    positions, speeds = np.r_[tuple(place.q for place in places)], np.r_[tuple(place.qd for place in places)]
+    chosen: dict[str, Any] = dict.fromkeys(("reference", "stiffness"), np.array(joints))
+    chosen["rest"] = positions
     chosen |= dict.fromkeys(("axis", "damping", "armature"), speeds)
     chosen |= dict.fromkeys(("mass", "com", "inertia"), np.array(bodies))
-    numbers = {name: np.array(getattr(tree, name))[indices] for name, indices in chosen.items()}
+    numbers = {name: np.array(getattr(tree, name))[at] for name, at in chosen.items()}
     numbers["rest"] = numbers["rest"] * np.repeat(numbers["stiffness"] > 0.0, counts)
     number_of_joint = {-1: -1} | {j: i for i, j in enumerate(joints)}
     parents = np.array([number_of_joint[tree.parent[j]] for j in joints])
@@ -124,7 +124,7 @@ def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
     return tree.body_names if quantity in OF_BODIES else tree.joint_names
 
 
-def compare_features(result: ParametersResult, robot: Robot) -> list[dict[str, Any]]:
+def compare_features(result: ParametersResult, robot: Robot) -> list[Cause]:
     """Checks that features without a term in the equations are as many as in the solution; the causes where they are not."""
     compiled = {feature.feature: feature for feature in robot.features}
     stated = {feature.feature: feature for feature in robot.features_stated}

@@ -1,14 +1,12 @@
 """A number of the model, stated and compiled: its rows, check and causes; and the check that no other forces act."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-import tmt
 from tmt import literal
 
 from ...core.check import Result
@@ -36,6 +34,9 @@ UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gra
     "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
 COMPONENTS = {1: [""], 3: [*"xyz"], 9: [row + of_row for row in "xyz" for of_row in "xyz"]}  # by their number
+
+
+Cause = dict[str, Any]
 
 
 @dataclass(kw_only=True)
@@ -68,15 +69,12 @@ class FeatureRow(Row):
 
     @classmethod
     def of(cls, feature: Feature) -> "FeatureRow":
-        names, why = ";".join(feature.names), feature.reason
-        return cls(
-            feature=feature.feature, count=feature.count, names=names, treatment=feature.treatment, reason=why
-        )
+        return cls(**asdict(feature) | {"count": feature.count, "names": ";".join(feature.names)})
 
 
 @dataclass
 class ParametersResult(Result):
-    causes: list[dict[str, Any]] = field(default_factory=list)  # of the checks that fail
+    causes: list[Cause] = field(default_factory=list)  # of the checks that fail
 
 
 def unit_of(quantity: str, slides: bool) -> str:
@@ -97,9 +95,7 @@ def rows_of(number: Stated, unit: str, asked_by: str | None = None) -> list[Numb
     return rows
 
 
-def compare_number(
-    result: Result, number: Stated, unit: str, words: Mapping[int, str] = MappingProxyType({})
-) -> list[dict[str, Any]]:
+def compare_number(result: Result, number: Stated, unit: str, words: Mapping[int, str]) -> list[Cause]:
     """Add the check of a number of a body or joint; the causes, one for each component that differs.
 
     words: for whole numbers. Rank 1: an option, or a convention of a joint (its order, its sign, its zero); 2: one number.
@@ -129,29 +125,25 @@ def compare_number(
 
 def cause(
     rank: int, place: str, stated: float, compiled: float, text: str, size: float, quantity: str
-) -> dict[str, Any]:
+) -> Cause:
     """A cause; size: its difference over its tolerance."""
     number = float(compiled) if np.isfinite(compiled) else None
     about = {"rank": rank, "place": place, "stated": float(stated), "found": number, "text": text}
     return about | {"size": float(size), "quantity": quantity}
 
 
-def check_forces(
-    result: Result, sample: Sample, tree: tmt.Tree, dynamics: MujocoDynamics, causes: Sequence[dict[str, Any]]
-) -> list[dict[str, Any]]:
-    """Check that no forces act that the equations do not have; these are causes unless `causes` explain them.
+def check_forces(result: ParametersResult, sample: Sample, dynamics: MujocoDynamics) -> list[Cause]:
+    """Check that no forces act that the equations do not have; these are causes unless those of the result explain them.
 
     Fluid and tendons: MuJoCo adds their forces to those of springs and damping, of whose sum the rounding is allowed.
     """
-    unexplained = []
+    unexplained, tree = [], sample.tree
     largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(sample.q, tree)).max()
     for source, force in dynamics.other_forces(sample.q, sample.qd).items():
         allowed = FACTOR * EPS * float(largest) if source == "fluid and tendons" else 0.0
-        most, is_rounding = float(np.abs(force).max()), allowed > 0.0
-        check = result.check(
-            sample.name, f"no forces of {source}", most, allowed, "N m", rounding=is_rounding
-        )
-        if check.failed and not any(cause["quantity"] in OF_FORCES for cause in causes):
+        most, is_rounded = float(np.abs(force).max()), allowed > 0.0
+        check = result.check(sample.name, f"no forces of {source}", most, allowed, "N m", rounding=is_rounded)
+        if check.failed and not any(cause["quantity"] in OF_FORCES for cause in result.causes):
             place = f"forces of {source}"
             if source == "actuators":
                 place += f" ({', '.join(dynamics.acting_actuators(sample.q, sample.qd))})"

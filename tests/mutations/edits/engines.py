@@ -1,7 +1,7 @@
 """Edits of the comparison with other engines."""
 
 EDITS = (
-    ("remarks", "remarks", "feature.treatment in (OFF, OPEN, LEFT_OUT)", "feature.treatment in (OFF, OPEN)",
+    ("mujoco.parameters", "remarks", "feature.treatment in (OFF, OPEN, LEFT_OUT)", "feature.treatment in (OFF, OPEN)",
      "a keyframe that is left out is not told"),
     ("experiments.engines", "compare_quantity", "FACTOR * eps * size", "100 * FACTOR * eps * size", "tolerance x 100"),
     ("experiments.engines", "compare_quantity", "record.eps", "1.2e-07", "every engine is judged as float32"),

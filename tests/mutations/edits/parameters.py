@@ -29,7 +29,7 @@ EDITS = (
     ("parameters.numbers", "check_forces", "np.abs(sample.qd * _1).max()", "1e6 * _0", "the tolerance of forces x 1e6"),
     ("parameters.numbers", "check_forces", "np.abs(force).max()", "0.0 * np.abs(force).max()", "no force is seen"),
     ("reference", "compared_with", "path is None or has_hinges(*_1)", "True", "any file is that of the arm"),
-    ("mujoco.remarks", "remarks", "feature.treatment in _1", "feature.treatment == OFF", "an open tree is not said"),
+    ("mujoco.parameters", "remarks", "feature.treatment in _1", "feature.treatment == OFF", "an open tree is not said"),
     ("mujoco.parameters", "row_of", "is_on and not is_same", "is_on", "an option without effect changes numbers"),
     ("mujoco.dynamics", "MujocoDynamics.other_forces", "d.qfrc_actuator[_1]", "0 * _0", "actuators exert no force"),
     ("mujoco.dynamics", "MujocoDynamics.other_forces", "d.qfrc_constraint[_1]", "0 * _0", "contacts exert no force"),
