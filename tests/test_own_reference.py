@@ -123,7 +123,7 @@ def test_the_right_joints_are_named_in_place_of_the_stated_ones(folder, asked, j
     mirrored = ",".join(
         f"-{name}" for name in right.split(",")
     )  # the mirror image of the pendulum is the same
-    assert any(f"--joints={one})" in cause["text"] for cause in run.causes for one in (right, mirrored))
+    assert any(f"--joints={one})" in cause.text for cause in run.causes for one in (right, mirrored))
 
 
 def test_a_report_has_what_can_be_compared_and_the_rest_gets_status_2(inside, folder, capsys):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .cause import Cause
 from .finding import Finding
 
 RULES = {  # which values pass
@@ -92,7 +93,7 @@ class Result:
     experiment: str
     rows: list[Any] = field(default_factory=list)  # each a Row
     checks: list[Check] = field(default_factory=list)
-    causes: list[dict[str, Any]] = field(default_factory=list)  # of failing checks: place, stated, text ...
+    causes: list[Cause] = field(default_factory=list)  # of failing checks
     notes: list[Finding] = field(default_factory=list)  # for the report
     shown: Sequence[str] | None = None  # columns of the table in the report; None: all; []: it is only a file
     tables: dict[str, Any] = field(default_factory=dict)  # further tables by name: lists of rows

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from io import StringIO
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import get_type_hints
 from urllib.parse import quote
 
 from markupsafe import Markup
 
+from ..core.cause import Cause
 from ..core.check import About
 from ..core.errors import Refused
 from ..core.finding import Finding
@@ -76,7 +77,6 @@ class FileRow(Row):
         return VERDICTS.index(self.verdict), is_stable, -(self.worst_ratio or 0.0), self.file
 
 
-Cause = Mapping[str, Any]  # its text, and more
 FIELDS = get_type_hints(FileRow)
 FLEET_COLUMNS = tuple(name for name in FileRow(file="", verdict="").columns() if name != "has_report")
 
@@ -106,7 +106,7 @@ def judge(
     reasons: list[str] = []
     if failed.differing:
         row.verdict = DIFFER
-        names = [cause["text"] for cause in causes] or [str(failed.differing[0])]
+        names = [cause.text for cause in causes] or [str(failed.differing[0])]
         reasons.append(block("fleet", "first_of", reasons=names))
     elif unfinished:
         row.verdict = BROKE

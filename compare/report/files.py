@@ -17,7 +17,6 @@ from .folder import files, save
 from .verdict import Parts, Report, passed
 
 COMPUTED = "=", "+", "-", "@", "\t", "\r"  # how the texts begin that a spreadsheet would compute
-OF_CAUSES = "rank", "place", "stated", "found", "text"
 
 
 def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
@@ -33,7 +32,7 @@ def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
             if text:
                 save(folder / "tables" / f"{name}.csv", text)
     made = [check.record() for section in report.sections for check in section.result.checks]
-    found = [{name: cause[name] for name in OF_CAUSES} for cause in report.causes]
+    found = [cause.record() for cause in report.causes]
     checks, causes = (records(parts, *named) for named in (("check", made), ("cause", found)))
     documents = Document(report, parts), Document(report, parts, folder)
     bodies: list[list[str]] = [parts.attempt(document.file, [], document.body) for document in documents]

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
+from ..core.cause import Cause
 from ..core.check import About, Check, Result
 from ..core.errors import described
 from ..core.experiment import Experiment
@@ -15,7 +16,6 @@ from ..core.words import capital
 from ..robots import Robot
 
 Value = TypeVar("Value")
-Causes = Sequence[Mapping[str, Any]]
 UNKNOWN = Experiment()
 OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
 
@@ -90,7 +90,7 @@ class Report(NamedTuple):
     robot: Robot
     origin: dict[str, Any]  # see provenance
     verdict: str  # in words, a sentence in each line
-    causes: Causes = ()  # of the failures, lowest rank first
+    causes: Sequence[Cause] = ()  # of the failures, lowest rank first
     skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
     reference: Mapping[str, str] | None = None  # kind and name of what MuJoCo is compared with
     first_lines: Sequence[str] = ()  # what is said of it
@@ -143,7 +143,11 @@ def worst(sections: Sequence[Section]) -> Check | None:
 
 
 def verdict(
-    sections: Sequence[Section], experiments: int, causes: Causes = (), subject: str = "", robot: str = ""
+    sections: Sequence[Section],
+    experiments: int,
+    causes: Sequence[Cause] = (),
+    subject: str = "",
+    robot: str = "",
 ) -> str:
     """The outcome, a sentence in each line, with its cause or its largest share of a tolerance.
 

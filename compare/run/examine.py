@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
+from ..core.cause import Cause
 from ..core.check import ENDS, About, Result
 from ..core.errors import described
 from ..core.finding import Finding
@@ -23,7 +24,6 @@ from .explained import explained
 from .reference import Compared
 
 Value = TypeVar("Value")
-Cause = dict[str, Any]
 START, END = "start", "figures"  # tasks of the clock: before the first experiment, and after the last
 DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers on which Mbar and h depend, by their names in `parameters`
@@ -130,8 +130,7 @@ class Run:
             self.sections.append(section)
             if self.setup.own:
                 add_problems(section.result, self.setup.own.equations.problems, self.told)
-            found = new_causes(self.setup, self.sections, self.causes)
-            new = [{"experiment": name, **cause} for cause in found]
+            new = new_causes(self.setup, self.sections, self.causes)
             self.causes = new + self.causes
             if self.causes:
                 section.explained = self.attempt("explained", explained, self.setup, section) or []
@@ -219,15 +218,15 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[Cause]
     is_first = failed[-1] in DIAGNOSED and not any(name in DIAGNOSED for name in failed[:-1])
     if not (not known if failed[-1] == "diagnosis" else is_first):
         return of_numbers
-    diagnosis, places = module("diagnosis"), [cause["place"] for cause in known]
+    diagnosis, places = module("diagnosis"), [cause.place for cause in known]
     found, _ = attempt("diagnosis", setup.robot, diagnosis.diagnosed, setup)
     causes = [cause for cause in found.causes if cause.place not in places] if found else []
-    return [cause.record() for cause in causes] + of_numbers
+    return causes + of_numbers
 
 
 def in_one(setup: Setup, of_numbers: Sequence[Cause]) -> list[Cause]:
     """The causes; one option, convention, number or error of two replaces the numbers that it explains."""
-    replaced = [cause["quantity"] for cause in of_numbers if cause["quantity"] in IN_EQUATIONS]
+    replaced = [cause for cause in of_numbers if cause.quantity in IN_EQUATIONS]
     if len(replaced) < 2:
         return list(of_numbers)
     diagnosis = module("diagnosis")
@@ -235,8 +234,7 @@ def in_one(setup: Setup, of_numbers: Sequence[Cause]) -> list[Cause]:
     explaining = [cause for cause in found.diagnosis.causes if cause.rank < 3] if found else []
     if not explaining:
         return list(of_numbers)
-    first = explaining[0].record() | {"quantity": min(replaced, key=IN_EQUATIONS.index)}
-    return [first, *(cause for cause in of_numbers if cause["quantity"] not in IN_EQUATIONS)]
+    return [explaining[0], *(cause for cause in of_numbers if cause not in replaced)]
 
 
 def attempt(
@@ -270,7 +268,7 @@ def say_outcome(
     about = {"is_open": bool(not_judged), "share": max(used, default=0.0), "seconds": seconds}
     style = "red" if section.failed else "yellow" if not_judged else ""
     terminal.say(block("run", "outcome", section=section, **about), style)
-    lines = [f"CAUSE {cause['text']}" for cause in new]
+    lines = [f"CAUSE {cause.text}" for cause in new]
     if not (known and section.record.states_causes):  # there the causes are the checks
         lines += [f"FAIL {check}" for check in section.failed if check not in section.explained]
     lines += map(str, not_judged)

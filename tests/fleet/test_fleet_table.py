@@ -10,6 +10,7 @@ from urllib.parse import unquote
 
 import pytest
 
+from compare.core.cause import Cause
 from compare.core.check import AT_OWN_STEP, ENDS, About, Result
 from compare.fleet import table
 from compare.fleet.models import place_of_report
@@ -27,7 +28,8 @@ from compare.fleet.table import (
 from compare.report.verdict import Section
 from compare.run.reference import Reference
 
-CAUSES = [{"text": "mass of upper: stated 1 kg, compiled 2 kg"}, {"text": "another"}]
+CAUSE = Cause(rank=2, place="", stated=1.0, explains=2.0, text="mass of upper: stated 1 kg, compiled 2 kg")
+CAUSES = [CAUSE, dataclasses.replace(CAUSE, text="another")]
 BROKEN = ENDS, None, 0.0, "ended by SIGKILL, 4 times", "equal", About.PROGRAM
 OFF = "limit, observed / predicted - 1", 0.01, 0.001, "", "at most", About.PREDICTION
 STILL = "motion", None, 0.0, "nothing moves", "not judged", About.MODELS

@@ -10,6 +10,7 @@ from models import PATHS
 from sections import BAD, GOOD, section
 from small_runs import Lines
 
+from compare.core.cause import Cause
 from compare.core.check import About, Result
 from compare.core.text import say
 from compare.engines.mujoco.reading import read
@@ -57,14 +58,14 @@ def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
 
 def test_what_does_not_agree_is_named_with_its_first_cause_and_nothing_else():
     sections = [section("mass", GOOD, BAD), section("gravity", GOOD), section("diagnosis", BAD)]
-    text = verdict(sections, 10, [{"text": f"number {k}"} for k in range(3)])
+    text = verdict(sections, 10, [replace(CAUSE, text=f"number {k}") for k in range(3)])
     assert "3 of 10 experiments" in text and " mass." in text and "gravity" not in text
     assert "diagnosis" not in text
     assert "2 of 4" in text and "number 0; 2 more" in text and "number 2" not in text
     assert "First failing check: mass: Mbar" in verdict(sections, 10)
 
 
-CAUSE = {"rank": 2, "experiment": "parameters", "text": "mass of forearm: stated 1"}
+CAUSE = Cause(rank=2, place="", stated=1.0, explains=2.0, text="mass of forearm: stated 1")
 
 
 def test_the_verdict_counts_what_the_cause_explains_what_states_it_and_what_stands():
@@ -134,7 +135,7 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
     say_outcome(said, section("mass", GOOD, ("a", 0.25, 1.0, "at most", True)), 1.25, [])
     assert len(said) == 1 and said[0].split()[:4] == ["mass", "ok", "2", "checks"] and " 50 %" in said[0]
     of = section("mass", *[BAD] * 7, GOOD)
-    say_outcome(said, of, 1.0, [{"text": "mass of forearm: stated 1"}])
+    say_outcome(said, of, 1.0, [CAUSE])
     assert said[1].split()[1:5] == ["7", "FAILED", "8", "checks"]
     assert said[2] == "  CAUSE mass of forearm: stated 1"
     assert [line.startswith("  FAIL mass: Mbar, zero: 2 kg m2") for line in said[3:]] == [True] * 4 + [False]

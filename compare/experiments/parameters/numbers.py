@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 import tmt
 from tmt import literal
 
+from ...core.cause import Cause
 from ...core.check import Result
 from ...core.rows import Row, column
 from ...engines.mujoco.dynamics import MujocoDynamics
@@ -74,11 +75,6 @@ class FeatureRow(Row):
         )
 
 
-@dataclass
-class ParametersResult(Result):
-    causes: list[dict[str, Any]] = field(default_factory=list)  # of the checks that fail
-
-
 def unit_of(quantity: str, slides: bool) -> str:
     """The unit of a number of a body, or of a joint that turns or slides."""
     unit = UNITS[quantity]
@@ -100,7 +96,7 @@ def rows_of(number: Stated, unit: str, asked_by: str | None = None) -> list[Numb
 
 def compare_number(
     result: Result, number: Stated, unit: str, words: Mapping[int, str] = MappingProxyType({})
-) -> list[dict[str, Any]]:
+) -> list[Cause]:
     """Add the check of a number of a body or joint; the causes, one for each component that differs.
 
     words: for whole numbers. Rank 1: an option, or a convention of a joint (its order, its sign, its zero); 2: one number.
@@ -124,22 +120,18 @@ def compare_number(
                 texts = [f"{float(value)!r} {unit}".rstrip() for value in (a, b)]
             text = f"{place}: stated {texts[0]}, compiled {texts[1]}" + " (the opposite sign)" * is_flipped
             size = difference[k] / tolerance if tolerance else np.inf
-            causes.append(cause(rank, place, a, b, text, size, quantity))
+            causes.append(cause(place, a, b, text, rank=rank, size=float(size), quantity=quantity))
     return causes
 
 
-def cause(
-    rank: int, place: str, stated: float, compiled: float, text: str, size: float, quantity: str
-) -> dict[str, Any]:
-    """A cause; size: its difference over its tolerance."""
+def cause(place: str, stated: float, compiled: float, text: str, **more: Any) -> Cause:
     number = float(compiled) if np.isfinite(compiled) else None
-    about = {"rank": rank, "place": place, "stated": float(stated), "found": number, "text": text}
-    return about | {"size": float(size), "quantity": quantity}
+    return Cause(place=place, stated=float(stated), explains=number, text=text, **more)
 
 
 def check_forces(
-    result: Result, sample: Sample, tree: tmt.Tree, dynamics: MujocoDynamics, causes: Sequence[dict[str, Any]]
-) -> list[dict[str, Any]]:
+    result: Result, sample: Sample, tree: tmt.Tree, dynamics: MujocoDynamics, causes: Sequence[Cause]
+) -> list[Cause]:
     """Check that no forces act that the equations do not have; these are causes unless `causes` explain them.
 
     Fluid and tendons: MuJoCo adds their forces to those of springs and damping, of whose sum the rounding is allowed.
@@ -152,10 +144,10 @@ def check_forces(
         check = result.check(
             sample.name, f"no forces of {source}", most, allowed, "N m", rounding=is_rounding
         )
-        if check.failed and not any(cause["quantity"] in OF_FORCES for cause in causes):
+        if check.failed and not any(cause.quantity in OF_FORCES for cause in causes):
             place = f"forces of {source}"
             if source == "actuators":
                 place += f" ({', '.join(dynamics.acting_actuators(sample.q, sample.qd))})"
             text = f"{place}: stated none, up to {most:.3g} N m at random states"
-            unexplained.append(cause(2, place, 0.0, most, text, np.inf, place))
+            unexplained.append(cause(place, 0.0, most, text, rank=2, quantity=place))
     return unexplained
