@@ -81,7 +81,7 @@ class Option(NamedTuple):
 
     type: Callable[[str], Any] | None = not_empty  # None: it takes no value
     metavar: str | None = None
-    default: str | None = None
+    default: str | float | None = None
     of_every: bool = False  # whether every experiment takes it; else `all`, and those whose record has it
     example: str = ""  # of its use, in the help of those
 

@@ -130,16 +130,13 @@ class Result:
 
     def not_judged(
         self, scene: str, quantity: str, reason: str, unit: str = "", about: About = About.MODELS
-    ) -> Check:
+    ) -> None:
         """Add a check that was not judged: it neither passes nor fails, and nothing is said to agree."""
         check = Check(self.experiment, scene, quantity, None, 0.0, unit, reason, about=about, judged=False)
         self.checks.append(check)
-        return check
 
 
 def largest_known(values: Sequence[float | None]) -> float | None:
     """The largest of the values that are not None; inf where one is not a number; None if there is none."""
     known = [float(value) for value in values if value is not None]
-    if np.isnan(known).any():
-        return np.inf
-    return max(known, default=None)
+    return np.inf if np.isnan(known).any() else max(known, default=None)

@@ -50,9 +50,6 @@ class Program:
     file = ""  # that is run, where there are others with the same expressions
 
     def __post_init__(self) -> None:
-        self.start()
-
-    def start(self) -> None:
         """Compile or load the text."""
 
     def values(self, quantity: str, states: States) -> list[Array]:
@@ -94,7 +91,7 @@ def parts(quantity: str) -> int:
 class CProgram(Program):
     """Compiled with -O2, called for many states by a loop in C."""
 
-    def start(self) -> None:
+    def __post_init__(self) -> None:
         compiler = shlex.split(os.environ.get("CC", ""))
         compiler = compiler or [name for name in ("gcc", "cc", "clang") if shutil.which(name)][:1]
         if not compiler or not shutil.which(compiler[0]):
@@ -105,9 +102,8 @@ class CProgram(Program):
             raise NotRun(f"a C library cannot be made or loaded: {error}") from None
         loops = "\n".join([f'#include "{self.name}.h"', *map(self.loop, self.quantities)])
         # the header before the source: the declarations must be those of the functions
-        self.library = self.compiled(
-            compiler, "states", loops, "-include", f"{self.name}.h", f"{self.name}.c"
-        )
+        header, source = f"{self.name}.h", f"{self.name}.c"
+        self.library = self.compiled(compiler, "states", loops, "-include", header, source)
 
     def compiled(self, compiler: Sequence[str], name: str, text: str, *more: str) -> ctypes.CDLL:
         """The library of a text and of more files."""
@@ -150,7 +146,7 @@ class CProgram(Program):
 class PythonProgram(Program):
     """A module, called with all states at once."""
 
-    def start(self) -> None:
+    def __post_init__(self) -> None:
         self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
 
     def values(self, quantity: str, states: States) -> list[Array]:
@@ -161,7 +157,7 @@ class PythonProgram(Program):
 class SymbolicProgram(Program):
     """The matrices of SymPy, as functions of states."""
 
-    def start(self) -> None:
+    def __post_init__(self) -> None:
         self.file = f"{self.name}.py"
         self.matrices = runpy.run_path(str(self.folder / self.file))
         robot = Robot("", Path(), self.tree, {}, ())
@@ -181,7 +177,7 @@ class SymbolicProgram(Program):
 class MatlabProgram(Program):
     """Run by Octave; states and values go through files of doubles."""
 
-    def start(self) -> None:
+    def __post_init__(self) -> None:
         found = [name for name in ("octave-cli", "octave") if shutil.which(name)]
         if not found:
             raise NotRun("Octave was not found")

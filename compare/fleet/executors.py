@@ -28,14 +28,7 @@ RETRIES = 3  # of a call whose process is killed by SIGKILL, as a Dask scheduler
 SHARE = 0.9  # of the machine's memory, for all its processes together
 CONNECTING = 10.0  # s, time limit for the scheduler and its first worker to answer
 ALONE = 60.0  # s without a worker or a connection after which a fleet ends
-LOGGERS = [
-    "distributed",
-    "distributed.client",
-    "distributed.core",
-    "tornado",
-    "tornado.application",
-    "asyncio",
-]
+LOGGERS = "distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio"
 
 
 class OtherVersion(RuntimeError):

@@ -1,11 +1,11 @@
 """Run a fleet: submit the files whose reports are missing or old, and write the report of each as it comes."""
 
-import dataclasses
 import hashlib
 import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import NamedTuple
@@ -29,24 +29,18 @@ class Started(NamedTuple):
     future: "Future[Outcome[Compared]]"
 
 
+@dataclass
 class Run:
-    """A running fleet. After carry_out `rows` has a row for each model.
+    """A running fleet."""
 
-    sent: the files of a solution, added to the bundle of each model; see FleetOptions.
-    """
-
-    def __init__(
-        self,
-        models: Sequence[Model],
-        options: FleetOptions,
-        executor: Executor,
-        out: Path,
-        sent: Mapping[str, bytes],
-    ):
-        self.models, self.options, self.executor, self.out, self.sent = models, options, executor, out, sent
-        self.rows: list[FileRow] = []
-        self.first: dict[object, Model] = {}  # by the content of a model and its parts
-        self.copies: list[tuple[Model, Model]] = []  # and the first model of the same content
+    models: Sequence[Model]
+    options: FleetOptions
+    executor: Executor
+    out: Path
+    sent: Mapping[str, bytes]  # the files of a solution, added to the bundle of each model; see FleetOptions
+    rows: list[FileRow] = field(default_factory=list)  # after carry_out one for each model
+    first: dict[object, Model] = field(default_factory=dict)  # by the content of a model and its parts
+    copies: list[tuple[Model, Model]] = field(default_factory=list)  # and the first model of the same content
 
     def carry_out(self, progress: Callable[[list[FileRow]], object]) -> None:
         """Run to the end, copies last. progress is called with the new rows, and every POLLING s."""
@@ -69,7 +63,7 @@ class Run:
             progress(self.rows[before:])
         before, rows = len(self.rows), {row.file: row for row in self.rows}
         for model, first in self.copies:
-            row = dataclasses.replace(rows[first.shown], file=model.shown, same_as=first.shown, seconds=0.0)
+            row = replace(rows[first.shown], file=model.shown, same_as=first.shown, seconds=0.0)
             row.reason = block("fleet", "copy", file=first.shown, reason=row.reason)
             self.rows.append(row)
         progress(self.rows[before:])
@@ -102,7 +96,7 @@ class Run:
         if compared is None:
             self.rows.append(FileRow(file=shown, verdict=BROKE, reason=outcome.why))
             return
-        mark = json.dumps((started.key, dataclasses.asdict(compared.row))).encode()
+        mark = json.dumps((started.key, asdict(compared.row))).encode()
         write_whole(self.out / place_of_report(shown), compared.report | {MARK: mark})
         self.rows.append(compared.row)
 

@@ -77,6 +77,6 @@ def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) ->
     report, parts = write_report(out, examined, list(reasons.items()), origin, compared)
     written = {name: (out / name).read_bytes() for name in folder.files(out)}
     shutil.rmtree(top)
-    judge(row, report.sections, report.causes, parts.lines, compared.reference)
+    judge(row, report, parts.lines, compared.reference)
     row.seconds, row.has_report = round(time.process_time() - began, 2), True
     return Compared(row, written)

@@ -42,9 +42,8 @@ def listen() -> None:
         for number in numbers:  # a thread: the main one may be in a block that postpones interrupts
             signal.signal(number, lambda *_: threading.Thread(target=end, daemon=True).start())
     elif numbers:
-        before = signal.signal(
-            signal.SIGHUP, signal.SIG_IGN
-        )  # the tracker inherits this: it outlives the run
+        # the tracker inherits this: it outlives the run
+        before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
         resource_tracker.ensure_running()  # unblocks signals where it starts
         signal.signal(signal.SIGHUP, before)
         signal.pthread_sigmask(signal.SIG_BLOCK, numbers)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..core.rows import Row
+from ..core.rows import Row, columns_of
 from ..core.text import escaped
 from .document import Document, joined
 from .folder import files, save
@@ -28,7 +28,7 @@ def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
     (folder / "tables").mkdir()
     for section in report.sections:
         for name, rows in section.tables.items():
-            text = parts.attempt(f"tables/{name}.csv", "", csv_of_rows, rows)
+            text = parts.attempt(f"tables/{name}.csv", "", csv, rows)
             if text:
                 save(folder / "tables" / f"{name}.csv", text)
     made = [check.record() for section in report.sections for check in section.result.checks]
@@ -63,15 +63,12 @@ def records(parts: Parts, name: str, found: Sequence[Mapping[str, Any]]) -> list
     return written
 
 
-def csv_of_rows(rows: Sequence[Row]) -> str:
-    return csv([row.record() for row in rows])
-
-
-def csv(records: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> str:
+def csv(rows: Sequence[Row], columns: Sequence[str] = ()) -> str:
     """A table with these or all columns: true and false in lower case, nothing for what is no number."""
-    names = columns or dict.fromkeys(name for record in records for name in record)
-    cells = [{name: cell(value) for name, value in record.items()} for record in records]
-    return pd.DataFrame(cells, columns=list(names), dtype=object).to_csv(index=False, lineterminator="\n")
+    cells = [{name: cell(value) for name, value in row.record().items()} for row in rows]
+    return pd.DataFrame(cells, columns=list(columns or columns_of(rows)), dtype=object).to_csv(
+        index=False, lineterminator="\n"
+    )
 
 
 def cell(value: Any) -> Any:

@@ -12,11 +12,10 @@ import re
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 from ..process import interrupt
 
@@ -224,15 +223,10 @@ def files(folder: Path) -> list[str]:
 
 def refuse_foreign(out: Path) -> None:
     """FolderError for a file under a report's names that the report in `out` does not list as its own."""
-    own = provenance_of(out).get("files", ())
+    own: Sequence[str] = ()
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        own = json.loads((out / "results.json").read_text(encoding="utf-8"))["provenance"]["files"]
     for name in files(out):
         if name not in own:
             why = "which no earlier report has written; use another folder (--out)"
             raise FolderError(f"{out} has {name}, {why}")
-
-
-def provenance_of(out: Path) -> dict[str, Any]:
-    try:
-        return dict(json.loads((out / "results.json").read_text(encoding="utf-8"))["provenance"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}

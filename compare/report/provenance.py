@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import ROOT
 from ..core.timing import vectors
 from ..core.words import readable
 from ..process.workers import Clock
@@ -55,19 +56,18 @@ def durations(clock: Clock) -> dict[str, dict[str, float]]:
 
 def commit() -> str | None:
     """The commit of the program, and whether it was changed since; None outside of a repository."""
-    root = Path(__file__).resolve().parents[2]
-    if not (root / ".git").exists():
+    if not (ROOT / ".git").exists():
         return None
     try:
-        head = git(root, "rev-parse", "HEAD")
-        changed = git(root, "status", "--porcelain", "--", *PROGRAM_FILES)
+        head = git("rev-parse", "HEAD")
+        changed = git("status", "--porcelain", "--", *PROGRAM_FILES)
     except (OSError, ValueError, subprocess.CalledProcessError):
         return None
     return head + (" with uncommitted changes" if changed else "")
 
 
-def git(root: Path, *words: str) -> str:
-    run = subprocess.run(["git", "-C", root, *words], capture_output=True, check=True)
+def git(*words: str) -> str:
+    run = subprocess.run(["git", "-C", ROOT, *words], capture_output=True, check=True)
     return run.stdout.decode().strip()
 
 

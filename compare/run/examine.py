@@ -218,23 +218,21 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[Cause]
     is_first = failed[-1] in DIAGNOSED and not any(name in DIAGNOSED for name in failed[:-1])
     if not (not known if failed[-1] == "diagnosis" else is_first):
         return of_numbers
-    diagnosis, places = module("diagnosis"), [cause.place for cause in known]
-    found, _ = attempt("diagnosis", setup.robot, diagnosis.diagnosed, setup)
+    places = [cause.place for cause in known]
+    found, _ = attempt("diagnosis", setup.robot, module("diagnosis").diagnosed, setup)
     causes = [cause for cause in found.causes if cause.place not in places] if found else []
     return causes + of_numbers
 
 
-def in_one(setup: Setup, of_numbers: Sequence[Cause]) -> list[Cause]:
+def in_one(setup: Setup, of_numbers: list[Cause]) -> list[Cause]:
     """The causes; one option, convention, number or error of two replaces the numbers that it explains."""
     replaced = [cause for cause in of_numbers if cause.quantity in IN_EQUATIONS]
     if len(replaced) < 2:
-        return list(of_numbers)
-    diagnosis = module("diagnosis")
-    found, _ = attempt("diagnosis", setup.robot, diagnosis.diagnosed, setup)
+        return of_numbers
+    found, _ = attempt("diagnosis", setup.robot, module("diagnosis").diagnosed, setup)
     explaining = [cause for cause in found.diagnosis.causes if cause.rank < 3] if found else []
-    if not explaining:
-        return list(of_numbers)
-    return [explaining[0], *(cause for cause in of_numbers if cause not in replaced)]
+    others = [cause for cause in of_numbers if cause not in replaced]
+    return [explaining[0], *others] if explaining else of_numbers
 
 
 def attempt(

@@ -25,7 +25,8 @@ from compare.fleet.table import (
     UNCONFIRMED,
     FileRow,
 )
-from compare.report.verdict import Section
+from compare.report.verdict import Report, Section
+from compare.robots.arm import ARM
 from compare.run.reference import Reference
 
 CAUSE = Cause(rank=2, place="", stated=1.0, explains=2.0, text="mass of upper: stated 1 kg, compiled 2 kg")
@@ -59,7 +60,8 @@ def judged(*checks, limits=(), runs=(), causes=(), lost=(), reference=("arm",)):
     kind, *renamed = reference
     section = Section("stability", "", "", "", result)
     judged_row = row()
-    table.judge(judged_row, [section], causes, lost, Reference(kind, "a.xml", renamed=tuple(renamed)))
+    report = Report([section], ARM, {}, "", causes)
+    table.judge(judged_row, report, lost, Reference(kind, "a.xml", renamed=tuple(renamed)))
     return judged_row
 
 
