@@ -15,7 +15,7 @@ from concurrent.futures import Future
 from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar, cast
+from typing import Any, Generic, NamedTuple, TypeVar, cast
 
 from ..core.errors import Refused, described
 from ..process import interrupt
@@ -40,22 +40,6 @@ class Outcome(NamedTuple, Generic[T]):
 
     value: T | None
     why: str
-
-
-class Executor(Protocol):
-    """Who makes calls. Refused where there is nobody who could."""
-
-    workers: int  # number of calls at the same time
-
-    def submit(self, function: Callable[..., T], *arguments: Any) -> "Future[Outcome[T]]": ...
-
-    def outcome(self, future: "Future[Outcome[T]]") -> Outcome[T]:
-        """That of a call that is done."""
-
-    def check(self) -> None:
-        """Refused if there is nobody left to answer."""
-
-    def close(self) -> None: ...
 
 
 @cache
@@ -94,6 +78,7 @@ class Pool:
         return self.processes.submit(alone, function, arguments, self.folder, self.memory)
 
     def outcome(self, future: "Future[Outcome[T]]") -> Outcome[T]:
+        """That of a call that is done."""
         try:
             return future.result()
         except TimeoutError:
@@ -104,7 +89,7 @@ class Pool:
             return Outcome(None, described(error))
 
     def check(self) -> None:
-        """It is there."""
+        """Refused if there is nobody left to answer."""
 
     def close(self) -> None:
         self.processes.close(at_once=True)
@@ -191,6 +176,11 @@ class Cluster:
     def close(self) -> None:
         with suppress(Exception):
             self.client.close(timeout=1)
+
+
+Executor = (
+    Pool | Cluster
+)  # who makes `workers` calls at the same time; Refused where there is nobody who could
 
 
 def on_worker(

@@ -17,7 +17,7 @@ from functools import partial
 from multiprocessing import active_children, parent_process
 from multiprocessing import context as contexts
 from multiprocessing.process import BaseProcess
-from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar
 
 from pebble import ProcessExpired, ProcessPool
 
@@ -31,6 +31,7 @@ except ImportError:  # Windows: no memory limit
 
 P = ParamSpec("P")
 T = TypeVar("T")
+Answer = tuple[Any, BaseException | None, float]  # what a call has returned or raised, its processor time, s
 KILLED, UNEXPECTED = -9, 256  # exit codes: after SIGKILL; of a lasting process that ends with the status 0
 LONGEST_PATH = 70  # bytes, of the folder of the forkserver's socket, whose whole path may have 107
 
@@ -144,14 +145,6 @@ class Context(contexts.SpawnContext):
 
     def __init__(self, kind: type[BaseProcess]):
         self.Process = kind  # type: ignore[assignment,misc]  # a class of processes, which Pebble starts
-
-
-class Answer(NamedTuple):
-    """What a call has returned or raised, and its processor time, s."""
-
-    value: Any
-    error: BaseException | None
-    seconds: float
 
 
 @dataclass
@@ -274,4 +267,4 @@ def timed(function: Callable[[], Any]) -> Answer:
     except BaseException as error:
         error.place = place(error)  # type: ignore[attr-defined]  # it is sent without its traceback
         raised = error
-    return Answer(value, raised, time.process_time() - began)
+    return value, raised, time.process_time() - began

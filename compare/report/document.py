@@ -28,6 +28,10 @@ FIRST_NOTES = 3  # of a section of the page, which folds the others
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
 MAIN_TABLES = {"what_should_i_use": "What should I use?"}  # further tables of report.md, with their titles
+WORDS = (
+    "title",
+    "alternative",
+)  # of a picture of the first screen: macros overview_title, overview_alternative
 # columns of failing checks
 ON_FIRST_SCREEN = "experiment", "scene", "quantity", "value", "tolerance", "note"
 JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
@@ -135,15 +139,17 @@ class Document:
         for section in sections:
             group = [other for other in sections if other.record.overview == section.record.overview]
             fails = any(other in wrong for other in group)
-            title, alternative = "overview_title", "overview_alternative"
             for figure in section.figures:
                 if figure.is_overview:
-                    words = block(section.name, title), block(section.name, alternative)
-                    pictures.append(Picture(figure, link_to(group), *words, fails))
+                    title, alternative = (block(section.name, f"overview_{part}") for part in WORDS)
+                    pictures.append(Picture(figure, link_to(group), title, alternative, fails))
         if not self.page:
             return pictures
-        if not any(picture.fails for picture in pictures):
-            pictures += [picture for section in wrong for picture in picture_of_failure(section)][:1]
+        failing = [(section, figure) for section in wrong for figure in linked([section])]
+        if failing and not any(picture.fails for picture in pictures):
+            section, figure = failing[0]
+            without_caption = figure._replace(caption="")
+            pictures.append(Picture(without_caption, link_to([section]), section.title, figure.caption, True))
         return sorted(pictures, key=lambda picture: not picture.fails)
 
     def introduction(self) -> str:
@@ -186,25 +192,15 @@ def still_figures(sections: Sequence[Section]) -> list[Figure]:
     return [figure for section in sections for figure in section.own_figures if not figure.moves]
 
 
-def linked(sections: Sequence[Section]) -> Figure | None:
-    """The figure behind a picture: of distances or limits, else the first."""
-    figures = sorted(still_figures(sections), key=lambda figure: not figure.is_main)
-    return figures[0] if figures else None
-
-
-def picture_of_failure(section: Section) -> list[Picture]:
-    """A figure of a failing section as a picture of the first screen; none if it has no figure."""
-    figure = linked([section])
-    if figure is None:
-        return []
-    without_caption = figure._replace(caption="")
-    return [Picture(without_caption, link_to([section]), section.title, figure.caption, True)]
+def linked(sections: Sequence[Section]) -> list[Figure]:
+    """The figures behind a picture: first those of distances or limits."""
+    return sorted(still_figures(sections), key=lambda figure: not figure.is_main)
 
 
 def link_to(sections: Sequence[Section]) -> str:
     """The anchor of the figure behind a picture, or of the last section."""
-    figure = linked(sections)
-    return f"figure-{figure.file}" if figure else sections[-1].name
+    figures = linked(sections)
+    return f"figure-{figures[0].file}" if figures else sections[-1].name
 
 
 def joints_of(robot: Robot) -> list[str]:

@@ -17,6 +17,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
 
+from ..core.errors import Refused
 from ..process import interrupt
 
 fcntl: ModuleType | None
@@ -30,15 +31,11 @@ STAGES = ("new", "old", "moving", "done")
 TRIES = 20
 
 
-class FolderError(ValueError):
-    """A folder that cannot take a report; the message is one line."""
-
-
 @contextmanager
 def new_report(out: str | Path) -> Iterator[Path]:
     """An empty folder inside `out`; its files replace the old report at the end of the block.
 
-    All other files in `out` stay. If the block raises, `out` is unchanged. FolderError if `out` cannot be
+    All other files in `out` stay. If the block raises, `out` is unchanged. Refused if `out` cannot be
     written, or has files under a report's names that are not the old report's.
     """
     work = Work(Path(out))
@@ -52,7 +49,7 @@ def new_report(out: str | Path) -> Iterator[Path]:
         if not path.is_relative_to(work.new):
             raise
         path = work.out / path.relative_to(work.new)  # as the reader knows it
-        raise FolderError(f"cannot write {path}: {error.strerror}; an earlier report is unchanged") from None
+        raise Refused(f"cannot write {path}: {error.strerror}; an earlier report is unchanged") from None
     finally:
         work.remove()
         interrupt.undo.remove(work.remove)
@@ -84,7 +81,7 @@ class Work:
                 refuse_foreign(self.out)
         except OSError as error:
             why = f"{what_is_wrong(self.out, error)}; expected a writable folder"
-            raise FolderError(f"cannot write to {self.out}: {why}") from None
+            raise Refused(f"cannot write to {self.out}: {why}") from None
 
     def exchange(self) -> None:
         """Move the old report away and the new one in; on an error put everything back."""
@@ -102,7 +99,7 @@ class Work:
                 if not isinstance(error, OSError):
                     raise
                 text = f"cannot replace the report in {self.out}: {error.strerror}; the old one is unchanged"
-                raise FolderError(text) from None
+                raise Refused(text) from None
             interrupt.settle()
 
     def remove(self) -> None:
@@ -222,11 +219,11 @@ def files(folder: Path) -> list[str]:
 
 
 def refuse_foreign(out: Path) -> None:
-    """FolderError for a file under a report's names that the report in `out` does not list as its own."""
+    """Refused for a file under a report's names that the report in `out` does not list as its own."""
     own: Sequence[str] = ()
     with suppress(OSError, ValueError, KeyError, TypeError):
         own = json.loads((out / "results.json").read_text(encoding="utf-8"))["provenance"]["files"]
     for name in files(out):
         if name not in own:
             why = "which no earlier report has written; use another folder (--out)"
-            raise FolderError(f"{out} has {name}, {why}")
+            raise Refused(f"{out} has {name}, {why}")

@@ -5,7 +5,7 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from textwrap import TextWrapper
 from typing import IO, cast
@@ -42,6 +42,12 @@ class Terminal:
             text = narrow if len(narrow) <= columns else wrapped.fill(text)
         with self.paused():
             self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
+
+    def say_lines(self, lines: Iterable[str], style: str = "") -> None:
+        """Print lines, the first one in this style."""
+        for line in lines:
+            self.say(line, style)
+            style = ""
 
     def show(self, text: str) -> None:
         self.text = text

@@ -16,7 +16,7 @@ from ..engines.own.own_file import OwnFileError
 from ..experiments import EXPERIMENTS, skipped
 from ..process.streams import say_error
 from ..process.workers import WorkerEnded, load_modules, start_workers
-from ..report.folder import FolderError, new_report
+from ..report.folder import new_report
 from ..report.terminal import Terminal
 from ..robots.case import SEED
 from ..robots.scene_file import SceneError, read_scenes
@@ -46,20 +46,16 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             raise Refused(block("run", "does_not_apply", **about))
         with new_report(options.out) as folder:
             report, parts = compute(options, command, compared, folder, terminal)
-    except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded) as error:
+    except (ModelError, OwnFileError, SceneError, WorkerEnded) as error:
         raise Refused(error) from None
     good = report.passed and not parts.broken
     terminal.say()
-    first, *more = report.verdict.split("\n")
-    terminal.say(first, "bold green" if good else "bold red")
-    for line in more:
-        terminal.say(line)
+    terminal.say_lines(report.verdict.split("\n"), "bold green" if good else "bold red")
     for line in parts.lines:
         say_error(line)
     path, seconds = os.path.join(options.out, "index.html"), time.perf_counter() - started
     terminal.say(block("run", "report", path=path, seconds=seconds))
-    for line in report.answer if is_alone else ():
-        terminal.say(line)
+    terminal.say_lines(report.answer if is_alone else ())
     return 0 if good else 1
 
 
@@ -69,8 +65,7 @@ def compute(
     """Run the experiments and write the report to a folder; see write_report."""
     is_alone, robot, started = options.experiment != "all", compared.robot, time.perf_counter()
     step = compared.integrator_step(options.dt, options.integrator)
-    for line in compared.reference.lines:
-        terminal.say(line)
+    terminal.say_lines(compared.reference.lines)
     if robot.coordinates.nv > MOST_SPEEDS:
         terminal.say(say(Finding("shared", "large", {"speeds": robot.coordinates.nv, "most": MOST_SPEEDS})))
     names = [options.experiment] if is_alone else list(EXPERIMENTS)
