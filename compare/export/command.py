@@ -118,6 +118,5 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
 
 
 def identifier(stem: str) -> str:
-    """The name of a file as an identifier."""
     name = re.sub(r"\W", "_", stem, flags=re.ASCII).strip("_")[:50]
     return name if name[:1].isalpha() and not is_word(name) else f"robot_{name}".rstrip("_")

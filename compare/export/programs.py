@@ -61,7 +61,6 @@ class Program:
         return evaluator(self.tree, quantity).operations
 
     def run(self, *command: str) -> str:
-        """The output of a command in the folder."""
         try:
             done = subprocess.run(
                 command, cwd=self.folder, stdin=subprocess.DEVNULL, capture_output=True, text=True,
@@ -106,13 +105,11 @@ class CProgram(Program):
         self.library = self.compiled(compiler, "states", loops, "-include", header, source)
 
     def compiled(self, compiler: Sequence[str], name: str, text: str, *more: str) -> ctypes.CDLL:
-        """The library of a text and of more files."""
         (self.folder / f"_{name}.c").write_text(f"{text}\n", encoding="utf-8")
         self.run(*compiler, *FLAGS, *more, f"_{name}.c", "-o", f"_{name}.so", "-lm")
         return ctypes.CDLL(str(self.folder / f"_{name}.so"))
 
     def loop(self, quantity: str) -> str:
-        """A function for many states."""
         kind, coordinates = "float" if self.single else "double", self.tree.coordinates
         sizes = {"q": coordinates.nq, "qd": coordinates.nv, "tau": coordinates.nv}
         size = prod(shape_of(quantity, self.tree))

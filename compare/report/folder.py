@@ -56,8 +56,6 @@ def new_report(out: str | Path) -> Iterator[Path]:
 
 
 class Work:
-    """The folder of one run inside `out`."""
-
     def __init__(self, out: Path):
         self.out, self.path = out, out / ".new-"  # the path of the folder as soon as it is made
         self.lock: int | None = None
@@ -65,7 +63,6 @@ class Work:
 
     @property
     def new(self) -> Path:
-        """The folder of the new report."""
         return self.path / "new"
 
     def make(self) -> None:
@@ -186,7 +183,6 @@ def unlock(number: int | None) -> None:
 
 
 def what_is_wrong(out: Path, error: OSError) -> str:
-    """Why a folder cannot be made."""
     for path in (*reversed(out.parents), out):
         name = "it" if path == out else str(path)
         if os.path.islink(path) and not os.path.exists(path):
@@ -212,7 +208,6 @@ def save(path: Path, text: str) -> None:
 
 
 def files(folder: Path) -> list[str]:
-    """The files of a report in a folder, as relative paths."""
     paths = [path for name in OWN for path in [folder / name, *(folder / name).rglob("*")]]
     of_files = [path for path in paths if path.is_file() or path.is_symlink()]
     return sorted(path.relative_to(folder).as_posix() for path in of_files)

@@ -72,7 +72,6 @@ def git(*words: str) -> str:
 
 
 def installed(package: str) -> str | None:
-    """The version of an installed package, or None."""
     try:
         return version(package)
     except PackageNotFoundError:

@@ -45,7 +45,7 @@ def largest(
     if experiment not in ran:
         return about | {"state": "absent"}
     where = where or {"quantity": quantity}
-    records = [row.record() for row in ran[experiment].rows]
+    records = [row.record() for row in ran[experiment].result.rows]
     rows = [record for record in records if all(record.get(key) == value for key, value in where.items())]
     if not rows or any(row["largest_difference"] is None for row in rows):
         return about | {"state": "diverged" if rows else "empty"}
@@ -56,6 +56,6 @@ def largest(
 
 def printed(section: Section, item: str) -> dict[str, Any]:
     """A printed item, with the numbers of both engines; its unit is None where there is no result."""
-    rows = [record for record in (row.record() for row in section.rows) if record["item"] == item]
+    rows = [record for record in (row.record() for row in section.result.rows) if record["item"] == item]
     values = {name: [row[name] for row in rows] for name in ("published", "tmt", "mujoco")}
     return {"item": item, "unit": rows[0]["unit"] if rows else None, **values}

@@ -35,7 +35,6 @@ warnings.filterwarnings("ignore", "constrained_layout not applied")
 
 
 def joint_lines(robot: Robot) -> dict[str, Line]:
-    """Colour and dash of each joint's line, by its name."""
     return {name: LINES[k % len(LINES)] for k, name in enumerate(robot.joints)}
 
 

@@ -73,7 +73,6 @@ def first(items: Sequence[Item], most: int, key: Callable[[Item], Any]) -> list[
 
 
 def of_origin(origin: Mapping[str, Any]) -> pd.DataFrame:
-    """The provenance: what, and its value."""
     rows = [[IN_WORDS.get(name, name), in_one_cell(value)] for name, value in origin.items()]
     return pd.DataFrame(rows, columns=["what", "value"])
 

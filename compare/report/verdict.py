@@ -63,10 +63,6 @@ class Section:
         return [say(note) for note in self.result.notes]
 
     @property
-    def rows(self) -> list[Row]:
-        return self.result.rows
-
-    @property
     def tables(self) -> dict[str, list[Row]]:
         """Its tables that have rows, by their names; its own first."""
         tables = {self.name: self.result.rows} | self.result.tables

@@ -98,7 +98,6 @@ class Run:
         return Examined(sections, self.causes, needless)
 
     def begin(self) -> None:
-        """Start the long work of the experiments."""
         for name in self.names:
             begin = functions(name).begin
             if begin and not self.is_large:
@@ -176,7 +175,6 @@ class Run:
 
 
 def section_with(name: str, result: Result, robot: Robot) -> Section:
-    """The section of an experiment with this result."""
     experiment = functions(name)
     result.headline = result.headline or experiment.headline(result)
     of_robot = {"robot": robot, "values": experiment.claim_values(robot)}

@@ -89,7 +89,6 @@ def inlined_scene(pictures: Pictures, stride: int) -> dict[str, Any]:
 
 
 def on_page(pictures: Pictures) -> list[list[Outline]]:
-    """The pictures of each engine, in the units of the drawing."""
     return [[whole_numbers(points) for points in path] for path in pictures.placed(ROOM, MIDDLE)]
 
 
@@ -109,6 +108,5 @@ def shorter(pictures: Sequence[Outline], others: Sequence[Outline] = ()) -> list
 
 
 def outline(picture: Outline, links: Sequence[Sequence[int]]) -> str:
-    """The sticks of a picture as a path of SVG."""
     points = np.reshape(picture or [], (-1, 2)).tolist()
     return "".join("M{} {}L{} {}".format(*points[i], *points[j]) for i, j in links)
