@@ -26,7 +26,6 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {in_one_line(' '.join(message.split()))}\n")
-        raise AssertionError  # exit ends the process
 
     def add_option(self, name: str, option: "Option", template: str) -> None:
         """Add an option; its help is the macro of its name."""

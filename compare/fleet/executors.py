@@ -23,6 +23,7 @@ from ..process.workers import Beginning, WorkerEnded, Workers, kill_children
 from .cache import RESUME, program
 
 T = TypeVar("T")
+Arguments = tuple[Any, ...]
 ENVIRONMENT = {"MUJOCO_GL": "disabled", "OPENBLAS_NUM_THREADS": "1"}
 RETRIES = 3  # of a call whose process is killed by SIGKILL, as a Dask scheduler does
 SHARE = 0.9  # of the machine's memory, for all its processes together
@@ -95,7 +96,7 @@ class Pool:
         self.processes.close(at_once=True)
 
 
-def alone(function: Callable[..., T], arguments: tuple[Any, ...], folder: str, memory: int) -> Outcome[T]:
+def alone(function: Callable[..., T], arguments: Arguments, folder: str, memory: int) -> Outcome[T]:
     """Make a call in this process, in a folder of its own. What it has started ends with it."""
     with tempfile.TemporaryDirectory(dir=folder, ignore_cleanup_errors=True) as place:
         os.chdir(place)
@@ -183,13 +184,11 @@ Executor = (
 )  # who makes `workers` calls at the same time; Refused where there is nobody who could
 
 
-def on_worker(
-    function: Callable[..., T], arguments: tuple[Any, ...], limit: float, expected: str
-) -> Outcome[T]:
+def on_worker(function: Callable[..., T], arguments: Arguments, limit: float, version: str) -> Outcome[T]:
     from distributed import get_worker
 
     worker = get_worker()
-    if program() != expected:
+    if program() != version:
         raise OtherVersion(f"worker {worker.address}; all workers need the version of this machine")
     multiprocessing.current_process().daemon = False  # else a worker of Dask may not start a process
     memory = (worker.memory_manager.memory_limit or memory_of_machine()) / worker.state.nthreads

@@ -123,11 +123,10 @@ def judge(row: FileRow, report: Report, lost: Sequence[str], reference: Referenc
 
 def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
     """Whether the file's step is stable in its runs and with its own servos, None if unknown; the smallest limit, s."""
-    tables = [section.result.tables for section in sections]
-    limits = [row for of_section in tables for row in of_section.get("step_limits", ())]
+    limits = [row for section in sections for row in section.result.tables.get("step_limits", ())]
     own = [row for row in limits if row.integrator == row.file_integrator]
     stable = [row.stable_at_file_dt for row in own if row.stable_at_file_dt is not None]
-    runs = [row for of_section in tables for row in of_section.get("own_run", ())]
+    runs = [row for section in sections for row in section.result.tables.get("own_run", ())]
     stable += [row.outcome in ("calm", "alike") for row in runs]
     finite = [row.predicted_dt for row in own if row.limit == "finite"]
     return (all(stable) if stable else None), min(finite, default=None)

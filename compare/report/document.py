@@ -130,10 +130,7 @@ class Document:
         return self.template.first_screen(report.sections, report.skipped, pictures, failing)
 
     def pictures(self) -> list[Picture]:
-        """The pictures, those in which something fails first, each with the anchor of its figure.
-
-        If none of them shows a failure, a figure of the first failing experiment comes first.
-        """
+        """The pictures, those in which something fails first; a figure of what fails, if none shows it."""
         sections, pictures = self.report.sections, list[Picture]()
         wrong = [section for section in sections if any(failures([section]))]
         for section in sections:

@@ -23,10 +23,7 @@ PROGRAM_FILES = [":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml"]
 
 
 def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict[str, Any]:
-    """Command, model, versions, machine, commit and seed of a run; `seconds` follow at its end.
-
-    model: the file; shown: its name in the report.
-    """
+    """Command, model (a file, shown by this name), versions, machine, commit and seed; `seconds` follow."""
     versions = {package: installed(package) for package in (*PACKAGES, *OF_ENGINES)}
     return {
         "command": readable(command),

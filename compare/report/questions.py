@@ -11,6 +11,7 @@ from ..robots import Robot
 from .verdict import Section
 
 COLUMNS = ["part", "question", "answered in", "answer"]
+Ran = Mapping[str, Section]  # by the names of the experiments
 
 
 def answers(sections: Sequence[Section], robot: Robot) -> pd.DataFrame | None:
@@ -21,7 +22,7 @@ def answers(sections: Sequence[Section], robot: Robot) -> pd.DataFrame | None:
     return pd.DataFrame(cells, columns=COLUMNS) if cells else None
 
 
-def answer(ran: Mapping[str, Section], kind: str, *about: Any) -> Finding:
+def answer(ran: Ran, kind: str, *about: Any) -> Finding:
     """One answer; kind, about: see robots.Question."""
     if kind == "figure":
         return Finding("questions", "figure", {"name": about[0]})
@@ -37,9 +38,7 @@ def answer(ran: Mapping[str, Section], kind: str, *about: Any) -> Finding:
     return Finding("questions", "largest", values)
 
 
-def largest(
-    ran: Mapping[str, Section], experiment: str, quantity: str, where: Mapping[str, Any]
-) -> dict[str, Any]:
+def largest(ran: Ran, experiment: str, quantity: str, where: Mapping[str, Any]) -> dict[str, Any]:
     """The largest difference in an experiment: of the rows with these values, or of this quantity."""
     about = {"experiment": experiment, "quantity": quantity}
     if experiment not in ran:

@@ -52,10 +52,7 @@ def zero_at_the_end(axis: Axis, end: float, far: float, most: int) -> None:
 
 
 def pixels(figure: Figure) -> np.ndarray:
-    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more.
-
-    A text with a $ is no formula, unless it is a number of an axis.
-    """
+    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more."""
     for text in figure.findobj(Text):
         text.set_parse_math("$" not in text.get_text() or NUMBER.fullmatch(text.get_text()) is not None)
     figure.set_dpi(DPI)

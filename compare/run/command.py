@@ -91,10 +91,7 @@ def compute(
 def write_report(
     folder: Path, examined: "Examined", skipped: Reasons, origin: dict[str, Any], compared: Compared
 ) -> Written:
-    """Write a report with its verdict to a folder that has its figures; what could not be made of it.
-
-    skipped, origin: see Report.
-    """
+    """Write a report with its verdict to a folder that has its figures; what could not be made of it."""
     from ..report import files, verdict
 
     parts, (reference, robot, *_) = verdict.Parts(), compared

@@ -184,10 +184,7 @@ def section_with(name: str, result: Result, robot: Robot) -> Section:
 
 
 def add_problems(result: Result, problems: Sequence[Problem], told: set[int]) -> None:
-    """Add a failed check for each problem of the user's own equations, before the other checks.
-
-    told: the numbers of problems that need not be told again.
-    """
+    """Add a failed check for each problem of a user's own equations that is not told, before the others."""
     others, result.checks = result.checks, []
     asked = EXPERIMENTS.get(result.experiment, Experiment(0)).asks_of_own
     for number, problem in enumerate(problems):
@@ -255,10 +252,7 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
 def say_outcome(
     terminal: Terminal, section: Section, seconds: float, new: Sequence[Cause], known: bool = False
 ) -> None:
-    """One line for an experiment, then the new causes, and the first failing checks that none explains.
-
-    seconds: of the processor, for the experiment itself; known: whether there are causes, new ones or others.
-    """
+    """One line for an experiment, then the new causes, and the first failing checks that no known one explains."""
     used = [check.over_tolerance or 0.0 for check in section.result.checks]
     not_judged = failures([section]).not_judged
     about = {"is_open": bool(not_judged), "share": max(used, default=0.0), "seconds": seconds}

@@ -66,10 +66,7 @@ def inlined(scenes: Sequence[Pictures], engines: Sequence[str]) -> tuple[str, in
 
 
 def inlined_scene(pictures: Pictures, stride: int) -> dict[str, Any]:
-    """One scene as the script has it: of each engine a list of pictures.
-
-    A picture is 0 where it is the one before, 1 where it is that of the first engine.
-    """
+    """One scene as the script has it: of each engine a list of pictures, see `shorter`."""
     ours, theirs = (path[::stride] for path in on_page(pictures))
     dt = stride * float(pictures.t[1] - pictures.t[0])
     slower = max(1.0, pictures.slower(SHOWN_FOR / (len(pictures.t) - 1)))
