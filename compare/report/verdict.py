@@ -81,8 +81,11 @@ class Section:
         return [figure for figure in self.figures if not figure.is_overview]
 
 
+Sections = Sequence[Section]
+
+
 class Report(NamedTuple):
-    sections: Sequence[Section]
+    sections: Sections
     robot: Robot
     origin: dict[str, Any]  # see provenance
     verdict: str  # in words, a sentence in each line
@@ -118,7 +121,7 @@ class Failures(NamedTuple):
     not_judged: list[Check]
 
 
-def failures(sections: Sequence[Section]) -> Failures:
+def failures(sections: Sections) -> Failures:
     """The checks that fail, by their kinds, and those that were not judged."""
     checks = [check for section in sections for check in section.result.checks]
     kinds = About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION, About.ENGINE
@@ -126,12 +129,12 @@ def failures(sections: Sequence[Section]) -> Failures:
     return Failures._make([*failed, [check for check in checks if not check.judged]])
 
 
-def passed(sections: Sequence[Section]) -> bool:
+def passed(sections: Sections) -> bool:
     """Whether something was compared, no check fails, and all were judged."""
     return any(section.judged for section in sections) and not any(failures(sections))
 
 
-def worst(sections: Sequence[Section]) -> Check | None:
+def worst(sections: Sections) -> Check | None:
     """The check that uses most of a tolerance of rounding, or None."""
     checks = [check for section in sections for check in section.result.checks]
     of_rounding = [check for check in checks if check.over_tolerance is not None]
@@ -139,11 +142,7 @@ def worst(sections: Sequence[Section]) -> Check | None:
 
 
 def verdict(
-    sections: Sequence[Section],
-    experiments: int,
-    causes: Sequence[Cause] = (),
-    subject: str = "",
-    robot: str = "",
+    sections: Sections, experiments: int, causes: Sequence[Cause] = (), subject: str = "", robot: str = ""
 ) -> str:
     """The outcome, a sentence in each line, with its cause or its largest share of a tolerance.
 

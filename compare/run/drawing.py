@@ -1,6 +1,6 @@
 """Figures on disk, drawn in another process than the one that computes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import chain, islice
 from pathlib import Path
 
@@ -16,12 +16,7 @@ from ..robots import Robot
 
 
 def draw(
-    experiment: str,
-    result: Result,
-    robot: Robot,
-    folder: Path,
-    others: Mapping[str, Result],
-    few: bool = False,
+    experiment: str, result: Result, robot: Robot, folder: Path, others: dict[str, Result], few: bool = False
 ) -> list[Figure]:
     """The figures of an experiment on disk.
 
