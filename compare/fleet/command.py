@@ -107,7 +107,7 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
             executor = Pool(1 if options.timing else options.workers or cores(), options.limit)
         try:
             run = Run(models, file_options, executor, out, sent)
-            terminal.tell(run.progress)
+            terminal.how_far = run.progress
             with terminal.progress("", PERIOD):
                 run.carry_out(lambda rows: say_rows(terminal, rows))
         finally:

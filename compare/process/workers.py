@@ -140,13 +140,6 @@ if sys.platform != "win32":
         """A process that makes one call, forked from one that has loaded what the call needs."""
 
 
-class Context(contexts.SpawnContext):
-    """How processes are started."""
-
-    def __init__(self, kind: type[BaseProcess]):
-        self.Process = kind  # type: ignore[assignment,misc]  # a class of processes, which Pebble starts
-
-
 @dataclass
 class Call(Generic[T]):
     """A call of workers. Its future has the answer, however often it is tried."""
@@ -182,7 +175,9 @@ class Workers:
         kind: type[BaseProcess] = contexts.SpawnProcess if self.is_fresh else Lasting
         if self.is_fresh and hasattr(os, "fork") and len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PATH:
             kind = Forked
-        return ProcessPool(self.count, int(self.is_fresh), self.beginning.begin, context=Context(kind))
+        context = contexts.SpawnContext()
+        context.Process = kind  # type: ignore[assignment,misc]  # a class of processes, which Pebble starts
+        return ProcessPool(self.count, int(self.is_fresh), self.beginning.begin, context=context)
 
     def submit(self, function: Callable[P, T], /, *arguments: P.args, **named: P.kwargs) -> "Future[T]":
         """The future of a call, which raises what the function raises, TimeoutError after the time limit, or WorkerEnded."""

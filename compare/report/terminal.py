@@ -29,7 +29,7 @@ class Terminal:
         self.lines, self.screen = console(self.out), console(self.err)
         self.status: Status | None = None
         self.text = ""
-        self.how_far: Callable[[], list[str]] = list
+        self.how_far: Callable[[], list[str]] = list  # count, name: before the text; asked at every moment
 
     def say(self, text: str = "", style: str = "") -> None:
         """Print a line; on a narrower terminal without wide gaps if it fits then, else wrapped."""
@@ -51,10 +51,6 @@ class Terminal:
 
     def show(self, text: str) -> None:
         self.text = text
-
-    def tell(self, how_far: Callable[[], list[str]]) -> None:
-        """Show how far the run is (count, name) before the current text; called again at every moment."""
-        self.how_far = how_far
 
     @contextmanager
     def progress(self, text: str, period: float = 25.0) -> Iterator[None]:

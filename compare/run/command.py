@@ -3,7 +3,6 @@
 import argparse
 import os
 import time
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +27,6 @@ if TYPE_CHECKING:  # they take long to load
     from .examine import Examined
 
 Written = tuple["Report", "Parts"]
-Reasons = Sequence[tuple[str, str]]  # experiments, and why they are skipped
 COMPUTING = "compare.run.examine", "tmt.compiled.machine"  # modules that take long to load
 DRAWING = "compare.report.style", *COMPUTING
 
@@ -82,14 +80,14 @@ def compute(
         setup = examine.setup_of(compared, options.quick, alone=is_alone, step=step, **more)
         for name, said in reasons.items():
             terminal.say(block("run", "skipped", name=name, reason=said))
-        terminal.tell(partial(examine.progress, workers.clock, names))
+        terminal.how_far = partial(examine.progress, workers.clock, names)
         examined = examine.examine(names, setup, folder, terminal, workers, workers.clock)
     origin |= {"seconds": round(time.perf_counter() - started, 1)} | durations(workers.clock)
-    return write_report(folder, examined, list(reasons.items()), origin, compared)
+    return write_report(folder, examined, reasons, origin, compared)
 
 
 def write_report(
-    folder: Path, examined: "Examined", skipped: Reasons, origin: dict[str, Any], compared: Compared
+    folder: Path, examined: "Examined", skipped: dict[str, str], origin: dict[str, Any], compared: Compared
 ) -> Written:
     """Write a report with its verdict to a folder that has its figures; what could not be made of it."""
     from ..report import files, verdict
@@ -99,6 +97,6 @@ def write_report(
     count, subject = len(EXPERIMENTS) - len(needless), block("run", "subject", kind=reference.kind)
     about = sections, count, causes, subject, robot.name
     words = parts.attempt("the verdict", "No verdict.", verdict.verdict, *about)
-    left_out, named = [*skipped, *needless.items()], {"kind": reference.kind, "name": reference.name}
+    left_out, named = list((skipped | needless).items()), {"kind": reference.kind, "name": reference.name}
     report = verdict.Report(sections, robot, origin, words, causes, left_out, named, reference.lines)
     return report, files.write(folder, report, parts)
