@@ -1,5 +1,6 @@
 """Checks and their rules, and the result of an experiment: rows, checks and findings."""
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -10,11 +11,7 @@ import numpy as np
 from .cause import Cause
 from .finding import Finding
 
-RULES = {  # which values pass
-    "at most": lambda value, tolerance: value <= tolerance,
-    "at least": lambda value, tolerance: value >= tolerance,
-    "equal": lambda value, tolerance: value == tolerance,
-}
+RULES = {"at most": operator.le, "at least": operator.ge, "equal": operator.eq}  # which values pass
 ENDS = "runs to its end"  # names of checks
 AT_OWN_STEP, AT_REQUESTED_STEP = "stable at its own step", "stable at the requested step"
 # in results.json

@@ -148,7 +148,6 @@ def earlier(folder: str) -> dict[str, dict[str, str]]:
 
 
 def by_file(table: str) -> dict[str, dict[str, str]]:
-    """The columns COMPARED by file name, as text."""
     return {row["file"]: {name: row[name] for name in COMPARED} for row in csv.DictReader(StringIO(table))}
 
 

@@ -79,8 +79,7 @@ class Document:
         report = self.report
         texts = [self.made("the first screen", self.first_screen)]
         if self.page:
-            what = "the motion in index.html"
-            self.motion = self.parts.attempt(what, "", motion_in_html, report.sections, report.robot.noun)
+            self.motion = self.made("the motion", motion_in_html, report.sections, report.robot.noun)
             texts.append(self.motion)
         texts.append(self.made("the introduction", self.introduction))
         if report.causes:
@@ -89,13 +88,12 @@ class Document:
             texts.append(self.template.questions(self.answers))
         for section in report.sections:
             missing = self.template.missing(section.name, section.title)
-            what = f"{section.name} in {self.file}"
-            texts.append(self.parts.attempt(what, missing, self.section, section))
+            texts.append(self.made(section.name, self.section, section, otherwise=missing))
         texts.append(self.template.skipped(report.skipped) if report.skipped else "")
         return [*texts, self.template.provenance(tables.of_origin(report.origin))]
 
-    def made(self, name: str, make: Callable[[], str]) -> str:
-        return self.parts.attempt(f"{name} in {self.file}", "", make)
+    def made(self, name: str, make: Callable[..., str], *arguments: Any, otherwise: str = "") -> str:
+        return self.parts.attempt(f"{name} in {self.file}", otherwise, make, *arguments)
 
     def text(self, body: Sequence[str]) -> str:
         """The whole document, with what could not be made of it."""
@@ -155,7 +153,6 @@ class Document:
         return " ".join(text.split())
 
     def section(self, section: Section) -> str:
-        """One experiment: what was found, figures, tolerance, and the details."""
         checks, few = section.result.checks, MOST_ROWS if self.page else MOST_IN_MARKDOWN
         failed = [check for check in section.failed if check not in section.explained]
         not_judged = [check for check in checks if not check.judged]

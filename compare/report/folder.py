@@ -202,7 +202,6 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def save(path: Path, text: str) -> None:
-    """A text file, UTF-8 wherever it is written."""
     with writing(path):
         path.write_text(text, encoding="utf-8", errors="backslashreplace")
 

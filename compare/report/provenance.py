@@ -44,11 +44,8 @@ def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict[s
 
 def durations(clock: Clock) -> dict[str, dict[str, float]]:
     """CPU seconds of each task, and when it ended, wall-clock seconds from the start."""
-    seconds = {task: clock.seconds_of(task) for task in clock.ended}
-    return {
-        "seconds_of": {task: round(time, 2) for task, time in seconds.items() if time},
-        "ended_after_s": {task: round(at, 2) for task, at in clock.ended.items()},
-    }
+    seconds = {task: round(time, 2) for task in clock.ended if (time := clock.seconds_of(task))}
+    return {"seconds_of": seconds, "ended_after_s": {task: round(at, 2) for task, at in clock.ended.items()}}
 
 
 def commit() -> str | None:

@@ -4,12 +4,12 @@ from ..edit import Edit
 
 EDITS = (
     # rules
-    Edit("core.check", "RULES", "value <= tolerance", "True", "'at most' always passes"),
-    Edit("core.check", "RULES", "value <= tolerance", "value < tolerance", "a value equal to its tolerance fails"),
-    Edit("core.check", "RULES", "value >= tolerance", "True", "'at least' always passes"),
-    Edit("core.check", "RULES", "value >= tolerance", "value > tolerance", "a value equal to the least fails"),
-    Edit("core.check", "RULES", "value == tolerance", "True", "'equal' always passes"),
-    Edit("core.check", "RULES", "value == tolerance", "value <= tolerance", "'equal' passes what is smaller"),
+    Edit("core.check", "RULES", "operator.le", "lambda *values: True", "'at most' always passes"),
+    Edit("core.check", "RULES", "operator.le", "operator.lt", "a value equal to its tolerance fails"),
+    Edit("core.check", "RULES", "operator.ge", "lambda *values: True", "'at least' always passes"),
+    Edit("core.check", "RULES", "operator.ge", "operator.gt", "a value equal to the least fails"),
+    Edit("core.check", "RULES", "operator.eq", "lambda *values: True", "'equal' always passes"),
+    Edit("core.check", "RULES", "operator.eq", "operator.le", "'equal' passes what is smaller"),
     Edit("core.check", "Check.passed", "self.judged and self.value is not None and bool(_1)", "self.value is None or bool(_1)",
          "a check without a number passes"),
     Edit("core.check", "Check.__post_init__", "not np.isfinite(self.tolerance)", "False",
