@@ -179,9 +179,8 @@ class Cluster:
             self.client.close(timeout=1)
 
 
-Executor = (
-    Pool | Cluster
-)  # who makes `workers` calls at the same time; Refused where there is nobody who could
+# who makes `workers` calls at the same time; Refused where there is nobody who could
+Executor = Pool | Cluster
 
 
 def on_worker(function: Callable[..., T], arguments: Arguments, limit: float, version: str) -> Outcome[T]:

@@ -150,23 +150,19 @@ class Call(Generic[T]):
     tries: int = 0
 
 
+@dataclass(eq=False)
 class Workers:
-    """Processes that make calls at the same time; one that ends, or takes too long, is replaced.
+    """Processes that make calls at the same time; one that ends, or takes too long, is replaced."""
 
-    limit: s for a call. retries: how often a call is made again whose process is killed by SIGKILL (no memory, an operator), of
-    which it may not be the cause. is_fresh: each call has a process of its own. The clock has the processor times of the calls.
-    """
+    count: int
+    beginning: Beginning
+    limit: float | None = None  # s for a call
+    retries: int = 0  # of a call whose process is killed by SIGKILL (no memory, an operator)
+    is_fresh: bool = False  # each call has a process of its own
+    clock: Clock = field(default_factory=Clock)  # of the calls
+    pending: set["Future[Any]"] = field(default_factory=set)
 
-    def __init__(
-        self,
-        count: int,
-        beginning: Beginning,
-        limit: float | None = None,
-        retries: int = 0,
-        is_fresh: bool = False,
-    ):
-        self.count, self.beginning, self.limit, self.retries = count, beginning, limit, retries
-        self.is_fresh, self.clock, self.pending = is_fresh, Clock(), set[Future[Any]]()
+    def __post_init__(self) -> None:
         self.pool = self.new_pool()
         interrupt.undo.append(kill_children)
 

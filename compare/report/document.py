@@ -28,19 +28,15 @@ FIRST_NOTES = 3  # of a section of the page, which folds the others
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
 MAIN_TABLES = {"what_should_i_use": "What should I use?"}  # further tables of report.md, with their titles
-WORDS = (
-    "title",
-    "alternative",
-)  # of a picture of the first screen: macros overview_title, overview_alternative
+# macros of a picture of the first screen: overview_title, overview_alternative
+WORDS = "title", "alternative"
 # columns of failing checks
 ON_FIRST_SCREEN = "experiment", "scene", "quantity", "value", "tolerance", "note"
 JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
 
 
 class Picture(NamedTuple):
-    """A picture of the first screen."""
-
-    figure: Figure
+    figure: Figure  # of the first screen
     link: str  # to a figure, or to a section
     title: str
     alternative: str

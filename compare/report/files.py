@@ -63,9 +63,8 @@ def records(parts: Parts, name: str, found: Sequence[Mapping[str, Any]]) -> list
 def csv(rows: Sequence[Row], columns: Sequence[str] = ()) -> str:
     """A table with these or all columns: true and false in lower case, nothing for what is no number."""
     cells = [{name: cell(value) for name, value in row.record().items()} for row in rows]
-    return pd.DataFrame(cells, columns=list(columns or columns_of(rows)), dtype=object).to_csv(
-        index=False, lineterminator="\n"
-    )
+    table = pd.DataFrame(cells, columns=list(columns or columns_of(rows)), dtype=object)
+    return table.to_csv(index=False, lineterminator="\n")
 
 
 def cell(value: Any) -> Any:
