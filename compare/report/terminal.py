@@ -40,8 +40,13 @@ class Terminal:
             wrapped = TextWrapper(max(columns, 20), break_long_words=False, break_on_hyphens=False)
             wrapped.subsequent_indent = f"{indent}  "
             text = narrow if len(narrow) <= columns else wrapped.fill(text)
-        with self.paused():
+        if self.status:
+            self.status.stop()
+        try:
             self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
+        finally:
+            if self.status:
+                self.status.start()
 
     def say_lines(self, lines: Iterable[str], style: str = "") -> None:
         """Print lines, the first one in this style."""
@@ -90,16 +95,6 @@ class Terminal:
 
     def __rich__(self) -> Text:
         return Text(self.line(), no_wrap=True)
-
-    @contextmanager
-    def paused(self) -> Iterator[None]:
-        if self.status:
-            self.status.stop()
-        try:
-            yield
-        finally:
-            if self.status:
-                self.status.start()
 
 
 def console(stream: Stream) -> Console:
