@@ -71,7 +71,7 @@ def test_what_is_the_users_own_must_follow_from_the_m_and_h_that_the_cause_expla
     (folder / "own_equations_beside.py").write_text((folder / "mine.py").read_text())
     (folder / "slip.py").write_text(SLIP)
     found = examined(folder, f"slip.py:{name}", ["mass", "gravity", "acceleration"])
-    assert "mass" in found.causes[0]["text"] and found.failed
+    assert "mass" in found.causes[0].text and found.failed
     left = standing(found.sections)
     if stands == {"energy"}:
         assert {check.quantity.split()[0].strip(",") for check in left} >= {"energy"}
@@ -95,7 +95,7 @@ def test_a_wrong_number_of_a_file_explains_no_error_of_an_engine(tmp_path, monke
     bias = MujocoDynamics.bias
     monkeypatch.setattr(MujocoDynamics, "bias", lambda *a: bias(*a) + wrong)
     sections, causes, _ = examine(NAMES, setup_of_heavy(tmp_path), tmp_path, Lines(), IDLE)
-    assert causes[0]["text"].startswith("mass of forearm")
+    assert causes[0].text.startswith("mass of forearm")
     assert {check.experiment for check in standing(sections)} == stands
     assert sections[2].name == "mass" and sections[2].explained
 

@@ -141,7 +141,7 @@ def found(text):
 
 
 def places(text):
-    return [cause["place"] for cause in found(text)[1]]
+    return [cause.place for cause in found(text)[1]]
 
 
 def test_every_quantity_is_one_that_can_differ():
@@ -162,7 +162,7 @@ def test_a_number_that_differs_fails_its_own_check_and_is_the_cause(quantity):
         else:
             raise
     assert quantity.removesuffix(" of all") in failed
-    numbers = [(c["rank"], c["place"], c["stated"], pytest.approx(c["found"], rel=1e-14)) for c in known]
+    numbers = [(c.rank, c.place, c.stated, pytest.approx(c.explains, rel=1e-14)) for c in known]
     assert numbers == causes
 
 
@@ -170,8 +170,8 @@ def test_causes_come_by_rank_then_by_size():
     """Not in the order in which numbers are read: mass, CoM, air."""
     mass, com = ('mass="1.9"', 'mass="1.9000001"'), ('pos="0.15 0 0"', 'pos="0.151 0 0"')
     causes = found(edited(mass, com, ("<option ", '<option density="1.2" ')))[1]
-    assert [cause["place"] for cause in causes] == ["density", "com x of forearm", "mass of upper arm"]
-    assert causes[1]["text"].index("0.15 m") < causes[1]["text"].index("0.151 m")  # the stated number first
+    assert [cause.place for cause in causes] == ["density", "com x of forearm", "mass of upper arm"]
+    assert causes[1].text.index("0.15 m") < causes[1].text.index("0.151 m")  # the stated number first
 
 
 def test_a_force_that_no_number_explains_is_the_cause():
@@ -197,4 +197,4 @@ def test_geoms_that_cannot_touch_are_no_cause():
 def test_one_convention_or_slip_stands_for_the_numbers_that_follow_from_it(edits, causes):
     setup = setup_of(edited(*edits), make=Setup, states=20)
     sections = [Section("parameters", "", "", "", parameters.rows(setup))]
-    assert [cause["place"] for cause in new_causes(setup, sections, [])] == causes
+    assert [cause.place for cause in new_causes(setup, sections, [])] == causes

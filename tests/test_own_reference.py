@@ -116,7 +116,7 @@ def test_equations_without_any_use_are_compared_to_the_end(folder):
 def test_the_right_joints_are_named_in_place_of_the_stated_ones(folder, asked, joints, right):
     run = examined(folder, asked, ["diagnosis"], joints=joints)
     mirrored = "-" + right.replace(",", ",-")  # the mirror image of the pendulum is the same
-    assert any(f"--joints={one})" in cause["text"] for cause in run.causes for one in (right, mirrored))
+    assert any(f"--joints={one})" in cause.text for cause in run.causes for one in (right, mirrored))
 
 
 def test_a_report_has_what_can_be_compared_and_the_rest_gets_status_2(inside, folder, capsys):

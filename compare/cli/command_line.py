@@ -26,7 +26,6 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {in_one_line(' '.join(message.split()))}\n")
-        raise AssertionError  # exit ends the process
 
     def add_option(self, name: str, option: "Option", template: str) -> None:
         """Add an option; its help is the macro of its name."""
@@ -36,7 +35,6 @@ class Parser(argparse.ArgumentParser):
         self.add_argument(name, help=" ".join(block(template, name.strip("-")).split()), **values)
 
     def refuse_option(self, word: str, options: Sequence[str]) -> NoReturn:
-        """End with an unknown option, and the nearest known one."""
         names, name = {name.strip("-"): name for name in options}, word.strip("-").split("=")[0]
         self.error(f"{word!r} is not an option; {expected(name, names, ' '.join(options))}")
 
@@ -128,7 +126,6 @@ def command_parser(name: str, usage: str, template: str, options: dict[str, Opti
 
 
 def help_of(experiment: str) -> str:
-    """The summary of an experiment, its own text, and commands."""
     record, summary = EXPERIMENTS[experiment], fill(block(experiment, "summary"), LINE_WIDTH - 1)
     examples = [" --mjcf my_arm.xml" if record.needs_file else ""]
     examples += [OPTIONS[name].example for name in record.options if OPTIONS[name].example]

@@ -2,17 +2,14 @@
 
 from dataclasses import dataclass
 from math import inf
-
-COLUMNS = ("rank", "place", "stated", "found", "text")  # of results.json and of a report
+from typing import Any
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cause:
     """One explanation: an option, a convention, a number or a term that is not as stated, or two of them."""
 
-    rank: (
-        int  # 1: an option, or the convention of a joint; 2: one number, term or coefficient; 3: two of these
-    )
+    rank: int  # 1: an option, or the convention of a joint; 2: one number, term or coefficient; 3: two
     place: str  # such as "mass of forearm"
     stated: float | str
     explains: float | str | None  # the value that explains the difference; None: it is not a finite number
@@ -26,7 +23,7 @@ class Cause:
     quantity: str = ""  # of a number of the file: its name in `parameters`
     size: float = inf  # of such a number: its difference over its tolerance
 
-    def record(self) -> dict[str, float | str | None]:
-        """The values of COLUMNS."""
-        values = self.rank, self.place, self.stated, self.explains, self.text
-        return dict(zip(COLUMNS, values))
+    def record(self) -> dict[str, Any]:
+        """As in results.json and in a report."""
+        about = {"rank": self.rank, "place": self.place, "stated": self.stated}
+        return about | {"found": self.explains, "text": self.text}

@@ -1,5 +1,6 @@
 """Checks and their rules, and the result of an experiment: rows, checks and findings."""
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -7,14 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from .cause import Cause
 from .finding import Finding
 from .pictures import Pictures
 
-RULES = {  # which values pass
-    "at most": lambda value, tolerance: value <= tolerance,
-    "at least": lambda value, tolerance: value >= tolerance,
-    "equal": lambda value, tolerance: value == tolerance,
-}
+RULES = {"at most": operator.le, "at least": operator.ge, "equal": operator.eq}  # which values pass
 ENDS = "runs to its end"  # names of checks
 AT_OWN_STEP, AT_REQUESTED_STEP = "stable at its own step", "stable at the requested step"
 # in results.json
@@ -93,7 +91,7 @@ class Result:
     experiment: str
     rows: list[Any] = field(default_factory=list)  # each a Row
     checks: list[Check] = field(default_factory=list)
-    causes: list[dict[str, Any]] = field(default_factory=list)  # of failing checks: place, stated, text ...
+    causes: list[Cause] = field(default_factory=list)  # of failing checks
     notes: list[Finding] = field(default_factory=list)  # for the report
     shown: Sequence[str] | None = None  # columns of the table in the report; None: all; []: it is only a file
     tables: dict[str, Any] = field(default_factory=dict)  # further tables by name: lists of rows
@@ -131,16 +129,13 @@ class Result:
 
     def not_judged(
         self, scene: str, quantity: str, reason: str, unit: str = "", about: About = About.MODELS
-    ) -> Check:
+    ) -> None:
         """Add a check that was not judged: it neither passes nor fails, and nothing is said to agree."""
         check = Check(self.experiment, scene, quantity, None, 0.0, unit, reason, about=about, judged=False)
         self.checks.append(check)
-        return check
 
 
 def largest_known(values: Sequence[float | None]) -> float | None:
     """The largest of the values that are not None; inf where one is not a number; None if there is none."""
     known = [float(value) for value in values if value is not None]
-    if np.isnan(known).any():
-        return np.inf
-    return max(known, default=None)
+    return np.inf if np.isnan(known).any() else max(known, default=None)

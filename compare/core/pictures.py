@@ -16,9 +16,7 @@ class Pictures(NamedTuple):
     scene: str
     run: str  # method and step
     t: np.ndarray  # (pictures,) s
-    points: dict[
-        str, np.ndarray
-    ]  # by engine (pictures, points, 2): right and up, m; NaN once it has diverged
+    points: dict[str, np.ndarray]  # by engine (pictures, points, 2): right, up, m; NaN once it diverged
     links: list[tuple[int, int]]  # pairs of points that a stick joins
     apart: np.ndarray  # (pictures,): the largest difference of a joint; NaN if an engine has diverged
     unit: str  # of that

@@ -1,16 +1,12 @@
 """Records of the modules of a folder, which are read without importing the modules."""
 
 import ast
+from operator import attrgetter
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
-
-class Ordered(Protocol):
-    @property
-    def order(self) -> int: ...
-
-
-Record = TypeVar("Record", bound=Ordered)
+Record = TypeVar("Record")
+order_of = attrgetter("order")
 
 
 def records_in(folder: Path, name: str, kind: type[Record]) -> dict[str, Record]:
@@ -23,4 +19,4 @@ def records_in(folder: Path, name: str, kind: type[Record]) -> dict[str, Record]
             assert isinstance(call, ast.Expr) and isinstance(call.value, ast.Call)
             fields = {str(field.arg): ast.literal_eval(field.value) for field in call.value.keywords}
             records[file.parent.name if file.stem == "__init__" else file.stem] = kind(**fields)
-    return dict(sorted(records.items(), key=lambda item: item[1].order))
+    return dict(sorted(records.items(), key=lambda item: order_of(item[1])))

@@ -60,7 +60,6 @@ class Row:
         return columns
 
     def unit_of(self, of_field: Column) -> str:
-        """The unit that ends the name of a column."""
         return of_field.unit
 
     def record(self) -> dict[str, Any]:

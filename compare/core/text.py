@@ -9,7 +9,7 @@ import hashlib
 import re
 from functools import cache
 from html.entities import codepoint2name
-from math import degrees, isfinite
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +74,6 @@ FILTERS = {
     "g": lambda value, digits=3: f"{value:.{digits}g}",
     "apart": apart,
     "percent": lambda share, digits=2: f"{100.0 * share:.{digits}g} %",
-    "degrees": lambda angle, digits=4: f"{degrees(angle):.{digits}g} deg",
     "count": count,
     "rounded": rounded,
     "share_of": lambda share: f"{rounded(share)} times" if share > 1.0 else f"{100.0 * share:.2g} % of",

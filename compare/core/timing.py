@@ -28,7 +28,6 @@ def in_turns(runs: Sequence[Call], rounds: int) -> list[list[float]]:
 
 
 def fastest(runs: Mapping[Name, Call], rounds: int) -> dict[Name, float]:
-    """Seconds of the fastest call of each function, by its name."""
     return {name: min(taken) for name, taken in zip(runs, in_turns(list(runs.values()), rounds))}
 
 

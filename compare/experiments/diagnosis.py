@@ -133,7 +133,7 @@ def rows(setup: Setup) -> DiagnosisResult:
         result.find("too_slow")
     if not result.notes:
         result.find("nothing")
-    result.causes = [cause.record() for cause in found.causes]
+    result.causes = found.causes
     return result
 
 

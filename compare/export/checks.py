@@ -61,7 +61,6 @@ class Judge:
         self.scales = Entries(self.tree, *states[:2])
 
     def rows(self, program: Program, name: str) -> list[Row]:
-        """A row for each array of a quantity."""
         values, exact = program.values(name, self.states), exact_of_many(self.tree, name, *self.states)
         rows = []
         for symbol, quantity in QUANTITIES.items():

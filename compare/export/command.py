@@ -74,8 +74,7 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
     except ModelError as error:
         raise Refused(error) from None
     robot, name = compared.robot, options.name or identifier(Path(options.mjcf or "arm").stem)
-    for line in compared.reference.lines if options.mjcf else ():
-        terminal.say(line)
+    terminal.say_lines(compared.reference.lines if options.mjcf else ())
     quantities = (options.quantity or QUANTITIES.get(options.to, OF_MOST)).replace(" ", "").split(",")
 
     def written(*head: str) -> dict[str, str]:
@@ -111,8 +110,7 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
             path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise Refused(f"cannot write to {options.out}: {error.strerror}") from None
-    for line in block("export", "table", outcome=outcome, times=times).splitlines():
-        terminal.say(line)
+    terminal.say_lines(block("export", "table", outcome=outcome, times=times).splitlines())
     style = "bold green" if outcome.passed else "bold" if outcome.not_run else "bold red"
     terminal.say(block("export", "verdict", outcome=outcome, states=STATES), style)
     terminal.say(block("export", "files", paths=paths, seconds=time.perf_counter() - started))
@@ -120,6 +118,5 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
 
 
 def identifier(stem: str) -> str:
-    """The name of a file as an identifier."""
     name = re.sub(r"\W", "_", stem, flags=re.ASCII).strip("_")[:50]
     return name if name[:1].isalpha() and not is_word(name) else f"robot_{name}".rstrip("_")

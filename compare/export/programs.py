@@ -50,9 +50,6 @@ class Program:
     file = ""  # that is run, where there are others with the same expressions
 
     def __post_init__(self) -> None:
-        self.start()
-
-    def start(self) -> None:
         """Compile or load the text."""
 
     def values(self, quantity: str, states: States) -> list[Array]:
@@ -64,7 +61,6 @@ class Program:
         return evaluator(self.tree, quantity).operations
 
     def run(self, *command: str) -> str:
-        """The output of a command in the folder."""
         try:
             done = subprocess.run(
                 command, cwd=self.folder, stdin=subprocess.DEVNULL, capture_output=True, text=True,
@@ -94,7 +90,7 @@ def parts(quantity: str) -> int:
 class CProgram(Program):
     """Compiled with -O2, called for many states by a loop in C."""
 
-    def start(self) -> None:
+    def __post_init__(self) -> None:
         compiler = shlex.split(os.environ.get("CC", ""))
         compiler = compiler or [name for name in ("gcc", "cc", "clang") if shutil.which(name)][:1]
         if not compiler or not shutil.which(compiler[0]):
@@ -105,18 +101,15 @@ class CProgram(Program):
             raise NotRun(f"a C library cannot be made or loaded: {error}") from None
         loops = "\n".join([f'#include "{self.name}.h"', *map(self.loop, self.quantities)])
         # the header before the source: the declarations must be those of the functions
-        self.library = self.compiled(
-            compiler, "states", loops, "-include", f"{self.name}.h", f"{self.name}.c"
-        )
+        header, source = f"{self.name}.h", f"{self.name}.c"
+        self.library = self.compiled(compiler, "states", loops, "-include", header, source)
 
     def compiled(self, compiler: Sequence[str], name: str, text: str, *more: str) -> ctypes.CDLL:
-        """The library of a text and of more files."""
         (self.folder / f"_{name}.c").write_text(f"{text}\n", encoding="utf-8")
         self.run(*compiler, *FLAGS, *more, f"_{name}.c", "-o", f"_{name}.so", "-lm")
         return ctypes.CDLL(str(self.folder / f"_{name}.so"))
 
     def loop(self, quantity: str) -> str:
-        """A function for many states."""
         kind, coordinates = "float" if self.single else "double", self.tree.coordinates
         sizes = {"q": coordinates.nq, "qd": coordinates.nv, "tau": coordinates.nv}
         size = prod(shape_of(quantity, self.tree))
@@ -150,7 +143,7 @@ class CProgram(Program):
 class PythonProgram(Program):
     """A module, called with all states at once."""
 
-    def start(self) -> None:
+    def __post_init__(self) -> None:
         self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
 
     def values(self, quantity: str, states: States) -> list[Array]:
@@ -161,7 +154,7 @@ class PythonProgram(Program):
 class SymbolicProgram(Program):
     """The matrices of SymPy, as functions of states."""
 
-    def start(self) -> None:
+    def __post_init__(self) -> None:
         self.file = f"{self.name}.py"
         self.matrices = runpy.run_path(str(self.folder / self.file))
         robot = Robot("", Path(), self.tree, {}, ())
@@ -181,7 +174,7 @@ class SymbolicProgram(Program):
 class MatlabProgram(Program):
     """Run by Octave; states and values go through files of doubles."""
 
-    def start(self) -> None:
+    def __post_init__(self) -> None:
         found = [name for name in ("octave-cli", "octave") if shutil.which(name)]
         if not found:
             raise NotRun("Octave was not found")

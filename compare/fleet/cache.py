@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -11,7 +10,7 @@ from pathlib import Path
 
 from ..core.errors import ROOT, Refused
 from ..process import interrupt
-from ..report.folder import fcntl, lock, what_is_wrong  # fcntl: None on Windows
+from ..report.folder import fcntl, lock, unlock, what_is_wrong
 from ..report.provenance import installed
 from .models import unpacked
 
@@ -49,8 +48,7 @@ def locked(out: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        if held is not None:
-            os.close(held)
+        unlock(held)
 
 
 def saved(place: Path, key: str) -> object:

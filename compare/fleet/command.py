@@ -107,7 +107,7 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
             executor = Pool(1 if options.timing else options.workers or cores(), options.limit)
         try:
             run = Run(models, file_options, executor, out, sent)
-            terminal.tell(run.progress)
+            terminal.how_far = run.progress
             with terminal.progress("", PERIOD):
                 run.carry_out(lambda rows: say_rows(terminal, rows))
         finally:
@@ -115,12 +115,10 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
         changed = None if before is None else changes(before, run.rows)
         summary = write_table(out, run.rows, left_out, changed, command)
     terminal.say()
-    terminal.say(summary[0], "bold green" if run.is_good else "bold red")
-    for line in summary[1:]:
-        terminal.say(line)
+    terminal.say_lines(summary, "bold green" if run.is_good else "bold red")
     if changed is not None:
-        for line in changed or ["no changes"]:
-            terminal.say(f"since {in_one_line(options.since)}: {line}")
+        since = f"since {in_one_line(options.since)}: "
+        terminal.say_lines(since + line for line in changed or ["no changes"])
     page, seconds = in_one_line(os.path.join(options.out, "index.html")), time.perf_counter() - started
     terminal.say(f"Fleet: {page} ({seconds:.1f} s)")
     return 0 if run.is_good else 1

@@ -15,7 +15,7 @@ from concurrent.futures import Future
 from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar, cast
+from typing import Any, Generic, NamedTuple, TypeVar, cast
 
 from ..core.errors import Refused, described
 from ..process import interrupt
@@ -23,19 +23,13 @@ from ..process.workers import Beginning, WorkerEnded, Workers, kill_children
 from .cache import RESUME, program
 
 T = TypeVar("T")
+Arguments = tuple[Any, ...]
 ENVIRONMENT = {"MUJOCO_GL": "disabled", "OPENBLAS_NUM_THREADS": "1"}
 RETRIES = 3  # of a call whose process is killed by SIGKILL, as a Dask scheduler does
 SHARE = 0.9  # of the machine's memory, for all its processes together
 CONNECTING = 10.0  # s, time limit for the scheduler and its first worker to answer
 ALONE = 60.0  # s without a worker or a connection after which a fleet ends
-LOGGERS = [
-    "distributed",
-    "distributed.client",
-    "distributed.core",
-    "tornado",
-    "tornado.application",
-    "asyncio",
-]
+LOGGERS = "distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio"
 
 
 class OtherVersion(RuntimeError):
@@ -47,22 +41,6 @@ class Outcome(NamedTuple, Generic[T]):
 
     value: T | None
     why: str
-
-
-class Executor(Protocol):
-    """Who makes calls. Refused where there is nobody who could."""
-
-    workers: int  # number of calls at the same time
-
-    def submit(self, function: Callable[..., T], *arguments: Any) -> "Future[Outcome[T]]": ...
-
-    def outcome(self, future: "Future[Outcome[T]]") -> Outcome[T]:
-        """That of a call that is done."""
-
-    def check(self) -> None:
-        """Refused if there is nobody left to answer."""
-
-    def close(self) -> None: ...
 
 
 @cache
@@ -101,6 +79,7 @@ class Pool:
         return self.processes.submit(alone, function, arguments, self.folder, self.memory)
 
     def outcome(self, future: "Future[Outcome[T]]") -> Outcome[T]:
+        """That of a call that is done."""
         try:
             return future.result()
         except TimeoutError:
@@ -111,13 +90,13 @@ class Pool:
             return Outcome(None, described(error))
 
     def check(self) -> None:
-        """It is there."""
+        """Refused if there is nobody left to answer."""
 
     def close(self) -> None:
         self.processes.close(at_once=True)
 
 
-def alone(function: Callable[..., T], arguments: tuple[Any, ...], folder: str, memory: int) -> Outcome[T]:
+def alone(function: Callable[..., T], arguments: Arguments, folder: str, memory: int) -> Outcome[T]:
     """Make a call in this process, in a folder of its own. What it has started ends with it."""
     with tempfile.TemporaryDirectory(dir=folder, ignore_cleanup_errors=True) as place:
         os.chdir(place)
@@ -200,13 +179,15 @@ class Cluster:
             self.client.close(timeout=1)
 
 
-def on_worker(
-    function: Callable[..., T], arguments: tuple[Any, ...], limit: float, expected: str
-) -> Outcome[T]:
+# who makes `workers` calls at the same time; Refused where there is nobody who could
+Executor = Pool | Cluster
+
+
+def on_worker(function: Callable[..., T], arguments: Arguments, limit: float, version: str) -> Outcome[T]:
     from distributed import get_worker
 
     worker = get_worker()
-    if program() != expected:
+    if program() != version:
         raise OtherVersion(f"worker {worker.address}; all workers need the version of this machine")
     multiprocessing.current_process().daemon = False  # else a worker of Dask may not start a process
     memory = (worker.memory_manager.memory_limit or memory_of_machine()) / worker.state.nthreads

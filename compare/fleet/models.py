@@ -47,11 +47,9 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
     files: dict[str, tuple[Path, bool]] = {}  # by the real path: the same file may be found more than once
     for path, is_named in sorted(paths_of(words), key=lambda pair: (not pair[1], pair[0].is_symlink())):
         files.setdefault(os.path.realpath(path), (path, is_named))
-    kinds = {
-        file: MODEL_ELEMENTS[0] if is_named else kind_of(path) for file, (path, is_named) in files.items()
-    }
-    is_model = {file: kind in MODEL_ELEMENTS for file, kind in kinds.items()}
-    models = {file: Model(path, needed_by(path)) for file, (path, _) in files.items() if is_model[file]}
+    kinds = {file: kind_of(*path_and_named) for file, path_and_named in files.items()}
+    paths = {file: path for file, (path, _) in files.items() if kinds[file] in MODEL_ELEMENTS}
+    models = {file: Model(path, needed_by(path)) for file, path in paths.items()}
     left_out = []
     users = {os.path.realpath(part): model.shown for model in models.values() for part in model.parts[1:]}
     for file, (path, is_named) in files.items():
@@ -66,9 +64,9 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
     return sorted(models.values(), key=lambda model: model.shown), sorted(left_out)
 
 
-def kind_of(path: Path) -> str:
-    """The name of the root element; of a file that cannot be read that of MJCF: the table shows it with the reason."""
-    root = next(elements_of(path), None)
+def kind_of(path: Path, is_named: bool) -> str:
+    """The name of the root element; MJCF's of a file that is named, or cannot be read: the table shows why."""
+    root = None if is_named else next(elements_of(path), None)
     return MODEL_ELEMENTS[0] if root is None else root.tag
 
 

@@ -1,14 +1,13 @@
 """Run a fleet: submit the files whose reports are missing or old, and write the report of each as it comes."""
 
-import dataclasses
 import hashlib
 import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import NamedTuple
 
 from ..core.text import block
 from .cache import MARK, program, saved, write_whole
@@ -21,89 +20,75 @@ AHEAD = 2  # files that are submitted for each worker; they are in memory
 POLLING = 0.3  # s between two lines of progress
 
 
-class Started(NamedTuple):
-    """A file that is compared now."""
-
-    model: Model
-    key: str  # of everything that its report depends on
-    future: "Future[Outcome[Compared]]"
+Answer = Future[Outcome[Compared]]
 
 
+@dataclass
 class Run:
-    """A running fleet. After carry_out `rows` has a row for each model.
-
-    sent: the files of a solution, added to the bundle of each model; see FleetOptions.
-    """
-
-    def __init__(
-        self,
-        models: Sequence[Model],
-        options: FleetOptions,
-        executor: Executor,
-        out: Path,
-        sent: Mapping[str, bytes],
-    ):
-        self.models, self.options, self.executor, self.out, self.sent = models, options, executor, out, sent
-        self.rows: list[FileRow] = []
-        self.first: dict[object, Model] = {}  # by the content of a model and its parts
-        self.copies: list[tuple[Model, Model]] = []  # and the first model of the same content
+    models: Sequence[Model]
+    options: FleetOptions
+    executor: Executor
+    out: Path
+    sent: Mapping[str, bytes]  # the files of a solution, added to the bundle of each model; see FleetOptions
+    rows: list[FileRow] = field(default_factory=list)  # after carry_out one for each model
+    first: dict[object, Model] = field(default_factory=dict)  # by the content of a model and its parts
+    copies: list[tuple[Model, Model]] = field(default_factory=list)  # and the first model of the same content
+    under_way: dict[Answer, tuple[Model, str]] = field(default_factory=dict)  # and the keys of their reports
+    done: SimpleQueue[Answer] = field(default_factory=SimpleQueue)
 
     def carry_out(self, progress: Callable[[list[FileRow]], object]) -> None:
         """Run to the end, copies last. progress is called with the new rows, and every POLLING s."""
-        done: SimpleQueue[Future[Outcome[Compared]]] = SimpleQueue()
-        under_way: dict[Future[Outcome[Compared]], Started] = {}
-        waiting = list(self.models[::-1])
-        while waiting or under_way:
+        waiting, most = list(self.models[::-1]), AHEAD * self.executor.workers
+        while waiting or self.under_way:
             before = len(self.rows)
-            while waiting and len(under_way) < AHEAD * self.executor.workers and len(self.rows) == before:
-                if started := self.start(waiting.pop()):
-                    under_way[started.future] = started
-                    started.future.add_done_callback(done.put)
-            if under_way and len(self.rows) == before:
+            while waiting and len(self.under_way) < most and len(self.rows) == before:
+                self.start(waiting.pop())
+            if self.under_way and len(self.rows) == before:
                 try:
-                    future = done.get(timeout=POLLING)
+                    answer = self.done.get(timeout=POLLING)
                 except Empty:
                     self.executor.check()
                 else:
-                    self.receive(under_way.pop(future))
+                    self.receive(answer)
             progress(self.rows[before:])
         before, rows = len(self.rows), {row.file: row for row in self.rows}
         for model, first in self.copies:
-            row = dataclasses.replace(rows[first.shown], file=model.shown, same_as=first.shown, seconds=0.0)
+            row = replace(rows[first.shown], file=model.shown, same_as=first.shown, seconds=0.0)
             row.reason = block("fleet", "copy", file=first.shown, reason=row.reason)
             self.rows.append(row)
         progress(self.rows[before:])
 
-    def start(self, model: Model) -> Started | None:
-        """A file that is submitted; None: it is not readable, a copy, or its report is up to date."""
+    def start(self, model: Model) -> None:
+        """Submit a file, unless it is not readable, a copy, or its report is up to date."""
         try:
             files = bundle(model) | dict(self.sent)
         except OSError as error:
             reason = block("fleet", "unreadable", why=error.strerror)
             self.rows.append(FileRow(file=model.shown, verdict=REFUSED, reason=reason))
-            return None
+            return
         hashes = [(name, hashlib.sha256(content).hexdigest()) for name, content in files.items()]
         (own_name, own_hash), *others = hashes
         first = self.first.setdefault((Path(own_name).with_stem("model"), own_hash, *others), model)
         if first is not model:
             self.copies.append((model, first))
-            return None
+            return
         inputs = repr((program(), hashes, model.shown, self.options))
         key = hashlib.sha256(inputs.encode("utf-8", "backslashreplace")).hexdigest()
         if row := row_of_data(saved(self.out / place_of_report(model.shown), key)):
             self.rows.append(row)
-            return None
-        return Started(model, key, self.executor.submit(compare_file, model.shown, self.options, files))
-
-    def receive(self, started: Started) -> None:
-        """A file is done: write its report."""
-        outcome, shown = self.executor.outcome(started.future), started.model.shown
-        compared = outcome.value
-        if compared is None:
-            self.rows.append(FileRow(file=shown, verdict=BROKE, reason=outcome.why))
             return
-        mark = json.dumps((started.key, dataclasses.asdict(compared.row))).encode()
-        write_whole(self.out / place_of_report(shown), compared.report | {MARK: mark})
+        answer = self.executor.submit(compare_file, model.shown, self.options, files)
+        self.under_way[answer] = model, key
+        answer.add_done_callback(self.done.put)
+
+    def receive(self, answer: Answer) -> None:
+        """A file is done: write its report."""
+        (model, key), (compared, why) = self.under_way.pop(answer), self.executor.outcome(answer)
+        if compared is None:
+            self.rows.append(FileRow(file=model.shown, verdict=BROKE, reason=why))
+            return
+        mark = json.dumps((key, asdict(compared.row))).encode()
+        write_whole(self.out / place_of_report(model.shown), compared.report | {MARK: mark})
         self.rows.append(compared.row)
 
     def progress(self) -> list[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from io import StringIO
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import get_type_hints
 from urllib.parse import quote
 
 from markupsafe import Markup
@@ -20,7 +20,7 @@ from ..core.text import block, environment, say
 from ..core.words import in_one_line
 from ..report import files
 from ..report.provenance import OURS, commit, installed
-from ..report.verdict import Section, failures, worst
+from ..report.verdict import Report, Section, failures, worst
 from ..run.reference import Reference
 from .cache import write_whole
 from .models import place_of_report
@@ -76,7 +76,7 @@ class FileRow(Row):
         return VERDICTS.index(self.verdict), is_stable, -(self.worst_ratio or 0.0), self.file
 
 
-Cause = Mapping[str, Any]  # its text, and more
+LeftOut = Sequence[tuple[str, str]]  # files that are no models, and why
 FIELDS = get_type_hints(FileRow)
 FLEET_COLUMNS = tuple(name for name in FileRow(file="", verdict="").columns() if name != "has_report")
 
@@ -89,24 +89,19 @@ def row_of_data(data: object) -> FileRow | None:
     return FileRow(**data) if are_right else None
 
 
-def judge(
-    row: FileRow,
-    sections: Sequence[Section],
-    causes: Sequence[Cause],
-    lost: Sequence[str],
-    reference: Reference,
-) -> None:
+def judge(row: FileRow, report: Report, lost: Sequence[str], reference: Reference) -> None:
     """Set verdict and reason of a row, largest share of a tolerance, and step. lost: parts of the report that broke off.
 
     An unstable step of the file and joints that are matched by other names do not change the verdict; the reason names them.
     """
+    sections = report.sections
     failed, top = failures(sections), worst(sections)
     unfinished = [*(f"{check.experiment}: {check.note}" for check in failed.broke), *lost]
     checks = [check for section in sections for check in section.result.checks]
     reasons: list[str] = []
     if failed.differing:
         row.verdict = DIFFER
-        names = [cause["text"] for cause in causes] or [str(failed.differing[0])]
+        names = [cause.text for cause in report.causes] or [str(failed.differing[0])]
         reasons.append(block("fleet", "first_of", reasons=names))
     elif unfinished:
         row.verdict = BROKE
@@ -128,11 +123,10 @@ def judge(
 
 def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
     """Whether the file's step is stable in its runs and with its own servos, None if unknown; the smallest limit, s."""
-    tables = [section.result.tables for section in sections]
-    limits = [row for of_section in tables for row in of_section.get("step_limits", ())]
+    limits = [row for section in sections for row in section.result.tables.get("step_limits", ())]
     own = [row for row in limits if row.integrator == row.file_integrator]
     stable = [row.stable_at_file_dt for row in own if row.stable_at_file_dt is not None]
-    runs = [row for of_section in tables for row in of_section.get("own_run", ())]
+    runs = [row for section in sections for row in section.result.tables.get("own_run", ())]
     stable += [row.outcome in ("calm", "alike") for row in runs]
     finite = [row.predicted_dt for row in own if row.limit == "finite"]
     return (all(stable) if stable else None), min(finite, default=None)
@@ -140,7 +134,7 @@ def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
 
 def table_of(rows: Sequence[FileRow]) -> str:
     """fleet.csv."""
-    return files.csv([row.record() for row in rows], FLEET_COLUMNS)
+    return files.csv(rows, FLEET_COLUMNS)
 
 
 def earlier(folder: str) -> dict[str, dict[str, str]]:
@@ -154,7 +148,6 @@ def earlier(folder: str) -> dict[str, dict[str, str]]:
 
 
 def by_file(table: str) -> dict[str, dict[str, str]]:
-    """The columns COMPARED by file name, as text."""
     return {row["file"]: {name: row[name] for name in COMPARED} for row in csv.DictReader(StringIO(table))}
 
 
@@ -178,24 +171,15 @@ def is_change(old: str, new: str) -> bool:
 
 
 def write_table(
-    out: Path,
-    rows: Sequence[FileRow],
-    left_out: Sequence[tuple[str, str]],
-    changed: Sequence[str] | None,
-    command: str,
+    out: Path, rows: Sequence[FileRow], left_out: LeftOut, changed: Sequence[str] | None, command: str
 ) -> list[str]:
     """Write fleet.csv and index.html; the lines of the summary. changed: lines of --since, None: without it."""
     rows = sorted(rows, key=lambda row: row.order)
-    numbers = Counter(row.verdict for row in rows)
-    text = block(
-        "fleet",
-        "summary",
-        numbers={verdict: numbers[verdict] for verdict in VERDICTS if numbers[verdict]},
-        copies=sum(row.same_as is not None for row in rows),
-        unstable=[row.file for row in rows if row.stable_at_file_dt is False],
-        left_out=left_out,
-    )
-    summary = [line for line in text.split("\n") if line]
+    numbers = dict(Counter(row.verdict for row in rows))  # in the order of VERDICTS
+    copies = sum(row.same_as is not None for row in rows)
+    unstable = [row.file for row in rows if row.stable_at_file_dt is False]
+    about = {"numbers": numbers, "copies": copies, "unstable": unstable, "left_out": left_out}
+    summary = [line for line in block("fleet", "summary", **about).split("\n") if line]
     origin = {"command": command, "date": datetime.now(UTC).isoformat(timespec="seconds"), "commit": commit()}
     origin |= {OURS: installed(OURS), "mujoco": installed("mujoco")}
     page = fleet_page(rows, summary=summary, left_out=left_out, changed=changed, origin=origin)

@@ -74,9 +74,9 @@ def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) ->
         examined = experiment.examine(names, setup, out, Terminal(), workers, Clock())
     origin = provenance.provenance(options.command(shown), compared.robot.mjcf, shown, SEED)
     origin["seconds"] = round(time.process_time() - began, 1)
-    report, parts = write_report(out, examined, list(reasons.items()), origin, compared)
+    report, parts = write_report(out, examined, reasons, origin, compared)
     written = {name: (out / name).read_bytes() for name in folder.files(out)}
     shutil.rmtree(top)
-    judge(row, report.sections, report.causes, parts.lines, compared.reference)
+    judge(row, report, parts.lines, compared.reference)
     row.seconds, row.has_report = round(time.process_time() - began, 2), True
     return Compared(row, written)

@@ -18,7 +18,6 @@ from typing import NoReturn
 
 from ..core.errors import how_ended
 
-CAN_BLOCK = hasattr(signal, "pthread_sigmask")
 undo: list[Callable[[], object]] = []  # functions to call before the process ends, last first
 postponed = threading.RLock()  # held while an interrupt has to wait, and while the run ends
 PARENT = int(os.environ.pop("COMPARE_PARENT", 0))  # the process that waits for this one, see status_of_child
@@ -38,13 +37,12 @@ def listen() -> None:
     Now.listening = True
     if PARENT:
         threading.Thread(target=end_with_parent, daemon=True).start()
-    if not CAN_BLOCK:
+    if not hasattr(signal, "pthread_sigmask"):
         for number in numbers:  # a thread: the main one may be in a block that postpones interrupts
             signal.signal(number, lambda *_: threading.Thread(target=end, daemon=True).start())
     elif numbers:
-        before = signal.signal(
-            signal.SIGHUP, signal.SIG_IGN
-        )  # the tracker inherits this: it outlives the run
+        # the tracker inherits this: it outlives the run
+        before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
         resource_tracker.ensure_running()  # unblocks signals where it starts
         signal.signal(signal.SIGHUP, before)
         signal.pthread_sigmask(signal.SIG_BLOCK, numbers)

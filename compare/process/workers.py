@@ -17,7 +17,7 @@ from functools import partial
 from multiprocessing import active_children, parent_process
 from multiprocessing import context as contexts
 from multiprocessing.process import BaseProcess
-from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar
 
 from pebble import ProcessExpired, ProcessPool
 
@@ -31,6 +31,7 @@ except ImportError:  # Windows: no memory limit
 
 P = ParamSpec("P")
 T = TypeVar("T")
+Answer = tuple[Any, BaseException | None, float]  # what a call has returned or raised, its processor time, s
 KILLED, UNEXPECTED = -9, 256  # exit codes: after SIGKILL; of a lasting process that ends with the status 0
 LONGEST_PATH = 70  # bytes, of the folder of the forkserver's socket, whose whole path may have 107
 
@@ -139,21 +140,6 @@ if sys.platform != "win32":
         """A process that makes one call, forked from one that has loaded what the call needs."""
 
 
-class Context(contexts.SpawnContext):
-    """How processes are started."""
-
-    def __init__(self, kind: type[BaseProcess]):
-        self.Process = kind  # type: ignore[assignment,misc]  # a class of processes, which Pebble starts
-
-
-class Answer(NamedTuple):
-    """What a call has returned or raised, and its processor time, s."""
-
-    value: Any
-    error: BaseException | None
-    seconds: float
-
-
 @dataclass
 class Call(Generic[T]):
     """A call of workers. Its future has the answer, however often it is tried."""
@@ -164,23 +150,19 @@ class Call(Generic[T]):
     tries: int = 0
 
 
+@dataclass(eq=False)
 class Workers:
-    """Processes that make calls at the same time; one that ends, or takes too long, is replaced.
+    """Processes that make calls at the same time; one that ends, or takes too long, is replaced."""
 
-    limit: s for a call. retries: how often a call is made again whose process is killed by SIGKILL (no memory, an operator), of
-    which it may not be the cause. is_fresh: each call has a process of its own. The clock has the processor times of the calls.
-    """
+    count: int
+    beginning: Beginning
+    limit: float | None = None  # s for a call
+    retries: int = 0  # of a call whose process is killed by SIGKILL (no memory, an operator)
+    is_fresh: bool = False  # each call has a process of its own
+    clock: Clock = field(default_factory=Clock)  # of the calls
+    pending: set["Future[Any]"] = field(default_factory=set)
 
-    def __init__(
-        self,
-        count: int,
-        beginning: Beginning,
-        limit: float | None = None,
-        retries: int = 0,
-        is_fresh: bool = False,
-    ):
-        self.count, self.beginning, self.limit, self.retries = count, beginning, limit, retries
-        self.is_fresh, self.clock, self.pending = is_fresh, Clock(), set[Future[Any]]()
+    def __post_init__(self) -> None:
         self.pool = self.new_pool()
         interrupt.undo.append(kill_children)
 
@@ -189,7 +171,9 @@ class Workers:
         kind: type[BaseProcess] = contexts.SpawnProcess if self.is_fresh else Lasting
         if self.is_fresh and hasattr(os, "fork") and len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PATH:
             kind = Forked
-        return ProcessPool(self.count, int(self.is_fresh), self.beginning.begin, context=Context(kind))
+        context = contexts.SpawnContext()
+        context.Process = kind  # type: ignore[assignment,misc]  # a class of processes, which Pebble starts
+        return ProcessPool(self.count, int(self.is_fresh), self.beginning.begin, context=context)
 
     def submit(self, function: Callable[P, T], /, *arguments: P.args, **named: P.kwargs) -> "Future[T]":
         """The future of a call, which raises what the function raises, TimeoutError after the time limit, or WorkerEnded."""
@@ -274,4 +258,4 @@ def timed(function: Callable[[], Any]) -> Answer:
     except BaseException as error:
         error.place = place(error)  # type: ignore[attr-defined]  # it is sent without its traceback
         raised = error
-    return Answer(value, raised, time.process_time() - began)
+    return value, raised, time.process_time() - began

@@ -28,15 +28,15 @@ FIRST_NOTES = 3  # of a section of the page, which folds the others
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
 MAIN_TABLES = {"what_should_i_use": "What should I use?"}  # further tables of report.md, with their titles
+# macros of a picture of the first screen: overview_title, overview_alternative
+WORDS = "title", "alternative"
 # columns of failing checks
 ON_FIRST_SCREEN = "experiment", "scene", "quantity", "value", "tolerance", "note"
 JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
 
 
 class Picture(NamedTuple):
-    """A picture of the first screen."""
-
-    figure: Figure
+    figure: Figure  # of the first screen
     link: str  # to a figure, or to a section
     title: str
     alternative: str
@@ -75,8 +75,7 @@ class Document:
         report = self.report
         texts = [self.made("the first screen", self.first_screen)]
         if self.page:
-            what = "the motion in index.html"
-            self.motion = self.parts.attempt(what, "", motion_in_html, report.sections, report.robot.noun)
+            self.motion = self.made("the motion", motion_in_html, report.sections, report.robot.noun)
             texts.append(self.motion)
         texts.append(self.made("the introduction", self.introduction))
         if report.causes:
@@ -85,13 +84,12 @@ class Document:
             texts.append(self.template.questions(self.answers))
         for section in report.sections:
             missing = self.template.missing(section.name, section.title)
-            what = f"{section.name} in {self.file}"
-            texts.append(self.parts.attempt(what, missing, self.section, section))
+            texts.append(self.made(section.name, self.section, section, otherwise=missing))
         texts.append(self.template.skipped(report.skipped) if report.skipped else "")
         return [*texts, self.template.provenance(tables.of_origin(report.origin))]
 
-    def made(self, name: str, make: Callable[[], str]) -> str:
-        return self.parts.attempt(f"{name} in {self.file}", "", make)
+    def made(self, name: str, make: Callable[..., str], *arguments: Any, otherwise: str = "") -> str:
+        return self.parts.attempt(f"{name} in {self.file}", otherwise, make, *arguments)
 
     def text(self, body: Sequence[str]) -> str:
         """The whole document, with what could not be made of it."""
@@ -126,24 +124,23 @@ class Document:
         return self.template.first_screen(report.sections, report.skipped, pictures, failing)
 
     def pictures(self) -> list[Picture]:
-        """The pictures, those in which something fails first, each with the anchor of its figure.
-
-        If none of them shows a failure, a figure of the first failing experiment comes first.
-        """
+        """The pictures, those in which something fails first; a figure of what fails, if none shows it."""
         sections, pictures = self.report.sections, list[Picture]()
         wrong = [section for section in sections if any(failures([section]))]
         for section in sections:
             group = [other for other in sections if other.record.overview == section.record.overview]
             fails = any(other in wrong for other in group)
-            title, alternative = "overview_title", "overview_alternative"
             for figure in section.figures:
                 if figure.is_overview:
-                    words = block(section.name, title), block(section.name, alternative)
-                    pictures.append(Picture(figure, link_to(group), *words, fails))
+                    title, alternative = (block(section.name, f"overview_{part}") for part in WORDS)
+                    pictures.append(Picture(figure, link_to(group), title, alternative, fails))
         if not self.page:
             return pictures
-        if not any(picture.fails for picture in pictures):
-            pictures += [picture for section in wrong for picture in picture_of_failure(section)][:1]
+        failing = [(section, figure) for section in wrong for figure in linked([section])]
+        if failing and not any(picture.fails for picture in pictures):
+            section, figure = failing[0]
+            without_caption = figure._replace(caption="")
+            pictures.append(Picture(without_caption, link_to([section]), section.title, figure.caption, True))
         return sorted(pictures, key=lambda picture: not picture.fails)
 
     def introduction(self) -> str:
@@ -152,7 +149,6 @@ class Document:
         return " ".join(text.split())
 
     def section(self, section: Section) -> str:
-        """One experiment: what was found, figures, tolerance, and the details."""
         checks, few = section.result.checks, MOST_ROWS if self.page else MOST_IN_MARKDOWN
         failed = [check for check in section.failed if check not in section.explained]
         not_judged = [check for check in checks if not check.judged]
@@ -160,7 +156,9 @@ class Document:
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
         first = [figure for figure in figures if figure in first or figure.is_main]
         lists = {"failing": listing(failed, few), "not_judged": listing(not_judged, few)}
-        lists |= {"explained": listing(section.explained, MOST_ROWS), "all": closest(checks)}
+        lists["explained"] = listing(section.explained, MOST_ROWS)
+        of_all = tables.of_checks(tables.closest(checks, MOST_ROWS), tables.CHECK[1:])
+        lists["all"] = Listing(len(checks), of_all)  # those that fail or come closest to their tolerances
         of_section = [self.table(section, name, rows) for name, rows in section.tables.items()]
         folded = [figure for figure in figures if figure not in first]
         return self.template.section(section, lists, of_section, first, folded)
@@ -180,34 +178,19 @@ def listing(checks: Sequence[Check], most: int, columns: Sequence[str] = tables.
     return Listing(len(checks), tables.of_checks(checks[:most], columns))
 
 
-def closest(checks: Sequence[Check]) -> Listing:
-    """All checks, with those that fail or come closest to their tolerances."""
-    return Listing(len(checks), tables.of_checks(tables.closest(checks, MOST_ROWS), tables.CHECK[1:]))
-
-
 def still_figures(sections: Sequence[Section]) -> list[Figure]:
     return [figure for section in sections for figure in section.own_figures if not figure.moves]
 
 
-def linked(sections: Sequence[Section]) -> Figure | None:
-    """The figure behind a picture: of distances or limits, else the first."""
-    figures = sorted(still_figures(sections), key=lambda figure: not figure.is_main)
-    return figures[0] if figures else None
-
-
-def picture_of_failure(section: Section) -> list[Picture]:
-    """A figure of a failing section as a picture of the first screen; none if it has no figure."""
-    figure = linked([section])
-    if figure is None:
-        return []
-    without_caption = figure._replace(caption="")
-    return [Picture(without_caption, link_to([section]), section.title, figure.caption, True)]
+def linked(sections: Sequence[Section]) -> list[Figure]:
+    """The figures behind a picture: first those of distances or limits."""
+    return sorted(still_figures(sections), key=lambda figure: not figure.is_main)
 
 
 def link_to(sections: Sequence[Section]) -> str:
     """The anchor of the figure behind a picture, or of the last section."""
-    figure = linked(sections)
-    return f"figure-{figure.file}" if figure else sections[-1].name
+    figures = linked(sections)
+    return f"figure-{figures[0].file}" if figures else sections[-1].name
 
 
 def joints_of(robot: Robot) -> list[str]:

@@ -10,30 +10,26 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..core.rows import Row
+from ..core.rows import Row, columns_of
 from ..core.text import escaped
 from .document import Document, joined
 from .folder import files, save
 from .verdict import Parts, Report, passed
 
 COMPUTED = "=", "+", "-", "@", "\t", "\r"  # how the texts begin that a spreadsheet would compute
-OF_CAUSES = "rank", "place", "stated", "found", "text"
 
 
 def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
-    """Write all files of a report, beside its figures; what could not be made of it.
-
-    A part that breaks is left out and named in all files; the others are written.
-    """
+    """Write all files of a report, beside its figures; the parts that break are left out, and named in all files."""
     parts = Parts() if parts is None else parts
     (folder / "tables").mkdir()
     for section in report.sections:
         for name, rows in section.tables.items():
-            text = parts.attempt(f"tables/{name}.csv", "", csv_of_rows, rows)
+            text = parts.attempt(f"tables/{name}.csv", "", csv, rows)
             if text:
                 save(folder / "tables" / f"{name}.csv", text)
     made = [check.record() for section in report.sections for check in section.result.checks]
-    found = [{name: cause[name] for name in OF_CAUSES} for cause in report.causes]
+    found = [cause.record() for cause in report.causes]
     checks, causes = (records(parts, *named) for named in (("check", made), ("cause", found)))
     documents = Document(report, parts), Document(report, parts, folder)
     bodies: list[list[str]] = [parts.attempt(document.file, [], document.body) for document in documents]
@@ -64,15 +60,11 @@ def records(parts: Parts, name: str, found: Sequence[Mapping[str, Any]]) -> list
     return written
 
 
-def csv_of_rows(rows: Sequence[Row]) -> str:
-    return csv([row.record() for row in rows])
-
-
-def csv(records: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> str:
+def csv(rows: Sequence[Row], columns: Sequence[str] = ()) -> str:
     """A table with these or all columns: true and false in lower case, nothing for what is no number."""
-    names = columns or dict.fromkeys(name for record in records for name in record)
-    cells = [{name: cell(value) for name, value in record.items()} for record in records]
-    return pd.DataFrame(cells, columns=list(names), dtype=object).to_csv(index=False, lineterminator="\n")
+    cells = [{name: cell(value) for name, value in row.record().items()} for row in rows]
+    table = pd.DataFrame(cells, columns=list(columns or columns_of(rows)), dtype=object)
+    return table.to_csv(index=False, lineterminator="\n")
 
 
 def cell(value: Any) -> Any:

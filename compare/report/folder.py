@@ -12,12 +12,12 @@ import re
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
+from ..core.errors import Refused
 from ..process import interrupt
 
 fcntl: ModuleType | None
@@ -31,15 +31,11 @@ STAGES = ("new", "old", "moving", "done")
 TRIES = 20
 
 
-class FolderError(ValueError):
-    """A folder that cannot take a report; the message is one line."""
-
-
 @contextmanager
 def new_report(out: str | Path) -> Iterator[Path]:
     """An empty folder inside `out`; its files replace the old report at the end of the block.
 
-    All other files in `out` stay. If the block raises, `out` is unchanged. FolderError if `out` cannot be
+    All other files in `out` stay. If the block raises, `out` is unchanged. Refused if `out` cannot be
     written, or has files under a report's names that are not the old report's.
     """
     work = Work(Path(out))
@@ -53,15 +49,13 @@ def new_report(out: str | Path) -> Iterator[Path]:
         if not path.is_relative_to(work.new):
             raise
         path = work.out / path.relative_to(work.new)  # as the reader knows it
-        raise FolderError(f"cannot write {path}: {error.strerror}; an earlier report is unchanged") from None
+        raise Refused(f"cannot write {path}: {error.strerror}; an earlier report is unchanged") from None
     finally:
         work.remove()
         interrupt.undo.remove(work.remove)
 
 
 class Work:
-    """The folder of one run inside `out`."""
-
     def __init__(self, out: Path):
         self.out, self.path = out, out / ".new-"  # the path of the folder as soon as it is made
         self.lock: int | None = None
@@ -69,7 +63,6 @@ class Work:
 
     @property
     def new(self) -> Path:
-        """The folder of the new report."""
         return self.path / "new"
 
     def make(self) -> None:
@@ -85,7 +78,7 @@ class Work:
                 refuse_foreign(self.out)
         except OSError as error:
             why = f"{what_is_wrong(self.out, error)}; expected a writable folder"
-            raise FolderError(f"cannot write to {self.out}: {why}") from None
+            raise Refused(f"cannot write to {self.out}: {why}") from None
 
     def exchange(self) -> None:
         """Move the old report away and the new one in; on an error put everything back."""
@@ -103,7 +96,7 @@ class Work:
                 if not isinstance(error, OSError):
                     raise
                 text = f"cannot replace the report in {self.out}: {error.strerror}; the old one is unchanged"
-                raise FolderError(text) from None
+                raise Refused(text) from None
             interrupt.settle()
 
     def remove(self) -> None:
@@ -190,7 +183,6 @@ def unlock(number: int | None) -> None:
 
 
 def what_is_wrong(out: Path, error: OSError) -> str:
-    """Why a folder cannot be made."""
     for path in (*reversed(out.parents), out):
         name = "it" if path == out else str(path)
         if os.path.islink(path) and not os.path.exists(path):
@@ -210,29 +202,22 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def save(path: Path, text: str) -> None:
-    """A text file, UTF-8 wherever it is written."""
     with writing(path):
         path.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def files(folder: Path) -> list[str]:
-    """The files of a report in a folder, as relative paths."""
     paths = [path for name in OWN for path in [folder / name, *(folder / name).rglob("*")]]
     of_files = [path for path in paths if path.is_file() or path.is_symlink()]
     return sorted(path.relative_to(folder).as_posix() for path in of_files)
 
 
 def refuse_foreign(out: Path) -> None:
-    """FolderError for a file under a report's names that the report in `out` does not list as its own."""
-    own = provenance_of(out).get("files", ())
+    """Refused for a file under a report's names that the report in `out` does not list as its own."""
+    own: Sequence[str] = ()
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        own = json.loads((out / "results.json").read_text(encoding="utf-8"))["provenance"]["files"]
     for name in files(out):
         if name not in own:
             why = "which no earlier report has written; use another folder (--out)"
-            raise FolderError(f"{out} has {name}, {why}")
-
-
-def provenance_of(out: Path) -> dict[str, Any]:
-    try:
-        return dict(json.loads((out / "results.json").read_text(encoding="utf-8"))["provenance"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}
+            raise Refused(f"{out} has {name}, {why}")

@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import ROOT
 from ..core.timing import vectors
 from ..core.words import readable
 from ..process.workers import Clock
@@ -22,10 +23,7 @@ PROGRAM_FILES = [":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml"]
 
 
 def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict[str, Any]:
-    """Command, model, versions, machine, commit and seed of a run; `seconds` follow at its end.
-
-    model: the file; shown: its name in the report.
-    """
+    """Command, model (a file, shown by this name), versions, machine, commit and seed; `seconds` follow."""
     versions = {package: installed(package) for package in (*PACKAGES, *OF_ENGINES)}
     return {
         "command": readable(command),
@@ -46,33 +44,28 @@ def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict[s
 
 def durations(clock: Clock) -> dict[str, dict[str, float]]:
     """CPU seconds of each task, and when it ended, wall-clock seconds from the start."""
-    seconds = {task: clock.seconds_of(task) for task in clock.ended}
-    return {
-        "seconds_of": {task: round(time, 2) for task, time in seconds.items() if time},
-        "ended_after_s": {task: round(at, 2) for task, at in clock.ended.items()},
-    }
+    seconds = {task: round(time, 2) for task in clock.ended if (time := clock.seconds_of(task))}
+    return {"seconds_of": seconds, "ended_after_s": {task: round(at, 2) for task, at in clock.ended.items()}}
 
 
 def commit() -> str | None:
     """The commit of the program, and whether it was changed since; None outside of a repository."""
-    root = Path(__file__).resolve().parents[2]
-    if not (root / ".git").exists():
+    if not (ROOT / ".git").exists():
         return None
     try:
-        head = git(root, "rev-parse", "HEAD")
-        changed = git(root, "status", "--porcelain", "--", *PROGRAM_FILES)
+        head = git("rev-parse", "HEAD")
+        changed = git("status", "--porcelain", "--", *PROGRAM_FILES)
     except (OSError, ValueError, subprocess.CalledProcessError):
         return None
     return head + (" with uncommitted changes" if changed else "")
 
 
-def git(root: Path, *words: str) -> str:
-    run = subprocess.run(["git", "-C", root, *words], capture_output=True, check=True)
+def git(*words: str) -> str:
+    run = subprocess.run(["git", "-C", ROOT, *words], capture_output=True, check=True)
     return run.stdout.decode().strip()
 
 
 def installed(package: str) -> str | None:
-    """The version of an installed package, or None."""
     try:
         return version(package)
     except PackageNotFoundError:

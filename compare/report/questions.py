@@ -11,6 +11,7 @@ from ..robots import Robot
 from .verdict import Section
 
 COLUMNS = ["part", "question", "answered in", "answer"]
+Ran = Mapping[str, Section]  # by the names of the experiments
 
 
 def answers(sections: Sequence[Section], robot: Robot) -> pd.DataFrame | None:
@@ -21,7 +22,7 @@ def answers(sections: Sequence[Section], robot: Robot) -> pd.DataFrame | None:
     return pd.DataFrame(cells, columns=COLUMNS) if cells else None
 
 
-def answer(ran: Mapping[str, Section], kind: str, *about: Any) -> Finding:
+def answer(ran: Ran, kind: str, *about: Any) -> Finding:
     """One answer; kind, about: see robots.Question."""
     if kind == "figure":
         return Finding("questions", "figure", {"name": about[0]})
@@ -37,15 +38,13 @@ def answer(ran: Mapping[str, Section], kind: str, *about: Any) -> Finding:
     return Finding("questions", "largest", values)
 
 
-def largest(
-    ran: Mapping[str, Section], experiment: str, quantity: str, where: Mapping[str, Any]
-) -> dict[str, Any]:
+def largest(ran: Ran, experiment: str, quantity: str, where: Mapping[str, Any]) -> dict[str, Any]:
     """The largest difference in an experiment: of the rows with these values, or of this quantity."""
     about = {"experiment": experiment, "quantity": quantity}
     if experiment not in ran:
         return about | {"state": "absent"}
     where = where or {"quantity": quantity}
-    records = [row.record() for row in ran[experiment].rows]
+    records = [row.record() for row in ran[experiment].result.rows]
     rows = [record for record in records if all(record.get(key) == value for key, value in where.items())]
     if not rows or any(row["largest_difference"] is None for row in rows):
         return about | {"state": "diverged" if rows else "empty"}
@@ -56,6 +55,6 @@ def largest(
 
 def printed(section: Section, item: str) -> dict[str, Any]:
     """A printed item, with the numbers of both engines; its unit is None where there is no result."""
-    rows = [record for record in (row.record() for row in section.rows) if record["item"] == item]
+    rows = [record for record in (row.record() for row in section.result.rows) if record["item"] == item]
     values = {name: [row[name] for row in rows] for name in ("published", "tmt", "mujoco")}
     return {"item": item, "unit": rows[0]["unit"] if rows else None, **values}

@@ -22,24 +22,19 @@ PINK, SKY = "#CC79A7", "#56B4E9"
 # of joints
 DASHES: tuple[Any, ...] = "-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1))
 LINES = tuple(zip((BLUE, RED, GREEN, ORANGE, PINK, SKY), DASHES))
-STYLE: dict[Any, Any] = {
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "savefig.dpi": 150,
-}
+DPI = 150
 WIDTH = 7.5  # inches, a page
 NUMBER = re.compile(r"\$(\\mathdefault\{)?[-0-9.^{}]*(\\times10)?[-0-9.^{}]*\$")  # of an axis, as a formula
-matplotlib.rcParams.update(STYLE)
+matplotlib.rc("font", size=9)
+matplotlib.rc("axes", titlesize=9, grid=True, axisbelow=True)
+matplotlib.rc("grid", alpha=0.3)
+matplotlib.rc("legend", frameon=False)
+matplotlib.rc("savefig", dpi=DPI)
 # names that leave no room for what is drawn
 warnings.filterwarnings("ignore", "constrained_layout not applied")
 
 
 def joint_lines(robot: Robot) -> dict[str, Line]:
-    """Colour and dash of each joint's line, by its name."""
     return {name: LINES[k % len(LINES)] for k, name in enumerate(robot.joints)}
 
 
@@ -57,13 +52,10 @@ def zero_at_the_end(axis: Axis, end: float, far: float, most: int) -> None:
 
 
 def pixels(figure: Figure) -> np.ndarray:
-    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more.
-
-    A text with a $ is no formula, unless it is a number of an axis.
-    """
+    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more."""
     for text in figure.findobj(Text):
         text.set_parse_math("$" not in text.get_text() or NUMBER.fullmatch(text.get_text()) is not None)
-    figure.set_dpi(STYLE["savefig.dpi"])
+    figure.set_dpi(DPI)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())

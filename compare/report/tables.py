@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 
 import pandas as pd
 
+from ..core.cause import Cause
 from ..core.check import Check
 from ..core.rows import Column, Row, columns_of
 
@@ -44,8 +45,8 @@ def of_rows(rows: Sequence[Row], shown: Sequence[str] | None = None) -> pd.DataF
     return of_records([row.record() for row in rows], columns)
 
 
-def of_causes(causes: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    return of_records(causes, CAUSE).rename(columns={"text": "cause"})
+def of_causes(causes: Sequence[Cause]) -> pd.DataFrame:
+    return of_records([cause.record() for cause in causes], CAUSE).rename(columns={"text": "cause"})
 
 
 def of_checks(checks: Sequence[Check], columns: Sequence[str] = CHECK) -> pd.DataFrame:
@@ -72,7 +73,6 @@ def first(items: Sequence[Item], most: int, key: Callable[[Item], Any]) -> list[
 
 
 def of_origin(origin: Mapping[str, Any]) -> pd.DataFrame:
-    """The provenance: what, and its value."""
     rows = [[IN_WORDS.get(name, name), in_one_cell(value)] for name, value in origin.items()]
     return pd.DataFrame(rows, columns=["what", "value"])
 

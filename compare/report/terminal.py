@@ -5,7 +5,7 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from textwrap import TextWrapper
 from typing import IO, cast
@@ -29,7 +29,7 @@ class Terminal:
         self.lines, self.screen = console(self.out), console(self.err)
         self.status: Status | None = None
         self.text = ""
-        self.how_far: Callable[[], list[str]] = list
+        self.how_far: Callable[[], list[str]] = list  # count, name: before the text; asked at every moment
 
     def say(self, text: str = "", style: str = "") -> None:
         """Print a line; on a narrower terminal without wide gaps if it fits then, else wrapped."""
@@ -40,15 +40,22 @@ class Terminal:
             wrapped = TextWrapper(max(columns, 20), break_long_words=False, break_on_hyphens=False)
             wrapped.subsequent_indent = f"{indent}  "
             text = narrow if len(narrow) <= columns else wrapped.fill(text)
-        with self.paused():
+        if self.status:
+            self.status.stop()
+        try:
             self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
+        finally:
+            if self.status:
+                self.status.start()
+
+    def say_lines(self, lines: Iterable[str], style: str = "") -> None:
+        """Print lines, the first one in this style."""
+        for line in lines:
+            self.say(line, style)
+            style = ""
 
     def show(self, text: str) -> None:
         self.text = text
-
-    def tell(self, how_far: Callable[[], list[str]]) -> None:
-        """Show how far the run is (count, name) before the current text; called again at every moment."""
-        self.how_far = how_far
 
     @contextmanager
     def progress(self, text: str, period: float = 25.0) -> Iterator[None]:
@@ -88,16 +95,6 @@ class Terminal:
 
     def __rich__(self) -> Text:
         return Text(self.line(), no_wrap=True)
-
-    @contextmanager
-    def paused(self) -> Iterator[None]:
-        if self.status:
-            self.status.stop()
-        try:
-            yield
-        finally:
-            if self.status:
-                self.status.start()
 
 
 def console(stream: Stream) -> Console:

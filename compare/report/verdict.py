@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
+from ..core.cause import Cause
 from ..core.check import About, Check, Result
 from ..core.errors import described
 from ..core.experiment import Experiment
@@ -15,7 +16,6 @@ from ..core.words import capital
 from ..robots import Robot
 
 Value = TypeVar("Value")
-Causes = Sequence[Mapping[str, Any]]
 UNKNOWN = Experiment()
 OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
 
@@ -63,10 +63,6 @@ class Section:
         return [say(note) for note in self.result.notes]
 
     @property
-    def rows(self) -> list[Row]:
-        return self.result.rows
-
-    @property
     def tables(self) -> dict[str, list[Row]]:
         """Its tables that have rows, by their names; its own first."""
         tables = {self.name: self.result.rows} | self.result.tables
@@ -85,12 +81,15 @@ class Section:
         return [figure for figure in self.figures if not figure.is_overview]
 
 
+Sections = Sequence[Section]
+
+
 class Report(NamedTuple):
-    sections: Sequence[Section]
+    sections: Sections
     robot: Robot
     origin: dict[str, Any]  # see provenance
     verdict: str  # in words, a sentence in each line
-    causes: Causes = ()  # of the failures, lowest rank first
+    causes: Sequence[Cause] = ()  # of the failures, lowest rank first
     skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
     reference: Mapping[str, str] | None = None  # kind and name of what MuJoCo is compared with
     first_lines: Sequence[str] = ()  # what is said of it
@@ -122,7 +121,7 @@ class Failures(NamedTuple):
     not_judged: list[Check]
 
 
-def failures(sections: Sequence[Section]) -> Failures:
+def failures(sections: Sections) -> Failures:
     """The checks that fail, by their kinds, and those that were not judged."""
     checks = [check for section in sections for check in section.result.checks]
     kinds = About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION, About.ENGINE
@@ -130,12 +129,12 @@ def failures(sections: Sequence[Section]) -> Failures:
     return Failures._make([*failed, [check for check in checks if not check.judged]])
 
 
-def passed(sections: Sequence[Section]) -> bool:
+def passed(sections: Sections) -> bool:
     """Whether something was compared, no check fails, and all were judged."""
     return any(section.judged for section in sections) and not any(failures(sections))
 
 
-def worst(sections: Sequence[Section]) -> Check | None:
+def worst(sections: Sections) -> Check | None:
     """The check that uses most of a tolerance of rounding, or None."""
     checks = [check for section in sections for check in section.result.checks]
     of_rounding = [check for check in checks if check.over_tolerance is not None]
@@ -143,7 +142,7 @@ def worst(sections: Sequence[Section]) -> Check | None:
 
 
 def verdict(
-    sections: Sequence[Section], experiments: int, causes: Causes = (), subject: str = "", robot: str = ""
+    sections: Sections, experiments: int, causes: Sequence[Cause] = (), subject: str = "", robot: str = ""
 ) -> str:
     """The outcome, a sentence in each line, with its cause or its largest share of a tolerance.
 

@@ -3,7 +3,6 @@
 import argparse
 import os
 import time
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +15,7 @@ from ..engines.own.own_file import OwnFileError
 from ..experiments import EXPERIMENTS, skipped
 from ..process.streams import say_error
 from ..process.workers import WorkerEnded, load_modules, start_workers
-from ..report.folder import FolderError, new_report
+from ..report.folder import new_report
 from ..report.terminal import Terminal
 from ..robots.case import SEED
 from ..robots.scene_file import SceneError, read_scenes
@@ -28,7 +27,6 @@ if TYPE_CHECKING:  # they take long to load
     from .examine import Examined
 
 Written = tuple["Report", "Parts"]
-Reasons = Sequence[tuple[str, str]]  # experiments, and why they are skipped
 COMPUTING = "compare.run.examine", "tmt.compiled.machine"  # modules that take long to load
 DRAWING = "compare.report.style", *COMPUTING
 
@@ -46,20 +44,16 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             raise Refused(block("run", "does_not_apply", **about))
         with new_report(options.out) as folder:
             report, parts = compute(options, command, compared, folder, terminal)
-    except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded) as error:
+    except (ModelError, OwnFileError, SceneError, WorkerEnded) as error:
         raise Refused(error) from None
     good = report.passed and not parts.broken
     terminal.say()
-    first, *more = report.verdict.split("\n")
-    terminal.say(first, "bold green" if good else "bold red")
-    for line in more:
-        terminal.say(line)
+    terminal.say_lines(report.verdict.split("\n"), "bold green" if good else "bold red")
     for line in parts.lines:
         say_error(line)
     path, seconds = os.path.join(options.out, "index.html"), time.perf_counter() - started
     terminal.say(block("run", "report", path=path, seconds=seconds))
-    for line in report.answer if is_alone else ():
-        terminal.say(line)
+    terminal.say_lines(report.answer if is_alone else ())
     return 0 if good else 1
 
 
@@ -69,8 +63,7 @@ def compute(
     """Run the experiments and write the report to a folder; see write_report."""
     is_alone, robot, started = options.experiment != "all", compared.robot, time.perf_counter()
     step = compared.integrator_step(options.dt, options.integrator)
-    for line in compared.reference.lines:
-        terminal.say(line)
+    terminal.say_lines(compared.reference.lines)
     if robot.coordinates.nv > MOST_SPEEDS:
         terminal.say(say(Finding("shared", "large", {"speeds": robot.coordinates.nv, "most": MOST_SPEEDS})))
     names = [options.experiment] if is_alone else list(EXPERIMENTS)
@@ -87,19 +80,16 @@ def compute(
         setup = examine.setup_of(compared, options.quick, alone=is_alone, step=step, **more)
         for name, said in reasons.items():
             terminal.say(block("run", "skipped", name=name, reason=said))
-        terminal.tell(partial(examine.progress, workers.clock, names))
+        terminal.how_far = partial(examine.progress, workers.clock, names)
         examined = examine.examine(names, setup, folder, terminal, workers, workers.clock)
     origin |= {"seconds": round(time.perf_counter() - started, 1)} | durations(workers.clock)
-    return write_report(folder, examined, list(reasons.items()), origin, compared)
+    return write_report(folder, examined, reasons, origin, compared)
 
 
 def write_report(
-    folder: Path, examined: "Examined", skipped: Reasons, origin: dict[str, Any], compared: Compared
+    folder: Path, examined: "Examined", skipped: dict[str, str], origin: dict[str, Any], compared: Compared
 ) -> Written:
-    """Write a report with its verdict to a folder that has its figures; what could not be made of it.
-
-    skipped, origin: see Report.
-    """
+    """Write a report with its verdict to a folder that has its figures; what could not be made of it."""
     from ..report import files, verdict
 
     parts, (reference, robot, *_) = verdict.Parts(), compared
@@ -107,6 +97,6 @@ def write_report(
     count, subject = len(EXPERIMENTS) - len(needless), block("run", "subject", kind=reference.kind)
     about = sections, count, causes, subject, robot.name
     words = parts.attempt("the verdict", "No verdict.", verdict.verdict, *about)
-    left_out, named = [*skipped, *needless.items()], {"kind": reference.kind, "name": reference.name}
+    left_out, named = list((skipped | needless).items()), {"kind": reference.kind, "name": reference.name}
     report = verdict.Report(sections, robot, origin, words, causes, left_out, named, reference.lines)
     return report, files.write(folder, report, parts)

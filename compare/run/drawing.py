@@ -1,6 +1,6 @@
 """Figures on disk, drawn in another process than the one that computes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import chain, islice
 from pathlib import Path
 
@@ -14,11 +14,9 @@ from ..report.folder import writing
 from ..report.verdict import Figure, Section
 from ..robots import Robot
 
-Results = Mapping[str, Result]
-
 
 def draw(
-    experiment: str, result: Result, robot: Robot, folder: Path, others: Results, few: bool = False
+    experiment: str, result: Result, robot: Robot, folder: Path, others: dict[str, Result], few: bool = False
 ) -> list[Figure]:
     """The figures of an experiment on disk.
 
@@ -44,10 +42,7 @@ def draw(
 
 
 def results_needed(experiment: str, names: Sequence[str], sections: Sequence[Section]) -> dict[str, Result]:
-    """The results, rows alone, for the picture of the first screen, if this is the last of its experiments.
-
-    names: of the experiments that run, in their order; sections: of those that are done.
-    """
+    """The results, rows alone, for the picture of the first screen, if this is the last of its experiments."""
     picture = picture_of(experiment)
     needed = [name for name in names if picture and picture_of(name) == picture]
     if needed[-1:] != [experiment]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
+from ..core.cause import Cause
 from ..core.check import ENDS, About, Result
 from ..core.errors import described
 from ..core.finding import Finding
@@ -23,7 +24,6 @@ from .explained import explained
 from .reference import Compared
 
 Value = TypeVar("Value")
-Cause = dict[str, Any]
 START, END = "start", "figures"  # tasks of the clock: before the first experiment, and after the last
 DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers on which Mbar and h depend, by their names in `parameters`
@@ -98,7 +98,6 @@ class Run:
         return Examined(sections, self.causes, needless)
 
     def begin(self) -> None:
-        """Start the long work of the experiments."""
         for name in self.names:
             begin = functions(name).begin
             if begin and not self.is_large:
@@ -130,8 +129,7 @@ class Run:
             self.sections.append(section)
             if self.setup.own:
                 add_problems(section.result, self.setup.own.equations.problems, self.told)
-            found = new_causes(self.setup, self.sections, self.causes)
-            new = [{"experiment": name, **cause} for cause in found]
+            new = new_causes(self.setup, self.sections, self.causes)
             self.causes = new + self.causes
             if self.causes:
                 section.explained = self.attempt("explained", explained, self.setup, section) or []
@@ -177,7 +175,6 @@ class Run:
 
 
 def section_with(name: str, result: Result, robot: Robot) -> Section:
-    """The section of an experiment with this result."""
     experiment = functions(name)
     result.headline = result.headline or experiment.headline(result)
     of_robot = {"robot": robot, "values": experiment.claim_values(robot)}
@@ -187,10 +184,7 @@ def section_with(name: str, result: Result, robot: Robot) -> Section:
 
 
 def add_problems(result: Result, problems: Sequence[Problem], told: set[int]) -> None:
-    """Add a failed check for each problem of the user's own equations, before the other checks.
-
-    told: the numbers of problems that need not be told again.
-    """
+    """Add a failed check for each problem of a user's own equations that is not told, before the others."""
     others, result.checks = result.checks, []
     asked = EXPERIMENTS.get(result.experiment, Experiment(0)).asks_of_own
     for number, problem in enumerate(problems):
@@ -219,24 +213,21 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[Cause]
     is_first = failed[-1] in DIAGNOSED and not any(name in DIAGNOSED for name in failed[:-1])
     if not (not known if failed[-1] == "diagnosis" else is_first):
         return of_numbers
-    diagnosis, places = module("diagnosis"), [cause["place"] for cause in known]
-    found, _ = attempt("diagnosis", setup.robot, diagnosis.diagnosed, setup)
+    places = [cause.place for cause in known]
+    found, _ = attempt("diagnosis", setup.robot, module("diagnosis").diagnosed, setup)
     causes = [cause for cause in found.causes if cause.place not in places] if found else []
-    return [cause.record() for cause in causes] + of_numbers
+    return causes + of_numbers
 
 
-def in_one(setup: Setup, of_numbers: Sequence[Cause]) -> list[Cause]:
+def in_one(setup: Setup, of_numbers: list[Cause]) -> list[Cause]:
     """The causes; one option, convention, number or error of two replaces the numbers that it explains."""
-    replaced = [cause["quantity"] for cause in of_numbers if cause["quantity"] in IN_EQUATIONS]
+    replaced = [cause for cause in of_numbers if cause.quantity in IN_EQUATIONS]
     if len(replaced) < 2:
-        return list(of_numbers)
-    diagnosis = module("diagnosis")
-    found, _ = attempt("diagnosis", setup.robot, diagnosis.diagnosed, setup)
+        return of_numbers
+    found, _ = attempt("diagnosis", setup.robot, module("diagnosis").diagnosed, setup)
     explaining = [cause for cause in found.diagnosis.causes if cause.rank < 3] if found else []
-    if not explaining:
-        return list(of_numbers)
-    first = explaining[0].record() | {"quantity": min(replaced, key=IN_EQUATIONS.index)}
-    return [first, *(cause for cause in of_numbers if cause["quantity"] not in IN_EQUATIONS)]
+    others = [cause for cause in of_numbers if cause not in replaced]
+    return [explaining[0], *others] if explaining else of_numbers
 
 
 def attempt(
@@ -261,16 +252,13 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
 def say_outcome(
     terminal: Terminal, section: Section, seconds: float, new: Sequence[Cause], known: bool = False
 ) -> None:
-    """One line for an experiment, then the new causes, and the first failing checks that none explains.
-
-    seconds: of the processor, for the experiment itself; known: whether there are causes, new ones or others.
-    """
+    """One line for an experiment, then the new causes, and the first failing checks that no known one explains."""
     used = [check.over_tolerance or 0.0 for check in section.result.checks]
     not_judged = failures([section]).not_judged
     about = {"is_open": bool(not_judged), "share": max(used, default=0.0), "seconds": seconds}
     style = "red" if section.failed else "yellow" if not_judged else ""
     terminal.say(block("run", "outcome", section=section, **about), style)
-    lines = [f"CAUSE {cause['text']}" for cause in new]
+    lines = [f"CAUSE {cause.text}" for cause in new]
     if not (known and section.record.states_causes):  # there the causes are the checks
         lines += [f"FAIL {check}" for check in section.failed if check not in section.explained]
     lines += map(str, not_judged)

@@ -59,7 +59,6 @@ def of_own_numbers(setup: Setup) -> Setup | None:
 
 @lru_cache
 def compared_again(mended: Setup, name: str) -> Result:
-    """The result of an experiment, computed once."""
     return module(name).rows(mended)
 
 

@@ -80,9 +80,9 @@ def test_a_number_may_be_off_by_64_eps_of_its_scale(quantity, stated, scale, sha
 
 def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none():
     (cause,) = compare_number(Result("parameters"), Stated("arm", "mass", 2.0, 2.5), "", {})
-    assert (cause["rank"], cause["place"], cause["stated"], cause["found"]) == (2, "mass of arm", 2.0, 2.5)
+    assert (cause.rank, cause.place, cause.stated, cause.explains) == (2, "mass of arm", 2.0, 2.5)
     result, vector = Result("parameters"), Stated("arm", "com", np.zeros(3), np.array([0.0, 1e-30, np.nan]))
-    places = [cause["place"] for cause in compare_number(result, vector, "", {})]
+    places = [cause.place for cause in compare_number(result, vector, "", {})]
     assert places == ["com y of arm", "com z of arm"]
     assert failing(result) == ["com"]
 
@@ -116,7 +116,7 @@ def beside_solution(tmp_path, text, solution=CART):
 ])  # fmt: skip
 def test_a_number_that_is_another_one_than_in_the_solution_is_the_cause(tmp_path, old, new, causes):
     result = beside_solution(tmp_path, CART.replace(old, new))
-    found = [(cause["place"], cause["stated"], pytest.approx(cause["found"])) for cause in result.causes]
+    found = [(cause.place, cause.stated, pytest.approx(cause.explains)) for cause in result.causes]
     assert found == causes
     assert len(failing(result)) == len(causes) and len(result.checks) > 20
 

@@ -128,8 +128,8 @@ def test_a_wrong_value_is_a_failed_check_with_status_1_and_stands_in_the_file(tm
         (self.folder / "arm.py").write_text(text.replace("9.81", "9.8100001"), encoding="utf-8")
         started(self)
 
-    started = PythonProgram.start
-    monkeypatch.setattr(PythonProgram, "start", start)
+    started = PythonProgram.__post_init__
+    monkeypatch.setattr(PythonProgram, "__post_init__", start)
     assert main(["equations", "--to", "python", "--out", str(tmp_path / "out")]) == 1
     head = (tmp_path / "out" / "arm.py").read_text(encoding="utf-8")[:400]
     assert "Failed at 1,000 random states" in head and "bias" in head and "acceleration" in head
@@ -141,7 +141,7 @@ def test_what_cannot_be_run_is_written_and_says_so(error, status, said, tmp_path
     def start(self):
         raise error("no such thing")
 
-    monkeypatch.setattr(PythonProgram, "start", start)
+    monkeypatch.setattr(PythonProgram, "__post_init__", start)
     assert main(["equations", "--to", "python", "--out", str(tmp_path / "out")]) == status
     assert f"{said}: no such thing" in (tmp_path / "out" / "arm.py").read_text(encoding="utf-8")
 

@@ -11,14 +11,17 @@ from urllib.parse import unquote
 
 import pytest
 
+from compare.core.cause import Cause
 from compare.core.check import AT_OWN_STEP, ENDS, About, Result
 from compare.fleet import table
 from compare.fleet.models import place_of_report
 from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, NOT_JUDGED, REFUSED, UNCONFIRMED, FileRow
-from compare.report.verdict import Section
+from compare.report.verdict import Report, Section
+from compare.robots.arm import ARM
 from compare.run.reference import Reference
 
-CAUSES = [{"text": "mass of upper: stated 1 kg, compiled 2 kg"}, {"text": "another"}]
+CAUSE = Cause(rank=2, place="", stated=1.0, explains=2.0, text="mass of upper: stated 1 kg, compiled 2 kg")
+CAUSES = [CAUSE, dataclasses.replace(CAUSE, text="another")]
 BROKEN = ENDS, None, 0.0, "ended by SIGKILL, 4 times", "equal", About.PROGRAM
 OFF = "limit, observed / predicted - 1", 0.01, 0.001, "", "at most", About.PREDICTION
 STILL = "motion", None, 0.0, "nothing moves", "not judged", About.MODELS
@@ -45,7 +48,8 @@ def judged(*checks, limits=(), runs=(), causes=(), lost=(), reference="arm"):
             continue
         result.check("home", quantity, value, tolerance, "s", note, about == About.MODELS, rule, about)
     section, judged_row = Section("stability", "", "", "", result), row()
-    table.judge(judged_row, [section], causes, lost, Reference(reference, "a.xml"))
+    report = Report([section], ARM, {}, "", causes)
+    table.judge(judged_row, report, lost, Reference(reference, "a.xml"))
     return judged_row
 
 

@@ -11,7 +11,8 @@ import pytest
 from matplotlib.figure import Figure
 from runs import ENVIRONMENT, posix
 
-from compare.report.folder import FolderError, new_report
+from compare.core.errors import Refused
+from compare.report.folder import new_report
 from compare.robots.arm import ARM
 from compare.run.drawing import draw
 
@@ -61,7 +62,7 @@ def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch):
             raise PermissionError(13, "Permission denied")
         return rename(source, target)
 
-    with pytest.raises(FolderError), new_report(tmp_path) as work:
+    with pytest.raises(Refused), new_report(tmp_path) as work:
         fill(work, "new")
         monkeypatch.setattr(type(tmp_path), "rename", stubborn)
     monkeypatch.undo()
@@ -71,6 +72,7 @@ def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch):
 RUN = f"""
 import json, os, sys
 from compare.process import interrupt
+from compare.core.errors import Refused
 from compare.report.folder import new_report
 
 {getsource(fill)}
@@ -153,7 +155,7 @@ def test_only_what_a_run_has_left_is_cleared(tmp_path):
 def test_files_of_somebody_elses_are_not_replaced(tmp_path, name):
     old_report(tmp_path)
     (tmp_path / name).write_text("[]")
-    with pytest.raises(FolderError, match=r"precious\.csv|results\.json|mass\.csv"), new_report(tmp_path):
+    with pytest.raises(Refused, match=r"precious\.csv|results\.json|mass\.csv"), new_report(tmp_path):
         pass
     assert (tmp_path / name).read_text() == "[]"
 
@@ -164,7 +166,7 @@ def test_files_of_somebody_elses_are_not_replaced(tmp_path, name):
 def test_what_stands_in_a_folders_place_is_named_and_stays(tmp_path, name, word):
     (tmp_path / "file").write_text("")
     (tmp_path / "link").symlink_to("nowhere")
-    with pytest.raises(FolderError) as error, new_report(tmp_path / name):
+    with pytest.raises(Refused) as error, new_report(tmp_path / name):
         pass
     assert str(tmp_path / name) in str(error.value) and word in str(error.value)
     assert names_in(tmp_path) == {"file", "link"}
@@ -177,7 +179,7 @@ def test_a_full_disk_while_a_figure_is_drawn_is_said_with_the_name_of_the_file(t
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))  # bytes of a file, as on a disk that is full
     try:
-        with pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
+        with pytest.raises(Refused) as error, new_report(tmp_path / "out") as work:
             draw("plain", None, ARM, work, {})
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)

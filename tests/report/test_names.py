@@ -6,6 +6,7 @@ import html
 import math
 import random
 import re
+from dataclasses import make_dataclass
 
 from in_process import without_workers
 from markdown_it import MarkdownIt
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from compare.__main__ import main
+from compare.core.rows import Row
 from compare.core.text import cell, escaped
 from compare.core.words import in_one_line
 from compare.report import files, style
@@ -66,8 +68,11 @@ def test_a_report_of_a_robot_with_any_names(tmp_path, capsys):
 
 
 def test_in_a_table_on_the_terminal_and_in_a_figure(capsys):
-    rows = [{"text": "=1+1", "number": -1.5, "count": 2}, {"text": "-x", "number": math.nan, "count": None}]
-    assert files.csv(rows) == "text,number,count\n'=1+1,-1.5,2\n'-x,,\n"
+    cells = make_dataclass("Cells", ["text", "number", "count"], bases=(Row,))
+    assert (
+        files.csv([cells("=1+1", -1.5, 2), cells("-x", math.nan, None)])
+        == "text,number,count\n'=1+1,-1.5,2\n'-x,,\n"
+    )
     Terminal().say("a\x1b[31m\u202e[red]")
     assert capsys.readouterr().out == "a\\x1b[31m\\u202e[red]\n"
     figure = Figure()

@@ -9,6 +9,7 @@ import pytest
 from matplotlib.figure import Figure as Drawing
 from sections import BAD, GOOD, section
 
+from compare.core.cause import Cause
 from compare.report import images
 from compare.report.document import Document
 from compare.report.files import write
@@ -16,7 +17,7 @@ from compare.report.verdict import OVERVIEW, Figure, Parts, Report, verdict
 from compare.robots import Question
 from compare.robots.arm import ARM
 
-CAUSE = {"rank": 2, "place": "mass of forearm", "stated": 1.5, "found": 1.6, "text": "forearm: 1.6 kg"}
+CAUSE = Cause(rank=2, place="mass of forearm", stated=1.5, explains=1.6, text="forearm: 1.6 kg")
 
 
 @pytest.fixture
@@ -103,12 +104,12 @@ def test_results_have_every_check_cause_and_digit(folder):
     write(folder, report_of(folder, [of], [CAUSE]))
     results = json.loads(text_of(folder / "results.json"))
     assert results["passed"] is False and [check["passed"] for check in results["checks"]] == [True, False]
-    assert results["causes"] == [CAUSE]
+    assert results["causes"] == [CAUSE.record()]
     lines = text_of(folder / "tables" / "mass.csv").splitlines()
     assert lines == ["a,b,engine,ok", *(f"{row['a']!r},{row['b']},tmt,true" for row in rows)]
     assert pd.read_csv(folder / "tables" / "extra.csv")["names"].tolist() == [names]  # cut in the report
     html, text = (text_of(folder / name) for name in ("index.html", "report.md"))
-    assert names not in text and CAUSE["text"] in html and CAUSE["text"] in text
+    assert names not in text and CAUSE.text in html and CAUSE.text in text
     assert html.count("<td>0.123</td>") == 3 and "The cause explains 1 failing check" in text
     assert [path.name for path in (folder / "figures").iterdir()] == ["mass_distances.png"]
 
@@ -119,7 +120,7 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
     other = {"quantity": "Mbar", "scene": "zero", "unit": "kg m2", "largest_difference": "far"}
     rows = {"mass": other, "gravity": {"a": 1.5}, "speed": {}}
     sections = [section(name, GOOD, rows=[row]) for name, row in rows.items()]
-    report = report_of(folder, sections, [CAUSE | {"found": float("nan")}, CAUSE], robot=asks)
+    report = report_of(folder, sections, [replace(CAUSE, explains=float("nan")), CAUSE], robot=asks)
     sections[1].figures = [Figure("nowhere", "A caption.")]
     sections[2].result.rows = [3]
     parts = write(folder, report)

@@ -6,7 +6,7 @@ from compare.report import provenance
 
 
 def test_the_commit_is_said_and_whether_the_program_was_changed_since(tmp_path, monkeypatch):
-    monkeypatch.setattr(provenance, "__file__", str(tmp_path / "compare/report/provenance.py"))
+    monkeypatch.setattr(provenance, "ROOT", tmp_path)
     assert provenance.commit() is None  # no repository
 
     def git(*words):

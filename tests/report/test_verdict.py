@@ -10,6 +10,7 @@ from models import PATHS
 from sections import BAD, GOOD, section
 from small_runs import Lines
 
+from compare.core.cause import Cause
 from compare.core.check import About, Result
 from compare.core.text import say
 from compare.engines.mujoco.reading import read
@@ -58,10 +59,13 @@ def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
 
 def test_what_does_not_agree_is_named_with_its_first_cause_and_nothing_else():
     sections = [section("mass", GOOD, BAD), section("gravity", GOOD), section("diagnosis", BAD)]
-    text = verdict(sections, 10, [{"text": f"number {k}"} for k in range(3)])
+    text = verdict(sections, 10, [replace(CAUSE, text=f"number {k}") for k in range(3)])
     assert all(part in text for part in ("3 of 10 experiments", " mass.", "2 of 4", "number 0; 2 more"))
     assert not any(part in text for part in ("gravity", "diagnosis", "number 2"))
     assert "First failing check: mass: Mbar" in verdict(sections, 10)
+
+
+CAUSE = Cause(rank=2, place="", stated=1.0, explains=2.0, text="mass of forearm: stated 1")
 
 
 def test_the_verdict_counts_what_the_cause_explains_what_states_it_and_what_stands():
@@ -107,7 +111,8 @@ def test_an_experiment_alone_is_named_and_a_step_that_is_not_stable_comes_first(
 def test_what_was_not_judged_is_neither_passed_nor_failed_and_nothing_is_said_to_agree():
     some, none = section("mass", GOOD), section("gravity")
     for result in (some.result, none.result):
-        check = result.not_judged("held", "qdd", "the tolerance exceeds every value")
+        result.not_judged("held", "qdd", "the tolerance exceeds every value")
+        (check,) = [check for check in result.checks if not check.judged]
         assert (check.judged, check.passed, check.failed) == (False, False, False)
         assert not check.record()["judged"]
     for one, passed_checks in ((some, "1 check"), (none, None)):

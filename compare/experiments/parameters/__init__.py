@@ -8,6 +8,8 @@ import numpy as np
 
 import tmt
 
+from ...core.cause import Cause
+from ...core.check import Result
 from ...core.finding import Finding
 from ...engines.mujoco import Reading
 from ...engines.mujoco.dynamics import MujocoDynamics
@@ -20,7 +22,7 @@ from ...robots.joint_map import places_of
 from .. import Experiment
 from ..setup import Setup
 from . import numbers
-from .numbers import ABSENT, OF_BODIES, UNITS, Cause, FeatureRow, NumberRow, ParametersResult
+from .numbers import ABSENT, OF_BODIES, UNITS, FeatureRow, NumberRow
 
 EXPERIMENT = Experiment(order=10, serves_own=False, states_causes=True)
 SHOWN = ["of", "quantity", "component", "stated", "compiled", "unit"]
@@ -32,11 +34,11 @@ AT_TIMES = ("limited", "contact pairs")
 MAY_DIFFER = ("contact", "limit", "clamp", "actuator")
 
 
-def rows(setup: Setup) -> ParametersResult:
+def rows(setup: Setup) -> Result:
     """One row for each number; one check for each quantity of each joint or body; the causes that follow."""
     robot, reading = setup.robot, cast(Reading, setup.reading)
     is_of_file = not robot.is_stated
-    result = ParametersResult("parameters", shown=[*SHOWN, "asked_by"] if is_of_file else SHOWN)
+    result = Result("parameters", shown=[*SHOWN, "asked_by"] if is_of_file else SHOWN)
     dynamics = cast(MujocoDynamics, setup.compared()["mujoco"])
     joints = dict(enumerate(("the world", *robot.joints), start=-1))
     slides = {name for name, kind in zip(robot.joints, robot.tree.kind) if kind == "slide"}
@@ -59,7 +61,7 @@ def rows(setup: Setup) -> ParametersResult:
         result.tables["inventory"] = [FeatureRow.of(feature) for feature in robot.features]
 
     def order(cause: Cause) -> tuple[int, bool, float]:
-        return cause["rank"], cause["quantity"] in AT_TIMES, -cause["size"]
+        return cause.rank, cause.quantity in AT_TIMES, -cause.size
 
     result.causes = sorted(result.causes, key=order)
     return result
@@ -124,7 +126,7 @@ def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
     return tree.body_names if quantity in OF_BODIES else tree.joint_names
 
 
-def compare_features(result: ParametersResult, robot: Robot) -> list[Cause]:
+def compare_features(result: Result, robot: Robot) -> list[Cause]:
     """Checks that features without a term in the equations are as many as in the solution; the causes where they are not."""
     compiled = {feature.feature: feature for feature in robot.features}
     stated = {feature.feature: feature for feature in robot.features_stated}
@@ -136,11 +138,11 @@ def compare_features(result: ParametersResult, robot: Robot) -> list[Cause]:
         value = float(compiled[name].count if name in compiled else 0)
         if not result.check("file", f"{name}, how many", value, number, "", rule="equal").passed:
             text = f"{name}: {number:g} in {robot.stated_in}, {value:g} in this file"
-            causes.append(numbers.cause(2, name, number, value, text, 1.0, name))
+            causes.append(numbers.cause(name, number, value, text, rank=2, size=1.0, quantity=name))
     return causes
 
 
-def headline(result: ParametersResult) -> Finding | None:
+def headline(result: Result) -> Finding | None:
     """What is not as stated, and how many numbers are equal to the stated ones to the last bit."""
     stated = [row for row in result.rows if row.stated is not None]
     unchanged = [row for row in stated if not row.asked_by]
@@ -152,7 +154,7 @@ def headline(result: ParametersResult) -> Finding | None:
     return result.finding("headline", numbers=len(unchanged), off=off, changed=changed, failing=failing)
 
 
-def figures(result: ParametersResult, robot: Robot) -> Iterator[partial[Any]]:
+def figures(result: Result, robot: Robot) -> Iterator[partial[Any]]:
     from ..figures_sketch import draw_sketch  # matplotlib is for the process that draws
 
     yield partial(draw_sketch, robot)

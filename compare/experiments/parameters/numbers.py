@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from tmt import literal
 
+from ...core.cause import Cause
 from ...core.check import Result
 from ...core.rows import Row, column
 from ...diagnosis.places import unit_of as unit_of_joint
@@ -34,9 +35,6 @@ UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gra
     "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
 COMPONENTS = {1: [""], 3: [*"xyz"], 9: [row + of_row for row in "xyz" for of_row in "xyz"]}  # by their number
-
-
-Cause = dict[str, Any]
 
 
 @dataclass(kw_only=True)
@@ -70,11 +68,6 @@ class FeatureRow(Row):
     @classmethod
     def of(cls, feature: Feature) -> "FeatureRow":
         return cls(**asdict(feature) | {"count": feature.count, "names": ";".join(feature.names)})
-
-
-@dataclass
-class ParametersResult(Result):
-    causes: list[Cause] = field(default_factory=list)  # of the checks that fail
 
 
 def unit_of(quantity: str, slides: bool) -> str:
@@ -119,20 +112,16 @@ def compare_number(result: Result, number: Stated, unit: str, words: Mapping[int
                 texts = [f"{float(value)!r} {unit}".rstrip() for value in (a, b)]
             text = f"{place}: stated {texts[0]}, compiled {texts[1]}" + " (the opposite sign)" * is_flipped
             size = difference[k] / tolerance if tolerance else np.inf
-            causes.append(cause(rank, place, a, b, text, size, quantity))
+            causes.append(cause(place, a, b, text, rank=rank, size=float(size), quantity=quantity))
     return causes
 
 
-def cause(
-    rank: int, place: str, stated: float, compiled: float, text: str, size: float, quantity: str
-) -> Cause:
-    """A cause; size: its difference over its tolerance."""
+def cause(place: str, stated: float, compiled: float, text: str, **more: Any) -> Cause:
     number = float(compiled) if np.isfinite(compiled) else None
-    about = {"rank": rank, "place": place, "stated": float(stated), "found": number, "text": text}
-    return about | {"size": float(size), "quantity": quantity}
+    return Cause(place=place, stated=float(stated), explains=number, text=text, **more)
 
 
-def check_forces(result: ParametersResult, sample: Sample, dynamics: MujocoDynamics) -> list[Cause]:
+def check_forces(result: Result, sample: Sample, dynamics: MujocoDynamics) -> list[Cause]:
     """Check that no forces act that the equations do not have; these are causes unless those of the result explain them.
 
     Fluid and tendons: MuJoCo adds their forces to those of springs and damping, of whose sum the rounding is allowed.
@@ -143,10 +132,10 @@ def check_forces(result: ParametersResult, sample: Sample, dynamics: MujocoDynam
         allowed = FACTOR * EPS * float(largest) if source == "fluid and tendons" else 0.0
         most, is_rounded = float(np.abs(force).max()), allowed > 0.0
         check = result.check(sample.name, f"no forces of {source}", most, allowed, "N m", rounding=is_rounded)
-        if check.failed and not any(cause["quantity"] in OF_FORCES for cause in result.causes):
+        if check.failed and not any(cause.quantity in OF_FORCES for cause in result.causes):
             place = f"forces of {source}"
             if source == "actuators":
                 place += f" ({', '.join(dynamics.acting_actuators(sample.q, sample.qd))})"
             text = f"{place}: stated none, up to {most:.3g} N m at random states"
-            unexplained.append(cause(2, place, 0.0, most, text, np.inf, place))
+            unexplained.append(cause(place, 0.0, most, text, rank=2, quantity=place))
     return unexplained

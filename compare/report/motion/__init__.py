@@ -66,10 +66,7 @@ def inlined(scenes: Sequence[Pictures], engines: Sequence[str]) -> tuple[str, in
 
 
 def inlined_scene(pictures: Pictures, stride: int) -> dict[str, Any]:
-    """One scene as the script has it: of each engine a list of pictures.
-
-    A picture is 0 where it is the one before, 1 where it is that of the first engine.
-    """
+    """One scene as the script has it: of each engine a list of pictures, see `shorter`."""
     ours, theirs = (path[::stride] for path in on_page(pictures))
     dt = stride * float(pictures.t[1] - pictures.t[0])
     slower = max(1.0, pictures.slower(SHOWN_FOR / (len(pictures.t) - 1)))
@@ -89,7 +86,6 @@ def inlined_scene(pictures: Pictures, stride: int) -> dict[str, Any]:
 
 
 def on_page(pictures: Pictures) -> list[list[Outline]]:
-    """The pictures of each engine, in the units of the drawing."""
     return [[whole_numbers(points) for points in path] for path in pictures.placed(ROOM, MIDDLE)]
 
 
@@ -109,6 +105,5 @@ def shorter(pictures: Sequence[Outline], others: Sequence[Outline] = ()) -> list
 
 
 def outline(picture: Outline, links: Sequence[Sequence[int]]) -> str:
-    """The sticks of a picture as a path of SVG."""
     points = np.reshape(picture or [], (-1, 2)).tolist()
     return "".join("M{} {}L{} {}".format(*points[i], *points[j]) for i, j in links)

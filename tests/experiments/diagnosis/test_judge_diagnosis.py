@@ -4,6 +4,7 @@ import pytest
 from edited import XML, setup_of
 from small_runs import InProcess, Lines
 
+from compare.core.check import Result
 from compare.core.text import say
 from compare.experiments import diagnosis, parameters
 from compare.judge.scale import EPS, FACTOR
@@ -56,9 +57,9 @@ def test_damping_is_seen_in_accelerations_alone():
 ])  # fmt: skip
 def test_beside_others_it_is_made_where_one_fails(names, text, made, found, tmp_path, monkeypatch):
     # not by parameters, but in the values
-    monkeypatch.setattr(parameters, "rows", lambda setup: parameters.ParametersResult("parameters"))
+    monkeypatch.setattr(parameters, "rows", lambda setup: Result("parameters"))
     setup = setup_of(text, make=experiment.Setup, states=20, exact_states=1, size="small")
     sections, causes, reasons = experiment.examine(names, setup, tmp_path, Lines(), InProcess())
     assert [section.name for section in sections] == made
     assert list(reasons) == [name for name in names if name not in made]
-    assert [cause["place"] for cause in causes] == found
+    assert [cause.place for cause in causes] == found

@@ -2,12 +2,12 @@
 
 EDITS = (
     # rules
-    ("core.check", "RULES", "value <= tolerance", "True", "'at most' always passes"),
-    ("core.check", "RULES", "value <= tolerance", "value < tolerance", "a value equal to its tolerance fails"),
-    ("core.check", "RULES", "value >= tolerance", "True", "'at least' always passes"),
-    ("core.check", "RULES", "value >= tolerance", "value > tolerance", "a value equal to the least fails"),
-    ("core.check", "RULES", "value == tolerance", "True", "'equal' always passes"),
-    ("core.check", "RULES", "value == tolerance", "value <= tolerance", "'equal' passes what is smaller"),
+    ("core.check", "RULES", "operator.le", "lambda *values: True", "'at most' always passes"),
+    ("core.check", "RULES", "operator.le", "operator.lt", "a value equal to its tolerance fails"),
+    ("core.check", "RULES", "operator.ge", "lambda *values: True", "'at least' always passes"),
+    ("core.check", "RULES", "operator.ge", "operator.gt", "a value equal to the least fails"),
+    ("core.check", "RULES", "operator.eq", "lambda *values: True", "'equal' always passes"),
+    ("core.check", "RULES", "operator.eq", "operator.le", "'equal' passes what is smaller"),
     ("core.check", "Check.passed", "_1 and _2 is not None and _3", "_2 is None or _3", "a check of no number passes"),
     ("core.check", "Check.__post_init__", "not np.isfinite(self.tolerance)", "False", "a tolerance may be infinite"),
     ("core.check", "Check.over_tolerance", "self.value / self.tolerance", "0.0", "the share of the tolerance is 0"),
