@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from tmt.arm import ARM
 from tmt.derivation.quantities import QUANTITIES, State
@@ -24,15 +23,15 @@ def literal(name: str) -> Callable[..., Any]:
     """The quantity of that name as a function of q, qd, tau (as far as it takes them) and a model."""
     takes, formula, parts = QUANTITIES[name].takes, QUANTITIES[name].of, QUANTITIES[name].parts
 
-    def function(*arguments: ArrayLike | Tree, model: ArrayLike | Tree = ARM) -> Any:
+    def function(*arguments: Any, model: Tree = ARM) -> Any:
         arrays, last = arguments[: len(takes)], arguments[len(takes) :]
         if len(arrays) < len(takes) or len(last) > 1:
             raise TypeError(f"{name} takes {', '.join(takes)} and a model")
-        tree = last[0] if last else model
+        tree: Tree = last[0] if last else model
         scalars = states(tree, **dict(zip(takes, arrays)))
         state, batch = State(tree, *scalars), scalars[0][0].shape
-        if name == "acceleration" and not state.tree.never_singular:
-            check_regular(state, batch)
+        if name == "acceleration" and not tree.never_singular:
+            check_regular(tree, state, batch)
         values = formula(state)
         if parts:
             return tuple(gather(part, batch) for part in values)
@@ -42,9 +41,9 @@ def literal(name: str) -> Callable[..., Any]:
     return quantity(function)
 
 
-def check_regular(state: State, batch: tuple[int, ...]) -> None:
+def check_regular(tree: Tree, state: State, batch: tuple[int, ...]) -> None:
     """Raise ValueError where Mbar is singular."""
-    n, tree = len(state.qd), state.tree
+    n = len(state.qd)
     positions = gather(state.q, batch).reshape(-1, len(state.q))
     if place := singular.first(tree, positions, gather(state.mass_matrix, batch).reshape(-1, n, n)):
         at = ", ".join(f"{value:.6g}" for value in positions[place[0]])

@@ -121,8 +121,3 @@ def rows_of(array: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
     """States of a batch one after the other, as compiled code takes them."""
     states = array if array.shape[:-1] == batch else np.broadcast_to(array, (*batch, array.shape[-1]))
     return np.require(states.reshape(-1, array.shape[-1]), requirements=["C", "A", "W"])
-
-
-def evaluator(tree: Tree, quantity: str) -> Evaluator:
-    """The Evaluator of a quantity, one of tmt's public ones."""
-    return Evaluator(tree, quantity)

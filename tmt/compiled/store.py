@@ -14,11 +14,11 @@ import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from pathlib import Path
 
 from tmt.methods.stepping import Method
-from tmt.model.tree import Tree
+from tmt.model.tree import Tree, stated
 
 from .machine import Library, object_code, versions
 from .sources import own_sources
@@ -66,7 +66,7 @@ def word_of(value: object) -> str | None:
         return repr(value)
     is_of_tmt = type(value).__module__.split(".")[0] == __name__.split(".")[0]
     if is_of_tmt and isinstance(value, Tree | Method) and is_dataclass(value):
-        return f"{type(value).__qualname__}({[getattr(value, field.name) for field in fields(value)]!r})"
+        return f"{type(value).__qualname__}({stated(value)})"
     return None
 
 

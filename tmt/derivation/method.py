@@ -152,8 +152,7 @@ def bias_rates(
     tree: AnyTree, q: Scalars, qd: Scalars, terms: Terms = mass_matrix_and_bias
 ) -> list[list[Scalar]]:
     """dh/dqd (nv rows of nv, N m s/rad): the exact derivative of the bias by the speeds, by dual numbers."""
-    of_terms = getattr(terms, "bias_rates", None)
-    return of_terms(tree, q, qd) if of_terms else jacobian(lambda rates: terms(tree, q, rates)[1], qd)
+    return jacobian(lambda rates: terms(tree, q, rates)[1], qd)
 
 
 def from_rest(tree: AnyTree, q: Scalars) -> list[tuple[Scalar, Scalar]]:

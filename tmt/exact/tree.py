@@ -1,11 +1,11 @@
 """A Tree with its numbers in another type, so that none is rounded on the way: for many digits."""
 
 from collections.abc import Callable, Iterable
-from types import SimpleNamespace
 
 import mpmath
 
 from tmt.derivation.coordinates import Coordinates, normalized
+from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.scalar import Scalar
 from tmt.derivation.vectors import Vector, sqrt
 from tmt.model.tree import Tree
@@ -19,8 +19,16 @@ with mpmath.workdps(60):  # arcsin x = x (1 + x^2 / 6 + ...), the highest first;
     ARC_SINE = [mpmath.binomial(2 * k, k) / (4**k * (2 * k + 1)) for k in reversed(range(18))]
 
 
-def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> SimpleNamespace:
-    """What the method asks of a Tree, each number made by `number` from its double; directions have length 1 in all digits.
+class ExactTree(Mechanism[Scalar]):
+    """A Tree in another type of number."""
+
+    @property
+    def coordinates(self) -> Coordinates:
+        return Analytic(*super().coordinates)
+
+
+def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> ExactTree:
+    """A Tree with each number made by `number` from its double; directions have length 1 in all digits.
 
     number: mpmath.mpf, or another type made from a double. Turns about an axis that is a little longer than 1 would not be
     turns, and regrouped sums would differ from the literal ones by that.
@@ -29,7 +37,7 @@ def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> SimpleNamespace
     def lifted(value: Scalar) -> Scalar:
         return tuple(map(lifted, value)) if isinstance(value, tuple) else number(value)
 
-    axis = []
+    axis: list[Vector] = []
     for joint in tree.coordinates.joints:
         first, *more = [Vector(*map(number, direction)) for direction in tree.axis[joint.qd]]
         x = _unit(first)
@@ -38,18 +46,8 @@ def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> SimpleNamespace
             y = _unit(more[0] - x * x.dot(more[0]))
             axis += [y, x.cross(y)]
     numbers = {name: lifted(getattr(tree, name)) for name in NUMBERS}
-    numbers["rest"] = of_length_1(tree.coordinates, numbers["rest"])
-    return SimpleNamespace(
-        **numbers,
-        axis=tuple(map(tuple, axis)),
-        parent=tree.parent,
-        kind=tree.kind,
-        body_joint=tree.body_joint,
-        coordinates=Analytic(*tree.coordinates),
-        moves=tree.moves,
-        has_springs=tree.has_springs,
-        has_gains=tree.has_gains,
-    )
+    numbers["rest"] = tuple(of_length_1(tree.coordinates, numbers["rest"]))
+    return ExactTree(**vars(tree) | numbers | {"axis": tuple(map(tuple, axis))})
 
 
 def _unit(vector: Vector) -> Vector:

@@ -4,12 +4,13 @@ A method's `slope` asks a Dynamics for them. Another way to have them is a subcl
 (forms.py), with derivatives by those of the linear system (derivatives.py).
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from tmt.derivation import method
+from tmt.derivation.mechanism import AnyTree
+from tmt.derivation.method import Terms as Terms
 from tmt.derivation.scalar import Scalar
-from tmt.derivation.vectors import solve, solve_any
+from tmt.derivation.vectors import Scalars, solve, solve_any
 from tmt.model.tree import Tree
 
 Values = list[Scalar]
@@ -25,16 +26,13 @@ class Implicit(NamedTuple):
     bias_rows: frozenset[int]  # speeds of whose bias it takes the change
 
 
-Terms = Callable[[Tree, Values, Values], tuple[Rows, Values]]  # (tree, q, qd) -> Mbar and h
-
-
 class Dynamics:
     """Accelerations from Mbar and h, which `terms` gives."""
 
     def __init__(self, terms: Terms = method.mass_matrix_and_bias):
         self.terms = terms
 
-    def __call__(self, tree: Tree, q: Values, qd: Values) -> tuple[Rows, Values]:
+    def __call__(self, tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
         """Mbar (nv rows of nv) and h (nv,)."""
         return self.terms(tree, q, qd)
 

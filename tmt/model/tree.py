@@ -179,9 +179,9 @@ class Tree(Mechanism[float]):
         return locked(self, angles)
 
 
-def stated(tree: Tree) -> str:
-    """All numbers and names of a Tree: equal for equal trees alone."""
-    return repr([getattr(tree, field.name) for field in fields(tree)])
+def stated(value: Any) -> str:
+    """All fields of a Tree or another dataclass: equal for equal ones of a class alone."""
+    return repr([getattr(value, field.name) for field in fields(value)])
 
 
 def _kinds(values: Any, n: int) -> Names:
