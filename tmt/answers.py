@@ -99,9 +99,8 @@ class Answers:
         may_be_singular = self.may_be_singular and quantity == "acceleration"
         if is_prepared and not may_be_singular and self.is_state(arguments):
             return evaluator.of_one(*arguments)
-        with np.errstate(
-            all="ignore"
-        ):  # of numbers beyond the largest double, which the literal form refuses
+        # without warnings of numbers beyond the largest double, which the literal form refuses
+        with np.errstate(all="ignore"):
             numbers = [x if type(x) is ndarray and x.dtype is DOUBLE else real_numbers(x) for x in arguments]
         arrays = [x for x in numbers if x is not None]
         if [array.shape[-1:] for array in arrays] != self.shapes[: len(arguments)]:
@@ -111,9 +110,11 @@ class Answers:
         except ValueError:
             return None
         count = math.prod(batch)
-        if count == 0 or (count <= SMALL and not is_prepared):
-            return None
-        if may_be_singular and self.is_singular(arrays[0]):
+        if (
+            count == 0
+            or (count <= SMALL and not is_prepared)
+            or (may_be_singular and self.is_singular(arrays[0]))
+        ):
             return None
         try:
             return evaluator.of_any(*arrays) if batch else evaluator.of_one(*arrays)

@@ -5,27 +5,19 @@ all of them together. A product that goes into one sum alone is rounded with it,
 twice as many lines in one function, so long tapes are cut; what one part hands to a later one stands in an array.
 """
 
-import operator
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from tmt.derivation.scalar import Scalar
 
 from .ir import DOUBLE, POINTER, Code, Value, wide
 from .sine import sincos
-from .trace import LEAVES, Expression, Tape
+from .trace import FOLD, LEAVES, Expression, Tape
 
 LONGEST = 1_000  # nodes of one function
 OF_ONE = ("solution", "bias_rates")  # functions of linear.py, which take one state
-OPERATIONS: dict[str, Callable[..., Any]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": operator.truediv,
-    "neg": operator.neg,
-}
 
 
 @dataclass(frozen=True)
@@ -183,9 +175,8 @@ class Steps:
             return {item: both[nodes[item][1][1]] for item in self.items[i]}
         if name == "call":
             numbers = {item: nodes[item][1][1] for item in self.items[i]}
-            place = called(
-                code, arguments[0], [value(a) for a in arguments[1:]], 1 + max(numbers.values()), width
-            )
+            taken = [value(a) for a in arguments[1:]]
+            place = called(code, arguments[0], taken, 1 + max(numbers.values()), width)
             return {item: place.load(k * width, wide(DOUBLE, width)) for item, k in numbers.items()}
         if i in self.fused:
             product = self.fused[i]
@@ -198,7 +189,7 @@ class Steps:
             return {i: value(arguments[0]).function("sqrt")}
         if name == "arctan":
             return {i: code.library("atan", value(arguments[0]))}
-        return {i: OPERATIONS[name](*map(value, arguments))}
+        return {i: FOLD[name](*map(value, arguments))}
 
 
 def called(code: Code, name: str, values: list[Value], count: int, width: int) -> Value:

@@ -105,10 +105,8 @@ def distribution_of(tree: AnyTree, body: int) -> Distribution:
     inertia = Matrix(map(exact_vector, tree.inertia[body]))
     (xx, *_), (_, yy, _), (*_, zz) = inertia
     half = (xx + yy + zz) / 2
-    twice = inertia + inertia.transposed
-    second = Matrix([[half, 0, 0], [0, half, 0], [0, 0, half]]) - Matrix(
-        [row * Fraction(1, 2) for row in twice]
-    )
+    symmetric = Matrix([row * Fraction(1, 2) for row in inertia + inertia.transposed])
+    second = Matrix([[half, 0, 0], [0, half, 0], [0, 0, half]]) - symmetric
     about_com = Distribution(fraction(tree.mass[body]), NOTHING.moment, second)
     return about_com.moved(exact_vector(tree.com[body]))
 
@@ -218,9 +216,7 @@ def mass_matrix_and_bias(
 
 
 @lru_cache(maxsize=64)
-def rounded_once(
-    tree: AnyTree, number: Callable[..., Scalar]
-) -> tuple[list[Distribution], list[Distribution], list[Distribution]]:
+def rounded_once(tree: AnyTree, number: Callable[..., Scalar]) -> tuple[list[Distribution], ...]:
     """What each joint carries itself, its part that is not even about a hinge, and the part that is."""
     exact = carried_by_joint(tree)
     even = [NOTHING] * len(exact)
@@ -228,8 +224,7 @@ def rounded_once(
         if joint.kind == "hinge":
             even[i] = exact[i].even_about(exact_vector(tree.axis[joint.qd.start]))
     uneven = [all_of_it.less(part) for all_of_it, part in zip(exact, even)]
-    own, uneven, even = ([part.rounded(number) for part in parts] for parts in (exact, uneven, even))
-    return own, uneven, even
+    return tuple([part.rounded(number) for part in parts] for parts in (exact, uneven, even))
 
 
 def handed_down(offset: Vector, turn: Matrix, force: Vector, moment: Vector) -> tuple[Vector, Vector]:

@@ -30,14 +30,10 @@ class Flat:
     def move(self, q: Scalars, u: Scalars) -> list[Scalar]:
         return [x + y for x, y in zip(q, u)]
 
-    def tangent(self, q: Scalars, dq: Scalars) -> list[Scalar]:
-        return list(dq)
-
-    def component_rates(self, q: Scalars, qd: Scalars) -> list[Scalar]:
-        return list(qd)
-
     def rates(self, u: Scalars, qd: Scalars) -> list[Scalar]:
         return list(qd)
+
+    tangent = component_rates = rates
 
 
 class Ball:
@@ -52,8 +48,13 @@ class Ball:
     def component_rates(self, q: Scalars, qd: Scalars) -> list[Scalar]:
         return [0.5 * x for x in product(q, [0.0, *qd])]
 
-    def rates(self, u: Scalars, qd: Scalars) -> list[Scalar]:
-        return inverse_derivative(u, qd)
+    def rates(self, movement: Scalars, speeds: Scalars) -> list[Scalar]:
+        """dexp^-1(u) omega, see above."""
+        u, omega = Vector(*movement), Vector(*speeds)
+        half = sqrt(u.dot(u) + TINY) * 0.5
+        share = (1.0 - half * cos(half) / sin(half)) / (half * half) * 0.25
+        once = u.cross(omega)
+        return list(omega + once * 0.5 + u.cross(once) * share)
 
 
 FLAT, BALL = Flat(), Ball()
@@ -73,7 +74,6 @@ class Joint(NamedTuple):
 
     @property
     def rule(self) -> Flat | Ball:
-        """How it moves."""
         return BALL if self.kind == "ball" else FLAT
 
 
@@ -172,12 +172,3 @@ def logarithm(p: Scalars) -> list[Scalar]:
     size, length = sqrt(w * w + TINY), sqrt(x * x + y * y + z * z + TINY)
     share = arctan(length / (1.0 + size)) * 4.0 / length * (w / size)
     return [x * share, y * share, z * share]
-
-
-def inverse_derivative(movement: Scalars, speeds: Scalars) -> list[Scalar]:
-    """dexp^-1(u) omega, see above."""
-    u, omega = Vector(*movement), Vector(*speeds)
-    half = sqrt(u.dot(u) + TINY) * 0.5
-    share = (1.0 - half * cos(half) / sin(half)) / (half * half) * 0.25
-    once = u.cross(omega)
-    return list(omega + once * 0.5 + u.cross(once) * share)

@@ -23,13 +23,13 @@ unless they are said to be in body axes.
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.scalar import Rows, Scalar, Values
 
 from .dual import jacobian
 from .mechanism import AnyTree, origin_in_parent, turn_in_parent
 from .vectors import IDENTITY, ZERO, Matrix, Scalars, Vector, solve, total, total_vector
 
-Terms = Callable[[AnyTree, Scalars, Scalars], tuple[list[list[Scalar]], list[Scalar]]]  # Mbar and h
+Terms = Callable[[AnyTree, Scalars, Scalars], tuple[Rows, Values]]  # Mbar and h
 
 
 class Frame(NamedTuple):
@@ -148,9 +148,7 @@ def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[l
     return mass_matrix(parts, tree.armature), bias(parts, tree.gravity)
 
 
-def bias_rates(
-    tree: AnyTree, q: Scalars, qd: Scalars, terms: Terms = mass_matrix_and_bias
-) -> list[list[Scalar]]:
+def bias_rates(tree: AnyTree, q: Scalars, qd: Scalars, terms: Terms = mass_matrix_and_bias) -> Rows:
     """dh/dqd (nv rows of nv, N m s/rad): the exact derivative of the bias by the speeds, by dual numbers."""
     return jacobian(lambda rates: terms(tree, q, rates)[1], qd)
 

@@ -30,16 +30,7 @@ def exact(tree: Tree, q: Sequence[float], qd: Sequence[float], tau: Sequence[flo
         for name, fields in FIELDS.items():
             value = QUANTITIES[name].of(state)
             values |= zip(fields, value if QUANTITIES[name].parts else [value])
-        return SimpleNamespace(**{field: _array(value) for field, value in values.items()})
-
-
-def _array(nested: Scalar) -> np.ndarray:
-    """Nested iterables of numbers as an object array."""
-
-    def lists(item: Scalar) -> Scalar:
-        return [lists(i) for i in item] if hasattr(item, "__iter__") else item
-
-    return np.array(lists(nested), dtype=object)
+        return SimpleNamespace(**{field: np.array(value, dtype=object) for field, value in values.items()})
 
 
 def distance(values: np.ndarray, truth: np.ndarray) -> np.ndarray:
