@@ -42,7 +42,6 @@ def literal(name: str) -> Callable[..., Any]:
 
 
 def check_regular(tree: Tree, state: State, batch: tuple[int, ...]) -> None:
-    """Raise ValueError where Mbar is singular."""
     n = len(state.qd)
     positions = gather(state.q, batch).reshape(-1, len(state.q))
     if place := singular.first(tree, positions, gather(state.mass_matrix, batch).reshape(-1, n, n)):

@@ -57,7 +57,6 @@ class Motion(_Path):
         return motion
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """How a copy is made, in this process or another."""
         return type(self), (*self, self.ended, self.evaluations)
 
 

@@ -52,7 +52,6 @@ class Entries:
         return right.negated()
 
     def one(self) -> Code:
-        """One state."""
         code = Code("one", dict.fromkeys((*ARRAYS, "out"), POINTER), result=INDEX)
         state, out = code.reserve(DOUBLE, self.count), code["out"]
         for array, size, before in zip(ARRAYS, self.sizes, self.begins):

@@ -52,7 +52,6 @@ class Evaluator:
 
     @cached_property
     def scalar(self) -> "Library":
-        """The functions for one state at a time."""
         return self.library(1)
 
     @cached_property

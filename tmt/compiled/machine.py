@@ -15,7 +15,6 @@ lock = Lock()  # LLVM's passes are not made for several threads at once
 
 @lru_cache(maxsize=1)
 def processor() -> tuple[str, str]:
-    """The name of this processor and what it can do."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
@@ -39,7 +38,6 @@ def target() -> llvm.TargetMachine:
 
 
 def object_code(text: str) -> bytes:
-    """The object file of a module."""
     with lock:
         machine = target()
         module = llvm.parse_assembly(text)

@@ -34,7 +34,6 @@ class Runner:
         self.functions: dict[int, Callable[..., None]] = {}
 
     def compiled(self, width: int) -> Callable[..., None]:
-        """The compiled function for `width` runs side by side."""
         if width not in self.functions:
             from . import runs, store  # here, so that `import tmt` need not wait for llvmlite
 

@@ -29,7 +29,6 @@ SHORTEST_STEP, GROWTH, SHRINKING, SAFETY = 1e-9, 6.0, 0.333, 0.9
 
 
 def source(tree: Tree, stepping: Any, width: int) -> str:
-    """The module that follows runs of a tree, `width` side by side."""
     step = Step(tree, stepping, width)
     if stepping.solves_stages:
         advance = step.solving()
@@ -83,7 +82,6 @@ class Step:
         return len(traced.outputs)
 
     def explicit(self) -> Advance:
-        """A step of a method that solves nothing."""
         self.add_step("step")
 
         def advance(code: Code, state: Value, new: Value, dt: Value, evaluations: Variable) -> Value:
@@ -248,7 +246,6 @@ def residual(tree: Tree, stepping: Any, joints: Joints, linear: bool) -> Traced:
 
 
 def run(step: Step, advance: Advance) -> Code:
-    """The loops over runs, records and steps."""
     names = {"q": POINTER, "qd": POINTER, "tau": POINTER, "dt": DOUBLE, "tolerance": DOUBLE, "info": POINTER}
     code = Code("run", names | dict.fromkeys(("every", "records", "runs"), INDEX))
     nq, n, width = step.nq, step.n, step.width

@@ -10,7 +10,6 @@ from pathlib import Path
 
 
 def stamps(files: Iterable[str]) -> dict[str, tuple[int, int]]:
-    """When each file was written, and its size."""
     stats = {file: os.stat(file) for file in files}
     return {file: (stat.st_mtime_ns, stat.st_size) for file, stat in stats.items()}
 

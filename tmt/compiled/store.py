@@ -92,7 +92,6 @@ def complain(error: OSError) -> None:
 
 
 def cache_folder() -> Path:
-    """Where object files are kept."""
     if os.environ.get("TMT_CACHE"):
         return Path(os.environ["TMT_CACHE"])
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tmt"

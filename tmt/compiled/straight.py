@@ -108,7 +108,6 @@ class Steps:
         self.order = [i for i in nodes if i not in left_out]
 
     def takes(self, i: int) -> list[int]:
-        """The values that a step takes."""
         arguments = self.tape.operands(i)
         if i in self.fused:
             product = self.fused[i]

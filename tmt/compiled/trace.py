@@ -127,7 +127,6 @@ class Tape:
         return None
 
     def apply(self, operation: str, *operands: Scalar) -> "Expression":
-        """The expression for one operation, simplified."""
         values = [self.lift(operand) for operand in operands]
         numbers = [value.number for value in values]
         if None not in numbers:
@@ -167,7 +166,6 @@ class Tape:
         return sorted(needed)
 
     def operands(self, i: int) -> tuple[int, ...]:
-        """The nodes that a node is computed from."""
         operation, arguments = self.nodes[i]
         if operation in LEAVES:
             return ()
@@ -199,7 +197,6 @@ class Expression:
 
     @property
     def name(self) -> str:
-        """The name of an input."""
         return self.tape.nodes[self.i][1][0]
 
     def apply(self, operation: str, *values: Scalar) -> Scalar:

@@ -168,7 +168,6 @@ def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[l
 
 
 def bias(tree: AnyTree, q: Scalars, qd: Scalars) -> list[Scalar]:
-    """h (nv, N m) alone."""
     return along(*carried(tree, q, qd))
 
 

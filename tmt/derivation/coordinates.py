@@ -69,7 +69,6 @@ class Joint(NamedTuple):
 
     @property
     def speeds(self) -> range:
-        """The numbers of its speeds in qd."""
         return range(self.qd.start, self.qd.stop)
 
     @property
@@ -109,7 +108,6 @@ class Coordinates(NamedTuple):
 
     @staticmethod
     def logarithm(p: Scalars) -> list[Scalar]:
-        """Of a quaternion, see below."""
         return logarithm(p)
 
     def tangent(self, q: Scalars, dq: Scalars) -> list[Scalar]:
@@ -127,7 +125,6 @@ class Coordinates(NamedTuple):
 
 @lru_cache(maxsize=256)
 def coordinates_of(kinds: tuple[str, ...]) -> Coordinates:
-    """The coordinates of joints of these kinds."""
     joints, nq, nv = [], 0, 0
     for kind in kinds:
         positions, speeds = KINDS[kind]
@@ -153,7 +150,6 @@ def conjugate(p: Scalars) -> list[Scalar]:
 
 
 def normalized(p: Scalars) -> list[Scalar]:
-    """The quaternion at length 1."""
     length = sqrt(sum((x * x for x in p[1:]), p[0] * p[0]))
     return [x / length for x in p]
 

@@ -143,7 +143,6 @@ def bias(parts: Sequence[Body], gravity: Iterable[Scalar]) -> list[Scalar]:
 
 
 def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[list[Scalar]], list[Scalar]]:
-    """Mbar and h at positions q and speeds qd."""
     parts = bodies(tree, q, qd)
     return mass_matrix(parts, tree.armature), bias(parts, tree.gravity)
 
@@ -201,7 +200,6 @@ def potential(parts: Sequence[Body], gravity: Iterable[Scalar]) -> Scalar:
 
 
 def spring_energy(tree: AnyTree, q: Scalars) -> Scalar:
-    """Energy of the springs in J."""
     if not tree.has_springs:
         return 0.0
     return total(0.5 * stiffness * (x * x) for stiffness, x in from_rest(tree, q) if stiffness)

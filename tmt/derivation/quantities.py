@@ -95,6 +95,5 @@ QUANTITIES = {
 
 
 def shape_of(name: str, tree: AnyTree) -> tuple[int, ...]:
-    """The shape of a quantity of a tree."""
     sizes = {"m": len(tree.mass), "nv": len(tree.axis)}
     return tuple(size if isinstance(size, int) else sizes[size] for size in QUANTITIES[name].shape)

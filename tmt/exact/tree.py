@@ -51,7 +51,6 @@ def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> ExactTree:
 
 
 def _unit(vector: Vector) -> Vector:
-    """The vector at length 1."""
     return vector * (1 / sqrt(vector.dot(vector)))
 
 

@@ -47,7 +47,6 @@ SI units, angles in rad. Shapes are those of one state; ... stands for any batch
 def text(
     model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str]
 ) -> str:
-    """See `tmt.equations`."""
     checked_model(model)
     known = [*LANGUAGES, *SYMBOLIC]
     if not isinstance(language, str) or language not in known:
@@ -82,7 +81,6 @@ def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ..
 
 @lru_cache(maxsize=4)
 def symbols_of(model: Tree, quantities: tuple[str, ...]) -> symbols.Symbolic:
-    """The symbolic equations, derived once for all files."""
     return symbols.symbolic(model, quantities)
 
 
@@ -91,7 +89,6 @@ def is_word(name: str) -> bool:
 
 
 def conventions(model: Tree) -> list[str]:
-    """Equation, joints and units in words."""
     coordinates, m = model.coordinates, len(model.mass)
     sizes = f"nq = {coordinates.nq} numbers in q, nv = {coordinates.nv} in qd and tau, m = {m} bodies"
     lines = [
@@ -111,7 +108,6 @@ def places(part: slice) -> str:
 
 
 def digest(model: Tree) -> str:
-    """The first digits of a hash of a Tree's names and numbers."""
     return hashlib.sha256(stated(model).encode()).hexdigest()[:16]
 
 

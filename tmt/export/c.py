@@ -17,7 +17,6 @@ def source(program: Program) -> str:
 
 
 def header(program: Program) -> str:
-    """The declarations, for C and C++."""
     name, sizes, guard = program.name, program.functions[0].sizes, f"{program.name.upper()}_H"
     note = "Arrays of more than one dimension are stored by rows; they may not overlap."
     parts = [

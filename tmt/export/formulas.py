@@ -34,7 +34,6 @@ class Section(NamedTuple):
 
     @property
     def fits(self) -> bool:
-        """Whether the entries fit on a line side by side."""
         columns = list(zip(*self.rows))
         widths = [max(map(width, column)) for column in columns]
         return len(columns) > 1 and sum(widths) + 4 * len(columns) <= WIDTH
@@ -141,7 +140,6 @@ def in_brackets(inner: Formula, power: str = "") -> Formula:
 
 
 def width(formula: Formula) -> int:
-    """About the number of characters that a formula prints."""
     return sum(len(re.sub(r"\\(dot|[a-z]+)|[{}_]", "x", token.text)) + len(token.power) for token in formula)
 
 
@@ -158,7 +156,6 @@ def tables(symbolic: Symbolic) -> list[list[tuple[str, ...]]]:
 
 
 def introduction(symbolic: Symbolic) -> str:
-    """The conventions in sentences."""
     quantities = "; ".join(": ".join(TITLES[name]) for name in symbolic.entries)
     note = [f"{symbolic.note[0].upper()}{symbolic.note[1:]}."] if symbolic.note else []
     fixed = ["Forces of dampers D and springs K are not in h.", "Numbers are shown with six digits."]

@@ -63,7 +63,6 @@ def in_latex(formula: Formula) -> str:
 
 
 def escaped(text: str) -> str:
-    """Text in LaTeX."""
     named = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "²": "$^2$"}
     plain = text.encode("latin-1", "replace").decode("latin-1")  # what pdflatex has letters for
     return re.sub(r"[_&%$#{}\\~^²]", lambda found: named.get(found[0], f"\\{found[0]}"), plain)

@@ -31,7 +31,6 @@ def source(program: Program) -> str:
 
 
 def text(function: Function) -> str:
-    """One function."""
     takes, results, sizes, dimensions = function.takes, function.results, function.sizes, len(function.shape)
     assignments, values = statements(function, SYNTAX)
     lines = [f"assert(size({x}, 1) == {sizes[x]}, '{x} has {sizes[x]} rows');" for x in takes]

@@ -90,7 +90,6 @@ class Names:
         return offsets
 
     def tensor(self, b: int, name: str) -> list[list[Expression]]:
-        """The inertia of body b."""
         body, values = self.source.body_names[b], without_tiny(sum(self.source.inertia[b], ()))
         tensor: list[list[Expression]] = [[0] * 3 for _ in AXES]
         for i, j in itertools.combinations_with_replacement(range(3), 2):
@@ -190,7 +189,6 @@ def unit(axis: Iterable[Expression]) -> list[Expression]:
 
 
 def direction(vector: Sequence[Expression]) -> str:
-    """A direction in words."""
     along = [i for i, x in enumerate(vector) if x]
     if len(along) == 1:
         return ("-" if vector[along[0]] < 0 else "") + AXES[along[0]]

@@ -33,7 +33,6 @@ def source(program: Program) -> str:
 
 
 def text(function: Function) -> str:
-    """One function."""
     takes, results = ", ".join(function.takes), ", ".join(function.results)
     assignments, values = statements(function, SYNTAX)
     empty = ", ".join([f"np.empty((*batch, {function.size}))"] * len(function.results))

@@ -55,7 +55,6 @@ class Forms:
         return min((grouped(terms, first, last) for first in (self.masses, products, ())), key=cost)
 
     def form(self, poly: Polynomial) -> Expression:
-        """The shortest form of a polynomial in sines and cosines alone."""
         if poly not in self.found:
             self.found[poly] = min(self.candidates(poly), key=cost)
         return self.found[poly]
@@ -165,7 +164,6 @@ class Forms:
 
 
 def has_square(poly: Polynomial, place: int) -> bool:
-    """Whether a term has a higher power than one of a generator."""
     return any(monomial[place] > 1 for monomial in poly)
 
 

@@ -25,7 +25,6 @@ class Function(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many numbers a result has."""
         return prod(self.shape)
 
     @property

@@ -40,7 +40,6 @@ class RungeKutta(Tableau):
             raise ValueError(f"row {i} of A has {len(row)} entries; an explicit method has {i}")
 
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
-        """The state (q, qd) one dt later, from `slope(q, qd)` at each stage."""
         return self.combined(self.stage_slopes(slope, q, qd, dt, joints), q, qd, dt, joints)
 
     def stage_slopes(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints) -> Slopes:

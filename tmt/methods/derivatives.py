@@ -123,10 +123,8 @@ def of_part(
 
 
 def values_of(numbers: Values) -> Values:
-    """Numbers without their derivatives."""
     return [x.value if isinstance(x, Dual) else x for x in numbers]
 
 
 def times(matrix: Rows, values: Values) -> Values:
-    """A matrix, given by rows, times values."""
     return [sum(m * x for m, x in zip(row, values)) for row in matrix]

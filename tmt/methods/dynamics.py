@@ -52,11 +52,9 @@ class Dynamics:
         return self.solve_any(matrix, minus(force, implicit.pull))
 
     def bias_rates(self, tree: Tree, q: Values, qd: Values) -> Rows:
-        """dh/dqd (nv rows of nv)."""
         return method.bias_rates(tree, q, qd, self.terms)
 
     def solve_any(self, matrix: Rows, right: Values) -> Values:
-        """The solution of a linear system whose matrix need not be symmetric."""
         return solve_any(matrix, right)
 
 

@@ -124,7 +124,6 @@ def placed(joints: Joints, q: Values, moved: Values, balls: list[Values]) -> Val
 
 
 def weighted(weights: Sequence[float], values: Sequence[Scalar]) -> Scalar:
-    """Sum of weights * values."""
     terms = [w * v for w, v in zip(weights, values)]
     return sum(terms[1:], terms[0])
 

@@ -64,11 +64,9 @@ class SemiImplicitEuler(Method):
     def slope(
         self, tree: Tree, q: Values, qd: Values, tau: Values, dt: Scalar, terms: Terms = LITERAL
     ) -> Values:
-        """a from the linear system above."""
         return dynamics_of(terms).acceleration(tree, q, qd, tau, self.implicit(tree, qd, dt))
 
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
-        """The state (q, qd) one dt later."""
         qd = advance(qd, dt, (1.0,), [slope(q, qd)])
         return joints.move(q, increments(dt, (1.0,), [qd], len(qd))), qd
 

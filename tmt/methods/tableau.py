@@ -58,5 +58,4 @@ class Tableau(Method):
 
 
 def is_vector(values: np.ndarray | None) -> TypeGuard[np.ndarray]:
-    """Whether values are finite numbers in a row."""
     return values is not None and values.ndim == 1 and bool(np.isfinite(values).all())

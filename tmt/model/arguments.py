@@ -72,7 +72,6 @@ def _state(model: Tree, name: str, values: ArrayLike) -> Array:
 
 
 def _check_quaternions(model: Tree, q: Array) -> None:
-    """Raise ValueError unless the quaternions of all balls have length 1."""
     places = dict(zip(model.joint_names, model.coordinates.joints))
     for name in [name for name, joint in places.items() if joint.kind == "ball"]:
         quaternions = q[..., places[name].q].reshape(-1, 4)
@@ -83,13 +82,11 @@ def _check_quaternions(model: Tree, q: Array) -> None:
 
 
 def checked_model(model: Any) -> None:
-    """Raise ValueError unless it is a Tree."""
     if not isinstance(model, Tree):
         raise ValueError(f"model is {shown(model)}; a tmt.Tree is expected")
 
 
 def positive(name: str, value: Any, kind: str) -> float:
-    """The value as a finite float above 0."""
     if type(value) is float and 0.0 < value < math.inf:
         return value
     try:

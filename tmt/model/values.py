@@ -63,5 +63,4 @@ def numbers_of(name: str, values: Any, shape: tuple[int, ...]) -> Any:
 
 
 def nested(item: Any) -> Any:
-    """Lists as tuples, at every depth."""
     return tuple(map(nested, item)) if isinstance(item, list) else item
