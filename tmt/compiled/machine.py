@@ -10,6 +10,7 @@ import llvmlite
 import llvmlite.binding as llvm
 
 MUCH = 300_000  # characters of a module that is not optimised before it becomes machine code
+Function = Callable[..., Any]
 lock = Lock()  # LLVM's passes are not made for several threads at once
 
 
@@ -63,9 +64,7 @@ class Library:
             self.engine.add_object_file(llvm.ObjectFileRef.from_data(code))
             self.engine.finalize_object()
 
-    def function(
-        self, name: str, result: Any, *arguments: Any, keeps_lock: bool = False
-    ) -> Callable[..., Any]:
+    def function(self, name: str, result: Any, *arguments: Any, keeps_lock: bool = False) -> Function:
         """A function of that name as ctypes calls it, of ctypes' types; keeps_lock: Python's other threads wait meanwhile."""
         address = self.engine.get_function_address(name)
         if not address:

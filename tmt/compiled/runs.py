@@ -20,9 +20,8 @@ from .ir import DOUBLE, FLAG, INDEX, POINTER, Code, Value, Variable, module, wid
 from .sine import LIMIT
 from .straight import Traced, functions, trace
 
-Advance = Callable[
-    [Code, Value, Value, Value, Variable], Value
-]  # (code, state, new state, dt, evaluations): why it ends
+# (code, state, new state, dt, evaluations): why it ends
+Advance = Callable[[Code, Value, Value, Value, Variable], Value]
 INLINED = 1_500  # nodes of the slopes of a step that are put in the place of their calls
 # of an adaptive method, in units of dt and of the step before
 SHORTEST_STEP, GROWTH, SHRINKING, SAFETY = 1e-9, 6.0, 0.333, 0.9
@@ -42,9 +41,8 @@ def source(tree: Tree, stepping: Any, width: int) -> str:
 class Step:
     """The functions of one step, and the lines that call them."""
 
-    def __init__(
-        self, tree: Tree, stepping: Any, width: int
-    ):  # stepping: a Method, with what NEEDS says of its kind
+    # stepping: a Method, with what NEEDS says of its kind
+    def __init__(self, tree: Tree, stepping: Any, width: int):
         self.tree, self.stepping, self.width = tree, stepping, width
         self.nq, self.n = tree.coordinates.nq, tree.coordinates.nv
         self.joints: Joints = tree.coordinates if tree.coordinates.balls else FLAT

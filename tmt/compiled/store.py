@@ -47,10 +47,9 @@ def library(
     try:
         path = own_folder() / f"{name}.o"
         code = read(path)
-    except NotOwn as error:
-        complain(error)
-        return Library(source())
-    except Exception:  # whatever is wrong with the folder or the file
+    except Exception as error:  # whatever is wrong with the folder or the file
+        if isinstance(error, NotOwn):
+            complain(error)
         return Library(source())
     if code is None:
         code = object_code(source())
@@ -85,10 +84,8 @@ def complain(error: OSError) -> None:
     """Say once in a process why the folder is not used; on stderr, unless logging is set up otherwise."""
     if not complaints:
         complaints.append(error)
-        advice = "remove it, or set TMT_CACHE to a folder of your own"
-        logging.getLogger("tmt").warning(
-            "%s: nothing there is run, code is compiled in memory; %s", error, advice
-        )
+        done, advice = "code is compiled in memory", "remove it, or set TMT_CACHE to a folder of your own"
+        logging.getLogger("tmt").warning("%s: nothing there is run, %s; %s", error, done, advice)
 
 
 def cache_folder() -> Path:

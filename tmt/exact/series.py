@@ -39,12 +39,11 @@ def values_at(high: np.ndarray, low: np.ndarray, th: float, tl: float, state: np
 @lru_cache(maxsize=1)
 def functions() -> dict[str, Callable[..., None]]:
     library, integer, place = store.library(source, "series"), ctypes.c_int64, ctypes.c_void_p
-    return {
-        "expand": library.function("expand", None, place, integer, integer, place, place),
-        "values_at": library.function(
-            "values_at", None, *[place] * 3, *[ctypes.c_double] * 2, integer, integer
-        ),
+    arguments = {
+        "expand": [place, integer, integer, place, place],
+        "values_at": [*[place] * 3, *[ctypes.c_double] * 2, integer, integer],
     }
+    return {name: library.function(name, None, *types) for name, types in arguments.items()}
 
 
 def source() -> str:

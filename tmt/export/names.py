@@ -51,9 +51,8 @@ class Names:
         self.mass, self.com, self.inertia = [], [], []
         for b, (name, body) in enumerate(zip(bodies, tree.body_names)):
             index, carrier = f"{{{b + 1}}}", tree.body_joint[b]
-            centre = (
-                f"centre of mass of {body} from {tree.joint_names[carrier] if carrier >= 0 else 'the world'}"
-            )
+            origin = tree.joint_names[carrier] if carrier >= 0 else "the world"
+            centre = f"centre of mass of {body} from {origin}"
             self.mass.append(self.symbol(tree.mass[b], f"m_{name}", f"m_{index}", "kg", f"mass of {body}"))
             self.com.append(self.vector(tree.com[b], f"c_{name}", f"c_{index}", "m", centre))
             self.inertia.append(self.tensor(b, name))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from tmt.arm import ARM
 from tmt.derivation.quantities import State
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.scalar import Rows, Scalar, Values
 from tmt.model.tree import Tree
 
 from .names import EPS, Names, Parameter, number
@@ -96,13 +96,14 @@ def derived(names: Names, quantities: Sequence[str], deadline: float, note: str)
         poly = ring.without_noise((ring.scalar(0) + scalar).poly, 0 if names.is_exact else NOISE)
         return forms.shortest(poly).xreplace({place: from_reference[i] for i, place in places.items()})
 
+    def column(entries: Values) -> Expression:
+        return sympy.Matrix([expression(entry) for entry in entries])
+
     state = State(names.mechanism(ring.scalar), variables)
     derivations: dict[str, Callable[[], Expression]] = {
         "mass_matrix": lambda: symmetric(state.mass_matrix, expression),
-        "gravity_balance": lambda: sympy.Matrix([expression(entry) for entry in state.gravity_balance]),
-        "bias": lambda: sympy.Matrix(
-            [expression(x) for x in coriolis(ring, state.mass_matrix, variables, names.qd)]
-        ),
+        "gravity_balance": lambda: column(state.gravity_balance),
+        "bias": lambda: column(coriolis(ring, state.mass_matrix, variables, names.qd)),
     }
     needed = {"gravity_balance", *quantities} if "bias" in quantities else {*quantities}
     entries = {name: derive() for name, derive in derivations.items() if name in needed}
@@ -116,7 +117,7 @@ def derived(names: Names, quantities: Sequence[str], deadline: float, note: str)
     return Symbolic(names.q, names.qd, *joints, parameters, names.named, entries, display, note)
 
 
-def symmetric(M: Sequence[Sequence[Scalar]], expression: Callable[[Scalar], Expression]) -> Expression:
+def symmetric(M: Rows, expression: Callable[[Scalar], Expression]) -> Expression:
     """A symmetric Matrix of the expressions of the entries on and above its diagonal."""
     import sympy
 
@@ -126,11 +127,8 @@ def symmetric(M: Sequence[Sequence[Scalar]], expression: Callable[[Scalar], Expr
 
 
 def coriolis(
-    ring: Ring,
-    mass_matrix: Sequence[Sequence[Scalar]],
-    q: Sequence[Angle | Trig],
-    speeds: Sequence[Expression],
-) -> list[Scalar]:
+    ring: Ring, mass_matrix: Rows, q: Sequence[Angle | Trig], speeds: Sequence[Expression]
+) -> Values:
     """The bias without gravity: sum over j, k of (dM_ij/dq_k - dM_jk/dq_i / 2) qd_j qd_k."""
     zero, n = ring.scalar(0), range(len(q))
     M = [[zero + entry for entry in row] for row in mass_matrix]

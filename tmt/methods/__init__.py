@@ -66,9 +66,8 @@ class AdaptiveRungeKutta(RungeKutta):
     the estimates e5 and e3 combine to e5^2 / sqrt(e5^2 + 0.01 e3^2) (Hairer, Norsett, Wanner, section II.10).
     """
 
-    errors: tuple[
-        Numbers, ...
-    ] = ()  # weights of the stages in the two estimates, of the movement and of the speeds
+    # weights of the stages in the two estimates, of the movement and of the speeds
+    errors: tuple[Numbers, ...] = ()
 
     adaptive = True
 

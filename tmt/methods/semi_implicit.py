@@ -47,9 +47,8 @@ class SemiImplicitEuler(Method):
     def held(self, tree: Tree) -> tuple[Gains, Gains]:
         """All that acts implicitly, as stiffness and as damping, (nv, nv) each."""
         n = len(tree.axis)
-        stiffness = (
-            by_speed(tree, tree.stiffness) if self.implicit_springs and tree.has_springs else [0.0] * n
-        )
+        has_stiffness = self.implicit_springs and tree.has_springs
+        stiffness = by_speed(tree, tree.stiffness) if has_stiffness else [0.0] * n
         position_gain, speed_gain = self.gains_held(tree)
         return with_diagonal(position_gain, stiffness), with_diagonal(speed_gain, tree.damping)
 
@@ -73,10 +72,10 @@ class SemiImplicitEuler(Method):
 
 def with_diagonal(gains: Gains, diagonal: Sequence[float]) -> Gains:
     """A matrix of gains, if there are any, with these numbers added on its diagonal."""
-    rows = gains or [[0.0] * len(diagonal) for _ in diagonal]
-    return [
-        [x + d if i == j else x for j, x in enumerate(row)] for i, (row, d) in enumerate(zip(rows, diagonal))
-    ]
+    rows = [list(row) for row in gains] or [[0.0] * len(diagonal) for _ in diagonal]
+    for i, x in enumerate(diagonal):
+        rows[i][i] += x
+    return rows
 
 
 def by_speed(tree: Tree, of_joints: Iterable[T]) -> list[T]:

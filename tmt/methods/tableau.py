@@ -25,9 +25,8 @@ class Tableau(Method):
 
     def __post_init__(self) -> None:
         if type(self.order) is not int or not 1 <= self.order <= 100:
-            raise ValueError(
-                f"order of the method is {shown(self.order)}; a whole number from 1 to 100 is expected"
-            )
+            expected = "a whole number from 1 to 100 is expected"
+            raise ValueError(f"order of the method is {shown(self.order)}; {expected}")
         self.make_plain("A", "b", "c")
         if not len(self.A) == len(self.b) == len(self.c):
             raise ValueError("A, b and c must have one entry for each stage")

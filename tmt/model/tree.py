@@ -217,9 +217,8 @@ def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows[float]:
 
 def _check_ball(i: int, axes: NDArray[np.float64], reference: float, rest: Numbers[float]) -> None:
     if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0.0:
-        raise ValueError(
-            f"the axes of joint {i}, a ball, are {axes.tolist()}; a right-handed frame is expected"
-        )
+        expected = "a right-handed frame is expected"
+        raise ValueError(f"the axes of joint {i}, a ball, are {axes.tolist()}; {expected}")
     if reference:
         raise ValueError(f"Tree.reference[{i}] is {reference:g}; 0 is expected of a ball")
     if abs(math.hypot(*rest) - 1.0) > CLOSE_TO_ONE:
@@ -242,7 +241,5 @@ def _check_inertia(name: str, inertia: NDArray[np.float64]) -> None:
         raise ValueError(f"the inertia of {name!r} is not symmetric: {inertia.tolist()}")
     a, b, c = np.linalg.eigvalsh(inertia)
     if a + b < c - 1e-12 * scale:  # as b is at most c, this finds an a below 0 too
-        raise ValueError(
-            f"the inertia of {name!r} has principal values {a:g}, {b:g}, {c:g}; "
-            "each must be at least 0 and none larger than the other two together"
-        )
+        expected = "each must be at least 0 and none larger than the other two together"
+        raise ValueError(f"the inertia of {name!r} has principal values {a:g}, {b:g}, {c:g}; {expected}")
