@@ -27,10 +27,7 @@ all_answers: dict[int, "Answers"] = {}
 
 
 def answered(quantity: str, model: Tree, *arguments: ArrayLike) -> Any:
-    """The quantity of states of any batch shape: what the function of that name in literal.py returns.
-
-    arguments: q, or q and qd, or q, qd and tau, as that function takes them.
-    """
+    """The quantity of states of any batch shape, given as the function in literal.py takes them."""
     answers = all_answers.get(id(model))
     if answers is None and isinstance(model, Tree):
         answers = answers_of(model)

@@ -212,10 +212,7 @@ def cause(tree: Tree, code: int, q: np.ndarray, qd: np.ndarray, dt: float) -> in
 
 
 def singular_step(tree: Tree, q: Array, qd: Array, every: int, between: Between | None, run: int) -> Place:
-    """The first step of a run after which Mbar is singular, as far as `singular_in` looks, and the words for it.
-
-    Where each so-manyth state is kept alone it also looks at those before the last record and where the rates change most.
-    """
+    """The first step after which Mbar is singular, and why; between records as well, where it would show."""
     place = singular_in(tree, q, qd)
     places = [(place[0] * every, place[1])] if place else []
     if between and every > 1:
@@ -227,10 +224,7 @@ def singular_step(tree: Tree, q: Array, qd: Array, every: int, between: Between 
 
 
 def singular_in(tree: Tree, q: Array, qd: Array) -> Place:
-    """The first state of a run at which Mbar is singular, among those where it would show; and the words for it.
-
-    They are its start, its last, and the one before the largest change of the rates.
-    """
+    """The first of start, last state and that before the largest change of rates where Mbar is singular; why."""
     alive = int(np.isfinite(q[:, 0]).sum())
     records = np.unique([0, alive - 1, fastest_change(qd[:alive])])
     place = singular.first(tree, q[records])

@@ -218,10 +218,7 @@ def squares(state: Value, result: Value, first: int, scales: list[int | None], t
 
 
 def residual(tree: Tree, stepping: Any, joints: Joints, linear: bool) -> Traced:
-    """What accelerations a of the stages leave of their equations, and its derivative along da: (q, qd, tau, dt, a, da).
-
-    linear: of the equations made linear at (q, qd).
-    """
+    """What accelerations a of the stages leave of their equations (or linear ones), and the derivative along da."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
     def function(q: Values, qd: Values, tau: Values, dt: Values, a: Values, da: Values) -> Values:

@@ -123,10 +123,7 @@ def check_own(path: Path, on_the_way: bool = False) -> None:
 
 
 def private(path: Path, group: int) -> bool:
-    """Whether the group of a path is the user's own, without other members, as many systems make one for each user.
-
-    Where there are further access rights the group's bits stand for those.
-    """
+    """Whether the group of a path is the user's own, without other members and without further rights."""
     import grp  # POSIX only
     import pwd
 

@@ -167,11 +167,7 @@ def motions(tree: AnyTree, placements: list[tuple[Vector, Matrix]], qd: Scalars)
 def mass_matrix_and_bias(
     tree: AnyTree, q: Scalars, qd: Scalars, number: Callable[..., Scalar] = float
 ) -> tuple[list[list[Scalar]], list[Scalar]]:
-    """Mbar (nv rows of nv, kg m2) and h (nv, N m), as in method.py; over any scalar.
-
-    q (nq), qd (nv): sequences of scalars, rad and rad/s. number: the type of the model's numbers, float or
-    mpmath.mpf; each is the exact value, rounded once.
-    """
+    """Mbar and h, as in method.py; number: float or mpmath.mpf, to which what is exact is rounded once."""
     n, joints = len(tree.axis), tree.coordinates.joints
     axes = [Vector(*axis) for axis in tree.axis]
     placements = [(origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)) for i in range(len(joints))]

@@ -16,10 +16,7 @@ from .vectors import ZERO, Scalars, solve
 
 
 class State:
-    """A state of a tree, and what follows from it: each part once.
-
-    q (nq), qd, tau (nv): sequences of scalars; at rest and without torque where they are not given.
-    """
+    """A state of a tree, by default at rest and without torque, and what follows from it: each part once."""
 
     def __init__(self, tree: AnyTree, q: Scalars, qd: Scalars | None = None, tau: Scalars | None = None):
         nothing = [0.0] * len(tree.axis)

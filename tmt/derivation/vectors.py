@@ -154,10 +154,7 @@ def solve(matrix: Sequence[Scalars], right: Scalars) -> Values:
 
 
 def solve_any(matrix: Sequence[Scalars], right: Scalars) -> Values:
-    """Solution x of `matrix` x = `right` for any matrix that needs no pivots, given by rows: L U.
-
-    MuJoCo's implicit integrator factorises its unsymmetric matrix without pivots too.
-    """
+    """Solution x of `matrix` x = `right`, any by rows, by L U without pivots, as MuJoCo's implicit has it."""
     n = len(right)
     upper, x = [list(row) for row in matrix], list(right)
     for k in range(n):

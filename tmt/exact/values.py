@@ -19,9 +19,8 @@ FIELDS = {name: quantity.parts or (name,) for name, quantity in QUANTITIES.items
 def exact(tree: Tree, q: Sequence[float], qd: Sequence[float], tau: Sequence[float]) -> SimpleNamespace:
     """Every TMT quantity at one state, from the same source as the floats, with 50 digits, by its name.
 
-    q (nq,), qd, tau (nv,): rad, rad/s, N m. The numbers of the tree and of the state are taken as what their
-    doubles are exactly; 0.1 means 0.1000000000000000055511151231257827... Each is an object array of mpmath numbers, of which
-    names, shapes and units are as in `tmt`; a quantity of several arrays has each by its own name.
+    q (nq,), qd, tau (nv,): rad, rad/s, N m. Numbers are taken as what their doubles are exactly. Each is an
+    object array of mpmath numbers, with shape and unit as in `tmt`; of several arrays each has its own name.
     """
     with mpmath.workdps(DIGITS):
         q, qd, tau = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd, tau))

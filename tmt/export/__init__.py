@@ -4,7 +4,6 @@ import hashlib
 import keyword
 import re
 from collections.abc import Callable, Sequence
-from functools import lru_cache
 from textwrap import wrap
 from typing import Any
 
@@ -23,7 +22,6 @@ LANGUAGES: dict[str, Callable[[Program], str]] = {
 SYMBOLIC: dict[str, Callable[[symbols.Symbolic, Sequence[str]], str]] = {
     "latex": latex.latex, "html": page.page, "sympy": symbols.python_source,
 }  # fmt: skip
-OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
 UNITS = {
     "hinge": "rad, rad/s, N m",
     "slide": "m, m/s, N",
@@ -51,7 +49,7 @@ def text(
     known = [*LANGUAGES, *SYMBOLIC]
     if not isinstance(language, str) or language not in known:
         raise ValueError(f"language is {shown(language)}; expected one of {', '.join(known)}")
-    chosen = checked_quantities(quantities, OF_SYMBOLS if language in SYMBOLIC else tuple(QUANTITIES))
+    chosen = checked_quantities(quantities, symbols.QUANTITIES if language in SYMBOLIC else tuple(QUANTITIES))
     if not isinstance(head, list | tuple) or not all(isinstance(line, str) for line in head):
         raise ValueError(f"head is {shown(head)}; a sequence of lines is expected")
     is_name = isinstance(name, str) and re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name)
@@ -64,7 +62,7 @@ def text(
     lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
     if language in SYMBOLIC:
-        return SYMBOLIC[language](symbols_of(model, chosen), lines)
+        return SYMBOLIC[language](symbols.symbolic(model, chosen), lines)
     functions = [function_of(model, quantity) for quantity in dict.fromkeys(chosen)]
     return LANGUAGES[language](Program(name, lines, functions, single))
 
@@ -77,11 +75,6 @@ def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ..
         what = wrong[0] if wrong else ()
         raise ValueError(f"quantity is {shown(what)}; expected some of {', '.join(choices)}")
     return chosen
-
-
-@lru_cache(maxsize=4)
-def symbols_of(model: Tree, quantities: tuple[str, ...]) -> symbols.Symbolic:
-    return symbols.symbolic(model, quantities)
 
 
 def is_word(name: str) -> bool:

@@ -31,10 +31,7 @@ MOTION = r"M(q)\,\ddot{q} + h(q, \dot{q}) = \tau - D\,\dot{q} - K (q - q_0)"
 
 
 def latex(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
-    """A LaTeX document (article, amsmath): symbols in words, a table of parameters, then each quantity.
-
-    head_lines: lines of text, such as where the equations are from; they are comments at the top.
-    """
+    """A LaTeX document (article, amsmath): head_lines as comments, symbols, parameters, each quantity."""
     equations = []
     for section in sections(symbolic):
         equations.append(rf"\medskip\textbf{{{escaped(section.heading)}}}")

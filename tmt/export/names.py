@@ -33,10 +33,8 @@ class Parameter(NamedTuple):
 class Names:
     """Symbols of a Tree's joints and numbers.
 
-    parameters: {symbol: Parameter}, {} where numbers are not `named`.
-    Masses, centres of mass and inertias are named after their body, armatures after their joint, offsets l_1,
-    l_2 and so on. display: {symbol: LaTeX}, with the number of the body or joint in place of its name.
-    joints: what each q is, in words.
+    parameters: {symbol: Parameter}, {} where numbers are not `named`. display: {symbol: LaTeX}, with
+    the number of the body or joint in place of its name. joints: what each q is, in words.
     """
 
     def __init__(self, tree: Tree, named: bool):

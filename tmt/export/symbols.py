@@ -3,6 +3,7 @@
 import operator
 import time
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 from tmt.arm import ARM
@@ -26,10 +27,8 @@ NOISE = 1e-16  # of the largest coefficient of an entry: left over where terms c
 class Symbolic(NamedTuple):
     """Equations of a Tree in SymPy.
 
-    q, qd: symbols of the joints and their speeds, in order. joint_names: as the Tree has them. joints: what
-    each q is, in words. parameters: {symbol: (value, unit, meaning)}; {} where all numbers are in the
-    expressions, then `named` is False. entries: {quantity: Matrix}. display: {symbol: LaTeX}. note: "", or
-    why parameters have no names.
+    parameters: {symbol: (value, unit, meaning)}; {} where numbers are in the expressions (`named` is False).
+    entries: {quantity: Matrix}. display: {symbol: LaTeX}. note: "", or why parameters have no names.
     """
 
     q: list[Expression]
@@ -43,14 +42,14 @@ class Symbolic(NamedTuple):
     note: str
 
 
+@lru_cache(maxsize=4)  # one for all files
 def symbolic(
-    tree: Tree = ARM, quantities: Sequence[str] = QUANTITIES, seconds: float = 60.0, named: bool = True
+    tree: Tree = ARM, quantities: tuple[str, ...] = QUANTITIES, seconds: float = 60.0, named: bool = True
 ) -> Symbolic:
     """Mbar, h and the torque that balances gravity of a Tree of hinges and slides, simplified.
 
-    quantities: some of QUANTITIES. seconds: the time that it may take; parameters that have no names by half
-    of it are numbers. Raises ValueError for a ball, an unknown quantity, without SymPy, and where it takes
-    longer.
+    seconds: the time that it may take; parameters that have no names by half of it are numbers. Raises
+    ValueError for a ball, an unknown quantity, without SymPy, and where it takes longer.
     """
     try:
         import sympy  # noqa: F401
@@ -159,8 +158,7 @@ def parallel_hinges(tree: Tree) -> dict[int, tuple[int, int]]:
 def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     """Python text with SymPy: symbols, `parameters` {symbol: value}, matrices M, h and G.
 
-    mass_matrix, bias and gravity are pairs of a matrix with numbers and the list of its symbols, as
-    compare.assert_agrees and --reference take them. head_lines: lines of text, which become comments.
+    mass_matrix, bias and gravity are pairs of a matrix with numbers and the list of its symbols.
     """
     from sympy.printing.str import StrPrinter
 

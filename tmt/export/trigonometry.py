@@ -22,11 +22,7 @@ class TooLong(Exception):
 
 
 class Ring:
-    """Polynomials in SymPy symbols and in sines and cosines of n angles, until a deadline (time.monotonic).
-
-    exact: whether coefficients are rational; else they have PRECISION bits. functions: the ring of sines and
-    cosines alone.
-    """
+    """Polynomials in symbols, sines and cosines of n angles, until a deadline; exact: rational coefficients."""
 
     def __init__(self, symbols: Sequence[Expression], n: int, exact: bool, deadline: float):
         from sympy import QQ, Dummy, RealField

@@ -25,11 +25,10 @@ Slopes = tuple[list[Values], list[Values]]  # of all stages: rates of the moveme
 
 @dataclass(frozen=True)
 class RungeKutta(Tableau):
-    """An explicit Runge-Kutta method, given by its Butcher tableau.
+    """An explicit Runge-Kutta method, by its Butcher tableau; ValueError if that is none, or not explicit.
 
     Applied to (q, qd) as one first-order system, like MuJoCo's RK4; to balls as Munthe-Kaas does, who keeps the order: what is
-    integrated is the movement from the start of the step. Raises ValueError if the tableau is not explicit, a row of A does not
-    sum to c, or b does not sum to 1.
+    integrated is the movement from the start of the step.
     """
 
     # balls turn by the weighted mean of their speeds, as MuJoCo's RK4 up to 3.17: then of order 2

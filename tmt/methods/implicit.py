@@ -29,10 +29,7 @@ CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size:
 
 @dataclass(frozen=True)
 class ImplicitRungeKutta(Tableau):
-    """An implicit Runge-Kutta method, given by its Butcher tableau, applied to (q, qd) as one first-order system.
-
-    Raises ValueError if A is not square, a row of A does not sum to c, or b does not sum to 1.
-    """
+    """An implicit Runge-Kutta method, by its Butcher tableau, applied to (q, qd) as one first-order system."""
 
     solves_stages = True
 
@@ -45,10 +42,7 @@ class ImplicitRungeKutta(Tableau):
         return len(self.b)
 
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
-        """The state (q, qd) one dt later, on floats, arrays and dual numbers of them.
-
-        Raises ArithmeticError where Newton's method does not find the stages (a compiled run ends there).
-        """
+        """The state (q, qd) one dt later; ArithmeticError where Newton's method does not find the stages."""
 
         def linear(q_i: Values, qd_i: Values) -> Values:
             """The slope as it would be if it were linear, as at (q, qd)."""

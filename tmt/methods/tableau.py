@@ -13,10 +13,7 @@ Numbers = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Tableau(Method):
-    """A method that is given by its Butcher tableau, whose numbers are made plain floats.
-
-    Raises ValueError if an entry is no number, a row of A does not sum to c, or b does not sum to 1.
-    """
+    """A method given by its Butcher tableau; ValueError unless rows of A sum to c, and b to 1."""
 
     order: int = field()  # it must be given, though Method has a default
     A: tuple[Numbers, ...]  # row i: the weights in stage i, of the stages before it or of all

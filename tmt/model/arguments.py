@@ -3,12 +3,10 @@
 The line says what was given and what is accepted.
 """
 
-import functools
 import math
 import numbers
 import os
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,22 +17,6 @@ from .values import real_numbers, shown
 
 ALWAYS_FREE = 1e8  # B, that any machine has
 Array = NDArray[np.float64]
-Function = TypeVar("Function", bound=Callable[..., Any])
-
-
-def quantity(function: Function) -> Function:
-    """The function without NumPy's warnings, which no caller can place; ValueError where memory is short."""
-
-    @functools.wraps(function)
-    def evaluated(*arguments: Any, **named: Any) -> Any:
-        try:
-            with np.errstate(all="ignore"):
-                return function(*arguments, **named)
-        except MemoryError as error:
-            name = function.__name__
-            raise ValueError(f"{name} of these states does not fit into memory: {error}") from None
-
-    return cast(Function, evaluated)
 
 
 def states(model: Tree, **arrays: ArrayLike) -> list[list[Array]]:
