@@ -224,7 +224,7 @@ def singular_step(tree: Tree, q: Array, qd: Array, every: int, between: Between 
 
 
 def singular_in(tree: Tree, q: Array, qd: Array) -> Place:
-    """The first of start, last state and that before the largest change of rates where Mbar is singular; why."""
+    """The first of start, last and that before the largest change of rates where Mbar is singular; why."""
     alive = int(np.isfinite(q[:, 0]).sum())
     records = np.unique([0, alive - 1, fastest_change(qd[:alive])])
     place = singular.first(tree, q[records])

@@ -218,7 +218,7 @@ def squares(state: Value, result: Value, first: int, scales: list[int | None], t
 
 
 def residual(tree: Tree, stepping: Any, joints: Joints, linear: bool) -> Traced:
-    """What accelerations a of the stages leave of their equations (or linear ones), and the derivative along da."""
+    """What accelerations a of the stages leave of their equations (or linear ones), and its derivative by da."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
     def function(q: Values, qd: Values, tau: Values, dt: Values, a: Values, da: Values) -> Values:

@@ -13,15 +13,14 @@ from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree, stated
 from tmt.model.values import shown
 
-from . import c, latex, matlab, page, python, symbols
+from . import c, matlab, python
 from .statements import Function, Program
 
 LANGUAGES: dict[str, Callable[[Program], str]] = {
     "c": c.source, "c header": c.header, "python": python.source, "matlab": matlab.source,
 }  # fmt: skip
-SYMBOLIC: dict[str, Callable[[symbols.Symbolic, Sequence[str]], str]] = {
-    "latex": latex.latex, "html": page.page, "sympy": symbols.python_source,
-}  # fmt: skip
+SYMBOLIC = "latex", "html", "sympy"
+OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
 UNITS = {
     "hinge": "rad, rad/s, N m",
     "slide": "m, m/s, N",
@@ -49,7 +48,7 @@ def text(
     known = [*LANGUAGES, *SYMBOLIC]
     if not isinstance(language, str) or language not in known:
         raise ValueError(f"language is {shown(language)}; expected one of {', '.join(known)}")
-    chosen = checked_quantities(quantities, symbols.QUANTITIES if language in SYMBOLIC else tuple(QUANTITIES))
+    chosen = checked_quantities(quantities, OF_SYMBOLS if language in SYMBOLIC else tuple(QUANTITIES))
     if not isinstance(head, list | tuple) or not all(isinstance(line, str) for line in head):
         raise ValueError(f"head is {shown(head)}; a sequence of lines is expected")
     is_name = isinstance(name, str) and re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name)
@@ -62,9 +61,18 @@ def text(
     lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
     if language in SYMBOLIC:
-        return SYMBOLIC[language](symbols.symbolic(model, chosen), lines)
+        return symbolic_text(model, language, chosen, lines)
     functions = [function_of(model, quantity) for quantity in dict.fromkeys(chosen)]
     return LANGUAGES[language](Program(name, lines, functions, single))
+
+
+def symbolic_text(model: Tree, language: str, quantities: tuple[str, ...], head: Sequence[str]) -> str:
+    try:
+        from . import latex, page, symbols
+    except ImportError:
+        raise ValueError("symbolic equations need SymPy: pip install sympy") from None
+    writers = {"latex": latex.latex, "html": page.page, "sympy": symbols.python_source}
+    return writers[language](symbols.symbolic(model, quantities), head)
 
 
 def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ...]:

@@ -4,6 +4,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+import sympy
+
 from .symbols import TITLES, Symbolic
 from .trigonometry import Expression
 
@@ -19,6 +21,7 @@ class Token(NamedTuple):
 
 
 Formula = list[Token]
+Row = tuple[str, ...]
 
 
 class Section(NamedTuple):
@@ -98,7 +101,6 @@ def tokens(expression: Expression, display: Mapping[Expression, str]) -> Formula
 
 def sum_of(terms: Sequence[Expression], display: Mapping[Expression, str]) -> Formula:
     """Terms with their signs: those without a minus first, and short ones before long ones."""
-    import sympy
 
     def rank(term: Expression) -> tuple[bool, bool, int, list[int]]:
         return is_negative(term), term.has(sympy.sin, sympy.cos), term.count_ops(), order(term, display)
@@ -143,12 +145,10 @@ def width(formula: Formula) -> int:
     return sum(len(re.sub(r"\\(dot|[a-z]+)|[{}_]", "x", token.text)) + len(token.power) for token in formula)
 
 
-def tables(symbolic: Symbolic) -> list[list[tuple[str, ...]]]:
+def tables(symbolic: Symbolic) -> list[list[Row]]:
     """Rows of joints (symbol, meaning), and of parameters (symbol, value, unit, meaning); no empty table."""
-    joints: list[tuple[str, ...]] = [
-        (symbolic.display[q], text) for q, text in zip(symbolic.q, symbolic.joints)
-    ]
-    parameters: list[tuple[str, ...]] = [
+    joints: list[Row] = [(symbolic.display[q], text) for q, text in zip(symbolic.q, symbolic.joints)]
+    parameters: list[Row] = [
         (symbolic.display[symbol], f"{row.value:.6g}", row.unit.replace("2", "²"), row.meaning)
         for symbol, row in symbolic.parameters.items()
     ]

@@ -6,6 +6,9 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
+import sympy
+from sympy.printing.str import StrPrinter
+
 from tmt.arm import ARM
 from tmt.derivation.quantities import State
 from tmt.derivation.scalar import Rows, Scalar, Values
@@ -49,12 +52,8 @@ def symbolic(
     """Mbar, h and the torque that balances gravity of a Tree of hinges and slides, simplified.
 
     seconds: the time that it may take; parameters that have no names by half of it are numbers. Raises
-    ValueError for a ball, an unknown quantity, without SymPy, and where it takes longer.
+    ValueError for a ball, an unknown quantity, and where it takes longer.
     """
-    try:
-        import sympy  # noqa: F401
-    except ImportError:
-        raise ValueError("symbolic equations need SymPy: pip install sympy") from None
     if unknown := [name for name in quantities if name not in QUANTITIES]:
         raise ValueError(f"unknown quantity {unknown[0]!r}; known: {', '.join(QUANTITIES)}")
     for name, kind in zip(tree.joint_names, tree.kind):
@@ -75,8 +74,6 @@ def symbolic(
 
 def derived(names: Names, quantities: Sequence[str], deadline: float, note: str) -> Symbolic:
     """The equations with the parameters that `names` has; TooLong at the deadline."""
-    import sympy
-
     tree = names.source
     places = {i: sympy.Dummy() for i, kind in enumerate(tree.kind) if kind == "slide"}
     hinges = [i for i, kind in enumerate(tree.kind) if kind == "hinge"]
@@ -118,8 +115,6 @@ def derived(names: Names, quantities: Sequence[str], deadline: float, note: str)
 
 def symmetric(M: Rows, expression: Callable[[Scalar], Expression]) -> Expression:
     """A symmetric Matrix of the expressions of the entries on and above its diagonal."""
-    import sympy
-
     n = range(len(M))
     upper = {(i, j): expression(M[i][j]) for i in n for j in n if i <= j}
     return sympy.Matrix([[upper[min(i, j), max(i, j)] for j in n] for i in n])
@@ -155,17 +150,16 @@ def parallel_hinges(tree: Tree) -> dict[int, tuple[int, int]]:
     return found
 
 
+class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types
+    def _print_Float(self, expression: Expression) -> str:
+        return repr(float(expression))
+
+
 def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     """Python text with SymPy: symbols, `parameters` {symbol: value}, matrices M, h and G.
 
     mass_matrix, bias and gravity are pairs of a matrix with numbers and the list of its symbols.
     """
-    from sympy.printing.str import StrPrinter
-
-    class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types
-        def _print_Float(self, expression: Expression) -> str:
-            return repr(float(expression))
-
     printed = Printer().doprint
     q, qd = (list(map(str, symbols)) for symbols in (symbolic.q, symbolic.qd))
     lines = [

@@ -29,7 +29,7 @@ CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size:
 
 @dataclass(frozen=True)
 class ImplicitRungeKutta(Tableau):
-    """An implicit Runge-Kutta method, by its Butcher tableau, applied to (q, qd) as one first-order system."""
+    """An implicit Runge-Kutta method, by its Butcher tableau, of (q, qd) as one first-order system."""
 
     solves_stages = True
 
