@@ -60,10 +60,7 @@ def check_regular(tree: Tree, state: State, batch: tuple[int, ...]) -> None:
 
 
 def gather(nested: Scalar, batch: tuple[int, ...], overflow: float | None = None) -> np.ndarray:
-    """Nested iterables of scalars, each of the batch shape or constant, as one array with that shape in front.
-
-    overflow: what stands for what is not finite, since all that was given is; None: it is a ValueError.
-    """
+    """Nested scalars as an array, the batch shape in front; overflow: what is not finite is that, or an error."""
 
     def lists(item: Scalar) -> Scalar:
         is_scalar = isinstance(item, (float, np.ndarray))

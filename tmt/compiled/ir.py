@@ -165,10 +165,7 @@ class Variable:
 
 
 class Code:
-    """The lines of one function.
-
-    arguments: {name: kind}; `self[name]` is the value. attributes: LLVM's, such as "alwaysinline", of a function for others here.
-    """
+    """The lines of one function; `self[name]` is an argument; attributes: LLVM's, of one for others here."""
 
     def __init__(self, name: str, arguments: Mapping[str, str], result: str = "void", attributes: str = ""):
         self.name, self.arguments, self.result, self.attributes = name, arguments, result, attributes

@@ -33,10 +33,7 @@ LEAVES = ("input", "number")
 
 
 class Tape:
-    """The expressions of one trace, each kept once, in an order in which they can be computed.
-
-    number: the type of the model's numbers: float, or an exact one that can be made from a float.
-    """
+    """The expressions of one trace, each once, in order of computation; number: float, or an exact type."""
 
     def __init__(self, number: Callable[[Scalar], Scalar] = float):
         self.number_type = number

@@ -108,7 +108,11 @@ class Coordinates(NamedTuple):
 
     @staticmethod
     def logarithm(p: Scalars) -> list[Scalar]:
-        return logarithm(p)
+        """The movement u, |u| at most pi rad, with exponential(u) = p or -p; |p| = 1."""
+        w, x, y, z = p
+        size, length = sqrt(w * w + TINY), sqrt(x * x + y * y + z * z + TINY)
+        share = arctan(length / (1.0 + size)) * 4.0 / length * (w / size)
+        return [x * share, y * share, z * share]
 
     def tangent(self, q: Scalars, dq: Scalars) -> list[Scalar]:
         """The movement that changes q by small dq, linear in dq."""
@@ -160,11 +164,3 @@ def exponential(u: Scalars) -> list[Scalar]:
     half = sqrt(x * x + y * y + z * z + TINY) * 0.5
     share = sin(half) / half * 0.5
     return [cos(half), x * share, y * share, z * share]
-
-
-def logarithm(p: Scalars) -> list[Scalar]:
-    """The movement u, |u| at most pi rad, with exponential(u) = p or -p; |p| = 1."""
-    w, x, y, z = p
-    size, length = sqrt(w * w + TINY), sqrt(x * x + y * y + z * z + TINY)
-    share = arctan(length / (1.0 + size)) * 4.0 / length * (w / size)
-    return [x * share, y * share, z * share]

@@ -7,13 +7,9 @@ import mpmath
 from tmt.derivation.coordinates import Coordinates, normalized
 from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.scalar import Scalar
-from tmt.derivation.vectors import Vector, sqrt
+from tmt.derivation.vectors import Scalars, Vector, sqrt
 from tmt.model.tree import Tree
 
-NUMBERS = (
-    "offset", "damping", "mass", "com", "inertia", "gravity", "armature", "stiffness", "rest", "reference",
-    "position_gain", "speed_gain",
-)  # fmt: skip
 HALVINGS = 4  # of a turn of at most pi rad: then the sine of its half is below 0.1
 with mpmath.workdps(60):  # arcsin x = x (1 + x^2 / 6 + ...), the highest first; the next is below 1e-37
     ARC_SINE = [mpmath.binomial(2 * k, k) / (4**k * (2 * k + 1)) for k in reversed(range(18))]
@@ -35,7 +31,9 @@ def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> ExactTree:
     """
 
     def lifted(value: Scalar) -> Scalar:
-        return tuple(map(lifted, value)) if isinstance(value, tuple) else number(value)
+        if isinstance(value, tuple):
+            return tuple(map(lifted, value))
+        return number(value) if isinstance(value, float) else value
 
     axis: list[Vector] = []
     for joint in tree.coordinates.joints:
@@ -45,9 +43,9 @@ def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> ExactTree:
         if joint.kind == "ball":
             y = _unit(more[0] - x * x.dot(more[0]))
             axis += [y, x.cross(y)]
-    numbers = {name: lifted(getattr(tree, name)) for name in NUMBERS}
-    numbers["rest"] = tuple(of_length_1(tree.coordinates, numbers["rest"]))
-    return ExactTree(**vars(tree) | numbers | {"axis": tuple(map(tuple, axis))})
+    numbers = {name: lifted(value) for name, value in vars(tree).items()}
+    rest = tuple(of_length_1(tree.coordinates, numbers["rest"]))
+    return ExactTree(**numbers | {"axis": tuple(map(tuple, axis)), "rest": rest})
 
 
 def _unit(vector: Vector) -> Vector:
@@ -62,24 +60,20 @@ def of_length_1(coordinates: Coordinates, q: Iterable[Scalar]) -> list[Scalar]:
     return position
 
 
-def logarithm(p: Iterable[Scalar]) -> list[Scalar]:
-    """coordinates.logarithm without a root of what vanishes: the turn is halved until a series of the arc sine takes it."""
-    w, *v = p
-    cosine = sqrt(w * w)
-    scale = w / cosine
-    for _ in range(HALVINGS):
-        cosine = sqrt((cosine + 1.0) / 2.0)
-        scale = scale / (cosine * 2.0)
-    v = Vector(*v) * scale
-    square, share = v.dot(v), 0.0
-    for factor in ARC_SINE:
-        share = share * square + factor
-    return list(v * (share * 2.0 ** (HALVINGS + 1)))
-
-
 class Analytic(Coordinates):
     """Coordinates whose `difference` of two quaternions of length 1 has derivatives where it is zero too."""
 
     @staticmethod
-    def logarithm(p: Iterable[Scalar]) -> list[Scalar]:
-        return logarithm(p)
+    def logarithm(p: Scalars) -> list[Scalar]:
+        """Without a root of what vanishes: the turn is halved until a series of the arc sine takes it."""
+        w, *v = p
+        cosine = sqrt(w * w)
+        scale = w / cosine
+        for _ in range(HALVINGS):
+            cosine = sqrt((cosine + 1.0) / 2.0)
+            scale = scale / (cosine * 2.0)
+        v = Vector(*v) * scale
+        square, share = v.dot(v), 0.0
+        for factor in ARC_SINE:
+            share = share * square + factor
+        return list(v * (share * 2.0 ** (HALVINGS + 1)))

@@ -95,7 +95,7 @@ def conventions(model: Tree) -> list[str]:
     lines = [
         *CONVENTIONS.splitlines(),
         *wrap(f"{sizes}: {', '.join(model.body_names)}.", 120),
-        f"Numbers of the model: sha256 {digest(model)}.",
+        f"Numbers of the model: sha256 {hashlib.sha256(stated(model).encode()).hexdigest()[:16]}.",
         "Joint, kind, place in q, place in qd and tau (from 0); units of q, qd, tau:",
     ]
     for name, joint in zip(model.joint_names, coordinates.joints):
@@ -106,10 +106,6 @@ def conventions(model: Tree) -> list[str]:
 def places(part: slice) -> str:
     """The first and the last number of a part of q or qd."""
     return f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}"
-
-
-def digest(model: Tree) -> str:
-    return hashlib.sha256(stated(model).encode()).hexdigest()[:16]
 
 
 def function_of(model: Tree, name: str) -> Function:

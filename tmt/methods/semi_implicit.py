@@ -81,7 +81,7 @@ def with_diagonal(gains: Gains, diagonal: Sequence[float]) -> Gains:
 def by_speed(tree: Tree, of_joints: Iterable[T]) -> list[T]:
     """For each speed the value of its joint."""
     pairs = zip(of_joints, tree.coordinates.joints)
-    return [value for value, joint in pairs for _ in range(joint.qd.start, joint.qd.stop)]
+    return [value for value, joint in pairs for _ in joint.speeds]
 
 
 def weighted(row: Sequence[float], values: Sequence[Scalar]) -> Scalar:
