@@ -63,8 +63,9 @@ def gather(nested: Scalar, batch: tuple[int, ...], overflow: float | None = None
     """Nested scalars as an array, the batch shape in front; overflow: what is not finite is that, or an error."""
 
     def lists(item: Scalar) -> Scalar:
-        is_scalar = isinstance(item, (float, np.ndarray))
-        return np.broadcast_to(item, batch) if is_scalar else [lists(part) for part in item]
+        if isinstance(item, (float, np.ndarray)):
+            return np.broadcast_to(item, batch) if batch else item
+        return [lists(part) for part in item]
 
     array = np.array(lists(nested), dtype=float)
     finite = np.isfinite(array)

@@ -76,8 +76,10 @@ class Runner:
                 array[:] = filled[:-missing]
 
         threads = cores() if count > width and steps * count * self.stepping.stages > SPREAD else 1
-        parts = min(count // width, PIECES * threads) if threads > 1 else 1
-        in_threads(follow_some, count, parts, width, threads)
+        if threads == 1:
+            follow_some(slice(count))
+        else:
+            in_threads(follow_some, count, min(count // width, PIECES * threads), width, threads)
         return self.outcome(q, qd, info, every)
 
     def outcome(self, q: Array, qd: Array, info: Array, every: int = 1) -> Outcome:

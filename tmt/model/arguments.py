@@ -54,9 +54,10 @@ def _state(model: Tree, name: str, values: ArrayLike) -> Array:
 
 
 def _check_quaternions(model: Tree, q: Array) -> None:
-    places = dict(zip(model.joint_names, model.coordinates.joints))
-    for name in [name for name, joint in places.items() if joint.kind == "ball"]:
-        quaternions = q[..., places[name].q].reshape(-1, 4)
+    for name, joint in zip(model.joint_names, model.coordinates.joints):
+        if joint.kind != "ball":
+            continue
+        quaternions = q[..., joint.q].reshape(-1, 4)
         off = np.abs(np.linalg.norm(quaternions, axis=-1) - 1.0)
         if off.size and off.max() > CLOSE_TO_ONE:
             expected = "a quaternion w, x, y, z of length 1 is expected"
