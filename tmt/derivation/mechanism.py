@@ -72,10 +72,9 @@ AnyTree = Mechanism[Scalar]
 
 def origin_in_parent(tree: AnyTree, i: int, q: Scalars) -> Vector:
     """Origin of joint i's frame in its parent's, at the position q of the tree (nq,)."""
-    offset = Vector(*tree.offset[i])
-    if tree.kind[i] != "slide":
+    joint, offset = tree.coordinates.joints[i], Vector(*tree.offset[i])
+    if joint.kind != "slide":
         return offset
-    joint = tree.coordinates.joints[i]
     return offset + Vector(*tree.axis[joint.qd.start]) * (q[joint.q.start] - tree.reference[i])
 
 
