@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tmt.arm import ARM
-from tmt.compiled.runner import Outcome, runner_of
+from tmt.compiled.runner import Ended, runner_of
 from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED
 from tmt.model import arguments, singular
 from tmt.model.tree import Tree
@@ -152,9 +152,7 @@ def starts(model: Tree, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
     return batch, *(np.stack(part, axis=-1).reshape(math.prod(batch), len(part)) for part in state)
 
 
-def by_series(
-    tree: Tree, q: Array, qd: Array, tau: Array, dt: float, every: int, tolerance: float
-) -> Outcome:
+def by_series(tree: Tree, q: Array, qd: Array, tau: Array, dt: float, every: int, tolerance: float) -> Ended:
     """Write the true motions to the paths (runs, records, nq and nv), which hold the starts: why each ended, and the steps."""
     from tmt.exact.motion import followed  # here, so that `import tmt` need not wait for it
 

@@ -59,7 +59,6 @@ class Evaluator:
         return self.scalar.function("one", WHOLE, *[ctypes.c_char_p] * 3, POINTER, keeps_lock=True)
 
     def loop(self, wide: bool) -> Callable[..., int]:
-        """The function for many states, one at a time or as many as fill a register."""
         if wide not in self.loops:
             from .machine import lanes
 

@@ -10,8 +10,8 @@ from tmt.derivation import articulated, composite
 from tmt.derivation.dual import seeded
 from tmt.derivation.method import Terms, reduced_force
 from tmt.derivation.quantities import QUANTITIES, State
-from tmt.derivation.scalar import Scalar
-from tmt.methods.dynamics import Dynamics, Implicit, Rows, Values, minus, plus
+from tmt.derivation.scalar import Rows, Scalar, Values
+from tmt.methods.dynamics import Dynamics, Held, Implicit, minus, plus
 from tmt.methods.stepping import Method
 from tmt.model.tree import Tree
 
@@ -37,9 +37,7 @@ class Traceable(Dynamics):
         super().__init__(form.mass_matrix_and_bias)
         self.n, self.by_bodies, self.has_used_bodies = len(tree.axis), by_bodies, False
 
-    def acceleration(
-        self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
-    ) -> Values:
+    def acceleration(self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Held = None) -> Values:
         if not self.by_bodies or (implicit and not acts_at_single_joints(implicit)):
             return super().acceleration(tree, q, qd, tau, implicit)
         self.has_used_bodies = True

@@ -17,7 +17,7 @@ SPREAD = 20_000  # evaluations of the dynamics from which several cores share th
 PIECES = 4  # for each core, as one of them may be busy with something else
 MOST = 64  # trees and methods whose compiled runs are held
 Array = np.ndarray
-Outcome = tuple[Array, int]
+Ended = tuple[Array, int]  # why each run ended, and the evaluations
 Call = Callable[[], None]
 DIRECT = ctypes.c_void_p
 ARGUMENTS = [DIRECT, DIRECT, DIRECT, ctypes.c_double, ctypes.c_double, DIRECT, *[ctypes.c_int64] * 3]
@@ -51,7 +51,7 @@ class Runner:
         sizes = every, arrays[0].shape[1], len(arrays[0])
         return partial(self.compiled(width), q, qd, tau, dt, tolerance, info, *sizes)
 
-    def follow(self, q: Array, qd: Array, tau: Array, dt: float, tolerance: float, every: int) -> Outcome:
+    def follow(self, q: Array, qd: Array, tau: Array, dt: float, tolerance: float, every: int) -> Ended:
         """Fill the paths, which hold each `every`-th state alone.
 
         Returns why each run ended, 0 where it did not, and after how many steps, (runs, 2); and the evaluations of the dynamics.
@@ -82,7 +82,7 @@ class Runner:
             in_threads(follow_some, count, min(count // width, PIECES * threads), width, threads)
         return self.outcome(q, qd, info, every)
 
-    def outcome(self, q: Array, qd: Array, info: Array, every: int = 1) -> Outcome:
+    def outcome(self, q: Array, qd: Array, info: Array, every: int = 1) -> Ended:
         """What `follow` returns, once compiled code has filled the paths and info."""
         steps, codes = (q.shape[1] - 1) * every, info[:, :2]
         taken = steps * len(q)

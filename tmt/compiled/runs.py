@@ -10,7 +10,8 @@ from typing import Any
 
 from tmt.derivation.coordinates import FLAT
 from tmt.derivation.dual import seeded
-from tmt.methods.dynamics import Values, minus, plus
+from tmt.derivation.scalar import Values
+from tmt.methods.dynamics import minus, plus
 from tmt.methods.implicit import CLOSE, ITERATIONS
 from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED, Joints
 from tmt.model.tree import Tree
@@ -89,7 +90,6 @@ class Step:
         return advance
 
     def adaptive(self) -> Advance:
-        """As many steps as the tolerance wants between two times."""
         nq, n, order = self.nq, self.n, self.stepping.order
         count = self.add_step("attempt")
         # of each component of an error: the number of the state in whose units it is; None: an angle of a turn

@@ -51,7 +51,6 @@ def source() -> str:
 
 
 def sincos_of_pair() -> Code:
-    """sincos(out, high, low): four doubles."""
     code = Code("sincos", {"out": POINTER, "high": DOUBLE, "low": DOUBLE}, attributes="noinline")
     for k, x in enumerate(sincos(code["high"], code["low"])):
         code["out"].store(x, k)

@@ -76,7 +76,6 @@ def symbolic_text(model: Tree, language: str, quantities: tuple[str, ...], head:
 
 
 def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ...]:
-    """The quantities, of which each must be one of the choices."""
     chosen = tuple(quantities) if isinstance(quantities, list | tuple) else (quantities,)
     wrong = [quantity for quantity in chosen if not isinstance(quantity, str) or quantity not in choices]
     if wrong or not chosen:

@@ -10,7 +10,6 @@ LEAST = 1.2e-38  # of floats: what keeps a root from zero must not become zero
 
 
 def source(program: Program) -> str:
-    """The source file: all functions, and what they need."""
     parts = [comment(program.head), "#include <math.h>"]
     parts += [f"{declared(program, f)}\n{{\n{body(f, program.single)}\n}}" for f in program.functions]
     return "\n\n".join(parts) + "\n"
@@ -51,7 +50,6 @@ def declared(program: Program, function: Function) -> str:
 
 
 def body(function: Function, single: bool) -> str:
-    """The lines of a function, whose results are written last."""
     used = {x for x, _ in function.used}
     lines = [f"(void){x};" for x in function.takes if x not in used]
     syntax = Syntax(

@@ -16,7 +16,6 @@ STATES = (
 
 
 def source(program: Program) -> str:
-    """The file: a function that is called with the name of a quantity."""
     lines = [f"function varargout = {program.name}(quantity, varargin)"]
     lines += [f"% {line}".rstrip() for line in [*program.head, "", STATES]]
     cases = []

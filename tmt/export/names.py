@@ -75,7 +75,6 @@ class Names:
             self.joints.append(words.format(name, direction(self.axes[i])))
 
     def named_offsets(self) -> list[Symbols]:
-        """From the joint before each joint; where the first joints are in the world has no effect."""
         offsets, count, joints = [], itertools.count(1), self.source.joint_names
         for name, before, values in zip(joints, self.source.parent, self.source.offset):
             if before < 0 or not any(values):

@@ -14,7 +14,7 @@ from tmt.derivation.quantities import State
 from tmt.derivation.scalar import Rows, Scalar, Values
 from tmt.model.tree import Tree
 
-from .names import EPS, Names, Parameter, number
+from .names import EPS, Names, Parameter, Symbols, number
 from .shortest import Forms
 from .trigonometry import Angle, Expression, Ring, TooLong, Trig
 
@@ -120,9 +120,7 @@ def symmetric(M: Rows, expression: Callable[[Scalar], Expression]) -> Expression
     return sympy.Matrix([[upper[min(i, j), max(i, j)] for j in n] for i in n])
 
 
-def coriolis(
-    ring: Ring, mass_matrix: Rows, q: Sequence[Angle | Trig], speeds: Sequence[Expression]
-) -> Values:
+def coriolis(ring: Ring, mass_matrix: Rows, q: Sequence[Angle | Trig], speeds: Symbols) -> Values:
     """The bias without gravity: sum over j, k of (dM_ij/dq_k - dM_jk/dq_i / 2) qd_j qd_k."""
     zero, n = ring.scalar(0), range(len(q))
     M = [[zero + entry for entry in row] for row in mass_matrix]

@@ -7,11 +7,10 @@ code, see tmt.compiled). METHODS may be given further ones, and objects of a use
 from dataclasses import dataclass
 
 from tmt.derivation.coordinates import FLAT
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.scalar import Rows, Scalar, Values
 from tmt.methods import dop853
 from tmt.methods.derivatives import amplification as amplification
 from tmt.methods.derivatives import one_step as one_step
-from tmt.methods.dynamics import Values
 from tmt.methods.implicit import ImplicitRungeKutta
 from tmt.methods.semi_implicit import SemiImplicitEuler as SemiImplicitEuler
 from tmt.methods.semi_implicit import by_speed as by_speed
@@ -76,13 +75,11 @@ class AdaptiveRungeKutta(RungeKutta):
         if len(self.errors) != 2 or any(len(row) != len(self.b) for row in self.errors):
             raise ValueError("errors must be two rows of one weight for each stage")
 
-    def attempt(
-        self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT
-    ) -> tuple[Values, ...]:
+    def attempt(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> Rows:
         """A step, and the two estimates of its error, each for the movement and qd."""
         slopes = self.stage_slopes(slope, q, qd, dt, joints)
         estimates = [increments(dt, weights, part, len(qd)) for weights in self.errors for part in slopes]
-        return *self.combined(slopes, q, qd, dt, joints), *estimates
+        return [*self.combined(slopes, q, qd, dt, joints), *estimates]
 
 
 CLASSICAL = (  # Kutta (1901): A, b, c

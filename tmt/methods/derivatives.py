@@ -11,8 +11,8 @@ import numpy as np
 from tmt.derivation import composite
 from tmt.derivation.dual import Dual, seeded
 from tmt.derivation.method import reduced_force
-from tmt.derivation.scalar import Scalar
-from tmt.methods.dynamics import Dynamics, Implicit, Rows, Terms, Values, minus, plus
+from tmt.derivation.scalar import Rows, Scalar, Values
+from tmt.methods.dynamics import Dynamics, Held, Terms, minus, plus
 from tmt.methods.stepping import Method, State, stepped
 from tmt.model.tree import Tree
 
@@ -29,9 +29,7 @@ class Differentiated(Dynamics):
         # of the last states: A (states, nv, nv) and the force (states, nv) of A a = force
         self.system: tuple[Array, Array]
 
-    def residual(
-        self, tree: Tree, a: Values, q: Values, qd: Values, tau: Values, implicit: Implicit | None
-    ) -> Values:
+    def residual(self, tree: Tree, a: Values, q: Values, qd: Values, tau: Values, implicit: Held) -> Values:
         """What a leaves of the linear system, (nv,): zero where it is the slope, and linear in a.
 
         dh/dqd a is (h(qd + a) - h(qd - a)) / 2, as h is quadratic in the speeds.
@@ -47,9 +45,7 @@ class Differentiated(Dynamics):
                 left[i] = left[i] + 0.5 * implicit.dt * (ahead[i] - behind[i])
         return left
 
-    def acceleration(
-        self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
-    ) -> Values:
+    def acceleration(self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Held = None) -> Values:
         plain = implicit._replace(pull=values_of(implicit.pull)) if implicit else None
         plain_q, plain_qd = values_of(q), values_of(qd)
         n, states = len(qd), plain_qd[0].shape

@@ -9,12 +9,9 @@ from typing import NamedTuple
 from tmt.derivation import method
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms as Terms
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.scalar import Rows, Scalar, Values
 from tmt.derivation.vectors import Scalars, solve, solve_any
 from tmt.model.tree import Tree
-
-Values = list[Scalar]
-Rows = list[Values]
 
 
 class Implicit(NamedTuple):
@@ -24,6 +21,9 @@ class Implicit(NamedTuple):
     pull: Values  # (nv,), N m
     dt: Scalar  # s
     bias_rows: frozenset[int]  # speeds of whose bias it takes the change
+
+
+Held = Implicit | None
 
 
 class Dynamics:
@@ -36,9 +36,7 @@ class Dynamics:
         """Mbar (nv rows of nv) and h (nv,)."""
         return self.terms(tree, q, qd)
 
-    def acceleration(
-        self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
-    ) -> Values:
+    def acceleration(self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Held = None) -> Values:
         """a (nv,) from Mbar a = Qbar, or from the linear system of a method that takes something implicitly."""
         M, h = self(tree, q, qd)
         force = method.reduced_force(tree, h, q, qd, tau)

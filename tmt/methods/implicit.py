@@ -17,9 +17,8 @@ import numpy as np
 
 from tmt.derivation.coordinates import FLAT, Flat, Joint, normalized, product
 from tmt.derivation.dual import Dual, jacobian, seeded, unit_vectors
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.scalar import Scalar, Values
 from tmt.derivation.vectors import solve_any
-from tmt.methods.dynamics import Values
 from tmt.methods.stepping import Joints, Slope, State
 from tmt.methods.tableau import Numbers, Tableau
 
@@ -50,7 +49,6 @@ class ImplicitRungeKutta(Tableau):
             return [sum(x[0].parts(f)) for f in slope(x[: len(q)], x[len(q) :])]
 
         def left_over(slope: Slope, a: Values) -> Values:
-            """qdd - a of the stages."""
             slopes = [slope(*state) for state in self.stage_states(q, qd, dt, a, joints)]
             return [f - x for f, x in zip(chain(*slopes), a)]
 

@@ -6,8 +6,8 @@ from functools import lru_cache
 from typing import TypeVar
 
 from tmt.derivation.coordinates import FLAT
-from tmt.derivation.scalar import Scalar
-from tmt.methods.dynamics import LITERAL, Implicit, Terms, Values, dynamics_of
+from tmt.derivation.scalar import Scalar, Values
+from tmt.methods.dynamics import LITERAL, Implicit, Terms, dynamics_of
 from tmt.methods.stepping import Joints, Method, Slope, State, advance, increments
 from tmt.model.tree import Tree
 

@@ -42,7 +42,6 @@ def listed(values: Any) -> tuple[Any, ...] | None:
 
 
 def names(field: str, values: Any) -> tuple[str, ...]:
-    """The values as a tuple of different strings that can stand in a line."""
     found = listed(values) or ()
     are_names = all(isinstance(name, str) and name.isprintable() for name in found)
     if listed(values) is None or not are_names or len(set(found)) < len(found):
