@@ -32,9 +32,7 @@ class NotOwn(OSError):
     """What lies there can be written by others, or belongs to somebody else."""
 
 
-def library(
-    source: Callable[[], str], *what: Tree | Method | Callable[..., object] | str | int | None
-) -> Library:
+def library(source: Callable[[], str], *what: Tree | Method | str | int) -> Library:
     """The compiled module of a source, from the folder if it lies there; what: all that the source follows from, with tmt itself.
 
     Of what is the user's own (a class of trees, a method), or of changed sources, nothing is kept: it may be another.

@@ -41,13 +41,9 @@ class State:
         return method.bias(at_rest, self.tree.gravity)
 
     @property
-    def force(self) -> list[Scalar]:
-        """Qbar."""
-        return method.reduced_force(self.tree, self.bias, self.q, self.qd, self.tau)
-
-    @property
     def acceleration(self) -> list[Scalar]:
-        return solve(self.mass_matrix, self.force)
+        Qbar = method.reduced_force(self.tree, self.bias, self.q, self.qd, self.tau)
+        return solve(self.mass_matrix, Qbar)
 
     @property
     def potential_energy(self) -> Scalar:

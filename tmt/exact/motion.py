@@ -23,6 +23,7 @@ from tmt.exact.tree import exact_tree, of_length_1
 from tmt.model.tree import Tree
 
 Numbers = Sequence[float] | np.ndarray
+Nodes = list[Expression]
 
 DIGITS = 60  # of the numbers that are traced
 FORMS: dict[str, Callable[..., Any]] = {
@@ -145,9 +146,7 @@ def equations(tree: Tree, tau: Numbers, form: str) -> Equations:
     return traced._replace(code=np.array([*traced.code, *more]))
 
 
-def program(
-    tape: Tape, inputs: list[Expression], results: list[Expression]
-) -> tuple[Equations, dict[int, int]]:
+def program(tape: Tape, inputs: Nodes, results: Nodes) -> tuple[Equations, dict[int, int]]:
     """The operations that make results of inputs, which stand in the first rows; and the row of each node of the tape."""
     order = tape.needed(results)
     constant = {i: tape.nodes[i][1][0] for i in order if tape.nodes[i][0] == "number"}
