@@ -14,11 +14,9 @@ up; "body axes" are those that coincide with it at q = 0. Signs: Mbar qdd + h = 
 (MuJoCo's qfrc_bias) and D the joint damping; `gravity_balance` is +dV/dq, the torque that holds the arm at
 rest where no springs act.
 
-Symbols of the assignment: Mbar is `mass_matrix`, dV/dq `gravity_balance`, x_b `com_positions`, omega_b
-`angular_velocities`, T_b and B_b `jacobians`, h_b and g_b `convective_terms`, V and E `potential_energy` and
-`energy`. In MuJoCo's names tau is qfrc_applied, qdd is qacc, and joint damping and springs are in
-qfrc_passive. The arm's alpha turns about y, then beta about x, then, at the elbow, gamma about y, all
-right-handed; with all angles zero the upper arm points along -z, the forearm along +x.
+In MuJoCo's names tau is qfrc_applied, qdd is qacc, and joint damping and springs are in qfrc_passive. The
+arm's alpha turns about y, then beta about x, then, at the elbow, gamma about y, all right-handed; with all
+angles zero the upper arm points along -z, the forearm along +x.
 
     import numpy as np, tmt
 
@@ -72,8 +70,7 @@ def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
     Parameters
     ----------
-    q : (..., nq), rad
-        Joint positions.
+    q : joint positions (..., nq), rad
     model : Tree, default ARM
 
     Examples
@@ -92,8 +89,7 @@ def angular_velocities(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.nda
 
     Parameters
     ----------
-    q, qd : (..., nq) and (..., nv), rad and rad/s
-        Joint positions and speeds.
+    q, qd : joint positions and speeds (..., nq) and (..., nv), rad and rad/s
     model : Tree, default ARM
 
     Examples
@@ -108,17 +104,12 @@ def angular_velocities(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.nda
 def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     """T_b = dx_b/dq in the inertial frame, m/rad, and B_b with omega_b = B_b qd in body axes; both (..., m, 3, nv).
 
-    Assignment, parts d and e.
+    B_b has unit 1. Assignment, parts d and e.
 
     Parameters
     ----------
-    q : (..., nq), rad
-        Joint positions.
+    q : joint positions (..., nq), rad
     model : Tree, default ARM
-
-    Returns
-    -------
-    T, B : (..., m, 3, nv), m/rad and 1
 
     Examples
     --------
@@ -132,17 +123,12 @@ def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
 def convective_terms(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     """v_conv = d(T_b qd)/dq qd, m/s2, inertial frame, and w_conv = d(B_b qd)/dq qd, rad/s2, body axes.
 
-    h_b and g_b in the assignment, part e.
+    Both (..., m, 3); h_b and g_b in the assignment, part e.
 
     Parameters
     ----------
-    q, qd : (..., nq) and (..., nv), rad and rad/s
-        Joint positions and speeds.
+    q, qd : joint positions and speeds (..., nq) and (..., nv), rad and rad/s
     model : Tree, default ARM
-
-    Returns
-    -------
-    v_conv, w_conv : (..., m, 3), m/s2 and rad/s2
 
     Examples
     --------
@@ -160,8 +146,7 @@ def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
     Parameters
     ----------
-    q : (..., nq), rad
-        Joint positions.
+    q : joint positions (..., nq), rad
     model : Tree, default ARM
 
     Examples
@@ -179,8 +164,7 @@ def bias(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
     Parameters
     ----------
-    q, qd : (..., nq) and (..., nv), rad and rad/s
-        Joint positions and speeds.
+    q, qd : joint positions and speeds (..., nq) and (..., nv), rad and rad/s
     model : Tree, default ARM
 
     Examples
@@ -198,8 +182,7 @@ def gravity_balance(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
     Parameters
     ----------
-    q : (..., nq), rad
-        Joint positions.
+    q : joint positions (..., nq), rad
     model : Tree, default ARM
 
     Examples
@@ -217,8 +200,7 @@ def spring_torque(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
     Parameters
     ----------
-    q : (..., nq), rad
-        Joint positions.
+    q : joint positions (..., nq), rad
     model : Tree, default ARM
 
     Examples
@@ -237,8 +219,7 @@ def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM)
 
     Parameters
     ----------
-    q, qd, tau : (..., nq), (..., nv) and (..., nv), rad, rad/s and N m
-        Joint positions, speeds and torques.
+    q, qd, tau : joint positions, speeds and torques (..., nq), (..., nv) and (..., nv), rad, rad/s and N m
     model : Tree, default ARM
 
     Examples
@@ -255,8 +236,7 @@ def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
     Parameters
     ----------
-    q : (..., nq), rad
-        Joint positions.
+    q : joint positions (..., nq), rad
     model : Tree, default ARM
 
     Examples
@@ -274,8 +254,7 @@ def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
     Parameters
     ----------
-    q, qd : (..., nq) and (..., nv), rad and rad/s
-        Joint positions and speeds.
+    q, qd : joint positions and speeds (..., nq) and (..., nv), rad and rad/s
     model : Tree, default ARM
 
     Examples

@@ -6,7 +6,7 @@ given; whatever is, the literal form says.
 
 import math
 from collections.abc import Callable
-from typing import Any, TypeGuard
+from typing import Any
 
 import numpy as np
 from numpy import ndarray
@@ -27,10 +27,7 @@ all_answers: dict[int, "Answers"] = {}
 
 
 def answered(quantity: str, model: Tree, *arguments: ArrayLike) -> Any:
-    """The quantity of states of any batch shape: what the function of that name in literal.py returns.
-
-    arguments: q, or q and qd, or q, qd and tau, as that function takes them.
-    """
+    """The quantity of states of any batch shape, given as the function in literal.py takes them."""
     answers = all_answers.get(id(model))
     if answers is None and isinstance(model, Tree):
         answers = answers_of(model)
@@ -79,8 +76,9 @@ def prepare(model: Tree = ARM, *quantities: str) -> None:
     if unknown := [name for name in quantities if not isinstance(name, str) or name not in QUANTITIES]:
         raise ValueError(f"{shown(unknown[0])} is no quantity; known are {', '.join(QUANTITIES)}")
     for quantity in quantities or QUANTITIES:
-        answers = answers_of(model)
-        answers.prepared[quantity] = answers.evaluators[quantity].one_state
+        evaluator = answers_of(model).evaluators[quantity]
+        evaluator.loop(wide=False)  # it is compiled, or loaded
+        answers_of(model).prepared[quantity] = evaluator.of_one
 
 
 class Answers:
@@ -89,19 +87,22 @@ class Answers:
     def __init__(self, tree: Tree):
         self.tree = tree  # held, so that no other has its id
         self.evaluators = {name: Evaluator(tree, name) for name in QUANTITIES}
-        self.prepared: dict[str, Callable[..., int]] = {}  # of one state, compiled or loaded by now
+        self.prepared: dict[str, Callable[..., Any]] = {}  # of one state
         self.shapes = [(tree.coordinates.nq,), (tree.coordinates.nv,), (tree.coordinates.nv,)]
         self.may_be_singular = not tree.never_singular
 
-    def by_machine_code(self, quantity: str, arguments: tuple[ArrayLike, ...]) -> Any:
+    def by_machine_code(self, quantity: str, arguments: tuple[Any, ...]) -> Any:
         """The quantity of states; None where NumPy is to answer: of few states, and where something is wrong."""
-        evaluator, is_prepared = self.evaluators[quantity], quantity in self.prepared
+        prepared = self.prepared.get(quantity)
         may_be_singular = self.may_be_singular and quantity == "acceleration"
-        if is_prepared and not may_be_singular and self.is_state(arguments):
-            return evaluator.of_one(*arguments)
-        with np.errstate(
-            all="ignore"
-        ):  # of numbers beyond the largest double, which the literal form refuses
+        if prepared and not may_be_singular:
+            for array, shape in zip(arguments, self.shapes):  # no generator, which takes as long as the rest
+                if type(array) is not ndarray or array.shape != shape or array.dtype is not DOUBLE:
+                    break
+            else:  # one state in arrays of doubles: nothing else has to be looked at
+                return prepared(*arguments)
+        # without warnings of numbers beyond the largest double, which the literal form refuses
+        with np.errstate(all="ignore"):
             numbers = [x if type(x) is ndarray and x.dtype is DOUBLE else real_numbers(x) for x in arguments]
         arrays = [x for x in numbers if x is not None]
         if [array.shape[-1:] for array in arrays] != self.shapes[: len(arguments)]:
@@ -111,21 +112,15 @@ class Answers:
         except ValueError:
             return None
         count = math.prod(batch)
-        if count == 0 or (count <= SMALL and not is_prepared):
+        if count == 0 or (count <= SMALL and not prepared):
             return None
         if may_be_singular and self.is_singular(arrays[0]):
             return None
+        evaluator = self.evaluators[quantity]
         try:
             return evaluator.of_any(*arrays) if batch else evaluator.of_one(*arrays)
         except MemoryError:
             return None
-
-    def is_state(self, arguments: tuple[ArrayLike, ...]) -> TypeGuard[tuple[ndarray, ...]]:
-        """Whether one state is given, in arrays of doubles: then nothing else has to be looked at."""
-        for array, shape in zip(arguments, self.shapes):  # no generator, which takes as long as the rest
-            if type(array) is not ndarray or array.shape != shape or array.dtype is not DOUBLE:
-                return False
-        return True
 
     def is_singular(self, q: ndarray) -> bool:
         """Whether Mbar may be singular at a position among these, or cannot be told here."""

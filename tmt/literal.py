@@ -14,7 +14,7 @@ from tmt.arm import ARM
 from tmt.derivation.quantities import QUANTITIES, State
 from tmt.derivation.scalar import Scalar
 from tmt.model import singular
-from tmt.model.arguments import quantity, states
+from tmt.model.arguments import states
 from tmt.model.tree import Tree
 
 BEYOND = "the result is beyond the largest double; smaller numbers in the state or model are expected"
@@ -22,29 +22,36 @@ BEYOND = "the result is beyond the largest double; smaller numbers in the state 
 
 def literal(name: str) -> Callable[..., Any]:
     """The quantity of that name as a function of q, qd, tau (as far as it takes them) and a model."""
-    takes, formula, parts = QUANTITIES[name].takes, QUANTITIES[name].of, QUANTITIES[name].parts
+    takes = QUANTITIES[name].takes
 
-    def function(*arguments: ArrayLike | Tree, model: ArrayLike | Tree = ARM) -> Any:
+    def function(*arguments: Any, model: Tree = ARM) -> Any:
         arrays, last = arguments[: len(takes)], arguments[len(takes) :]
         if len(arrays) < len(takes) or len(last) > 1:
             raise TypeError(f"{name} takes {', '.join(takes)} and a model")
-        tree = last[0] if last else model
-        scalars = states(tree, **dict(zip(takes, arrays)))
-        state, batch = State(tree, *scalars), scalars[0][0].shape
-        if name == "acceleration" and not state.tree.never_singular:
-            check_regular(state, batch)
-        values = formula(state)
-        if parts:
-            return tuple(gather(part, batch) for part in values)
-        return gather(values, batch, overflow=np.inf if name == "energy" else None)
+        try:
+            with np.errstate(all="ignore"):  # of warnings, which no caller can place
+                return answer(name, last[0] if last else model, dict(zip(takes, arrays)))
+        except MemoryError as error:
+            raise ValueError(f"{name} of these states does not fit into memory: {error}") from None
 
     function.__name__ = function.__qualname__ = name
-    return quantity(function)
+    return function
 
 
-def check_regular(state: State, batch: tuple[int, ...]) -> None:
-    """Raise ValueError where Mbar is singular."""
-    n, tree = len(state.qd), state.tree
+def answer(name: str, tree: Tree, arrays: dict[str, ArrayLike]) -> Any:
+    """The quantity of that name at states in arrays by name, of which all are checked."""
+    scalars = states(tree, **arrays)
+    state, batch = State(tree, *scalars), scalars[0][0].shape
+    if name == "acceleration" and not tree.never_singular:
+        check_regular(tree, state, batch)
+    values = QUANTITIES[name].of(state)
+    if QUANTITIES[name].parts:
+        return tuple(gather(part, batch) for part in values)
+    return gather(values, batch, overflow=np.inf if name == "energy" else None)
+
+
+def check_regular(tree: Tree, state: State, batch: tuple[int, ...]) -> None:
+    n = len(state.qd)
     positions = gather(state.q, batch).reshape(-1, len(state.q))
     if place := singular.first(tree, positions, gather(state.mass_matrix, batch).reshape(-1, n, n)):
         at = ", ".join(f"{value:.6g}" for value in positions[place[0]])
@@ -53,14 +60,12 @@ def check_regular(state: State, batch: tuple[int, ...]) -> None:
 
 
 def gather(nested: Scalar, batch: tuple[int, ...], overflow: float | None = None) -> np.ndarray:
-    """Nested iterables of scalars, each of the batch shape or constant, as one array with that shape in front.
-
-    overflow: what stands for what is not finite, since all that was given is; None: it is a ValueError.
-    """
+    """Nested scalars as an array, the batch shape in front; overflow: what is not finite is that, or an error."""
 
     def lists(item: Scalar) -> Scalar:
-        is_scalar = isinstance(item, (float, np.ndarray))
-        return np.broadcast_to(item, batch) if is_scalar else [lists(part) for part in item]
+        if isinstance(item, (float, np.ndarray)):
+            return np.broadcast_to(item, batch) if batch else item
+        return [lists(part) for part in item]
 
     array = np.array(lists(nested), dtype=float)
     finite = np.isfinite(array)

@@ -10,14 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tmt.arm import ARM
-from tmt.compiled.runner import runner_of
+from tmt.compiled.runner import Ended, runner_of
 from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED
 from tmt.model import arguments, singular
 from tmt.model.tree import Tree
 from tmt.model.values import shown
 
 DOUBLE = np.dtype(float)
-Between = Callable[[int, int], list[np.ndarray]]  # (run, record): its states q and qd up to the next record
+Array = np.ndarray
+Place = tuple[int, str] | None
+Between = Callable[[int, int], list[Array]]  # (run, record): its states q and qd up to the next record
 
 
 class _Path(NamedTuple):
@@ -49,15 +51,12 @@ class Motion(_Path):
     ended: str | np.ndarray | None
     evaluations: int
 
-    def __new__(
-        cls, t: np.ndarray, q: np.ndarray, qd: np.ndarray, ended: str | np.ndarray | None, evaluations: int
-    ) -> Motion:
+    def __new__(cls, t: Array, q: Array, qd: Array, ended: str | Array | None, evaluations: int) -> Motion:
         motion = super().__new__(cls, t, q, qd)
         motion.ended, motion.evaluations = ended, evaluations
         return motion
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """How a copy is made, in this process or another."""
         return type(self), (*self, self.ended, self.evaluations)
 
 
@@ -153,9 +152,7 @@ def starts(model: Tree, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
     return batch, *(np.stack(part, axis=-1).reshape(math.prod(batch), len(part)) for part in state)
 
 
-def by_series(
-    tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, every: int, tolerance: float
-) -> tuple[np.ndarray, int]:
+def by_series(tree: Tree, q: Array, qd: Array, tau: Array, dt: float, every: int, tolerance: float) -> Ended:
     """Write the true motions to the paths (runs, records, nq and nv), which hold the starts: why each ended, and the steps."""
     from tmt.exact.motion import followed  # here, so that `import tmt` need not wait for it
 
@@ -171,9 +168,9 @@ def by_series(
 
 
 def reasons(
-    tree: Tree, q: np.ndarray, qd: np.ndarray, codes: np.ndarray, dt: float, tolerance: float, every: int = 1,
+    tree: Tree, q: Array, qd: Array, codes: Array, dt: float, tolerance: float, every: int = 1,
     between: Between | None = None,
-) -> np.ndarray:  # fmt: skip
+) -> Array:  # fmt: skip
     """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
 
     q, qd: the paths (runs, records, nq and nv); codes (runs, 2): why the compiled loop ended each, 0: it did not, and after how
@@ -212,13 +209,8 @@ def cause(tree: Tree, code: int, q: np.ndarray, qd: np.ndarray, dt: float) -> in
     return OVERFLOW if code == TURNED and not reach > 2.0**48 else code
 
 
-def singular_step(
-    tree: Tree, q: np.ndarray, qd: np.ndarray, every: int, between: Between | None, run: int
-) -> tuple[int, str] | None:
-    """The first step of a run after which Mbar is singular, as far as `singular_in` looks, and the words for it.
-
-    Where each so-manyth state is kept alone it also looks at those before the last record and where the rates change most.
-    """
+def singular_step(tree: Tree, q: Array, qd: Array, every: int, between: Between | None, run: int) -> Place:
+    """The first step after which Mbar is singular, and why; between records as well, where it would show."""
     place = singular_in(tree, q, qd)
     places = [(place[0] * every, place[1])] if place else []
     if between and every > 1:
@@ -229,11 +221,8 @@ def singular_step(
     return min(places, default=None)
 
 
-def singular_in(tree: Tree, q: np.ndarray, qd: np.ndarray) -> tuple[int, str] | None:
-    """The first state of a run at which Mbar is singular, among those where it would show; and the words for it.
-
-    They are its start, its last, and the one before the largest change of the rates.
-    """
+def singular_in(tree: Tree, q: Array, qd: Array) -> Place:
+    """The first of start, last and that before the largest change of rates where Mbar is singular; why."""
     alive = int(np.isfinite(q[:, 0]).sum())
     records = np.unique([0, alive - 1, fastest_change(qd[:alive])])
     place = singular.first(tree, q[records])

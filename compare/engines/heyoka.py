@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tmt import Tree
-from tmt.compiled import evaluator
+from tmt.compiled import Evaluator
 from tmt.derivation import composite
 from tmt.derivation.method import acceleration
 from tmt.derivation.vectors import arctan, cos, sin, sqrt
@@ -30,7 +30,7 @@ class Heyoka(Engine):
     methods: Mapping[str, Method] = {"Taylor": Method("heyoka", "Taylor", None, "Taylor", adaptive=True)}
 
     def too_long(self, tree: Tree) -> str | None:
-        if len(tree.axis) <= MOST_JOINTS and evaluator(tree, "acceleration").operations <= MOST_OPERATIONS:
+        if len(tree.axis) <= MOST_JOINTS and Evaluator(tree, "acceleration").operations <= MOST_OPERATIONS:
             return None
         return f"with {len(tree.axis)} speeds its compilation would take minutes"
 

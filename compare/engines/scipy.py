@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tmt.compiled import evaluator
+from tmt.compiled import Evaluator
 
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates
@@ -35,7 +35,7 @@ class ScipyDynamics(TmtQuantities, OneByOne):
 
     def rate(self) -> Callable[[Array, Array], Array]:
         """rate(y, tau): dy/dt of y = (q, v), (nq + nv,)."""
-        acceleration, tree, nq = evaluator(self.tree, "acceleration").of_one, self.tree, self.coordinates.nq
+        acceleration, tree, nq = Evaluator(self.tree, "acceleration").of_one, self.tree, self.coordinates.nq
         has_balls = bool(tree.coordinates.balls)
 
         def rate(y: Array, tau: Array) -> Array:

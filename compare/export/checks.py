@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tmt.compiled import evaluator
+from tmt.compiled import Evaluator
 from tmt.exact.many import Pairs, exact_of_many
 
 from ..core import timing
@@ -131,7 +131,7 @@ def times(
     calls: dict[object, Callable[..., Any]] = {}
     for name in names:
         calls[name, "c"], _ = program.call(name, (q, qd, tau))
-        compiled = evaluator(compared.robot.tree, name)
+        compiled = Evaluator(compared.robot.tree, name)
         calls[name, "tmt"] = partial(compiled.fill, False, np.empty((count, compiled.size)), q, qd, tau)
     if not MinimalCalls.unavailable():
         loops = MinimalCalls(compared.mujoco.of(compared.robot.case())).loops(q[0], qd[0], tau[0])

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tmt
-from tmt.compiled import evaluator
+from tmt.compiled import Evaluator
 from tmt.derivation.quantities import QUANTITIES, shape_of
 
 from ..engines.own.functions import functions_of
@@ -58,7 +58,7 @@ class Program:
 
     def operations(self, quantity: str) -> int:
         """+ - * / of an evaluation; a sine, a cosine, a root count as one each."""
-        return evaluator(self.tree, quantity).operations
+        return Evaluator(self.tree, quantity).operations
 
     def run(self, *command: str) -> str:
         try:

@@ -4,7 +4,6 @@ import dataclasses
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from importlib import import_module
 from inspect import signature
 
 import numpy as np
@@ -13,12 +12,11 @@ from trees import one_body, random_states, small_tree, wrist
 
 import tmt
 from tmt import answers, literal
-from tmt.compiled import cores
+from tmt.compiled import cores, evaluator
 from tmt.derivation.quantities import QUANTITIES
 from tmt.exact.values import FIELDS, distance, exact
 
 EPS = np.finfo(float).eps
-evaluator = import_module("tmt.compiled.evaluator")  # the package has the function of that name
 SMALL = small_tree()
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import tmt
-from tmt.compiled import evaluator, runner_of
+from tmt.compiled import Evaluator, runner_of
 from tmt.derivation.quantities import QUANTITIES
 from tmt.methods import METHODS
 
@@ -104,8 +104,8 @@ PLACES = {
     **{f"Tree.{field.name}": with_field(tmt.ARM, field.name) for field in dataclasses.fields(tmt.Tree)},
     **{f"method.{part}": with_field(METHODS["dopri8_adaptive"], part) for part in ("order", "A", "b", "c", "errors")},
     "A of an implicit method": with_field(METHODS["implicit_midpoint"], "A"),
-    "tree of an evaluator": lambda tree: evaluator(tree, "acceleration"),
-    "quantity": lambda quantity: evaluator(tmt.ARM, quantity),
+    "tree of an evaluator": lambda tree: Evaluator(tree, "acceleration"),
+    "quantity": lambda quantity: Evaluator(tmt.ARM, quantity),
     "tree of a runner": lambda tree: runner_of(tree, "rk4"),
     "method of a runner": lambda name: runner_of(tmt.ARM, name),
     "model of prepare": tmt.prepare,

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from trees import random_state, random_states, small_tree
 
 from tmt import literal
-from tmt.compiled import evaluator, forms
+from tmt.compiled import Evaluator, forms
 from tmt.compiled.ir import POINTER, Code, module
 from tmt.compiled.machine import Library
 from tmt.compiled.sine import LIMIT
@@ -32,7 +32,7 @@ def rows_of(compiled, states, wide=False):
 
 
 def test_states_side_by_side_have_the_bits_of_each_alone(rng):
-    states, compiled = random_states(rng, SMALL, COUNT), evaluator(SMALL, "acceleration")
+    states, compiled = random_states(rng, SMALL, COUNT), Evaluator(SMALL, "acceleration")
     wanted, found = literal.acceleration(*states, SMALL), rows_of(compiled, states)
     assert np.abs(found - wanted).max() <= 1e5 * EPS * np.abs(wanted).max() and compiled.operations > 0
     for count in (*range(10), 17, COUNT):

@@ -52,7 +52,6 @@ class Entries:
         return right.negated()
 
     def one(self) -> Code:
-        """One state."""
         code = Code("one", dict.fromkeys((*ARRAYS, "out"), POINTER), result=INDEX)
         state, out = code.reserve(DOUBLE, self.count), code["out"]
         for array, size, before in zip(ARRAYS, self.sizes, self.begins):
@@ -64,10 +63,8 @@ class Entries:
 
     def rows(self) -> Code:
         """Many states; for those that are missing in a register at the end the last stands."""
-        numbers = ["count", *(f"of_{array}" for array in ARRAYS)]
-        code = Code(
-            "rows", dict.fromkeys((*ARRAYS, "out"), POINTER) | dict.fromkeys(numbers, INDEX), result=INDEX
-        )
+        numbers = dict.fromkeys(("count", *(f"of_{array}" for array in ARRAYS)), INDEX)
+        code = Code("rows", dict.fromkeys((*ARRAYS, "out"), POINTER) | numbers, result=INDEX)
         count, width = code["count"], self.width
         state, out = code.reserve(self.kind, self.count), code.reserve(self.kind, self.results)
         wrong = Variable(code, INDEX, 0)

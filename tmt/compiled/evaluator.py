@@ -52,7 +52,6 @@ class Evaluator:
 
     @cached_property
     def scalar(self) -> "Library":
-        """The functions for one state at a time."""
         return self.library(1)
 
     @cached_property
@@ -60,7 +59,6 @@ class Evaluator:
         return self.scalar.function("one", WHOLE, *[ctypes.c_char_p] * 3, POINTER, keeps_lock=True)
 
     def loop(self, wide: bool) -> Callable[..., int]:
-        """The function for many states, one at a time or as many as fill a register."""
         if wide not in self.loops:
             from .machine import lanes
 
@@ -121,8 +119,3 @@ def rows_of(array: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
     """States of a batch one after the other, as compiled code takes them."""
     states = array if array.shape[:-1] == batch else np.broadcast_to(array, (*batch, array.shape[-1]))
     return np.require(states.reshape(-1, array.shape[-1]), requirements=["C", "A", "W"])
-
-
-def evaluator(tree: Tree, quantity: str) -> Evaluator:
-    """The Evaluator of a quantity, one of tmt's public ones."""
-    return Evaluator(tree, quantity)

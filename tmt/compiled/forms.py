@@ -8,20 +8,18 @@ from functools import lru_cache
 
 from tmt.derivation import articulated, composite
 from tmt.derivation.dual import seeded
-from tmt.derivation.method import reduced_force
+from tmt.derivation.method import Terms, reduced_force
 from tmt.derivation.quantities import QUANTITIES, State
-from tmt.derivation.scalar import Scalar
-from tmt.methods.dynamics import Dynamics, Implicit, Rows, Values, minus, plus
+from tmt.derivation.scalar import Rows, Scalar, Values
+from tmt.methods.dynamics import Dynamics, Held, Implicit, minus, plus
 from tmt.methods.stepping import Method
 from tmt.model.tree import Tree
 
 from .straight import Traced, trace
 from .trace import Expression
 
-FEW, MANY = (
-    5,
-    20,
-)  # speeds: up to FEW the composite form alone is traced, from MANY on the articulated one alone
+# speeds: up to FEW the composite form alone is traced, from MANY on the articulated one alone
+FEW, MANY = 5, 20
 DENSE = 10  # speeds from which solving linear systems and the derivatives of the bias are loops and no longer straight lines
 DYNAMICS = ("mass_matrix", "bias", "gravity_balance")
 
@@ -39,9 +37,7 @@ class Traceable(Dynamics):
         super().__init__(form.mass_matrix_and_bias)
         self.n, self.by_bodies, self.has_used_bodies = len(tree.axis), by_bodies, False
 
-    def acceleration(
-        self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
-    ) -> Values:
+    def acceleration(self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Held = None) -> Values:
         if not self.by_bodies or (implicit and not acts_at_single_joints(implicit)):
             return super().acceleration(tree, q, qd, tau, implicit)
         self.has_used_bodies = True
@@ -76,12 +72,11 @@ def is_shorter_articulated(tree: Tree) -> bool:
     n = len(tree.axis)
     if n <= FEW or n >= MANY:
         return n >= MANY
-    sizes = tree.coordinates.nq, n
-    inner, outer = (
-        trace("terms", sizes, lambda q, qd, form=form: flat(form.mass_matrix_and_bias(tree, q, qd)))
-        for form in (articulated, composite)
-    )
-    return len(inner.nodes) < len(outer.nodes)
+
+    def length(terms: Terms) -> int:
+        return len(trace("terms", (tree.coordinates.nq, n), lambda q, qd: flat(terms(tree, q, qd))).nodes)
+
+    return length(articulated.mass_matrix_and_bias) < length(composite.mass_matrix_and_bias)
 
 
 def quantity(tree: Tree, name: str) -> Traced:

@@ -21,7 +21,6 @@ def wide(kind: str, width: int) -> str:
 
 
 def element(kind: str) -> str:
-    """The kind of one of the values of a kind."""
     return kind.rpartition("x ")[2].rstrip(">")
 
 
@@ -30,7 +29,6 @@ def width_of(kind: str) -> int:
 
 
 def constant(kind: str, number: Number) -> str:
-    """The text of a constant."""
     width, text = width_of(kind), str(number)
     if element(kind) == DOUBLE:
         text = f"0x{struct.unpack('>Q', struct.pack('>d', number))[0]:016X}"
@@ -94,7 +92,6 @@ class Value:
         return self.code.put(self.kind, f"{operation} {self.kind} {self.name}, {self.like(other).name}")
 
     def negated(self) -> "Value":
-        """Of a flag: whether it is false."""
         return self.bits("xor", True)
 
     def compare(self, how: str, other: "Value | Number") -> "Value":
@@ -113,7 +110,6 @@ class Value:
         return self.code.put(kind, f"select {self.kind} {self.name}, {kind} {yes.name}, {kind} {no.name}")
 
     def cast(self, how: str, kind: str) -> "Value":
-        """bitcast, sitofp, fptosi, zext ..."""
         return self.code.put(kind, f"{how} {self.kind} {self.name} to {kind}")
 
     def lane(self, l: int) -> "Value":
@@ -126,7 +122,6 @@ class Value:
         return self.code.put(self.kind, f"insertelement {self.kind} {self.name}, {x.kind} {x.name}, i32 {l}")
 
     def shuffled(self, lanes: list[int]) -> "Value":
-        """These lanes side by side."""
         kind, order = wide(element(self.kind), len(lanes)), ", ".join(f"i32 {l}" for l in lanes)
         mask = f"<{len(lanes)} x i32> <{order}>"
         return self.code.put(kind, f"shufflevector {self.kind} {self.name}, {self.kind} undef, {mask}")
@@ -170,10 +165,7 @@ class Variable:
 
 
 class Code:
-    """The lines of one function.
-
-    arguments: {name: kind}; `self[name]` is the value. attributes: LLVM's, such as "alwaysinline", of a function for others here.
-    """
+    """The lines of one function; `self[name]` is an argument; attributes: LLVM's, of one for others here."""
 
     def __init__(self, name: str, arguments: Mapping[str, str], result: str = "void", attributes: str = ""):
         self.name, self.arguments, self.result, self.attributes = name, arguments, result, attributes
@@ -194,7 +186,6 @@ class Code:
         return Value(self, kind, constant(kind, x))
 
     def intrinsic(self, name: str, *values: Value) -> Value:
-        """The result of one of LLVM's own functions."""
         kind, width = values[0].kind, width_of(values[0].kind)
         name = f"llvm.{name}.f64" if width == 1 else f"llvm.{name}.v{width}f64"
         self.intrinsics.add(f"declare {kind} @{name}({', '.join([kind] * len(values))})")
@@ -257,14 +248,12 @@ class Code:
 
     @contextmanager
     def when(self, flag: Value) -> Iterator[None]:
-        """The lines are run where the flag is true."""
         yes, done = self.label(), self.label()
         self.branch(flag, yes, done)
         yield
         self.begin(done)
 
     def give_back(self, value: Value | None = None) -> None:
-        """Return, at the end of the function."""
         self.lines.append(f"  ret {value.kind} {value.name}" if value else "  ret void")
 
     @property
@@ -285,12 +274,10 @@ class Loop:
         self.code, self.index, self.done = code, index, done
 
     def leave(self, flag: Value) -> None:
-        """End the loop where the flag is true."""
         on = self.code.label()
         self.code.lines += [f"  br i1 {flag.name}, label %{self.done}, label %{on}", f"{on}:"]
 
 
 def module(functions: list[Code]) -> str:
-    """The text of a module."""
     declared = sorted(set().union(*(f.intrinsics for f in functions)))
     return "\n".join([*declared, *(f.text for f in functions)])

@@ -81,5 +81,4 @@ def put_directions(state: Value, at: int, n: int, first: Value, width: int) -> N
 
 
 def any_of(flags: Value, width: int) -> Value:
-    """Whether one of several flags is true."""
     return flags if width == 1 else flags.cast("bitcast", f"i{width}").compare("ne", 0)

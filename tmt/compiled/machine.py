@@ -10,12 +10,12 @@ import llvmlite
 import llvmlite.binding as llvm
 
 MUCH = 300_000  # characters of a module that is not optimised before it becomes machine code
+Function = Callable[..., Any]
 lock = Lock()  # LLVM's passes are not made for several threads at once
 
 
 @lru_cache(maxsize=1)
 def processor() -> tuple[str, str]:
-    """The name of this processor and what it can do."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
@@ -39,7 +39,6 @@ def target() -> llvm.TargetMachine:
 
 
 def object_code(text: str) -> bytes:
-    """The object file of a module."""
     with lock:
         machine = target()
         module = llvm.parse_assembly(text)
@@ -65,9 +64,7 @@ class Library:
             self.engine.add_object_file(llvm.ObjectFileRef.from_data(code))
             self.engine.finalize_object()
 
-    def function(
-        self, name: str, result: Any, *arguments: Any, keeps_lock: bool = False
-    ) -> Callable[..., Any]:
+    def function(self, name: str, result: Any, *arguments: Any, keeps_lock: bool = False) -> Function:
         """A function of that name as ctypes calls it, of ctypes' types; keeps_lock: Python's other threads wait meanwhile."""
         address = self.engine.get_function_address(name)
         if not address:

@@ -16,6 +16,9 @@ from .cores import cores, in_threads
 SPREAD = 20_000  # evaluations of the dynamics from which several cores share them
 PIECES = 4  # for each core, as one of them may be busy with something else
 MOST = 64  # trees and methods whose compiled runs are held
+Array = np.ndarray
+Ended = tuple[Array, int]  # why each run ended, and the evaluations
+Call = Callable[[], None]
 DIRECT = ctypes.c_void_p
 ARGUMENTS = [DIRECT, DIRECT, DIRECT, ctypes.c_double, ctypes.c_double, DIRECT, *[ctypes.c_int64] * 3]
 runners: dict[tuple[int, str], "Runner"] = {}
@@ -34,7 +37,6 @@ class Runner:
         self.functions: dict[int, Callable[..., None]] = {}
 
     def compiled(self, width: int) -> Callable[..., None]:
-        """The compiled function for `width` runs side by side."""
         if width not in self.functions:
             from . import runs, store  # here, so that `import tmt` need not wait for llvmlite
 
@@ -43,17 +45,13 @@ class Runner:
             self.functions[width] = library.function("run", None, *ARGUMENTS)
         return self.functions[width]
 
-    def call(
-        self, width: int, arrays: Sequence[np.ndarray], dt: float, tolerance: float, every: int = 1
-    ) -> Callable[[], None]:
+    def call(self, width: int, arrays: Sequence[Array], dt: float, tolerance: float, every: int = 1) -> Call:
         """A call of compiled code alone that fills q, qd, tau and info (runs, 3), see runs.py, which must live as long as it."""
         q, qd, tau, info = map(address, arrays)
         sizes = every, arrays[0].shape[1], len(arrays[0])
         return partial(self.compiled(width), q, qd, tau, dt, tolerance, info, *sizes)
 
-    def follow(
-        self, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, tolerance: float, every: int
-    ) -> tuple[np.ndarray, int]:
+    def follow(self, q: Array, qd: Array, tau: Array, dt: float, tolerance: float, every: int) -> Ended:
         """Fill the paths, which hold each `every`-th state alone.
 
         Returns why each run ended, 0 where it did not, and after how many steps, (runs, 2); and the evaluations of the dynamics.
@@ -78,13 +76,13 @@ class Runner:
                 array[:] = filled[:-missing]
 
         threads = cores() if count > width and steps * count * self.stepping.stages > SPREAD else 1
-        parts = min(count // width, PIECES * threads) if threads > 1 else 1
-        in_threads(follow_some, count, parts, width, threads)
+        if threads == 1:
+            follow_some(slice(count))
+        else:
+            in_threads(follow_some, count, min(count // width, PIECES * threads), width, threads)
         return self.outcome(q, qd, info, every)
 
-    def outcome(
-        self, q: np.ndarray, qd: np.ndarray, info: np.ndarray, every: int = 1
-    ) -> tuple[np.ndarray, int]:
+    def outcome(self, q: Array, qd: Array, info: Array, every: int = 1) -> Ended:
         """What `follow` returns, once compiled code has filled the paths and info."""
         steps, codes = (q.shape[1] - 1) * every, info[:, :2]
         taken = steps * len(q)
@@ -98,7 +96,7 @@ class Runner:
         return codes, taken * self.stepping.stages
 
 
-def address(array: np.ndarray) -> int:
+def address(array: Array) -> int:
     return array.__array_interface__["data"][0]
 
 

@@ -10,7 +10,8 @@ from typing import Any
 
 from tmt.derivation.coordinates import FLAT
 from tmt.derivation.dual import seeded
-from tmt.methods.dynamics import Values, minus, plus
+from tmt.derivation.scalar import Values
+from tmt.methods.dynamics import minus, plus
 from tmt.methods.implicit import CLOSE, ITERATIONS
 from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED, Joints
 from tmt.model.tree import Tree
@@ -20,16 +21,14 @@ from .ir import DOUBLE, FLAG, INDEX, POINTER, Code, Value, Variable, module, wid
 from .sine import LIMIT
 from .straight import Traced, functions, trace
 
-Advance = Callable[
-    [Code, Value, Value, Value, Variable], Value
-]  # (code, state, new state, dt, evaluations): why it ends
+# (code, state, new state, dt, evaluations): why it ends
+Advance = Callable[[Code, Value, Value, Value, Variable], Value]
 INLINED = 1_500  # nodes of the slopes of a step that are put in the place of their calls
 # of an adaptive method, in units of dt and of the step before
 SHORTEST_STEP, GROWTH, SHRINKING, SAFETY = 1e-9, 6.0, 0.333, 0.9
 
 
 def source(tree: Tree, stepping: Any, width: int) -> str:
-    """The module that follows runs of a tree, `width` side by side."""
     step = Step(tree, stepping, width)
     if stepping.solves_stages:
         advance = step.solving()
@@ -43,9 +42,8 @@ def source(tree: Tree, stepping: Any, width: int) -> str:
 class Step:
     """The functions of one step, and the lines that call them."""
 
-    def __init__(
-        self, tree: Tree, stepping: Any, width: int
-    ):  # stepping: a Method, with what NEEDS says of its kind
+    # stepping: a Method, with what NEEDS says of its kind
+    def __init__(self, tree: Tree, stepping: Any, width: int):
         self.tree, self.stepping, self.width = tree, stepping, width
         self.nq, self.n = tree.coordinates.nq, tree.coordinates.nv
         self.joints: Joints = tree.coordinates if tree.coordinates.balls else FLAT
@@ -83,7 +81,6 @@ class Step:
         return len(traced.outputs)
 
     def explicit(self) -> Advance:
-        """A step of a method that solves nothing."""
         self.add_step("step")
 
         def advance(code: Code, state: Value, new: Value, dt: Value, evaluations: Variable) -> Value:
@@ -93,7 +90,6 @@ class Step:
         return advance
 
     def adaptive(self) -> Advance:
-        """As many steps as the tolerance wants between two times."""
         nq, n, order = self.nq, self.n, self.stepping.order
         count = self.add_step("attempt")
         # of each component of an error: the number of the state in whose units it is; None: an angle of a turn
@@ -222,10 +218,7 @@ def squares(state: Value, result: Value, first: int, scales: list[int | None], t
 
 
 def residual(tree: Tree, stepping: Any, joints: Joints, linear: bool) -> Traced:
-    """What accelerations a of the stages leave of their equations, and its derivative along da: (q, qd, tau, dt, a, da).
-
-    linear: of the equations made linear at (q, qd).
-    """
+    """What accelerations a of the stages leave of their equations (or linear ones), and its derivative by da."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
     def function(q: Values, qd: Values, tau: Values, dt: Values, a: Values, da: Values) -> Values:
@@ -248,7 +241,6 @@ def residual(tree: Tree, stepping: Any, joints: Joints, linear: bool) -> Traced:
 
 
 def run(step: Step, advance: Advance) -> Code:
-    """The loops over runs, records and steps."""
     names = {"q": POINTER, "qd": POINTER, "tau": POINTER, "dt": DOUBLE, "tolerance": DOUBLE, "info": POINTER}
     code = Code("run", names | dict.fromkeys(("every", "records", "runs"), INDEX))
     nq, n, width = step.nq, step.n, step.width

@@ -10,7 +10,6 @@ from pathlib import Path
 
 
 def stamps(files: Iterable[str]) -> dict[str, tuple[int, int]]:
-    """When each file was written, and its size."""
     stats = {file: os.stat(file) for file in files}
     return {file: (stat.st_mtime_ns, stat.st_size) for file, stat in stats.items()}
 
@@ -29,9 +28,9 @@ def contents() -> str:
 def own_sources() -> str | None:
     """A name for the contents of tmt's files; None if one has changed since the import, or a module is not from a file."""
     modules = [module for name, module in list(sys.modules.items()) if name.startswith("tmt.")]
-    if not all(
-        type(module.__loader__) is SourceFileLoader and module.__file__ in IMPORTED for module in modules
-    ):
+    if not all(type(module.__loader__) is SourceFileLoader for module in modules):
+        return None
+    if not IMPORTED.keys() >= {module.__file__ for module in modules}:
         return None
     try:
         name = contents()

@@ -14,11 +14,11 @@ import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from pathlib import Path
 
 from tmt.methods.stepping import Method
-from tmt.model.tree import Tree
+from tmt.model.tree import Tree, stated
 
 from .machine import Library, object_code, versions
 from .sources import own_sources
@@ -32,9 +32,7 @@ class NotOwn(OSError):
     """What lies there can be written by others, or belongs to somebody else."""
 
 
-def library(
-    source: Callable[[], str], *what: Tree | Method | Callable[..., object] | str | int | None
-) -> Library:
+def library(source: Callable[[], str], *what: Tree | Method | str | int) -> Library:
     """The compiled module of a source, from the folder if it lies there; what: all that the source follows from, with tmt itself.
 
     Of what is the user's own (a class of trees, a method), or of changed sources, nothing is kept: it may be another.
@@ -47,10 +45,9 @@ def library(
     try:
         path = own_folder() / f"{name}.o"
         code = read(path)
-    except NotOwn as error:
-        complain(error)
-        return Library(source())
-    except Exception:  # whatever is wrong with the folder or the file
+    except Exception as error:  # whatever is wrong with the folder or the file
+        if isinstance(error, NotOwn):
+            complain(error)
         return Library(source())
     if code is None:
         code = object_code(source())
@@ -66,7 +63,7 @@ def word_of(value: object) -> str | None:
         return repr(value)
     is_of_tmt = type(value).__module__.split(".")[0] == __name__.split(".")[0]
     if is_of_tmt and isinstance(value, Tree | Method) and is_dataclass(value):
-        return f"{type(value).__qualname__}({[getattr(value, field.name) for field in fields(value)]!r})"
+        return f"{type(value).__qualname__}({stated(value)})"
     return None
 
 
@@ -85,14 +82,11 @@ def complain(error: OSError) -> None:
     """Say once in a process why the folder is not used; on stderr, unless logging is set up otherwise."""
     if not complaints:
         complaints.append(error)
-        advice = "remove it, or set TMT_CACHE to a folder of your own"
-        logging.getLogger("tmt").warning(
-            "%s: nothing there is run, code is compiled in memory; %s", error, advice
-        )
+        done, advice = "code is compiled in memory", "remove it, or set TMT_CACHE to a folder of your own"
+        logging.getLogger("tmt").warning("%s: nothing there is run, %s; %s", error, done, advice)
 
 
 def cache_folder() -> Path:
-    """Where object files are kept."""
     if os.environ.get("TMT_CACHE"):
         return Path(os.environ["TMT_CACHE"])
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tmt"
@@ -127,10 +121,7 @@ def check_own(path: Path, on_the_way: bool = False) -> None:
 
 
 def private(path: Path, group: int) -> bool:
-    """Whether the group of a path is the user's own, without other members, as many systems make one for each user.
-
-    Where there are further access rights the group's bits stand for those.
-    """
+    """Whether the group of a path is the user's own, without other members and without further rights."""
     import grp  # POSIX only
     import pwd
 

@@ -5,27 +5,18 @@ all of them together. A product that goes into one sum alone is rounded with it,
 twice as many lines in one function, so long tapes are cut; what one part hands to a later one stands in an array.
 """
 
-import operator
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
 
 from tmt.derivation.scalar import Scalar
 
 from .ir import DOUBLE, POINTER, Code, Value, wide
 from .sine import sincos
-from .trace import LEAVES, Expression, Tape
+from .trace import FOLD, LEAVES, Expression, Tape
 
 LONGEST = 1_000  # nodes of one function
 OF_ONE = ("solution", "bias_rates")  # functions of linear.py, which take one state
-OPERATIONS: dict[str, Callable[..., Any]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": operator.truediv,
-    "neg": operator.neg,
-}
 
 
 @dataclass(frozen=True)
@@ -66,19 +57,12 @@ def trace(name: str, sizes: Iterable[int], function: Callable[..., Sequence[Scal
     return Traced(name, tape, [x for part in lists for x in part], list(outputs))
 
 
-class Handed(NamedTuple):
-    """Where the parts of a long function hand values to later ones."""
-
-    array: Value
-    places: dict[int, int]  # of nodes
-
-
 def functions(traced: Traced, width: int, inline: bool = False) -> list[Code]:
     """The code of a traced function, with all its parts, for `width` states side by side."""
     steps = Steps(traced)
     if len(steps.order) <= LONGEST:
         code = entry(traced.name, "alwaysinline" if inline else "noinline")
-        steps.write(code, steps.order, width, None)
+        steps.write(code, steps.order, width, {})
         return [code]
     sections = [steps.order[k : k + LONGEST] for k in range(0, len(steps.order), LONGEST)]
     places, size = steps.handed_on(sections)
@@ -86,7 +70,7 @@ def functions(traced: Traced, width: int, inline: bool = False) -> list[Code]:
     handed = main.reserve(wide(DOUBLE, width), size)
     for k, section in enumerate(sections):
         part = entry(f"{traced.name}.{k}", "noinline", "handed")
-        steps.write(part, section, width, Handed(part["handed"], places))
+        steps.write(part, section, width, places)
         main.call(part.name, main["in"], main["out"], handed)
         result.append(part)
     main.give_back()
@@ -116,7 +100,6 @@ class Steps:
         self.order = [i for i in nodes if i not in left_out]
 
     def takes(self, i: int) -> list[int]:
-        """The values that a step takes."""
         arguments = self.tape.operands(i)
         if i in self.fused:
             product = self.fused[i]
@@ -144,8 +127,8 @@ class Steps:
             free += leaving[k]
         return places, max(size, 1)
 
-    def write(self, code: Code, order: list[int], width: int, handed: Handed | None) -> None:
-        """The lines of some of the steps, of which those that hand values on and take them are given an array for it."""
+    def write(self, code: Code, order: list[int], width: int, places: dict[int, int]) -> None:
+        """The lines of some of the steps; places: those of the nodes that parts of a long function hand on."""
         tape, kind, out = self.tape, wide(DOUBLE, width), code["out"]
         values: dict[int, Value] = {}
 
@@ -156,8 +139,8 @@ class Steps:
                     values[i] = code.number(float(arguments[0]), kind)
                 elif i in self.input:
                     values[i] = code["in"].load(self.input[i] * width, kind)
-                elif handed:
-                    values[i] = handed.array.load(handed.places[i] * width, kind)
+                elif i in places:
+                    values[i] = code["handed"].load(places[i] * width, kind)
             return values[i]
 
         for i in order:
@@ -166,8 +149,8 @@ class Steps:
             for node, x in made.items():
                 for k in self.outputs.get(node, ()):
                     out.store(x, k * width)
-                if handed and node in handed.places:
-                    handed.array.store(x, handed.places[node] * width)
+                if node in places:
+                    code["handed"].store(x, places[node] * width)
         if order[-1:] == self.order[-1:]:  # inputs and numbers that are results too
             for i in [i for i in self.outputs if tape.nodes[i][0] in LEAVES]:
                 for k in self.outputs[i]:
@@ -183,9 +166,8 @@ class Steps:
             return {item: both[nodes[item][1][1]] for item in self.items[i]}
         if name == "call":
             numbers = {item: nodes[item][1][1] for item in self.items[i]}
-            place = called(
-                code, arguments[0], [value(a) for a in arguments[1:]], 1 + max(numbers.values()), width
-            )
+            taken = [value(a) for a in arguments[1:]]
+            place = called(code, arguments[0], taken, 1 + max(numbers.values()), width)
             return {item: place.load(k * width, wide(DOUBLE, width)) for item, k in numbers.items()}
         if i in self.fused:
             product = self.fused[i]
@@ -198,7 +180,7 @@ class Steps:
             return {i: value(arguments[0]).function("sqrt")}
         if name == "arctan":
             return {i: code.library("atan", value(arguments[0]))}
-        return {i: OPERATIONS[name](*map(value, arguments))}
+        return {i: FOLD[name](*map(value, arguments))}
 
 
 def called(code: Code, name: str, values: list[Value], count: int, width: int) -> Value:

@@ -33,10 +33,7 @@ LEAVES = ("input", "number")
 
 
 class Tape:
-    """The expressions of one trace, each kept once, in an order in which they can be computed.
-
-    number: the type of the model's numbers: float, or an exact one that can be made from a float.
-    """
+    """The expressions of one trace, each once, in order of computation; number: float, or an exact type."""
 
     def __init__(self, number: Callable[[Scalar], Scalar] = float):
         self.number_type = number
@@ -127,7 +124,6 @@ class Tape:
         return None
 
     def apply(self, operation: str, *operands: Scalar) -> "Expression":
-        """The expression for one operation, simplified."""
         values = [self.lift(operand) for operand in operands]
         numbers = [value.number for value in values]
         if None not in numbers:
@@ -167,7 +163,6 @@ class Tape:
         return sorted(needed)
 
     def operands(self, i: int) -> tuple[int, ...]:
-        """The nodes that a node is computed from."""
         operation, arguments = self.nodes[i]
         if operation in LEAVES:
             return ()
@@ -199,7 +194,6 @@ class Expression:
 
     @property
     def name(self) -> str:
-        """The name of an input."""
         return self.tape.nodes[self.i][1][0]
 
     def apply(self, operation: str, *values: Scalar) -> Scalar:

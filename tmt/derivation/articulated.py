@@ -17,7 +17,7 @@ of Mbar with n times the length of the paths to the world.
 
 from typing import NamedTuple
 
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.scalar import Scalar, Values
 
 from .composite import Distribution, rounded_once, turning
 from .mechanism import AnyTree, turn_in_parent
@@ -108,9 +108,7 @@ class Share(NamedTuple):
     u: Scalar
 
 
-def acceleration(
-    tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armature: Scalars = ()
-) -> list[Scalar]:
+def acceleration(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armature: Scalars = ()) -> Values:
     """qdd (nv,) from Mbar qdd = force - h; force: all but the bias; armature: in place of the tree's."""
     frames, rigid = outward(tree, q, qd)
     armature = armature or tree.armature
@@ -168,7 +166,6 @@ def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[l
 
 
 def bias(tree: AnyTree, q: Scalars, qd: Scalars) -> list[Scalar]:
-    """h (nv, N m) alone."""
     return along(*carried(tree, q, qd))
 
 

@@ -105,10 +105,8 @@ def distribution_of(tree: AnyTree, body: int) -> Distribution:
     inertia = Matrix(map(exact_vector, tree.inertia[body]))
     (xx, *_), (_, yy, _), (*_, zz) = inertia
     half = (xx + yy + zz) / 2
-    twice = inertia + inertia.transposed
-    second = Matrix([[half, 0, 0], [0, half, 0], [0, 0, half]]) - Matrix(
-        [row * Fraction(1, 2) for row in twice]
-    )
+    symmetric = Matrix([row * Fraction(1, 2) for row in inertia + inertia.transposed])
+    second = Matrix([[half, 0, 0], [0, half, 0], [0, 0, half]]) - symmetric
     about_com = Distribution(fraction(tree.mass[body]), NOTHING.moment, second)
     return about_com.moved(exact_vector(tree.com[body]))
 
@@ -169,11 +167,7 @@ def motions(tree: AnyTree, placements: list[tuple[Vector, Matrix]], qd: Scalars)
 def mass_matrix_and_bias(
     tree: AnyTree, q: Scalars, qd: Scalars, number: Callable[..., Scalar] = float
 ) -> tuple[list[list[Scalar]], list[Scalar]]:
-    """Mbar (nv rows of nv, kg m2) and h (nv, N m), as in method.py; over any scalar.
-
-    q (nq), qd (nv): sequences of scalars, rad and rad/s. number: the type of the model's numbers, float or
-    mpmath.mpf; each is the exact value, rounded once.
-    """
+    """Mbar and h, as in method.py; number: float or mpmath.mpf, to which what is exact is rounded once."""
     n, joints = len(tree.axis), tree.coordinates.joints
     axes = [Vector(*axis) for axis in tree.axis]
     placements = [(origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)) for i in range(len(joints))]
@@ -218,9 +212,7 @@ def mass_matrix_and_bias(
 
 
 @lru_cache(maxsize=64)
-def rounded_once(
-    tree: AnyTree, number: Callable[..., Scalar]
-) -> tuple[list[Distribution], list[Distribution], list[Distribution]]:
+def rounded_once(tree: AnyTree, number: Callable[..., Scalar]) -> tuple[list[Distribution], ...]:
     """What each joint carries itself, its part that is not even about a hinge, and the part that is."""
     exact = carried_by_joint(tree)
     even = [NOTHING] * len(exact)
@@ -228,8 +220,7 @@ def rounded_once(
         if joint.kind == "hinge":
             even[i] = exact[i].even_about(exact_vector(tree.axis[joint.qd.start]))
     uneven = [all_of_it.less(part) for all_of_it, part in zip(exact, even)]
-    own, uneven, even = ([part.rounded(number) for part in parts] for parts in (exact, uneven, even))
-    return own, uneven, even
+    return tuple([part.rounded(number) for part in parts] for parts in (exact, uneven, even))
 
 
 def handed_down(offset: Vector, turn: Matrix, force: Vector, moment: Vector) -> tuple[Vector, Vector]:

@@ -30,14 +30,10 @@ class Flat:
     def move(self, q: Scalars, u: Scalars) -> list[Scalar]:
         return [x + y for x, y in zip(q, u)]
 
-    def tangent(self, q: Scalars, dq: Scalars) -> list[Scalar]:
-        return list(dq)
-
-    def component_rates(self, q: Scalars, qd: Scalars) -> list[Scalar]:
-        return list(qd)
-
     def rates(self, u: Scalars, qd: Scalars) -> list[Scalar]:
         return list(qd)
+
+    tangent = component_rates = rates
 
 
 class Ball:
@@ -52,8 +48,13 @@ class Ball:
     def component_rates(self, q: Scalars, qd: Scalars) -> list[Scalar]:
         return [0.5 * x for x in product(q, [0.0, *qd])]
 
-    def rates(self, u: Scalars, qd: Scalars) -> list[Scalar]:
-        return inverse_derivative(u, qd)
+    def rates(self, movement: Scalars, speeds: Scalars) -> list[Scalar]:
+        """dexp^-1(u) omega, see above."""
+        u, omega = Vector(*movement), Vector(*speeds)
+        half = sqrt(u.dot(u) + TINY) * 0.5
+        share = (1.0 - half * cos(half) / sin(half)) / (half * half) * 0.25
+        once = u.cross(omega)
+        return list(omega + once * 0.5 + u.cross(once) * share)
 
 
 FLAT, BALL = Flat(), Ball()
@@ -68,12 +69,10 @@ class Joint(NamedTuple):
 
     @property
     def speeds(self) -> range:
-        """The numbers of its speeds in qd."""
         return range(self.qd.start, self.qd.stop)
 
     @property
     def rule(self) -> Flat | Ball:
-        """How it moves."""
         return BALL if self.kind == "ball" else FLAT
 
 
@@ -109,8 +108,11 @@ class Coordinates(NamedTuple):
 
     @staticmethod
     def logarithm(p: Scalars) -> list[Scalar]:
-        """Of a quaternion, see below."""
-        return logarithm(p)
+        """The movement u, |u| at most pi rad, with exponential(u) = p or -p; |p| = 1."""
+        w, x, y, z = p
+        size, length = sqrt(w * w + TINY), sqrt(x * x + y * y + z * z + TINY)
+        share = arctan(length / (1.0 + size)) * 4.0 / length * (w / size)
+        return [x * share, y * share, z * share]
 
     def tangent(self, q: Scalars, dq: Scalars) -> list[Scalar]:
         """The movement that changes q by small dq, linear in dq."""
@@ -127,7 +129,6 @@ class Coordinates(NamedTuple):
 
 @lru_cache(maxsize=256)
 def coordinates_of(kinds: tuple[str, ...]) -> Coordinates:
-    """The coordinates of joints of these kinds."""
     joints, nq, nv = [], 0, 0
     for kind in kinds:
         positions, speeds = KINDS[kind]
@@ -153,7 +154,6 @@ def conjugate(p: Scalars) -> list[Scalar]:
 
 
 def normalized(p: Scalars) -> list[Scalar]:
-    """The quaternion at length 1."""
     length = sqrt(sum((x * x for x in p[1:]), p[0] * p[0]))
     return [x / length for x in p]
 
@@ -164,20 +164,3 @@ def exponential(u: Scalars) -> list[Scalar]:
     half = sqrt(x * x + y * y + z * z + TINY) * 0.5
     share = sin(half) / half * 0.5
     return [cos(half), x * share, y * share, z * share]
-
-
-def logarithm(p: Scalars) -> list[Scalar]:
-    """The movement u, |u| at most pi rad, with exponential(u) = p or -p; |p| = 1."""
-    w, x, y, z = p
-    size, length = sqrt(w * w + TINY), sqrt(x * x + y * y + z * z + TINY)
-    share = arctan(length / (1.0 + size)) * 4.0 / length * (w / size)
-    return [x * share, y * share, z * share]
-
-
-def inverse_derivative(movement: Scalars, speeds: Scalars) -> list[Scalar]:
-    """dexp^-1(u) omega, see above."""
-    u, omega = Vector(*movement), Vector(*speeds)
-    half = sqrt(u.dot(u) + TINY) * 0.5
-    share = (1.0 - half * cos(half) / sin(half)) / (half * half) * 0.25
-    once = u.cross(omega)
-    return list(omega + once * 0.5 + u.cross(once) * share)

@@ -93,10 +93,7 @@ def seeded(values: Iterable[Scalar], slopes: Iterable[Scalar]) -> list[Dual]:
 def jacobian(
     function: Callable[[list[Scalar]], Iterable[Scalar]], x: Scalars, directions: Sequence[Scalars] = ()
 ) -> list[list[Scalar]]:
-    """d function_i / d x_j (rows i, columns j) of a function from a list of scalars to a list of scalars.
-
-    directions: lists as long as x, along which it is differentiated in place of along each x_j.
-    """
+    """d function_i / d x_j (rows i, columns j) of lists of scalars; directions: in place of each x_j alone."""
     columns = []
     for direction in directions or unit_vectors(len(x)):
         nudged = seeded(x, direction)

@@ -23,13 +23,13 @@ unless they are said to be in body axes.
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.scalar import Rows, Scalar, Values
 
 from .dual import jacobian
 from .mechanism import AnyTree, origin_in_parent, turn_in_parent
 from .vectors import IDENTITY, ZERO, Matrix, Scalars, Vector, solve, total, total_vector
 
-Terms = Callable[[AnyTree, Scalars, Scalars], tuple[list[list[Scalar]], list[Scalar]]]  # Mbar and h
+Terms = Callable[[AnyTree, Scalars, Scalars], tuple[Rows, Values]]  # Mbar and h
 
 
 class Frame(NamedTuple):
@@ -143,17 +143,13 @@ def bias(parts: Sequence[Body], gravity: Iterable[Scalar]) -> list[Scalar]:
 
 
 def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[list[Scalar]], list[Scalar]]:
-    """Mbar and h at positions q and speeds qd."""
     parts = bodies(tree, q, qd)
     return mass_matrix(parts, tree.armature), bias(parts, tree.gravity)
 
 
-def bias_rates(
-    tree: AnyTree, q: Scalars, qd: Scalars, terms: Terms = mass_matrix_and_bias
-) -> list[list[Scalar]]:
+def bias_rates(tree: AnyTree, q: Scalars, qd: Scalars, terms: Terms = mass_matrix_and_bias) -> Rows:
     """dh/dqd (nv rows of nv, N m s/rad): the exact derivative of the bias by the speeds, by dual numbers."""
-    of_terms = getattr(terms, "bias_rates", None)
-    return of_terms(tree, q, qd) if of_terms else jacobian(lambda rates: terms(tree, q, rates)[1], qd)
+    return jacobian(lambda rates: terms(tree, q, rates)[1], qd)
 
 
 def from_rest(tree: AnyTree, q: Scalars) -> list[tuple[Scalar, Scalar]]:
@@ -204,7 +200,6 @@ def potential(parts: Sequence[Body], gravity: Iterable[Scalar]) -> Scalar:
 
 
 def spring_energy(tree: AnyTree, q: Scalars) -> Scalar:
-    """Energy of the springs in J."""
     if not tree.has_springs:
         return 0.0
     return total(0.5 * stiffness * (x * x) for stiffness, x in from_rest(tree, q) if stiffness)

@@ -16,10 +16,7 @@ from .vectors import ZERO, Scalars, solve
 
 
 class State:
-    """A state of a tree, and what follows from it: each part once.
-
-    q (nq), qd, tau (nv): sequences of scalars; at rest and without torque where they are not given.
-    """
+    """A state of a tree, by default at rest and without torque, and what follows from it: each part once."""
 
     def __init__(self, tree: AnyTree, q: Scalars, qd: Scalars | None = None, tau: Scalars | None = None):
         nothing = [0.0] * len(tree.axis)
@@ -44,13 +41,9 @@ class State:
         return method.bias(at_rest, self.tree.gravity)
 
     @property
-    def force(self) -> list[Scalar]:
-        """Qbar."""
-        return method.reduced_force(self.tree, self.bias, self.q, self.qd, self.tau)
-
-    @property
     def acceleration(self) -> list[Scalar]:
-        return solve(self.mass_matrix, self.force)
+        Qbar = method.reduced_force(self.tree, self.bias, self.q, self.qd, self.tau)
+        return solve(self.mass_matrix, Qbar)
 
     @property
     def potential_energy(self) -> Scalar:
@@ -95,6 +88,5 @@ QUANTITIES = {
 
 
 def shape_of(name: str, tree: AnyTree) -> tuple[int, ...]:
-    """The shape of a quantity of a tree."""
     sizes = {"m": len(tree.mass), "nv": len(tree.axis)}
     return tuple(size if isinstance(size, int) else sizes[size] for size in QUANTITIES[name].shape)

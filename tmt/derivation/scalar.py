@@ -3,3 +3,5 @@
 from typing import Any
 
 Scalar = Any
+Values = list[Scalar]
+Rows = list[Values]

@@ -12,35 +12,13 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.scalar import Rows, Scalar, Values
 
 Scalars = Sequence[Scalar] | NDArray[Any]
 
 
-@singledispatch
-def sin(angle: Scalar) -> Scalar:
-    """Sine of a scalar of any registered type, angle in rad."""
-    return np.sin(angle)
-
-
-@singledispatch
-def cos(angle: Scalar) -> Scalar:
-    """Cosine of a scalar of any registered type, angle in rad."""
-    return np.cos(angle)
-
-
-@singledispatch
-def sqrt(value: Scalar) -> Scalar:
-    """Square root of a scalar of any registered type."""
-    return np.sqrt(value)
-
-
-@singledispatch
-def arctan(value: Scalar) -> Scalar:
-    """Arc tangent of a scalar of any registered type, in rad."""
-    return np.arctan(value)
-
-
+# of a scalar of any registered type, angles in rad
+sin, cos, sqrt, arctan = map(singledispatch, (np.sin, np.cos, np.sqrt, np.arctan))
 sin.register(mpmath.mpf, mpmath.sin)
 cos.register(mpmath.mpf, mpmath.cos)
 sqrt.register(mpmath.mpf, mpmath.sqrt)
@@ -150,7 +128,7 @@ def turn_of(quaternion: Iterable[Scalar]) -> Matrix:
     return Matrix([first, second, third])
 
 
-def solve(matrix: Sequence[Scalars], right: Scalars) -> list[Scalar]:
+def solve(matrix: Sequence[Scalars], right: Scalars) -> Values:
     """Solution x of `matrix` x = `right`, for a symmetric positive definite matrix given by rows.
 
     Factorised as U D U' from the last row to the first, without square roots or pivots (none are needed: it
@@ -158,9 +136,9 @@ def solve(matrix: Sequence[Scalars], right: Scalars) -> list[Scalar]:
     as in MuJoCo.
     """
     n = len(right)
-    scaled: list[list[Scalar]] = [[None] * n for _ in range(n)]  # U D
-    upper: list[list[Scalar]] = [[None] * n for _ in range(n)]
-    inverse: list[Scalar] = [None] * n  # of D
+    scaled: Rows = [[None] * n for _ in range(n)]  # U D
+    upper: Rows = [[None] * n for _ in range(n)]
+    inverse: Values = [None] * n  # of D
     for j in reversed(range(n)):
         behind = range(j + 1, n)
         inverse[j] = 1.0 / (matrix[j][j] - total(scaled[j][k] * upper[j][k] for k in behind))
@@ -175,11 +153,8 @@ def solve(matrix: Sequence[Scalars], right: Scalars) -> list[Scalar]:
     return x
 
 
-def solve_any(matrix: Sequence[Scalars], right: Scalars) -> list[Scalar]:
-    """Solution x of `matrix` x = `right` for any matrix that needs no pivots, given by rows: L U.
-
-    MuJoCo's implicit integrator factorises its unsymmetric matrix without pivots too.
-    """
+def solve_any(matrix: Sequence[Scalars], right: Scalars) -> Values:
+    """Solution x of `matrix` x = `right`, any by rows, by L U without pivots, as MuJoCo's implicit has it."""
     n = len(right)
     upper, x = [list(row) for row in matrix], list(right)
     for k in range(n):

@@ -23,6 +23,7 @@ from tmt.exact.tree import exact_tree, of_length_1
 from tmt.model.tree import Tree
 
 Numbers = Sequence[float] | np.ndarray
+Nodes = list[Expression]
 
 DIGITS = 60  # of the numbers that are traced
 FORMS: dict[str, Callable[..., Any]] = {
@@ -36,8 +37,8 @@ MOST_OPERATIONS = 20_000_000  # of all steps of a run: some 20 s
 BESIDE = 100  # operations, as long as the rest of a step takes
 SEEN = 200  # steps by which it is seen whether a run would take more
 OPERATIONS = {
-    "+": series.ADD, "-": series.SUBTRACT, "neg": series.NEGATIVE, "*": series.MULTIPLY, "/": series.DIVIDE,
-    "sqrt": series.ROOT,
+    "+": [series.ADD], "-": [series.SUBTRACT], "neg": [series.NEGATIVE], "*": [series.MULTIPLY], "/": [series.DIVIDE],
+    "sqrt": [series.ROOT], "sincos": [series.SLOPE, series.SINE, series.COSINE],
 }  # fmt: skip
 
 
@@ -122,10 +123,8 @@ def followed(
             return np.array(path), count, error
         left, count = float((times[-1] - t) / Fraction(min(step, 2.0 * float(times[-1])))), count + 1
         if count - 1 + left > most and count >= min(SEEN, most):
-            error = TooManySteps(
-                f"at t = {float(t):.3g} s a series takes steps of {step:.1e} s, and in {float(times[-1]):g} s more than {most}"
-            )
-            return np.array(path), count, error
+            why = f"a series takes steps of {step:.1e} s, and in {float(times[-1]):g} s more than {most}"
+            return np.array(path), count, TooManySteps(f"at t = {float(t):.3g} s {why}")
         end = times[-1] if step == math.inf else t + Fraction(step)
         while len(path) < len(times) and times[len(path)] <= end:
             path.append(after(times[len(path)] - t, high[:n], low[:n]))
@@ -147,9 +146,7 @@ def equations(tree: Tree, tau: Numbers, form: str) -> Equations:
     return traced._replace(code=np.array([*traced.code, *more]))
 
 
-def program(
-    tape: Tape, inputs: list[Expression], results: list[Expression]
-) -> tuple[Equations, dict[int, int]]:
+def program(tape: Tape, inputs: Nodes, results: Nodes) -> tuple[Equations, dict[int, int]]:
     """The operations that make results of inputs, which stand in the first rows; and the row of each node of the tape."""
     order = tape.needed(results)
     constant = {i: tape.nodes[i][1][0] for i in order if tape.nodes[i][0] == "number"}
@@ -160,13 +157,9 @@ def program(
         if operation == "item":
             row[i] = row[arguments[0]] + 1 + arguments[1]
         elif i not in row:
-            acts = (
-                (series.SLOPE, series.SINE, series.COSINE)
-                if operation == "sincos"
-                else (OPERATIONS[operation],)
-            )
+            acts = OPERATIONS[operation]
             if operation == "*" and any(i in constant for i in arguments):  # the number is the second
-                acts, arguments = (series.SCALE,), tuple(sorted(arguments, key=lambda i: i in constant))
+                acts, arguments = [series.SCALE], tuple(sorted(arguments, key=lambda i: i in constant))
             a, b = row[arguments[0]], row[arguments[-1]]
             code += [(act, rows + k, a, b) for k, act in enumerate(acts)]
             row[i], rows = rows, rows + len(acts)

@@ -38,23 +38,19 @@ def values_at(high: np.ndarray, low: np.ndarray, th: float, tl: float, state: np
 
 @lru_cache(maxsize=1)
 def functions() -> dict[str, Callable[..., None]]:
-    """The two compiled functions."""
     library, integer, place = store.library(source, "series"), ctypes.c_int64, ctypes.c_void_p
-    return {
-        "expand": library.function("expand", None, place, integer, integer, place, place),
-        "values_at": library.function(
-            "values_at", None, *[place] * 3, *[ctypes.c_double] * 2, integer, integer
-        ),
+    arguments = {
+        "expand": [place, integer, integer, place, place],
+        "values_at": [*[place] * 3, *[ctypes.c_double] * 2, integer, integer],
     }
+    return {name: library.function(name, None, *types) for name, types in arguments.items()}
 
 
 def source() -> str:
-    """The module of the interpreter."""
     return module([sincos_of_pair(), expansion(), evaluation()])
 
 
 def sincos_of_pair() -> Code:
-    """sincos(out, high, low): four doubles."""
     code = Code("sincos", {"out": POINTER, "high": DOUBLE, "low": DOUBLE}, attributes="noinline")
     for k, x in enumerate(sincos(code["high"], code["low"])):
         code["out"].store(x, k)
@@ -96,7 +92,6 @@ def convolution(code: Code, a: Value, b: Value, first: Value, last: Value) -> tu
 
 
 def expansion() -> Code:
-    """The function of `expand`."""
     code = Code("expand", {"code": POINTER, "count": INDEX, "width": INDEX, "high": POINTER, "low": POINTER})
     high, low, width, both = code["high"], code["low"], code["width"], code.reserve(DOUBLE, 4)
     with code.loop(width - 1) as orders, code.loop(code["count"]) as operations:
@@ -146,7 +141,6 @@ def expansion() -> Code:
 
 
 def is_any(operation: Value, *kinds: int) -> Value:
-    """Whether an operation is one of these."""
     first, *more = (operation.compare("eq", kind) for kind in kinds)
     return reduce(lambda flag, other: flag.bits("or", other), more, first)
 
@@ -157,7 +151,6 @@ def put_pair(high: Value, low: Value, at: Value, h: Value, l: Value) -> None:
 
 
 def evaluation() -> Code:
-    """The function of `values_at`."""
     names = dict.fromkeys(("high", "low", "state"), POINTER) | dict.fromkeys(("th", "tl"), DOUBLE)
     names |= dict.fromkeys(("width", "n"), INDEX)
     code = Code("values_at", names)

@@ -1,35 +1,41 @@
 """A Tree with its numbers in another type, so that none is rounded on the way: for many digits."""
 
 from collections.abc import Callable, Iterable
-from types import SimpleNamespace
 
 import mpmath
 
 from tmt.derivation.coordinates import Coordinates, normalized
+from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.scalar import Scalar
-from tmt.derivation.vectors import Vector, sqrt
+from tmt.derivation.vectors import Scalars, Vector, sqrt
 from tmt.model.tree import Tree
 
-NUMBERS = (
-    "offset", "damping", "mass", "com", "inertia", "gravity", "armature", "stiffness", "rest", "reference",
-    "position_gain", "speed_gain",
-)  # fmt: skip
 HALVINGS = 4  # of a turn of at most pi rad: then the sine of its half is below 0.1
 with mpmath.workdps(60):  # arcsin x = x (1 + x^2 / 6 + ...), the highest first; the next is below 1e-37
     ARC_SINE = [mpmath.binomial(2 * k, k) / (4**k * (2 * k + 1)) for k in reversed(range(18))]
 
 
-def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> SimpleNamespace:
-    """What the method asks of a Tree, each number made by `number` from its double; directions have length 1 in all digits.
+class ExactTree(Mechanism[Scalar]):
+    """A Tree in another type of number."""
+
+    @property
+    def coordinates(self) -> Coordinates:
+        return Analytic(*super().coordinates)
+
+
+def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> ExactTree:
+    """A Tree with each number made by `number` from its double; directions have length 1 in all digits.
 
     number: mpmath.mpf, or another type made from a double. Turns about an axis that is a little longer than 1 would not be
     turns, and regrouped sums would differ from the literal ones by that.
     """
 
     def lifted(value: Scalar) -> Scalar:
-        return tuple(map(lifted, value)) if isinstance(value, tuple) else number(value)
+        if isinstance(value, tuple):
+            return tuple(map(lifted, value))
+        return number(value) if isinstance(value, float) else value
 
-    axis = []
+    axis: list[Vector] = []
     for joint in tree.coordinates.joints:
         first, *more = [Vector(*map(number, direction)) for direction in tree.axis[joint.qd]]
         x = _unit(first)
@@ -37,23 +43,12 @@ def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> SimpleNamespace
         if joint.kind == "ball":
             y = _unit(more[0] - x * x.dot(more[0]))
             axis += [y, x.cross(y)]
-    numbers = {name: lifted(getattr(tree, name)) for name in NUMBERS}
-    numbers["rest"] = of_length_1(tree.coordinates, numbers["rest"])
-    return SimpleNamespace(
-        **numbers,
-        axis=tuple(map(tuple, axis)),
-        parent=tree.parent,
-        kind=tree.kind,
-        body_joint=tree.body_joint,
-        coordinates=Analytic(*tree.coordinates),
-        moves=tree.moves,
-        has_springs=tree.has_springs,
-        has_gains=tree.has_gains,
-    )
+    numbers = {name: lifted(value) for name, value in vars(tree).items()}
+    rest = tuple(of_length_1(tree.coordinates, numbers["rest"]))
+    return ExactTree(**numbers | {"axis": tuple(map(tuple, axis)), "rest": rest})
 
 
 def _unit(vector: Vector) -> Vector:
-    """The vector at length 1."""
     return vector * (1 / sqrt(vector.dot(vector)))
 
 
@@ -65,24 +60,20 @@ def of_length_1(coordinates: Coordinates, q: Iterable[Scalar]) -> list[Scalar]:
     return position
 
 
-def logarithm(p: Iterable[Scalar]) -> list[Scalar]:
-    """coordinates.logarithm without a root of what vanishes: the turn is halved until a series of the arc sine takes it."""
-    w, *v = p
-    cosine = sqrt(w * w)
-    scale = w / cosine
-    for _ in range(HALVINGS):
-        cosine = sqrt((cosine + 1.0) / 2.0)
-        scale = scale / (cosine * 2.0)
-    v = Vector(*v) * scale
-    square, share = v.dot(v), 0.0
-    for factor in ARC_SINE:
-        share = share * square + factor
-    return list(v * (share * 2.0 ** (HALVINGS + 1)))
-
-
 class Analytic(Coordinates):
     """Coordinates whose `difference` of two quaternions of length 1 has derivatives where it is zero too."""
 
     @staticmethod
-    def logarithm(p: Iterable[Scalar]) -> list[Scalar]:
-        return logarithm(p)
+    def logarithm(p: Scalars) -> list[Scalar]:
+        """Without a root of what vanishes: the turn is halved until a series of the arc sine takes it."""
+        w, *v = p
+        cosine = sqrt(w * w)
+        scale = w / cosine
+        for _ in range(HALVINGS):
+            cosine = sqrt((cosine + 1.0) / 2.0)
+            scale = scale / (cosine * 2.0)
+        v = Vector(*v) * scale
+        square, share = v.dot(v), 0.0
+        for factor in ARC_SINE:
+            share = share * square + factor
+        return list(v * (share * 2.0 ** (HALVINGS + 1)))

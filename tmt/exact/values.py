@@ -19,9 +19,8 @@ FIELDS = {name: quantity.parts or (name,) for name, quantity in QUANTITIES.items
 def exact(tree: Tree, q: Sequence[float], qd: Sequence[float], tau: Sequence[float]) -> SimpleNamespace:
     """Every TMT quantity at one state, from the same source as the floats, with 50 digits, by its name.
 
-    q (nq,), qd, tau (nv,): rad, rad/s, N m. The numbers of the tree and of the state are taken as what their
-    doubles are exactly; 0.1 means 0.1000000000000000055511151231257827... Each is an object array of mpmath numbers, of which
-    names, shapes and units are as in `tmt`; a quantity of several arrays has each by its own name.
+    q (nq,), qd, tau (nv,): rad, rad/s, N m. Numbers are taken as what their doubles are exactly. Each is an
+    object array of mpmath numbers, with shape and unit as in `tmt`; of several arrays each has its own name.
     """
     with mpmath.workdps(DIGITS):
         q, qd, tau = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd, tau))
@@ -30,16 +29,7 @@ def exact(tree: Tree, q: Sequence[float], qd: Sequence[float], tau: Sequence[flo
         for name, fields in FIELDS.items():
             value = QUANTITIES[name].of(state)
             values |= zip(fields, value if QUANTITIES[name].parts else [value])
-        return SimpleNamespace(**{field: _array(value) for field, value in values.items()})
-
-
-def _array(nested: Scalar) -> np.ndarray:
-    """Nested iterables of numbers as an object array."""
-
-    def lists(item: Scalar) -> Scalar:
-        return [lists(i) for i in item] if hasattr(item, "__iter__") else item
-
-    return np.array(lists(nested), dtype=object)
+        return SimpleNamespace(**{field: np.array(value, dtype=object) for field, value in values.items()})
 
 
 def distance(values: np.ndarray, truth: np.ndarray) -> np.ndarray:

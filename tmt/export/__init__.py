@@ -4,7 +4,6 @@ import hashlib
 import keyword
 import re
 from collections.abc import Callable, Sequence
-from functools import lru_cache
 from textwrap import wrap
 from typing import Any
 
@@ -14,15 +13,13 @@ from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree, stated
 from tmt.model.values import shown
 
-from . import c, latex, matlab, page, python, symbols
+from . import c, matlab, python
 from .statements import Function, Program
 
 LANGUAGES: dict[str, Callable[[Program], str]] = {
     "c": c.source, "c header": c.header, "python": python.source, "matlab": matlab.source,
 }  # fmt: skip
-SYMBOLIC: dict[str, Callable[[symbols.Symbolic, Sequence[str]], str]] = {
-    "latex": latex.latex, "html": page.page, "sympy": symbols.python_source,
-}  # fmt: skip
+SYMBOLIC = "latex", "html", "sympy"
 OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
 UNITS = {
     "hinge": "rad, rad/s, N m",
@@ -47,7 +44,6 @@ SI units, angles in rad. Shapes are those of one state; ... stands for any batch
 def text(
     model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str]
 ) -> str:
-    """See `tmt.equations`."""
     checked_model(model)
     known = [*LANGUAGES, *SYMBOLIC]
     if not isinstance(language, str) or language not in known:
@@ -65,13 +61,21 @@ def text(
     lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
     if language in SYMBOLIC:
-        return SYMBOLIC[language](symbols_of(model, chosen), lines)
+        return symbolic_text(model, language, chosen, lines)
     functions = [function_of(model, quantity) for quantity in dict.fromkeys(chosen)]
     return LANGUAGES[language](Program(name, lines, functions, single))
 
 
+def symbolic_text(model: Tree, language: str, quantities: tuple[str, ...], head: Sequence[str]) -> str:
+    try:
+        from . import latex, page, symbols
+    except ImportError:
+        raise ValueError("symbolic equations need SymPy: pip install sympy") from None
+    writers = {"latex": latex.latex, "html": page.page, "sympy": symbols.python_source}
+    return writers[language](symbols.symbolic(model, quantities), head)
+
+
 def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ...]:
-    """The quantities, of which each must be one of the choices."""
     chosen = tuple(quantities) if isinstance(quantities, list | tuple) else (quantities,)
     wrong = [quantity for quantity in chosen if not isinstance(quantity, str) or quantity not in choices]
     if wrong or not chosen:
@@ -80,24 +84,17 @@ def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ..
     return chosen
 
 
-@lru_cache(maxsize=4)
-def symbols_of(model: Tree, quantities: tuple[str, ...]) -> symbols.Symbolic:
-    """The symbolic equations, derived once for all files."""
-    return symbols.symbolic(model, quantities)
-
-
 def is_word(name: str) -> bool:
     return keyword.iskeyword(name) or name in WORDS.split() or name in QUANTITIES
 
 
 def conventions(model: Tree) -> list[str]:
-    """Equation, joints and units in words."""
     coordinates, m = model.coordinates, len(model.mass)
     sizes = f"nq = {coordinates.nq} numbers in q, nv = {coordinates.nv} in qd and tau, m = {m} bodies"
     lines = [
         *CONVENTIONS.splitlines(),
         *wrap(f"{sizes}: {', '.join(model.body_names)}.", 120),
-        f"Numbers of the model: sha256 {digest(model)}.",
+        f"Numbers of the model: sha256 {hashlib.sha256(stated(model).encode()).hexdigest()[:16]}.",
         "Joint, kind, place in q, place in qd and tau (from 0); units of q, qd, tau:",
     ]
     for name, joint in zip(model.joint_names, coordinates.joints):
@@ -108,11 +105,6 @@ def conventions(model: Tree) -> list[str]:
 def places(part: slice) -> str:
     """The first and the last number of a part of q or qd."""
     return f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}"
-
-
-def digest(model: Tree) -> str:
-    """The first digits of a hash of a Tree's names and numbers."""
-    return hashlib.sha256(stated(model).encode()).hexdigest()[:16]
 
 
 def function_of(model: Tree, name: str) -> Function:

@@ -10,14 +10,12 @@ LEAST = 1.2e-38  # of floats: what keeps a root from zero must not become zero
 
 
 def source(program: Program) -> str:
-    """The source file: all functions, and what they need."""
     parts = [comment(program.head), "#include <math.h>"]
     parts += [f"{declared(program, f)}\n{{\n{body(f, program.single)}\n}}" for f in program.functions]
     return "\n\n".join(parts) + "\n"
 
 
 def header(program: Program) -> str:
-    """The declarations, for C and C++."""
     name, sizes, guard = program.name, program.functions[0].sizes, f"{program.name.upper()}_H"
     note = "Arrays of more than one dimension are stored by rows; they may not overlap."
     parts = [
@@ -52,7 +50,6 @@ def declared(program: Program, function: Function) -> str:
 
 
 def body(function: Function, single: bool) -> str:
-    """The lines of a function, whose results are written last."""
     used = {x for x, _ in function.used}
     lines = [f"(void){x};" for x in function.takes if x not in used]
     syntax = Syntax(

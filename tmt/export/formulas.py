@@ -4,6 +4,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+import sympy
+
 from .symbols import TITLES, Symbolic
 from .trigonometry import Expression
 
@@ -19,6 +21,7 @@ class Token(NamedTuple):
 
 
 Formula = list[Token]
+Row = tuple[str, ...]
 
 
 class Section(NamedTuple):
@@ -34,7 +37,6 @@ class Section(NamedTuple):
 
     @property
     def fits(self) -> bool:
-        """Whether the entries fit on a line side by side."""
         columns = list(zip(*self.rows))
         widths = [max(map(width, column)) for column in columns]
         return len(columns) > 1 and sum(widths) + 4 * len(columns) <= WIDTH
@@ -99,7 +101,6 @@ def tokens(expression: Expression, display: Mapping[Expression, str]) -> Formula
 
 def sum_of(terms: Sequence[Expression], display: Mapping[Expression, str]) -> Formula:
     """Terms with their signs: those without a minus first, and short ones before long ones."""
-    import sympy
 
     def rank(term: Expression) -> tuple[bool, bool, int, list[int]]:
         return is_negative(term), term.has(sympy.sin, sympy.cos), term.count_ops(), order(term, display)
@@ -141,16 +142,13 @@ def in_brackets(inner: Formula, power: str = "") -> Formula:
 
 
 def width(formula: Formula) -> int:
-    """About the number of characters that a formula prints."""
     return sum(len(re.sub(r"\\(dot|[a-z]+)|[{}_]", "x", token.text)) + len(token.power) for token in formula)
 
 
-def tables(symbolic: Symbolic) -> list[list[tuple[str, ...]]]:
+def tables(symbolic: Symbolic) -> list[list[Row]]:
     """Rows of joints (symbol, meaning), and of parameters (symbol, value, unit, meaning); no empty table."""
-    joints: list[tuple[str, ...]] = [
-        (symbolic.display[q], text) for q, text in zip(symbolic.q, symbolic.joints)
-    ]
-    parameters: list[tuple[str, ...]] = [
+    joints: list[Row] = [(symbolic.display[q], text) for q, text in zip(symbolic.q, symbolic.joints)]
+    parameters: list[Row] = [
         (symbolic.display[symbol], f"{row.value:.6g}", row.unit.replace("2", "²"), row.meaning)
         for symbol, row in symbolic.parameters.items()
     ]
@@ -158,7 +156,6 @@ def tables(symbolic: Symbolic) -> list[list[tuple[str, ...]]]:
 
 
 def introduction(symbolic: Symbolic) -> str:
-    """The conventions in sentences."""
     quantities = "; ".join(": ".join(TITLES[name]) for name in symbolic.entries)
     note = [f"{symbolic.note[0].upper()}{symbolic.note[1:]}."] if symbolic.note else []
     fixed = ["Forces of dampers D and springs K are not in h.", "Numbers are shown with six digits."]

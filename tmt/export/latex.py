@@ -31,10 +31,7 @@ MOTION = r"M(q)\,\ddot{q} + h(q, \dot{q}) = \tau - D\,\dot{q} - K (q - q_0)"
 
 
 def latex(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
-    """A LaTeX document (article, amsmath): symbols in words, a table of parameters, then each quantity.
-
-    head_lines: lines of text, such as where the equations are from; they are comments at the top.
-    """
+    """A LaTeX document (article, amsmath): head_lines as comments, symbols, parameters, each quantity."""
     equations = []
     for section in sections(symbolic):
         equations.append(rf"\medskip\textbf{{{escaped(section.heading)}}}")
@@ -63,7 +60,6 @@ def in_latex(formula: Formula) -> str:
 
 
 def escaped(text: str) -> str:
-    """Text in LaTeX."""
     named = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "²": "$^2$"}
     plain = text.encode("latin-1", "replace").decode("latin-1")  # what pdflatex has letters for
     return re.sub(r"[_&%$#{}\\~^²]", lambda found: named.get(found[0], f"\\{found[0]}"), plain)

@@ -16,7 +16,6 @@ STATES = (
 
 
 def source(program: Program) -> str:
-    """The file: a function that is called with the name of a quantity."""
     lines = [f"function varargout = {program.name}(quantity, varargin)"]
     lines += [f"% {line}".rstrip() for line in [*program.head, "", STATES]]
     cases = []
@@ -31,7 +30,6 @@ def source(program: Program) -> str:
 
 
 def text(function: Function) -> str:
-    """One function."""
     takes, results, sizes, dimensions = function.takes, function.results, function.sizes, len(function.shape)
     assignments, values = statements(function, SYNTAX)
     lines = [f"assert(size({x}, 1) == {sizes[x]}, '{x} has {sizes[x]} rows');" for x in takes]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import sympy
 
 from tmt.derivation.mechanism import AnyTree, Mechanism
 from tmt.derivation.scalar import Scalar
@@ -17,6 +18,7 @@ GREEK = frozenset((
     "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "mu", "nu", "xi", "rho", "sigma", "tau", "phi",
     "chi", "psi", "omega",
 ))  # fmt: skip
+Symbols = list[Expression]
 AXES = "xyz"
 EPS = 2.0**-52
 ROUND = 16 * EPS  # relative: a number this close to one of 10 digits is meant to be that
@@ -33,10 +35,8 @@ class Parameter(NamedTuple):
 class Names:
     """Symbols of a Tree's joints and numbers.
 
-    parameters: {symbol: Parameter}, {} where numbers are not `named`.
-    Masses, centres of mass and inertias are named after their body, armatures after their joint, offsets l_1,
-    l_2 and so on. display: {symbol: LaTeX}, with the number of the body or joint in place of its name.
-    joints: what each q is, in words.
+    parameters: {symbol: Parameter}, {} where numbers are not `named`. display: {symbol: LaTeX}, with
+    the number of the body or joint in place of its name. joints: what each q is, in words.
     """
 
     def __init__(self, tree: Tree, named: bool):
@@ -51,9 +51,8 @@ class Names:
         self.mass, self.com, self.inertia = [], [], []
         for b, (name, body) in enumerate(zip(bodies, tree.body_names)):
             index, carrier = f"{{{b + 1}}}", tree.body_joint[b]
-            centre = (
-                f"centre of mass of {body} from {tree.joint_names[carrier] if carrier >= 0 else 'the world'}"
-            )
+            origin = tree.joint_names[carrier] if carrier >= 0 else "the world"
+            centre = f"centre of mass of {body} from {origin}"
             self.mass.append(self.symbol(tree.mass[b], f"m_{name}", f"m_{index}", "kg", f"mass of {body}"))
             self.com.append(self.vector(tree.com[b], f"c_{name}", f"c_{index}", "m", centre))
             self.inertia.append(self.tensor(b, name))
@@ -64,8 +63,6 @@ class Names:
 
     def add_joints(self, names: Sequence[str]) -> None:
         """Symbols of positions and speeds: Greek letters if all joints are called so."""
-        import sympy
-
         greek = GREEK.issuperset(self.source.joint_names)
         self.q = [sympy.Symbol(name if greek else f"q_{name}") for name in names]
         self.qd = [sympy.Symbol(f"{name}dot" if greek else f"qd_{name}") for name in names]
@@ -77,8 +74,7 @@ class Names:
             words = "angle of {} about {}, rad" if hinge else "position of {} along {}, m"
             self.joints.append(words.format(name, direction(self.axes[i])))
 
-    def named_offsets(self) -> list[list[Expression]]:
-        """From the joint before each joint; where the first joints are in the world has no effect."""
+    def named_offsets(self) -> list[Symbols]:
         offsets, count, joints = [], itertools.count(1), self.source.joint_names
         for name, before, values in zip(joints, self.source.parent, self.source.offset):
             if before < 0 or not any(values):
@@ -89,10 +85,9 @@ class Names:
             offsets.append(self.vector(values, f"l_{k}", f"l_{{{k}}}", "m", meaning))
         return offsets
 
-    def tensor(self, b: int, name: str) -> list[list[Expression]]:
-        """The inertia of body b."""
+    def tensor(self, b: int, name: str) -> list[Symbols]:
         body, values = self.source.body_names[b], without_tiny(sum(self.source.inertia[b], ()))
-        tensor: list[list[Expression]] = [[0] * 3 for _ in AXES]
+        tensor: list[Symbols] = [[0] * 3 for _ in AXES]
         for i, j in itertools.combinations_with_replacement(range(3), 2):
             axes = AXES[i] + AXES[j]
             kind = f"entry {axes} of the inertia tensor of {body}"
@@ -103,9 +98,7 @@ class Names:
             tensor[i][j] = tensor[j][i] = entry
         return tensor
 
-    def vector(
-        self, values: Sequence[float], name: str, tex: str, unit: str, meaning: str
-    ) -> list[Expression]:
+    def vector(self, values: Sequence[float], name: str, tex: str, unit: str, meaning: str) -> Symbols:
         """Symbols of components with their signs; of a vector along an axis that of its length."""
         values = without_tiny(values)
         if sum(map(bool, values)) == 1:
@@ -113,15 +106,11 @@ class Names:
             length = self.symbol(max(map(abs, values)), name, tex, unit, meaning)
             return [sign * length for sign in np.sign(values).astype(int).tolist()]
         stem = tex.rstrip("}") if "_" in tex else f"{tex}_{{"
-        return [
-            self.symbol(value, f"{name}_{x}", f"{stem}{x}}}", unit, f"{meaning}, {x}")
-            for x, value in zip(AXES, values)
-        ]
+        components = zip(AXES, values)
+        return [self.symbol(v, f"{name}_{x}", f"{stem}{x}}}", unit, f"{meaning}, {x}") for x, v in components]
 
     def symbol(self, value: float, name: str, tex: str, unit: str, meaning: str) -> Expression:
         """The symbol of a new parameter, or the number; 0 where it is zero."""
-        import sympy
-
         value = meant(value)
         if not self.named or not value:
             return number(value)
@@ -177,20 +166,15 @@ def without_tiny(values: Sequence[float]) -> list[float]:
 
 
 def number(value: float) -> Expression:
-    import sympy
-
     return sympy.Integer(int(value)) if float(value).is_integer() else sympy.Float(value)
 
 
 def unit(axis: Iterable[Expression]) -> list[Expression]:
     """A direction of length 1 in more digits than a double has."""
-    import sympy
-
     return list(sympy.Matrix([sympy.Rational(x) for x in axis]).normalized().evalf(DIGITS))
 
 
 def direction(vector: Sequence[Expression]) -> str:
-    """A direction in words."""
     along = [i for i, x in enumerate(vector) if x]
     if len(along) == 1:
         return ("-" if vector[along[0]] < 0 else "") + AXES[along[0]]

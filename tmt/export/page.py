@@ -49,7 +49,6 @@ def entry(name: Token, formula: Formula) -> str:
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
-    """A table of a symbol and texts."""
     lines = []
     for symbol, *texts in rows:
         cells = [f"<math>{in_mathml(Token(symbol))}</math>", *map(html.escape, texts)]

@@ -25,7 +25,6 @@ def arrays(*states):
 
 
 def source(program: Program) -> str:
-    """The module; its functions have the names of the quantities."""
     head = "\n".join(line.rstrip().replace("\\", "\\\\").replace('"""', "'''") for line in program.head)
     sizes = program.functions[0].sizes
     texts = "".join(f"\n\n{text(function)}\n" for function in program.functions)
@@ -33,7 +32,6 @@ def source(program: Program) -> str:
 
 
 def text(function: Function) -> str:
-    """One function."""
     takes, results = ", ".join(function.takes), ", ".join(function.results)
     assignments, values = statements(function, SYNTAX)
     empty = ", ".join([f"np.empty((*batch, {function.size}))"] * len(function.results))

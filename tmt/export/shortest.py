@@ -5,9 +5,12 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import reduce
 
+from sympy import Add, Integer, Mul, Rational, cos, gcd, sin
+
 from tmt.derivation.scalar import Scalar
 
 from .names import Names
+from .names import number as exact_number
 from .trigonometry import NOISE, Expression, Polynomial, Ring
 
 FEW_TERMS, FEW_FACTORED = 40, 6  # of a polynomial of which every form is tried, of one that is factored
@@ -36,8 +39,6 @@ class Forms:
 
     def shortest(self, poly: Polynomial) -> Expression:
         """The shortest expression that is found for a polynomial in symbols, sines and cosines."""
-        from sympy import Mul
-
         count, terms, products = len(self.symbols), [], set()
         parts: dict[tuple[int, ...], Polynomial] = defaultdict(lambda: self.ring.functions.zero)
         for monomial, number in poly.items():
@@ -55,7 +56,6 @@ class Forms:
         return min((grouped(terms, first, last) for first in (self.masses, products, ())), key=cost)
 
     def form(self, poly: Polynomial) -> Expression:
-        """The shortest form of a polynomial in sines and cosines alone."""
         if poly not in self.found:
             self.found[poly] = min(self.candidates(poly), key=cost)
         return self.found[poly]
@@ -76,8 +76,6 @@ class Forms:
 
     def expressions(self, poly: Polynomial, angles: Sequence[Expression]) -> Iterator[Expression]:
         """A polynomial with its common factors taken out, and as a product of polynomials."""
-        from sympy import Mul
-
         yield self.expression(poly, angles)
         if self.ring.exact and len(poly) <= FEW_FACTORED:
             number, factors = poly.factor_list()
@@ -86,8 +84,6 @@ class Forms:
                 yield Mul(self.number(number), *(self.form(factor) ** power for factor, power in reduced))
 
     def expression(self, poly: Polynomial, angles: Sequence[Expression]) -> Expression:
-        from sympy import cos, sin
-
         functions: dict[int, Expression] = {}
         for (sine, cosine), angle in zip(self.ring.places, angles):
             functions |= {sine: sin(angle), cosine: cos(angle)}
@@ -98,12 +94,9 @@ class Forms:
         return grouped(terms, (), ())
 
     def number(self, value: Scalar) -> Expression:
-        from sympy import Float, Integer, Rational
-
         if self.ring.exact:
             return Rational(int(value.numerator), int(value.denominator))
-        value = float(value)
-        return Integer(int(value)) if value.is_integer() else Float(value)
+        return exact_number(float(value))
 
     def harmonics(self, poly: Polynomial) -> Harmonics:
         """A polynomial as a sum of sines and cosines of sums of angles."""
@@ -133,8 +126,6 @@ class Forms:
         return waves
 
     def of_harmonics(self, harmonics: Harmonics) -> Expression:
-        from sympy import Add, Mul, cos, sin
-
         terms = []
         for (is_sine, k), number in harmonics.items():
             angle = Add(*map(Mul, k, self.angles))
@@ -165,7 +156,6 @@ class Forms:
 
 
 def has_square(poly: Polynomial, place: int) -> bool:
-    """Whether a term has a higher power than one of a generator."""
     return any(monomial[place] > 1 for monomial in poly)
 
 
@@ -176,8 +166,6 @@ def cost(form: Expression) -> int:
 
 def term(number: Expression, form: Expression, symbols: Mapping[Expression, Expression]) -> Term:
     """A term of a sum, of a number, an expression and further factors."""
-    from sympy import Mul
-
     factors = dict(symbols)
     for factor in Mul.make_args(form):
         if factor.is_number:
@@ -190,8 +178,6 @@ def term(number: Expression, form: Expression, symbols: Mapping[Expression, Expr
 
 def grouped(terms: list[Term], first: Collection[Expression], last: Collection[Expression]) -> Expression:
     """The sum of terms, common factors taken out: of `first` if possible, of `last` only if all have it."""
-    from sympy import Add, Mul
-
     counts = Counter(factor for _, factors in terms for factor in factors.items())
     shared = {
         factor: (count == len(terms), factor[0] in first, count)
@@ -214,7 +200,5 @@ def grouped(terms: list[Term], first: Collection[Expression], last: Collection[E
 
 def content(numbers: Sequence[Expression]) -> Expression:
     """What is taken out of a sum with these coefficients: their divisor, with the sign of most of them."""
-    from sympy import Integer, gcd
-
     size = reduce(gcd, numbers) if all(number.is_Rational for number in numbers) else Integer(1)
     return size if sum(1 if number > 0 else -1 for number in numbers) >= 0 else -size

@@ -25,7 +25,6 @@ class Function(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many numbers a result has."""
         return prod(self.shape)
 
     @property
@@ -80,9 +79,8 @@ class Writer:
         self.tape, self.syntax = traced.tape, syntax
         outputs = [self.tape.lift(x) for x in traced.outputs]
         self.uses = Counter(x.i for x in outputs)
-        self.items: dict[int, list[tuple[int, int]]] = defaultdict(
-            list
-        )  # of a sine and cosine: [(which, node)]
+        # of a sine and cosine: [(which, node)]
+        self.items: dict[int, list[tuple[int, int]]] = defaultdict(list)
         for i in traced.nodes:
             self.uses.update(self.tape.operands(i))
             kind, arguments = self.tape.nodes[i]
@@ -97,13 +95,12 @@ class Writer:
         for i in order:
             kind, arguments = self.tape.nodes[i]
             if kind == "number":
-                value = float(arguments[0])
-                self.known[i] = self.syntax.number(value), SUM if value < 0.0 else ATOM
+                number = float(arguments[0])
+                self.known[i] = self.syntax.number(number), SUM if number < 0.0 else ATOM
             elif kind == "sincos":
                 for which, item in self.items[i]:
-                    yield self.assigned(
-                        item, f"{'sc'[which]}{i}", self.call(("sin", "cos")[which], arguments[0])
-                    )
+                    value = self.call(("sin", "cos")[which], arguments[0])
+                    yield self.assigned(item, f"{'sc'[which]}{i}", value)
             elif kind not in ("input", "item"):
                 self.known[i] = self.expression(kind, arguments)
                 text, _ = self.known[i]

@@ -3,14 +3,18 @@
 import operator
 import time
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import NamedTuple
+
+import sympy
+from sympy.printing.str import StrPrinter
 
 from tmt.arm import ARM
 from tmt.derivation.quantities import State
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.scalar import Rows, Scalar, Values
 from tmt.model.tree import Tree
 
-from .names import EPS, Names, Parameter, number
+from .names import EPS, Names, Parameter, Symbols, number
 from .shortest import Forms
 from .trigonometry import Angle, Expression, Ring, TooLong, Trig
 
@@ -26,10 +30,8 @@ NOISE = 1e-16  # of the largest coefficient of an entry: left over where terms c
 class Symbolic(NamedTuple):
     """Equations of a Tree in SymPy.
 
-    q, qd: symbols of the joints and their speeds, in order. joint_names: as the Tree has them. joints: what
-    each q is, in words. parameters: {symbol: (value, unit, meaning)}; {} where all numbers are in the
-    expressions, then `named` is False. entries: {quantity: Matrix}. display: {symbol: LaTeX}. note: "", or
-    why parameters have no names.
+    parameters: {symbol: (value, unit, meaning)}; {} where numbers are in the expressions (`named` is False).
+    entries: {quantity: Matrix}. display: {symbol: LaTeX}. note: "", or why parameters have no names.
     """
 
     q: list[Expression]
@@ -43,19 +45,15 @@ class Symbolic(NamedTuple):
     note: str
 
 
+@lru_cache(maxsize=4)  # one for all files
 def symbolic(
-    tree: Tree = ARM, quantities: Sequence[str] = QUANTITIES, seconds: float = 60.0, named: bool = True
+    tree: Tree = ARM, quantities: tuple[str, ...] = QUANTITIES, seconds: float = 60.0, named: bool = True
 ) -> Symbolic:
     """Mbar, h and the torque that balances gravity of a Tree of hinges and slides, simplified.
 
-    quantities: some of QUANTITIES. seconds: the time that it may take; parameters that have no names by half
-    of it are numbers. Raises ValueError for a ball, an unknown quantity, without SymPy, and where it takes
-    longer.
+    seconds: the time that it may take; parameters that have no names by half of it are numbers. Raises
+    ValueError for a ball, an unknown quantity, and where it takes longer.
     """
-    try:
-        import sympy  # noqa: F401
-    except ImportError:
-        raise ValueError("symbolic equations need SymPy: pip install sympy") from None
     if unknown := [name for name in quantities if name not in QUANTITIES]:
         raise ValueError(f"unknown quantity {unknown[0]!r}; known: {', '.join(QUANTITIES)}")
     for name, kind in zip(tree.joint_names, tree.kind):
@@ -76,8 +74,6 @@ def symbolic(
 
 def derived(names: Names, quantities: Sequence[str], deadline: float, note: str) -> Symbolic:
     """The equations with the parameters that `names` has; TooLong at the deadline."""
-    import sympy
-
     tree = names.source
     places = {i: sympy.Dummy() for i, kind in enumerate(tree.kind) if kind == "slide"}
     hinges = [i for i, kind in enumerate(tree.kind) if kind == "hinge"]
@@ -96,13 +92,14 @@ def derived(names: Names, quantities: Sequence[str], deadline: float, note: str)
         poly = ring.without_noise((ring.scalar(0) + scalar).poly, 0 if names.is_exact else NOISE)
         return forms.shortest(poly).xreplace({place: from_reference[i] for i, place in places.items()})
 
+    def column(entries: Values) -> Expression:
+        return sympy.Matrix([expression(entry) for entry in entries])
+
     state = State(names.mechanism(ring.scalar), variables)
     derivations: dict[str, Callable[[], Expression]] = {
         "mass_matrix": lambda: symmetric(state.mass_matrix, expression),
-        "gravity_balance": lambda: sympy.Matrix([expression(entry) for entry in state.gravity_balance]),
-        "bias": lambda: sympy.Matrix(
-            [expression(x) for x in coriolis(ring, state.mass_matrix, variables, names.qd)]
-        ),
+        "gravity_balance": lambda: column(state.gravity_balance),
+        "bias": lambda: column(coriolis(ring, state.mass_matrix, variables, names.qd)),
     }
     needed = {"gravity_balance", *quantities} if "bias" in quantities else {*quantities}
     entries = {name: derive() for name, derive in derivations.items() if name in needed}
@@ -116,21 +113,14 @@ def derived(names: Names, quantities: Sequence[str], deadline: float, note: str)
     return Symbolic(names.q, names.qd, *joints, parameters, names.named, entries, display, note)
 
 
-def symmetric(M: Sequence[Sequence[Scalar]], expression: Callable[[Scalar], Expression]) -> Expression:
+def symmetric(M: Rows, expression: Callable[[Scalar], Expression]) -> Expression:
     """A symmetric Matrix of the expressions of the entries on and above its diagonal."""
-    import sympy
-
     n = range(len(M))
     upper = {(i, j): expression(M[i][j]) for i in n for j in n if i <= j}
     return sympy.Matrix([[upper[min(i, j), max(i, j)] for j in n] for i in n])
 
 
-def coriolis(
-    ring: Ring,
-    mass_matrix: Sequence[Sequence[Scalar]],
-    q: Sequence[Angle | Trig],
-    speeds: Sequence[Expression],
-) -> list[Scalar]:
+def coriolis(ring: Ring, mass_matrix: Rows, q: Sequence[Angle | Trig], speeds: Symbols) -> Values:
     """The bias without gravity: sum over j, k of (dM_ij/dq_k - dM_jk/dq_i / 2) qd_j qd_k."""
     zero, n = ring.scalar(0), range(len(q))
     M = [[zero + entry for entry in row] for row in mass_matrix]
@@ -158,18 +148,16 @@ def parallel_hinges(tree: Tree) -> dict[int, tuple[int, int]]:
     return found
 
 
+class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types
+    def _print_Float(self, expression: Expression) -> str:
+        return repr(float(expression))
+
+
 def python_source(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     """Python text with SymPy: symbols, `parameters` {symbol: value}, matrices M, h and G.
 
-    mass_matrix, bias and gravity are pairs of a matrix with numbers and the list of its symbols, as
-    compare.assert_agrees and --reference take them. head_lines: lines of text, which become comments.
+    mass_matrix, bias and gravity are pairs of a matrix with numbers and the list of its symbols.
     """
-    from sympy.printing.str import StrPrinter
-
-    class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types
-        def _print_Float(self, expression: Expression) -> str:
-            return repr(float(expression))
-
     printed = Printer().doprint
     q, qd = (list(map(str, symbols)) for symbols in (symbolic.q, symbolic.qd))
     lines = [

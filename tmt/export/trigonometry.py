@@ -4,6 +4,9 @@ import time
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from sympy import QQ, Dummy, RealField
+from sympy.polys.rings import PolyRing
+
 from tmt.derivation.scalar import Scalar
 from tmt.derivation.vectors import Vector, cos, sin
 
@@ -13,7 +16,7 @@ NOISE = 1e-25  # of the largest coefficient of a polynomial
 LARGEST_PRODUCT = 3_000_000  # pairs of terms in one product: some seconds
 
 
-Polynomial = Any  # of SymPy, which need not be installed
+Polynomial = Any  # of SymPy
 Expression = Any  # of SymPy
 
 
@@ -22,16 +25,9 @@ class TooLong(Exception):
 
 
 class Ring:
-    """Polynomials in SymPy symbols and in sines and cosines of n angles, until a deadline (time.monotonic).
-
-    exact: whether coefficients are rational; else they have PRECISION bits. functions: the ring of sines and
-    cosines alone.
-    """
+    """Polynomials in symbols, sines and cosines of n angles until a deadline; exact: rational coefficients."""
 
     def __init__(self, symbols: Sequence[Expression], n: int, exact: bool, deadline: float):
-        from sympy import QQ, Dummy, RealField
-        from sympy.polys.rings import PolyRing
-
         domain = QQ if exact else RealField(prec=PRECISION)
         functions = [Dummy() for _ in range(2 * n)]  # sines, then cosines
         self.ring = PolyRing([*symbols, *functions], domain, "lex")

@@ -7,11 +7,10 @@ code, see tmt.compiled). METHODS may be given further ones, and objects of a use
 from dataclasses import dataclass
 
 from tmt.derivation.coordinates import FLAT
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.scalar import Rows, Scalar, Values
 from tmt.methods import dop853
 from tmt.methods.derivatives import amplification as amplification
 from tmt.methods.derivatives import one_step as one_step
-from tmt.methods.dynamics import Values
 from tmt.methods.implicit import ImplicitRungeKutta
 from tmt.methods.semi_implicit import SemiImplicitEuler as SemiImplicitEuler
 from tmt.methods.semi_implicit import by_speed as by_speed
@@ -25,11 +24,10 @@ Slopes = tuple[list[Values], list[Values]]  # of all stages: rates of the moveme
 
 @dataclass(frozen=True)
 class RungeKutta(Tableau):
-    """An explicit Runge-Kutta method, given by its Butcher tableau.
+    """An explicit Runge-Kutta method, by its Butcher tableau; ValueError if that is none, or not explicit.
 
     Applied to (q, qd) as one first-order system, like MuJoCo's RK4; to balls as Munthe-Kaas does, who keeps the order: what is
-    integrated is the movement from the start of the step. Raises ValueError if the tableau is not explicit, a row of A does not
-    sum to c, or b does not sum to 1.
+    integrated is the movement from the start of the step.
     """
 
     # balls turn by the weighted mean of their speeds, as MuJoCo's RK4 up to 3.17: then of order 2
@@ -40,7 +38,6 @@ class RungeKutta(Tableau):
             raise ValueError(f"row {i} of A has {len(row)} entries; an explicit method has {i}")
 
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
-        """The state (q, qd) one dt later, from `slope(q, qd)` at each stage."""
         return self.combined(self.stage_slopes(slope, q, qd, dt, joints), q, qd, dt, joints)
 
     def stage_slopes(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints) -> Slopes:
@@ -67,9 +64,8 @@ class AdaptiveRungeKutta(RungeKutta):
     the estimates e5 and e3 combine to e5^2 / sqrt(e5^2 + 0.01 e3^2) (Hairer, Norsett, Wanner, section II.10).
     """
 
-    errors: tuple[
-        Numbers, ...
-    ] = ()  # weights of the stages in the two estimates, of the movement and of the speeds
+    # weights of the stages in the two estimates, of the movement and of the speeds
+    errors: tuple[Numbers, ...] = ()
 
     adaptive = True
 
@@ -79,13 +75,11 @@ class AdaptiveRungeKutta(RungeKutta):
         if len(self.errors) != 2 or any(len(row) != len(self.b) for row in self.errors):
             raise ValueError("errors must be two rows of one weight for each stage")
 
-    def attempt(
-        self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT
-    ) -> tuple[Values, ...]:
+    def attempt(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> Rows:
         """A step, and the two estimates of its error, each for the movement and qd."""
         slopes = self.stage_slopes(slope, q, qd, dt, joints)
         estimates = [increments(dt, weights, part, len(qd)) for weights in self.errors for part in slopes]
-        return *self.combined(slopes, q, qd, dt, joints), *estimates
+        return [*self.combined(slopes, q, qd, dt, joints), *estimates]
 
 
 CLASSICAL = (  # Kutta (1901): A, b, c

@@ -11,11 +11,12 @@ import numpy as np
 from tmt.derivation import composite
 from tmt.derivation.dual import Dual, seeded
 from tmt.derivation.method import reduced_force
-from tmt.derivation.scalar import Scalar
-from tmt.methods.dynamics import Dynamics, Implicit, Rows, Terms, Values, minus, plus
+from tmt.derivation.scalar import Rows, Scalar, Values
+from tmt.methods.dynamics import Dynamics, Held, Terms, minus, plus
 from tmt.methods.stepping import Method, State, stepped
 from tmt.model.tree import Tree
 
+Array = np.ndarray
 FEW_SPEEDS = 4  # up to which dual numbers go through the solution of the linear system too
 PART = 4096  # states times speeds that are taken at once: more do not stay in the processor's cache
 
@@ -26,11 +27,9 @@ class Differentiated(Dynamics):
     def __init__(self) -> None:
         super().__init__(composite.mass_matrix_and_bias)
         # of the last states: A (states, nv, nv) and the force (states, nv) of A a = force
-        self.system: tuple[np.ndarray, np.ndarray]
+        self.system: tuple[Array, Array]
 
-    def residual(
-        self, tree: Tree, a: Values, q: Values, qd: Values, tau: Values, implicit: Implicit | None
-    ) -> Values:
+    def residual(self, tree: Tree, a: Values, q: Values, qd: Values, tau: Values, implicit: Held) -> Values:
         """What a leaves of the linear system, (nv,): zero where it is the slope, and linear in a.
 
         dh/dqd a is (h(qd + a) - h(qd - a)) / 2, as h is quadratic in the speeds.
@@ -46,24 +45,15 @@ class Differentiated(Dynamics):
                 left[i] = left[i] + 0.5 * implicit.dt * (ahead[i] - behind[i])
         return left
 
-    def linear_system(
-        self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Implicit | None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """A (states, nv, nv) and the force (states, nv) of A a = force, at states given by their components."""
-        n, zero = len(qd), 0.0 * qd[0]
-        a = seeded([zero] * n, np.eye(n)[..., None])
-        left = self.residual(tree, a, q, qd, tau, implicit)
-        A = np.array([np.broadcast_to(row.slope, (n, *zero.shape)) for row in left])
-        force = np.array([np.broadcast_to(row.value, zero.shape) for row in left])
-        return A.transpose(2, 0, 1), -force.T
-
-    def acceleration(
-        self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
-    ) -> Values:
+    def acceleration(self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Held = None) -> Values:
         plain = implicit._replace(pull=values_of(implicit.pull)) if implicit else None
-        A, force = self.linear_system(tree, values_of(q), values_of(qd), tau, plain)
-        self.system = A, force
-        a = np.linalg.solve(A, force[..., None])[..., 0].T.copy()
+        plain_q, plain_qd = values_of(q), values_of(qd)
+        n, states = len(qd), plain_qd[0].shape
+        unknown = seeded(np.zeros((n, *states)), np.eye(n)[..., None])
+        left = self.residual(tree, unknown, plain_q, plain_qd, tau, plain)
+        A = np.array([np.broadcast_to(row.slope, (n, *states)) for row in left]).transpose(2, 0, 1)
+        self.system = A, -np.array([np.broadcast_to(row.value, states) for row in left]).T
+        a = np.linalg.solve(A, self.system[1][..., None])[..., 0].T.copy()
         dual = next((x for x in (*q, *qd) if isinstance(x, Dual)), None)
         if dual is None:
             return list(a)
@@ -86,9 +76,7 @@ def takes_terms(stepping: Method) -> bool:
     return len(signature(stepping.slope).parameters) > 5  # tree, q, qd, tau, dt
 
 
-def amplification(
-    stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float | np.ndarray
-) -> np.ndarray:
+def amplification(stepping: Method, tree: Tree, q: Array, qd: Array, tau: Array, dt: float | Array) -> Array:
     """The exact Jacobian of one step of a method, d(q, qd)+/d(q, qd), shape (..., 2 nv, 2 nv), for movements of q.
 
     q (..., nq), qd (..., nv): states, rad and rad/s; tau: torque (nv,), N m; dt: step in s, one for all or (...). At an
@@ -104,9 +92,7 @@ def amplification(
     return np.concatenate([np.empty((0, 2 * nv, 2 * nv)), *jacobians]).reshape(*batch, 2 * nv, 2 * nv)
 
 
-def of_part(
-    stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: list[float], dt: np.ndarray
-) -> np.ndarray:
+def of_part(stepping: Method, tree: Tree, q: Array, qd: Array, tau: list[float], dt: Array) -> Array:
     """The same of a few states: q (states, nq), qd (states, nv), dt (states,)."""
     joints, nv, nq = tree.coordinates, qd.shape[1], q.shape[1]
     start = [*q.T.copy(), *qd.T.copy()]
@@ -123,10 +109,8 @@ def of_part(
 
 
 def values_of(numbers: Values) -> Values:
-    """Numbers without their derivatives."""
     return [x.value if isinstance(x, Dual) else x for x in numbers]
 
 
 def times(matrix: Rows, values: Values) -> Values:
-    """A matrix, given by rows, times values."""
     return [sum(m * x for m, x in zip(row, values)) for row in matrix]

@@ -4,16 +4,14 @@ A method's `slope` asks a Dynamics for them. Another way to have them is a subcl
 (forms.py), with derivatives by those of the linear system (derivatives.py).
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from tmt.derivation import method
-from tmt.derivation.scalar import Scalar
-from tmt.derivation.vectors import solve, solve_any
+from tmt.derivation.mechanism import AnyTree
+from tmt.derivation.method import Terms as Terms
+from tmt.derivation.scalar import Rows, Scalar, Values
+from tmt.derivation.vectors import Scalars, solve, solve_any
 from tmt.model.tree import Tree
-
-Values = list[Scalar]
-Rows = list[Values]
 
 
 class Implicit(NamedTuple):
@@ -25,7 +23,7 @@ class Implicit(NamedTuple):
     bias_rows: frozenset[int]  # speeds of whose bias it takes the change
 
 
-Terms = Callable[[Tree, Values, Values], tuple[Rows, Values]]  # (tree, q, qd) -> Mbar and h
+Held = Implicit | None
 
 
 class Dynamics:
@@ -34,13 +32,11 @@ class Dynamics:
     def __init__(self, terms: Terms = method.mass_matrix_and_bias):
         self.terms = terms
 
-    def __call__(self, tree: Tree, q: Values, qd: Values) -> tuple[Rows, Values]:
+    def __call__(self, tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
         """Mbar (nv rows of nv) and h (nv,)."""
         return self.terms(tree, q, qd)
 
-    def acceleration(
-        self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
-    ) -> Values:
+    def acceleration(self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Held = None) -> Values:
         """a (nv,) from Mbar a = Qbar, or from the linear system of a method that takes something implicitly."""
         M, h = self(tree, q, qd)
         force = method.reduced_force(tree, h, q, qd, tau)
@@ -54,11 +50,9 @@ class Dynamics:
         return self.solve_any(matrix, minus(force, implicit.pull))
 
     def bias_rates(self, tree: Tree, q: Values, qd: Values) -> Rows:
-        """dh/dqd (nv rows of nv)."""
         return method.bias_rates(tree, q, qd, self.terms)
 
     def solve_any(self, matrix: Rows, right: Values) -> Values:
-        """The solution of a linear system whose matrix need not be symmetric."""
         return solve_any(matrix, right)
 
 

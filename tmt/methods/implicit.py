@@ -15,26 +15,20 @@ from itertools import chain
 
 import numpy as np
 
-from tmt.derivation.coordinates import FLAT, Flat, normalized, product
+from tmt.derivation.coordinates import FLAT, Flat, Joint, normalized, product
 from tmt.derivation.dual import Dual, jacobian, seeded, unit_vectors
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.scalar import Scalar, Values
 from tmt.derivation.vectors import solve_any
-from tmt.methods.dynamics import Values
 from tmt.methods.stepping import Joints, Slope, State
 from tmt.methods.tableau import Numbers, Tableau
 
-ITERATIONS = (
-    50  # Newton's method doubles the correct digits each time: a stage that needs more is not being found
-)
+ITERATIONS = 50  # Newton's method doubles the correct digits each time: a stage that needs more is not found
 CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size: the next change would be its square
 
 
 @dataclass(frozen=True)
 class ImplicitRungeKutta(Tableau):
-    """An implicit Runge-Kutta method, given by its Butcher tableau, applied to (q, qd) as one first-order system.
-
-    Raises ValueError if A is not square, a row of A does not sum to c, or b does not sum to 1.
-    """
+    """An implicit Runge-Kutta method, by its Butcher tableau, of (q, qd) as one first-order system."""
 
     solves_stages = True
 
@@ -44,14 +38,10 @@ class ImplicitRungeKutta(Tableau):
 
     @property
     def stages(self) -> int:
-        """Evaluations of the dynamics in one iteration of Newton's method."""
         return len(self.b)
 
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
-        """The state (q, qd) one dt later, on floats, arrays and dual numbers of them.
-
-        Raises ArithmeticError where Newton's method does not find the stages (a compiled run ends there).
-        """
+        """The state (q, qd) one dt later; ArithmeticError where Newton's method does not find the stages."""
 
         def linear(q_i: Values, qd_i: Values) -> Values:
             """The slope as it would be if it were linear, as at (q, qd)."""
@@ -59,7 +49,6 @@ class ImplicitRungeKutta(Tableau):
             return [sum(x[0].parts(f)) for f in slope(x[: len(q)], x[len(q) :])]
 
         def left_over(slope: Slope, a: Values) -> Values:
-            """qdd - a of the stages."""
             slopes = [slope(*state) for state in self.stage_states(q, qd, dt, a, joints)]
             return [f - x for f, x in zip(chain(*slopes), a)]
 
@@ -78,25 +67,23 @@ class ImplicitRungeKutta(Tableau):
         """The states (q_i, qd_i) of the stages with accelerations a, all of them in one list."""
         n, s = len(qd), range(self.stages)
         speeds = [[qd[k] + dt * weighted(self.A[i], a[k::n]) for k in range(n)] for i in s]
-        balls = [
-            self.ball_stages(q[joint.q], [stage[joint.qd] for stage in speeds], dt) for joint in joints.balls
-        ]
+        balls = [self.ball_stages(joint, q, speeds, dt) for joint in joints.balls]
         for i in s:
             twice = [sum(self.A[i][k] * self.A[k][j] for k in s) for j in s]
             moved = [dt * (self.c[i] * qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)]
             yield placed(joints, q, moved, [stages[i] for stages in balls]), speeds[i]
 
-    def ball_stages(self, p: Values, omegas: list[Values], dt: Scalar) -> list[Values]:
-        """The quaternions p_i of a ball that starts at p and has these speeds in the stages."""
+    def ball_stages(self, ball: Joint, q: Values, speeds: list[Values], dt: Scalar) -> list[Values]:
+        """The quaternions p_i of a ball that starts at q and has the speeds of these stages."""
         s = range(self.stages)
-        matrix = [[1.0 if i == j else 0.0 for j in range(4 * len(s))] for i in range(4 * len(s))]
+        matrix = unit_vectors(4 * len(s))
         for j in s:
             for c, unit in enumerate(unit_vectors(4)):
-                for r, value in enumerate(product(unit, [0.0, *omegas[j]])):
+                for r, value in enumerate(product(unit, [0.0, *speeds[j][ball.qd]])):
                     for i in s:
                         entry = matrix[4 * i + r][4 * j + c]
                         matrix[4 * i + r][4 * j + c] = entry - dt * (0.5 * self.A[i][j] * value)
-        components = solve_any(matrix, [*p] * len(s))
+        components = solve_any(matrix, q[ball.q] * len(s))
         return [components[4 * i : 4 * i + 4] for i in s]
 
     def finish(self, q: Values, qd: Values, dt: Scalar, a: Values, joints: Joints) -> State:
@@ -124,7 +111,6 @@ def placed(joints: Joints, q: Values, moved: Values, balls: list[Values]) -> Val
 
 
 def weighted(weights: Sequence[float], values: Sequence[Scalar]) -> Scalar:
-    """Sum of weights * values."""
     terms = [w * v for w, v in zip(weights, values)]
     return sum(terms[1:], terms[0])
 

@@ -6,8 +6,8 @@ from functools import lru_cache
 from typing import TypeVar
 
 from tmt.derivation.coordinates import FLAT
-from tmt.derivation.scalar import Scalar
-from tmt.methods.dynamics import LITERAL, Implicit, Terms, Values, dynamics_of
+from tmt.derivation.scalar import Scalar, Values
+from tmt.methods.dynamics import LITERAL, Implicit, Terms, dynamics_of
 from tmt.methods.stepping import Joints, Method, Slope, State, advance, increments
 from tmt.model.tree import Tree
 
@@ -47,9 +47,8 @@ class SemiImplicitEuler(Method):
     def held(self, tree: Tree) -> tuple[Gains, Gains]:
         """All that acts implicitly, as stiffness and as damping, (nv, nv) each."""
         n = len(tree.axis)
-        stiffness = (
-            by_speed(tree, tree.stiffness) if self.implicit_springs and tree.has_springs else [0.0] * n
-        )
+        has_stiffness = self.implicit_springs and tree.has_springs
+        stiffness = by_speed(tree, tree.stiffness) if has_stiffness else [0.0] * n
         position_gain, speed_gain = self.gains_held(tree)
         return with_diagonal(position_gain, stiffness), with_diagonal(speed_gain, tree.damping)
 
@@ -64,27 +63,25 @@ class SemiImplicitEuler(Method):
     def slope(
         self, tree: Tree, q: Values, qd: Values, tau: Values, dt: Scalar, terms: Terms = LITERAL
     ) -> Values:
-        """a from the linear system above."""
         return dynamics_of(terms).acceleration(tree, q, qd, tau, self.implicit(tree, qd, dt))
 
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
-        """The state (q, qd) one dt later."""
         qd = advance(qd, dt, (1.0,), [slope(q, qd)])
         return joints.move(q, increments(dt, (1.0,), [qd], len(qd))), qd
 
 
 def with_diagonal(gains: Gains, diagonal: Sequence[float]) -> Gains:
     """A matrix of gains, if there are any, with these numbers added on its diagonal."""
-    rows = gains or [[0.0] * len(diagonal) for _ in diagonal]
-    return [
-        [x + d if i == j else x for j, x in enumerate(row)] for i, (row, d) in enumerate(zip(rows, diagonal))
-    ]
+    rows = [list(row) for row in gains] or [[0.0] * len(diagonal) for _ in diagonal]
+    for i, x in enumerate(diagonal):
+        rows[i][i] += x
+    return rows
 
 
 def by_speed(tree: Tree, of_joints: Iterable[T]) -> list[T]:
     """For each speed the value of its joint."""
     pairs = zip(of_joints, tree.coordinates.joints)
-    return [value for value, joint in pairs for _ in range(joint.qd.start, joint.qd.stop)]
+    return [value for value, joint in pairs for _ in joint.speeds]
 
 
 def weighted(row: Sequence[float], values: Sequence[Scalar]) -> Scalar:

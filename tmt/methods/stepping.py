@@ -8,8 +8,8 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 from tmt.derivation.coordinates import FLAT, Coordinates, Flat
-from tmt.derivation.scalar import Scalar
-from tmt.methods.dynamics import LITERAL, Terms, Values, dynamics_of
+from tmt.derivation.scalar import Scalar, Values
+from tmt.methods.dynamics import LITERAL, Terms, dynamics_of
 from tmt.model.tree import Tree
 from tmt.model.values import shown
 

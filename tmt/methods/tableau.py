@@ -13,10 +13,7 @@ Numbers = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Tableau(Method):
-    """A method that is given by its Butcher tableau, whose numbers are made plain floats.
-
-    Raises ValueError if an entry is no number, a row of A does not sum to c, or b does not sum to 1.
-    """
+    """A method given by its Butcher tableau; ValueError unless rows of A sum to c, and b to 1."""
 
     order: int = field()  # it must be given, though Method has a default
     A: tuple[Numbers, ...]  # row i: the weights in stage i, of the stages before it or of all
@@ -25,9 +22,8 @@ class Tableau(Method):
 
     def __post_init__(self) -> None:
         if type(self.order) is not int or not 1 <= self.order <= 100:
-            raise ValueError(
-                f"order of the method is {shown(self.order)}; a whole number from 1 to 100 is expected"
-            )
+            expected = "a whole number from 1 to 100 is expected"
+            raise ValueError(f"order of the method is {shown(self.order)}; {expected}")
         self.make_plain("A", "b", "c")
         if not len(self.A) == len(self.b) == len(self.c):
             raise ValueError("A, b and c must have one entry for each stage")
@@ -58,5 +54,4 @@ class Tableau(Method):
 
 
 def is_vector(values: np.ndarray | None) -> TypeGuard[np.ndarray]:
-    """Whether values are finite numbers in a row."""
     return values is not None and values.ndim == 1 and bool(np.isfinite(values).all())

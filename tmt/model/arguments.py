@@ -3,12 +3,10 @@
 The line says what was given and what is accepted.
 """
 
-import functools
 import math
 import numbers
 import os
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,22 +17,6 @@ from .values import real_numbers, shown
 
 ALWAYS_FREE = 1e8  # B, that any machine has
 Array = NDArray[np.float64]
-Function = TypeVar("Function", bound=Callable[..., Any])
-
-
-def quantity(function: Function) -> Function:
-    """The function without NumPy's warnings, which no caller can place; ValueError where memory is short."""
-
-    @functools.wraps(function)
-    def evaluated(*arguments: Any, **named: Any) -> Any:
-        try:
-            with np.errstate(all="ignore"):
-                return function(*arguments, **named)
-        except MemoryError as error:
-            name = function.__name__
-            raise ValueError(f"{name} of these states does not fit into memory: {error}") from None
-
-    return cast(Function, evaluated)
 
 
 def states(model: Tree, **arrays: ArrayLike) -> list[list[Array]]:
@@ -72,10 +54,10 @@ def _state(model: Tree, name: str, values: ArrayLike) -> Array:
 
 
 def _check_quaternions(model: Tree, q: Array) -> None:
-    """Raise ValueError unless the quaternions of all balls have length 1."""
-    places = dict(zip(model.joint_names, model.coordinates.joints))
-    for name in [name for name, joint in places.items() if joint.kind == "ball"]:
-        quaternions = q[..., places[name].q].reshape(-1, 4)
+    for name, joint in zip(model.joint_names, model.coordinates.joints):
+        if joint.kind != "ball":
+            continue
+        quaternions = q[..., joint.q].reshape(-1, 4)
         off = np.abs(np.linalg.norm(quaternions, axis=-1) - 1.0)
         if off.size and off.max() > CLOSE_TO_ONE:
             expected = "a quaternion w, x, y, z of length 1 is expected"
@@ -83,13 +65,11 @@ def _check_quaternions(model: Tree, q: Array) -> None:
 
 
 def checked_model(model: Any) -> None:
-    """Raise ValueError unless it is a Tree."""
     if not isinstance(model, Tree):
         raise ValueError(f"model is {shown(model)}; a tmt.Tree is expected")
 
 
 def positive(name: str, value: Any, kind: str) -> float:
-    """The value as a finite float above 0."""
     if type(value) is float and 0.0 < value < math.inf:
         return value
     try:

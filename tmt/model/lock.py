@@ -56,7 +56,6 @@ WORLD = Carrier(-1, ZERO, IDENTITY)
 
 
 def locked(tree: Tree, angles: Mapping[str, Any]) -> Tree:
-    """What Tree.lock says."""
     names, joints = tree.joint_names, tree.coordinates.joints
     if not isinstance(angles, Mapping):
         expected = "a dict of positions by the names of joints is expected"

@@ -8,10 +8,7 @@ from typing import Any
 
 
 def accepts_former_names(former: Mapping[str, str]) -> Callable[[Any], Any]:
-    """A decorator of a dataclass: it accepts and has the fields `former`, {former name: name}.
-
-    ValueError for a field that is none.
-    """
+    """A decorator: a class accepts and has the fields {former name: name}; ValueError for one that is none."""
 
     def decorated(cls: Any) -> Any:
         initialize, known = cls.__init__, [field.name for field in fields(cls)]

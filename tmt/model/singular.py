@@ -68,7 +68,6 @@ def never(tree: Mechanism[float]) -> bool:
 
 
 def _turn_alone(tree: Mechanism[float], turning: list[int]) -> bool:
-    """Whether a body that does not turn has these joints at rest, from the tip inward."""
     if len(turning) == 1:
         return True
     outer, inner = turning[:2]

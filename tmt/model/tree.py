@@ -129,7 +129,6 @@ class Tree(Mechanism[float]):
         object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
-        """The joints and the number of bodies."""
         n, m = len(self.joint_names), len(self.body_names)
         names = shorten(", ".join(self.joint_names), NAMES_SHOWN, placeholder=" ...")
         return f"Tree({n} joint{'s' if n > 1 else ''}: {names}; {m} {'bodies' if m > 1 else 'body'})"
@@ -179,13 +178,12 @@ class Tree(Mechanism[float]):
         return locked(self, angles)
 
 
-def stated(tree: Tree) -> str:
-    """All numbers and names of a Tree: equal for equal trees alone."""
-    return repr([getattr(tree, field.name) for field in fields(tree)])
+def stated(value: Any) -> str:
+    """All fields of a Tree or another dataclass: equal for equal ones of a class alone."""
+    return repr([getattr(value, field.name) for field in fields(value)])
 
 
 def _kinds(values: Any, n: int) -> Names:
-    """The kinds of the joints; hinges where none is given."""
     if isinstance(values, (list, tuple)) and not values:
         return ("hinge",) * n
     kinds = listed(values) or ()
@@ -218,11 +216,9 @@ def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows[float]:
 
 
 def _check_ball(i: int, axes: NDArray[np.float64], reference: float, rest: Numbers[float]) -> None:
-    """Raise ValueError unless joint i can be a ball."""
     if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0.0:
-        raise ValueError(
-            f"the axes of joint {i}, a ball, are {axes.tolist()}; a right-handed frame is expected"
-        )
+        expected = "a right-handed frame is expected"
+        raise ValueError(f"the axes of joint {i}, a ball, are {axes.tolist()}; {expected}")
     if reference:
         raise ValueError(f"Tree.reference[{i}] is {reference:g}; 0 is expected of a ball")
     if abs(math.hypot(*rest) - 1.0) > CLOSE_TO_ONE:
@@ -240,13 +236,10 @@ def _direction(i: int, axis: Numbers[float]) -> Numbers[float]:
 
 
 def _check_inertia(name: str, inertia: NDArray[np.float64]) -> None:
-    """Raise ValueError unless the 3 x 3 tensor can belong to a rigid body."""
     scale = np.abs(inertia).max()
     if np.abs(inertia - inertia.T).max() > 1e-12 * scale:
         raise ValueError(f"the inertia of {name!r} is not symmetric: {inertia.tolist()}")
     a, b, c = np.linalg.eigvalsh(inertia)
     if a + b < c - 1e-12 * scale:  # as b is at most c, this finds an a below 0 too
-        raise ValueError(
-            f"the inertia of {name!r} has principal values {a:g}, {b:g}, {c:g}; "
-            "each must be at least 0 and none larger than the other two together"
-        )
+        expected = "each must be at least 0 and none larger than the other two together"
+        raise ValueError(f"the inertia of {name!r} has principal values {a:g}, {b:g}, {c:g}; {expected}")

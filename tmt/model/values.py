@@ -42,7 +42,6 @@ def listed(values: Any) -> tuple[Any, ...] | None:
 
 
 def names(field: str, values: Any) -> tuple[str, ...]:
-    """The values as a tuple of different strings that can stand in a line."""
     found = listed(values) or ()
     are_names = all(isinstance(name, str) and name.isprintable() for name in found)
     if listed(values) is None or not are_names or len(set(found)) < len(found):
@@ -63,5 +62,4 @@ def numbers_of(name: str, values: Any, shape: tuple[int, ...]) -> Any:
 
 
 def nested(item: Any) -> Any:
-    """Lists as tuples, at every depth."""
     return tuple(map(nested, item)) if isinstance(item, list) else item

@@ -5,7 +5,7 @@ from functools import lru_cache
 from typing import Any
 
 import tmt
-from tmt.compiled import evaluator
+from tmt.compiled import Evaluator
 
 from ...core.timing import fastest
 from ...engines import Engine, Method, Setting, same_scheme
@@ -62,7 +62,7 @@ def add_rows(result: ReductionResult, robot: Robot, seconds: Mapping[Any, float]
 @lru_cache
 def operations(tree: tmt.Tree) -> int | None:
     """Operations of one evaluation of the accelerations in compiled code; None for many joints."""
-    return evaluator(tree, "acceleration").operations if len(tree.axis) <= MOST_TRACED else None
+    return Evaluator(tree, "acceleration").operations if len(tree.axis) <= MOST_TRACED else None
 
 
 def largest_gain(rows: Sequence[ReductionRow], nv: int) -> ReductionRow | None:

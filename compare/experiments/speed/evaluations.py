@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 import tmt
-from tmt.compiled import evaluator, runner_of
+from tmt.compiled import Evaluator, runner_of
 from tmt.compiled.cores import cores
 
 from ...core import timing
@@ -72,7 +72,7 @@ def loops(setup: Setup) -> tuple[list[Loop], list[EvaluationRow]]:
 def at_one_state(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> list[Loop]:
     """The ways of tmt at one state, (nq,) and (nv,)."""
     tmt.prepare(tree)
-    run, compiled = runner_of(tree, "rk4").follow, evaluator(tree, "acceleration")
+    run, compiled = runner_of(tree, "rk4").follow, Evaluator(tree, "acceleration")
     chain, arrays = chained(tree), (q, qd, tau, np.empty(len(qd)))
     most = min(MOST_CALLS, MOST_NUMBERS // len(tree.axis))
     paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
@@ -92,7 +92,7 @@ def at_one_state(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray)
 
 def at_many_states(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> list[Loop]:
     """The ways of tmt over many states, (N, nq) and (N, nv)."""
-    count, run, compiled = len(qd), runner_of(tree, "rk4").follow, evaluator(tree, "acceleration")
+    count, run, compiled = len(qd), runner_of(tree, "rk4").follow, Evaluator(tree, "acceleration")
     out = np.empty((count, compiled.size))
     positions, speeds = (np.stack([part, part], axis=1) for part in (q, qd))
     one_by_one = EvaluationRow(FORWARD, ONE_BY_ONE, count, operations=compiled.operations)
