@@ -3,7 +3,7 @@
 import csv
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from io import StringIO
 from pathlib import Path
@@ -77,7 +77,8 @@ class FileRow(Row):
 
 
 LeftOut = Sequence[tuple[str, str]]  # files that are no models, and why
-FIELDS = get_type_hints(FileRow)
+HINTS = get_type_hints(FileRow)
+FIELDS = {field.name: HINTS[field.name] for field in fields(FileRow)}
 FLEET_COLUMNS = tuple(name for name in FileRow(file="", verdict="").columns() if name != "has_report")
 
 

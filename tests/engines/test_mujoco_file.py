@@ -15,8 +15,7 @@ from runs import posix
 import compare
 from compare.core.text import say
 from compare.engines.mujoco import ModelError, Source, load, parse, read
-from compare.engines.mujoco.parameters import parameters
-from compare.engines.mujoco.remarks import remarks
+from compare.engines.mujoco.parameters import parameters, remarks
 from compare.robots.arm import ARM
 
 JOINTS = 'name="gamma" type="hinge"'

@@ -11,7 +11,7 @@ from models import PATHS, random_tree
 import tmt
 from compare.engines import RECORDS, Setting
 from compare.engines.mujoco import read
-from compare.engines.mujoco.urdf import urdf
+from compare.engines.mujoco.handed_on import urdf
 from compare.engines.outside import Outside
 from compare.engines.outside.mjcf_text import whole_text
 from compare.judge.entries import Entries

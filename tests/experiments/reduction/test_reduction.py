@@ -70,7 +70,7 @@ class WrongLock(Mujoco):
     """MuJoCo whose dynamics of a case with locked joints are wrong."""
 
     def __init__(self, right, of_locked):
-        super().__init__(right.source, right.joints, right.bodies)
+        super().__init__(right.source, right.bodies)
         self.of_locked = of_locked
 
     def of(self, case):
