@@ -19,6 +19,7 @@ from .runs import Run, TrajectoryResult
 from .true_motion import difference_while_judged
 
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
+LEVEL = 1e-6  # of a position: a smaller change is not seen in a panel
 LEGEND_COLUMNS = 4  # of a legend; with names longer than LONG three
 LONG = 14  # letters of a joint's name
 MARKS: dict[str, Any] = {"marker": "o", "linestyle": "none", "mfc": "white", "markersize": 2.8, "mew": 0.9}
@@ -69,8 +70,8 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
         zero_at_the_end(axes[2, 0].yaxis, DRAWN_ZERO, values.max(), most=6)
     turns = unit == "rad" and not case.coordinates.has_balls
     place, speed = ("angle", "rate") if turns else ("position", "speed")
-    axes[0, 0].set_ylabel(f"{place}, {unit}")
-    axes[1, 0].set_ylabel(f"{speed}, {unit.replace(' or', '/s or')}/s")
+    label_axis(axes[0, 0], place, unit)
+    label_axis(axes[1, 0], speed, f"{unit.replace(' or', '/s or')}/s")
     axes[2, 0].set_ylabel(f"{place}: difference, {unit}" if unit == "rad" else f"difference, {unit}")
     fig.align_ylabels(axes[:, 0])
     add_legend(fig, axes, any(len(case.coordinates.speeds[i]) > LONG for i in shown))
@@ -134,6 +135,18 @@ def over_time(
         ax.plot(run.t, first[:, i], linestyle=dash, color=colour, label=label)
         ax.plot(run.t[every], mujoco[every, i], color=colour, clip_on=False, **MARKS)
     ax.plot([], [], color="black", label="MuJoCo", **MARKS)
+
+
+def label_axis(ax: Axes, name: str, unit: str) -> None:
+    """Name a vertical axis, with the power of ten by which its numbers are multiplied."""
+    low, high = ax.get_ylim()
+    largest = max(abs(low), abs(high))
+    if high - low < LEVEL * largest:  # a position that does not change: its numbers would all be alike
+        ax.set_ylim((low + high) / 2 - 0.05 * largest, (low + high) / 2 + 0.05 * largest)
+    power = int(np.floor(np.log10(largest)))
+    factor = 1.0 if -2 <= power <= 3 else 10.0**power
+    ax.yaxis.set_major_formatter(lambda value, _: f"{value / factor:g}".replace("-", "\N{MINUS SIGN}"))
+    ax.set_ylabel(f"{name}, {unit}" if factor == 1.0 else f"{name}, {factor:.0e} {unit}")
 
 
 def drawable(case: Case, name: str, values: np.ndarray) -> np.ndarray:
