@@ -45,10 +45,6 @@ class LimitRow(OfMethod):
         """How far the observed limit is from the predicted one, relative; None if one of them is missing."""
         return relative_difference(self.observed_dt, self.predicted_dt)
 
-    @property
-    def urgency(self) -> tuple[bool, bool, float]:
-        return self.passed is not False, True, float("inf")
-
 
 def relative_difference(observed: float | None, predicted: float | None) -> float | None:
     return abs(observed / predicted - 1.0) if observed and predicted else None
