@@ -1,5 +1,6 @@
 """The reference of a file: the arm's stated numbers, those of a solution, tmt's equations for the model, or a user's own."""
 
+import argparse
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -14,11 +15,12 @@ from ..engines.mujoco.names import integrator_by_name
 from ..engines.mujoco.parameters import of_source, remarks
 from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import OwnFileError, aside, own_object, raised_in
+from ..experiments.setup import Request
 from ..robots import Robot
 from ..robots.actuators import Drive
 from ..robots.arm import ARM
 from ..robots.case import SEED
-from ..robots.file import robot_of, robot_of_solution
+from ..robots.file import names_of_keys, robot_of, robot_of_solution
 from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, matched_joints
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
@@ -66,18 +68,43 @@ class Compared(NamedTuple):
     mujoco: Mujoco
     reading: Reading | None  # None: the robot's numbers are stated
 
-    def integrator_step(self, dt: float | None, integrator: str | None) -> tuple[float, str] | None:
-        """The step, s, and the integrator of --dt and --integrator, the file's where one is None; None: both are."""
-        if dt is None and integrator is None:
-            return None
-        if self.reading is None:
-            stated = f"the numbers of {self.robot.name} are stated"
-            raise ModelError(f"--dt and --integrator need a robot's file; {stated}")
+    def request_of(self, options: argparse.Namespace) -> Request:
+        """What the options ask of stability; ModelError, in one line, for what needs a file or is not of this one."""
+        asked = {name: getattr(options, name) for name in (*Request._fields[1:], "dt", "integrator")}
+        given = [f"--{name.replace('_', '-')}" for name, value in asked.items() if value]
+        if given and self.reading is None:
+            need = "needs" if len(given) == 1 else "need"
+            raise ModelError(
+                f"{' and '.join(given)} {need} a robot's file; the numbers of {self.robot.name} are stated"
+            )
+        dt, integrator = asked.pop("dt"), asked.pop("integrator")
+        if self.reading is None or not given:
+            return Request()
+        if asked["posture"]:
+            self.check_posture(asked["posture"])
+        for name in ("delay", "kp"):
+            if asked[name] and not asked["control_period"]:
+                raise ModelError(f"--{name} is of a program with a --control-period")
+        if asked["kv"] and not asked["kp"]:
+            raise ModelError("--kv needs --kp")
         try:
             name = integrator_by_name(integrator or self.reading.integrator)
         except ValueError as error:
             raise ModelError(f"--integrator: {error}") from None
-        return self.reading.dt if dt is None else dt, name
+        step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
+        return Request(step, **asked)
+
+    def check_posture(self, text: str) -> None:
+        """ModelError for what is neither the name of a posture nor a position of all joints."""
+        assert self.reading is not None
+        names = [*names_of_keys(self.reading).values(), "qpos0"]
+        if text in names:
+            return
+        try:
+            self.robot.posture(tuple(map(float, text.split(","))))
+        except ValueError as error:
+            choices = f"expected one of {', '.join(names)}, or numbers of all joints (deg, m, quaternions)"
+            raise ModelError(f"--posture {text}: {error}; {choices}") from None
 
 
 def compared_with(
