@@ -1,4 +1,4 @@
-"""TMT and MuJoCo compared; and equations of one's own compared with MuJoCo: assert_agrees and differences.
+"""TMT and MuJoCo compared; equations of one's own compared with MuJoCo, assert_agrees and differences; step_limits of a file.
 
 ARCHITECTURE.md shows the parts. How a tolerance is derived: 64 eps times the sum of the absolute values of
 the terms that are added, times the condition number of Mbar where a linear system is solved. Of a trajectory
@@ -9,12 +9,17 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .agreement import assert_agrees, differences
+    from .stability.api import step_limits
 
-__all__ = ["assert_agrees", "differences"]
+__all__ = ["assert_agrees", "differences", "step_limits"]
 
 
 def __getattr__(name: str) -> object:
-    """The two functions when they are asked for: `python -m compare` need not wait for them."""
+    """The public functions when they are asked for: `python -m compare` need not wait for them."""
+    if name == "step_limits":
+        from .stability.api import step_limits
+
+        return step_limits
     if name in __all__:
         from . import agreement
 

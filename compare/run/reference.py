@@ -20,8 +20,9 @@ from ..robots import Robot
 from ..robots.actuators import Drive
 from ..robots.arm import ARM
 from ..robots.case import SEED
-from ..robots.file import names_of_keys, robot_of, robot_of_solution
+from ..robots.file import robot_of, robot_of_solution
 from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, matched_joints
+from ..stability.answer import posture_of
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 SOLUTION = "solution"  # the kind of reference that is another file
@@ -80,8 +81,6 @@ class Compared(NamedTuple):
         dt, integrator = asked.pop("dt"), asked.pop("integrator")
         if self.reading is None or not given:
             return Request()
-        if asked["posture"]:
-            self.check_posture(asked["posture"])
         for name in ("delay", "kp"):
             if asked[name] and not asked["control_period"]:
                 raise ModelError(f"--{name} is of a program with a --control-period")
@@ -89,22 +88,12 @@ class Compared(NamedTuple):
             raise ModelError("--kv needs --kp")
         try:
             name = integrator_by_name(integrator or self.reading.integrator)
+            if asked["posture"]:
+                posture_of(asked["posture"], self.reading)
         except ValueError as error:
-            raise ModelError(f"--integrator: {error}") from None
+            raise ModelError(f"{' '.join(given)}: {error}") from None
         step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
         return Request(step, **asked)
-
-    def check_posture(self, text: str) -> None:
-        """ModelError for what is neither the name of a posture nor a position of all joints."""
-        assert self.reading is not None
-        names = [*names_of_keys(self.reading).values(), "qpos0"]
-        if text in names:
-            return
-        try:
-            self.robot.posture(tuple(map(float, text.split(","))))
-        except ValueError as error:
-            choices = f"expected one of {', '.join(names)}, or numbers of all joints (deg, m, quaternions)"
-            raise ModelError(f"--posture {text}: {error}; {choices}") from None
 
 
 def compared_with(

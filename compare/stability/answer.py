@@ -7,7 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.rows import Row, column
+from ..engines.mujoco.names import INTEGRATORS
 from ..engines.mujoco.reading import Reading
+from ..engines.mujoco.variants import has_free_base
+from ..robots.coordinates import Coordinates
 from ..robots.file import names_of_keys
 from .closed_form import radius
 from .cures import Cure, cures
@@ -39,6 +42,7 @@ class StepLimitRow(Row):
     """
 
     posture: str
+    base: str  # fixed, free
     surroundings: str  # contact; free, nothing touches; air, contacts off
     integrator: str
     limit: str
@@ -98,6 +102,31 @@ def postures_of(reading: Reading) -> list[Posture]:
     ]
 
 
+def posture_of(asked: str | Sequence[float], reading: Reading) -> Posture:
+    """The posture of a name, or positions of all joints (deg, m, quaternions); ValueError, in one line, for neither.
+
+    A name may be numbers separated by commas.
+    """
+    named = {posture.name: posture for posture in postures_of(reading)} | {"qpos0": Posture("qpos0", "")}
+    if isinstance(asked, str) and asked in named:
+        return named[asked]
+    coordinates = Coordinates(reading.tree.joint_names, reading.tree.kind)
+    try:
+        numbers = tuple(map(float, asked.split(",") if isinstance(asked, str) else asked))
+        q = coordinates.from_degrees(numbers, positions=True)
+    except ValueError as error:
+        choices = f"expected one of {', '.join(named)}, or numbers of all joints (deg, m, quaternions)"
+        raise ValueError(f"posture {asked}: {error}; {choices}") from None
+    return Posture(
+        asked if isinstance(asked, str) else ",".join(f"{x:g}" for x in numbers), "", tuple(q.tolist())
+    )
+
+
+def integrators_at_rest() -> list[str]:
+    """The integrators of the installed MuJoCo; without implicit, which at rest is implicitfast."""
+    return [name for name in INTEGRATORS if name != "implicit"]
+
+
 class Curve(NamedTuple):
     """The factor by which deviations grow in a step, over the step, s, of an integrator at a place; and that seen in runs."""
 
@@ -145,7 +174,8 @@ def curve(place: Place, row: StepLimitRow) -> Curve:
     limit_dt = row.predicted_dt or LONGEST / COARSER
     low, high = min(row.file_dt, limit_dt) / 8.0, min(4.0 * max(limit_dt, row.file_dt), LONGEST)
     predicted, state = [], place.rest
-    for dt in np.geomspace(low, high, CURVE_STEPS):
+    steps = [*np.geomspace(low, high, CURVE_STEPS), *(share * limit_dt for share in CURVE_RUNS)]
+    for dt in sorted(step for step in steps if step <= high):
         at = tried(place.model, state, float(dt), row.integrator)
         if not at.rest.is_found:
             break
@@ -167,7 +197,7 @@ def limit_row(
     at = tried(model, found.rest.state, dt, integrator)
     end = limiting(place, found.rest, found.growth)
     row = StepLimitRow(
-        posture=place.posture, surroundings=place.surroundings, integrator=integrator, limit=found.kind.replace(" ", "_"),
+        posture=place.posture, base="free" if has_free_base(model) else "fixed", surroundings=place.surroundings, integrator=integrator, limit=found.kind.replace(" ", "_"),
         predicted_dt=found.dt, file_dt=dt, file_integrator=file_integrator, stable_at_file_dt=holds(found, dt),
         limiting_joint=end.joint, limiting_contact=end.contact, growth_rate=found.growth.rate or None,
         growth=at.growth.factor,

@@ -7,9 +7,17 @@ from typing import Any, NamedTuple
 
 from ...core.check import AT_OWN_STEP, AT_REQUESTED_STEP, About
 from ...core.rows import Row, column
-from ...engines.mujoco.names import INTEGRATORS
 from ...engines.mujoco.reading import Reading
-from ...stability.answer import Asked, Curve, PlaceAnswer, Posture, StepLimitRow, answer, postures_of
+from ...stability.answer import (
+    Asked,
+    Curve,
+    PlaceAnswer,
+    Posture,
+    StepLimitRow,
+    answer,
+    posture_of,
+    postures_of,
+)
 from ...stability.control import Controlled, controlled
 from ...stability.limits import LONGEST, SHORTEST
 from ...stability.motion import Motion, motion
@@ -80,7 +88,7 @@ def begin(setup: Setup) -> Work | None:
     request = setup.request
     postures = postures_of(reading)
     if request.posture:
-        postures = [posture_asked(request.posture, reading, setup)]
+        postures = [posture_of(request.posture, reading)]
     asked = [
         Asked(
             reading.dt,
@@ -113,14 +121,6 @@ def integrators_of(setup: Setup, own: str) -> list[str]:
     return [
         name for name in INTEGRATORS if name != "implicit" or own == name
     ]  # at rest implicitfast is the same
-
-
-def posture_asked(text: str, reading: Reading, setup: Setup) -> Posture:
-    """A keyframe by the name of its posture, qpos0, or numbers."""
-    named = {posture.name: posture for posture in postures_of(reading)} | {"qpos0": Posture("qpos0", "")}
-    if text in named:
-        return named[text]
-    return Posture(text, "", tuple(setup.robot.posture(tuple(map(float, text.split(",")))).tolist()))
 
 
 def answer_of(task: tuple[Posture, bool, Asked], reading: Reading) -> PlaceAnswer:
