@@ -43,6 +43,9 @@ class Request(NamedTuple):
     at_speed: bool = False
 
 
+NO_REQUEST = Request()
+
+
 @dataclass(frozen=True, eq=False)
 class Setup:
     """What an experiment has.
@@ -60,7 +63,7 @@ class Setup:
     progress: Callable[[str], Any] = nothing  # reports the progress of long work
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
     alone: bool = False  # whether the experiment runs by itself, and may take longer than in `all`
-    request: Request = Request()  # of stability
+    request: Request = NO_REQUEST  # of stability
     size: str = "full"
 
     @property

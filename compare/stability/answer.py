@@ -113,10 +113,12 @@ def posture_of(asked: str | Sequence[float], reading: Reading) -> Posture:
     coordinates = Coordinates(reading.tree.joint_names, reading.tree.kind)
     try:
         numbers = tuple(map(float, asked.split(",") if isinstance(asked, str) else asked))
-        q = coordinates.from_degrees(numbers, positions=True)
-    except ValueError as error:
-        choices = f"expected one of {', '.join(named)}, or numbers of all joints (deg, m, quaternions)"
-        raise ValueError(f"posture {asked}: {error}; {choices}") from None
+    except ValueError:
+        numbers = ()
+    if len(numbers) != len(reading.qpos0):
+        choices = f"{', '.join(named)}, or {len(reading.qpos0)} numbers (deg, m, quaternions)"
+        raise ValueError(f"posture {asked} is not one of this file: expected {choices}")
+    q = coordinates.from_degrees(numbers, positions=True)
     return Posture(
         asked if isinstance(asked, str) else ",".join(f"{x:g}" for x in numbers), "", tuple(q.tolist())
     )
@@ -197,11 +199,20 @@ def limit_row(
     at = tried(model, found.rest.state, dt, integrator)
     end = limiting(place, found.rest, found.growth)
     row = StepLimitRow(
-        posture=place.posture, base="free" if has_free_base(model) else "fixed", surroundings=place.surroundings, integrator=integrator, limit=found.kind.replace(" ", "_"),
-        predicted_dt=found.dt, file_dt=dt, file_integrator=file_integrator, stable_at_file_dt=holds(found, dt),
-        limiting_joint=end.joint, limiting_contact=end.contact, growth_rate=found.growth.rate or None,
+        posture=place.posture,
+        base="free" if has_free_base(model) else "fixed",
+        surroundings=place.surroundings,
+        integrator=integrator,
+        limit=found.kind.replace(" ", "_"),
+        predicted_dt=found.dt,
+        file_dt=dt,
+        file_integrator=file_integrator,
+        stable_at_file_dt=holds(found, dt),
+        limiting_joint=end.joint,
+        limiting_contact=end.contact,
+        growth_rate=found.growth.rate or None,
         growth=at.growth.factor,
-    )  # fmt: skip
+    )
     add_rest(row, place, at)
     if place.frictionless is not None and row.is_known:
         smooth = limit(place.frictionless, place.rest, integrator, dt)

@@ -5,6 +5,7 @@ from __future__ import annotations  # so that help() shows the short names of ty
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
+from typing import Any, cast
 
 from ..engines.mujoco.names import integrator_by_name
 from ..engines.mujoco.reading import read
@@ -58,8 +59,9 @@ def step_limits(
     ...     model.actuator_biasprm[:, 2] = -kv
     ...     print(kv, compare.step_limits(model, integrators=["Euler"])[0].predicted_dt)
     """
-    is_path = isinstance(mjcf, PathLike) or (isinstance(mjcf, str) and not mjcf.lstrip().startswith("<"))
-    reading = read(Path(mjcf) if is_path else mjcf)
+    if isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<"):
+        mjcf = Path(mjcf)
+    reading = read(cast(Any, mjcf))  # ModelError for what is no model
     names = [integrator_by_name(name) for name in integrators or integrators_at_rest()]
     asked = Asked(dt or reading.dt, reading.integrator, names, in_runs=in_runs)
     place = posture_of(posture, reading) if posture is not None else postures_of(reading)[0]

@@ -42,8 +42,8 @@ class Controlled(NamedTuple):
         waiting = -(-delay // steps)  # earlier numbers that are still on the way
         state = np.eye(size, size + waiting * count)
         numbers = [self.C @ state]
-        for place in range(waiting):
-            numbers.append(np.eye(count, state.shape[1], size + place * count))
+        places = range(size, size + waiting * count, count)
+        numbers += [np.eye(count, state.shape[1], place) for place in places]
         moved = state
         for step in range(steps):
             age = max(0, -(-(delay - step) // steps))

@@ -15,6 +15,7 @@ from ...stability.answer import (
     Posture,
     StepLimitRow,
     answer,
+    integrators_at_rest,
     posture_of,
     postures_of,
 )
@@ -118,9 +119,7 @@ def begin(setup: Setup) -> Work | None:
 def integrators_of(setup: Setup, own: str) -> list[str]:
     if setup.is_quick:
         return list(dict.fromkeys((own, DEFAULT)))
-    return [
-        name for name in INTEGRATORS if name != "implicit" or own == name
-    ]  # at rest implicitfast is the same
+    return list(dict.fromkeys([*integrators_at_rest(), own]))
 
 
 def answer_of(task: tuple[Posture, bool, Asked], reading: Reading) -> PlaceAnswer:
@@ -131,7 +130,8 @@ def answer_of(task: tuple[Posture, bool, Asked], reading: Reading) -> PlaceAnswe
 def control_row(posture: Posture, reading: Reading, request: Any, asked: Asked) -> ControlRow | None:
     """The controller of --control-period at a posture; None: no actuator is a servo, and there are no gains for them."""
     place = standing_at(reading, posture.name, posture.key)
-    found = controlled(place.model, place.rest, asked.dt, asked.integrator, request.kp, request.kv)
+    model = place.frictionless or place.model  # dry friction would hold small deviations at any period
+    found = controlled(model, place.rest, asked.dt, asked.integrator, request.kp, request.kv)
     if found is None:
         return None
     steps = max(1, round(request.control_period / asked.dt))
@@ -244,30 +244,24 @@ def add_answer(
 ) -> None:
     own = in_use(rows, asked.integrator)
     worst = next((row for row in own if row.stable_at_file_dt is False), own[0] if own else None)
-    runs = [
-        run
-        for run in result.tables.get("own_run", ())
-        if run.dt == asked.dt and run.integrator == asked.integrator
+    own_runs = result.tables.get("own_run", ())
+    runs = [run for run in own_runs if (run.dt, run.integrator) == (asked.dt, asked.integrator)]
+    here = [row for row in rows if worst and row.posture == worst.posture]
+    others = [
+        row for row in here if row.integrator != asked.integrator and row.surroundings == worst.surroundings
     ]
-    others = []
-    for name in asked.integrators:
-        if worst and name != asked.integrator:
-            others += [
-                row
-                for row in rows
-                if (row.integrator, row.posture, row.surroundings)
-                == (name, worst.posture, worst.surroundings)
-            ]
     air = [
         row
-        for row in rows
-        if worst and row.surroundings == "air" != worst.surroundings and row.integrator == asked.integrator
+        for row in here
+        if row.integrator == asked.integrator and row.surroundings == "air" != worst.surroundings
     ]
-    result.top.append(result.finding(
-        "answer", OF, row=worst, also=[row.posture for row in own if row is not worst and row.stable_at_file_dt == worst.stable_at_file_dt],
-        others=others, air=air[0] if air else None, requested=is_requested, dt=asked.dt, integrator=asked.integrator,
-        uncalm=[run for run in runs if run.outcome in ("worse", "fails")], up_to=LONGEST, usual=USUAL_PUSH,
-    ))  # fmt: skip
+    alike = [row for row in own if row is not worst and row.stable_at_file_dt == worst.stable_at_file_dt]
+    values = {
+        "row": worst, "also": [row.posture for row in alike], "others": others, "air": air[0] if air else None,
+        "requested": is_requested, "dt": asked.dt, "integrator": asked.integrator,
+        "uncalm": [run for run in runs if run.outcome in ("worse", "fails")], "up_to": LONGEST, "usual": USUAL_PUSH,
+    }  # fmt: skip
+    result.top.append(result.finding("answer", OF, **values))
     places: dict[tuple[str, str], StepLimitRow] = {}
     for row in rows:
         places.setdefault((row.posture, row.surroundings), row)
