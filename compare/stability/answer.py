@@ -81,6 +81,11 @@ class StepLimitRow(Row):
         return self.limit in ("finite", "none", "below")
 
     @property
+    def is_held_by_friction(self) -> bool:
+        """Whether the limit is lower without dry friction, which holds small deviations at any step."""
+        return self.smooth_dt is not None and self.smooth_dt < 0.99 * self.longest
+
+    @property
     def longest(self) -> float:
         """The longest stable step, s; inf: none fails."""
         return {"none": np.inf, "below": 0.0}.get(self.limit, self.predicted_dt or 0.0)

@@ -9,7 +9,7 @@ from ..engines.mujoco.step import Step
 from .growth import GROWS, Growth, growth
 from .rest import Rest, rest_near
 
-LONGEST, SHORTEST = 0.1, 1e-6  # s: steps that are tried
+LONGEST, SHORTEST = 0.4, 1e-6  # s: steps that are tried
 COARSER = 1.5  # fold, from one tried step to the next
 REFINED = 2e-3  # of a limit
 SLOW = 1.2  # a factor below: of what grows little in a step

@@ -29,7 +29,7 @@ from .tables import LimitRow, StabilityResult
 
 OF = "of_file"  # the template
 RADII_WITHIN = 1e-4  # relative: of the growth in a step, MuJoCo's is by differences
-DEFAULT = "Euler"  # MuJoCo's integrator where a file states none
+DEFAULT_STEP, DEFAULT = 0.002, "Euler"  # MuJoCo's step, s, and integrator where a file states none
 FAR = 1e-3  # rad or m: a rest farther from its posture is said
 CREEPS = 1e-5  # rad/s or m/s: a creep that is said
 MODES = "growth of a step in closed form, TMT to MuJoCo"
@@ -258,7 +258,7 @@ def add_answer(
     alike = [row for row in own if row is not worst and row.stable_at_file_dt == worst.stable_at_file_dt]
     values = {
         "row": worst, "also": [row.posture for row in alike], "others": others, "air": air[0] if air else None,
-        "requested": is_requested, "dt": asked.dt, "integrator": asked.integrator,
+        "default": None if is_requested else at_default(worst, others, asked), "requested": is_requested, "dt": asked.dt, "integrator": asked.integrator,
         "uncalm": [run for run in runs if run.outcome in ("worse", "fails")], "up_to": LONGEST, "usual": USUAL_PUSH,
     }  # fmt: skip
     result.top.append(result.finding("answer", OF, **values))
@@ -273,6 +273,19 @@ def add_answer(
     if worst and worst.stable_at_file_dt is False:
         stable = [row.integrator for row in others if row.stable_at_file_dt]
         result.find("cures", OF, row=worst, integrators=stable, cures=cures)
+
+
+def at_default(
+    worst: StepLimitRow | None, others: Sequence[StepLimitRow], asked: Asked
+) -> dict[str, Any] | None:
+    """Whether MuJoCo's default step is stable; None: it is the file's, or is not known."""
+    rows = [row for row in (worst, *others) if row and row.integrator == DEFAULT and row.is_known]
+    if not rows or (asked.dt, asked.integrator) == (DEFAULT_STEP, DEFAULT):
+        return None
+    row = rows[0]
+    stable = row.longest >= DEFAULT_STEP
+    by_friction = stable and row.is_held_by_friction and (row.smooth_dt or 0.0) < DEFAULT_STEP
+    return {"dt": DEFAULT_STEP, "integrator": DEFAULT, "stable": stable, "by_friction": by_friction}
 
 
 def add_control(result: StabilityResult, row: ControlRow | None) -> None:
