@@ -9,6 +9,7 @@ import numpy as np
 from ..core.rows import Row, column
 from ..engines.mujoco.names import INTEGRATORS
 from ..engines.mujoco.reading import Reading
+from ..engines.mujoco.step import distance
 from ..engines.mujoco.variants import has_free_base
 from ..robots.coordinates import Coordinates
 from ..robots.file import names_of_keys
@@ -62,6 +63,7 @@ class StepLimitRow(Row):
     apart: float | None = None
     largest_push: float | None = None  # rad/s or m/s
     finer_push: bool | None = None  # whether a finer step bears no larger push
+    gives_way: float | None = None  # rad or m, from the rest to that at the limit
     moved: float | None = None  # rad or m, from the posture to the rest
     moved_joint: str = ""
     creep: float | None = None  # rad/s or m/s
@@ -201,7 +203,7 @@ def limit_row(
     """The limit of an integrator at a place, and what its step of dt, s, does there; in_runs: with what runs show."""
     model = place.model
     found = limit(model, place.rest, integrator, dt)
-    at = tried(model, found.rest.state, dt, integrator)
+    at = found.first
     end = limiting(place, found.rest, found.growth)
     row = StepLimitRow(
         posture=place.posture,
@@ -218,6 +220,8 @@ def limit_row(
         growth_rate=found.growth.rate or None,
         growth=at.growth.factor,
     )
+    if found.dt:
+        row.gives_way = float(np.abs(distance(model, place.rest, found.rest.state)).max())
     add_rest(row, place, at)
     if place.frictionless is not None and row.is_known:
         smooth = limit(place.frictionless, place.rest, integrator, dt)

@@ -19,21 +19,6 @@ BESIDE_DRIFT = 2.0  # fold: what grows faster than a drift
 
 
 @dataclass(frozen=True)
-class Limit:
-    """The largest stable step of an integrator.
-
-    kind: finite; none, stable up to LONGEST; below, not stable at SHORTEST; saddle, something grows at any step, at the rate
-    of `growth`; no rest, none was found.
-    dt: s, of a finite one. growth: of what grows just beyond. rest: the one just below the limit, else at the last step tried.
-    """
-
-    kind: str
-    dt: float | None
-    growth: Growth
-    rest: Rest
-
-
-@dataclass(frozen=True)
 class Tried:
     """A step that was tried: its rest, and what grows there. drift: the rate of what grows by itself, 1/s."""
 
@@ -52,6 +37,23 @@ class Tried:
         return self.rest.is_found and self.growth.rate <= max(GROWS, BESIDE_DRIFT * self.drift)
 
 
+@dataclass(frozen=True)
+class Limit:
+    """The largest stable step of an integrator.
+
+    kind: finite; none, stable up to LONGEST; below, not stable at SHORTEST; saddle, something grows at any step, at the rate
+    of `growth`; no rest, none was found.
+    dt: s, of a finite one. growth: of what grows just beyond. rest: the one just below the limit, else at the last step tried.
+    first: the step with which the search began.
+    """
+
+    kind: str
+    dt: float | None
+    growth: Growth
+    rest: Rest
+    first: Tried
+
+
 def tried(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, drift: float = 0.0) -> Tried:
     """The rest near a state at a step, and its growth. drift: the rate of what grows by itself, 1/s."""
     rest = rest_near(Step(model, dt, integrator), state)
@@ -62,7 +64,7 @@ def limit(
     model: mujoco.MjModel, state: np.ndarray, integrator: str, first: float, drift: float = 0.0
 ) -> Limit:
     """The limit near a step `first`, s: from there upwards to what fails, or downwards to what holds, then by bisection."""
-    at = tried(model, state, first, integrator, drift)
+    at = began = tried(model, state, first, integrator, drift)
     stable, failing = (at, None) if at.is_stable else (None, at)
     while failing is None and at.dt < LONGEST:
         at = tried(model, at.rest.state, min(at.dt * COARSER, LONGEST), integrator, drift)
@@ -73,21 +75,21 @@ def limit(
             stable = finer
         elif grows_by_itself(at, finer):
             if finer.growth.rate > SADDLE:
-                return Limit("saddle", None, finer.growth, finer.rest)
+                return Limit("saddle", None, finer.growth, finer.rest, began)
             return limit(model, state, integrator, first, finer.growth.rate)
         elif not (at.rest.is_found or finer.rest.is_found):
-            return Limit("no rest", None, finer.growth, finer.rest)
+            return Limit("no rest", None, finer.growth, finer.rest, began)
         else:
             failing = finer
         at = finer
     if stable is None:
-        return Limit("below", None, at.growth, at.rest)
+        return Limit("below", None, at.growth, at.rest, began)
     if failing is None:
-        return Limit("none", None, stable.growth, stable.rest)
+        return Limit("none", None, stable.growth, stable.rest, began)
     while failing.dt > stable.dt * (1.0 + REFINED):
         middle = tried(model, stable.rest.state, float(np.sqrt(stable.dt * failing.dt)), integrator, drift)
         stable, failing = (middle, failing) if middle.is_stable else (stable, middle)
-    return Limit("finite", stable.dt, failing.growth, stable.rest)
+    return Limit("finite", stable.dt, failing.growth, stable.rest, began)
 
 
 def grows_by_itself(coarse: Tried, fine: Tried) -> bool:

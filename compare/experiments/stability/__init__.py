@@ -163,7 +163,9 @@ def headline(result: StabilityResult) -> Finding | None:
         table = result.tables["step_limits"]
         own = of_file.in_use(table, table[0].file_integrator)
         return (
-            result.finding("headline", of_file.OF, row=own[0], up_to=LONGEST, dt=own[0].file_dt)
+            result.finding(
+                "headline", of_file.OF, row=own[0], up_to=LONGEST, dt=own[0].file_dt, far=of_file.GIVES_WAY
+            )
             if own
             else None
         )

@@ -30,6 +30,7 @@ from .tables import LimitRow, StabilityResult
 OF = "of_file"  # the template
 RADII_WITHIN = 1e-4  # relative: of the growth in a step, MuJoCo's is by differences
 DEFAULT_STEP, DEFAULT = 0.002, "Euler"  # MuJoCo's step, s, and integrator where a file states none
+GIVES_WAY = 0.1  # rad or m: a rest at the limit so far from that of the file's step is said
 FAR = 1e-3  # rad or m: a rest farther from its posture is said
 CREEPS = 1e-5  # rad/s or m/s: a creep that is said
 MODES = "growth of a step in closed form, TMT to MuJoCo"
@@ -256,10 +257,11 @@ def add_answer(
         if row.integrator == asked.integrator and row.surroundings == "air" != worst.surroundings
     ]
     alike = [row for row in own if row is not worst and row.stable_at_file_dt == worst.stable_at_file_dt]
+    default = None if is_requested else at_default(worst, others, asked)
     values = {
         "row": worst, "also": [row.posture for row in alike], "others": others, "air": air[0] if air else None,
-        "default": None if is_requested else at_default(worst, others, asked), "requested": is_requested, "dt": asked.dt, "integrator": asked.integrator,
-        "uncalm": [run for run in runs if run.outcome in ("worse", "fails")], "up_to": LONGEST, "usual": USUAL_PUSH,
+        "default": default, "requested": is_requested, "dt": asked.dt, "integrator": asked.integrator,
+        "uncalm": [run for run in runs if run.outcome in ("worse", "fails")], "up_to": LONGEST, "usual": USUAL_PUSH, "far": GIVES_WAY,
     }  # fmt: skip
     result.top.append(result.finding("answer", OF, **values))
     places: dict[tuple[str, str], StepLimitRow] = {}
