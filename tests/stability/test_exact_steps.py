@@ -42,7 +42,9 @@ def test_a_floor_raises_the_limit_of_euler_and_lowers_that_of_implicitfast():
     for name, sign, least, most in (("Euler", -1.0, 1.5, 10.0), ("implicitfast", 1.0, 0.1, 0.5)):
         air = (sign * kv + np.sqrt(kv**2 + 4.0 * m * kp)) / kp
         assert least < standing[name].dt / air < most
-        weightless = LEG.replace("<option", '<option gravity="0 0 0"').replace('name="foot"', 'contype="0" conaffinity="0"')
+        weightless = LEG.replace("<option", '<option gravity="0 0 0"').replace(
+            'name="foot"', 'contype="0" conaffinity="0"'
+        )
         assert limit_of(weightless, name).dt == pytest.approx(air, rel=3e-3)
     for dt in (1e-3, 4e-3):
         rest = rest_of(LEG, dt)
@@ -66,7 +68,9 @@ def test_limits_of_one_hinge_are_those_of_the_formula():
     for integrator, off in (("Euler", -kv), ("implicitfast", kv)):
         exact = (off + np.sqrt(off**2 + 4.0 * INERTIA * kp)) / kp
         found = limit_of(hinge(kp, kv), integrator)
-        assert (found.kind, found.dt) == (("finite", pytest.approx(exact, rel=3e-3)) if exact < 0.1 else ("none", None))
+        assert (found.kind, found.dt) == (
+            ("finite", pytest.approx(exact, rel=3e-3)) if exact < 0.1 else ("none", None)
+        )
     filtered = '<general joint="turn" dyntype="filter" dynprm="0.004" gainprm="20" biastype="affine" biasprm="0 -20 -0.1"/>'
     assert limit_of(hinge(actuator=filtered), "implicitfast").dt == pytest.approx(0.008, rel=3e-3)
     exactly = filtered.replace('"filter"', '"filterexact"')
@@ -87,7 +91,14 @@ def test_the_closed_form_is_the_derivative_of_mujocos_own_step(kind):
         known = len(forces.rows.R)
         if kind == "a loaded loop":
             assert np.abs(forces.rows.f).max() > 1.0
-    rows = {"a loaded loop": 3, "a limit": 1, "friction loss": 1, "a box": 12, "a free caster": 9, "the two-mass leg": 1}
+    rows = {
+        "a loaded loop": 3,
+        "a limit": 1,
+        "friction loss": 1,
+        "a box": 12,
+        "a free caster": 9,
+        "the two-mass leg": 1,
+    }
     rows |= {f"{cone}, condim {d}": count for cone, counts in (("elliptic", (1, 3, 6)), ("pyramidal", (1, 4, 10)))
              for d, count in zip((1, 3, 6), counts)}  # fmt: skip
     assert known == rows.get(kind, 0)
@@ -97,7 +108,9 @@ def test_no_closed_form_of_discrete_or_at_the_edge_of_a_limit():
     place = place_of(LEG)
     assert radius(rest_of(LEG), place.tree) is not None
     assert "discrete" not in EVERY and radius(rest_of(LEG, integrator="discrete"), place.tree) is None
-    touching = hinge(joint='range="-1 0" limited="true"').replace("<mujoco>", '<mujoco><compiler angle="radian"/>')
+    touching = hinge(joint='range="-1 0" limited="true"').replace(
+        "<mujoco>", '<mujoco><compiler angle="radian"/>'
+    )
     assert radius(rest_of(touching), place_of(touching).tree) is None
 
 

