@@ -15,7 +15,7 @@ import numpy as np
 from ..engines.mujoco.step import NUDGE, Step
 from ..engines.mujoco.variants import Servo, held_servos, with_servos
 from .rest import Rest, rest_near
-from .runs import LASTS, MOST_STEPS, SMALL_PUSH, apart, has_grown, pushed, speeds_of
+from .runs import GROWN, LASTS, MOST_STEPS, SMALL_PUSH, apart, has_grown, pushed, speeds_of
 
 MOST_PERIOD = 0.5  # s
 MOST_DELAYED = 5  # periods: the longest delay that is tried
@@ -65,9 +65,10 @@ class Controlled(NamedTuple):
         return None if most is None else most - 1
 
     def grows_in_run(self, steps: int, delay: int) -> bool:
-        """Whether a small push grows in a run of the program."""
-        step = self.rest.step
-        count = int(min(max(LASTS / self.dt, LEAST_PERIODS * steps), MOST_STEPS))
+        """Whether a small push grows in a run of the program, which lasts until a growth that is expected would show."""
+        step, factor = self.rest.step, self.factor(steps, delay)
+        periods = max(LEAST_PERIODS, np.log(GROWN) / np.log(factor) if factor > 1.0 else 0.0)
+        count = int(min(max(LASTS / self.dt, periods * steps), MOST_STEPS))
         plain, moved = (
             step.run_program(start, self.servos, count, steps, delay)
             for start in (self.rest.state, pushed(self.rest, SMALL_PUSH))

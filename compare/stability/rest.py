@@ -19,6 +19,7 @@ TRIES, SHARES = (
     (1.0, 0.5, 0.25, 0.1, 0.03),
 )  # of Newton's method, and the parts of its step that are tried
 REACH = 0.05  # rad or m: its longest step
+UNHELD = 1e-6  # of the largest slope of a force: none
 DEPENDENT = 1e-9  # of the largest singular value: directions that change no force
 RELAXED_STEP = 1e-3  # s, the longest step of a relaxed run
 RELAXED = (4.0, 10.0), (3.0, 1.0), (2.0, 0.0)  # s, 1/s: how long its parts last, how fast its speeds decay
@@ -50,6 +51,13 @@ class Rest:
         """Of the creep, (nv,)."""
         self.step.put(self.state)
         return self.step.data.qvel.copy()
+
+    @property
+    def is_held(self) -> np.ndarray:
+        """At which positions the forces depend on the movement, (nv,): not a wheel, or what slides along a floor."""
+        nv = self.step.model.nv
+        slope = np.abs(self.A - np.eye(self.step.size))[nv : 2 * nv, :nv].max(axis=0, initial=0.0)
+        return slope > UNHELD * slope.max(initial=0.0)
 
     @property
     def accelerations(self) -> np.ndarray:

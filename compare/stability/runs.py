@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from ..engines.mujoco.step import Step
+from ..engines.mujoco.step import Step, distance
 from ..robots.case import SEED
 from .limits import COARSER, LONGEST, SHORTEST, Limit
 from .rest import Rest, rest_near
@@ -26,6 +26,7 @@ CURVE_STEPS, LEAST_SIZES = (
 PUSHES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # rad/s or m/s, of all speeds
 USUAL_PUSH = 0.1  # rad/s or m/s: what a robot in use meets
 CALM, CALMER = 1e-3, 0.01  # rad/s or m/s, and of the push: a speed at the end that is rest
+FAR = 0.5  # rad or m: from a rest to what is another one
 THROWN, AS_FAST = 10.0, 2.0  # fold: of the push; of the speed at a finer step
 FINER = 8  # the step over the one that shows whether the robot itself bears a push
 
@@ -95,15 +96,26 @@ class Pushes(NamedTuple):
 
 
 def speed_after(model: mujoco.MjModel, rest: Rest, push: float, dt: float) -> float:
-    """The largest speed, beside the creep, in the last eighth of a run after a push, by the file's own solver; inf: it fails."""
+    """The largest speed, beside the creep, in the last eighth of a run after a push, by the file's own solver.
+
+    inf: the run fails, or ends elsewhere, as one of a robot that falls over and lies still.
+    """
     step = Step(model, dt, rest.step.integrator, exact=False)
     steps = int(np.clip(LASTS / dt, LEAST_STEPS, MOST_STEPS))
     speeds = speeds_of(step.run(pushed(rest, push), steps))
-    return float(np.abs(speeds[-steps // 8 :] - rest.speeds).max()) if len(speeds) == steps else np.inf
+    if (
+        len(speeds) < steps
+        or np.abs(distance(model, rest.state, step.state())[rest.is_held]).max(initial=0.0) > FAR
+    ):
+        return np.inf
+    return float(np.abs(speeds[-steps // 8 :] - rest.speeds).max())
 
 
 def survives(model: mujoco.MjModel, rest: Rest, push: float) -> bool:
-    """Whether the robot calms down after a push, or moves on no faster than at a finer step, as what nothing brakes does."""
+    """Whether the robot calms down near its rest after a push, or moves on no faster than at a finer step.
+
+    So does what nothing brakes.
+    """
     dt, speed = rest.step.dt, speed_after(model, rest, push, rest.step.dt)
     if speed <= max(CALM, CALMER * push):
         return True

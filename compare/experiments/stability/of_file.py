@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ...core.check import AT_OWN_STEP, AT_REQUESTED_STEP, About
 from ...core.rows import Row, column
 from ...engines.mujoco.reading import Reading
@@ -22,7 +24,7 @@ from ...stability.answer import (
 from ...stability.control import Controlled, controlled
 from ...stability.limits import LONGEST, SHORTEST
 from ...stability.motion import Motion, motion
-from ...stability.place import standing_at
+from ...stability.place import Place, standing_at
 from ...stability.runs import USUAL_PUSH
 from ..setup import Setup
 from .tables import LimitRow, StabilityResult
@@ -128,9 +130,13 @@ def answer_of(task: tuple[Posture, bool, Asked], reading: Reading) -> PlaceAnswe
     return answer(posture, contacts, reading, asked)
 
 
+def place_asked(posture: Posture, reading: Reading) -> Place:
+    return standing_at(reading, posture.name, posture.key, np.array(posture.q) if posture.q else None)
+
+
 def control_row(posture: Posture, reading: Reading, request: Any, asked: Asked) -> ControlRow | None:
     """The controller of --control-period at a posture; None: no actuator is a servo, and there are no gains for them."""
-    place = standing_at(reading, posture.name, posture.key)
+    place = place_asked(posture, reading)
     model = place.frictionless or place.model  # dry friction would hold small deviations at any period
     found = controlled(model, place.rest, asked.dt, asked.integrator, request.kp, request.kv)
     if found is None:
@@ -150,7 +156,7 @@ def in_seconds(steps: int | None, found: Controlled) -> float | None:
 
 
 def motion_row(posture: Posture, reading: Reading, asked: Asked) -> MotionRow:
-    place = standing_at(reading, posture.name, posture.key)
+    place = place_asked(posture, reading)
     moving: Motion = motion(place.model, place.start, asked.dt, asked.integrator)
     return MotionRow(
         posture=posture.name, integrator=asked.integrator, dt=asked.dt, rate=moving.rate, exact_rate=moving.exact_rate,

@@ -13,7 +13,7 @@ EDITS = (
     ("fleet.table", "own_step", "all(stable)", "any(stable)", "one posture at which the step is stable is enough"),
     ("fleet.table", "own_step", "min(finite, default=None)", "max(finite, default=None)", "the largest of the limits"),
     ("fleet.table", "own_step", 'row.integrator == row.file_integrator', "True", "limits of any integrator"),
-    ("command_line", "request", "'--joints' in words[:-1]", "False", "a first joint of the other sense is an option"),
+    ("command_line", "request", "option in words[:-1]", "False", "a first joint of the other sense is an option"),
     ("command_line", "process_count", "0 < int(text) <= 1024", "True", "a fleet may have no process"),
     ("command_line", "seconds", "1e-6 <= float(text) <= most", "float(text) <= most", "a step may be negative"),
     ("command_line", "expected", "word.casefold()", "word", "a word in capitals is near to none"),
