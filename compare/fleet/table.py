@@ -117,7 +117,7 @@ def judge(row: FileRow, report: Report, lost: Sequence[str], reference: Referenc
         reasons += [say(Finding("verdict", kind, {"checks": getattr(failed, kind)})) for kind in kinds]
     if unfinished:
         reasons.append(block("fleet", "unfinished", reasons=unfinished))
-    row.reason = "; ".join(filter(None, (*reasons, reference.matched)))
+    row.reason = "; ".join(filter(None, (*reasons, reference.matched, *reference.otherwise)))
     row.worst_ratio = None if top is None else top.over_tolerance
     row.stable_at_file_dt, row.limit = own_step(sections)
 
