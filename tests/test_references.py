@@ -7,7 +7,6 @@ import pytest
 from models import PATHS
 
 import tmt
-from compare.engines.mujoco import ModelError
 from compare.robots.arm import ARM
 from compare.run.reference import JointsDiffer, compared_with
 

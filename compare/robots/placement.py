@@ -1,4 +1,4 @@
-"""Where the frames of a file may lie without another motion: the stated robot, moved and turned with gravity to where the file is.
+"""Where the frames of a file may lie without another motion: the stated robot, moved and turned with gravity.
 
 The anchor of a hinge may lie anywhere on its axis, that of a slide anywhere.
 """
@@ -20,12 +20,13 @@ MOST_AXES = 6  # of the first joints: pairs of them are tried
 
 @dataclass(frozen=True)
 class Placement:
-    """A stated Tree as a file places it; it moves in the same way."""
+    """A stated Tree as a file places it; it moves in the same way if gravity is turned with it."""
 
     tree: tmt.Tree
     turn: np.ndarray  # (3, 3), of the stated robot and its gravity
     shift: np.ndarray  # (3,) m, of its origin
     along: tuple[str, ...]  # joints whose anchor is elsewhere on their axis
+    is_with_gravity: bool  # whether gravity is turned with the robot; else the turn is an error
 
     @property
     def is_same(self) -> bool:
@@ -46,14 +47,15 @@ class Placement:
         cosine = np.clip((np.trace(self.turn) - 1.0) / 2.0, -1.0, 1.0)
         values = {"shift": self.shift.tolist(), "angle": float(np.degrees(np.arccos(cosine)))}
         values |= {"axis": axis_of(self.turn).tolist(), "along": self.along, "is_moved": self.is_moved}
-        return [Finding("remarks", "placed", values | {"is_turned": self.is_turned})]
+        values |= {"is_turned": self.is_turned, "is_with_gravity": self.is_with_gravity}
+        return [Finding("remarks", "placed", values)]
 
 
 def placed(stated: tmt.Tree, tree: tmt.Tree) -> Placement:
     """The stated Tree, moved and turned such that most of its vectors are those of the Tree of a file, which has its joints."""
     joints = [tree.joint_names.index(name) for name in stated.joint_names]
     anchors, _, axes = places_of(stated)
-    file_anchors, _, file_axes = (values[joints] for values in places_of(tree))
+    file_anchors, _, _ = (values[joints] for values in places_of(tree))
     turn = turned(vectors_of(stated, range(len(joints))), vectors_of(tree, joints))
     anchors, axes = anchors @ turn.T, axes @ turn.T
     free = [directions(kind, axis) for kind, axis in zip(stated.kind, axes)]
@@ -67,7 +69,9 @@ def placed(stated: tmt.Tree, tree: tmt.Tree) -> Placement:
             moved[i] += projection @ apart
             along.append(name)
     changed = along or shift.any() or (turn != np.eye(3)).any()
-    return Placement(moved_tree(stated, turn, moved, shift) if changed else stated, turn, shift, tuple(along))
+    tree_there = moved_tree(stated, turn, moved, shift) if changed else stated
+    is_with_gravity = bool(same_vectors(np.array([tree_there.gravity]), np.array([tree.gravity]))[0])
+    return Placement(tree_there, turn, shift, tuple(along), is_with_gravity)
 
 
 def moved_tree(stated: tmt.Tree, turn: np.ndarray, anchors: np.ndarray, shift: np.ndarray) -> tmt.Tree:
@@ -78,12 +82,16 @@ def moved_tree(stated: tmt.Tree, turn: np.ndarray, anchors: np.ndarray, shift: n
     centres = (before[at] + np.array(stated.com)) @ turn.T + shift
     return replace(
         stated,
-        offset=anchors - origins,
-        axis=np.array(stated.axis) @ turn.T,
-        com=centres - anchors[at],
-        inertia=[symmetric(turn @ inertia @ turn.T) for inertia in np.array(stated.inertia)],
-        gravity=turn @ stated.gravity,
+        offset=rows(anchors - origins),
+        axis=rows(np.array(stated.axis) @ turn.T),
+        com=rows(centres - anchors[at]),
+        inertia=tuple(rows(symmetric(turn @ inertia @ turn.T)) for inertia in np.array(stated.inertia)),
+        gravity=tuple((turn @ stated.gravity).tolist()),
     )
+
+
+def rows(values: np.ndarray) -> tuple[tuple[float, ...], ...]:
+    return tuple(map(tuple, values.tolist()))
 
 
 def symmetric(tensor: np.ndarray) -> np.ndarray:
@@ -100,11 +108,11 @@ def vectors_of(tree: tmt.Tree, joints: Sequence[int]) -> np.ndarray:
 
 
 def turned(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """The rotation, (3, 3), by which most vectors, (k, 3), and the last are the others; the identity unless more are so then."""
+    """The rotation, (3, 3), by which most vectors, (k, 3), are the others; the identity unless one makes more of them so."""
     best, turn = same_vectors(vectors, others).sum(), np.eye(3)
     for candidate in rotations(vectors, others):
         same = same_vectors(vectors @ candidate.T, others)
-        if same[-1] and same.sum() > best:
+        if same.sum() > best:
             best, turn = same.sum(), candidate
     return turn
 
@@ -159,7 +167,7 @@ def shifted(
 
 def axis_of(turn: np.ndarray) -> np.ndarray:
     """The axis of a rotation, (3,), of length 1; 0 of none."""
-    values, vectors = np.linalg.eigh(turn + turn.T)
+    _, vectors = np.linalg.eigh(turn + turn.T)
     axis = vectors[:, -1]
     off = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    return np.where(np.abs(axis) < SAME, 0.0, axis) * (-1.0 if off @ axis < 0.0 else 1.0)
+    return np.where(np.abs(axis) < SAME, 0.0, axis * (-1.0 if off @ axis < 0.0 else 1.0))

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.finding import Finding
 from ..core.text import say
 from ..core.words import in_one_line
 from ..engines import Engine

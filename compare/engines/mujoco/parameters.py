@@ -229,9 +229,10 @@ def of_welded(source: Source) -> list[Finding]:
     """Which bodies are one with another, of a Source that is joined; links without mass."""
     model, findings = source.model, []
     names = {body: element_name(model, "body", body) for body in range(model.nbody)}
-    if source.welded:
-        pairs = [f"{names[body]} on {names[base]}" for body, base in source.welded.items()]
+    if pairs := [f"{names[body]} on {names[base]}" for body, base in source.welded.items() if base]:
         findings.append(Finding("remarks", "welded", {"pairs": pairs}))
+    if fixed := [names[body] for body, base in source.welded.items() if not base]:
+        findings.append(Finding("remarks", "fixed", {"bodies": fixed}))
     light = [body for body in sorted(set(model.jnt_bodyid.tolist())) if not model.body_mass[body]]
     if light:
         findings.append(Finding("remarks", "massless", {"links": [names[body] for body in light]}))

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from .names import matrix, moving, tensor
+from .names import element_name, tensor
 
 # kg and kg m2: more than the least mass that MuJoCo compiles, less than the rounding of any other
 LEAST = 1e-14
@@ -19,7 +19,6 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     except ValueError as error:
         if NO_MASS not in str(error) or spec.compiler.settotalmass > 0.0:
             raise
-        refused = error
     stated = spec.compiler.boundmass, spec.compiler.boundinertia
     spec.compiler.boundmass = spec.compiler.boundinertia = LEAST
     model = spec.compile()
@@ -27,15 +26,17 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     model.body_mass[model.body_mass == LEAST] = 0.0
     model.body_inertia[model.body_inertia == LEAST] = 0.0
     mujoco.mj_setConst(model, mujoco.MjData(model))
-    if (model.body_subtreemass[model.jnt_bodyid] <= 0.0).any():
-        raise refused
+    if empty := [int(body) for body in model.jnt_bodyid if not model.body_subtreemass[body]]:
+        raise ValueError(
+            f"{element_name(model, 'body', empty[0])} moves, and neither it nor what it carries has mass"
+        )
     return model
 
 
 def welded_bodies(model: mujoco.MjModel) -> dict[int, int]:
-    """The moving bodies with mass that have no joint, and the body with one to which they are fixed, by number."""
+    """The bodies with mass that have no joint, and the body with one to which they are fixed, 0: the world, by number."""
     massive = (model.body_mass > 0.0) | (model.body_inertia > 0.0).any(axis=1)
-    bodies = np.flatnonzero(massive & moving(model) & (model.body_weldid != np.arange(model.nbody)))
+    bodies = np.flatnonzero(massive & (model.body_weldid != np.arange(model.nbody)))
     return {int(body): int(model.body_weldid[body]) for body in bodies}
 
 
@@ -43,7 +44,9 @@ def join(model: mujoco.MjModel, welded: Mapping[int, int]) -> None:
     """Give each body the mass, the centre of mass and the inertia of those that are welded to it, which lose theirs."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    for base in set(welded.values()):
+    fixed = [body for body, base in welded.items() if not base]
+    model.body_mass[fixed], model.body_inertia[fixed] = 0.0, 0.0
+    for base in set(welded.values()) - {0}:
         group = [base, *(body for body, onto in welded.items() if onto == base)]
         masses, centres = model.body_mass[group], data.xipos[group]
         com, total = masses @ centres / masses.sum(), np.zeros((3, 3))
