@@ -6,6 +6,7 @@ printed as XML (which has seven digits). A URDF's meshes are found by their pack
 """
 
 import os
+import re
 import warnings
 from collections.abc import Mapping
 from copy import copy
@@ -28,6 +29,7 @@ ADVICE = {  # by what MuJoCo says of a file that it cannot compile
     "no decoder found": "MuJoCo reads STL, OBJ and MSH; collision meshes may be deleted: contacts are not compared",
     "mass and inertia of moving bodies": "boundmass and boundinertia of <compiler> give some, or both joints in one body",
 }
+ROOT_ELEMENT = re.compile(r"(?:\ufeff|\s|<[?!][^>]*>)*<([A-Za-z][\w.:-]*)")
 Positions = Mapping[str, float | tuple[float, ...]]  # of joints by name: rad, m or a quaternion
 
 
@@ -77,7 +79,9 @@ class Source:
         except UnicodeDecodeError:
             raise ModelError(f"{self} has names that are not UTF-8; save it as UTF-8") from None
         except ValueError as error:
-            is_model = "<mujoco" in self.text or "<robot" in self.text
+            is_model, root = "<mujoco" in self.text or "<robot" in self.text, ROOT_ELEMENT.match(self.text)
+            if root and not is_model:
+                raise ModelError(f"{self} is not MJCF or URDF: its root element is <{root[1]}>") from None
             problem = f"MuJoCo cannot compile {self}" if is_model else f"{self} is not MJCF"
             advice = "".join(f"; {text}" for part, text in ADVICE.items() if part in str(error))
             raise ModelError(f"{problem}: {error}{advice}") from None

@@ -25,42 +25,46 @@ class Numbers(NamedTuple):
 
     @property
     def stated(self) -> np.ndarray:
-        return np.ravel(self.number.stated).astype(float)
+        return np.array(self.number.stated, float).ravel()
 
     @property
     def compiled(self) -> np.ndarray:
-        return np.ravel(self.number.compiled).astype(float)
+        return np.array(self.number.compiled, float).ravel()
 
 
 def causes_in_common(numbers: Sequence[Numbers], from_geoms: Sequence[str]) -> list[Cause]:
     """The causes of all numbers, those of one error as one. from_geoms: bodies for which the file has no inertial."""
     left, causes = [each for each in numbers if each.causes], []
-    for names in ALIKE:
-        together = [each for each in numbers if each.number.quantity in names and each.stated.any()]
+    for quantities in ALIKE:
+        together = [each for each in numbers if each.number.quantity in quantities and each.stated.any()]
         factor = common_factor(together)
-        if factor and all(each in left for each in together):
-            values = {"quantities": names, "factor": factor}
+        if factor and len(without(left, together)) == len(left) - len(together):
+            values = {"quantities": quantities, "factor": factor}
             causes.append(as_one(together, "factor", values, 1.0, factor))
-            left = [each for each in left if each not in together]
+            left = without(left, together)
     order = [each for each in left if each.number.quantity == "order"]
     if len(order) > 1:
-        of_file = {
-            int(each.compiled[0]): each.number.place for each in numbers if each.number.quantity == "order"
-        }
-        right = [each.number.place for each in numbers if each.number.quantity == "order"]
-        names = {"file": [of_file[k] for k in sorted(of_file)], "stated": right}
-        causes.append(as_one(order, "order", names, ", ".join(names["stated"]), ", ".join(names["file"])))
-        left = [each for each in left if each not in order]
+        every = [each for each in numbers if each.number.quantity == "order"]
+        right = [each.number.place for each in every]
+        file = [each.number.place for each in sorted(every, key=lambda each: each.compiled[0])]
+        names = ", ".join(right), ", ".join(file)
+        causes.append(as_one(order, "order", {"file": file, "stated": right}, *names))
+        left = without(left, order)
     for body in from_geoms:
         of_body = [each for each in left if each.number.place == body and each.number.quantity in OF_INERTIAL]
         if len(of_body) > 1:
             causes.append(as_one(of_body, "from_geoms", {"body": body, "numbers": of_body}))
-            left = [each for each in left if each not in of_body]
+            left = without(left, of_body)
     while left:
         together = alike(left)
-        left = [each for each in left if each not in together]
+        left = without(left, together)
         causes += of_group(together)
     return causes
+
+
+def without(numbers: Sequence[Numbers], others: Sequence[Numbers]) -> list[Numbers]:
+    names = [(each.number.place, each.number.quantity) for each in others]
+    return [each for each in numbers if (each.number.place, each.number.quantity) not in names]
 
 
 def common_factor(numbers: Sequence[Numbers]) -> float | None:
