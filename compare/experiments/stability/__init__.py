@@ -18,7 +18,17 @@ from .equilibria import check_equilibria
 from .failure import OwnReset
 from .limits import Observed
 from .own_run import OwnRuns
-from .subjects import DAMPINGS, SCHEMES, Subjects, coarsest_case, methods_of, subjects_of, unit_of_movements
+from .subjects import (
+    DAMPINGS,
+    MOST_POSTURES,
+    SCHEMES,
+    Subjects,
+    coarsest_case,
+    left_out,
+    methods_of,
+    subjects_of,
+    unit_of_movements,
+)
 from .tables import DepartureRow, FinerRow, LimitRow, StabilityResult, TorqueRow
 
 EXPERIMENT = Experiment(order=100, serves_own=False, options=("--dt", "--integrator"), overview="limits")
@@ -96,6 +106,8 @@ def rows(setup: Setup, work: Work | None = None) -> StabilityResult:
     own_run.add(result, work.own_runs)
     if work.with_servos:
         servos.add(result, setup, work.with_servos)
+    if names := left_out(setup.robot):
+        result.top.append(result.finding("left_out", most=MOST_POSTURES, names=names))
     if is_large(setup.robot):
         result.top.append(result.finding("large", speeds=setup.robot.coordinates.nv, most=MOST_SPEEDS))
         return result

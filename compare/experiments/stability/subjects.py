@@ -29,6 +29,11 @@ class Subjects(NamedTuple):
 
 
 @lru_cache(maxsize=64)
+def left_out(robot: Robot) -> tuple[str, ...]:
+    """The named postures that are not examined."""
+    return posture_names(robot)[MOST_POSTURES:]
+
+
 def subjects_of(robot: Robot) -> Subjects:
     """What is examined of a robot; of a file's one centre and one saddle, and the rest to which it sinks."""
     names = posture_names(robot)[:MOST_POSTURES]

@@ -18,7 +18,7 @@ from compare.experiments import stability
 from compare.experiments.setup import Setup
 from compare.experiments.stability import claims, departure, failure, limits, own_run, subjects
 from compare.experiments.stability.servos.predicted import acting_at, predicted_at
-from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
+from compare.experiments.stability.subjects import MOST_POSTURES, left_out, subjects_of
 from compare.robots.arm import ARM
 from compare.truth.linear import held, posture_names
 
@@ -69,7 +69,9 @@ def test_known_limits_of_undamped_modes_and_of_methods_that_are_stable_but_on_a_
 
 def test_of_many_keyframes_the_first_are_looked_at():
     keys = "".join(f'<key name="k{i}" qpos="{0.3 * i}"/>' for i in range(9))
-    seen = subjects_of(setup_of_file(SWING.format(keys=f"<keyframe>{keys}</keyframe>")).robot)
+    robot = setup_of_file(SWING.format(keys=f"<keyframe>{keys}</keyframe>")).robot
+    seen = subjects_of(robot)
+    assert left_out(robot) == ("k6", "k7", "k8") and left_out(seen.robot) == ("rest",)
     assert posture_names(seen.robot) == (*(f"k{i}" for i in range(MOST_POSTURES)), "rest")
     assert np.abs(held(seen.robot, "rest").tau).max() < 1e-6
     body = setup_of_file(PATHS["free_body"]).robot
