@@ -17,7 +17,18 @@ from numpy.typing import ArrayLike
 from ...robots.case import Case
 from .. import GRID, Motion, Prepared, Setting, Tolerance, as_far_as_it_goes, rows_of_states
 from .inventory import contact_pairs
-from .names import EVALUATIONS, INTEGRATORS, bit, element_name, joint_places, moving, number_of_actuators, on
+from .names import (
+    EVALUATIONS,
+    INTEGRATORS,
+    OF_A_JOINT,
+    bit,
+    element_name,
+    joint_name,
+    joint_places,
+    moving,
+    number_of_actuators,
+    on,
+)
 
 Array = np.ndarray | float
 Pair = tuple[np.ndarray, np.ndarray]
@@ -130,9 +141,14 @@ class MujocoDynamics:
         return self._each(torque, q, v, a)  # a travels in the place of tau
 
     def acting_actuators(self, q: Array, v: Array) -> list[str]:
-        """The names of the actuators that exert a force at a state."""
-        forces = self._each(lambda d: d.actuator_force, q, v).reshape(-1, number_of_actuators(self.model))
-        return [element_name(self.model, "actuator", i) for i in np.flatnonzero(forces.any(axis=0)).tolist()]
+        """The names of the actuators that exert a force at a state, and their joints."""
+        m = self.model
+        forces = self._each(lambda d: d.actuator_force, q, v).reshape(-1, number_of_actuators(m))
+        names = {i: element_name(m, "actuator", i) for i in np.flatnonzero(forces.any(axis=0)).tolist()}
+        joints = {
+            i: m.actuator_trnid[i, 0] for i in names if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT
+        }
+        return [f"{name} on {joint_name(m, joints[i])}" if i in joints else name for i, name in names.items()]
 
     def additional_bodies(self) -> list[tuple[str, float]]:
         """Bodies with mass, kg, that are not among those of the case, by name."""

@@ -27,6 +27,7 @@ PARTS_OF_FREE = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]
 ADVICE = {  # by what MuJoCo says of a file that it cannot compile
     "Error opening file": "package://NAME/... is looked for in a folder NAME beside the file or above it, else beside the file",
     "no decoder found": "MuJoCo reads STL, OBJ and MSH; collision meshes may be deleted: contacts are not compared",
+    "must have positive eigenvalues": "the order of fullinertia is xx, yy, zz, xy, xz, yz",
     "mass and inertia of moving bodies": "boundmass and boundinertia of <compiler> give some, or both joints in one body",
 }
 ROOT_ELEMENT = re.compile(r"(?:\ufeff|\s|<[?!][^>]*>)*<([A-Za-z][\w.:-]*)")
