@@ -17,7 +17,7 @@ from ..diagnosis.forces import LeftOver
 from ..engines.own import QUICK
 from .comparison import Comparison
 
-SECONDS_OF_CAUSE = 10.0  # of a search
+SECONDS_OF_CAUSE = 4.5  # of a search
 
 
 class Why(NamedTuple):

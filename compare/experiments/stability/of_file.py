@@ -10,7 +10,9 @@ import numpy as np
 from ...core.check import AT_OWN_STEP, AT_REQUESTED_STEP, About
 from ...core.rows import Row, column
 from ...engines.mujoco.reading import Reading
+from ...robots.file import names_of_keys
 from ...stability.answer import (
+    MOST_POSTURES,
     Asked,
     Curve,
     PlaceAnswer,
@@ -166,6 +168,8 @@ def motion_row(posture: Posture, reading: Reading, asked: Asked) -> MotionRow:
 
 def add(result: StabilityResult, setup: Setup, work: Work) -> None:
     """Rows, checks, the answer at the top, the curves, and what makes the step stable."""
+    if setup.reading and (names := list(names_of_keys(setup.reading).values())[MOST_POSTURES:]):
+        result.top.append(result.finding("left_out", OF, most=MOST_POSTURES, names=names))
     for number, (asked, answers) in enumerate(zip(work.asked, work.answers)):
         found = list(answers)
         rows = [row for place in found for row in place.rows]
