@@ -58,7 +58,7 @@ class Search:
 
     computed: the values with changes of numbers of the model, (changes, states, entries). given: (states,
     entries); NaN where nothing is given. tolerance: of each entry, (states, entries). end: the
-    time.monotonic() at which OutOfTime is raised.
+    time.process_time() at which OutOfTime is raised.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class Search:
         if len(numbers) > ROWS:
             starts = range(0, len(numbers), ROWS)
             return np.concatenate([self.values(numbers[k : k + ROWS], x[k : k + ROWS]) for k in starts])
-        if time.monotonic() > self.end:
+        if time.process_time() > self.end:
             raise OutOfTime
         changes: dict[Path, ndarray] = {}
         columns = []

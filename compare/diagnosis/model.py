@@ -182,7 +182,8 @@ class Equations:
         """The entries of Mbar, and the coefficients of h, (states,) each."""
 
         def bias(speeds: ndarray) -> ndarray:
-            return Equations(self.tree, self.q, np.broadcast_to(speeds, self.qd.shape)).h
+            q, qd = np.tile(self.q, (len(speeds), 1)), np.repeat(speeds, len(self.q), axis=0)
+            return Equations(self.tree, q, qd).h.reshape(len(speeds), *self.qd.shape)
 
         of_M = dict(zip(self.entries[self.in_M], self.right.T))
         return of_M | coefficients_of(bias, self.nv)
@@ -272,13 +273,14 @@ class Values(NamedTuple):
 def coefficients_of(bias: Callable[[ndarray], ndarray], nv: int) -> dict[Entry, ndarray]:
     """Coefficients of h_i, (states,) each: "gravity" (i,), and "velocity" (i, j, k) of qd_j qd_k, j <= k.
 
-    bias: speeds (nv,) -> h (states, nv), of which the part that is even in the speeds is taken.
+    bias: speeds (n, nv) -> h (n, states, nv), of which the part that is even in the speeds is taken.
     """
-    unit, even, rest = np.eye(nv), {}, bias(np.zeros(nv))
+    unit, even = np.eye(nv), {}
     pairs = [(j, k) for j in range(nv) for k in range(j, nv)] if nv <= MOST_SPEEDS else []
-    for j, k in pairs:
-        speeds = unit[j] + (j != k) * unit[k]
-        even[j, k] = (bias(speeds) + bias(-speeds)) / 2.0 - rest
+    speeds = [unit[j] + (j != k) * unit[k] for j, k in pairs]
+    rest, *values = bias(np.array([0.0 * unit[0], *speeds, *(-speed for speed in speeds)]))
+    for pair, forward, back in zip(pairs, values, values[len(pairs) :]):
+        even[pair] = (forward + back) / 2.0 - rest
     mixed = {(j, k): values - even[j, j] - even[k, k] for (j, k), values in even.items() if j != k}
     found = {Entry("gravity", (i,)): rest[:, i] for i in range(nv)}
     for pair, values in (even | mixed).items():

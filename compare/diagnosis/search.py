@@ -60,7 +60,7 @@ def diagnose(
     """
     with np.errstate(all="ignore"):  # values may be no numbers, or beyond the largest
         given = Given(tree, values, bias, mass_matrix, qdd=qdd)
-        return Explanations(given, time.monotonic() + seconds, stated, seconds).diagnosis()
+        return Explanations(given, time.process_time() + seconds, stated, seconds).diagnosis()
 
 
 class Given:
@@ -111,7 +111,7 @@ class Given:
 
 
 class Explanations:
-    """What explains given values. end: the time.monotonic() at which the search ends."""
+    """What explains given values. end: the time.process_time() at which the search ends."""
 
     def __init__(self, given: Given, end: float, stated: Stated | None, seconds: float = inf):
         self.given, self.equations, self.stated, self.seconds, self.end = given, given.equations, stated, seconds, end
@@ -151,6 +151,8 @@ class Explanations:
     @cached_property
     def compared(self) -> Compared:
         values, plain = self.given.values, Equations(self.given.tree, self.given.values.q, self.given.values.qd)
+        if self.equations.layout.is_symmetric and "coefficients" in vars(self.equations):
+            plain.coefficients = self.equations.coefficients
         of_M, of_h = values.tolerances
         tolerance = plain.layout.packed(of_M, of_h, 0.0 * of_h)
         packed = values.packed
