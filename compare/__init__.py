@@ -1,4 +1,4 @@
-"""TMT and MuJoCo compared; and equations of one's own compared with MuJoCo: assert_agrees and differences.
+"""TMT and MuJoCo compared; equations of one's own compared with MuJoCo, assert_agrees and differences; a file as a Tree, tree.
 
 ARCHITECTURE.md shows the parts. How a tolerance is derived: 64 eps times the sum of the absolute values of
 the terms that are added, times the condition number of Mbar where a linear system is solved. Of a trajectory
@@ -8,13 +8,13 @@ it is a band: the rounding that every step can add, carried on by the exact Jaco
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .agreement import assert_agrees, differences
+    from .agreement import assert_agrees, differences, tree
 
-__all__ = ["assert_agrees", "differences"]
+__all__ = ["assert_agrees", "differences", "tree"]
 
 
 def __getattr__(name: str) -> object:
-    """The two functions when they are asked for: `python -m compare` need not wait for them."""
+    """The public functions when they are asked for: `python -m compare` need not wait for them."""
     if name in __all__:
         from . import agreement
 

@@ -8,7 +8,7 @@ from textwrap import wrap
 from typing import Any
 
 from tmt.compiled import forms
-from tmt.derivation.quantities import QUANTITIES, is_quantity, quantity_of, shape_of
+from tmt.derivation.quantities import QUANTITIES, is_quantity, quantity_of, shape_of, what_is_known
 from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree, stated
 from tmt.model.values import shown
@@ -77,12 +77,11 @@ def symbolic_text(model: Tree, language: str, quantities: tuple[str, ...], head:
 
 def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ...]:
     chosen = tuple(quantities) if isinstance(quantities, list | tuple) else (quantities,)
-    wrong = [
-        quantity for quantity in chosen if not is_quantity(quantity) or (choices and quantity not in choices)
-    ]
+    wrong = [x for x in chosen if not is_quantity(x) or (choices and x not in choices)]
     if wrong or not chosen:
         what = wrong[0] if wrong else ()
-        raise ValueError(f"quantity is {shown(what)}; expected some of {', '.join(choices or QUANTITIES)}")
+        expected = f"expected some of {', '.join(choices)}" if choices else what_is_known(what)
+        raise ValueError(f"quantity is {shown(what)}; {expected}")
     return chosen
 
 
