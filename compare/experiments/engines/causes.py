@@ -156,8 +156,9 @@ def mass_without_contacts(entry: Entry) -> str | None:
         return None
     model, (read, stated) = entry.text.model, entry.values("mass")
     geoms = model.geom_bodyid == model.body(entry.name).id
-    touches = (model.geom_contype[geoms] | model.geom_conaffinity[geoms]).all()
-    return entry.name if read[entry.joint] < stated[entry.joint] and not touches else None
+    touches = model.geom_contype[geoms] | model.geom_conaffinity[geoms]  # of those that are not only drawn
+    all_touch = touches.size and touches.all()
+    return entry.name if read[entry.joint] < stated[entry.joint] and not all_touch else None
 
 
 def small_inertia(entry: Entry) -> str | None:
@@ -190,13 +191,14 @@ def fixed_root(entry: Entry) -> str | None:
 
 
 def turned_start(entry: Entry) -> str | None:
-    """A free body is turned by the pose that the file gives it."""
+    """Positions of a free body are turned about the place that the file gives it, by the turn that it has there."""
     model, root = entry.text.model, entry.root
     if entry.number not in PLACES or not root or model.body_dofnum[root] != 6:
         return None
     turn = Rotation.from_quat(np.roll(model.body_quat[root], -1))
     read, stated = entry.values("com")
-    is_so = np.allclose(turn.apply(stated[entry.joint]), read[entry.joint], atol=1e-6)
+    moved = model.body_pos[root] - turn.apply(model.body_pos[root])
+    is_so = moved.any() and np.allclose(stated[entry.joint] + moved, read[entry.joint], atol=1e-6)
     return str(model.body(root).name) if is_so else None
 
 
