@@ -27,6 +27,9 @@ FEATHERSTONE, BY_MUJOCO = "Featherstone", "SolverMuJoCo"  # of its solvers
 OFF = ("target_ke", "target_kd", "limit_ke", "limit_kd")  # actuators and limits
 FIELDS = "armature", "damping", "stiffness"
 USED = "implicitfast", "RK4"  # integrators of SolverMuJoCo; the others are those of MuJoCo Warp too
+UNCONSTRAINED = (
+    1 << 0 | 1 << 1 | 1 << 2 | 1 << 3 | 1 << 4
+)  # MuJoCo's flags: constraint, equality, frictionloss, limit, contact
 FLOAT32 = 1e-6  # share of the largest that a number loses
 
 
@@ -93,7 +96,11 @@ class Model(ReadModel):
         if method == FEATHERSTONE:
             return self.newton.solvers.SolverFeatherstone(self.model, angular_damping=0.0)
         options = {"integrator": method.split()[-1].lower(), "disable_contacts": True}
-        return self.newton.solvers.SolverMuJoCo(self.model, **options)
+        solver = self.newton.solvers.SolverMuJoCo(self.model, **options)
+        solver.mjw_model.opt.disableflags |= UNCONSTRAINED
+        for prm in (solver.mjw_model.actuator_gainprm, solver.mjw_model.actuator_biasprm):
+            prm.zero_()  # with actuation disabled implicitfast would be explicit in the damping
+        return solver
 
     def fields(self) -> Numbers:
         speeds = {name: values[self.dofs] for name, values in self.read.items()}

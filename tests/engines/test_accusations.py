@@ -21,8 +21,8 @@ OF_GEOMS = f'<mujoco model="m">{{}}<worldbody><body name="b">{HINGE}{SPHERE}</bo
 MESHES = f"""<mujoco model="m"><asset><mesh name="m" file="m.{{}}"/></asset><worldbody><body name="b">{HINGE}
 <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
 SEVERAL = '<joint name="j" axis="0 1 0"/><joint name="k" axis="0 0 1" pos="0.3 0 0"/>'
-ROOT = f"""<mujoco model="m"><worldbody><body name="root" pos="0 0.4 1"><body name="b">{HINGE}{INERTIAL.format("0.2 0 0")}</body></body>
-</worldbody></mujoco>"""
+ROOT = f"""<mujoco model="m"><worldbody><body name="root" pos="0 0.4 1"><body name="b">{HINGE}
+{INERTIAL.format("0.2 0 0")}</body></body></worldbody></mujoco>"""
 TURNED = f"""<mujoco model="m"><worldbody><body name="b" pos="0 0 1" quat="0.8 0 0.6 0"><joint name="f" type="free"/>
 {INERTIAL.format("0.2 0 0")}</body></worldbody></mujoco>"""
 SMALL = """<mujoco model="m"><worldbody><body name="b"><joint name="j" axis="0 1 0"/>

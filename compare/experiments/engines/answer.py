@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...core.words import listed
 from ...engines import LABELS
 from ...judge.run import movement_unit
 from ...robots.case import Case
@@ -50,7 +49,7 @@ def as_read(result: EnginesResult, label: str) -> str:
     rows = [row for row in result.rows if row.engine == label]
     shares = [row.as_read_over_bar for row in rows if row.as_read_over_bar is not None]
     if differing:
-        return f"{listed(differing)}"
+        return ", ".join(differing)
     return SAME if all(share <= 1.0 for share in shares) else OTHER
 
 

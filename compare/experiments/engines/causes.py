@@ -46,8 +46,8 @@ class Text:
         self.class_of: dict[str, str] = {}  # of joints, by name
         for world in self.root.findall("worldbody"):
             self.add_joints(world, outermost)
-        joints = (int(joint) for joint in self.model.actuator_trnid[:, 0])
-        self.driven = {self.model.joint(joint).name for joint in joints if 0 <= joint < self.model.njnt}
+        actuators = [*self.root.findall("actuator/motor"), *self.root.findall("actuator/position")]
+        self.driven = {actuator.get("joint", "") for actuator in actuators}
 
     def add_class(self, default: ElementTree.Element, name: str, around: str | None) -> None:
         self.classes[name] = default, around
@@ -126,7 +126,7 @@ def class_without_joint(entry: Entry) -> str | None:
 
 
 def armature_without_motor(entry: Entry) -> str | None:
-    """The engine has the armature of all joints that are driven, and of no other."""
+    """The engine has the armature of all joints that a motor or a position servo drives, and of no other."""
     is_zero = entry.number == "armature" and not entry.values("armature")[0][entry.joint]
     return entry.name if is_zero and not entry.wrong & entry.text.driven else None
 

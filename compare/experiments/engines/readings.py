@@ -19,6 +19,7 @@ OF_BODIES = "mass", "moments"  # no convention makes these differ
 ENTRIES = {"mass": 1, "moments": 3, "com": 3, "inertia": 9, "axis": 3, "anchor": 3}  # of a joint
 OF_JOINTS = "axis", "anchor"
 FOLLOWS = {"inertia": "moments", "com_moved": "com", "axis_moved": "axis", "anchor_moved": "anchor"}
+REFUSED = "refused"  # in place of a number: the file itself
 AS_READ = "as read"  # checks of numbers
 
 
@@ -28,7 +29,7 @@ def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, r
     if reading["copied"]:
         kind, message = reading["copied"]
         result.find("copied", engine=label, error=kind, reason=message.rstrip("."))
-        result.otherwise[label] = ["the file itself"] if kind != OtherNames.__name__ else []
+        result.otherwise[label] = [REFUSED] if kind != OtherNames.__name__ else []
     if reading["way"] == FROM_URDF:
         result.by_urdf.append(label)
     if reading["way"] == FROM_COMPILED:

@@ -9,6 +9,7 @@ import tmt
 
 from ...engines import GRID, LABELS, RECORDS, Array, Engine, Method, Setting
 from ...engines.outside.model import EngineError
+from ...judge.run import diverged_at
 from ...judge.scale import FACTOR
 from ...robots.case import Case
 from ..followed import follow
@@ -67,14 +68,15 @@ def add_response(result: EnginesResult, setup: Setup, case: Case, engine: Engine
     steps = steps_of(setup, case)
     exact, setting = reference(case), Setting(case.duration, steps)
     run = follow(engine.of(case), case, method, setting, exact)
-    q, ended = run.motion.q, run.motion.ended is not None
+    q = run.motion.q
+    ended = run.motion.ended or diverged_at(case, exact.t, q, run.motion.v)
     how = HOW.get(engine.name) or HOW.get(f"{engine.name} {method.name}", HELD)
     row = ServoRow(
         scene=case.name, engine=LABELS[engine.name], method=method.name, servo=how, dt=case.duration / steps,
         deviation=float(run.error.max()),
     )  # fmt: skip
     if ended:
-        row.deviation, row.ended = None, str(run.motion.ended)
+        row.deviation, row.ended = None, str(ended)
     if not ended and row.deviation and row.deviation > LARGE:
         row.why, row.unexplained = explanation(case, engine, method, steps, q)
     result.tables["engines_servos"].append(row)
