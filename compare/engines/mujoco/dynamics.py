@@ -241,8 +241,8 @@ class MujocoDynamics:
         return states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs], ended
 
     def runner(
-        self, state: tuple[Array, Array, Array], dt: float, steps: int, method: str, tolerance: Tolerance
-    ) -> tuple[np.ndarray, Callable[[], np.ndarray]]:
+        self, state: tuple[Array, Array, Array], dt: float, steps: int, method: str, tolerance: Tolerance, threads: int = 1
+    ) -> tuple[np.ndarray, Callable[[], np.ndarray]]:  # fmt: skip
         """The first states, time first, and a call that runs MuJoCo's C loop from them; it returns (runs, steps, ...)."""
         if tolerance is not None:
             raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
@@ -264,8 +264,10 @@ class MujocoDynamics:
         controls = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
         options = {"control_spec": controls, "nstep": steps, "state": states, "sensordata": sensors}
 
+        of_threads = [data, *(mujoco.MjData(model) for _ in range(threads - 1))]
+
         def run() -> np.ndarray:
-            rollout([model] * runs, [data], starts, torques, skip_checks=True, **options)
+            rollout([model] * runs, of_threads, starts, torques, skip_checks=True, **options)
             return states
 
         return starts, run
