@@ -40,7 +40,11 @@ def edits(equations: Equations) -> list[Variant]:
     changes: list[dict[Path, float]] = []
     for kind in KINDS:
         for edit in kind(equations.tree, stated):
-            moved = {Path(name, at): x for name, field in edit.fields.items() for at, x in np.ndenumerate(field - stated[name])}
+            moved = {
+                Path(name, at): x
+                for name, field in edit.fields.items()
+                for at, x in np.ndenumerate(field - stated[name])
+            }
             moved = {path: x for path, x in moved.items() if x}
             same = tuple((path, f"{x:.12g}") for path, x in moved.items())
             if moved and same not in known:
@@ -79,7 +83,11 @@ def tensors(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
     orders = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == order[k] for k in range(3)))
     for order in orders:
         moved = [XYZ[k] for k in range(3) if order[k] != k]
-        what = f"axes {listed(moved)} exchanged" if len(moved) == 2 else f"axes in the order {', '.join(XYZ[k] for k in order)}"
+        what = (
+            f"axes {listed(moved)} exchanged"
+            if len(moved) == 2
+            else f"axes in the order {', '.join(XYZ[k] for k in order)}"
+        )
         ways[f"inertia of {{}}, {what}"] = "", partial(permuted, order=list(order))
         ways[f"moments of inertia of {{}}, {what}"] = "", partial(with_moments, order=list(order))
     ways["axial and transverse inertia of {}"] = "exchanged", axial_for_transverse
@@ -88,10 +96,15 @@ def tensors(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
     ways["inertia of {} "] = "left out, a point mass", lambda I: 0.0 * I
     for first, second in combinations(((0, 1), (0, 2), (1, 2)), 2):
         names = [XYZ[i] + XYZ[j] for i, j in (first, second)]
-        ways[f"products of inertia {listed(names)} of {{}}"] = "exchanged", partial(exchanged, first=first, second=second)
+        ways[f"products of inertia {listed(names)} of {{}}"] = (
+            "exchanged",
+            partial(exchanged, first=first, second=second),
+        )
     for name, bodies in sets_of_bodies(tree).items():
         for place, (explains, new) in ways.items():
-            yield Edit(place.format(name).rstrip(), explains, {"inertia": changed(stated["inertia"], bodies, new)})
+            yield Edit(
+                place.format(name).rstrip(), explains, {"inertia": changed(stated["inertia"], bodies, new)}
+            )
 
 
 def permuted(I: ndarray, order: list[int]) -> ndarray:
@@ -127,7 +140,10 @@ def exchanged(I: ndarray, first: tuple[int, int], second: tuple[int, int]) -> nd
 
 def vectors(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
     """A CoM or an offset at zero, of the other sign, with two coordinates exchanged; the CoM at half or twice its place."""
-    ways: dict[str, Callable[[ndarray], ndarray]] = {"zero": lambda r: 0.0 * r, "of the other sign": lambda r: -r}
+    ways: dict[str, Callable[[ndarray], ndarray]] = {
+        "zero": lambda r: 0.0 * r,
+        "of the other sign": lambda r: -r,
+    }
     for i, j in combinations(range(3), 2):
         order = [0, 1, 2]
         order[i], order[j] = j, i
@@ -168,7 +184,11 @@ def swapped(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
         for j in (j for j, parent in enumerate(tree.parent) if parent == i >= 0):
             offset, com = stated["offset"].copy(), stated["com"].copy()
             offset[j], com[b] = com[b], offset[j]
-            yield Edit(f"CoM of {tree.body_names[b]} and offset of {tree.joint_names[j]}", "exchanged", {"offset": offset, "com": com})
+            yield Edit(
+                f"CoM of {tree.body_names[b]} and offset of {tree.joint_names[j]}",
+                "exchanged",
+                {"offset": offset, "com": com},
+            )
 
 
 def scaled(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
@@ -201,4 +221,11 @@ def axes(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
                 yield Edit(f"axis of {tree.joint_names[i]}", f"{shown}{name}", {"axis": new})
 
 
-KINDS: tuple[Callable[[tmt.Tree, Numbers], Iterator[Edit]], ...] = (absent, tensors, vectors, swapped, scaled, axes)
+KINDS: tuple[Callable[[tmt.Tree, Numbers], Iterator[Edit]], ...] = (
+    absent,
+    tensors,
+    vectors,
+    swapped,
+    scaled,
+    axes,
+)

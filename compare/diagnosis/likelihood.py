@@ -14,7 +14,11 @@ OF_KINDS = {  # what a cause of a kind costs, besides its numbers
     "slip": 0.3, "load": 0.6, "several": 0.65, "term": 0.15, "part": 0.16, "coefficient": 0.3, "number": 0.0, "force": 0.2,
     OF_ZERO: 0.05,
 }  # fmt: skip
-OF_NAME, ADDED, PAIR = 0.1, 0.1, 0.3  # for each joint that is named; for a number that was 0; for a second cause
+OF_NAME, ADDED, PAIR = (
+    0.1,
+    0.1,
+    0.3,
+)  # for each joint that is named; for a number that was 0; for a second cause
 UNUSUAL = 1.0  # of a factor or a number that nobody writes
 
 
@@ -27,7 +31,11 @@ def cost(cause: Cause, equations: Equations) -> float:
     if cause.kind == "term" and cause.stated == "right":  # terms of an expression
         return 0.5
     if cause.kind in ("sign", "angles"):
-        slides = [name for name, kind in zip(equations.coordinates.names, equations.coordinates.all_kinds) if kind == "slide"]
+        slides = [
+            name
+            for name, kind in zip(equations.coordinates.names, equations.coordinates.all_kinds)
+            if kind == "slide"
+        ]
         words = cause.place.replace(",", " ").split()
         return base + OF_NAME * (1 + names) + 0.15 * sum(name in words for name in slides)
     if not isinstance(cause.explains, float):
@@ -38,9 +46,18 @@ def cost(cause: Cause, equations: Equations) -> float:
     if cause.kind == OF_ZERO:
         quarters = (value - stated) / (np.pi / 2.0)
         turns = abs(quarters - round(quarters)) < 1e-9 and cause.unit == "rad"
-        return base + (0.05 if turns else of_number(np.degrees(value) if cause.unit == "rad" else value, stated, equations))
+        return base + (
+            0.05
+            if turns
+            else of_number(np.degrees(value) if cause.unit == "rad" else value, stated, equations)
+        )
     base += 0.2 * is_massless
-    return base + of_number(value, stated, equations) + ADDED * (stated == 0.0) + 0.15 * cause.place.startswith(("anchor", "armature"))
+    return (
+        base
+        + of_number(value, stated, equations)
+        + ADDED * (stated == 0.0)
+        + 0.15 * cause.place.startswith(("anchor", "armature"))
+    )
 
 
 def of_factor(factor: float, equations: Equations) -> float:

@@ -68,8 +68,15 @@ class Recursion:
         return self.frames[self.tree.parent[i]] if self.tree.parent[i] >= 0 else self.world
 
     def frame(self, i: int) -> Frame:
-        tree, joint, parent, columns = self.tree, self.tree.coordinates.joints[i], self.before(i), list(self.q.T)
-        offset = np.stack([np.broadcast_to(x, self.rows) for x in origin_in_parent(tree, i, columns)], axis=-1)
+        tree, joint, parent, columns = (
+            self.tree,
+            self.tree.coordinates.joints[i],
+            self.before(i),
+            list(self.q.T),
+        )
+        offset = np.stack(
+            [np.broadcast_to(x, self.rows) for x in origin_in_parent(tree, i, columns)], axis=-1
+        )
         r = rotated(parent.turn, offset)
         local = [np.broadcast_to(axis, (self.rows, 3)) for axis in np.array(tree.axis[joint.qd])]
         omega = parent.omega
@@ -80,14 +87,19 @@ class Recursion:
             axis = self.step("axis", i, rotated(parent.turn, local[0]), lambda: local[0])
             coriolis = 2.0 * np.cross(omega, axis * self.qd[:, joint.qd])
             a = a + self.step("coriolis", i, coriolis, lambda: 0.0 * coriolis)
-            return parent._replace(origin=parent.origin + r, axes=[axis], a=a, slides=True, own=self.world.own)
+            return parent._replace(
+                origin=parent.origin + r, axes=[axis], a=a, slides=True, own=self.world.own
+            )
         own = matrices(turn_in_parent(tree, i, columns), self.rows)
         turned = self.step("transposed", i, own, lambda: backward(own))
         turn = self.step("order", i, parent.turn @ turned, lambda: own @ parent.turn)
         turn = self.step("absolute", i, turn, lambda: own)
         carrier = turn if joint.kind == "ball" else parent.turn
         axes = [self.step("axis", i, rotated(carrier, axis), partial(np.copy, axis)) for axis in local]
-        spin = np.sum([axis * self.qd[:, k : k + 1] for axis, k in zip(axes, range(joint.qd.start, joint.qd.stop))], axis=0)
+        spin = np.sum(
+            [axis * self.qd[:, k : k + 1] for axis, k in zip(axes, range(joint.qd.start, joint.qd.stop))],
+            axis=0,
+        )
         carried = self.step("carried", i, passed, lambda: rotated(turn @ own @ backward(parent.turn), passed))
         crossed = np.cross(carried, spin)
         alpha = parent.alpha + self.step("alpha", i, crossed, lambda: 0.0 * crossed)
@@ -118,9 +130,17 @@ class Recursion:
     def values(self) -> tuple[ndarray, ndarray, ndarray]:
         """Mbar (rows, nv, nv), velocity terms of h and h at rest (rows, nv)."""
         tree, nv = self.tree, len(self.tree.axis)
-        M, velocity_terms, rest = np.zeros((self.rows, nv, nv)), np.zeros((self.rows, nv)), np.zeros((self.rows, nv))
+        M, velocity_terms, rest = (
+            np.zeros((self.rows, nv, nv)),
+            np.zeros((self.rows, nv)),
+            np.zeros((self.rows, nv)),
+        )
         M += np.diag(tree.armature) if len(tree.armature) else 0.0
-        of_speed = [(i, k) for i, joint in enumerate(tree.coordinates.joints) for k in range(joint.qd.stop - joint.qd.start)]
+        of_speed = [
+            (i, k)
+            for i, joint in enumerate(tree.coordinates.joints)
+            for k in range(joint.qd.stop - joint.qd.start)
+        ]
         for b, at in enumerate(tree.body_joint):
             if at < 0:
                 continue
@@ -128,8 +148,13 @@ class Recursion:
             r = rotated(frame.turn, np.broadcast_to(tree.com[b], (self.rows, 3)))
             x, omega = frame.origin + r, frame.omega
             turning = np.cross(omega, np.cross(omega, r))
-            alone = rotated(frame.own, np.broadcast_to(tree.com[b], (self.rows, 3)))  # as if nothing turned its joint
-            axis_alone, joint = np.array(tree.axis[tree.coordinates.joints[at].qd])[0], tree.coordinates.joints[at]
+            alone = rotated(
+                frame.own, np.broadcast_to(tree.com[b], (self.rows, 3))
+            )  # as if nothing turned its joint
+            axis_alone, joint = (
+                np.array(tree.axis[tree.coordinates.joints[at].qd])[0],
+                tree.coordinates.joints[at],
+            )
             spin = axis_alone * self.qd[:, joint.qd][:, :1]
             turning = np.cross(frame.alpha, r) + self.step("centripetal", b, turning, lambda: 0.0 * turning)
             turning = self.segment(b, turning, lambda: np.cross(spin, np.cross(spin, alone)))
@@ -162,7 +187,12 @@ class Recursion:
         """The column by which a force on body b acts on joint i: as T, or with a slip of the inward recursion."""
         at = self.tree.body_joint[b]
         if self.slip == "moment of force":
-            return self.step("moment of force", b, right, lambda: np.cross(axis, self.frames[at].origin - self.frames[i].origin))
+            return self.step(
+                "moment of force",
+                b,
+                right,
+                lambda: np.cross(axis, self.frames[at].origin - self.frames[i].origin),
+            )
         if self.slip in ("offset inward", "CoM for offset inward"):
             lever, joint = x - self.frames[i].origin, at
             while joint != i and joint >= 0:
@@ -180,7 +210,9 @@ class Recursion:
         if self.slip == "offset inward":
             return -offset
         body = next((b for b, at in enumerate(self.tree.body_joint) if at == before), None)
-        com = np.zeros((self.rows, 3)) if body is None else np.broadcast_to(self.tree.com[body], (self.rows, 3))
+        com = (
+            np.zeros((self.rows, 3)) if body is None else np.broadcast_to(self.tree.com[body], (self.rows, 3))
+        )
         return rotated(parent.turn, com) - offset
 
     def turned_force(self, i: int, b: int, axis: ndarray, x: ndarray) -> ndarray:

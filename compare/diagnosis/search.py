@@ -93,7 +93,11 @@ class Given:
         """The size of each entry at a state, by its largest value at all states: large values are rounded too."""
         speed = 1.0 + np.abs(self.values.qd).max(axis=1, keepdims=True, initial=0.0) ** 2
         of_state = np.ones_like(self.packed)
-        of_state[:, self.layout.of_row(0, "velocity terms")[0] : self.layout.of_row(0, "velocity terms")[0] + self.layout.nv] = speed
+        of_state[
+            :,
+            self.layout.of_row(0, "velocity terms")[0] : self.layout.of_row(0, "velocity terms")[0]
+            + self.layout.nv,
+        ] = speed
         return np.nanmax(np.abs(self.packed) / of_state, axis=0, initial=0.0) * of_state
 
     def in_the_model(self, convention: Convention) -> "Given":
@@ -106,7 +110,9 @@ class Given:
         if self.layout.qdd is not None:  # qdd = S a + drift
             qdd = np.einsum("sij,sj->si", convention.S, self.layout.qdd) + convention.drift
             moved = np.einsum("sji,sj->si", np.linalg.inv(convention.S), self.values.bias)
-            return Given(self.tree, Values(convention.q, convention.qd, M, moved, (of_M, of_h)), None, qdd=qdd)
+            return Given(
+                self.tree, Values(convention.q, convention.qd, M, moved, (of_M, of_h)), None, qdd=qdd
+            )
         return Given(self.tree, scale, None, None, None if self.rest is None else rest)
 
 
@@ -114,7 +120,13 @@ class Explanations:
     """What explains given values. end: the time.process_time() at which the search ends."""
 
     def __init__(self, given: Given, end: float, stated: Stated | None, seconds: float = inf):
-        self.given, self.equations, self.stated, self.seconds, self.end = given, given.equations, stated, seconds, end
+        self.given, self.equations, self.stated, self.seconds, self.end = (
+            given,
+            given.equations,
+            stated,
+            seconds,
+            end,
+        )
         places = all_places(self.equations)
         if not np.isfinite(given.packed).any(axis=0).all():  # M or h alone
             right = np.isfinite(given.packed).any(axis=0)
@@ -132,11 +144,15 @@ class Explanations:
             return Diagnosis(False)
         compared, names = self.compared, self.equations.speeds
         entries, parts = tuple(self.entries_that_differ()), tuple(self.differing)
-        found = Diagnosis(True, entries=entries, compared=self.entries_compared, parts=parts, known=tuple(self.known))
+        found = Diagnosis(
+            True, entries=entries, compared=self.entries_compared, parts=parts, known=tuple(self.known)
+        )
         if len(np.unique(self.equations.q, axis=0)) < LEAST_STATES:
             return found._replace(too_few=len(self.equations.q))
         causes = next(filter(None, self.stages()), [])
-        nearest = sorted((fit for fit in self.all_singles if fit.is_possible), key=lambda fit: fit.left_over)[:SHOWN]
+        nearest = sorted((fit for fit in self.all_singles if fit.is_possible), key=lambda fit: fit.left_over)[
+            :SHOWN
+        ]
         shares = tuple((fit.places[0].name, fit.left_over, fit.explains) for fit in nearest)
         found = found._replace(nearest=shares, causes=ranked(distinct(sorted(causes, key=self.cost))))
         if causes:
@@ -150,13 +166,18 @@ class Explanations:
 
     @cached_property
     def compared(self) -> Compared:
-        values, plain = self.given.values, Equations(self.given.tree, self.given.values.q, self.given.values.qd)
+        values, plain = (
+            self.given.values,
+            Equations(self.given.tree, self.given.values.q, self.given.values.qd),
+        )
         if self.equations.layout.is_symmetric and "coefficients" in vars(self.equations):
             plain.coefficients = self.equations.coefficients
         of_M, of_h = values.tolerances
         tolerance = plain.layout.packed(of_M, of_h, 0.0 * of_h)
         packed = values.packed
-        tolerance = np.where(tolerance > 0.0, np.fmax(tolerance, ROUNDED * np.nanmax(np.abs(packed), axis=0, initial=0.0)), 0.0)
+        tolerance = np.where(
+            tolerance > 0.0, np.fmax(tolerance, ROUNDED * np.nanmax(np.abs(packed), axis=0, initial=0.0)), 0.0
+        )
         least = tolerance[tolerance > 0.0].min(initial=1.0)
         return Compared(plain, packed, np.where(tolerance > 0.0, tolerance, least), self.given.bias)
 
@@ -297,7 +318,11 @@ class Explanations:
 
     def on_its_scale(self, fit: Fitted) -> Fitted:
         """A fit judged by the scale of the model with its number: a length in mm rounds what is small in the right one."""
-        paths = [(path, change * factor) for place, change in zip(fit.places, fit.changes) for path, factor in place.moves]
+        paths = [
+            (path, change * factor)
+            for place, change in zip(fit.places, fit.changes)
+            for path, factor in place.moves
+        ]
         if fit.ratio <= 1.0 or fit.left_over > NEARLY or not paths:
             return fit
         fields = {path.field: self.equations.stated[path.field].copy() for path, _ in paths}
@@ -309,7 +334,10 @@ class Explanations:
             return fit
         values = self.given.values
         M, h = Values.of(tree, values.q, values.qd, None, None).tolerances
-        tolerance = np.fmax(self.search.tolerance, self.equations.layout.packed(M, h, h if self.given.rest is not None else 0.0 * h))
+        tolerance = np.fmax(
+            self.search.tolerance,
+            self.equations.layout.packed(M, h, h if self.given.rest is not None else 0.0 * h),
+        )
         left = self.search.weighted(Equations(tree, values.q, values.qd, self.equations.layout).right)
         return fit._replace(ratio=float((np.abs(left) * self.search.tolerance / tolerance).max()))
 
@@ -346,7 +374,9 @@ class Explanations:
         given = self.given
         if given.mass_matrix is None or given.rest is None or self.equations.coordinates.has_balls:
             return False
-        return follows_from(given.mass_matrix, given.values.q, given.values.qd, given.values.bias - given.rest)
+        return follows_from(
+            given.mass_matrix, given.values.q, given.values.qd, given.values.bias - given.rest
+        )
 
     # joints
 
@@ -389,12 +419,16 @@ class Explanations:
 
 def in_part(cause: Cause, parts: Sequence[str]) -> Cause:
     """A cause that is meant in some parts alone."""
-    return replace(cause, place=f"{cause.place}{IN_PARTS[tuple(parts)]}") if tuple(parts) in IN_PARTS else cause
+    return (
+        replace(cause, place=f"{cause.place}{IN_PARTS[tuple(parts)]}") if tuple(parts) in IN_PARTS else cause
+    )
 
 
 def distinct(causes: Iterable[Cause]) -> list[Cause]:
     """Each cause once; none of every body or joint where one of them suffices."""
-    once = list({(cause.place, str(cause.explains)): cause for cause in reversed(list(causes))}.values())[::-1]
+    once = list({(cause.place, str(cause.explains)): cause for cause in reversed(list(causes))}.values())[
+        ::-1
+    ]
     return [cause for cause in once if not any(is_of_one(other, cause) for other in once)]
 
 
@@ -402,5 +436,7 @@ def is_of_one(cause: Cause, of_all: Cause) -> bool:
     """Whether a cause is for one body or joint what another is for every one."""
     before, every, after = of_all.place.partition("every ")
     after = after.partition(" ")[2]
-    is_alike = cause.place.startswith(before) and cause.place.endswith(after) and cause.explains == of_all.explains
+    is_alike = (
+        cause.place.startswith(before) and cause.place.endswith(after) and cause.explains == of_all.explains
+    )
     return bool(every) and "every " not in cause.place and cause.kind == of_all.kind and is_alike

@@ -19,7 +19,10 @@ def slips(equations: Equations) -> Iterator[list[Variant]]:
     gravity, parts = equations.tree.gravity, np.sum(list(equations.terms.values()), axis=0)
     for name, changed in changed_bodies(equations):
         added = np.stack([equations.summed([b], gravity)[0] for b in changed]) - parts
-        variants = [slip(name.format(body), "no", "", right + added[numbers].sum(axis=0)) for body, numbers in bodies.items()]
+        variants = [
+            slip(name.format(body), "no", "", right + added[numbers].sum(axis=0))
+            for body, numbers in bodies.items()
+        ]
         yield [*variants[: len(parts)]]
         yield [*variants[len(parts) :]]
     if "ball" not in equations.tree.kind:
@@ -66,7 +69,13 @@ def turned(body: method.Body, R: Matrix) -> method.Body:
 def lagrange(equations: Equations) -> Iterator[Variant]:
     """Slips in h = Mdot qd - d(kinetic energy)/dq + dV/dq, of hinges and slides."""
     tree, q, qd, (M, velocity_terms, rest) = equations.tree, equations.q, equations.qd, equations.parts
-    slopes = np.stack([Equations(tree, q + 1j * TINY * unit, qd).parts[0].imag for unit in np.eye(equations.nv)], axis=-1) / TINY
+    slopes = (
+        np.stack(
+            [Equations(tree, q + 1j * TINY * unit, qd).parts[0].imag for unit in np.eye(equations.nv)],
+            axis=-1,
+        )
+        / TINY
+    )
     Mdot_qd = np.einsum("sijk,sk,sj->si", slopes, qd, qd)
     gradient = Mdot_qd - velocity_terms
     for name, explains, of_Mdot, of_gradient in (
@@ -78,15 +87,27 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
         ("Mdot qd in h", "halved", 0.5, 1.0),
         ("Mdot qd in h", "halved, and no gradient of the kinetic energy", 0.5, 0.0),
     ):
-        yield slip(name, "Mdot qd - d(qd' Mbar qd / 2)/dq", explains, equations.with_bias(of_Mdot * Mdot_qd - of_gradient * gradient, rest))
+        yield slip(
+            name,
+            "Mdot qd - d(qd' Mbar qd / 2)/dq",
+            explains,
+            equations.with_bias(of_Mdot * Mdot_qd - of_gradient * gradient, rest),
+        )
     for i, j in zip(*np.tril_indices(equations.nv)):
         for k in range(equations.nv):
             alone = np.zeros_like(slopes)
             alone[:, i, j, k] = slopes[:, i, j, k]
             alone[:, j, i, k] = slopes[:, j, i, k]
-            of_slope = np.einsum("sijk,sk,sj->si", alone, qd, qd) - np.einsum("sijk,si,sj->sk", alone, qd, qd) / 2.0
+            of_slope = (
+                np.einsum("sijk,sk,sj->si", alone, qd, qd) - np.einsum("sijk,si,sj->sk", alone, qd, qd) / 2.0
+            )
             name = f"dM[{equations.speeds[i]}][{equations.speeds[j]}]/d {equations.speeds[k]} in h"
-            for explains, factor in (("left out", 0.0), ("of the other sign", -1.0), ("halved", 0.5), ("twice", 2.0)):
+            for explains, factor in (
+                ("left out", 0.0),
+                ("of the other sign", -1.0),
+                ("halved", 0.5),
+                ("twice", 2.0),
+            ):
                 if of_slope.any():
                     values = equations.with_bias(velocity_terms + (factor - 1.0) * of_slope, rest)
                     yield slip(name, "once", explains, values)
