@@ -221,7 +221,7 @@ def add_checks(result: StabilityResult, rows: Sequence[StepLimitRow], quantity: 
         )
         limit = max(min(row.longest, LONGEST), SHORTEST)
         result.check(row.posture, quantity, row.file_dt, limit, "s", note, about=About.STEP)
-        if row.stable_at_file_dt and row.largest_push is not None:
+        if row.stable_at_file_dt and row.largest_push is not None and not row.has_fallen:
             push = USUAL_PUSH if row.finer_push else row.largest_push
             result.check(
                 row.posture, PUSHED, push, USUAL_PUSH, "rad/s or m/s", rule="at least", about=About.STEP
@@ -306,7 +306,7 @@ def add_control(result: StabilityResult, row: ControlRow | None) -> None:
 
 def limits_in_use(rows: Sequence[StepLimitRow]) -> list[LimitRow]:
     """The limits of a file's robot as it stands, in the form of those of the arm, for the picture of the first screen."""
-    kinds = {"finite": "finite", "none": "never_fails", "below": "always_fails"}
+    kinds = {"finite": "finite", "none": "never_fails", "moving": "never_fails", "below": "always_fails"}
     return [
         LimitRow(
             scene=row.posture, engine="mujoco", method=row.integrator, damping=0.0, mode=row.growth_rate or 0.0,
