@@ -18,7 +18,9 @@ def slips_of_tables(comparison: Comparison) -> list[Finding]:
     """What explains each table that differs; [] unless all that differs are tables, and each is explained."""
     failing = {name: compared for name, compared in comparison.compared.items() if compared.fails}
     equations = comparison.equations
-    if len(comparison.q) < LEAST_ROWS or any(equations is not None and equations.has(name) for name in failing):
+    if len(comparison.q) < LEAST_ROWS or any(
+        equations is not None and equations.has(name) for name in failing
+    ):
         return []
     findings = [next(slips_of_table(comparison, name, compared), None) for name, compared in failing.items()]
     return [finding for finding in findings if finding is not None] if None not in findings else []
@@ -27,7 +29,9 @@ def slips_of_tables(comparison: Comparison) -> list[Finding]:
 def slips_of_table(comparison: Comparison, name: str, compared: Compared) -> Iterator[Finding]:
     """What explains the differences of one table."""
     count = len(compared.yours)
-    yours, right, tolerance = (part.reshape(count, -1) for part in (compared.yours, compared.right, compared.tolerance))
+    yours, right, tolerance = (
+        part.reshape(count, -1) for part in (compared.yours, compared.right, compared.tolerance)
+    )
     wrong = np.abs(yours - right) > tolerance
     if not np.isfinite(yours).all():
         return
@@ -35,8 +39,15 @@ def slips_of_table(comparison: Comparison, name: str, compared: Compared) -> Ite
     if len(rows) <= FEW * count:
         names = list(comparison.entries(name).values())
         at = [(int(row), int(column)) for row in rows for column in np.flatnonzero(wrong[row])]
-        values = [(row, names[column], float(yours[row, column]), float(right[row, column])) for row, column in at[:SHOWN]]
-        yield Finding("agreement", "wrong_rows", {"quantity": name, "rows": rows.tolist(), "values": values, "count": count})
+        values = [
+            (row, names[column], float(yours[row, column]), float(right[row, column]))
+            for row, column in at[:SHOWN]
+        ]
+        yield Finding(
+            "agreement",
+            "wrong_rows",
+            {"quantity": name, "rows": rows.tolist(), "values": values, "count": count},
+        )
     for shift in (1, -1):
         moved = np.roll(right, shift, axis=0)
         inner = np.arange(count)[max(shift, 0) : count + min(shift, 0)]

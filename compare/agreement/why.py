@@ -77,7 +77,7 @@ def of_equations(comparison: Comparison, values: Values) -> Why:
         tested = conditions(equations.mass_matrix, equations.bias, coordinates, values.q, values.qd)
         broken = [condition.text for condition in tested if not condition.is_met]
     mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), coordinates.speeds)
-    if np.isfinite(M).all() and not mirrored.is_met:
+    if not diagnosis.is_symmetric:
         broken = [mirrored.text]
     return Why(" ".join([diagnosis.sentence(), *broken[:1]]), bool(diagnosis.causes))
 

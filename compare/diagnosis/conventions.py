@@ -53,7 +53,9 @@ class Convention:
         moved = velocity_terms + np.einsum("sij,sj->si", M, self.drift)
         return St @ M @ self.S, np.einsum("sij,sj->si", St, moved), np.einsum("sij,sj->si", St, rest)
 
-    def removed(self, M: ndarray, right: ndarray, h: ndarray, rest: ndarray) -> tuple[ndarray, ndarray, ndarray]:
+    def removed(
+        self, M: ndarray, right: ndarray, h: ndarray, rest: ndarray
+    ) -> tuple[ndarray, ndarray, ndarray]:
         """Given Mbar, h and h at rest, which are in this convention, as the model has them. right: the model's Mbar."""
         back = np.linalg.inv(self.S)
         transposed = np.swapaxes(back, 1, 2)
@@ -76,10 +78,14 @@ def values_in(equations: Equations, those: Sequence[Convention]) -> Iterator[nda
     parts = Equations(equations.tree, q, qd, equations.layout).parts
     count = len(those[0].q)
     for k, convention in enumerate(those):
-        yield equations.layout.packed(*convention.applied(*(part[k * count : (k + 1) * count] for part in parts)))
+        yield equations.layout.packed(
+            *convention.applied(*(part[k * count : (k + 1) * count] for part in parts))
+        )
 
 
-def stated(equations: Equations, kind: str, place: str, was: str, explains: str, joints: Iterable[Joint]) -> Convention:
+def stated(
+    equations: Equations, kind: str, place: str, was: str, explains: str, joints: Iterable[Joint]
+) -> Convention:
     """A convention that can be stated by the joints."""
     joint_map, identity = JointMap(equations.coordinates, list(joints)), np.eye(equations.nv)
     cause = Cause(rank=1, kind=kind, place=place, stated=was, explains=explains)
@@ -141,7 +147,13 @@ def named_orders(tree: tmt.Tree) -> Iterator[list[str]]:
         depth[i] = depth[parent] + 1 if parent >= 0 else 0
     breadth = [names[i] for i in np.argsort(depth, kind="stable")]
     mirrored = [SIDES.sub(other_side, name) for name in names]
-    for order in (breadth, sorted(names), mirrored, names[::-1], sorted(breadth, key=lambda name: depth[names.index(name)])):
+    for order in (
+        breadth,
+        sorted(names),
+        mirrored,
+        names[::-1],
+        sorted(breadth, key=lambda name: depth[names.index(name)]),
+    ):
         if sorted(order) == sorted(names):
             yield order
     by_side = sorted(names, key=lambda name: SIDES.sub(other_side, name))
@@ -194,7 +206,9 @@ def from_the_world(equations: Equations) -> Iterator[Convention]:
         names = listed([tree.joint_names[i] for i in chosen])
         bodies = [next((body for body, joint in zip(tree.body_names, tree.body_joint) if joint == before[i][0]), "")
                   for i in chosen]  # fmt: skip
-        explains = "measured from the world" + (f", not from {bodies[0]}" if len(chosen) == 1 and bodies[0] else "")
+        explains = "measured from the world" + (
+            f", not from {bodies[0]}" if len(chosen) == 1 and bodies[0] else ""
+        )
         cause = Cause(rank=1, kind="angles", place=f"angle of {names}", stated="between a body and the one before",
                       explains=explains)  # fmt: skip
         yield Convention(cause, q, equations.qd @ A.T, S, 0.0 * equations.qd)
@@ -241,8 +255,13 @@ def of_balls(equations: Equations) -> Iterator[Convention]:
         scalar_last, inverse = q.copy(), q.copy()
         scalar_last[:, joint.q] = np.roll(q[:, joint.q], 1, axis=1)
         inverse[:, joint.q] = q[:, joint.q] * [1.0, -1.0, -1.0, -1.0]
-        for explains, positions in {"read as x, y, z, w": scalar_last, "of the inverse rotation": inverse}.items():
-            cause = Cause(rank=1, kind="axes", place=f"quaternion of {name}", stated="w, x, y, z", explains=explains)
+        for explains, positions in {
+            "read as x, y, z, w": scalar_last,
+            "of the inverse rotation": inverse,
+        }.items():
+            cause = Cause(
+                rank=1, kind="axes", place=f"quaternion of {name}", stated="w, x, y, z", explains=explains
+            )
             yield Convention(cause, positions, qd, identity, zero)
 
 
@@ -251,4 +270,10 @@ def matrices(turn: Matrix, count: int) -> ndarray:
     return np.moveaxis(np.array([[np.broadcast_to(x, count) for x in row] for row in turn]), 2, 0)
 
 
-KINDS: tuple[Callable[[Equations], Iterator[Convention]], ...] = (senses, orders, units, from_the_world, of_balls)
+KINDS: tuple[Callable[[Equations], Iterator[Convention]], ...] = (
+    senses,
+    orders,
+    units,
+    from_the_world,
+    of_balls,
+)

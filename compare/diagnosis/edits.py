@@ -40,7 +40,11 @@ def edits(equations: Equations) -> list[Variant]:
     changes: list[dict[Path, float]] = []
     for kind in KINDS:
         for edit in kind(equations.tree, stated):
-            moved = {Path(name, at): x for name, field in edit.fields.items() for at, x in np.ndenumerate(field - stated[name])}
+            moved = {
+                Path(name, at): x
+                for name, field in edit.fields.items()
+                for at, x in np.ndenumerate(field - stated[name])
+            }
             moved = {path: x for path, x in moved.items() if x}
             same = tuple((path, f"{x:.12g}") for path, x in moved.items())
             if moved and same not in known:
@@ -79,7 +83,11 @@ def tensors(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
     orders = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == order[k] for k in range(3)))
     for order in orders:
         moved = [XYZ[k] for k in range(3) if order[k] != k]
-        what = f"axes {listed(moved)} exchanged" if len(moved) == 2 else f"axes in the order {', '.join(XYZ[k] for k in order)}"
+        what = (
+            f"axes {listed(moved)} exchanged"
+            if len(moved) == 2
+            else f"axes in the order {', '.join(XYZ[k] for k in order)}"
+        )
         ways[f"inertia of {{}}, {what}"] = "", partial(permuted, order=list(order))
         ways[f"moments of inertia of {{}}, {what}"] = "", partial(with_moments, order=list(order))
     ways["axial and transverse inertia of {}"] = "exchanged", axial_for_transverse
@@ -88,10 +96,15 @@ def tensors(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
     ways["inertia of {} "] = "left out, a point mass", lambda I: 0.0 * I
     for first, second in combinations(((0, 1), (0, 2), (1, 2)), 2):
         names = [XYZ[i] + XYZ[j] for i, j in (first, second)]
-        ways[f"products of inertia {listed(names)} of {{}}"] = "exchanged", partial(exchanged, first=first, second=second)
+        ways[f"products of inertia {listed(names)} of {{}}"] = (
+            "exchanged",
+            partial(exchanged, first=first, second=second),
+        )
     for name, bodies in sets_of_bodies(tree).items():
         for place, (explains, new) in ways.items():
-            yield Edit(place.format(name).rstrip(), explains, {"inertia": changed(stated["inertia"], bodies, new)})
+            yield Edit(
+                place.format(name).rstrip(), explains, {"inertia": changed(stated["inertia"], bodies, new)}
+            )
 
 
 def permuted(I: ndarray, order: list[int]) -> ndarray:
@@ -127,7 +140,10 @@ def exchanged(I: ndarray, first: tuple[int, int], second: tuple[int, int]) -> nd
 
 def vectors(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
     """A CoM or an offset at zero, of the other sign, with two coordinates exchanged; the CoM at half or twice its place."""
-    ways: dict[str, Callable[[ndarray], ndarray]] = {"zero": lambda r: 0.0 * r, "of the other sign": lambda r: -r}
+    ways: dict[str, Callable[[ndarray], ndarray]] = {
+        "zero": lambda r: 0.0 * r,
+        "of the other sign": lambda r: -r,
+    }
     for i, j in combinations(range(3), 2):
         order = [0, 1, 2]
         order[i], order[j] = j, i
@@ -143,7 +159,7 @@ def vectors(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
 def absent(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
     """A body, or all that a joint carries, left out."""
     carried = {name: bodies for name, bodies in sets_of_bodies(tree).items() if name != EVERY_BODY}
-    for i, joint in enumerate(tree.joint_names):
+    for i in range(len(tree.parent)):
         bodies = [b for b in range(len(tree.mass)) if tree.moves(b)[i]]
         if 1 < len(bodies) < len(tree.mass):
             carried.setdefault(listed([tree.body_names[b] for b in bodies]), bodies)
@@ -153,11 +169,14 @@ def absent(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
 
 
 def swapped(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
-    """The masses of two bodies exchanged; the mass of one that of another; the length and the CoM of a link exchanged."""
+    """Numbers of two bodies exchanged; the length and the CoM of a link exchanged."""
     for a, b in combinations(range(len(tree.mass)), 2):
-        masses, both = stated["mass"].copy(), listed([tree.body_names[a], tree.body_names[b]])
-        masses[[a, b]] = masses[[b, a]]
-        yield Edit(f"masses of {both}", "exchanged", {"mass": masses})
+        both, exchanged_fields = listed([tree.body_names[a], tree.body_names[b]]), {}
+        for field, name in {"mass": "masses", "com": "CoMs", "inertia": "inertias"}.items():
+            exchanged_fields[field] = stated[field].copy()
+            exchanged_fields[field][[a, b]] = stated[field][[b, a]]
+            yield Edit(f"{name} of {both}", "exchanged", {field: exchanged_fields[field]})
+        yield Edit(f"masses, CoMs and inertias of {both}", "exchanged", exchanged_fields)
     armatures = stated["armature"] if len(stated["armature"]) else np.zeros(0)
     names = Coordinates(tree.joint_names, tree.kind).speeds
     for i, j in combinations(np.flatnonzero(armatures).tolist(), 2):
@@ -168,7 +187,11 @@ def swapped(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
         for j in (j for j, parent in enumerate(tree.parent) if parent == i >= 0):
             offset, com = stated["offset"].copy(), stated["com"].copy()
             offset[j], com[b] = com[b], offset[j]
-            yield Edit(f"CoM of {tree.body_names[b]} and offset of {tree.joint_names[j]}", "exchanged", {"offset": offset, "com": com})
+            yield Edit(
+                f"CoM of {tree.body_names[b]} and offset of {tree.joint_names[j]}",
+                "exchanged",
+                {"offset": offset, "com": com},
+            )
 
 
 def scaled(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
@@ -201,4 +224,11 @@ def axes(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
                 yield Edit(f"axis of {tree.joint_names[i]}", f"{shown}{name}", {"axis": new})
 
 
-KINDS: tuple[Callable[[tmt.Tree, Numbers], Iterator[Edit]], ...] = (absent, tensors, vectors, swapped, scaled, axes)
+KINDS: tuple[Callable[[tmt.Tree, Numbers], Iterator[Edit]], ...] = (
+    absent,
+    tensors,
+    vectors,
+    swapped,
+    scaled,
+    axes,
+)

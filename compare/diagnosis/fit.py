@@ -21,7 +21,9 @@ FIRST_ROUNDS, FINALISTS = 6, 24  # after these rounds only the best go on
 CONVERGED = 1e-14  # a step of a place, of its size
 SEEN = 1e-100  # of the square of a derivative, in tolerances
 LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
-PROMISING = 1e-4  # of the difference: places that leave more, by their first and second derivatives, are not fitted
+PROMISING = (
+    1e-4  # of the difference: places that leave more, by their first and second derivatives, are not fitted
+)
 CANDIDATES = 64  # pairs that are fitted, the most promising of all
 ROWS = 256  # of changes in one evaluation
 TURNED = np.pi * np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # more starts for the zero of a hinge

@@ -89,7 +89,9 @@ def loads(equations: Equations, search: Search) -> Iterator[Cause]:
             of_tensor = {name: tensor[i, j] for name, i, j in INERTIA if abs(tensor[i, j]) > ZERO * mass}
             if np.linalg.eigvalsh(tensor)[0] < -ZERO * mass:
                 continue
-            explains += "".join(f", {name} {x:.4g}" for name, x in of_tensor.items()) + " kg m2" * bool(of_tensor)
+            explains += "".join(f", {name} {x:.4g}" for name, x in of_tensor.items()) + " kg m2" * bool(
+                of_tensor
+            )
         if not all(map(is_round, (mass, *com))):
             continue
         yield Cause(rank=3, kind="load", place=f"a load on {body}", stated="", explains=explains)
@@ -100,7 +102,9 @@ def several(equations: Equations, search: Search) -> Iterator[Cause]:
     groups = ["armature of ", "mass of ", *(f"inertia of {body}" for body in equations.tree.body_names)]
     first = search.coefficients[0]
     for prefix in groups:
-        chosen = [k for k, place in enumerate(search.places) if of_group(place.name, prefix) and first[k].any()]
+        chosen = [
+            k for k, place in enumerate(search.places) if of_group(place.name, prefix) and first[k].any()
+        ]
         if len(chosen) < 2:
             continue
         found = fit(search, first[chosen])
@@ -114,18 +118,25 @@ def several(equations: Equations, search: Search) -> Iterator[Cause]:
             if len(differing) < 2 or not all(is_round(value) for _, value in differing):
                 continue
             texts = [", ".join(f"{pair[k]:.6g}" for pair in differing) for k in (0, 1)]
-            names = [place.name.removeprefix(prefix) for place, pair in zip(places, pairs) if pair in differing]
+            names = [
+                place.name.removeprefix(prefix) for place, pair in zip(places, pairs) if pair in differing
+            ]
             if prefix.startswith("inertia"):
                 names = [name.removesuffix(prefix.removeprefix("inertia")) for name in names]
                 called = f"inertia {listed([name.removeprefix('inertia ') for name in names])}{prefix.removeprefix('inertia')}"
             else:
                 called = prefix + listed(names)
-            yield Cause(rank=3, kind="several", place=called, stated=texts[0], explains=texts[1], unit=places[0].unit)
+            yield Cause(
+                rank=3, kind="several", place=called, stated=texts[0], explains=texts[1], unit=places[0].unit
+            )
 
 
 def is_round(x: float) -> bool:
     """Whether a number has few digits, as people write them, the fewer the less exact it is."""
-    return any(abs(x - float(f"{x:.{digits}g}")) <= exact * abs(x) or abs(x) < exact for digits, exact in DIGITS.items())
+    return any(
+        abs(x - float(f"{x:.{digits}g}")) <= exact * abs(x) or abs(x) < exact
+        for digits, exact in DIGITS.items()
+    )
 
 
 def of_group(name: str, prefix: str) -> bool:

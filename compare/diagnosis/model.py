@@ -98,7 +98,11 @@ class Layout(NamedTuple):
         n = len(self.places[0])
         parts = {"M": slice(0, n), "h": slice(n, n + self.nv)}
         if self.is_split:
-            parts = {"M": parts["M"], "velocity terms": parts["h"], "gravity": slice(n + self.nv, n + 2 * self.nv)}
+            parts = {
+                "M": parts["M"],
+                "velocity terms": parts["h"],
+                "gravity": slice(n + self.nv, n + 2 * self.nv),
+            }
         return parts
 
     @property
@@ -165,7 +169,10 @@ class Equations:
     def parts(self) -> tuple[ndarray, ndarray, ndarray]:
         """Mbar (states, nv, nv), velocity terms of h and h at rest (states, nv), without changes."""
         M, velocity_terms, rest = self.sums(self.bodies, self.tree.gravity, self.tree.armature)
-        rows = [np.stack([np.broadcast_to(x, len(self.q)) for x in part], axis=-1) for part in (*M, velocity_terms, rest)]
+        rows = [
+            np.stack([np.broadcast_to(x, len(self.q)) for x in part], axis=-1)
+            for part in (*M, velocity_terms, rest)
+        ]
         return np.stack(rows[:-2], axis=1), rows[-2], rows[-1]
 
     @cached_property
@@ -223,13 +230,18 @@ class Equations:
     def summed(self, bodies: Bodies, gravity: Iterable[Any], armature: Sequence[Any] = ()) -> ndarray:
         """The values of some bodies, (changes, states, entries)."""
         M, velocity_terms, rest = self.sums(bodies, gravity, armature)
-        of_h = [velocity_terms, rest] if self.layout.is_split else [[v + g for v, g in zip(velocity_terms, rest)]]
+        of_h = (
+            [velocity_terms, rest]
+            if self.layout.is_split
+            else [[v + g for v, g in zip(velocity_terms, rest)]]
+        )
         if self.layout.qdd is not None:
             inertial = [sum(M_ij * qdd for M_ij, qdd in zip(row, self.layout.qdd.T)) for row in M]
             of_h = [[force + inertia for force, inertia in zip(of_h[0], inertial)]]
         flat = [*(M[i][j] for i, j in zip(*self.layout.places)), *chain.from_iterable(of_h)]
         count = max([np.shape(value)[0] for value in flat if np.ndim(value) == 2], default=1)
         return np.stack([np.broadcast_to(value, (count, len(self.q))) for value in flat], axis=-1)
+
 
 def packed(mass_matrix: ndarray, bias: ndarray) -> ndarray:
     """Mbar (..., nv, nv) and h (..., nv), (..., entries), by the layout without parts."""

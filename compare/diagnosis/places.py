@@ -113,7 +113,9 @@ def forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Place]:
     """Damping, stiffness, rest of the spring, friction and a constant force of each joint, and damping of all together."""
     names = Coordinates(tree.joint_names, tree.kind).speeds
 
-    def place(name: str, unit: str, stated: float, force: np.ndarray, least: float = 0.0, size: float = 1.0) -> Place:
+    def place(
+        name: str, unit: str, stated: float, force: np.ndarray, least: float = 0.0, size: float = 1.0
+    ) -> Place:
         return Place("number", name, stated, unit, size, column=force, least=least)
 
     for i, joint in enumerate(tree.coordinates.joints):
@@ -212,10 +214,20 @@ def masses_in_rows(equations: Equations) -> Iterator[Place]:
         entries = [k for k, (i, j) in enumerate(zip(*layout.places)) if i in those and j in those]
         entries += [k for i in those for k in layout.of_row(i)]
         for b, body in enumerate(tree.body_names):
-            added = np.sum([equations.terms[term][b] for term in ("translation", "gravity", "convective")], axis=0)
+            added = np.sum(
+                [equations.terms[term][b] for term in ("translation", "gravity", "convective")], axis=0
+            )
             if tree.mass[b]:
                 column = factor("number", "", added / tree.mass[b], entries).column
-                yield Place("number", f"mass of {body} in the rows of the {name}", tree.mass[b], "kg", tree.mass[b], column=column, least=0.0)
+                yield Place(
+                    "number",
+                    f"mass of {body} in the rows of the {name}",
+                    tree.mass[b],
+                    "kg",
+                    tree.mass[b],
+                    column=column,
+                    least=0.0,
+                )
 
 
 def terms(equations: Equations) -> Iterator[Place]:
@@ -271,7 +283,9 @@ def parts_of_bodies(equations: Equations) -> dict[str, np.ndarray]:
     for b, body in enumerate(tree.body_names):
         lengths, mass = lengths_of(tree, b), ("mass", b)
         for (first, numbers), (second, others) in combinations_with_replacement(lengths.items(), 2):
-            name = f"mass of {body} * ({first})^2" if first == second else f"mass of {body} * {first} * {second}"
+            name = (
+                f"mass of {body} * ({first})^2" if first == second else f"mass of {body} * {first} * {second}"
+            )
             sets[name] = [mass, *numbers, *others]
             if numbers[0][0] == "axis" and first != second:
                 moved_by_slides.add(name)
@@ -281,9 +295,13 @@ def parts_of_bodies(equations: Equations) -> dict[str, np.ndarray]:
     for b, body in enumerate(tree.body_names):
         for first, second in combinations(lengths_of(tree, b), 2):
             name = f"mass of {body} * {first} * {second}"
-            parts[name] = parts[name] - parts[f"mass of {body} * ({first})^2"] - parts[f"mass of {body} * ({second})^2"]
+            parts[name] = (
+                parts[name] - parts[f"mass of {body} * ({first})^2"] - parts[f"mass of {body} * ({second})^2"]
+            )
         for name in lengths_of(tree, b):
-            parts[f"gravity of {body} at {name}"] = parts[f"gravity of {body} at {name}"] - parts[f"mass of {body} * ({name})^2"]
+            parts[f"gravity of {body} at {name}"] = (
+                parts[f"gravity of {body} at {name}"] - parts[f"mass of {body} * ({name})^2"]
+            )
         for first, second in combinations(lengths_of(tree, b), 2):
             name = f"mass of {body} * {first} * {second}"
             if name in moved_by_slides:  # the first moment, of gravity too
@@ -324,6 +342,13 @@ def coefficients(equations: Equations) -> Iterator[Place]:
     for i, row in enumerate(rows):
         yield factor("coefficient", row, right, layout.of_row(i))
 
+    for joint, those in speeds_of_joints(equations.tree).items():
+        of_joint = [layout.of_row(i) for i in those]
+        if len(those) > 1:
+            yield factor("coefficient", f"h[{joint}]", right, list(chain.from_iterable(of_joint)))
+        for k, name in enumerate(list(layout.parts)[1:] if layout.is_split else ()):
+            yield factor("coefficient", f"{name} of h[{joint}]", right, [row[k] for row in of_joint])
+
     def in_row(values: np.ndarray, i: int, part: str) -> np.ndarray:
         column = zero.copy()
         column[:, layout.of_row(i, part)] = values[:, None]
@@ -338,26 +363,38 @@ def coefficients(equations: Equations) -> Iterator[Place]:
             yield factor("coefficient", entry.named(speeds), in_row(values * rates, i, "velocity terms"))
     if nv > MOST_SPEEDS:
         return
-    for (first, of_first), (second, of_second) in combinations_with_replacement(speeds_of_joints(equations.tree).items(), 2):
+    for (first, of_first), (second, of_second) in combinations_with_replacement(
+        speeds_of_joints(equations.tree).items(), 2
+    ):
         column = zero.copy()
         for entry, values in equations.coefficients.items():
             i, *pair = entry.at
             if entry.kind == "velocity" and is_between(pair[0], pair[1], of_first, of_second):
-                column[:, layout.of_row(i, "velocity terms")] += (values * np.prod(equations.qd[:, pair], axis=1))[:, None]
+                column[:, layout.of_row(i, "velocity terms")] += (
+                    values * np.prod(equations.qd[:, pair], axis=1)
+                )[:, None]
         yield factor("coefficient", f"products of the speeds of {first} and {second} in h", column)
     at_rest = [equations.coefficients[Entry("gravity", (i,))] for i in range(nv)]
     for i, j in np.argwhere(~np.eye(nv, dtype=bool)).tolist():
-        yield factor("coefficient", f"{rows[j]} at rest in {rows[i]}", in_row(at_rest[j], i, "gravity"), stated=0.0)
+        yield factor(
+            "coefficient", f"{rows[j]} at rest in {rows[i]}", in_row(at_rest[j], i, "gravity"), stated=0.0
+        )
     for term, (b, body) in product(BODY_TERMS[2:], enumerate(equations.tree.body_names)):
         for i, row in enumerate(rows):  # the factor of a term of a body in one row of h alone
-            yield factor("term", f"{OF_TERM[term].format(body)} in {row}", equations.terms[term][b], layout.of_row(i))
+            yield factor(
+                "term", f"{OF_TERM[term].format(body)} in {row}", equations.terms[term][b], layout.of_row(i)
+            )
 
 
 def blocks(equations: Equations) -> dict[str, list[int]]:
     """Entries of Mbar that couple two joints of several speeds, by their name; slides of a free joint are one."""
     joints, found = speeds_of_joints(equations.tree), {}
     for (first, of_first), (second, of_second) in combinations_with_replacement(joints.items(), 2):
-        inside = [k for k, (i, j) in enumerate(zip(*equations.layout.places)) if is_between(i, j, of_first, of_second)]
+        inside = [
+            k
+            for k, (i, j) in enumerate(zip(*equations.layout.places))
+            if is_between(i, j, of_first, of_second)
+        ]
         if max(len(of_first), len(of_second)) > 1:
             found[f"M[{first}][{second}]"] = inside
     return found
@@ -365,7 +402,10 @@ def blocks(equations: Equations) -> dict[str, list[int]]:
 
 def speeds_of_joints(tree: tmt.Tree) -> dict[str, list[int]]:
     """The numbers of the speeds of each joint, and of the three slides of each free joint."""
-    joints = {name: list(range(joint.qd.start, joint.qd.stop)) for name, joint in zip(tree.joint_names, tree.coordinates.joints)}
+    joints = {
+        name: list(range(joint.qd.start, joint.qd.stop))
+        for name, joint in zip(tree.joint_names, tree.coordinates.joints)
+    }
     for i, kind in enumerate(tree.kind):
         slides = [tree.joint_names[k] for k in range(i - 3, i) if k >= 0 and tree.kind[k] == "slide"]
         if kind == "ball" and len(slides) == 3:

@@ -20,19 +20,23 @@ from .coefficients import Bias, Compared
 from .consistency import follows_from
 from .conventions import Convention, all_conventions, values_in
 from .edits import edits
-from .fit import Fitted, OutOfTime, Search
+from .fit import PROMISING, Fitted, OutOfTime, Search, nearest_change
 from .groups import loads, several
 from .likelihood import NATURAL, cost
 from .model import ROUNDED, Equations, Layout, Values
 from .places import OF_ZERO, all_places
 from .recursion import slips_of_recursion
-from .slips import slips
+from .slips import lagrange, other_angles
 from .variants import Variant, program_options
 
 FEW = 2  # states at which conventions are tried first
 SHOWN = 12  # single explanations that leave least
 NEAR = 2  # conventions with which another cause is sought
 NEARLY = 1e-9  # of the difference: what a number leaves at most that may explain it on a larger scale
+SECOND_ORDER, MOST_NEAR = (
+    0.1,
+    200,
+)  # pairs of a slip and a number that are tried: by what they leave to first order
 PARTIAL = 0.7  # of the difference: what such a convention leaves at most
 IN_PARTS = {  # how the parts in which alone a slip was made are said
     ("M",): " in M alone", ("h",): " in h alone", ("velocity terms", "gravity"): " in h alone",
@@ -93,7 +97,11 @@ class Given:
         """The size of each entry at a state, by its largest value at all states: large values are rounded too."""
         speed = 1.0 + np.abs(self.values.qd).max(axis=1, keepdims=True, initial=0.0) ** 2
         of_state = np.ones_like(self.packed)
-        of_state[:, self.layout.of_row(0, "velocity terms")[0] : self.layout.of_row(0, "velocity terms")[0] + self.layout.nv] = speed
+        of_state[
+            :,
+            self.layout.of_row(0, "velocity terms")[0] : self.layout.of_row(0, "velocity terms")[0]
+            + self.layout.nv,
+        ] = speed
         return np.nanmax(np.abs(self.packed) / of_state, axis=0, initial=0.0) * of_state
 
     def in_the_model(self, convention: Convention) -> "Given":
@@ -106,15 +114,33 @@ class Given:
         if self.layout.qdd is not None:  # qdd = S a + drift
             qdd = np.einsum("sij,sj->si", convention.S, self.layout.qdd) + convention.drift
             moved = np.einsum("sji,sj->si", np.linalg.inv(convention.S), self.values.bias)
-            return Given(self.tree, Values(convention.q, convention.qd, M, moved, (of_M, of_h)), None, qdd=qdd)
+            return Given(
+                self.tree, Values(convention.q, convention.qd, M, moved, (of_M, of_h)), None, qdd=qdd
+            )
         return Given(self.tree, scale, None, None, None if self.rest is None else rest)
+
+
+def best_change(search: Search, k: int, off: ndarray) -> tuple[float, float]:
+    """What the best change of a place leaves of other differences, over its tolerance, and the change over its size."""
+    first, second = (part[k] * search.weight for part in search.coefficients)
+    _, x = nearest_change(first, second, off)
+    for _ in range(2):  # Newton's steps: the roots of a cubic have half the digits
+        slope, left = first + 2.0 * x * second, off - x * first - x * x * second
+        x += float((slope * left).sum() / max((slope * slope).sum(), 1e-300))
+    return float(np.abs(off - x * first - x * x * second).max()), x
 
 
 class Explanations:
     """What explains given values. end: the time.process_time() at which the search ends."""
 
     def __init__(self, given: Given, end: float, stated: Stated | None, seconds: float = inf):
-        self.given, self.equations, self.stated, self.seconds, self.end = given, given.equations, stated, seconds, end
+        self.given, self.equations, self.stated, self.seconds, self.end = (
+            given,
+            given.equations,
+            stated,
+            seconds,
+            end,
+        )
         places = all_places(self.equations)
         if not np.isfinite(given.packed).any(axis=0).all():  # M or h alone
             right = np.isfinite(given.packed).any(axis=0)
@@ -130,33 +156,43 @@ class Explanations:
     def diagnosis(self) -> Diagnosis:
         if not self.off.any():
             return Diagnosis(False)
-        compared, names = self.compared, self.equations.speeds
         entries, parts = tuple(self.entries_that_differ()), tuple(self.differing)
-        found = Diagnosis(True, entries=entries, compared=self.entries_compared, parts=parts, known=tuple(self.known))
+        found = Diagnosis(
+            True, entries=entries, compared=self.entries_compared, parts=parts, known=tuple(self.known)
+        )
+        found = found._replace(is_symmetric=self.equations.layout.is_symmetric)
         if len(np.unique(self.equations.q, axis=0)) < LEAST_STATES:
             return found._replace(too_few=len(self.equations.q))
         causes = next(filter(None, self.stages()), [])
-        nearest = sorted((fit for fit in self.all_singles if fit.is_possible), key=lambda fit: fit.left_over)[:SHOWN]
+        nearest = sorted((fit for fit in self.all_singles if fit.is_possible), key=lambda fit: fit.left_over)[
+            :SHOWN
+        ]
         shares = tuple((fit.places[0].name, fit.left_over, fit.explains) for fit in nearest)
         found = found._replace(nearest=shares, causes=ranked(distinct(sorted(causes, key=self.cost))))
         if causes:
             return found
         unfinished = None if self.is_finished else self.seconds
         closest = nearest[0].cause if nearest else None
-        return found._replace(closest=closest, details=compared.details(), seconds=unfinished)
+        details = self.compared.details() if self.equations.layout.qdd is None else ()
+        return found._replace(closest=closest, details=details, seconds=unfinished)
 
     def cost(self, cause: Cause) -> float:
         return cost(cause, self.equations)
 
     @cached_property
     def compared(self) -> Compared:
-        values, plain = self.given.values, Equations(self.given.tree, self.given.values.q, self.given.values.qd)
+        values, plain = (
+            self.given.values,
+            Equations(self.given.tree, self.given.values.q, self.given.values.qd),
+        )
         if self.equations.layout.is_symmetric and "coefficients" in vars(self.equations):
             plain.coefficients = self.equations.coefficients
         of_M, of_h = values.tolerances
         tolerance = plain.layout.packed(of_M, of_h, 0.0 * of_h)
         packed = values.packed
-        tolerance = np.where(tolerance > 0.0, np.fmax(tolerance, ROUNDED * np.nanmax(np.abs(packed), axis=0, initial=0.0)), 0.0)
+        tolerance = np.where(
+            tolerance > 0.0, np.fmax(tolerance, ROUNDED * np.nanmax(np.abs(packed), axis=0, initial=0.0)), 0.0
+        )
         least = tolerance[tolerance > 0.0].min(initial=1.0)
         return Compared(plain, packed, np.where(tolerance > 0.0, tolerance, least), self.given.bias)
 
@@ -185,8 +221,7 @@ class Explanations:
         for stage in stages:
             causes: list[Cause] = []
             try:
-                for cause in stage():  # what was found before the end is kept
-                    causes.append(cause)
+                causes += stage()  # what was found before the end is kept
             except OutOfTime:
                 self.is_finished = False
             yield [cause for cause in causes if self.cost(cause) < NATURAL]
@@ -217,42 +252,56 @@ class Explanations:
         if "velocity terms" in different and "M" in different and self.h_follows_from_M:
             different = [name for name in different if name != "velocity terms"]
             known = [name for name in known if name != "velocity terms"]
-            causes = self.within(known)
+            causes = self.natural(self.within(known, self.known))
             yield from causes
-            if self.natural(causes):
+            if causes:
                 return
         if different != self.known:
-            causes = [in_part(cause, said) for cause in self.within(different)]
+            causes = self.natural(self.within(different, said))
             yield from causes
-            if self.natural(causes):
+            if causes:
                 return
         for part in different[: len(different) if len(different) > 2 else len(different) - 1]:
             others = [name for name in different if name != part]
-            first, second = self.natural(self.within([part])), self.natural(self.within(others))
+            first, second = (
+                self.natural(self.within([part], [part])),
+                self.natural(self.within(others, others)),
+            )
             if first and second:
-                yield together([self.in_its_part(first[0], [part]), self.in_its_part(second[0], others)], 0.0)
-
-    def in_its_part(self, cause: Cause, parts: Sequence[str]) -> Cause:
-        """A cause that is meant in some parts alone; as it is, where a place names its part."""
-        return cause if cause.kind in ("coefficient", "part") else in_part(cause, parts)
+                yield together([first[0], second[0]], 0.0)
 
     def natural(self, causes: Iterable[Cause]) -> list[Cause]:
         return sorted((cause for cause in causes if self.cost(cause) < NATURAL), key=self.cost)
 
-    def within(self, parts: Sequence[str]) -> list[Cause]:
-        """What explains some parts of the values, whatever the others are."""
+    def within(self, parts: Sequence[str], said: Sequence[str]) -> list[Cause]:
+        """What explains some parts of the values, whatever the others are; said: the parts that it is meant for."""
         entries = np.zeros(self.search.right.shape[1], bool)
         for name in parts:
             entries[self.equations.layout.parts[name]] = True
         search = self.search.within(entries)
         if not (np.abs(search.off) > 1.0).any():
             return []
-        variants = chain(self.options, self.variants, self.recursions)
-        fits = [fit for fit in search.singles(is_thorough=False) if fit.explains]
-        return [*search.explained(variants), *self.causes(fits)]
+        others = np.zeros_like(entries)
+        for name in set(self.known) - set(said):
+            others[self.equations.layout.parts[name]] = True
+        causes = []
+        for cause, values in chain(self.options, self.variants, self.recursions, self.angles):
+            for explained in search.explained([(cause, values)]):
+                is_elsewhere = (np.abs(values - search.right) > search.tolerance)[:, others].any()
+                causes.append(in_part(explained, said) if is_elsewhere else explained)
+        numbers = {id(place): k for k, place in enumerate(search.places)}
+        for fit in search.singles(is_thorough=False):
+            if fit.explains:
+                moved = (
+                    search.coefficients[0][numbers[id(fit.places[0])]] * fit.changes[0] / fit.places[0].size
+                )
+                is_elsewhere = (np.abs(moved) > search.tolerance)[:, others].any()
+                causes += [in_part(cause, said) if is_elsewhere else cause for cause in self.causes([fit])]
+        return causes
 
     def terms(self) -> Iterator[Cause]:
         """Terms of coefficients; forces of accelerations have none."""
+        yield from self.search.explained(self.angles)
         yield from self.compared.causes(1) if self.equations.layout.qdd is None else ()
 
     def beside_conventions(self) -> Iterator[Cause]:
@@ -271,7 +320,31 @@ class Explanations:
     def pairs(self) -> Iterator[Cause]:
         fits = self.search.pairs(("number", OF_ZERO), ("number", OF_ZERO, "term", "coefficient"))
         yield from self.causes(fit for fit in fits if fit.explains)
+        yield from self.with_slips()
         yield from self.compared.causes(2) if self.equations.layout.qdd is None else ()
+
+    def with_slips(self) -> Iterator[Cause]:
+        """An edit or a slip beside a number, a term or another slip, whose changes of the values are added."""
+        variants, search = [*self.options, *self.variants, *self.recursions], self.search
+        changes = [(values - search.right) * search.weight for _, values in variants]
+        left = np.stack([(search.off - change).ravel() for change in changes])
+        squares = np.einsum("vm,vm->v", left, left)
+        columns = search.expansion[0].reshape(len(search.places), -1)
+        lengths = np.einsum("km,km->k", columns, columns)
+        after = squares[:, None] - np.divide(
+            (left @ columns.T) ** 2, lengths, out=np.zeros((len(left), len(columns))), where=lengths > 0.0
+        )
+        near = np.argwhere(after < (PROMISING * search.size) ** 2 + SECOND_ORDER * squares[:, None])
+        for v, k in near[np.argsort(after[tuple(near.T)])][:MOST_NEAR].tolist():
+            place, off = search.places[k], left[v].reshape(search.off.shape)
+            ratio, change = best_change(search, k, off)
+            if ratio <= 1.0 and place.is_possible(change * place.size):
+                yield together([variants[v][0], place.cause(change * place.size)], 0.0)
+        moved = np.stack([change.ravel() for change in changes])
+        both = squares[:, None] + np.einsum("vm,vm->v", moved, moved) - 2.0 * left @ moved.T
+        for v, w in np.argwhere(np.triu(both < (PROMISING * search.size) ** 2)).tolist()[:MOST_NEAR]:
+            if np.abs(left[v] - moved[w]).max() <= 1.0:
+                yield together([variants[v][0], variants[w][0]], 0.0)
 
     # what is computed once
 
@@ -281,7 +354,11 @@ class Explanations:
 
     @cached_property
     def variants(self) -> list[Variant]:
-        return [*edits(self.equations), *chain.from_iterable(slips(self.equations))]
+        return [*edits(self.equations), *lagrange(self.equations)]
+
+    @cached_property
+    def angles(self) -> list[Variant]:
+        return list(other_angles(self.equations))
 
     @cached_property
     def recursions(self) -> list[Variant]:
@@ -297,7 +374,11 @@ class Explanations:
 
     def on_its_scale(self, fit: Fitted) -> Fitted:
         """A fit judged by the scale of the model with its number: a length in mm rounds what is small in the right one."""
-        paths = [(path, change * factor) for place, change in zip(fit.places, fit.changes) for path, factor in place.moves]
+        paths = [
+            (path, change * factor)
+            for place, change in zip(fit.places, fit.changes)
+            for path, factor in place.moves
+        ]
         if fit.ratio <= 1.0 or fit.left_over > NEARLY or not paths:
             return fit
         fields = {path.field: self.equations.stated[path.field].copy() for path, _ in paths}
@@ -309,7 +390,10 @@ class Explanations:
             return fit
         values = self.given.values
         M, h = Values.of(tree, values.q, values.qd, None, None).tolerances
-        tolerance = np.fmax(self.search.tolerance, self.equations.layout.packed(M, h, h if self.given.rest is not None else 0.0 * h))
+        tolerance = np.fmax(
+            self.search.tolerance,
+            self.equations.layout.packed(M, h, h if self.given.rest is not None else 0.0 * h),
+        )
         left = self.search.weighted(Equations(tree, values.q, values.qd, self.equations.layout).right)
         return fit._replace(ratio=float((np.abs(left) * self.search.tolerance / tolerance).max()))
 
@@ -346,7 +430,9 @@ class Explanations:
         given = self.given
         if given.mass_matrix is None or given.rest is None or self.equations.coordinates.has_balls:
             return False
-        return follows_from(given.mass_matrix, given.values.q, given.values.qd, given.values.bias - given.rest)
+        return follows_from(
+            given.mass_matrix, given.values.q, given.values.qd, given.values.bias - given.rest
+        )
 
     # joints
 
@@ -389,12 +475,16 @@ class Explanations:
 
 def in_part(cause: Cause, parts: Sequence[str]) -> Cause:
     """A cause that is meant in some parts alone."""
-    return replace(cause, place=f"{cause.place}{IN_PARTS[tuple(parts)]}") if tuple(parts) in IN_PARTS else cause
+    return (
+        replace(cause, place=f"{cause.place}{IN_PARTS[tuple(parts)]}") if tuple(parts) in IN_PARTS else cause
+    )
 
 
 def distinct(causes: Iterable[Cause]) -> list[Cause]:
     """Each cause once; none of every body or joint where one of them suffices."""
-    once = list({(cause.place, str(cause.explains)): cause for cause in reversed(list(causes))}.values())[::-1]
+    once = list({(cause.place, str(cause.explains)): cause for cause in reversed(list(causes))}.values())[
+        ::-1
+    ]
     return [cause for cause in once if not any(is_of_one(other, cause) for other in once)]
 
 
@@ -402,5 +492,7 @@ def is_of_one(cause: Cause, of_all: Cause) -> bool:
     """Whether a cause is for one body or joint what another is for every one."""
     before, every, after = of_all.place.partition("every ")
     after = after.partition(" ")[2]
-    is_alike = cause.place.startswith(before) and cause.place.endswith(after) and cause.explains == of_all.explains
+    is_alike = (
+        cause.place.startswith(before) and cause.place.endswith(after) and cause.explains == of_all.explains
+    )
     return bool(every) and "every " not in cause.place and cause.kind == of_all.kind and is_alike

@@ -31,24 +31,40 @@ def program_options(equations: Equations) -> Iterator[Variant]:
     yield option("sign of gravity", "+", "-", with_bias(velocity_terms, -rest))
     yield option("velocity terms in h", "there", "left out", with_bias(0.0, rest))
     yield option("bias", "there", "left out", with_bias(0.0, 0.0))
-    yield option("sign of the bias", "Mbar qdd + h = tau", "Mbar qdd = tau + h", with_bias(-velocity_terms, -rest))
+    yield option(
+        "sign of the bias", "Mbar qdd + h = tau", "Mbar qdd = tau + h", with_bias(-velocity_terms, -rest)
+    )
     if q.shape == qd.shape:
         together = np.concatenate([q, qd], axis=1)
-        orders = {"exchanged, bias(qd, q)": (qd, q), "in turn, q1, qd1, q2, qd2, ...": (together[:, ::2], together[:, 1::2])}
+        orders = {
+            "exchanged, bias(qd, q)": (qd, q),
+            "in turn, q1, qd1, q2, qd2, ...": (together[:, ::2], together[:, 1::2]),
+        }
         for explains, (positions, speeds) in orders.items():
             _, moved, at_rest = Equations(tree, positions, speeds).parts
             if equations.layout.is_split:  # at rest too the arguments are in this order
-                still = Equations(tree, 0.0 * q, q) if explains.startswith("exchanged") else in_turn_at_rest(equations)
+                still = (
+                    Equations(tree, 0.0 * q, q)
+                    if explains.startswith("exchanged")
+                    else in_turn_at_rest(equations)
+                )
                 moved, at_rest = moved + at_rest - still.h, still.h
             yield option("arguments of bias", "bias(q, qd)", explains, with_bias(moved, at_rest))
     M = equations.parts[0]
     triangles = {"above": np.tril(M), "below": np.triu(M), "off": M * np.eye(equations.nv)}
     for where, left in triangles.items():
-        yield option(f"entries of M {where} the diagonal", "there", "left out", equations.layout.packed(left, velocity_terms, rest))
+        yield option(
+            f"entries of M {where} the diagonal",
+            "there",
+            "left out",
+            equations.layout.packed(left, velocity_terms, rest),
+        )
     if any(tree.damping):
         drag = np.array(tree.damping) * qd
         yield option("damping D qd", "not in h", "in h", with_bias(velocity_terms + drag, rest))
-        yield option("damping D qd", "not in h", "in h, of the other sign", with_bias(velocity_terms - drag, rest))
+        yield option(
+            "damping D qd", "not in h", "in h, of the other sign", with_bias(velocity_terms - drag, rest)
+        )
     if tree.has_springs:
         sprung = rest + literal.spring_torque(q, tree)
         yield option("springs k (q - rest)", "not in h", "in h", with_bias(velocity_terms, sprung))
