@@ -306,7 +306,7 @@ def parts_of_bodies(equations: Equations) -> dict[str, np.ndarray]:
             name = f"mass of {body} * {first} * {second}"
             if name in moved_by_slides:  # the first moment, of gravity too
                 parts[name] = parts[name] + parts[f"gravity of {body} at {second}"]
-    return {name: column for name, column in parts.items() if column.any()}
+    return {name: column for name, column in parts.items() if column.any() and name.startswith("mass")}
 
 
 def alone(equations: Equations, sets: list[list[tuple[str, int]]]) -> np.ndarray:
