@@ -23,10 +23,11 @@ from .given import Given
 from .groups import loads, several
 from .likelihood import NATURAL, cost
 from .model import ROUNDED, Equations, Values, packed
-from .places import OF_ZERO, all_places
+from .places import OF_ZERO
 from .recursion import slips_of_recursion
 from .slips import lagrange, other_angles
 from .statements import Stated, Statements
+from .terms import all_places
 from .variants import Variant, program_options
 
 FEW = 2  # states at which conventions are tried first
