@@ -43,7 +43,7 @@ EDITS = (
     ("diagnosis.variants", "program_options", "velocity_terms + drag", "velocity_terms - drag", "both have one sign"),
     ("diagnosis.variants", "program_options", "velocity_terms - drag", "velocity_terms + drag", "both dampings add"),
     ("diagnosis.conventions", "Convention.applied", "velocity_terms + _1", "velocity_terms", "axes that turn have no drift"),
-    ("diagnosis.conventions", "named_orders", "depth[parent] + 1 if _1 else 0", "0", "no order is breadth first"),
+    ("diagnosis.conventions", "named_orders", "len(tree.path(i))", "0", "no order is breadth first"),
     ("diagnosis.recursion", "Recursion.step", "np.where(where, _1, right)", "right", "no slip of the recursion is made"),
     ("diagnosis.groups", "fit", "np.abs(left).max() <= 1.0", "True", "any regression explains"),
     ("agreement.tables", "slips_of_table", "len(rows) <= FEW * count", "len(rows) <= count", "all rows are a few"),
