@@ -19,8 +19,8 @@ from .accelerations import CONSTANT, Affine
 from .comparison import Comparison
 from .tables import slips_of_tables
 
-SECONDS_OF_CAUSE = 10.0  # of a search
-SECONDS_OF_SLOPES = 3.0  # of accelerations at several torques
+SECONDS_OF_CAUSE = 4.5  # of a search
+SECONDS_OF_SLOPES = 1.5  # of accelerations at several torques
 
 
 class Why(NamedTuple):

@@ -13,8 +13,7 @@ from tmt.derivation.dual import seeded
 
 from ..robots.case import SEED, Case
 from ..robots.coordinates import floats
-from .rest import holding, moving, slopes
-from .steps import growth_of, is_runge_kutta, linear_step
+from .linear_step import growth_of, is_runge_kutta, linear_step
 
 AS_IT_STANDS = (
     6  # speeds up to which the method is differentiated as written; beyond, composite inertias are faster
@@ -208,3 +207,31 @@ def held(robot, posture: str, damping: float = 0.0) -> Held:
     return Held(
         robot.case(f"{posture}, held", posture=posture, torque="hold", damping=damping, gravity=gravity)
     )
+
+
+# forces at rest over any scalar, and their derivatives
+
+
+def moving(tree: tmt.Tree, q, directions) -> list:
+    """The position q, (nq,) of any scalars, as dual numbers with these slopes of movements, directions (nv,): (nq,)."""
+    start = [float(x) for x in q] if isinstance(q, np.ndarray) else q
+    return seeded(start, tree.coordinates.component_rates(start, list(directions)))
+
+
+def holding(tree: tmt.Tree, q) -> list:
+    """The holding torque against gravity, springs and a controller, N m, (nv,), over any scalar."""
+    torque = method.bias(method.bodies(tree, q), tree.gravity)
+    if tree.has_springs:
+        torque = [a + b for a, b in zip(torque, method.spring_torque(tree, q))]
+    return (
+        [a + b for a, b in zip(torque, method.fed_back(tree, q, [0.0] * len(torque)))]
+        if tree.has_gains
+        else torque
+    )
+
+
+def slopes(seeds, values) -> list:
+    """The derivatives of values along the directions of these dual numbers."""
+    shape = np.shape(seeds[0].slope)
+    derivatives = [seeds[0].parts(value)[1] for value in values]
+    return [np.broadcast_to(slope, shape) if np.ndim(slope) < len(shape) else slope for slope in derivatives]
