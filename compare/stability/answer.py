@@ -19,7 +19,7 @@ from .limits import COARSER, LONGEST, Limit, Tried, limit, tried
 from .naming import limiting
 from .place import Place, in_the_air_at, standing_at
 from .rest import SETTLED
-from .runs import growth_in_run, largest_push, observed
+from .runs import growth_in_run, largest_push, observed, own_limit
 
 MOST_POSTURES = 6  # the first keyframes
 STEP_DIGITS = 4
@@ -50,6 +50,9 @@ class StepLimitRow(Row):
     predicted_dt: float | None = step_column()
     observed_dt: float | None = step_column(default=None)
     failing_dt: float | None = step_column(default=None)
+    own_dt: float | None = step_column(
+        default=None
+    )  # the file's own run, from where it sinks to, fails beyond
     smooth_dt: float | None = step_column(default=None)  # the limit without dry friction
     file_dt: float = column("s")
     file_integrator: str
@@ -70,13 +73,17 @@ class StepLimitRow(Row):
     creeping_joint: str = ""
 
     @property
-    def contradicted(self) -> bool | None:
-        """Whether runs at the file's step show the opposite of what is predicted; None: no runs tell."""
-        if self.limit != "finite" or (self.observed_dt is None and self.failing_dt is None):
-            return None
-        fails = self.failing_dt is not None and self.failing_dt <= self.file_dt
-        rests = self.observed_dt is not None and self.observed_dt >= self.file_dt
-        return fails if self.file_dt <= (self.predicted_dt or 0.0) else rests
+    def contradicted(self) -> bool:
+        """Whether runs near rest hold or fail elsewhere than at the limit of the derivative."""
+        if (
+            self.limit != "finite"
+            or not self.predicted_dt
+            or (self.observed_dt is None and self.failing_dt is None)
+        ):
+            return False
+        holds = self.observed_dt is not None and self.observed_dt >= 0.95 * self.predicted_dt
+        fails = self.failing_dt is not None and self.failing_dt <= 1.05 * self.predicted_dt
+        return not (holds and fails)
 
     @property
     def is_known(self) -> bool:
@@ -89,8 +96,16 @@ class StepLimitRow(Row):
 
     @property
     def longest(self) -> float:
-        """The longest stable step, s; inf: none fails."""
-        return {"none": np.inf, "below": 0.0}.get(self.limit, self.predicted_dt or 0.0)
+        """The longest stable step, s; inf: none fails. Runs have the last word."""
+        predicted = {"none": np.inf, "below": 0.0}.get(self.limit, self.predicted_dt or 0.0)
+        if self.contradicted:
+            predicted = self.observed_dt or 0.0
+        return predicted if self.own_dt is None else min(predicted, self.own_dt)
+
+    @property
+    def decided_by_runs(self) -> bool:
+        """Whether runs say another limit than the derivative."""
+        return self.limit in ("finite", "none") and self.longest < 0.95 * (self.predicted_dt or np.inf)
 
 
 class Posture(NamedTuple):
@@ -229,10 +244,11 @@ def limit_row(
     if in_runs and row.is_known:
         if found.dt:
             row.observed_dt, row.failing_dt = observed(model, found, integrator)
-            if row.contradicted:  # runs have the last word
-                row.stable_at_file_dt = not row.stable_at_file_dt
-        pushes = largest_push(model, at.rest)
-        row.largest_push, row.finer_push = pushes
+        if longest := min(row.longest, LONGEST):
+            own = own_limit(model, place.rest, integrator, longest, dt)
+            row.own_dt = own if own < longest else None
+        row.stable_at_file_dt = dt <= row.longest
+        row.largest_push, row.finer_push = largest_push(model, at.rest)
     return row
 
 

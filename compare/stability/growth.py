@@ -11,7 +11,7 @@ from .rest import Rest
 OTHER_NUDGE = NUDGE / 3.0  # of the differences that show the noise
 NOISE_TIMES = 3.0  # fold, of the observed noise: what does not exceed it may be noise
 NOISE_LEAST = 1e-10  # of an entry of the derivative
-GROWS = 0.01  # 1/s: a rate below is no growth, as within a run of 4 s nobody sees it
+GROWS = 0.1  # 1/s: a rate below is a drift or a creep, of which a run of 4 s shows nothing
 
 
 class Growth(NamedTuple):

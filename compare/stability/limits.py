@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from ..engines.mujoco.step import Step
+from ..engines.mujoco.step import Step, distance
 from .growth import GROWS, Growth, growth
 from .rest import Rest, rest_near
 
@@ -15,6 +15,9 @@ REFINED = 2e-3  # of a limit
 SLOW = 1.2  # a factor below: of what grows little in a step
 BY_ITSELF = 0.7, 1.4  # of its rate at a coarser step: a slow growth whose rate stays is none of the step
 SADDLE = 0.1  # 1/s: what grows by itself and slower is a drift
+GIVES_WAY = (
+    0.3  # rad or m: a rest so far from where the search began is another one: soft constraints have given way
+)
 BESIDE_DRIFT = 2.0  # fold: what grows faster than a drift
 
 
@@ -26,6 +29,7 @@ class Tried:
     rest: Rest
     growth: Growth
     drift: float
+    moved: float  # rad or m, of the rest from the state from which it was sought
 
     @property
     def spectral_radius(self) -> float:
@@ -34,7 +38,8 @@ class Tried:
 
     @property
     def is_stable(self) -> bool:
-        return self.rest.is_found and self.growth.rate <= max(GROWS, BESIDE_DRIFT * self.drift)
+        stays = self.rest.is_found and self.moved <= GIVES_WAY
+        return stays and self.growth.rate <= max(GROWS, BESIDE_DRIFT * self.drift)
 
 
 @dataclass(frozen=True)
@@ -57,7 +62,9 @@ class Limit:
 def tried(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, drift: float = 0.0) -> Tried:
     """The rest near a state at a step, and its growth. drift: the rate of what grows by itself, 1/s."""
     rest = rest_near(Step(model, dt, integrator), state)
-    return Tried(dt, rest, growth(rest), drift)
+    return Tried(
+        dt, rest, growth(rest), drift, float(np.abs(distance(model, state, rest.state)).max(initial=0.0))
+    )
 
 
 def limit(
