@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from small import BOX, CASTER, INERTIA, KINDS, LEG, STANDING, hinge, limit_of, place_of, rest_of
 
+from compare.engines.mujoco.names import INTEGRATORS
 from compare.engines.mujoco.reading import read
 from compare.stability.naming import limiting
 from compare.stability.place import in_the_air_at, standing_at
@@ -20,7 +21,7 @@ FLOOR = '<geom type="plane" size="2 2 0.1"/>'
 
 def test_a_rest_is_where_a_step_leaves_the_speeds_as_they_are():
     for text in (KINDS["servos"], KINDS["a limit"], KINDS["elliptic, condim 3"], LEG):
-        for integrator in ("Euler", "implicitfast", "discrete", "RK4"):
+        for integrator in INTEGRATORS:
             rest = rest_of(text, 2e-3, integrator)
             before = rest.speeds
             assert rest.left < 1e-4 and np.abs(rest.accelerations).max() == pytest.approx(rest.left)
