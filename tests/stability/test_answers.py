@@ -24,7 +24,7 @@ def test_a_script_sweeps_the_gains_of_a_compiled_model():
         exact = (-kv + np.sqrt(kv**2 + 4.0 * INERTIA * 20.0)) / 20.0
         assert (row.limit, row.limiting_joint, row.surroundings) == ("finite", "turn", "free")
         assert row.predicted_dt == pytest.approx(exact, rel=3e-3)
-        assert row.stable_at_file_dt is (exact > 0.002) and row.largest_push is None
+        assert row.stable_at_file_dt is bool(exact > 0.002) and row.largest_push is None
     assert mujoco.MjModel.from_xml_string(hinge()).opt.timestep == model.opt.timestep == 0.002
 
 
@@ -52,7 +52,7 @@ def test_rows_tell_of_the_robot_in_contact_and_in_the_air():
 def test_runs_stand_beside_the_limit_where_they_are_asked_for():
     (row,) = compare.step_limits(two(), integrators=["Euler"], in_runs=True)
     assert row.observed_dt < row.predicted_dt < row.failing_dt < 1.07 * row.observed_dt
-    assert row.largest_push == 1.0 and row.contradicted is False and row.smooth_dt is None
+    assert row.largest_push == 1.0 and not row.contradicted and row.smooth_dt is row.own_dt is None
 
 
 @pytest.mark.parametrize("asked, q", [
@@ -84,17 +84,26 @@ def test_postures_differ():
     assert first == low == pytest.approx(numbers, rel=5e-3) and abs(bent / low - 1.0) > 0.05
 
 
-@pytest.mark.parametrize("more, contradicted, known, longest", [
-    ({}, None, True, 0.01), ({"observed_dt": 0.009, "failing_dt": 0.011}, False, True, 0.01),
-    ({"observed_dt": 0.001, "failing_dt": 0.002}, True, True, 0.01), ({"failing_dt": 0.0021}, False, True, 0.01),
-    ({"predicted_dt": 0.001, "observed_dt": 0.002}, True, True, 0.001),
-    ({"predicted_dt": 0.001, "observed_dt": 0.0019}, False, True, 0.001),
-    ({"limit": "none", "predicted_dt": None}, None, True, np.inf), ({"limit": "below", "predicted_dt": None}, None, True, 0.0),
-    ({"limit": "saddle", "predicted_dt": None}, None, False, 0.0), ({"limit": "no_rest", "predicted_dt": None}, None, False, 0.0),
+NEAR, OFF = {"observed_dt": 0.0097, "failing_dt": 0.0103}, {"observed_dt": 0.0094, "failing_dt": 0.0103}
+NONE = {"limit": "none", "predicted_dt": None}
+
+
+@pytest.mark.parametrize("more, contradicted, longest, by_runs", [
+    ({}, False, 0.01, False), (NEAR, False, 0.01, False), (OFF, True, 0.0094, True),
+    ({"observed_dt": 0.0097, "failing_dt": 0.0106}, True, 0.0097, False), ({"failing_dt": 0.001}, True, 0.0, True),
+    (NEAR | {"own_dt": 0.004}, False, 0.004, True), (NEAR | {"own_dt": 0.0099}, False, 0.0099, False),
+    (NONE, False, np.inf, False), (NONE | {"own_dt": 0.02}, False, 0.02, True),
+    (NONE | {"limit": "below"}, False, 0.0, False), (NONE | {"limit": "saddle"}, False, 0.0, False),
 ])  # fmt: skip
-def test_what_a_row_says(more, contradicted, known, longest):
+def test_runs_have_the_last_word(more, contradicted, longest, by_runs):
     row = StepLimitRow(**ROW | more)
-    assert (row.contradicted, row.is_known, row.longest) == (contradicted, known, longest)
+    assert (row.contradicted, row.longest, row.decided_by_runs) == (contradicted, longest, by_runs)
+    assert row.is_known is (row.limit != "saddle")
+
+
+@pytest.mark.parametrize("smooth, held", [(None, False), (0.0098, True), (0.0099, False)])
+def test_dry_friction_holds_if_the_limit_is_lower_without_it(smooth, held):
+    assert StepLimitRow(**ROW | {"smooth_dt": smooth}).is_held_by_friction is held
 
 
 def test_curves_have_the_growth_of_steps_and_of_runs():

@@ -130,5 +130,5 @@ def test_noise_of_differences_and_what_nothing_holds_never_grow():
         for integrator in EVERY:
             for dt in (1e-4, 2e-3, 0.05):
                 assert growth(rest_of(text, dt, integrator)).factor == 1.0
-        assert limit_of(text).kind == "none"
+        assert limit_of(text).growth.factor == 1.0  # its contacts may give way, at a long step
     assert in_the_air_at(place_of(KINDS["a box"]), "").surroundings == "air"
