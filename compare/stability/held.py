@@ -1,7 +1,9 @@
 """The linearized equations of motion at a held posture: its modes, and the steps of a method there."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eig
@@ -9,8 +11,9 @@ from scipy.linalg import eig
 import tmt
 from tmt import METHODS, literal
 from tmt.derivation import composite, method
-from tmt.derivation.dual import seeded
+from tmt.derivation.dual import Dual, seeded
 
+from ..robots import Robot
 from ..robots.case import SEED, Case
 from ..robots.coordinates import floats
 from .linear_step import growth_of, is_runge_kutta, linear_step
@@ -34,7 +37,12 @@ class Held:
 
     @property
     def name(self) -> str:
-        return self.case.scene.posture
+        return str(self.case.scene.posture)
+
+    @property
+    def damping(self) -> float:
+        """Added to all joints, N m s/rad."""
+        return float(np.max(self.case.scene.damping))
 
     @property
     def tree(self) -> tmt.Tree:
@@ -65,7 +73,7 @@ class Held:
         return np.concatenate([np.ones(3) if kind == "ball" else self.q[q] for kind, q, _ in joints])
 
     @cached_property
-    def known(self) -> dict:
+    def known(self) -> dict[object, tuple[str, float | None]]:
         """Results of `limit` by method."""
         return {}
 
@@ -127,7 +135,7 @@ class Held:
             return "saddle"
         return "marginal" if np.abs(values).min() <= small else "centre"
 
-    def curvature(self, direction) -> np.ndarray:
+    def curvature(self, direction: np.ndarray) -> np.ndarray:
         """The second derivative of the holding torque along a movement (nv,), N m, (nv,): by nested dual numbers."""
         inner = moving(self.tree, self.q, direction)
         outer = moving(self.tree, inner, direction)
@@ -151,7 +159,7 @@ class Held:
         """The amplification matrix of a step of a method of tmt, (2nv, 2nv)."""
         return linear_step(self, METHODS[name], np.array([dt], float))[0]
 
-    def growth(self, name, dt) -> np.ndarray:
+    def growth(self, name: str, dt: np.ndarray | float) -> np.ndarray:
         """The spectral radius of `step`, (...) for dt (...). The growth of a mode without stiffness is 1."""
         stepping, dt = METHODS[name], np.asarray(dt, float)
         idle = self.without_stiffness
@@ -166,7 +174,7 @@ class Held:
                 factors = np.where(np.abs(factors - 1.0) <= near, 1.0, factors)
             return np.abs(factors).max(axis=-1)
 
-    def limit(self, name) -> tuple[str, float | None]:
+    def limit(self, name: str) -> tuple[str, float | None]:
         """("finite", dt in s), ("never_fails", None) or ("always_fails", None): the largest step at which no mode grows.
 
         The first unstable step of 40 for each power of ten, then refined.
@@ -175,7 +183,7 @@ class Held:
             self.known[METHODS[name]] = self.first_failing(name)
         return self.known[METHODS[name]]
 
-    def first_failing(self, name) -> tuple[str, float | None]:
+    def first_failing(self, name: str) -> tuple[str, float | None]:
         low, high = min(SHORTEST_STEP, 1.0 / max(np.abs(self.modes[0]).max(), SLOWEST)), LONGEST_STEP
         for _ in range(4):
             steps = np.geomspace(low, high, SCANNED)
@@ -186,7 +194,7 @@ class Held:
             low, high = steps[first - 1], steps[first]
         return "finite", float(low)
 
-    def growing_rate(self, name, dt) -> float:
+    def growing_rate(self, name: str, dt: float) -> float:
         """The rate |lambda|, 1/s, of the mode of the equations of motion nearest to the one that a step lets grow fastest."""
         factors, growing = np.linalg.eig(self.step(name, dt))
         shape = growing[: self.nv, np.argmax(np.abs(factors))]
@@ -196,12 +204,12 @@ class Held:
         return float(np.abs(values[overlap > overlap.max() - 1e-6]).max())
 
 
-def posture_names(robot) -> tuple[str, ...]:
+def posture_names(robot: Robot) -> tuple[str, ...]:
     return (*robot.postures, *robot.positions)
 
 
 @lru_cache(maxsize=64)
-def held(robot, posture: str, damping: float = 0.0) -> Held:
+def held(robot: Robot, posture: str, damping: float = 0.0) -> Held:
     """A named posture under TMT's holding torque, with added joint damping, N m s/rad; without gravity if the robot floats."""
     gravity = not floats(robot.tree)
     return Held(
@@ -212,13 +220,13 @@ def held(robot, posture: str, damping: float = 0.0) -> Held:
 # forces at rest over any scalar, and their derivatives
 
 
-def moving(tree: tmt.Tree, q, directions) -> list:
+def moving(tree: tmt.Tree, q: np.ndarray | Sequence[Any], directions: np.ndarray) -> list[Dual]:
     """The position q, (nq,) of any scalars, as dual numbers with these slopes of movements, directions (nv,): (nq,)."""
     start = [float(x) for x in q] if isinstance(q, np.ndarray) else q
     return seeded(start, tree.coordinates.component_rates(start, list(directions)))
 
 
-def holding(tree: tmt.Tree, q) -> list:
+def holding(tree: tmt.Tree, q: np.ndarray | Sequence[Any]) -> list[Any]:
     """The holding torque against gravity, springs and a controller, N m, (nv,), over any scalar."""
     torque = method.bias(method.bodies(tree, q), tree.gravity)
     if tree.has_springs:
@@ -230,7 +238,7 @@ def holding(tree: tmt.Tree, q) -> list:
     )
 
 
-def slopes(seeds, values) -> list:
+def slopes(seeds: Sequence[Dual], values: Sequence[Any]) -> list[np.ndarray]:
     """The derivatives of values along the directions of these dual numbers."""
     shape = np.shape(seeds[0].slope)
     derivatives = [seeds[0].parts(value)[1] for value in values]

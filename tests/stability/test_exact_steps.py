@@ -7,6 +7,7 @@ import pytest
 from small import INERTIA, KINDS, LEG, hinge, limit_of, place_of, rest_of, sphere
 
 from compare.engines.mujoco.forces import forces_near
+from compare.engines.mujoco.names import INTEGRATORS
 from compare.stability.closed_form import matrix, radius
 from compare.stability.growth import growth
 from compare.stability.place import in_the_air_at
@@ -107,7 +108,8 @@ def test_the_closed_form_is_the_derivative_of_mujocos_own_step(kind):
 def test_no_closed_form_of_discrete_or_at_the_edge_of_a_limit():
     place = place_of(LEG)
     assert radius(rest_of(LEG), place.tree) is not None
-    assert "discrete" not in EVERY and radius(rest_of(LEG, integrator="discrete"), place.tree) is None
+    others = [name for name in INTEGRATORS if name not in EVERY]
+    assert all(radius(rest_of(LEG, integrator=name), place.tree) is None for name in others)
     touching = hinge(joint='range="-1 0" limited="true"').replace(
         "<mujoco>", '<mujoco><compiler angle="radian"/>'
     )
@@ -128,5 +130,5 @@ def test_noise_of_differences_and_what_nothing_holds_never_grow():
         for integrator in EVERY:
             for dt in (1e-4, 2e-3, 0.05):
                 assert growth(rest_of(text, dt, integrator)).factor == 1.0
-        assert limit_of(text).kind == "none"
+        assert limit_of(text).growth.factor == 1.0  # its contacts may give way, at a long step
     assert in_the_air_at(place_of(KINDS["a box"]), "").surroundings == "air"

@@ -25,7 +25,8 @@ FOOT = STANDING.format(cone="elliptic", condim=3)
 RUBBING = hinge(20.0, 30.0, 'frictionloss="0.3"')
 MOTORS = '<motor joint="turn" gear="2"/>'
 SPIN = """<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody><body><freejoint/>
-  <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.02 0.03"/></body></worldbody><keyframe><key qvel="0 0 0 0 {} 0"/></keyframe></mujoco>"""
+  <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.02 0.03"/></body></worldbody>
+  <keyframe><key qvel="0 0 0 0 {} 0"/></keyframe></mujoco>"""
 SWING = """<mujoco><option timestep="0.01"/><worldbody><body><joint name="a" axis="0 1 0" {}/>
   <geom size="0.05" pos="0 0 -0.5" mass="1"/></body></worldbody><keyframe><key qvel="3"/></keyframe></mujoco>"""
 
@@ -77,8 +78,8 @@ def test_a_servo_too_weak_for_a_push_bears_it_at_no_step():
     servo = (
         '<position joint="a" kp="8" kv="0.5" forcerange="-0.4 0.4"/>'  # after a fall it calms down, hanging
     )
-    text = f"""<mujoco><worldbody><body><joint name="a" axis="0 1 0"/><geom size="0.05" pos="0 0 0.5" mass="1"/></body></worldbody>
-      <actuator>{servo}</actuator></mujoco>"""
+    body = '<body><joint name="a" axis="0 1 0"/><geom size="0.05" pos="0 0 0.5" mass="1"/></body>'
+    text = f"<mujoco><worldbody>{body}</worldbody><actuator>{servo}</actuator></mujoco>"
     found = largest_push(place_of(text).model, rest_of(text))
     assert 1e-3 < found.largest < 1.0 and found.finer_too
 

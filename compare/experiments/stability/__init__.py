@@ -11,6 +11,7 @@ from ...robots import Robot
 from ...robots.case import Case
 from ...stability.held import held
 from ...stability.limits import LONGEST
+from ...stability.runs import USUAL_PUSH
 from .. import Drawing, Experiment
 from ..setup import Setup
 from . import claims, departure, failure, limits, of_file, own_run
@@ -49,7 +50,7 @@ def claim_values(robot: Robot) -> dict[str, Any]:
     return {
         "unit": unit_of_movements(robot),
         "radii": of_file.RADII_WITHIN,
-        "push": of_file.USUAL_PUSH,
+        "push": USUAL_PUSH,
         "up_to": LONGEST,
         "run": {"push": own_run.PUSH, "calm": own_run.CALM, "faster": own_run.FASTER, "finer": own_run.FINER},
     }
@@ -144,8 +145,9 @@ def add_of_stated(result: StabilityResult, setup: Setup, work: OfStated) -> None
         claims.check_finer_steps(result, robot, finer)
     for kept in work.kept:
         claims.check_kept(result, robot, kept)
-    for run in work.resets:
-        failure.check_reset(result, reset_case(subjects), run)
+    if case := reset_case(subjects):
+        for run in work.resets:
+            failure.check_reset(result, case, run)
     result.find(
         "examined", noun=robot.noun, centres=subjects.centres, saddles=subjects.saddles,
         names=[*robot.postures, *robot.positions], departures=bool(result.tables.get("departure")),

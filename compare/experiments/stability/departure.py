@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from ...core.check import About, Result
 from ...engines import Engine, Method
 from ...judge.run import LEFT, departure
 from ...stability.held import NEGLIGIBLE, Held
-from .subjects import unit_of_movements
+from .subjects import mujoco_of, unit_of_movements
 from .tables import DepartureRow, TorqueRow
 
 Departure = DepartureRow | TorqueRow  # with a predicted and an observed time
@@ -35,7 +36,7 @@ def predicted(at: Held, scheme: str, dt: float, moved: np.ndarray, off: np.ndarr
     compliance = np.linalg.pinv(at.matrix[n:, :n], rcond=NEGLIGIBLE**2)
     start, aside = at.sizes + moved, (compliance @ np.linalg.solve(at.mass_matrix, off.T)).T
     q, qd = start.copy(), np.zeros_like(start)
-    times = [None] * len(start)
+    times: list[float | None] = [None] * len(start)
     for k in range(1, round(LONGEST_DEPARTURE / dt) + 1):
         added = np.concatenate([q - at.sizes + aside, qd], axis=1) @ change
         q, qd = q + added[:, :n], qd + added[:, n:]
@@ -94,10 +95,9 @@ def check_departures(result: Result, rows: list[DepartureRow]) -> None:
 
 def late(row: Departure) -> float | None:
     """By how much a run leaves later than predicted, s: 0 where neither leaves, None where only one of them does."""
-    times = row.observed, row.predicted
-    if None in times:
-        return 0.0 if times == (None, None) else None
-    return times[0] - times[1]
+    if row.observed is None or row.predicted is None:
+        return 0.0 if row.observed is row.predicted else None
+    return row.observed - row.predicted
 
 
 def check_row(result: Result, where: str, row: Departure) -> None:
@@ -116,10 +116,14 @@ def near(row: Departure) -> float:
     return max(DEPARTURE_TOLERANCE, row.dt) * (1.0 + 1e-9)
 
 
-def departure_values(rows: list[DepartureRow]) -> dict:
+def departure_values(rows: list[DepartureRow]) -> dict[str, Any]:
     """How many departures are as predicted, and the largest difference, s."""
-    off = [abs(late(row)) for row in rows if None not in (row.observed, row.predicted)]
-    close = sum(late(row) is not None and abs(late(row)) <= near(row) for row in rows)
+    off = [
+        abs(row.observed - row.predicted)
+        for row in rows
+        if row.observed is not None and row.predicted is not None
+    ]
+    close = sum((by := late(row)) is not None and abs(by) <= near(row) for row in rows)
     return {"count": len(rows), "close": close, "worst": max(off, default=None)}
 
 
@@ -133,7 +137,7 @@ def own_torque(method: Method, engines: Mapping[str, Engine], at: Held) -> np.nd
     residual is least; compiled code regroups the sums, and there may be no double that it takes for its bias.
     """
     if method.engine == "mujoco":
-        return engines["mujoco"].of(at.case).gravity_balance(at.q)
+        return mujoco_of(engines, at.case).gravity_balance(at.q)
     tau = variants(at.tau, 2)
     return tau[np.argmin(np.abs(residual(method, engines, at, tau)).max(axis=1))]
 

@@ -13,7 +13,7 @@ from ...judge.scale import EPS, FACTOR
 from ...stability.held import held, posture_names
 from ...stability.linear_step import is_runge_kutta
 from ..setup import Setup
-from .subjects import DAMPINGS, coarsest_case, subjects_of
+from .subjects import DAMPINGS, coarsest_case, mujoco_of, subjects_of
 
 FINE_STEP, FINE_DAMPED_STEP = (
     1e-2,
@@ -39,7 +39,7 @@ def check_equilibria(result: Result, setup: Setup) -> None:
                 stepping = METHODS[method.scheme]
                 if is_runge_kutta(stepping) and at.growth(method.scheme, dt) > MOST_OF_A_STEP:
                     continue
-                theirs = transition(mujoco.of(at.case), at.q, at.tau, dt, method.name)
+                theirs = transition(mujoco_of(setup.engines, at.case), at.q, at.tau, dt, method.name)
                 where = f"{name}, {method.name}, dt = {dt:.4g} s, damping {damping:g}"
                 check_amplification(result, where, at.sizes, at.step(method.scheme, dt), theirs)
 

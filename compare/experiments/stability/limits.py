@@ -1,7 +1,7 @@
 """Step limits: up to which dt a method keeps a small deviation small, predicted from one step and observed in runs."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -52,7 +52,7 @@ def limit_rows(
             tried = predicted * TRIED_ABOUT
         seen, observed = observed_limit(method, engines, at, steps, tried)
         row = LimitRow(
-            scene=at.name, engine=method.engine, method=method.name, damping=at.case.scene.damping, mode=rate,
+            scene=at.name, engine=method.engine, method=method.name, damping=at.damping, mode=rate,
             predicted_dt=predicted, observed_dt=observed, limit=kind,
         )  # fmt: skip
         rows.append(Observed(row, seen, tolerance))
@@ -171,7 +171,7 @@ def check_limits(result: Result, limits: Sequence[Observed]) -> None:
     ]
 
 
-def summary(rows: Sequence[LimitRow]) -> dict:
+def summary(rows: Sequence[LimitRow]) -> dict[str, Any]:
     """How many limits are observed and as predicted, and the largest relative difference."""
     off = [row.apart for row in rows if row.apart is not None]
     wrong = sum(row.passed is False for row in rows)

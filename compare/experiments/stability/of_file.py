@@ -113,7 +113,8 @@ def begin(setup: Setup) -> Work | None:
                  for posture in postures[: None if setup.alone else 1] for contacts in (True, False)]  # fmt: skip
         answers.append(setup.map(partial(answer_of, reading=reading), tasks if not number else tasks[::2]))
     in_use = asked[-1]
-    control, motions = [], []
+    control: Iterable[ControlRow | None] = []
+    motions: Iterable[MotionRow] = []
     if request.control_period:
         control = setup.map(partial(control_row, reading=reading, request=request, asked=in_use), postures)
     if request.at_speed:
@@ -186,11 +187,11 @@ def add(result: StabilityResult, setup: Setup, work: Work) -> None:
             result.growth = drawn(found)
     for row in work.control:
         add_control(result, row)
-    for row in work.motions:
-        result.tables.setdefault("motion_stability", []).append(row)
-        result.check(row.posture, "growth along its motion", 1 if row.passed else None, 1, "runs",
+    for moving in work.motions:
+        result.tables.setdefault("motion_stability", []).append(moving)
+        result.check(moving.posture, "growth along its motion", 1 if moving.passed else None, 1, "runs",
                      rule="equal", about=About.STEP)  # fmt: skip
-        result.top.append(result.finding("motion", OF, row=row))
+        result.top.append(result.finding("motion", OF, row=moving))
 
 
 def drawn(found: Sequence[PlaceAnswer]) -> dict[str, dict[str, Curve]]:
@@ -245,15 +246,10 @@ def add_answer(
     own_runs = result.tables.get("own_run", ())
     runs = [run for run in own_runs if (run.dt, run.integrator) == (asked.dt, asked.integrator)]
     here = [row for row in rows if worst and row.posture == worst.posture]
-    others = [
-        row for row in here if row.integrator != asked.integrator and row.surroundings == worst.surroundings
-    ]
-    air = [
-        row
-        for row in here
-        if row.integrator == asked.integrator and row.surroundings == "air" != worst.surroundings
-    ]
-    alike = [row for row in own if row is not worst and row.stable_at_file_dt == worst.stable_at_file_dt]
+    where, is_stable = (worst.surroundings, worst.stable_at_file_dt) if worst else ("", None)
+    others = [row for row in here if row.integrator != asked.integrator and row.surroundings == where]
+    air = [row for row in here if row.integrator == asked.integrator and row.surroundings == "air" != where]
+    alike = [row for row in own if row is not worst and row.stable_at_file_dt == is_stable]
     default = None if is_requested else at_default(worst, others, asked)
     values = {
         "row": worst, "also": [row.posture for row in alike], "others": others, "air": air[0] if air else None,

@@ -101,5 +101,7 @@ def add(result: Result, work: Sequence[OwnRuns]) -> None:
             )
         result.tables.setdefault("own_run", []).extend(rows)
         others = sum(row.outcome == rows[0].outcome for row in rows[1:])
-        values = {"requested": quantity == AT_REQUESTED, "others": others, "calm": CALM}
-        result.top.append(result.finding("own_run", run=rows[0], **values))
+        requested = quantity == AT_REQUESTED
+        result.top.append(
+            result.finding("own_run", run=rows[0], requested=requested, others=others, calm=CALM)
+        )

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...engines import Engine, Method, one_of_each_scheme, same_scheme
+from ...engines.mujoco.dynamics import MujocoDynamics
 from ...robots import Robot
 from ...robots.case import Case
 from ...stability.held import held, posture_names
@@ -34,9 +35,9 @@ def subjects_of(robot: Robot) -> Subjects:
     at = {name: held(robot, name) for name in posture_names(robot)}
     centres = [name for name in at if at[name].stays and not at[name].without_stiffness.all()]
     saddles = [name for name in at if at[name].kind == "saddle"]
-    centres = tuple(sorted(centres, key=lambda name: name != robot.kinds.get("centre")))
-    saddles = tuple(sorted(saddles, key=lambda name: name != robot.kinds.get("saddle")))
-    return Subjects(robot, centres, saddles)
+    centres.sort(key=lambda name: name != robot.kinds.get("centre"))
+    saddles.sort(key=lambda name: name != robot.kinds.get("saddle"))
+    return Subjects(robot, tuple(centres), tuple(saddles))
 
 
 def methods_of(
@@ -52,6 +53,12 @@ def methods_of(
         for method in (*ours, *(one_of_each_scheme(mujoco) if schemes else mujoco.methods.values()))
         if not method.adaptive and (not schemes or method.scheme in schemes)
     )
+
+
+def mujoco_of(engines: Mapping[str, Engine], case: Case) -> MujocoDynamics:
+    dynamics = engines["mujoco"].of(case)
+    assert isinstance(dynamics, MujocoDynamics)
+    return dynamics
 
 
 def rk4_of_both(engines: Mapping[str, Engine]) -> tuple[Method, Method]:

@@ -1,6 +1,7 @@
 """The rows of the tables of stability, and its result."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from ...core.check import Result
 from ...core.rows import Column, Row, column
@@ -10,7 +11,7 @@ from ...stability.answer import Curve
 STEP_DIGITS = 5  # of a step in a report
 
 
-def time_step(**more):
+def time_step(**more: Any) -> Any:
     """A field with a time step, s."""
     return column("s", digits=STEP_DIGITS, **more)
 
