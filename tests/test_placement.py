@@ -41,6 +41,9 @@ ALONG = edited(
 )
 AS_LINKS = edited(('<joint name="alpha" type="hinge" axis="0 1 0"/>', ""), (UPPER, f"{YOKE}{UPPER}"),
                   ("</worldbody>", "</body></worldbody>"))  # fmt: skip
+# the forearm hangs, and that is called 90 degrees
+HANGING = edited(('name="gamma"', 'name="gamma" ref="1.5707963267948966"'),
+                 (FOREARM, '<inertial pos="0 0 -0.15" mass="1.5" diaginertia="0.019 0.019 0.001"/>'))  # fmt: skip
 OTHERWISE = {
     "moved": (moved('pos="0.2 0.1 1.4"'), "moved by (0.2, 0.1, 1.4) m"),
     "turned": (
@@ -51,6 +54,7 @@ OTHERWISE = {
         edited(("0 0 -9.81", "0 -9.81 0"), text=moved('euler="-1.5707963267948966 0 0"')),
         "gravity with it",
     ),
+    "drawn": (HANGING, "drawn at another position (ref) of gamma"),
     "along": (ALONG, "anchor elsewhere on the axis of alpha and gamma"),
     "welded": (edited((FOREARM, SPLIT)), "one (hand on forearm)"),
     "stand": (edited(("</worldbody>", f"{STAND}</worldbody>")), "fixed to the world, without motion: stand"),
@@ -89,6 +93,7 @@ def test_a_file_that_moves_as_stated_is_compared_in_its_place_and_said_to_be_oth
     edited(('name="beta" type="hinge" axis="1 0 0"', 'name="beta" type="hinge" axis="-1 0 0"')),
     XML.replace('axis="0 1 0"', 'axis="0 -1 0"'), edited(("0 0 -9.81", "0 0 9.81")),
     edited(('pos="0 0 -0.3"', 'pos="0 0 -0.31"')),
+    edited(('name="gamma"', 'name="gamma" ref="1.5707963267948966"')),
     edited(('axis="1 0 0"', 'axis="0 0 1"')), edited((FOREARM, FOREARM.replace("0.15", "-0.15"))),
 ])  # fmt: skip
 def test_what_moves_otherwise_is_not_moved_nor_turned(text):

@@ -1,6 +1,7 @@
 """Where the frames of a file may lie without another motion: the stated robot, moved and turned with gravity.
 
-The anchor of a hinge may lie anywhere on its axis, that of a slide anywhere.
+The anchor of a hinge may lie anywhere on its axis, that of a slide anywhere; frames may be parallel at any position of
+the joints.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,6 +11,8 @@ from itertools import combinations
 import numpy as np
 
 import tmt
+from tmt.derivation.method import joint_frames
+from tmt.derivation.vectors import Vector
 
 from ..core.finding import Finding
 from .joint_map import places_of
@@ -26,11 +29,12 @@ class Placement:
     turn: np.ndarray  # (3, 3), of the stated robot and its gravity
     shift: np.ndarray  # (3,) m, of its origin
     along: tuple[str, ...]  # joints whose anchor is elsewhere on their axis
+    drawn: tuple[str, ...]  # joints that the file draws at another position, its `ref`
     is_with_gravity: bool  # whether gravity is turned with the robot; else the turn is an error
 
     @property
     def is_same(self) -> bool:
-        return not (self.is_turned or self.is_moved or self.along)
+        return not (self.is_turned or self.is_moved or self.along or self.drawn)
 
     @property
     def is_turned(self) -> bool:
@@ -47,16 +51,24 @@ class Placement:
         cosine = np.clip((np.trace(self.turn) - 1.0) / 2.0, -1.0, 1.0)
         values = {"shift": self.shift.tolist(), "angle": float(np.degrees(np.arccos(cosine)))}
         values |= {"axis": axis_of(self.turn).tolist(), "along": self.along, "is_moved": self.is_moved}
-        values |= {"is_turned": self.is_turned, "is_with_gravity": self.is_with_gravity}
+        values |= {"is_turned": self.is_turned, "drawn": self.drawn, "is_with_gravity": self.is_with_gravity}
         return [Finding("remarks", "placed", values)]
 
 
 def placed(stated: tmt.Tree, tree: tmt.Tree) -> Placement:
     """The stated Tree, moved and turned such that most of its vectors are those of the Tree of a file, which has its joints."""
     joints = [tree.joint_names.index(name) for name in stated.joint_names]
+    reference = [tree.reference[joint] for joint in joints]
+    drawn = tuple(name for name, a, b in zip(stated.joint_names, stated.reference, reference) if a != b)
+    turn, most = turned(vectors_of(stated, range(len(joints))), vectors_of(tree, joints))
+    there = drawn_at(stated, reference) if drawn else stated
+    other_turn, count = turned(vectors_of(there, range(len(joints))), vectors_of(tree, joints))
+    if count > most:
+        stated, turn = there, other_turn
+    else:
+        drawn = ()
     anchors, _, axes = places_of(stated)
     file_anchors, _, _ = (values[joints] for values in places_of(tree))
-    turn = turned(vectors_of(stated, range(len(joints))), vectors_of(tree, joints))
     anchors, axes = anchors @ turn.T, axes @ turn.T
     free = [directions(kind, axis) for kind, axis in zip(stated.kind, axes)]
     size = max(1.0, np.abs(anchors).max(), np.abs(file_anchors).max())
@@ -71,7 +83,7 @@ def placed(stated: tmt.Tree, tree: tmt.Tree) -> Placement:
     changed = along or shift.any() or (turn != np.eye(3)).any()
     tree_there = moved_tree(stated, turn, moved, shift) if changed else stated
     is_with_gravity = bool(same_vectors(np.array([tree_there.gravity]), np.array([tree.gravity]))[0])
-    return Placement(tree_there, turn, shift, tuple(along), is_with_gravity)
+    return Placement(tree_there, turn, shift, tuple(along), drawn, is_with_gravity)
 
 
 def moved_tree(stated: tmt.Tree, turn: np.ndarray, anchors: np.ndarray, shift: np.ndarray) -> tmt.Tree:
@@ -107,14 +119,37 @@ def vectors_of(tree: tmt.Tree, joints: Sequence[int]) -> np.ndarray:
     return np.vstack([axes, np.diff(anchors, axis=0), centres, tree.gravity])
 
 
-def turned(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """The rotation, (3, 3), by which most vectors, (k, 3), are the others; the identity unless one makes more of them so."""
+def drawn_at(stated: tmt.Tree, reference: Sequence[float]) -> tmt.Tree:
+    """The same robot with frames that are parallel at other positions of its joints; a ball's stays."""
+    q = list(stated.zero)
+    for joint, position in zip(stated.coordinates.joints, reference):
+        if joint.kind != "ball":
+            q[joint.q.start] = position
+    frames = joint_frames(stated, q)
+    anchors = np.array([tuple(frame.origin) for frame in frames])
+    origins = [anchors[parent] if parent >= 0 else np.zeros(3) for parent in stated.parent]
+    turns = [np.array([list(row) for row in frames[joint].turn]) for joint in stated.body_joint]
+    return replace(
+        stated,
+        offset=rows(anchors - origins),
+        axis=tuple(tuple(axis) for frame in frames for axis in frame.axes),
+        com=tuple(tuple(frames[j].turn @ Vector(*com)) for j, com in zip(stated.body_joint, stated.com)),
+        inertia=tuple(rows(symmetric(R @ I @ R.T)) for R, I in zip(turns, np.array(stated.inertia))),
+        reference=tuple(reference),
+    )
+
+
+def turned(vectors: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, int]:
+    """The rotation, (3, 3), by which most vectors, (k, 3), are the others, and how many are.
+
+    It is the identity unless another one makes more of them so.
+    """
     best, turn = same_vectors(vectors, others).sum(), np.eye(3)
     for candidate in rotations(vectors, others):
         same = same_vectors(vectors @ candidate.T, others)
         if same.sum() > best:
             best, turn = same.sum(), candidate
-    return turn
+    return turn, int(best)
 
 
 def same_vectors(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
