@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from edited import CART
 
 import tmt
 from compare.engines.mujoco import ModelError, read
@@ -107,6 +108,18 @@ def test_a_robot_that_is_turned_against_gravity_differs_in_gravity_alone():
     (remark,) = placement.remarks()
     assert not remark.values["is_with_gravity"] and remark.values["angle"] == pytest.approx(np.degrees(0.3))
     assert np.abs(tmt.bias(*STATES[:2], placement.tree) - tmt.bias(*STATES[:2])).max() < 1e-13
+
+
+def test_the_anchor_of_a_slide_may_be_anywhere_that_of_a_ball_may_not():
+    tree, q = read(Source(CART)).tree, np.array([0.3, 0.7, 0.5, 0.5, -0.5, 0.5])
+    rail, wrist = (
+        CART.replace('name="rail"', 'name="rail" pos="0 1 2"'),
+        CART.replace('pos="0 0.01 0"', 'pos="0 0.02 0"'),
+    )
+    placement = placed(tree, read(Source(rail)).tree)
+    assert placement.along == ("rail",) and not placement.is_moved and not placement.is_turned
+    assert np.abs(tmt.mass_matrix(q, placement.tree) - tmt.mass_matrix(q, tree)).max() < 1e-14
+    assert placed(tree, read(Source(wrist)).tree).is_same
 
 
 def test_bodies_stay_one_where_joints_are_locked(tmp_path):
