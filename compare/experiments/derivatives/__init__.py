@@ -1,7 +1,6 @@
 """Derivatives: how exact is each way to them, and at what cost?"""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from math import inf, isfinite
 from typing import Any, NamedTuple, cast
@@ -9,7 +8,6 @@ from typing import Any, NamedTuple, cast
 from tmt.compiled.evaluator import Evaluator
 
 from ...core import timing
-from ...core.check import Result
 from ...core.finding import Finding
 from ...engines.mujoco import Mujoco
 from ...judge.scale import FACTOR
@@ -17,7 +15,7 @@ from ...robots import Robot
 from .. import Drawing, Experiment
 from ..setup import Setup
 from .subjects import Subject, dynamics_of, subjects
-from .tables import CostRow, DerivativeRow, HardRow
+from .tables import CostRow, DerivativeRow, DerivativesResult, HardRow, errors_of
 from .ways import CENTRED, COMPILED, EXACT, INVERSE, NUMPY, ONE_SIDED, USUAL, Measured, Quantity, measured
 
 EXPERIMENT = Experiment(order=105, serves_own=False, timed=True)
@@ -26,14 +24,6 @@ FEW_SPEEDS = 8  # of a robot with all integrators: of others they take minutes
 INTEGRATORS = "Euler", "implicitfast", "implicit", "discrete", "RK4"
 FEW_INTEGRATORS = ("implicitfast",)  # of all subjects but the first, unless the experiment runs alone
 Work = Iterable[list[Measured]]
-
-
-@dataclass
-class DerivativesResult(Result):
-    """Its result: what its figure needs, too."""
-
-    main: str = ""  # the subject that is drawn
-    times: dict[tuple[str, str], float] = field(default_factory=dict)  # s, by quantity and way
 
 
 def claim_values(robot: Robot) -> dict[str, Any]:
@@ -137,15 +127,6 @@ def cost(result: DerivativesResult, quantity: Quantity, scenes: Sequence[Derivat
     )
 
 
-def errors_of(rows: Iterable[DerivativeRow]) -> dict[float, float]:
-    """The largest error for each eps, 0 where there is none; inf where one is not a number."""
-    errors: dict[float, float] = {}
-    for row in rows:
-        error = inf if row.error is None else row.error
-        errors[row.eps or 0.0] = max(error, errors.get(row.eps or 0.0, 0.0))
-    return errors
-
-
 def add_advice(result: DerivativesResult, scenes: Sequence[DerivativeRow], every: Sequence[Measured]) -> None:
     """Which eps to use, what it costs, and where that fails."""
     steps = [row for row in scenes if row.quantity != INVERSE]
@@ -165,17 +146,17 @@ def add_advice(result: DerivativesResult, scenes: Sequence[DerivativeRow], every
     result.headline = result.finding("headline", **values)
     result.top.append(result.finding("advice", **values))
     costs = [row for row in result.tables["derivative_costs"] if row.time]
-    pairs = [(row, fastest_of(costs, row.quantity)) for row in costs if row.way == COMPILED]
+    pairs = [(row, of_mujoco(costs, row.quantity)) for row in costs if row.way == COMPILED]
     result.find("costs", pairs=[(row, other) for row, other in pairs if other])
     hard = [hard_row(one, scenes) for one in every if one.subject.kind != "scene"]
     result.tables["hard_derivatives"] = hard
     result.find("hard", rows=hard)
 
 
-def fastest_of(costs: Sequence[CostRow], quantity: str) -> CostRow | None:
-    """The fastest of MuJoCo's ways to a quantity."""
+def of_mujoco(costs: Sequence[CostRow], quantity: str) -> CostRow | None:
+    """MuJoCo's way to a quantity: its own function, centred where it can be."""
     others = [row for row in costs if row.quantity == quantity and row.way not in EXACT]
-    return min(others, key=lambda row: row.time or 0.0, default=None)
+    return max(others, key=lambda row: (row.way.endswith(CENTRED), row.way.startswith("mjd")), default=None)
 
 
 def hard_row(one: Measured, scenes: Sequence[DerivativeRow]) -> HardRow:

@@ -4,8 +4,7 @@ from matplotlib.figure import Figure
 
 from ...core.finding import Finding
 from ...report.style import BLUE, DASHES, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
-from . import DerivativesResult, errors_of
-from .tables import CostRow
+from .tables import CostRow, DerivativesResult, errors_of
 from .ways import EXACT, INVERSE
 
 LEAST = 1e-17  # that is drawn of an error

@@ -1,7 +1,10 @@
-"""The rows of the tables of derivatives."""
+"""The rows of the tables of derivatives, and the result that has them."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from math import inf
 
+from ...core.check import Result
 from ...core.rows import Row, column
 
 
@@ -40,3 +43,20 @@ class HardRow(Row):
     scenes_error: float | None  # with that, along the scenes
     best_eps: float
     best_error: float | None
+
+
+@dataclass
+class DerivativesResult(Result):
+    """Its result: what its figure needs, too."""
+
+    main: str = ""  # the subject that is drawn
+    times: dict[tuple[str, str], float] = field(default_factory=dict)  # s, by quantity and way
+
+
+def errors_of(rows: Iterable[DerivativeRow]) -> dict[float, float]:
+    """The largest error for each eps, 0 where there is none; inf where one is not a number."""
+    errors: dict[float, float] = {}
+    for row in rows:
+        error = inf if row.error is None else row.error
+        errors[row.eps or 0.0] = max(error, errors.get(row.eps or 0.0, 0.0))
+    return errors
