@@ -82,6 +82,17 @@ class Model(OfCompiled):
     def acceleration(self, q: Array, v: Array, force: Array) -> Array:
         return self.values(q, v, force)[2]
 
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        return (
+            ("derivatives",) if len(self.bare.qpos) > len(self.bare.dofs) else ()
+        )  # quaternions do not move like numbers
+
+    def derivatives(self, q: Array, v: Array, force: Array) -> Array:
+        by = functions()["derivatives"](self.model, self.data, *self.placed(q, v, force))
+        rows, at = self.bare.dofs, (self.bare.qpos, self.bare.dofs, self.bare.dofs)
+        return np.array([np.asarray(matrix)[np.ix_(rows, columns)] for matrix, columns in zip(by, at)])
+
     def run(self, course: Course) -> tuple[Array, int]:
         dt = np.asarray(course.dt, self.precision)
         model = self.models[course.method].tree_replace({"opt.timestep": dt})
@@ -112,5 +123,15 @@ def functions() -> dict[str, Callable[..., Any]]:
 
         return jax.lax.scan(record, (qpos, qvel), None, records)[1]
 
-    compiled = partial(jax.jit, compiler_options=COMPILER)
-    return {"values": compiled(values), "path": compiled(path, static_argnames="records")}
+    def acceleration(model: Any, data: Any, *state: Any) -> Any:
+        return values(model, data, *state)[2]
+
+    compiled, derivatives = (
+        partial(jax.jit, compiler_options=COMPILER),
+        jax.jacfwd(acceleration, argnums=(2, 3, 4)),
+    )
+    return {
+        "values": compiled(values),
+        "derivatives": compiled(derivatives),
+        "path": compiled(path, static_argnames="records"),
+    }

@@ -13,6 +13,7 @@ A process of its own keeps an engine's threads, its precision and a crash away f
 
 import importlib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache, cached_property
 from operator import attrgetter
 from pathlib import Path
@@ -20,6 +21,8 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 import numpy as np
+
+import tmt
 
 from ...core.words import listed
 from ...process.workers import Beginning, WorkerEnded, Workers
@@ -99,6 +102,19 @@ class OutsideDynamics(OneByOne):
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         return self.rows("acceleration", q, v, tau - passive(self.tree, q, v))
+
+    def derivatives(self, q: Array, v: Array, tau: Array) -> Array:
+        """Of the accelerations by movements of q, by v and by tau, (states, 3, nv, nv), with damping and springs."""
+        by = self.rows("derivatives", q, v, tau - passive(self.tree, q, v))
+        bare, rest = replace(self.tree, damping=(0.0,) * len(self.tree.axis), stiffness=()), np.zeros_like(v)
+        rates = (tmt.inverse_dynamics_derivatives(q, v, rest, tree) for tree in (self.tree, bare))
+        for k, (whole, part) in enumerate(zip(*rates)):
+            by[:, k] -= by[:, 2] @ (whole - part)
+        return by
+
+    def seconds(self, quantity: str, *state: Array) -> float:
+        """Of one evaluation of a quantity at a state, in the engine's process."""
+        return self.ask(answers.seconds, quantity, *state)
 
     def has(self, quantity: str) -> bool:
         return quantity in self.reading["has"]

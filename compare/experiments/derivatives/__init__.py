@@ -8,15 +8,32 @@ from typing import Any, NamedTuple, cast
 from tmt.compiled.evaluator import Evaluator
 
 from ...core import timing
+from ...core.check import About
 from ...core.finding import Finding
+from ...engines import LABELS, RECORDS
 from ...engines.mujoco import Mujoco
 from ...judge.scale import FACTOR
 from ...robots import Robot
 from .. import Drawing, Experiment
 from ..setup import Setup
-from .subjects import Subject, dynamics_of, subjects
+from .subjects import Subject, all_subjects, dynamics_of
 from .tables import CostRow, DerivativeRow, DerivativesResult, HardRow, errors_of
-from .ways import CENTRED, COMPILED, EXACT, INVERSE, NUMPY, ONE_SIDED, USUAL, Measured, Quantity, measured
+from .ways import (
+    CENTRED,
+    COMPILED,
+    EXACT,
+    FORWARD,
+    INVERSE,
+    NUMPY,
+    ONE_SIDED,
+    USUAL,
+    Measured,
+    Quantity,
+    engines_of,
+    measured,
+    over,
+    row_of,
+)  # fmt: skip
 
 EXPERIMENT = Experiment(order=105, serves_own=False, timed=True)
 MOST_SPEEDS = 40  # of a robot whose exact derivatives are traced in less than a minute
@@ -56,7 +73,7 @@ def begin(setup: Setup) -> Work:
     dt, tasks = float(mujoco.model.opt.timestep), list[Task]()
     is_small = setup.robot.coordinates.nv <= FEW_SPEEDS
     states = setup.of(4, 2, 2) if is_small else 1
-    for subject in subjects(setup.robot, setup.random.first(200), dt, states):
+    for subject in all_subjects(setup.robot, setup.random.first(200), dt, states):
         is_main = not tasks
         integrators = INTEGRATORS if is_small and (is_main or setup.alone) else FEW_INTEGRATORS
         tasks.append(Task(subject, integrators, is_main))
@@ -80,6 +97,8 @@ def rows(setup: Setup, work: Work | None = None) -> DerivativesResult:
     result.main = main[0].subject.name
     setup.quiet()  # nothing else may run while times are taken
     add_times(setup, result, main)
+    if setup.alone:
+        add_engines(setup, result, main[0])
     scenes = [row for one in every if one.subject.kind == "scene" for row in one.rows]
     result.tables["derivative_costs"] = [
         cost(result, one.quantity, scenes, way) for one in main for way in ways_of(one)
@@ -108,6 +127,23 @@ def add_times(setup: Setup, result: DerivativesResult, main: Sequence[Measured])
     result.times = timing.fastest(calls, setup.of(50, 20, 2))
 
 
+def add_engines(setup: Setup, result: DerivativesResult, forward: Measured) -> None:
+    """The rows, checks and times of other engines' derivatives of accelerations, of the main subject."""
+    subject, quantity = forward.subject, forward.quantity
+    for name, dynamics in engines_of(subject, setup.engines).items():
+        setup.progress(f"derivatives: {LABELS[name]}")
+        matrices = dynamics.derivatives(subject.q, subject.qd, subject.tau)
+        values, exact = quantity.side_by_side(matrices), quantity.exact_values(subject, 0.0)
+        share = over(exact.distance(values), FACTOR * RECORDS[name].eps * quantity.scale(subject, 0.0))
+        what = f"{quantity.name}: {LABELS[name]} to exact, over its tolerance"
+        result.check(subject.name, what, share, 1.0, "", about=About.ENGINE)
+        row = row_of(subject, quantity, LABELS[name], None, values, exact)
+        forward.rows.append(row)
+        result.rows.append(row)
+        state = subject.q[0], subject.qd[0], subject.tau[0]
+        result.times[quantity.name, LABELS[name]] = dynamics.seconds("derivatives", *state)
+
+
 def first(subject: Subject) -> Subject:
     return subject._replace(q=subject.q[:1], qd=subject.qd[:1], tau=subject.tau[:1])
 
@@ -129,14 +165,14 @@ def cost(result: DerivativesResult, quantity: Quantity, scenes: Sequence[Derivat
 
 def add_advice(result: DerivativesResult, scenes: Sequence[DerivativeRow], every: Sequence[Measured]) -> None:
     """Which eps to use, what it costs, and where that fails."""
-    steps = [row for row in scenes if row.quantity != INVERSE]
+    steps = [row for row in scenes if row.eps and row.quantity != INVERSE]
     by_side = {
         side: errors_of(row for row in steps if row.way.endswith(side)) for side in (CENTRED, ONE_SIDED)
     }
     best = {side: min(errors, key=lambda eps: errors[eps]) for side, errors in by_side.items()}
     inverse = errors_of(row for row in scenes if row.quantity == INVERSE and row.eps)
     at = min(inverse, key=lambda eps: inverse[eps])
-    exact = max(errors_of(row for row in scenes if row.eps is None).values())
+    exact = max(errors_of(row for row in scenes if row.way in EXACT).values())
     values: dict[str, Any] = {
         "eps": best[CENTRED], "error": by_side[CENTRED][best[CENTRED]], "usual": USUAL,
         "usual_error": by_side[ONE_SIDED][USUAL], "one_sided_eps": best[ONE_SIDED],
@@ -145,10 +181,18 @@ def add_advice(result: DerivativesResult, scenes: Sequence[DerivativeRow], every
     }  # fmt: skip
     result.headline = result.finding("headline", **values)
     result.top.append(result.finding("advice", **values))
-    costs = [row for row in result.tables["derivative_costs"] if row.time]
+    costs: list[CostRow] = [row for row in result.tables["derivative_costs"] if row.time]
     pairs = [(row, of_mujoco(costs, row.quantity)) for row in costs if row.way == COMPILED]
-    result.find("costs", pairs=[(row, other) for row, other in pairs if other])
-    hard = [hard_row(one, scenes) for one in every if one.subject.kind != "scene"]
+    others = [row for row in costs if row.way in LABELS.values()]
+    result.find(
+        "costs",
+        engines=others,
+        exact=[row for row in costs if row.quantity == FORWARD and row.way in EXACT],
+        pairs=[(row, other) for row, other in pairs if other],
+    )
+    hard = [
+        hard_row(one, scenes) for one in every if one.subject.kind != "scene" and one.quantity.name != FORWARD
+    ]
     result.tables["hard_derivatives"] = hard
     result.find("hard", rows=hard)
 

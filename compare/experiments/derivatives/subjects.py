@@ -81,7 +81,7 @@ def near_singular(subject: Subject, sample: Sample) -> Subject:
     return Subject(SINGULAR, "singular", subject.case, subject.tree, *states)
 
 
-def subjects(robot: Robot, sample: Sample, dt: float, states: int) -> Sequence[Subject]:
+def all_subjects(robot: Robot, sample: Sample, dt: float, states: int) -> Sequence[Subject]:
     """All subjects, the main one first."""
     scenes = [along(case, states) for case in cases_of(robot)]
     free = next((subject for subject in scenes if not subject.case.controller), scenes[0])

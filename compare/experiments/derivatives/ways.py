@@ -10,10 +10,13 @@ import tmt
 from tmt.compiled.evaluator import Evaluator
 from tmt.exact.many import Pairs, exact_of_many
 
+from ...engines import Engine
 from ...engines.mujoco import Mujoco
 from ...engines.mujoco.differences import Call, of_inverse, of_steps, of_transition
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.engine import methods_for
+from ...engines.outside import OutsideDynamics
+from ...engines.outside.model import EngineError
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR, gain_scale
 from .subjects import Subject, dynamics_of
@@ -27,7 +30,7 @@ USUAL = 1e-6  # of mjd_transitionFD in MuJoCo's own samples
 ONE_SIDED, CENTRED = "one-sided", "centred"
 BY_INVERSE, NUMPY, COMPILED = "mjd_inverseFD", "tmt, NumPy", "tmt, compiled"
 EXACT = NUMPY, COMPILED
-INVERSE = "dtau/dq and dtau/dqd"
+INVERSE, FORWARD = "dtau/dq and dtau/dqd", "dqdd/dq, dqdd/dqd and dqdd/dtau"
 TRUNCATED = 2.0 / 99.0  # of the difference between an eps and ten times that: twice the term in eps^2
 
 
@@ -41,20 +44,21 @@ class Quantity(NamedTuple):
     def exact_values(self, subject: Subject, dt: float) -> Pairs:
         """(states, rows, columns)."""
         values = exact_of_many(subject.tree, self.exact, *self.given(subject, dt))
-        return values if self.integrator else Pairs(*(side_by_side(part) for part in values))
+        return values if self.integrator else Pairs(*(self.side_by_side(part) for part in values))
 
     def given(self, subject: Subject, dt: float) -> list[Array]:
         """What tmt's quantity takes at all states."""
-        if self.integrator:
-            return [subject.q, subject.qd, subject.tau, np.full((subject.states, 1), dt)]
-        return [subject.q, subject.qd, accelerations(subject)]
+        third = accelerations(subject) if self.name == INVERSE else subject.tau
+        steps = [np.full((subject.states, 1), dt)] if self.integrator else []
+        return [subject.q, subject.qd, third, *steps]
+
+    def side_by_side(self, matrices: Array) -> Array:
+        """The derivatives of this quantity, (states, nv, columns), of those of tmt's, (states, parts, nv, nv)."""
+        return np.concatenate([matrices[:, k] for k in range(2 if self.name == INVERSE else 3)], axis=2)
 
     def by_numpy(self, subject: Subject, dt: float) -> Array:
-        q, qd, third, *_ = self.given(subject, dt)
-        if self.integrator:
-            method = self.exact.partition(":")[2]
-            return np.concatenate(tmt.step_derivatives(q, qd, third, dt, method, subject.tree), axis=2)
-        return np.concatenate(tmt.literal.inverse_dynamics_derivatives(q, qd, third, subject.tree), axis=2)
+        values = tmt.literal.literal(self.exact)(*self.given(subject, dt), subject.tree)
+        return np.asarray(values) if self.integrator else self.side_by_side(np.stack(values, axis=1))
 
     def by_machine_code(self, subject: Subject, dt: float) -> Array | None:
         evaluator = Evaluator(subject.tree, self.exact)
@@ -62,20 +66,23 @@ class Quantity(NamedTuple):
         if rows is None:
             return None
         values = rows.reshape(subject.states, *evaluator.shape)
-        return values if self.integrator else side_by_side(values)
+        return values if self.integrator else self.side_by_side(values)
 
     def scale(self, subject: Subject, dt: float) -> Array:
         """Of each entry, (states, rows, columns)."""
         entries, qdd = Entries(subject.tree, subject.q, subject.qd), accelerations(subject)
-        if not self.integrator:
+        if self.name == INVERSE:
             return np.concatenate(entries.force_rates(qdd), axis=2)
         by = tmt.derivatives(subject.q, subject.qd, subject.tau, subject.tree)
-        return entries.step(dt, by, entries.derivatives(subject.tau, qdd, by))
+        scale = entries.derivatives(subject.tau, qdd, by)
+        return entries.step(dt, by, scale) if self.integrator else np.concatenate(scale[:3], axis=2)
 
     def differences(self, dynamics: MujocoDynamics, subject: Subject, dt: float, k: int) -> Iterator["Way"]:
         """MuJoCo's ways at state k."""
         q, qd, tau = subject.q[k], subject.qd[k], subject.tau[k]
-        if not self.integrator:
+        if self.name == FORWARD:
+            return
+        if self.name == INVERSE:
             a = accelerations(subject)[k]
             yield Way(BY_INVERSE, False, lambda eps: of_inverse(dynamics, q, qd, a, eps))
             return
@@ -98,20 +105,16 @@ class Way(NamedTuple):
 
 
 def quantities(subject: Subject, integrators: Sequence[str]) -> list[Quantity]:
-    """The derivatives of the inverse dynamics, and of a step of each of these integrators that MuJoCo has."""
+    """The derivatives of accelerations and torques, and of a step of each of these integrators that MuJoCo has."""
     methods = methods_for(subject.tree)
     known = [name for name in integrators if name in methods]
     steps = [Quantity(f"A and B, {name}", f"step_derivatives:{methods[name].scheme}", name) for name in known]
-    return [Quantity(INVERSE, "inverse_dynamics_derivatives"), *steps]
+    inverse = Quantity(INVERSE, "inverse_dynamics_derivatives")
+    return [Quantity(FORWARD, "derivatives"), inverse, *steps]
 
 
 def accelerations(subject: Subject) -> Array:
     return tmt.acceleration(subject.q, subject.qd, subject.tau, subject.tree)
-
-
-def side_by_side(both: Array) -> Array:
-    """(states, 2, nv, nv) as (states, nv, 2 nv)."""
-    return np.concatenate([both[:, 0], both[:, 1]], axis=2)
 
 
 def units_of(quantity: Quantity, tree: tmt.Tree, columns: int) -> tuple[Array, Array]:
@@ -147,6 +150,21 @@ class Measured(NamedTuple):
     shares: Mapping[str, float]  # of the tolerance, by the way: of tmt's and of the centred differences
 
 
+def engines_of(subject: Subject, engines: Mapping[str, Engine]) -> dict[str, OutsideDynamics]:
+    """The engines that read the file and have derivatives of its accelerations, by name."""
+    every = {name: engine.of(subject.case) for name, engine in engines.items() if not engine.unavailable()}
+    outside = {name: of for name, of in every.items() if isinstance(of, OutsideDynamics)}
+    return {name: of for name, of in outside.items() if has_derivatives(of)}
+
+
+def has_derivatives(dynamics: OutsideDynamics) -> bool:
+    """Whether an engine reads the file and has derivatives; the experiment `engines` says why not."""
+    try:
+        return dynamics.has("derivatives")
+    except EngineError:
+        return False
+
+
 def measured(
     subject: Subject, mujoco: Mujoco, integrators: Sequence[str], dt: float, compiles: bool
 ) -> list[Measured]:
@@ -167,18 +185,26 @@ def measured(
             found |= {(same[0].name, eps): value for eps, value in values.items()}
             if same[0].centred:
                 shares[same[0].name] = share_of_differences(values, exact, subject, dt)
-        rows = []
-        for (way, eps), value in found.items():
-            high, low = (part[:, :, : value.shape[2]] for part in exact)
-            units = units_of(quantity, subject.tree, value.shape[2])
-            errors = [relative((v - h) - l, h, units) for v, h, l in zip(value, high, low)]
-            error = max(errors)
-            rows.append(DerivativeRow(
-                subject=subject.name, quantity=quantity.name, way=way, eps=eps,
-                error=error if np.isfinite(error) else None, states=subject.states,
-            ))  # fmt: skip
+        rows = [row_of(subject, quantity, way, eps, value, exact) for (way, eps), value in found.items()]
         result.append(Measured(subject, quantity, rows, shares))
     return result
+
+
+def row_of(
+    subject: Subject, quantity: Quantity, way: str, eps: float | None, values: Array, exact: Pairs
+) -> DerivativeRow:
+    """The largest error of a way at all states, whose values have all columns or the first ones."""
+    high, low = (part[:, :, : values.shape[2]] for part in exact)
+    units = units_of(quantity, subject.tree, values.shape[2])
+    error = max(relative((v - h) - l, h, units) for v, h, l in zip(values, high, low))
+    return DerivativeRow(
+        subject=subject.name,
+        quantity=quantity.name,
+        way=way,
+        eps=eps,
+        error=error if np.isfinite(error) else None,
+        states=subject.states,
+    )
 
 
 def over(difference: Array, tolerance: Array) -> float:
@@ -190,7 +216,7 @@ def over(difference: Array, tolerance: Array) -> float:
 
 
 def share_of_differences(values: Mapping[float, Array], exact: Pairs, subject: Subject, dt: float) -> float:
-    """The smallest over eps of the largest share of what rounding and truncation can make a centred difference off.
+    """The largest share, over eps and entries, of what rounding and truncation can make a centred difference off.
 
     Rounding: 64 eps of what a step adds, over the eps of the difference. Truncation: twice the term in eps^2, from ten times eps.
     """
