@@ -102,6 +102,7 @@ class Model(ReadModel):
             self.model.damping = values[self.order.v]
         else:
             wrong, stated = wrong_masses(self.numbers(), self.stated), self.stated
+            self.bodies(stated["reference"])  # places them there
             for number, k in self.last.items():
                 if k in wrong:
                     place = self.data.oMi[number]

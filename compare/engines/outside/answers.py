@@ -40,7 +40,7 @@ def answer(act: Callable[..., T], name: str, file: File, tree: tmt.Tree, is_set:
     except EngineError:
         raise
     except Exception as error:
-        raise kind(in_one_line(" ".join(described(error).split()))) from None
+        raise kind(in_one_line(" ".join(described(error, with_place=kind is EngineError).split()))) from None
 
 
 @cache
