@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from small import BOX, CASTER, INERTIA, KINDS, LEG, STANDING, hinge, limit_of, place_of, rest_of
 
+from compare.engines.mujoco.forces import rows_at
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.engines.mujoco.reading import read
+from compare.engines.mujoco.step import Step
 from compare.stability.naming import limiting
 from compare.stability.place import in_the_air_at, standing_at
 from compare.stability.rest import NEAR_REST
@@ -91,6 +93,26 @@ def test_what_limits_is_named_with_its_contact():
     assert named == ("k", "")
     stable = limit_of(KINDS["a box"])
     assert limiting(place_of(KINDS["a box"]), stable.rest, stable.growth) == ("", "")
+
+
+@pytest.mark.parametrize(
+    "cone, counts", [("elliptic", {1: 1, 3: 3, 6: 6}), ("pyramidal", {1: 1, 3: 4, 6: 10})]
+)
+def test_all_rows_of_a_contact_are_its_own(cone, counts):
+    for condim, count in counts.items():
+        rest = rest_of(STANDING.format(cone=cone, condim=condim))
+        assert rows_at(rest.step, rest.state)[1].contact.tolist() == [0] * count
+    rest = rest_of(KINDS["a limit"])
+    assert rows_at(rest.step, rest.state)[1].contact.tolist() == [-1]
+
+
+def test_a_relaxed_run_loses_its_speed_whether_anything_brakes_or_not():
+    place = place_of(POLE.format("").replace('damping="0.05"', ""))
+    step = Step(place.model, 1e-3, "Euler")
+    start = step.moved(place.rest, np.array([0.5, 0.0]))
+    for rate, slow in ((4.0, True), (0.0, False)):
+        step.put(step.relaxed(start, 3.0, rate, 1e-9))
+        assert (abs(step.data.qvel[0]) < 0.02) is slow
 
 
 def test_a_posture_may_be_numbers():
