@@ -104,6 +104,7 @@ OPTIONS = {
     "--reference": Option(stated_reference, "WHAT", of_every=True),
     "--joints": Option(metavar="LIST", example=" --mjcf robot.xml --reference my_equations.py:"),
     "--scenes": Option(metavar="FILE", example=" --scenes my.toml"),
+    "--engines": Option(metavar="LIST", example=" --mjcf robot.xml --engines drake,mjx"),
     "--dt": Option(seconds(5.0), "S", example=" --mjcf robot.xml --integrator Euler --dt 0.001"),
     "--integrator": Option(metavar="NAME"),
     "--posture": Option(metavar="NAME|NUMBERS"),

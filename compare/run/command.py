@@ -76,7 +76,12 @@ def compute(
         reasons = {name: say(reason) for name in names if (reason := skipped(name, robot))}
         names = [name for name in names if name not in reasons]
         origin = provenance(command, robot.mjcf, compared.reference.file, SEED)  # of the model as it was read
-        more = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
+        more = {
+            "map": workers.map,
+            "quiet": workers.quiet,
+            "progress": terminal.show,
+            "chosen": options.engines,
+        }
         setup = examine.setup_of(compared, options.quick, alone=is_alone, request=request, **more)
         for name, said in reasons.items():
             terminal.say(block("run", "skipped", name=name, reason=said))

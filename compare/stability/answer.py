@@ -18,10 +18,11 @@ from .cures import Cure, cures
 from .limits import COARSER, LONGEST, Limit, Tried, limit, tried
 from .naming import limiting
 from .place import Place, in_the_air_at, standing_at
-from .rest import SETTLED
+from .rest import NEAR_REST, SETTLED
 from .runs import growth_in_run, largest_push, observed, own_limit
 
 MOST_POSTURES = 6  # the first keyframes
+MOVING = 0.01  # rad/s or m/s: what creeps faster does not rest
 STEP_DIGITS = 4
 CURVE_STEPS, CURVE_RUNS = (
     18,
@@ -38,7 +39,8 @@ def step_column(**more: Any) -> Any:
 class StepLimitRow(Row):
     """The step limit of an integrator at a posture: step_limits.csv.
 
-    limit: finite, none, below, saddle, or no_rest, see limits.Limit. observed_dt, failing_dt: the longest step at which runs
+    limit: finite, none, below, saddle, or no_rest, see limits.Limit; moving, it creeps too fast for a rest.
+    observed_dt, failing_dt: the longest step at which runs
     hold and the shortest at which they fail. growth: per step, at the file's step; apart: in closed form minus that.
     """
 
@@ -67,6 +69,7 @@ class StepLimitRow(Row):
     largest_push: float | None = None  # rad/s or m/s
     finer_push: bool | None = None  # whether a finer step bears no larger push
     gives_way: float | None = None  # rad or m, from the rest to that at the limit
+    has_fallen: bool = False  # a free body rests far from its posture
     moved: float | None = None  # rad or m, from the posture to the rest
     moved_joint: str = ""
     creep: float | None = None  # rad/s or m/s
@@ -87,7 +90,7 @@ class StepLimitRow(Row):
 
     @property
     def is_known(self) -> bool:
-        return self.limit in ("finite", "none", "below")
+        return self.limit in ("finite", "none", "below", "moving")
 
     @property
     def is_held_by_friction(self) -> bool:
@@ -97,7 +100,7 @@ class StepLimitRow(Row):
     @property
     def longest(self) -> float:
         """The longest stable step, s; inf: none fails. Runs have the last word."""
-        predicted = {"none": np.inf, "below": 0.0}.get(self.limit, self.predicted_dt or 0.0)
+        predicted = {"none": np.inf, "moving": np.inf, "below": 0.0}.get(self.limit, self.predicted_dt or 0.0)
         if self.contradicted:
             predicted = self.observed_dt or 0.0
         return predicted if self.own_dt is None else min(predicted, self.own_dt)
@@ -105,7 +108,9 @@ class StepLimitRow(Row):
     @property
     def decided_by_runs(self) -> bool:
         """Whether runs say another limit than the derivative."""
-        return self.limit in ("finite", "none") and self.longest < 0.95 * (self.predicted_dt or np.inf)
+        return self.limit in ("finite", "none", "moving") and self.longest < 0.95 * (
+            self.predicted_dt or np.inf
+        )
 
 
 class Posture(NamedTuple):
@@ -235,21 +240,32 @@ def limit_row(
         growth_rate=found.growth.rate or None,
         growth=at.growth.factor,
     )
+    row.has_fallen = place.has_fallen
+    if np.abs(place.creep).max(initial=0.0) > MOVING and found.kind != "saddle" and place.left <= NEAR_REST:
+        row.limit, row.predicted_dt = "moving", None
     if found.dt:
         row.gives_way = float(np.abs(distance(model, place.rest, found.rest.state)).max())
     add_rest(row, place, at)
     if place.frictionless is not None and row.is_known:
         smooth = limit(place.frictionless, place.rest, integrator, dt)
         row.smooth_dt = smooth.dt
-    if in_runs and row.is_known:
-        if found.dt:
-            row.observed_dt, row.failing_dt = observed(model, found, integrator)
-        if longest := min(row.longest, LONGEST):
-            own = own_limit(model, place.rest, integrator, longest, dt)
-            row.own_dt = own if own < longest else None
-        row.stable_at_file_dt = dt <= row.longest
-        row.largest_push, row.finer_push = largest_push(model, at.rest)
+    if in_runs or row.limit == "moving":
+        add_runs(row, place, found)
     return row
+
+
+def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
+    """What runs show; they have the last word."""
+    if not row.is_known:
+        return
+    model, creep = place.model, float(np.abs(place.creep).max(initial=0.0))
+    if row.limit == "finite":
+        row.observed_dt, row.failing_dt = observed(model, found, row.integrator)
+    if longest := min(row.longest, LONGEST):
+        own = own_limit(model, place.rest, row.integrator, longest, creep)
+        row.own_dt = own if own < longest else None
+    row.stable_at_file_dt = row.file_dt <= row.longest
+    row.largest_push, row.finer_push = largest_push(model, found.first.rest)
 
 
 def holds(found: Limit, dt: float) -> bool | None:

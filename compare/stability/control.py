@@ -14,8 +14,8 @@ import numpy as np
 
 from ..engines.mujoco.step import NUDGE, Step
 from ..engines.mujoco.variants import Servo, held_servos, with_servos
+from .deviations import GROWN, LASTS, MOST_STEPS, SMALL_PUSH, apart, has_grown, pushed, speeds_of
 from .rest import Rest, rest_near
-from .runs import GROWN, LASTS, MOST_STEPS, SMALL_PUSH, apart, has_grown, pushed, speeds_of
 
 MOST_PERIOD = 0.5  # s
 MOST_DELAYED = 5  # periods: the longest delay that is tried

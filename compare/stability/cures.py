@@ -7,8 +7,10 @@ import mujoco
 import numpy as np
 
 from ..engines.mujoco import variants
+from ..engines.mujoco.step import Step
+from .deviations import grows
 from .limits import tried
-from .runs import grows
+from .rest import rest_near
 
 SPARE = 1.01  # of the step: so far above it a change must hold
 WITHIN = 1.05  # fold: how closely the least change is found
@@ -64,4 +66,5 @@ def least_factor(
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if holds(middle) else (middle, high)
     changed = change.made(model, high)
-    return None if changed is None or grows(changed, state, dt, integrator) else high
+    rest = None if changed is None else rest_near(Step(changed, dt, integrator), state)
+    return None if rest is None or grows(rest) else high

@@ -11,6 +11,7 @@ from .rest import Rest
 OTHER_NUDGE = NUDGE / 3.0  # of the differences that show the noise
 NOISE_TIMES = 3.0  # fold, of the observed noise: what does not exceed it may be noise
 NOISE_LEAST = 1e-10  # of an entry of the derivative
+NEAR_ONE = 1e-3  # the distance from 1 of an eigenvalue that noise may have split from 1
 GROWS = 0.1  # 1/s: a rate below is a drift or a creep, of which a run of 4 s shows nothing
 
 
@@ -18,12 +19,13 @@ class Growth(NamedTuple):
     """The mode of a step that grows fastest, beyond noise.
 
     factor: by which it is multiplied in a step, 1.0: none grows. rate: its logarithm over dt, 1/s. shape: its movement, speeds
-    and activations, (n,) complex.
+    and activations, (n,) complex. is_uncertain: another one may grow, within noise.
     """
 
     factor: float
     rate: float
     shape: np.ndarray
+    is_uncertain: bool = False
 
 
 def growth(rest: Rest) -> Growth:
@@ -43,7 +45,12 @@ def growth(rest: Rest) -> Growth:
     noise = rest.A - rest.step.derivative(rest.state, OTHER_NUDGE)
     overlap = np.maximum(np.abs((left.conj() * right).sum(axis=0)), 1e-300)
     uncertain = NOISE_TIMES * np.abs((left.conj() * (noise @ right)).sum(axis=0)) + NOISE_LEAST
-    excess[excess <= uncertain / overlap] = 0.0
+    is_noise = excess <= uncertain / overlap
+    apart_from_one = np.abs(values - 1.0) > NEAR_ONE
+    is_uncertain = bool((is_noise & apart_from_one & (excess > GROWS * rest.step.dt)).any())
+    excess[is_noise] = 0.0
     fastest = int(np.argmax(excess))
     factor = 1.0 + float(excess[fastest])
-    return Growth(factor, float(np.log(factor)) / rest.step.dt, right[:, fastest]) if factor > 1.0 else still
+    if factor == 1.0:
+        return still._replace(is_uncertain=is_uncertain)
+    return Growth(factor, float(np.log(factor)) / rest.step.dt, right[:, fastest], is_uncertain)

@@ -11,7 +11,7 @@ import tmt
 from ..engines.mujoco.linear import start_of
 from ..engines.mujoco.reading import Reading
 from ..engines.mujoco.step import Step, distance
-from ..engines.mujoco.variants import has_free_base, in_the_air, without_dry_friction
+from ..engines.mujoco.variants import has_free_base, in_the_air, of_free_joints, without_dry_friction
 from ..robots.coordinates import Coordinates
 from .limits import SADDLE, grows_by_itself, tried
 from .rest import Rest, relaxed
@@ -19,6 +19,7 @@ from .rest import Rest, relaxed
 FINE = 4  # fold: steps of the file's own, and finer, at which a saddle is known
 LEFT_BY = 0.02  # rad or m: the movement along its mode with which a saddle is left
 MOST_SADDLES = 3  # that are left one after the other
+FALLEN = 0.5  # rad or m: the movement of a free body that is a fall
 FALLS = 1.0  # m/s2: what is still accelerated so at the end of a relaxed run is held by nothing
 
 
@@ -36,6 +37,7 @@ class Place:
     rest: np.ndarray
     touching: int  # contacts at rest
     left: float  # rad/s2 or m/s2: the acceleration at the rest
+    creep: np.ndarray  # (nv,): its speeds
 
     @cached_property
     def model(self) -> mujoco.MjModel:
@@ -57,6 +59,12 @@ class Place:
         return "contact" if self.touching else "free"
 
     @property
+    def has_fallen(self) -> bool:
+        """Whether a free body is far from where it was: a walker that lies."""
+        far = np.abs(self.moved) > FALLEN
+        return bool((far & of_free_joints(self.model)).any())
+
+    @property
     def moved(self) -> np.ndarray:
         """From the posture to its rest, (nv,) rad or m."""
         return distance(self.model, self.start, self.rest)
@@ -73,7 +81,7 @@ def placed(reading: Reading, posture: str, key: str, q: np.ndarray | None, conta
     rest = beyond_saddles(model, relaxed(model, start))
     step = Step(model, model.opt.timestep, reading.integrator)
     found = Rest.at(step, rest)
-    return Place(reading, posture, contacts, start, rest, step.contacts(), found.left)
+    return Place(reading, posture, contacts, start, rest, step.contacts(), found.left, found.speeds)
 
 
 def beyond_saddles(model: mujoco.MjModel, state: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ contacts creep in MuJoCo: their force is proportional to the speed. The rest dep
 whose time constant is below two steps (refsafe), and on the integrator.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -20,7 +21,8 @@ TRIES, SHARES = (
 )  # of Newton's method, and the parts of its step that are tried
 REACH = 0.05  # rad or m: its longest step
 UNHELD = 1e-6  # of the largest slope of a force: none
-DEPENDENT = 1e-9  # of the largest singular value: directions that change no force
+# of the largest singular value: softer directions are moved only if the stiffer ones do not help
+DEPENDENT = 1e-4, 1e-6, 1e-9
 RELAXED_STEP = 1e-3  # s, the longest step of a relaxed run
 RELAXED = (4.0, 10.0), (3.0, 1.0), (2.0, 0.0)  # s, 1/s: how long its parts last, how fast its speeds decay
 RELAXED_STILL = 1e-6  # rad/s or m/s
@@ -115,15 +117,20 @@ def newton(step: Step, state: np.ndarray) -> Rest:
     for _ in range(TRIES):
         if rest.left <= AT_REST or not np.isfinite(rest.A).all():
             break
-        by = towards_rest(rest)
-        moves = (replace(rest, state=step.moved(state, share * by)) for share in SHARES)
-        tried = (replace(move, left=left_at(step, move.state)) for move in moves)
-        better = next((move for move in tried if move.left < rest.left), None)
+        better = next((move for move in moves_of(rest) if move.left < rest.left), None)
         if better is None:
             break
-        state = better.state
-        rest = replace(better, A=step.derivative(state))
+        rest = Rest.at(step, better.state)
     return rest
+
+
+def moves_of(rest: Rest) -> Iterator[Rest]:
+    """States that Newton's method tries: whole steps and parts of them, at first along the stiffer directions alone."""
+    for dependent in DEPENDENT:
+        by = towards_rest(rest, dependent)
+        for share in SHARES:
+            state = rest.step.moved(rest.state, share * by)
+            yield replace(rest, state=state, left=left_at(rest.step, state))
 
 
 def left_at(step: Step, state: np.ndarray) -> float:
@@ -133,7 +140,7 @@ def left_at(step: Step, state: np.ndarray) -> float:
     return left if np.isfinite(left) else np.inf
 
 
-def towards_rest(rest: Rest) -> np.ndarray:
+def towards_rest(rest: Rest, dependent: float) -> np.ndarray:
     """A step of Newton's method: positions and activations take what they can, the creep what is left."""
     step, nv = rest.step, rest.step.model.nv
     change = (rest.A - np.eye(step.size))[nv:]
@@ -142,9 +149,9 @@ def towards_rest(rest: Rest) -> np.ndarray:
     wanted = step.after(rest.state)[nv:] - change[:, speed] @ rest.speeds
     weights = np.r_[np.full(nv, 1.0 / step.dt), np.ones(step.size - 2 * nv)]
     by = np.zeros(step.size)
-    by[placed] = np.linalg.lstsq(weights[:, None] * change[:, placed], -weights * wanted, rcond=DEPENDENT)[0]
+    by[placed] = np.linalg.lstsq(weights[:, None] * change[:, placed], -weights * wanted, rcond=dependent)[0]
     left = (wanted + change[:, placed] @ by[placed])[:nv]
-    creep = np.linalg.lstsq(change[:nv, speed], -left, rcond=DEPENDENT)[0]
+    creep = np.linalg.lstsq(change[:nv, speed], -left, rcond=dependent)[0]
     share = min(1.0, REACH / max(np.abs(by).max(initial=0.0), REACH))
     by *= share
     by[speed] = share * (creep - rest.speeds)

@@ -19,6 +19,11 @@ def has_free_base(model: mujoco.MjModel) -> bool:
     return any(kind_of(model, joint) == "free" for joint in range(model.njnt))
 
 
+def of_free_joints(model: mujoco.MjModel) -> np.ndarray:
+    """Which speeds are those of free joints, (nv,)."""
+    return np.array(model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE)
+
+
 def in_the_air(model: mujoco.MjModel) -> mujoco.MjModel:
     """Without contacts; with a free joint also without gravity, as it would fall."""
     air = copied(model)
@@ -134,8 +139,7 @@ def with_armature(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:
     mujoco.mj_resetData(model, data)
     mujoco.mj_forward(model, data)
     own = 1.0 / np.maximum(model.dof_invweight0, mujoco.mjMINVAL)
-    is_free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
-    add_armature(changed, np.where(is_free, 0.0, factor * own))
+    add_armature(changed, np.where(of_free_joints(model), 0.0, factor * own))
     return changed
 
 

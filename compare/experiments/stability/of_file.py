@@ -10,7 +10,9 @@ import numpy as np
 from ...core.check import AT_OWN_STEP, AT_REQUESTED_STEP, About
 from ...core.rows import Row, column
 from ...engines.mujoco.reading import Reading
+from ...robots.file import names_of_keys
 from ...stability.answer import (
+    MOST_POSTURES,
     Asked,
     Curve,
     PlaceAnswer,
@@ -167,6 +169,8 @@ def motion_row(posture: Posture, reading: Reading, asked: Asked) -> MotionRow:
 
 def add(result: StabilityResult, setup: Setup, work: Work) -> None:
     """Rows, checks, the answer at the top, the curves, and what makes the step stable."""
+    if setup.reading and (names := list(names_of_keys(setup.reading).values())[MOST_POSTURES:]):
+        result.top.append(result.finding("left_out", OF, most=MOST_POSTURES, names=names))
     for number, (asked, answers) in enumerate(zip(work.asked, work.answers)):
         found = list(answers)
         rows = [row for place in found for row in place.rows]
@@ -218,7 +222,7 @@ def add_checks(result: StabilityResult, rows: Sequence[StepLimitRow], quantity: 
         )
         limit = max(min(row.longest, LONGEST), SHORTEST)
         result.check(row.posture, quantity, row.file_dt, limit, "s", note, about=About.STEP)
-        if row.stable_at_file_dt and row.largest_push is not None:
+        if row.stable_at_file_dt and row.largest_push is not None and not row.has_fallen:
             push = USUAL_PUSH if row.finer_push else row.largest_push
             result.check(
                 row.posture, PUSHED, push, USUAL_PUSH, "rad/s or m/s", rule="at least", about=About.STEP
@@ -298,7 +302,7 @@ def add_control(result: StabilityResult, row: ControlRow | None) -> None:
 
 def limits_in_use(rows: Sequence[StepLimitRow]) -> list[LimitRow]:
     """The limits of a file's robot as it stands, in the form of those of the arm, for the picture of the first screen."""
-    kinds = {"finite": "finite", "none": "never_fails", "below": "always_fails"}
+    kinds = {"finite": "finite", "none": "never_fails", "moving": "never_fails", "below": "always_fails"}
     return [
         LimitRow(
             scene=row.posture, engine="mujoco", method=row.integrator, damping=0.0, mode=row.growth_rate or 0.0,

@@ -32,5 +32,8 @@ EDITS = (
     ("fleet.table", "is_change", "old != new", "False", "no verdict has changed"),
     ("fleet.table", "FileRow.is_bad", "self.verdict in BAD_VERDICTS", "False", "always good"),
     ("fleet.cache", "program", "path.suffix in _1", "False", "any program is the same"),
+    ("fleet.rubric", "is_earned", "bool(about) and all(about)", "all(about)", "points for what was not checked"),
+    ("fleet.rubric", "is_earned", "all(about)", "any(about)", "points for one check of several"),
+    ("fleet.rubric", "Entry.is_about", "check['experiment'] == self.experiment and _1", "_1", "points for any experiment"),
     ("fleet.run", "Run.receive", "verdict=BROKE", "verdict='agree'", "a crash agrees"),
 )  # fmt: skip
