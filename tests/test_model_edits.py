@@ -208,6 +208,7 @@ def test_contacts_are_a_cause_if_geoms_touch_in_a_scene_or_at_a_random_state():
 
 
 FINGERTIP = FOREARM.replace("0.15", "0.225").replace("1.5", "1.2")
+LOADED = '<inertial pos="0.18 0 0" mass="2" diaginertia="0.0011 0.0266 0.0266"/>'  # 0.5 kg at 0.27 m
 IN_GEOMS = '<compiler angle="radian"/>', '<geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>'
 
 
@@ -226,6 +227,7 @@ IN_GEOMS = '<compiler angle="radian"/>', '<geom type="capsule" fromto="0 0 0 0.3
     ([(BETA + ' axis="1 0 0"', BETA + ' axis="0 0 1"')], "axis of beta: stated (1, 0, 0), compiled (0, 0, 1)"),
     ([(FOREARM, IN_GEOMS[1]), ('<compiler angle="radian" inertiafromgeom="false"/>', IN_GEOMS[0])],
      "inertial of forearm: missing; MuJoCo takes mass 0.9613 kg (stated 1.5 kg) and inertia from its geoms"),
+    ([(FOREARM, LOADED)], "load of forearm: 0.5 kg at (0.27, 0, 0) m from its joint more than stated"),
 ])  # fmt: skip
 def test_numbers_that_are_wrong_together_are_one_cause(edits, text):
     (cause,) = found(edited(*edits))[1]
@@ -238,6 +240,9 @@ def test_what_is_wrong_for_another_reason_stays_another_cause():
     assert {*places(edited(*edits))} == {"armature of beta", "armature of gamma"}
     assert len(places(edited(('mass="1.9"', 'mass="3.8"'), ('mass="1.5"', 'mass="3.1"')))) == 2
     assert len(places(edited((FOREARM, FINGERTIP)))) == 2
+    assert (
+        len(places(edited((FOREARM, LOADED.replace("0.0011 0.0266", "0.0009 0.0266"))))) == 3
+    )  # no body has this inertia
 
 
 @pytest.mark.parametrize("edits, causes", [

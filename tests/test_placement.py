@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from edited import CART
 
 import tmt
 from compare.engines.mujoco import ModelError, read
@@ -41,6 +42,9 @@ ALONG = edited(
 )
 AS_LINKS = edited(('<joint name="alpha" type="hinge" axis="0 1 0"/>', ""), (UPPER, f"{YOKE}{UPPER}"),
                   ("</worldbody>", "</body></worldbody>"))  # fmt: skip
+# the forearm hangs, and that is called 90 degrees
+HANGING = edited(('name="gamma"', 'name="gamma" ref="1.5707963267948966"'),
+                 (FOREARM, '<inertial pos="0 0 -0.15" mass="1.5" diaginertia="0.019 0.019 0.001"/>'))  # fmt: skip
 OTHERWISE = {
     "moved": (moved('pos="0.2 0.1 1.4"'), "moved by (0.2, 0.1, 1.4) m"),
     "turned": (
@@ -51,6 +55,7 @@ OTHERWISE = {
         edited(("0 0 -9.81", "0 -9.81 0"), text=moved('euler="-1.5707963267948966 0 0"')),
         "gravity with it",
     ),
+    "drawn": (HANGING, "drawn at another position (ref) of gamma"),
     "along": (ALONG, "anchor elsewhere on the axis of alpha and gamma"),
     "welded": (edited((FOREARM, SPLIT)), "one (hand on forearm)"),
     "stand": (edited(("</worldbody>", f"{STAND}</worldbody>")), "fixed to the world, without motion: stand"),
@@ -89,6 +94,7 @@ def test_a_file_that_moves_as_stated_is_compared_in_its_place_and_said_to_be_oth
     edited(('name="beta" type="hinge" axis="1 0 0"', 'name="beta" type="hinge" axis="-1 0 0"')),
     XML.replace('axis="0 1 0"', 'axis="0 -1 0"'), edited(("0 0 -9.81", "0 0 9.81")),
     edited(('pos="0 0 -0.3"', 'pos="0 0 -0.31"')),
+    edited(('name="gamma"', 'name="gamma" ref="1.5707963267948966"')),
     edited(('axis="1 0 0"', 'axis="0 0 1"')), edited((FOREARM, FOREARM.replace("0.15", "-0.15"))),
 ])  # fmt: skip
 def test_what_moves_otherwise_is_not_moved_nor_turned(text):
@@ -102,6 +108,18 @@ def test_a_robot_that_is_turned_against_gravity_differs_in_gravity_alone():
     (remark,) = placement.remarks()
     assert not remark.values["is_with_gravity"] and remark.values["angle"] == pytest.approx(np.degrees(0.3))
     assert np.abs(tmt.bias(*STATES[:2], placement.tree) - tmt.bias(*STATES[:2])).max() < 1e-13
+
+
+def test_the_anchor_of_a_slide_may_be_anywhere_that_of_a_ball_may_not():
+    tree, q = read(Source(CART)).tree, np.array([0.3, 0.7, 0.5, 0.5, -0.5, 0.5])
+    rail, wrist = (
+        CART.replace('name="rail"', 'name="rail" pos="0 1 2"'),
+        CART.replace('pos="0 0.01 0"', 'pos="0 0.02 0"'),
+    )
+    placement = placed(tree, read(Source(rail)).tree)
+    assert placement.along == ("rail",) and not placement.is_moved and not placement.is_turned
+    assert np.abs(tmt.mass_matrix(q, placement.tree) - tmt.mass_matrix(q, tree)).max() < 1e-14
+    assert placed(tree, read(Source(wrist)).tree).is_same
 
 
 def test_bodies_stay_one_where_joints_are_locked(tmp_path):

@@ -72,14 +72,22 @@ def of_equations(comparison: Comparison, values: Values) -> Why:
     diagnosis = diagnose(comparison.tree, values, SECONDS_OF_CAUSE, bias, stated, mass_matrix)
     if not diagnosis.differs:
         return Why("", False)
+    if not diagnosis.causes and is_single(values.packed):
+        return Why(say(Finding("agreement", "single")), False)
     broken = []
     if equations is not None and equations.has("mass_matrix") and values.are_finite and not diagnosis.causes:
         tested = conditions(equations.mass_matrix, equations.bias, coordinates, values.q, values.qd)
         broken = [condition.text for condition in tested if not condition.is_met]
     mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), coordinates.speeds)
-    if np.isfinite(M).all() and not mirrored.is_met:
+    if not diagnosis.is_symmetric:
         broken = [mirrored.text]
     return Why(" ".join([diagnosis.sentence(), *broken[:1]]), bool(diagnosis.causes))
+
+
+def is_single(values: ndarray) -> bool:
+    """Whether all numbers have single precision, and not all are whole."""
+    finite = values[np.isfinite(values)]
+    return bool((finite == finite.astype(np.float32)).all() and (finite % 1.0 != 0.0).any())
 
 
 def beside(comparison: Comparison, values: Values, tau: ndarray, qdd: ndarray) -> str:

@@ -12,7 +12,8 @@ listed, the likeliest first: M and h cannot distinguish them.
 
 from .cause import Diagnosis
 from .model import Values
-from .search import Stated, diagnose
+from .search import diagnose
+from .statements import Stated
 
 __all__ = ["STATES_ASKED", "Diagnosis", "Stated", "Values", "diagnose"]
 

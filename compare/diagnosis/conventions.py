@@ -8,7 +8,7 @@ qd = S v, so that M = S' Mbar S and h = S' (h + Mbar drift), with drift = dS/dt 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, permutations, product
+from itertools import chain, combinations, permutations, product
 
 import numpy as np
 from numpy import ndarray
@@ -142,23 +142,22 @@ def orders(equations: Equations) -> Iterator[Convention]:
 
 def named_orders(tree: tmt.Tree) -> Iterator[list[str]]:
     """Orders in which programs count joints: breadth first, by the alphabet, sides exchanged, reversed; two exchanged."""
-    names, depth = list(tree.joint_names), [0] * len(tree.parent)
-    for i, parent in enumerate(tree.parent):
-        depth[i] = depth[parent] + 1 if parent >= 0 else 0
-    breadth = [names[i] for i in np.argsort(depth, kind="stable")]
+    names, depth = list(tree.joint_names), [len(tree.path(i)) for i in range(len(tree.parent))]
+    breadth, alphabet = (
+        sorted(range(len(names)), key=key) for key in (lambda i: depth[i], lambda i: (depth[i], names[i]))
+    )
     mirrored = [SIDES.sub(other_side, name) for name in names]
+    by_side = sorted(names, key=lambda name: SIDES.sub(other_side, name))
     for order in (
-        breadth,
+        [names[i] for i in breadth],
+        [names[i] for i in alphabet],
         sorted(names),
         mirrored,
+        by_side,
         names[::-1],
-        sorted(breadth, key=lambda name: depth[names.index(name)]),
     ):
         if sorted(order) == sorted(names):
             yield order
-    by_side = sorted(names, key=lambda name: SIDES.sub(other_side, name))
-    yield by_side
-    yield [names[i] for i in sorted(range(len(names)), key=lambda i: (depth[i], names[i]))]
     for i, j in combinations(range(len(names)), 2):
         exchanged = list(names)
         exchanged[i], exchanged[j] = names[j], names[i]
@@ -184,33 +183,32 @@ def units(equations: Equations) -> Iterator[Convention]:
 
 def from_the_world(equations: Equations) -> Iterator[Convention]:
     """Angles measured from the world instead of from the body before, of any of the hinges with parallel axes."""
-    tree, nv = equations.tree, equations.nv
-    before = {i: hinge_before(tree, i) for i in range(len(tree.parent))}
+    tree, joints = equations.tree, equations.tree.coordinates.joints
+    before = {i: hinge_before(tree, i) for i, kind in enumerate(tree.kind) if kind == "hinge"}
+    absolute = np.eye(equations.nv)  # rows: angles from the world as sums of angles between bodies
+    for i, (parent, along) in before.items():
+        if parent >= 0:
+            absolute[joints[i].qd.start] += along * absolute[joints[parent].qd.start]
     chained = [i for i, (parent, _) in before.items() if parent >= 0]
     counts = range(1, len(chained) + 1) if len(chained) <= MOST_ABSOLUTE else (1, len(chained))
-    absolute = np.eye(nv)
-    starts = [joint.qd.start for joint in tree.coordinates.joints]
-    for i in range(len(tree.parent)):
-        parent, along = before[i]
-        if parent >= 0:
-            absolute[starts[i]] += along * absolute[starts[parent]]
-    for chosen in (those for count in counts for those in combinations(chained, count)):
-        own = np.eye(nv)
-        own[[starts[i] for i in chosen]] = absolute[[starts[i] for i in chosen]]
-        A, q = np.linalg.inv(own), equations.q.copy()
-        qs = [tree.coordinates.joints[i].q.start for i in range(len(tree.parent))]
-        hinges = [i for i, kind in enumerate(tree.kind) if kind == "hinge"]
-        rows = [starts[i] for i in hinges]
-        q[:, [qs[i] for i in hinges]] = q[:, [qs[i] for i in hinges]] @ A[np.ix_(rows, rows)].T
-        S = np.broadcast_to(A, (len(q), nv, nv))
-        names = listed([tree.joint_names[i] for i in chosen])
-        bodies = [next((body for body, joint in zip(tree.body_names, tree.body_joint) if joint == before[i][0]), "")
-                  for i in chosen]  # fmt: skip
-        explains = "measured from the world" + (
-            f", not from {bodies[0]}" if len(chosen) == 1 and bodies[0] else ""
+    at_q, at_v = ([getattr(joints[i], name).start for i in before] for name in ("q", "qd"))
+    for chosen in chain.from_iterable(combinations(chained, count) for count in counts):
+        own, q = np.eye(equations.nv), equations.q.copy()
+        rows = [joints[i].qd.start for i in chosen]
+        own[rows] = absolute[rows]
+        A = np.linalg.inv(own)
+        q[:, at_q] = q[:, at_q] @ A[np.ix_(at_v, at_v)].T
+        place, explains = (
+            f"angle of {listed([tree.joint_names[i] for i in chosen])}",
+            "measured from the world",
         )
-        cause = Cause(rank=1, kind="angles", place=f"angle of {names}", stated="between a body and the one before",
-                      explains=explains)  # fmt: skip
+        if len(chosen) == 1 and before[chosen[0]][0] in tree.body_joint:
+            body = tree.body_names[tree.body_joint.index(before[chosen[0]][0])]
+            explains = f"{explains}, not from {body}"
+        cause = Cause(
+            rank=1, kind="angles", place=place, stated="between a body and the one before", explains=explains
+        )
+        S = np.broadcast_to(A, (len(q), *A.shape))
         yield Convention(cause, q, equations.qd @ A.T, S, 0.0 * equations.qd)
 
 

@@ -159,7 +159,7 @@ def vectors(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
 def absent(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
     """A body, or all that a joint carries, left out."""
     carried = {name: bodies for name, bodies in sets_of_bodies(tree).items() if name != EVERY_BODY}
-    for i, joint in enumerate(tree.joint_names):
+    for i in range(len(tree.parent)):
         bodies = [b for b in range(len(tree.mass)) if tree.moves(b)[i]]
         if 1 < len(bodies) < len(tree.mass):
             carried.setdefault(listed([tree.body_names[b] for b in bodies]), bodies)
@@ -169,11 +169,14 @@ def absent(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
 
 
 def swapped(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
-    """The masses of two bodies exchanged; the mass of one that of another; the length and the CoM of a link exchanged."""
+    """Numbers of two bodies exchanged; the length and the CoM of a link exchanged."""
     for a, b in combinations(range(len(tree.mass)), 2):
-        masses, both = stated["mass"].copy(), listed([tree.body_names[a], tree.body_names[b]])
-        masses[[a, b]] = masses[[b, a]]
-        yield Edit(f"masses of {both}", "exchanged", {"mass": masses})
+        both, exchanged_fields = listed([tree.body_names[a], tree.body_names[b]]), {}
+        for field, name in {"mass": "masses", "com": "CoMs", "inertia": "inertias"}.items():
+            exchanged_fields[field] = stated[field].copy()
+            exchanged_fields[field][[a, b]] = stated[field][[b, a]]
+            yield Edit(f"{name} of {both}", "exchanged", {field: exchanged_fields[field]})
+        yield Edit(f"masses, CoMs and inertias of {both}", "exchanged", exchanged_fields)
     armatures = stated["armature"] if len(stated["armature"]) else np.zeros(0)
     names = Coordinates(tree.joint_names, tree.kind).speeds
     for i, j in combinations(np.flatnonzero(armatures).tolist(), 2):

@@ -21,6 +21,7 @@ from ..judge.agree import share_of
 from ..judge.entries import Entries
 from .cause import TEMPLATE, ranked
 from .fit import Search
+from .likelihood import cost
 from .model import ROUNDED, Equations, Values
 from .places import Place, factor, forces
 from .variants import Variant, option
@@ -60,7 +61,8 @@ class LeftOver:
         causes = search.explained(self.options())
         causes = causes or [fit.cause for fit in search.singles() if fit.explains]
         causes = causes or [fit.cause for fit in search.pairs(("number",), ("number",)) if fit.explains]
-        return ranked(causes)
+        equations = Equations(self.tree, self.values.q, self.values.qd)
+        return ranked(sorted(causes, key=lambda cause: cost(cause, equations)))
 
     def sentence(self) -> str:
         """The causes in words; "" if there is none."""

@@ -11,7 +11,8 @@ from .places import OF_ZERO, is_common
 NATURAL = 1.0  # a cause that costs less is said; the others only if there is no such
 OF_KINDS = {  # what a cause of a kind costs, besides its numbers
     "option": 0.0, "sign": 0.0, "unit": 0.1, "order": 0.25, "angles": 0.0, "axes": 0.15, "body": 0.12, "numbers": 0.2,
-    "slip": 0.3, "load": 0.6, "several": 0.65, "term": 0.15, "part": 0.16, "coefficient": 0.3, "number": 0.0, "force": 0.2,
+    "slip": 0.3, "angle": 0.45, "load": 0.6, "several": 0.65, "term": 0.15, "part": 0.16, "coefficient": 0.3, "number": 0.0,
+    "force": 0.2,
     OF_ZERO: 0.05,
 }  # fmt: skip
 OF_NAME, ADDED, PAIR = (
@@ -19,6 +20,7 @@ OF_NAME, ADDED, PAIR = (
     0.1,
     0.3,
 )  # for each joint that is named; for a number that was 0; for a second cause
+IN_PART = 0.12  # of a slip in some parts alone
 UNUSUAL = 1.0  # of a factor or a number that nobody writes
 
 
@@ -26,6 +28,11 @@ def cost(cause: Cause, equations: Equations) -> float:
     """A number that is smaller the likelier a cause is."""
     if len(cause.parts) > 1:
         return PAIR + sum(cost(part, equations) for part in cause.parts)
+    is_in_part = cause.place.endswith((" alone", "but not in gravity", "but not in the velocity terms of h"))
+    return of_one(cause, equations) + IN_PART * is_in_part + ADDED * ("damping added" in cause.place)
+
+
+def of_one(cause: Cause, equations: Equations) -> float:
     is_massless = cause.place.startswith("mass of") and cause.unit == "kg" and cause.explains == 0.0
     base, names = OF_KINDS.get(cause.kind, 0.5), cause.place.count(",") + cause.place.count(" and ")
     if cause.kind == "term" and cause.stated == "right":  # terms of an expression

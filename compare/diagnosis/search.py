@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import cached_property
 from itertools import chain
 from math import inf
-from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy import ndarray
@@ -14,38 +13,37 @@ from numpy import ndarray
 from tmt import Tree
 
 from ..core.cause import Cause
-from ..robots.joint_map import Joint, JointMap, within_a_turn
 from .cause import LEAST_STATES, Diagnosis, ranked, together
 from .coefficients import Bias, Compared
 from .consistency import follows_from
 from .conventions import Convention, all_conventions, values_in
 from .edits import edits
-from .fit import Fitted, OutOfTime, Search
+from .fit import PROMISING, Fitted, OutOfTime, Search, nearest_change
+from .given import Given
 from .groups import loads, several
 from .likelihood import NATURAL, cost
-from .model import ROUNDED, Equations, Layout, Values
-from .places import OF_ZERO, all_places
+from .model import ROUNDED, Equations, Values, packed
+from .places import OF_ZERO
 from .recursion import slips_of_recursion
-from .slips import slips
+from .slips import lagrange, other_angles
+from .statements import Stated, Statements
+from .terms import all_places
 from .variants import Variant, program_options
 
 FEW = 2  # states at which conventions are tried first
 SHOWN = 12  # single explanations that leave least
 NEAR = 2  # conventions with which another cause is sought
 NEARLY = 1e-9  # of the difference: what a number leaves at most that may explain it on a larger scale
+SECOND_ORDER, MOST_NEAR = (
+    0.1,
+    200,
+)  # pairs of a slip and a number that are tried: by what they leave to first order
 PARTIAL = 0.7  # of the difference: what such a convention leaves at most
 IN_PARTS = {  # how the parts in which alone a slip was made are said
     ("M",): " in M alone", ("h",): " in h alone", ("velocity terms", "gravity"): " in h alone",
     ("velocity terms",): " in the velocity terms of h alone", ("gravity",): " in gravity alone",
     ("M", "velocity terms"): ", but not in gravity", ("M", "gravity"): ", but not in the velocity terms of h",
 }  # fmt: skip
-
-
-class Stated(NamedTuple):
-    """How the joints of given equations are stated."""
-
-    joints: JointMap
-    by: Literal["argument", "option"] = "argument"  # joints=[...] of assert_agrees, or --joints
 
 
 def diagnose(
@@ -63,70 +61,22 @@ def diagnose(
         return Explanations(given, time.process_time() + seconds, stated, seconds).diagnosis()
 
 
-class Given:
-    """Values of Mbar and h, in a layout that has their parts, beside the right ones at the same states."""
-
-    def __init__(
-        self, tree: Tree, values: Values, bias: Bias | None, mass_matrix: Callable[[ndarray], ndarray] | None = None,
-        rest: ndarray | None = None, qdd: ndarray | None = None,
-    ):  # fmt: skip
-        self.tree, self.values, self.bias, self.mass_matrix = tree, values, bias, mass_matrix
-        M, h, nv = values.mass_matrix, values.bias, len(tree.axis)
-        if rest is None and bias is not None and values.qd.any() and np.isfinite(h).all():
-            rest = np.asarray(bias(np.zeros_like(values.qd)))
-        self.rest = rest if rest is not None and np.isfinite(rest).all() else None
-        skew = np.abs(M - np.swapaxes(M, 1, 2))
-        is_symmetric = not (skew > 2.0 * values.tolerances[0] + ROUNDED * np.abs(M)).any()
-        self.layout = Layout(nv, self.rest is not None, is_symmetric, qdd)
-        self.equations = Equations(tree, values.q, values.qd, self.layout)
-        at_rest = np.zeros_like(h) if self.rest is None else self.rest
-        of_M, of_h = values.tolerances
-        if qdd is not None:  # h are the forces of these accelerations
-            self.packed, self.tolerance = h, of_h
-            return
-        self.packed = self.layout.packed(M, h - at_rest, at_rest)
-        rounded = self.layout.packed(of_M, of_h, of_h if self.rest is not None else 0.0 * of_h)
-        self.tolerance = np.where(rounded > 0.0, np.fmax(rounded, ROUNDED * self.own_scale), 0.0)
-
-    @property
-    def own_scale(self) -> ndarray:
-        """The size of each entry at a state, by its largest value at all states: large values are rounded too."""
-        speed = 1.0 + np.abs(self.values.qd).max(axis=1, keepdims=True, initial=0.0) ** 2
-        of_state = np.ones_like(self.packed)
-        of_state[
-            :,
-            self.layout.of_row(0, "velocity terms")[0] : self.layout.of_row(0, "velocity terms")[0]
-            + self.layout.nv,
-        ] = speed
-        return np.nanmax(np.abs(self.packed) / of_state, axis=0, initial=0.0) * of_state
-
-    def in_the_model(self, convention: Convention) -> "Given":
-        """The values as the model has them, if they are in a convention."""
-        M, h, (of_M, of_h) = self.values.mass_matrix, self.values.bias, self.values.tolerances
-        rest = np.zeros_like(h) if self.rest is None else self.rest
-        right = Equations(self.tree, convention.q, convention.qd).parts[0]
-        M, h, rest = convention.removed(M, right, h, rest)
-        scale = Values.of(self.tree, convention.q, convention.qd, M, h)
-        if self.layout.qdd is not None:  # qdd = S a + drift
-            qdd = np.einsum("sij,sj->si", convention.S, self.layout.qdd) + convention.drift
-            moved = np.einsum("sji,sj->si", np.linalg.inv(convention.S), self.values.bias)
-            return Given(
-                self.tree, Values(convention.q, convention.qd, M, moved, (of_M, of_h)), None, qdd=qdd
-            )
-        return Given(self.tree, scale, None, None, None if self.rest is None else rest)
+def best_change(search: Search, k: int, off: ndarray) -> tuple[float, float]:
+    """What the best change of a place leaves of other differences, over its tolerance, and the change over its size."""
+    first, second = (part[k] * search.weight for part in search.coefficients)
+    _, x = nearest_change(first, second, off)
+    for _ in range(2):  # Newton's steps: the roots of a cubic have half the digits
+        slope, left = first + 2.0 * x * second, off - x * first - x * x * second
+        x += float((slope * left).sum() / max((slope * slope).sum(), 1e-300))
+    return float(np.abs(off - x * first - x * x * second).max()), x
 
 
 class Explanations:
     """What explains given values. end: the time.process_time() at which the search ends."""
 
     def __init__(self, given: Given, end: float, stated: Stated | None, seconds: float = inf):
-        self.given, self.equations, self.stated, self.seconds, self.end = (
-            given,
-            given.equations,
-            stated,
-            seconds,
-            end,
-        )
+        self.given, self.equations, self.seconds, self.end = given, given.equations, seconds, end
+        self.statements = Statements(given.equations.coordinates, stated)
         places = all_places(self.equations)
         if not np.isfinite(given.packed).any(axis=0).all():  # M or h alone
             right = np.isfinite(given.packed).any(axis=0)
@@ -142,44 +92,38 @@ class Explanations:
     def diagnosis(self) -> Diagnosis:
         if not self.off.any():
             return Diagnosis(False)
-        compared, names = self.compared, self.equations.speeds
         entries, parts = tuple(self.entries_that_differ()), tuple(self.differing)
-        found = Diagnosis(
-            True, entries=entries, compared=self.entries_compared, parts=parts, known=tuple(self.known)
-        )
+        is_symmetric, known = self.equations.layout.is_symmetric, tuple(self.known)
+        found = Diagnosis(True, entries=entries, compared=self.entries_compared, parts=parts, known=known)
+        found = found._replace(is_symmetric=is_symmetric)
         if len(np.unique(self.equations.q, axis=0)) < LEAST_STATES:
             return found._replace(too_few=len(self.equations.q))
         causes = next(filter(None, self.stages()), [])
-        nearest = sorted((fit for fit in self.all_singles if fit.is_possible), key=lambda fit: fit.left_over)[
-            :SHOWN
-        ]
+        possible = [fit for fit in self.all_singles if fit.is_possible]
+        nearest = sorted(possible, key=lambda fit: fit.left_over)[:SHOWN]
         shares = tuple((fit.places[0].name, fit.left_over, fit.explains) for fit in nearest)
         found = found._replace(nearest=shares, causes=ranked(distinct(sorted(causes, key=self.cost))))
         if causes:
             return found
         unfinished = None if self.is_finished else self.seconds
         closest = nearest[0].cause if nearest else None
-        return found._replace(closest=closest, details=compared.details(), seconds=unfinished)
+        details = self.compared.details() if self.equations.layout.qdd is None else ()
+        return found._replace(closest=closest, details=details, seconds=unfinished)
 
     def cost(self, cause: Cause) -> float:
         return cost(cause, self.equations)
 
     @cached_property
     def compared(self) -> Compared:
-        values, plain = (
-            self.given.values,
-            Equations(self.given.tree, self.given.values.q, self.given.values.qd),
-        )
+        """The coefficients, of the lower triangle of Mbar and of h as one."""
+        values, (of_M, of_h) = self.given.values, self.given.values.tolerances
+        plain = Equations(self.given.tree, values.q, values.qd)
         if self.equations.layout.is_symmetric and "coefficients" in vars(self.equations):
             plain.coefficients = self.equations.coefficients
-        of_M, of_h = values.tolerances
-        tolerance = plain.layout.packed(of_M, of_h, 0.0 * of_h)
-        packed = values.packed
-        tolerance = np.where(
-            tolerance > 0.0, np.fmax(tolerance, ROUNDED * np.nanmax(np.abs(packed), axis=0, initial=0.0)), 0.0
-        )
+        tolerance, largest = packed(of_M, of_h), np.nanmax(np.abs(values.packed), axis=0, initial=0.0)
+        tolerance = np.where(tolerance > 0.0, np.fmax(tolerance, ROUNDED * largest), 0.0)
         least = tolerance[tolerance > 0.0].min(initial=1.0)
-        return Compared(plain, packed, np.where(tolerance > 0.0, tolerance, least), self.given.bias)
+        return Compared(plain, values.packed, np.where(tolerance > 0.0, tolerance, least), self.given.bias)
 
     def entries_that_differ(self) -> Iterator[str]:
         """The names of entries of Mbar and h."""
@@ -206,8 +150,7 @@ class Explanations:
         for stage in stages:
             causes: list[Cause] = []
             try:
-                for cause in stage():  # what was found before the end is kept
-                    causes.append(cause)
+                causes += stage()  # what was found before the end is kept
             except OutOfTime:
                 self.is_finished = False
             yield [cause for cause in causes if self.cost(cause) < NATURAL]
@@ -220,7 +163,7 @@ class Explanations:
         """Options, conventions, single numbers and terms, and edits of several numbers."""
         yield from self.search.explained(self.options)
         yield from self.in_conventions
-        yield from self.causes(fit for fit in self.all_singles if fit.explains)
+        yield from self.statements.causes(fit for fit in self.all_singles if fit.explains)
         yield from self.search.explained(self.variants)
 
     def derivations(self) -> Iterator[Cause]:
@@ -234,46 +177,51 @@ class Explanations:
 
     def of_parts(self) -> Iterator[Cause]:
         """Slips in some parts alone: in all that differ, or one cause for each."""
-        different, known, said = self.differing, self.known, self.differing
+        different, known, causes = self.differing, self.known, []
         if "velocity terms" in different and "M" in different and self.h_follows_from_M:
-            different = [name for name in different if name != "velocity terms"]
-            known = [name for name in known if name != "velocity terms"]
-            causes = self.within(known)
-            yield from causes
-            if self.natural(causes):
-                return
+            different, known = (
+                [name for name in names if name != "velocity terms"] for names in (different, known)
+            )
+            causes += self.within(known, self.known)
         if different != self.known:
-            causes = [in_part(cause, said) for cause in self.within(different)]
-            yield from causes
-            if self.natural(causes):
-                return
-        for part in different[: len(different) if len(different) > 2 else len(different) - 1]:
-            others = [name for name in different if name != part]
-            first, second = self.natural(self.within([part])), self.natural(self.within(others))
-            if first and second:
-                yield together([self.in_its_part(first[0], [part]), self.in_its_part(second[0], others)], 0.0)
+            causes += self.within(different, self.differing)
+        yield from causes
+        if causes:
+            return
+        for part in different if len(different) > 2 else different[:-1]:
+            one, others = self.within([part], [part]), [name for name in different if name != part]
+            if one and (two := self.within(others, others)):
+                yield together([one[0], two[0]], 0.0)
 
-    def in_its_part(self, cause: Cause, parts: Sequence[str]) -> Cause:
-        """A cause that is meant in some parts alone; as it is, where a place names its part."""
-        return cause if cause.kind in ("coefficient", "part") else in_part(cause, parts)
-
-    def natural(self, causes: Iterable[Cause]) -> list[Cause]:
-        return sorted((cause for cause in causes if self.cost(cause) < NATURAL), key=self.cost)
-
-    def within(self, parts: Sequence[str]) -> list[Cause]:
-        """What explains some parts of the values, whatever the others are."""
+    def within(self, parts: Sequence[str], said: Sequence[str]) -> list[Cause]:
+        """Natural explanations of some parts, whatever the others are, the likeliest first; said: the parts that are meant."""
         entries = np.zeros(self.search.right.shape[1], bool)
         for name in parts:
             entries[self.equations.layout.parts[name]] = True
         search = self.search.within(entries)
         if not (np.abs(search.off) > 1.0).any():
             return []
-        variants = chain(self.options, self.variants, self.recursions)
-        fits = [fit for fit in search.singles(is_thorough=False) if fit.explains]
-        return [*search.explained(variants), *self.causes(fits)]
+        others = np.zeros_like(entries)
+        for name in set(self.known) - set(said):
+            others[self.equations.layout.parts[name]] = True
+        causes: list[Cause] = []
+
+        def add(found: Iterable[Cause], moved: ndarray) -> None:
+            is_elsewhere = (np.abs(moved) > search.tolerance)[:, others].any()
+            causes.extend(in_part(cause, said) if is_elsewhere else cause for cause in found)
+
+        for cause, values in chain(self.options, self.variants, self.recursions, self.angles):
+            add(search.explained([(cause, values)]), values - search.right)
+        numbers = {place.name: k for k, place in enumerate(search.places)}
+        for fit in search.singles(is_thorough=False):
+            if fit.explains:
+                size = fit.changes[0] / fit.places[0].size
+                add(self.statements.causes([fit]), search.coefficients[0][numbers[fit.places[0].name]] * size)
+        return sorted((cause for cause in causes if self.cost(cause) < NATURAL), key=self.cost)
 
     def terms(self) -> Iterator[Cause]:
         """Terms of coefficients; forces of accelerations have none."""
+        yield from self.search.explained(self.angles)
         yield from self.compared.causes(1) if self.equations.layout.qdd is None else ()
 
     def beside_conventions(self) -> Iterator[Cause]:
@@ -282,7 +230,9 @@ class Explanations:
             inner = Explanations(self.given.in_the_model(convention), self.end, None)
             for cause in inner.everything_but_conventions():
                 if inner.cost(cause) < NATURAL:
-                    yield from self.restated(together([convention.cause, cause], 0.0), convention.joints)
+                    yield from self.statements.restated(
+                        together([convention.cause, cause], 0.0), convention.joints
+                    )
 
     def everything_but_conventions(self) -> Iterator[Cause]:
         if self.off.any():
@@ -291,8 +241,32 @@ class Explanations:
 
     def pairs(self) -> Iterator[Cause]:
         fits = self.search.pairs(("number", OF_ZERO), ("number", OF_ZERO, "term", "coefficient"))
-        yield from self.causes(fit for fit in fits if fit.explains)
+        yield from self.statements.causes(fit for fit in fits if fit.explains)
+        yield from self.with_slips()
         yield from self.compared.causes(2) if self.equations.layout.qdd is None else ()
+
+    def with_slips(self) -> Iterator[Cause]:
+        """An edit or a slip beside a number, a term or another slip, whose changes of the values are added."""
+        variants, search = [*self.options, *self.variants, *self.recursions], self.search
+        changes = [(values - search.right) * search.weight for _, values in variants]
+        left = np.stack([(search.off - change).ravel() for change in changes])
+        squares = np.einsum("vm,vm->v", left, left)
+        columns = search.expansion[0].reshape(len(search.places), -1)
+        lengths = np.einsum("km,km->k", columns, columns)
+        after = squares[:, None] - np.divide(
+            (left @ columns.T) ** 2, lengths, out=np.zeros((len(left), len(columns))), where=lengths > 0.0
+        )
+        near = np.argwhere(after < (PROMISING * search.size) ** 2 + SECOND_ORDER * squares[:, None])
+        for v, k in near[np.argsort(after[tuple(near.T)])][:MOST_NEAR].tolist():
+            place, off = search.places[k], left[v].reshape(search.off.shape)
+            ratio, change = best_change(search, k, off)
+            if ratio <= 1.0 and place.is_possible(change * place.size):
+                yield together([variants[v][0], place.cause(change * place.size)], 0.0)
+        moved = np.stack([change.ravel() for change in changes])
+        both = squares[:, None] + np.einsum("vm,vm->v", moved, moved) - 2.0 * left @ moved.T
+        for v, w in np.argwhere(np.triu(both < (PROMISING * search.size) ** 2)).tolist()[:MOST_NEAR]:
+            if np.abs(left[v] - moved[w]).max() <= 1.0:
+                yield together([variants[v][0], variants[w][0]], 0.0)
 
     # what is computed once
 
@@ -302,7 +276,11 @@ class Explanations:
 
     @cached_property
     def variants(self) -> list[Variant]:
-        return [*edits(self.equations), *chain.from_iterable(slips(self.equations))]
+        return [*edits(self.equations), *lagrange(self.equations)]
+
+    @cached_property
+    def angles(self) -> list[Variant]:
+        return list(other_angles(self.equations))
 
     @cached_property
     def recursions(self) -> list[Variant]:
@@ -359,7 +337,7 @@ class Explanations:
             if left < 1e-3:
                 (values,) = values_in(self.equations, [convention])
                 for complete in self.search.explained([(convention.cause, values)]):
-                    causes += self.restated(complete, convention.joints)
+                    causes += self.statements.restated(complete, convention.joints)
         return causes
 
     @cached_property
@@ -377,44 +355,6 @@ class Explanations:
         return follows_from(
             given.mass_matrix, given.values.q, given.values.qd, given.values.bias - given.rest
         )
-
-    # joints
-
-    def causes(self, fits: Iterable[Fitted]) -> list[Cause]:
-        """The fits as causes; of zeros of joints with the joints to state."""
-        causes = []
-        for fit in fits:
-            if all(place.kind == OF_ZERO for place in fit.places):
-                causes += self.restated(fit.cause, self.with_zeros(fit))
-            else:
-                causes.append(fit.cause)
-        return causes
-
-    def with_zeros(self, fit: Fitted) -> JointMap:
-        """Joints with the zeros of a fit."""
-        changes = zip(fit.places, fit.changes)
-        zeros = {place.name: place.value(change) - place.stated for place, change in changes}
-        coordinates, joints = self.equations.coordinates, []
-        for name, kind in zip(coordinates.names, coordinates.all_kinds):
-            zero = within_a_turn(zeros.get(f"zero of {name}", 0.0), kind == "slide")
-            joints.append(Joint(name, zero=float(f"{zero:.12g}"), slides=kind == "slide"))
-        return JointMap(coordinates, joints)
-
-    def restated(self, cause: Cause, convention: JointMap | None) -> list[Cause]:
-        """A cause with how joints are to be stated in its convention; [] if that cannot be."""
-        if self.stated is None or convention is None:
-            return [cause]
-        wrong, by = self.stated
-        joints = convention if wrong.is_same else wrong.after(convention, self.equations.coordinates)
-        if joints is None:
-            return []
-        if joints.is_same and not wrong.is_same and not cause.parts:
-            names = ", ".join(map(str, wrong.joints))
-            part = Cause(rank=1, kind="order", place="joints", stated=names, explains="those of the model")
-            cause = replace(cause, parts=(part,))
-        statement = list(map(str, joints.joints))
-        option = f"--joints={','.join(statement)}"
-        return [replace(cause, joints=option if by == "option" else f"joints={statement}")]
 
 
 def in_part(cause: Cause, parts: Sequence[str]) -> Cause:

@@ -1,15 +1,18 @@
 """Where the frames of a file may lie without another motion: the stated robot, moved and turned with gravity.
 
-The anchor of a hinge may lie anywhere on its axis, that of a slide anywhere.
+The anchor of a hinge may lie anywhere on its axis, that of a slide anywhere; frames may be parallel at any position of
+the joints.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
 import tmt
+from tmt.derivation.method import joint_frames
 
 from ..core.finding import Finding
 from .joint_map import places_of
@@ -26,11 +29,12 @@ class Placement:
     turn: np.ndarray  # (3, 3), of the stated robot and its gravity
     shift: np.ndarray  # (3,) m, of its origin
     along: tuple[str, ...]  # joints whose anchor is elsewhere on their axis
+    drawn: tuple[str, ...]  # joints that the file draws at another position, its `ref`
     is_with_gravity: bool  # whether gravity is turned with the robot; else the turn is an error
 
     @property
     def is_same(self) -> bool:
-        return not (self.is_turned or self.is_moved or self.along)
+        return not (self.is_turned or self.is_moved or self.along or self.drawn)
 
     @property
     def is_turned(self) -> bool:
@@ -44,19 +48,31 @@ class Placement:
         """Where the file has the robot, and that its motion is the same."""
         if self.is_same:
             return []
-        cosine = np.clip((np.trace(self.turn) - 1.0) / 2.0, -1.0, 1.0)
-        values = {"shift": self.shift.tolist(), "angle": float(np.degrees(np.arccos(cosine)))}
-        values |= {"axis": axis_of(self.turn).tolist(), "along": self.along, "is_moved": self.is_moved}
-        values |= {"is_turned": self.is_turned, "is_with_gravity": self.is_with_gravity}
+        from scipy.spatial.transform import Rotation  # slow import
+
+        vector = Rotation.from_matrix(self.turn).as_rotvec(degrees=True)
+        angle = float(np.linalg.norm(vector))
+        axis = np.round(vector / (angle or 1.0), 9) + 0.0  # -0 would be shown
+        values = {"shift": self.shift.tolist(), "angle": angle, "axis": axis.tolist(), "along": self.along}
+        values |= {"is_moved": self.is_moved, "is_turned": self.is_turned}
+        values |= {"drawn": self.drawn, "is_with_gravity": self.is_with_gravity}
         return [Finding("remarks", "placed", values)]
 
 
 def placed(stated: tmt.Tree, tree: tmt.Tree) -> Placement:
     """The stated Tree, moved and turned such that most of its vectors are those of the Tree of a file, which has its joints."""
     joints = [tree.joint_names.index(name) for name in stated.joint_names]
+    reference = [tree.reference[joint] for joint in joints]
+    drawn = tuple(name for name, a, b in zip(stated.joint_names, stated.reference, reference) if a != b)
+    turn, most = turned(vectors_of(stated, range(len(joints))), vectors_of(tree, joints))
+    there = drawn_at(stated, reference) if drawn else stated
+    other_turn, count = turned(vectors_of(there, range(len(joints))), vectors_of(tree, joints))
+    if count > most:
+        stated, turn = there, other_turn
+    else:
+        drawn = ()
     anchors, _, axes = places_of(stated)
     file_anchors, _, _ = (values[joints] for values in places_of(tree))
-    turn = turned(vectors_of(stated, range(len(joints))), vectors_of(tree, joints))
     anchors, axes = anchors @ turn.T, axes @ turn.T
     free = [directions(kind, axis) for kind, axis in zip(stated.kind, axes)]
     size = max(1.0, np.abs(anchors).max(), np.abs(file_anchors).max())
@@ -68,34 +84,17 @@ def placed(stated: tmt.Tree, tree: tmt.Tree) -> Placement:
         if is_on_axis and np.abs(apart).max() > SAME * size:
             moved[i] += projection @ apart
             along.append(name)
-    changed = along or shift.any() or (turn != np.eye(3)).any()
-    tree_there = moved_tree(stated, turn, moved, shift) if changed else stated
-    is_with_gravity = bool(same_vectors(np.array([tree_there.gravity]), np.array([tree.gravity]))[0])
-    return Placement(tree_there, turn, shift, tuple(along), is_with_gravity)
-
-
-def moved_tree(stated: tmt.Tree, turn: np.ndarray, anchors: np.ndarray, shift: np.ndarray) -> tmt.Tree:
-    """The Tree with other anchors in the world, (n, 3), and with all of its vectors turned."""
-    before, _, _ = places_of(stated)
-    origins = [anchors[parent] if parent >= 0 else np.zeros(3) for parent in stated.parent]
-    at = list(stated.body_joint)
-    centres = (before[at] + np.array(stated.com)) @ turn.T + shift
-    return replace(
-        stated,
-        offset=rows(anchors - origins),
-        axis=rows(np.array(stated.axis) @ turn.T),
-        com=rows(centres - anchors[at]),
-        inertia=tuple(rows(symmetric(turn @ inertia @ turn.T)) for inertia in np.array(stated.inertia)),
-        gravity=tuple((turn @ stated.gravity).tolist()),
-    )
+    if along or shift.any() or (turn != np.eye(3)).any():
+        at, before = list(stated.body_joint), places_of(stated)[0]
+        centres = (before[at] + np.array(stated.com)) @ turn.T + shift
+        turns, gravity = np.array([turn] * len(at)), tuple((turn @ stated.gravity).tolist())
+        stated = with_frames(stated, moved, np.array(stated.axis) @ turn.T, centres, turns, gravity=gravity)
+    is_with_gravity = bool(same_vectors(np.array([stated.gravity]), np.array([tree.gravity]))[0])
+    return Placement(stated, turn, shift, tuple(along), drawn, is_with_gravity)
 
 
 def rows(values: np.ndarray) -> tuple[tuple[float, ...], ...]:
     return tuple(map(tuple, values.tolist()))
-
-
-def symmetric(tensor: np.ndarray) -> np.ndarray:
-    return (tensor + tensor.T) / 2.0
 
 
 def vectors_of(tree: tmt.Tree, joints: Sequence[int]) -> np.ndarray:
@@ -107,14 +106,45 @@ def vectors_of(tree: tmt.Tree, joints: Sequence[int]) -> np.ndarray:
     return np.vstack([axes, np.diff(anchors, axis=0), centres, tree.gravity])
 
 
-def turned(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """The rotation, (3, 3), by which most vectors, (k, 3), are the others; the identity unless one makes more of them so."""
+def drawn_at(stated: tmt.Tree, reference: Sequence[float]) -> tmt.Tree:
+    """The same robot with frames that are parallel at other positions of its joints; a ball's stays."""
+    q, at = list(stated.zero), list(stated.body_joint)
+    for joint, position in zip(stated.coordinates.joints, reference):
+        if joint.kind != "ball":
+            q[joint.q.start] = position
+    frames = joint_frames(stated, q)
+    anchors = np.array([tuple(frame.origin) for frame in frames])
+    axes = np.array([tuple(axis) for frame in frames for axis in frame.axes])
+    turns = np.array([[list(row) for row in frames[joint].turn] for joint in at])
+    centres = anchors[at] + np.einsum("bij,bj->bi", turns, stated.com)
+    return with_frames(stated, anchors, axes, centres, turns, reference=tuple(reference))
+
+
+def with_frames(
+    tree: tmt.Tree, anchors: np.ndarray, axes: np.ndarray, centres: np.ndarray, turns: np.ndarray, **more: Any
+) -> tmt.Tree:
+    """A Tree with other anchors (n, 3), axes (nv, 3) and centres of mass (m, 3) in the world, and with turned tensors.
+
+    turns: (m, 3, 3), of each body; more: other fields of the Tree.
+    """
+    origins = [anchors[parent] if parent >= 0 else np.zeros(3) for parent in tree.parent]
+    tensors = turns @ np.array(tree.inertia) @ turns.transpose(0, 2, 1)
+    tensors = (tensors + tensors.transpose(0, 2, 1)) / 2.0
+    offset, com = rows(anchors - origins), rows(centres - anchors[list(tree.body_joint)])
+    return replace(tree, offset=offset, axis=rows(axes), com=com, inertia=tuple(map(rows, tensors)), **more)
+
+
+def turned(vectors: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, int]:
+    """The rotation, (3, 3), by which most vectors, (k, 3), are the others, and how many are.
+
+    It is the identity unless another one makes more of them so.
+    """
     best, turn = same_vectors(vectors, others).sum(), np.eye(3)
     for candidate in rotations(vectors, others):
         same = same_vectors(vectors @ candidate.T, others)
         if same.sum() > best:
             best, turn = same.sum(), candidate
-    return turn
+    return turn, int(best)
 
 
 def same_vectors(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -163,11 +193,3 @@ def shifted(
         if count(shift) > best:
             best, chosen = count(shift), shift
     return chosen
-
-
-def axis_of(turn: np.ndarray) -> np.ndarray:
-    """The axis of a rotation, (3,), of length 1; 0 of none."""
-    _, vectors = np.linalg.eigh(turn + turn.T)
-    axis = vectors[:, -1]
-    off = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    return np.where(np.abs(axis) < SAME, 0.0, axis * (-1.0 if off @ axis < 0.0 else 1.0))

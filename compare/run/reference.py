@@ -157,7 +157,9 @@ def with_arm(source: Source, path: Text, shown: str) -> Compared:
     robot = robot.with_joints(names.names)
     placement = placed(robot.tree, reading.tree)
     if not placement.is_same:
-        robot = replace(robot, tree=placement.tree, landmarks=None)  # which are those of the stated place
+        # landmarks are those of the stated place, and so are the last digits of rounding
+        printed = tuple(item._replace(to_every_digit=(), sizes=()) for item in robot.printed)
+        robot = replace(robot, tree=placement.tree, landmarks=None, printed=printed)
     otherwise = tuple(map(say, placement.remarks() + of_welded(source)))
     of_arm = Reference("arm", shown, said, source.warnings, renamed=names.renamed, otherwise=otherwise)
     return Compared(of_arm, robot, parse(source, robot.tree), None)

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+import tmt
 from compare.engines import RECORDS
 from compare.engines.outside import Outside
 from compare.engines.outside.model import EngineError, Unasked, Unwritten
@@ -101,6 +102,10 @@ def compiled(field):
 CASES = (
     ("class_without_joint", "drake", ARM.format(DEFAULTS, '<joint name="j" class="leg"/>', ""),
      lambda path: drake(path).GetJointByName("j").default_damping(), compiled("dof_damping")),
+    ("no_springs", "drake", ARM.format("", '<joint name="j" stiffness="7"/>', ""),
+     lambda path: float(drake(path).num_force_elements() - 1), lambda path: 1.0),
+    ("mass_of_geoms", "pinocchio", OF_GEOMS.format('<default><geom mass="0.1"/></default>'),
+     lambda path: pinocchio(path).inertias[1].mass, lambda path: 0.1),
     ("armature_without_motor", "drake", ARM.format("", '<joint name="j" armature="0.1"/>', ""),
      lambda path: float(drake(path).num_actuators()), compiled("dof_armature")),
     ("option_gravity", "newton", ARM.format('<option gravity="1 2 -3"/>', HINGE, ""),
@@ -200,6 +205,20 @@ def test_pinocchio_has_no_springs_and_applies_no_damping(tmp_path):
     assert accelerations[0] == accelerations[1] and not any("stiffness" in name for name in dir(model))
     reading = Outside("pinocchio").of(compared_with("model", str(path)).robot.case()).reading
     assert reading["lacking"] == ("damping", "stiffness") and "stiffness" not in reading["read"]
+
+
+@pytest.mark.parametrize("engine", ("drake", "pinocchio", "newton"))
+def test_masses_that_were_read_otherwise_are_set(engine, tmp_path):
+    skip_unless_installed(engine)
+    second = f'<body pos="0.3 0 0" euler="0 0 40"><joint name="k" axis="0 1 0"/>{SPHERE}</body>'
+    two = OF_GEOMS.format('<compiler settotalmass="9"/>').replace(
+        f"{SPHERE}</body>", f"{SPHERE}{second}</body>"
+    )
+    robot = compared_with("model", str(file_of(tmp_path, two))).robot
+    of, q = Outside(engine).of(robot.case()), np.array([[0.4, -0.8]])
+    assert {"mass", "moments"} <= of.reading["mended"].keys()
+    expected = tmt.mass_matrix(q[0], robot.tree)
+    assert of.mass_matrix(q)[0] == pytest.approx(expected, rel=1e4 * RECORDS[engine].eps)
 
 
 def test_newtons_masses_inertias_and_gravity_are_set_by_its_public_arrays(tmp_path):

@@ -152,7 +152,7 @@ class Factors:
         """Solution x of matrix x = right."""
         n, x = len(right), list(right)
         for i in reversed(range(n)):
-            x[i] = x[i] - total(self.upper[i][k] * x[k] for k in range(i + 1, n))
+            x[i] = x[i] - total(self.upper[i][k] * x[k] for k in range(i + 1, n) if not is_zero(x[k]))
         for i in range(n):
             x[i] = x[i] * self.inverse[i] - total(self.upper[k][i] * x[k] for k in range(i))
         return x
@@ -186,6 +186,11 @@ def solve_any(matrix: Sequence[Scalars], right: Scalars) -> Values:
     for i in reversed(range(n)):
         x[i] = (x[i] - total(upper[i][k] * x[k] for k in range(i + 1, n))) / upper[i][i]
     return x
+
+
+def is_zero(x: Scalar) -> bool:
+    """Whether a scalar is a plain zero, as many entries of directions and of trees with branches are."""
+    return isinstance(x, float) and x == 0.0
 
 
 def total(terms: Iterable[Scalar]) -> Scalar:

@@ -17,7 +17,7 @@ from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import reduced_force
 from tmt.derivation.quantities import Form, State, added
 from tmt.derivation.scalar import Rows, Scalar, Values
-from tmt.derivation.vectors import Factors, solve_any
+from tmt.derivation.vectors import Factors, is_zero, solve_any, total
 from tmt.methods.dynamics import Dynamics, Held, Implicit, Terms, acts_at_single_joints, minus, plus
 from tmt.methods.stepping import Method, stepped
 from tmt.methods.stepping import State as Reached
@@ -219,4 +219,5 @@ def values_of(numbers: Values) -> Values:
 
 
 def times(matrix: Rows, values: Values) -> Values:
-    return [sum(m * x for m, x in zip(row, values)) for row in matrix]
+    some = [k for k, x in enumerate(values) if not is_zero(x)]
+    return [total(row[k] * values[k] for k in some) for row in matrix]

@@ -122,6 +122,7 @@ class Model(ReadModel):
             turned = [at for at, _ in self.order.turned if at not in balls]
             return name == "gravity" or not any(wrong[self.order.v[at]].any() for at in turned)
         joints = wrong_masses(self.numbers(), self.stated)
+        self.bodies(self.stated["reference"])  # places them there
         for k, bodies in bodies_of(self.plant, self.joints).items():
             if k in joints and bodies:
                 stated = Body(self.stated["mass"][k], self.stated["com"][k], self.stated["inertia"][k])

@@ -114,6 +114,7 @@ class Source:
     def joined(self) -> "Source":
         """The same, with the mass of bodies that are welded to a moving one in that one."""
         other = copy(self)
+        other._spec = self._spec  # which is not pickled, nor copied
         other.model, other.welded = mujoco.MjModel.__copy__(self.model), welded_bodies(self.model)
         join(other.model, other.welded)
         return other

@@ -16,7 +16,7 @@ from ...engines.mujoco.source import Source
 from ...engines.outside.mjcf_text import included
 from ...engines.outside.model import Reading
 
-OF_JOINTS = "armature", "damping", "stiffness", "axis", "axis_moved"
+OF_JOINTS = "armature", "damping", "stiffness", "axis"
 PLACES = "com", "com_moved", "inertia", "anchor", "anchor_moved", "axis", "axis_moved"
 MASSES = "mass", "moments", "com", "com_moved", "inertia"
 STANDARD = (0.0, 0.0, -9.81)
@@ -62,31 +62,36 @@ class Text:
             self.add_joints(child, childclass)
 
     def passed_over(self, joint: str, attribute: str) -> str | None:
-        """The class of a joint that has no <joint>, while a class around it states the attribute."""
-        name: str | None = self.class_of.get(joint)
-        if name not in self.classes or self.classes[name][0].find("joint") is not None:
-            return None
-        around = self.classes[name][1]
-        while around is not None:
-            default, outer = self.classes[around]
+        """The class without a <joint> between a joint and the class around it that states the attribute; None: there is none."""
+        name, empty = self.class_of.get(joint), None
+        while name in self.classes:
+            default, around = self.classes[name]
             stated = default.find("joint")
             if stated is not None and attribute in stated.attrib:
-                return name
-            around = outer
+                return empty
+            empty, name = name if stated is None else empty, around
         return None
 
-    def carriers(self, name: str) -> list[int]:
-        """The bodies from the one of a name, or of a joint of that name, to the last one before the world."""
+    def carriers(self, name: str, is_joint: bool) -> list[int]:
+        """The bodies from the one of a name, or that of a joint of that name, to the last one before the world."""
         bodies = [self.model.body(k).name for k in range(self.model.nbody)]
         joints = [self.model.joint(k).name for k in range(self.model.njnt)]
-        body = bodies.index(name) if name in bodies else 0
-        if not body and name in joints:
+        if is_joint and name in joints:
             body = int(self.model.jnt_bodyid[joints.index(name)])
+        else:
+            body = bodies.index(name) if name in bodies else 0
         carriers = []
         while body:
             carriers.append(body)
             body = int(self.model.body_parentid[body])
         return carriers
+
+    def turn_of_body(self, joint: str) -> np.ndarray:
+        """The rotation of the body of a joint at qpos0, from its axes to those of the world."""
+        turn = Rotation.identity()
+        for body in self.carriers(joint, True):
+            turn = Rotation.from_quat(np.roll(self.model.body_quat[body], -1)) * turn
+        return turn.as_matrix()
 
     def has_mass_of_geoms(self, name: str) -> bool:
         element = self.root.find(f".//body[@name='{name}']")
@@ -108,26 +113,41 @@ class Entry(NamedTuple):
     number: str
     name: str  # of a body or joint
     joint: int  # of the Tree, to whose row it belongs
+    place: int  # in all numbers as one row
     wrong: set[str]  # the names of all entries of this number that differ
 
     def values(self, number: str) -> tuple[np.ndarray, np.ndarray]:
         """What was read, and what is stated."""
         return self.reading["read"][number], self.reading["stated"][number]
 
+    def carriers(self, name: str) -> list[int]:
+        """The bodies from that of a name among the entries to the last one before the world."""
+        return self.text.carriers(name, self.number.startswith(("axis", "anchor")))
+
     @property
     def root(self) -> int:
         """The last body before the world; 0: none."""
-        return next(reversed(self.text.carriers(self.name)), 0)
+        return next(reversed(self.carriers(self.name)), 0)
 
 
 def class_without_joint(entry: Entry) -> str | None:
-    is_known = entry.number in OF_JOINTS
-    return entry.text.passed_over(entry.name, entry.number.removesuffix("_moved")) if is_known else None
+    """A class between has no <joint>, and the engine has MJCF's default: 0, and an axis along z of the body."""
+    name = entry.text.passed_over(entry.name, entry.number) if entry.number in OF_JOINTS else None
+    read = entry.values(entry.number)[0]
+    if name and entry.number == "axis":
+        z = entry.text.turn_of_body(entry.name) @ (0.0, 0.0, 1.0)
+        return name if np.allclose(read[entry.joint], z, atol=1e-6) else None
+    return name if name and not read[entry.place] else None
+
+
+def no_springs(entry: Entry) -> str | None:
+    """None of the springs of the joints was read."""
+    return "stiffness" if entry.number == "stiffness" and not entry.values("stiffness")[0].any() else None
 
 
 def armature_without_motor(entry: Entry) -> str | None:
     """The engine has the armature of all joints that a motor or a position servo drives, and of no other."""
-    is_zero = entry.number == "armature" and not entry.values("armature")[0][entry.joint]
+    is_zero = entry.number == "armature" and not entry.values("armature")[0][entry.place]
     return entry.name if is_zero and not entry.wrong & entry.text.driven else None
 
 
@@ -148,6 +168,10 @@ def total_mass(entry: Entry) -> str | None:
 def mass_of_meshes(entry: Entry) -> str | None:
     is_of_geoms = entry.number in MASSES and entry.text.has_mass_of_geoms(entry.name)
     return entry.name if is_of_geoms and entry.text.geoms(entry.name, "mesh") else None
+
+
+def mass_of_geoms(entry: Entry) -> str | None:
+    return entry.name if entry.number in MASSES and entry.text.has_mass_of_geoms(entry.name) else None
 
 
 def mass_without_contacts(entry: Entry) -> str | None:
@@ -172,17 +196,18 @@ def small_inertia(entry: Entry) -> str | None:
 def several_joints(entry: Entry) -> str | None:
     """All that is at another place is carried by a body with several joints."""
     counts = entry.text.model.body_jntnum
-    several = [[body for body in entry.text.carriers(name) if counts[body] > 1] for name in entry.wrong]
+    several = [[body for body in entry.carriers(name) if counts[body] > 1] for name in entry.wrong]
     if entry.number not in PLACES or not all(several):
         return None
-    body = next(body for body in entry.text.carriers(entry.name) if counts[body] > 1)
+    body = next(body for body in entry.carriers(entry.name) if counts[body] > 1)
     return str(entry.text.model.body(body).name)
 
 
 def fixed_root(entry: Entry) -> str | None:
     """Without the pose of a body on the world that has no joint, all is where the engine has it."""
     model, root = entry.text.model, entry.root
-    if entry.number not in PLACES or not root or model.body_jntnum[root]:
+    has_pose = (model.body_pos[root].any() or model.body_quat[root][1:].any()) and not model.body_jntnum[root]
+    if entry.number not in PLACES or not (root and has_pose):
         return None
     turn = Rotation.from_quat(np.roll(model.body_quat[root], -1))
     read, stated = entry.values("com")
@@ -203,8 +228,8 @@ def turned_start(entry: Entry) -> str | None:
 
 
 CAUSES: tuple[Callable[[Entry], str | None], ...] = (
-    class_without_joint, armature_without_motor, option_gravity, total_mass, mass_of_meshes, mass_without_contacts,
-    small_inertia, fixed_root, turned_start, several_joints,
+    class_without_joint, no_springs, armature_without_motor, option_gravity, total_mass, mass_of_meshes,
+    mass_without_contacts, small_inertia, mass_of_geoms, fixed_root, turned_start, several_joints,
 )  # fmt: skip
 
 

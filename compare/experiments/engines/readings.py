@@ -18,7 +18,11 @@ UNITS = {"gravity": "m/s2", "mass": "kg", "moments": "kg m2", "com": "m", "inert
 OF_BODIES = "mass", "moments"  # no convention makes these differ
 ENTRIES = {"mass": 1, "moments": 3, "com": 3, "inertia": 9, "axis": 3, "anchor": 3}  # of a joint
 OF_JOINTS = "axis", "anchor"
-FOLLOWS = {"inertia": "moments", "com_moved": "com", "axis_moved": "axis", "anchor_moved": "anchor"}
+# not listed where one of these differs too
+FOLLOWS = {
+    "inertia": ("moments", "mass"), "com": ("mass",), "axis_moved": ("axis",), "anchor_moved": ("anchor", "axis"),
+    "com_moved": ("com", "axis", "anchor", "mass"),
+}  # fmt: skip
 REFUSED = "refused"  # in place of a number: the file itself
 AS_READ = "as read"  # checks of numbers
 
@@ -42,7 +46,9 @@ def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, r
             what, most = f"{number} {AS_READ}", largest_difference(reading, number)
             tolerance = tolerance_of(reading, record, number)
             result.check(label, what, most, tolerance, UNITS[number], "", True, about=About.ENGINE)
-        is_said = number in reading["lacking"] or FOLLOWS.get(number) in reading["mended"]
+        is_said = number in reading["lacking"] or any(
+            cause in reading["mended"] for cause in FOLLOWS.get(number, ())
+        )
         if number in reading["mended"] and not is_said:
             add_differing(result, robot, record, reading, number)
 
@@ -67,7 +73,7 @@ def add_differing(
     text, rows = Text(robot.mjcf), []
     causes: dict[Cause | None, str] = {}
     for place in places:
-        cause = cause_of(Entry(text, reading, number, names[place], joints[place], wrong))
+        cause = cause_of(Entry(text, reading, number, names[place], joints[place], place, wrong))
         causes.setdefault(cause, names[place])
         pair = float(values[place]), float(stated[place])
         rows.append(

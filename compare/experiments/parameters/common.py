@@ -55,6 +55,11 @@ def causes_in_common(numbers: Sequence[Numbers], from_geoms: Sequence[str]) -> l
         if len(of_body) > 1:
             causes.append(as_one(of_body, "from_geoms", {"body": body, "numbers": of_body}))
             left = without(left, of_body)
+    for body in dict.fromkeys(each.number.place for each in left if each.number.quantity == "mass"):
+        of_body = [each for each in left if each.number.place == body and each.number.quantity in OF_INERTIAL]
+        if load := load_of(of_body):
+            causes.append(as_one(of_body, "load", {"body": body, **load}))
+            left = without(left, of_body)
     while left:
         together = alike(left)
         left = without(left, together)
@@ -65,6 +70,27 @@ def causes_in_common(numbers: Sequence[Numbers], from_geoms: Sequence[str]) -> l
 def without(numbers: Sequence[Numbers], others: Sequence[Numbers]) -> list[Numbers]:
     names = [(each.number.place, each.number.quantity) for each in others]
     return [each for each in numbers if (each.number.place, each.number.quantity) not in names]
+
+
+def load_of(numbers: Sequence[Numbers]) -> dict[str, Any] | None:
+    """The mass, kg, and the place, m from the joint, of a body that is added or missing; None: no body makes the difference."""
+    if len(numbers) < len(OF_INERTIAL):
+        return None
+    by_name = {each.number.quantity: each for each in numbers}
+    (stated_mass,), (mass,) = by_name["mass"].stated, by_name["mass"].compiled
+    stated_com, com = by_name["com"].stated, by_name["com"].compiled
+    added = mass - stated_mass
+    place = (mass * com - stated_mass * stated_com) / added
+    about_joint = (by_name["inertia"].compiled - by_name["inertia"].stated).reshape(3, 3)
+    about_joint = about_joint + steiner(mass, com) - steiner(stated_mass, stated_com)
+    low, middle, high = np.linalg.eigvalsh((about_joint - steiner(added, place)) * np.sign(added))
+    is_body = low >= -SAME * high and high <= (low + middle) * (1.0 + SAME)
+    return {"mass": abs(added), "place": place.tolist(), "is_added": added > 0.0} if is_body else None
+
+
+def steiner(mass: float, place: np.ndarray) -> np.ndarray:
+    """The inertia of a point, (3, 3) kg m2."""
+    return mass * (place @ place * np.eye(3) - np.outer(place, place))
 
 
 def common_factor(numbers: Sequence[Numbers]) -> float | None:
