@@ -33,6 +33,7 @@ from .tables import LimitRow, StabilityResult
 
 OF = "of_file"  # the template
 RADII_WITHIN = 1e-4  # relative: of the growth in a step, MuJoCo's is by differences
+MOST_GROWTH = 10.0  # in a step: with more, differences leave the zone in which the forces are linear
 DEFAULT_STEP, DEFAULT = 0.002, "Euler"  # MuJoCo's step, s, and integrator where a file states none
 GIVES_WAY = 0.1  # rad or m: a rest at the limit so far from that of the file's step is said
 FAR = 1e-3  # rad or m: a rest farther from its posture is said
@@ -213,7 +214,7 @@ def add_checks(result: StabilityResult, rows: Sequence[StepLimitRow], quantity: 
     """Closed form to differences; the step in use; what runs show there; the push that it survives."""
     for row in rows:
         where = f"{row.posture}, {row.surroundings}, {row.integrator}"
-        if row.apart is not None and row.growth:
+        if row.apart is not None and row.growth and row.growth <= MOST_GROWTH:
             result.check(where, MODES, abs(row.apart) / row.growth, RADII_WITHIN, "")
     own = in_use(rows, rows[0].file_integrator)
     for row in own:
