@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from ..engines.mujoco.step import Step
+from ..engines.mujoco.step import Step, distance
 from .deviations import GROWN, LASTS, SMALL_PUSH, apart, grows, pushed, speeds_of, steps_in
 from .limits import COARSER, LONGEST, SHORTEST, Limit
 from .rest import Rest, rest_near
@@ -17,6 +17,7 @@ CURVE_STEPS, LEAST_SIZES = (
 PUSHES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # rad/s or m/s, of all speeds
 USUAL_PUSH = 0.1  # rad/s or m/s: what a robot in use meets
 CALM, CALMER = 1e-3, 0.01  # rad/s or m/s, and of the push: a speed at the end that is rest
+FAR = 0.5  # rad or m: from a rest to what is another one
 AS_FAST, WILD = 2.0, 1e3  # fold: of the creep; a run that is faster has failed
 FINER = 8  # the step over the one that shows whether the robot itself bears a push
 
@@ -35,15 +36,21 @@ def growth_in_run(model: mujoco.MjModel, state: np.ndarray, dt: float, integrato
 
 
 def speed_after(model: mujoco.MjModel, rest: Rest, push: float, dt: float) -> float:
-    """The largest speed, beside the creep, in the last eighth of a run after a push, by the file's own solver; inf: it fails."""
+    """The largest speed, beside the creep, in the last eighth of a run after a push, by the file's own solver.
+
+    inf: the run fails, or ends elsewhere, as that of a robot which falls over and lies still.
+    """
     step = Step(model, dt, rest.step.integrator, exact=False)
     steps = steps_in(LASTS, dt)
     speeds = speeds_of(step.run(pushed(rest, push), steps))
-    return float(np.abs(speeds[-steps // 8 :] - rest.speeds).max()) if len(speeds) == steps else np.inf
+    moved = distance(model, rest.state, step.state())[rest.is_held]
+    if len(speeds) < steps or np.abs(moved).max(initial=0.0) > FAR:
+        return np.inf
+    return float(np.abs(speeds[-steps // 8 :] - rest.speeds).max())
 
 
 def calms(model: mujoco.MjModel, rest: Rest, push: float) -> bool:
-    """Whether the robot calms down after a push."""
+    """Whether the robot calms down near its rest after a push."""
     return speed_after(model, rest, push, rest.step.dt) <= max(CALM, CALMER * push)
 
 

@@ -1,11 +1,9 @@
-"""Find the time steps that are stable for a robot with its own servos, with each integrator of MuJoCo.
-Writes robot.xml and a report to the current folder; use your own file in the place of robot.xml."""
+"""Find the time steps that are stable for a robot as it is, with each integrator of MuJoCo, and sweep a gain.
+Use your own file in the place of the text; keyframes, contacts and all other actuators count too."""
 
-import csv
-import json
-import subprocess
-import sys
-from pathlib import Path
+import mujoco
+
+import compare
 
 ROBOT = """<mujoco>
   <option timestep="0.01" integrator="Euler"/>
@@ -20,16 +18,13 @@ ROBOT = """<mujoco>
   <actuator><position joint="shoulder" kp="400" kv="20"/><position joint="elbow" kp="300" kv="8"/></actuator>
 </mujoco>"""
 
-Path("robot.xml").write_text(ROBOT, encoding="utf-8")
-words = ["stability", "--quick", "--mjcf", "robot.xml", "--out", "report"]
-status = subprocess.run([sys.executable, "-m", "compare", *words], stdout=subprocess.DEVNULL).returncode
-results = json.loads(Path("report/results.json").read_text(encoding="utf-8"))
-for check in results["checks"]:
-    if check["quantity"] == "stable at its own step":
-        answer = "stable" if check["passed"] else "not stable"
-        print(f"step of the file, {check['value']} s: {answer} (status {status})")
-with open("report/tables/step_limits.csv", encoding="utf-8", newline="") as file:
-    for row in csv.DictReader(file):
-        dt = row["predicted_dt_s"]
-        limit = f"{float(dt):.4f} s, {row['limiting_joint']}" if dt else "none"
-        print(f"limit with {row['integrator']}: {limit}")
+model = mujoco.MjModel.from_xml_string(ROBOT)
+for row in compare.step_limits(model):
+    limit = f"{row.predicted_dt:.4f} s, {row.limiting_joint}" if row.predicted_dt else row.limit
+    print(
+        f"{row.integrator}: {limit}; {row.file_dt} s is {'stable' if row.stable_at_file_dt else 'not stable'}"
+    )
+for kv in (8.0, 2.0, 0.5):
+    model.actuator_biasprm[1, 2] = -kv
+    (row,) = compare.step_limits(model, integrators=["Euler"])
+    print(f"Euler, kv of the elbow {kv}: {row.predicted_dt:.4f} s")

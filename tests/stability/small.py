@@ -97,6 +97,11 @@ KINDS = {  # every kind of force at rest
         '<tendon><spatial stiffness="200" damping="2" springlength="0.2"><site site="wall"/><site site="end"/></spatial></tendon>'
         + HOLDING
     ),
+    "no damping implicit in Euler": two(HOLDING + '<option><flag eulerdamp="disable"/></option>', joint='damping="1"'),
+    "a tendon across branches": f"""<mujoco><worldbody><body pos="0 0 1"><joint name="j" axis="0 1 0"/>{ROD}</body>
+      <body pos="0 1 1"><joint name="k" axis="0 1 0"/>{ROD}</body></worldbody><tendon><fixed name="t" damping="2">
+      <joint joint="j" coef="1"/><joint joint="k" coef="-0.5"/></fixed></tendon>"""
+    + HOLDING.replace("</actuator>", '<position tendon="t" kp="50" kv="3"/></actuator></mujoco>'),
     "a ball": BALL, "a box": BOX, "a free caster": CASTER, "the two-mass leg": LEG,
     **{f"{cone}, condim {condim}": STANDING.format(cone=cone, condim=condim)
        for cone in ("elliptic", "pyramidal") for condim in (1, 3, 6)},

@@ -1,6 +1,7 @@
 """The step at rest: cases that are known exactly, and the closed form beside the differences of MuJoCo's own step."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -132,3 +133,14 @@ def test_noise_of_differences_and_what_nothing_holds_never_grow():
                 assert growth(rest_of(text, dt, integrator)).factor == 1.0
         assert limit_of(text).growth.factor == 1.0  # its contacts may give way, at a long step
     assert in_the_air_at(place_of(KINDS["a box"]), "").surroundings == "air"
+
+
+@pytest.mark.parametrize("noise, factor", [(0.0, 1.0002), (1e-6, 1.0002), (4e-5, 1.0)])
+def test_what_noise_splits_from_one_does_not_grow(noise, factor):
+    """A double eigenvalue 1: an entry e splits it by the root of e dt, which is growth unless it may be noise."""
+    dt, entry = 1e-3, 4e-5
+    A, other = (np.array([[1.0, dt], [below, 1.0]]) for below in (entry, entry - noise))
+    rest = SimpleNamespace(
+        A=A, state=None, step=SimpleNamespace(dt=dt, derivative=lambda state, nudge: other)
+    )
+    assert growth(rest).factor == pytest.approx(factor, rel=1e-9)

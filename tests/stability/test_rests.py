@@ -107,12 +107,12 @@ def test_all_rows_of_a_contact_are_its_own(cone, counts):
 
 
 def test_a_relaxed_run_loses_its_speed_whether_anything_brakes_or_not():
-    place = place_of(POLE.format("").replace("0.05", "0"))
+    place = place_of(POLE.format("").replace('damping="0.05"', ""))
     step = Step(place.model, 1e-3, "Euler")
     start = step.moved(place.rest, np.array([0.5, 0.0]))
     for rate, slow in ((4.0, True), (0.0, False)):
         step.put(step.relaxed(start, 3.0, rate, 1e-9))
-        assert (abs(step.data.qvel[0]) < 0.02) is slow
+        assert bool(abs(step.data.qvel[0]) < 0.02) is slow
 
 
 def test_a_posture_may_be_numbers():
