@@ -20,6 +20,7 @@ OTHERS = [
     tmt.Motion,
     compare.assert_agrees,
     compare.differences,
+    compare.step_limits,
     compare.tree,
     Difference,
 ]

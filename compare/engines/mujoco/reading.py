@@ -68,7 +68,7 @@ def read(origin: Source | Path | str | mujoco.MjModel) -> Reading:
         ranges=tuple(ranges[place.joint] for place in joints.values()),
         integrator=names_of_members.get(integrator, integrator.name.removeprefix("mjINT_")),
         dt=float(model.opt.timestep),
-        drive=drive_of(source, bodies, keys),
+        drive=drive_of(source, keys),
         bodies=tuple(bodies),
         source=source,
     )

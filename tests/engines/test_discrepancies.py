@@ -1,0 +1,47 @@
+"""The scripts of reports/engines/discrepancies.md print what stands below them; RENEW=1 writes it anew."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from compare.engines import RECORDS
+from compare.engines.outside import Outside
+
+TEXT = Path(__file__).parents[2] / "reports/engines/discrepancies.md"
+BLOCK = re.compile(r"^## (.*?)$(?:(?!^## ).)*?^```python\n(.*?)^```\n\n```text\n(.*?)^```$", re.M | re.S)
+BLOCKS = BLOCK.findall(TEXT.read_text())
+PACKAGES = {"pydrake": "drake", "mujoco_warp": "warp", "newton": "newton", "pinocchio": "pinocchio", "pybullet": "pybullet",
+            "mjx": "mjx"}  # fmt: skip
+# what engines themselves print is left out
+RUN = """import functools, sys
+with open(sys.argv[2], "w") as out:
+    exec(sys.argv[1], {"print": functools.partial(print, file=out), "__name__": "__main__"})
+"""
+SILENT = {"TF_CPP_MIN_LOG_LEVEL": "3", "JAX_PLATFORMS": "cpu"}
+
+
+def test_every_section_has_a_script_and_the_threads_that_were_found():
+    sections = TEXT.read_text().split("\n## ")[1:-1]  # the last is of what was solved
+    assert len(BLOCKS) == len(sections) and all("*Upstream:*" in section for section in sections)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("title, script, printed", BLOCKS, ids=[block[0] for block in BLOCKS])
+def test_a_script_prints_what_stands_below_it(title, script, printed, tmp_path):
+    needed = {engine for package, engine in PACKAGES.items() if package in script and engine in RECORDS}
+    if missing := [engine for engine in needed if Outside(engine).unavailable()]:
+        pytest.skip(f"{missing[0]} is not installed")
+    file = tmp_path / "printed.txt"
+    command = [sys.executable, "-c", RUN, script, str(file)]
+    subprocess.run(command, env=os.environ | SILENT, capture_output=True, check=True)
+    said = file.read_text()
+    if os.environ.get("RENEW"):
+        TEXT.write_text(
+            TEXT.read_text().replace(f"{script}```\n\n```text\n{printed}", f"{script}```\n\n```text\n{said}")
+        )
+    else:
+        assert said == printed

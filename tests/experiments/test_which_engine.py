@@ -1,0 +1,163 @@
+"""Which engine: servos, batches, times, the reference, the cheapest method, --engines."""
+
+import dataclasses
+from itertools import accumulate, chain, repeat
+
+import numpy as np
+import pytest
+
+from compare.core import timing
+from compare.core.errors import Refused
+from compare.engines import Motion
+from compare.engines.outside import servos_of
+from compare.experiments.engines import batches, servos
+from compare.experiments.engines.answer import cheapest_of
+from compare.experiments.engines.motion import BRIEF, MANY, brief, free_scene, reference
+from compare.experiments.engines.tables import EnginesResult, MethodRow
+from compare.experiments.setup import Setup, engines
+from compare.robots.arm import ARM
+from compare.run.examine import not_chosen
+from compare.run.reference import compared_with
+from compare.truth import reference as truth
+
+LEG = """<mujoco><option timestep="0.004"/><worldbody><body pos="0 0 1"><joint name="hip" axis="0 1 0" damping="0.2"/>
+<inertial pos="0 0 -0.3" mass="1" diaginertia="0.03 0.03 0.01"/></body></worldbody>
+<actuator><position joint="hip" kp="60" kv="4"/></actuator></mujoco>"""
+
+
+@pytest.fixture(scope="module")
+def setup(tmp_path_factory):
+    path = tmp_path_factory.mktemp("leg") / "leg.xml"
+    path.write_text(LEG)
+    compared = compared_with("model", str(path))
+    return Setup(compared.robot, engines(compared.mujoco), reading=compared.reading)
+
+
+def test_what_each_integrator_takes_explicitly_in_a_servo(setup):
+    result = EnginesResult("engines", tables={"engines_servos": []})
+    servos.follow_step(result, setup, setup.engines["mujoco"])
+    why = {row.method: row.why for row in result.tables["engines_servos"]}
+    assert why == {"Euler": "damping_of_servo_explicit", "implicitfast": "damping_implicit",
+                   "discrete": "springs_implicit", "RK4": "error_of_the_method"}  # fmt: skip
+    deviations = {row.method: row.deviation for row in result.tables["engines_servos"]}
+    assert deviations["RK4"] < 1e-5 < 1e-4 < deviations["implicitfast"] < deviations["Euler"]
+    servos.add_sentences(result)
+    assert [note.kind for note in result.notes] == ["response"] * 4
+
+
+def test_a_torque_that_is_held_is_told_from_one_that_is_not(setup):
+    """And a response that is like none is not explained."""
+    case, method = servos.scene_of(setup), setup.engines["mujoco"].methods["RK4"]
+    path = servos.held(case, 256)
+    assert servos.explanation(case, setup.engines["mujoco"], method, 256, path)[0] == "held"
+    another = path + np.linspace(0.0, 1.0, len(path))[:, None]
+    explained = servos.explanation(case, Diverging(setup.engines["mujoco"]), method, 256, another)
+    assert explained[0] == ""
+
+
+class Diverging:
+    """An engine whose error does not fall with its step."""
+
+    name = "mujoco"
+
+    def __init__(self, engine):
+        self.engine = engine
+
+    def of(self, case):
+        dynamics = self.engine.of(case)
+
+        class Off:
+            def prepare(self, *arguments):
+                run, read = dynamics.prepare(*arguments)
+
+                def off(outcome):
+                    motion = read(outcome)
+                    return Motion(motion.t, motion.q + 1.0, motion.v)
+
+                return run, off
+
+        return Off()
+
+
+def test_the_law_that_other_engines_get_is_that_of_the_actuators(setup):
+    case = servos.scene_of(setup)
+    law = servos_of(case)
+    assert law.position_gain == pytest.approx(60.0) and law.speed_gain == pytest.approx(4.0)
+    assert servos_of(free_scene(setup)) is None
+
+
+def test_batches_have_the_same_error_for_any_number_of_worlds(setup, monkeypatch):
+    monkeypatch.setattr(batches, "WORLDS", (1, 5))
+    result = EnginesResult("engines", tables={"engines_batches": []})
+    for name in ("mujoco", "tmt"):
+        batches.time_batches(result, setup, setup.engines[name])
+    rows = result.tables["engines_batches"]
+    assert [(row.engine, row.worlds) for row in rows] == [
+        ("MuJoCo", 1),
+        ("MuJoCo", 5),
+        ("TMT", 1),
+        ("TMT", 5),
+    ]
+    assert all(row.per_step_and_world > 0.0 and "CPU" in row.device for row in rows)
+    assert np.ptp([row.worst_error for row in rows]) <= 1e-13 and 0.0 < rows[0].worst_error < 1e-4
+
+
+@pytest.mark.parametrize("first", (0.016, 0.2))
+def test_a_first_call_that_is_disturbed_does_not_move_a_time(first, monkeypatch):
+    """A call of 1 ms that another process interrupts for 16 ms, or longer."""
+    moments = accumulate(chain.from_iterable(zip(repeat(0.0), chain([first], repeat(1e-3)))))
+    monkeypatch.setattr(timing.time, "perf_counter", lambda: next(moments))
+    (taken,) = timing.in_turns([lambda: None], rounds=5)
+    assert min(taken) == pytest.approx(1e-3) and timing.scatter(taken) <= timing.STEADY
+
+
+@pytest.mark.parametrize("taken, enough", (
+    ([0.3], True), ([0.02], False), ([0.02, 0.029], True), ([0.02, 0.031], False), ([0.001] * 14, False), ([0.001] * 16, True),
+))  # fmt: skip
+def test_when_a_function_was_called_often_enough(taken, enough):
+    assert timing.is_timed(taken) is enough
+
+
+def test_the_reference_of_engines_is_more_exact_than_doubles(setup):
+    case = dataclasses.replace(
+        ARM.cases[0], scene=dataclasses.replace(ARM.cases[0].scene, duration=1.0, dt=1.0 / 64)
+    )
+    near, exact = reference(case), truth.reference(case)
+    error = np.abs((near.high - exact.high) + (near.low - exact.low)).max()
+    assert error < 1e-16 * np.abs(exact.high).max() and error <= 10.0 * near.apart + 1e-18
+
+
+@pytest.mark.parametrize("speeds", (MANY, MANY + 1))
+def test_the_motion_of_a_robot_with_many_speeds_is_brief(speeds, tmp_path):
+    path = tmp_path / "chain.xml"
+    inertial = '<inertial pos="0 0 -0.1" mass="1" diaginertia="0.01 0.01 0.01"/>'
+    link = f'<body pos="0 0 -0.2"><joint axis="0 1 0" damping="0.1"/>{inertial}'
+    path.write_text(f"<mujoco><worldbody>{link * speeds}{'</body>' * speeds}</worldbody></mujoco>")
+    case = next(case for case in compared_with("model", str(path)).robot.cases if not case.is_held)
+    assert brief(case).duration == (BRIEF if speeds > MANY else case.duration) < 10.0
+    assert brief(case).scene.dt <= case.scene.dt and brief(None) is None
+
+
+def row(method, error, seconds, alone=None):
+    return MethodRow(
+        scene="s", engine="E", method=method, scheme="", dt=0.01, tolerance=None, worst_error=error, seconds=seconds,
+        seconds_alone=alone, scatter=1.0, steady=True, seconds_prepared=None, ended=None, order=1,
+    )  # fmt: skip
+
+
+def test_the_cheapest_method_is_that_of_the_engines_own_time():
+    """Just inside 1e-3; the time of the steps alone counts; a motion of 2 s; the floor is the smallest error."""
+    fields = cheapest_of(
+        [row("fast", 1.1e-3, 1.0), row("slow", 0.9e-3, 9.0), row("alone", 1e-3, 99.0, 4.0)], 2.0
+    )
+    assert (fields["within_1e_3"], fields["within_1e_3_cost"]) == ("alone", 2000.0)
+    assert fields["within_1e_6"] is None and (fields["floor"], fields["floor_method"]) == (0.9e-3, "slow")
+
+
+def test_engines_are_chosen_by_their_names():
+    others = not_chosen("drake,mjx")
+    assert (
+        "drake" not in others and "mjx" not in others and "mjx_float32" in others and "mujoco" not in others
+    )
+    with pytest.raises(Refused, match="draek is not an engine that reads"):
+        not_chosen("draek")
