@@ -147,15 +147,3 @@ class Model(ReadModel):
         placed = np.empty_like(matrices)
         placed[:, self.order.v[:, None], self.order.v] = matrices
         return placed
-
-
-def built(path: Path) -> Any:
-    """The model of a URDF or MJCF file: of that a copy without includes, which Pinocchio skips, and with a name for each body."""
-    import pinocchio
-
-    if path.suffix == ".urdf":
-        return pinocchio.buildModelFromUrdf(str(path))
-    with TemporaryDirectory() as folder:
-        copy = Path(folder) / path.name
-        copy.write_text(whole_text(path), encoding="utf-8")
-        return pinocchio.buildModelFromMJCF(str(copy))
