@@ -7,7 +7,7 @@ import pytest
 from models import PATHS
 
 from compare.engines.mujoco import read
-from compare.robots.actuators import Actuator, Drive, Tendon, controller, reason
+from compare.robots.actuators import Actuator, Drive, controller, reason
 from compare.robots.case import rates_at
 from compare.robots.file import robot_of
 from compare.robots.validation import WrongField
@@ -24,18 +24,10 @@ def gripper():
     return robot_of(read(PATHS["gripper"]), "gripper.xml")
 
 
-def test_ranges_of_control_activation_and_force():
-    ranges = {"control_range": (-1.0, 2.0), "activation_range": (-0.5, 0.5), "force_range": (-2.0, 3.0)}
-    one = dataclasses.replace(PLAIN, **ranges)
+def test_ranges_of_control_and_activation():
+    one = dataclasses.replace(PLAIN, control_range=(-1.0, 2.0), activation_range=(-0.5, 0.5))
     assert [one.clamped(u) for u in (3.0, -3.0, 1.0)] == [2.0, -1.0, 1.0]
     assert dataclasses.replace(one, dynamics="filter").clamped(3.0) == 0.5
-    assert all(one.is_cut(x) for x in (-2.001, -2.0, 3.0, 3.001))
-    assert not any(one.is_cut(x) for x in (-1.999, 2.999))
-    # of a tendon's spring the dead band
-    tendon = Tendon("t", 0, (1.0,), 10.0, 0.0, 0.2, 0.5)
-    assert [tendon.force(x) for x in (0.1, 0.3, 0.7)] == pytest.approx([1.0, 0.0, -2.0])
-    assert all(tendon.pulls(x) for x in (0.199, 0.2 + 1e-12, 0.501))
-    assert not any(tendon.pulls(x) for x in (0.201, 0.499))
 
 
 def test_controls_are_what_a_keyframe_states_else_the_targets_that_are_the_posture():

@@ -123,6 +123,16 @@ class Model(OfCompiled):
 
         return run, str(device.device_kind)
 
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        has_quaternions = len(self.bare.qpos) > len(self.bare.dofs)  # which do not move like numbers
+        return ("derivatives",) if has_quaternions else ()
+
+    def derivatives(self, q: Array, v: Array, force: Array) -> Array:
+        by = functions()["derivatives"](self.model, self.data, *self.placed(q, v, force))
+        rows, at = self.bare.dofs, (self.bare.qpos, self.bare.dofs, self.bare.dofs)
+        return np.array([np.asarray(matrix)[np.ix_(rows, columns)] for matrix, columns in zip(by, at)])
+
     def run(self, course: Course) -> tuple[Array, int]:
         dt = np.asarray(course.dt, self.precision)
         bare, model, tau = self.of_course(course)
@@ -155,9 +165,14 @@ def functions() -> dict[str, Callable[..., Any]]:
         return jax.lax.scan(record, (qpos, qvel), None, records)[1]
 
     worlds = jax.vmap(partial(path, records=1), in_axes=(None, None, 0, 0, 0, None))
+
+    def acceleration(model: Any, data: Any, *state: Any) -> Any:
+        return values(model, data, *state)[2]
+
     compiled = partial(jax.jit, compiler_options=COMPILER)
     return {
         "values": compiled(values),
+        "derivatives": compiled(jax.jacfwd(acceleration, argnums=(2, 3, 4))),
         "path": compiled(path, static_argnames="records"),
         "worlds": jax.jit(worlds),
     }

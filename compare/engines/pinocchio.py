@@ -133,3 +133,17 @@ class Model(ReadModel):
         q_own, v_own, force = self.own(q, v, force)
         a_own = self.pinocchio.aba(self.model, self.data, q_own, v_own, force) - self.turning(v_own)
         return self.order.tree(q, a_own)
+
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        """Movements of a free body are in other axes; of a composite joint Pinocchio 4.1 has wrong derivatives."""
+        composite = any(joint.shortname() == "JointModelComposite" for joint in self.model.joints)
+        return ("derivatives",) if self.file.free or composite else ()
+
+    def derivatives(self, q: Array, v: Array, force: Array) -> Array:
+        by = self.pinocchio.computeABADerivatives(self.model, self.data, *self.own(q, v, force))
+        upper = np.triu(by[2])
+        matrices = np.array([by[0], by[1], upper + np.triu(upper, 1).T])
+        placed = np.empty_like(matrices)
+        placed[:, self.order.v[:, None], self.order.v] = matrices
+        return placed

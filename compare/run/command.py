@@ -62,7 +62,7 @@ def compute(
 ) -> Written:
     """Run the experiments and write the report to a folder; see write_report."""
     is_alone, robot, started = options.experiment != "all", compared.robot, time.perf_counter()
-    step = compared.integrator_step(options.dt, options.integrator)
+    request = compared.request_of(options)
     terminal.say_lines(compared.reference.lines)
     if robot.coordinates.nv > MOST_SPEEDS:
         terminal.say(say(Finding("shared", "large", {"speeds": robot.coordinates.nv, "most": MOST_SPEEDS})))
@@ -82,7 +82,7 @@ def compute(
             "progress": terminal.show,
             "chosen": options.engines,
         }
-        setup = examine.setup_of(compared, options.quick, alone=is_alone, step=step, **more)
+        setup = examine.setup_of(compared, options.quick, alone=is_alone, request=request, **more)
         for name, said in reasons.items():
             terminal.say(block("run", "skipped", name=name, reason=said))
         terminal.how_far = partial(examine.progress, workers.clock, names)

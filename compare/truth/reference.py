@@ -18,7 +18,7 @@ from ..core.finding import Finding
 from ..robots import Robot
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates, rates_at
-from .steps import growth_of
+from ..stability.linear_step import growth_of, is_runge_kutta
 
 RECORDS = 64  # states of a run, without its start
 LOST = 1e-30  # error of a run in pairs relative to the growth of a small difference, about
@@ -99,10 +99,12 @@ def in_doubles(case: Case) -> Reference:
 
 def has_no_reference(robot: Robot) -> Finding | None:
     """Why a file's robot has no reference: its fastest mode diverges with the finest steps; or None."""
+    stepping = METHODS[DOUBLES]
+    assert is_runge_kutta(stepping)
     for case in robot.cases_of_torque if robot.is_read else ():
         dt = case.duration / (first_steps(case) << MOST_DOUBLINGS)
         decay, swing = rates_at(case.tree, case.q)
-        growth = np.abs(growth_of(METHODS[DOUBLES], np.array([-decay, 1j * swing]) * dt)).max()
+        growth = np.abs(growth_of(stepping, np.array([-decay, 1j * swing]) * dt)).max()
         if not growth <= DIVERGES:
             return Finding("speed", "no_reference", {"noun": robot.noun, "rate": max(decay, swing), "dt": dt})
     return None

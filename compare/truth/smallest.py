@@ -9,7 +9,6 @@ an analytic function that is 0 there is 0 everywhere.
 import dataclasses
 from collections.abc import Sequence
 from functools import lru_cache
-from types import SimpleNamespace
 from typing import NamedTuple
 
 import mpmath
@@ -18,7 +17,7 @@ import numpy as np
 import tmt
 from tmt.derivation import method
 from tmt.derivation.vectors import solve
-from tmt.exact.tree import exact_tree
+from tmt.exact.tree import ExactTree, exact_tree
 from tmt.exact.values import DIGITS
 
 from ..robots.case import SEED, Case
@@ -54,7 +53,7 @@ def needed(case: Case) -> Needed:
 
 
 def forces(
-    case: Case, tree: SimpleNamespace, still: Sequence[str], start: Numbers, q: Numbers, qd: Numbers
+    case: Case, tree: ExactTree, still: Sequence[str], start: Numbers, q: Numbers, qd: Numbers
 ) -> tuple[Numbers, Numbers]:
     """Mbar qdd (nv,) and the position; joints in `still` are at their start and at rest.
 

@@ -6,12 +6,15 @@ beyond, those in the axes of the world (articulated.py), whose number grows with
 
 from functools import lru_cache
 
-from tmt.derivation import articulated, composite
+from tmt.derivation import articulated, composite, linearized
 from tmt.derivation.dual import seeded
+from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms, reduced_force
-from tmt.derivation.quantities import QUANTITIES, State
+from tmt.derivation.quantities import Form, State, Step, argument_of, quantity_of
 from tmt.derivation.scalar import Rows, Scalar, Values
-from tmt.methods.dynamics import Dynamics, Held, Implicit, minus, plus
+from tmt.methods import Linearized, method_named, one_step
+from tmt.methods.derivatives import is_straight
+from tmt.methods.dynamics import Dynamics, Held, acts_at_single_joints, minus, plus
 from tmt.methods.stepping import Method
 from tmt.model.tree import Tree
 
@@ -21,7 +24,10 @@ from .trace import Expression
 # speeds: up to FEW the composite form alone is traced, from MANY on the articulated one alone
 FEW, MANY = 5, 20
 DENSE = 10  # speeds from which solving linear systems and the derivatives of the bias are loops and no longer straight lines
-DYNAMICS = ("mass_matrix", "bias", "gravity_balance")
+FORMS = (
+    Form(composite.mass_matrix_and_bias, composite.generalized_force),
+    Form(articulated.mass_matrix_and_bias, articulated.generalized_force, linearized.rates),
+)
 
 
 class Traceable(Dynamics):
@@ -32,12 +38,14 @@ class Traceable(Dynamics):
     it counts as armature.
     """
 
-    def __init__(self, tree: Tree, by_bodies: bool = False):
+    def __init__(self, tree: AnyTree, by_bodies: bool = False):
         form = articulated if is_shorter_articulated(tree) else composite
         super().__init__(form.mass_matrix_and_bias)
         self.n, self.by_bodies, self.has_used_bodies = len(tree.axis), by_bodies, False
 
-    def acceleration(self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Held = None) -> Values:
+    def acceleration(
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
+    ) -> Values:
         if not self.by_bodies or (implicit and not acts_at_single_joints(implicit)):
             return super().acceleration(tree, q, qd, tau, implicit)
         self.has_used_bodies = True
@@ -47,7 +55,7 @@ class Traceable(Dynamics):
             armature = plus(armature, [row[i] for i, row in enumerate(implicit.matrix)])
         return articulated.acceleration(tree, q, qd, force, armature)
 
-    def bias_rates(self, tree: Tree, q: Values, qd: Values) -> Rows:
+    def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
         if self.n <= DENSE:
             return super().bias_rates(tree, q, qd)
         rates = q[0].tape.call("bias_rates", [*q, *qd], self.n * self.n)
@@ -58,12 +66,6 @@ class Traceable(Dynamics):
             return super().solve_any(matrix, right)
         tape = next(x.tape for x in (*right, matrix[0][0]) if isinstance(x, Expression))
         return tape.call("solution", [*(x for row in matrix for x in row), *right], self.n)
-
-
-def acts_at_single_joints(implicit: Implicit) -> bool:
-    """Whether what a method takes implicitly is diagonal."""
-    across = [x for i, row in enumerate(implicit.matrix) for j, x in enumerate(row) if i != j]
-    return not implicit.bias_rows and all(isinstance(x, float) and x == 0.0 for x in across)
 
 
 @lru_cache(maxsize=64)
@@ -80,17 +82,34 @@ def is_shorter_articulated(tree: Tree) -> bool:
 
 
 def quantity(tree: Tree, name: str) -> Traced:
-    """A quantity as a function of (q, qd, tau), flat."""
+    """A quantity, by its full name, as a function of (q, qd, tau or qdd, dt), flat."""
     if name == "acceleration":
         return slope(tree, Method(), "quantity", with_step=False)
+    if not (quantity_of(name).is_long or name == "inverse_dynamics"):
+        return in_form(tree, name, FORMS[is_shorter_articulated(tree)])
+    forms = FORMS[len(tree.axis) >= MANY :]
+    return min((in_form(tree, name, form) for form in forms), key=lambda traced: traced.length)
 
-    def function(q: Values, qd: Values, tau: Values) -> Values:
-        state = State(tree, q, qd if "qd" in QUANTITIES[name].takes else None, tau)
-        if name in DYNAMICS:
-            state.mass_matrix, state.bias = Traceable(tree)(tree, q, state.qd)
-        return flat(state.bias if name == "gravity_balance" else QUANTITIES[name].of(state))
 
-    return trace("quantity", (tree.coordinates.nq, len(tree.axis), len(tree.axis)), function)
+def in_form(tree: Tree, name: str, form: Form) -> Traced:
+    """A quantity whose sums are in the order of a form."""
+    row, (nq, n) = quantity_of(name), (tree.coordinates.nq, len(tree.axis))
+    step = straight_step(tree, argument_of(name), form) if row.argument == "method" else None
+
+    def function(*arrays: Values) -> Values:
+        state = State(tree, dict(zip(row.takes, arrays)), form, argument_of(name), step)
+        return flat(row.of(state))
+
+    return trace("quantity", (nq, n, n, 1), function)
+
+
+def straight_step(tree: AnyTree, name: str, form: Form) -> Step:
+    """A step of the method of that name without loops; ValueError of one that solves its stages."""
+    stepping = method_named(name)
+    if not is_straight(stepping):
+        raise ValueError(f"a step of {name} is no fixed row of operations: NumPy alone gives its derivatives")
+    dynamics = Linearized(form)
+    return lambda q, qd, tau, dt: one_step(stepping, tree, q, qd, tau, dt, dynamics)
 
 
 def flat(nested: Scalar) -> Values:

@@ -8,7 +8,7 @@ from textwrap import wrap
 from typing import Any
 
 from tmt.compiled import forms
-from tmt.derivation.quantities import QUANTITIES, shape_of
+from tmt.derivation.quantities import QUANTITIES, is_quantity, quantity_of, shape_of, what_is_known
 from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree, stated
 from tmt.model.values import shown
@@ -48,7 +48,7 @@ def text(
     known = [*LANGUAGES, *SYMBOLIC]
     if not isinstance(language, str) or language not in known:
         raise ValueError(f"language is {shown(language)}; expected one of {', '.join(known)}")
-    chosen = checked_quantities(quantities, OF_SYMBOLS if language in SYMBOLIC else tuple(QUANTITIES))
+    chosen = checked_quantities(quantities, OF_SYMBOLS if language in SYMBOLIC else ())
     if not isinstance(head, list | tuple) or not all(isinstance(line, str) for line in head):
         raise ValueError(f"head is {shown(head)}; a sequence of lines is expected")
     is_name = isinstance(name, str) and re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name)
@@ -77,10 +77,11 @@ def symbolic_text(model: Tree, language: str, quantities: tuple[str, ...], head:
 
 def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ...]:
     chosen = tuple(quantities) if isinstance(quantities, list | tuple) else (quantities,)
-    wrong = [quantity for quantity in chosen if not isinstance(quantity, str) or quantity not in choices]
+    wrong = [x for x in chosen if not is_quantity(x) or (choices and x not in choices)]
     if wrong or not chosen:
         what = wrong[0] if wrong else ()
-        raise ValueError(f"quantity is {shown(what)}; expected some of {', '.join(choices)}")
+        expected = f"expected some of {', '.join(choices)}" if choices else what_is_known(what)
+        raise ValueError(f"quantity is {shown(what)}; {expected}")
     return chosen
 
 
@@ -110,8 +111,10 @@ def places(part: slice) -> str:
 def function_of(model: Tree, name: str) -> Function:
     import tmt  # for the docstring
 
-    quantity, shape = QUANTITIES[name], shape_of(name, model)
-    sizes = {"q": model.coordinates.nq, "qd": model.coordinates.nv, "tau": model.coordinates.nv}
-    title = getattr(tmt, name).__doc__.splitlines()[0]
+    quantity, shape, nv = quantity_of(name), shape_of(name, model), model.coordinates.nv
+    third = "qdd" if "qdd" in quantity.takes else "tau"
+    sizes = {"q": model.coordinates.nq, "qd": nv, third: nv, "dt": 1}
+    title = quantity.title or getattr(tmt, name.partition(":")[0]).__doc__.splitlines()[0]
     results, shape = (quantity.parts, shape[1:]) if quantity.parts else (("out",), shape)
-    return Function(name, title, quantity.takes, sizes, shape, results, forms.quantity(model, name))
+    identifier = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return Function(identifier, title, quantity.takes, sizes, shape, results, forms.quantity(model, name))

@@ -11,7 +11,6 @@ from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms as Terms
 from tmt.derivation.scalar import Rows, Scalar, Values
 from tmt.derivation.vectors import Scalars, solve, solve_any
-from tmt.model.tree import Tree
 
 
 class Implicit(NamedTuple):
@@ -26,6 +25,12 @@ class Implicit(NamedTuple):
 Held = Implicit | None
 
 
+def acts_at_single_joints(implicit: Implicit) -> bool:
+    """Whether what a method takes implicitly is diagonal."""
+    across = [x for i, row in enumerate(implicit.matrix) for j, x in enumerate(row) if i != j]
+    return not implicit.bias_rows and all(isinstance(x, float) and x == 0.0 for x in across)
+
+
 class Dynamics:
     """Accelerations from Mbar and h, which `terms` gives."""
 
@@ -36,7 +41,9 @@ class Dynamics:
         """Mbar (nv rows of nv) and h (nv,)."""
         return self.terms(tree, q, qd)
 
-    def acceleration(self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Held = None) -> Values:
+    def acceleration(
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
+    ) -> Values:
         """a (nv,) from Mbar a = Qbar, or from the linear system of a method that takes something implicitly."""
         M, h = self(tree, q, qd)
         force = method.reduced_force(tree, h, q, qd, tau)
@@ -49,7 +56,7 @@ class Dynamics:
             matrix = [plus(row, changes[i]) if i in changes else row for i, row in enumerate(matrix)]
         return self.solve_any(matrix, minus(force, implicit.pull))
 
-    def bias_rates(self, tree: Tree, q: Values, qd: Values) -> Rows:
+    def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
         return method.bias_rates(tree, q, qd, self.terms)
 
     def solve_any(self, matrix: Rows, right: Values) -> Values:

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from ...robots.actuators import Drive
+from .differences import of_steps
 from .dynamics import Array, MujocoDynamics
 from .names import INTEGRATORS, bit, control_of, element_name, output_of
 
@@ -14,18 +15,15 @@ STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
 BAD = [int(getattr(mujoco.mjtWarning, f"mjWARN_BADQ{what}")) for what in ("POS", "VEL", "ACC")]
 
 
-def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: Array, dt: float, integrator: str) -> np.ndarray:
+def transition(
+    dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str
+) -> np.ndarray:
     """d(q, qd)+/d(q, qd) of one step of MuJoCo at rest, positions as movements, (2nv, 2nv), by central differences.
 
     q: (nq,) rad, m; tau: (nv,) N m.
     """
-    n, ends, coordinates = len(dynamics.dofs), [], dynamics.coordinates
-    for sign in (1.0, -1.0):
-        nudges = sign * NUDGE * np.eye(2 * n)
-        motion = dynamics.run(coordinates.move(q, nudges[:, :n]), nudges[:, n:], tau, dt, 1, integrator)
-        ends.append((motion.q[:, 1], motion.v[:, 1]))
-    (q1, v1), (q0, v0) = ends
-    return np.concatenate([coordinates.difference(q1, q0), v1 - v0], axis=1).T / (2.0 * NUDGE)
+    n = len(dynamics.dofs)
+    return of_steps(dynamics, q, np.zeros(n), tau, dt, integrator, NUDGE, centred=True)()[:, : 2 * n]
 
 
 def left_to_itself(
@@ -49,8 +47,12 @@ class WholeRun(NamedTuple):
     failed_at: float | None  # s: MuJoCo warns of a bad number, resets it where it may; None: it runs on
 
 
-def start_of(model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray) -> np.ndarray:
+def start_of(
+    model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray, q: np.ndarray | None = None
+) -> np.ndarray:
     """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) rad/s and m/s added to its speeds.
+
+    q: other positions, (nq,), at rest.
 
     Where no controls are stated the targets of servos are the posture.
     """
@@ -58,6 +60,8 @@ def start_of(model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray) ->
     if key:
         names = [element_name(model, "key", k) for k in range(model.nkey)]
         mujoco.mj_resetDataKeyframe(model, data, names.index(key))
+    if q is not None:
+        data.qpos[:], data.qvel[:] = q, 0.0
     data.qvel[:] += push
     mujoco.mj_fwdPosition(model, data)
     lengths = [data.actuator_length[output_of(model, i)] for i in range(len(drive.actuators))]

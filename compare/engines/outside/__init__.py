@@ -122,6 +122,19 @@ class OutsideDynamics(OneByOne):
         stiffness = tuple(float(acting["stiffness"][joint.qd.start]) for joint in joints)
         return replace(self.tree, damping=tuple(acting["damping"].tolist()), stiffness=stiffness)
 
+    def derivatives(self, q: Array, v: Array, tau: Array) -> Array:
+        """Of the accelerations by movements of q, by v and by tau, (states, 3, nv, nv), with damping and springs."""
+        by = self.rows("derivatives", q, v, tau - passive(self.tree, q, v))
+        bare, rest = replace(self.tree, damping=(0.0,) * len(self.tree.axis), stiffness=()), np.zeros_like(v)
+        rates = (tmt.inverse_dynamics_derivatives(q, v, rest, tree) for tree in (self.tree, bare))
+        for k, (whole, part) in enumerate(zip(*rates)):
+            by[:, k] -= by[:, 2] @ (whole - part)
+        return by
+
+    def seconds(self, quantity: str, *state: Array) -> float:
+        """Of one evaluation of a quantity at a state, in the engine's process."""
+        return self.ask(answers.seconds, quantity, *state)
+
     def has(self, quantity: str) -> bool:
         return quantity in self.reading["has"]
 

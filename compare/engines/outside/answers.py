@@ -3,7 +3,7 @@
 import importlib
 import time
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -17,8 +17,9 @@ from ...judge.scale import FACTOR
 from .. import RECORDS, Array, Course
 from .model import EngineError, File, Numbers, ReadModel, Unread, numbers_of, size_of
 
+CALLS = 50  # at most, that are timed
 LIMIT = 120.0  # s, of an answer: compiling a large model may take hours
-QUANTITIES = "mass_matrix", "bias", "acceleration"
+QUANTITIES = "mass_matrix", "bias", "acceleration", "derivatives"
 T = TypeVar("T")
 
 
@@ -83,6 +84,12 @@ def gives(model: ReadModel, quantity: str) -> bool:
 def each(model: ReadModel, quantity: str, *values: Array) -> Array:
     """A quantity at many states, (states, ...)."""
     return np.array([getattr(model, quantity)(*state) for state in zip(*values)], dtype=float)
+
+
+def seconds(model: ReadModel, quantity: str, *state: Array) -> float:
+    """Of one evaluation of a quantity at a state, the shortest."""
+    call = partial(getattr(model, quantity), *state)
+    return timing.fastest({quantity: call}, CALLS)[quantity]
 
 
 def prepared(model: ReadModel, course: Course) -> tuple[float, float | None]:

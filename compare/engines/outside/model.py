@@ -193,6 +193,10 @@ class ReadModel:
         """(nv,), from M a = force - h by the engine's own forward dynamics; damping and springs are part of the force."""
         raise NotImplementedError
 
+    def derivatives(self, q: Array, v: Array, force: Array) -> Array:
+        """Of `acceleration` by movements of q, by v and by the force, (3, nv, nv), by the engine's own derivatives."""
+        raise NotImplementedError
+
     def prepare(self, course: Course) -> None:
         """What a run needs that does not depend on its start and length: objects, compiled code."""
 

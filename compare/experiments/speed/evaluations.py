@@ -142,7 +142,7 @@ body:
   %q.i = getelementptr double, ptr %q, i64 %last
   %qd.i = getelementptr double, ptr %qd, i64 %last
   %tau.i = getelementptr double, ptr %tau, i64 %last
-  %wrong = call i64 @one(ptr %q.i, ptr %qd.i, ptr %tau.i, ptr %out)
+  %wrong = call i64 @one(ptr %q.i, ptr %qd.i, ptr %tau.i, ptr %tau.i, ptr %out)
   %next = add i64 %i, 1
   %more = icmp slt i64 %next, %count
   br i1 %more, label %body, label %done

@@ -13,7 +13,8 @@ from ...core.check import About, Result
 from ...engines import LABELS, Engine
 from ...judge.run import LEFT, departure, deviation, number_or_none
 from ...robots import Robot
-from ...truth.linear import Held, held
+from ...robots.robot import Claims
+from ...stability.held import Held, held
 from .departure import check_row, own_torque, predicted, residual, variants
 from .subjects import fraction, rk4_of_both
 from .tables import ClaimRow, FinerRow, KeptRow, TorqueRow
@@ -32,6 +33,11 @@ MOVED = 1e-3  # rad: beyond its limit of the step a held robot moves by more
 PUSHED = 1.0  # rad/s2: a robot that a torque accelerates by as much does not stay where it rests
 
 
+def claims_of(robot: Robot) -> Claims:
+    assert robot.claims is not None
+    return robot.claims
+
+
 def add_rows(result: Result, rows: Sequence[ClaimRow]) -> None:
     result.tables.setdefault("stability_claims", []).extend(rows)
 
@@ -44,7 +50,7 @@ def holding_torques(robot: Robot, engines: Mapping[str, Engine]) -> list[TorqueR
 
     push: what the residual, the torque beyond the one that holds, does to the fastest unstable mode.
     """
-    claims, at = robot.claims, held(robot, robot.claims.left)
+    claims, at = claims_of(robot), held(robot, claims_of(robot).left)
     steps = round(WATCHED * claims.duration / claims.dt)
     within = variants(at.tau)
     names = [*(f"{VARIANT} {k}" for k in range(1, len(within) + 1)), NEAREST, *CLEAR_TORQUES]
@@ -86,7 +92,7 @@ def pushes(at: Held) -> np.ndarray:
 def check_torques(result: Result, robot: Robot, torques: list[TorqueRow]) -> None:
     """Claim 1: the posture is left after about the claimed time, because of rounding."""
     add_rows(result, torques)
-    claims, reproduced, values = robot.claims, True, []
+    claims, reproduced, values = claims_of(robot), True, []
     for engine, method in dict.fromkeys((row.engine, row.method) for row in torques):
         of_engine = [row for row in torques if row.engine == engine]
         rows = [row for row in of_engine if row.torque.startswith(VARIANT)]
@@ -128,7 +134,7 @@ def finer_steps(
     moved: the largest movement in a run of the claims; step: the largest dt |qd| by then; half_ulp: half
     a unit in the last place of the angle that it would have to change.
     """
-    claims, at = robot.claims, held(robot, robot.claims.left)
+    claims, at = claims_of(robot), held(robot, claims_of(robot).left)
     rest, rows = np.zeros_like(at.q), []
     for method in rk4_of_both(engines):
         own, dynamics = own_torque(method, engines, at), engines[method.engine].of(at.case)
@@ -153,7 +159,7 @@ def finer_steps(
 def check_finer_steps(result: Result, robot: Robot, finer: list[FinerRow]) -> None:
     """Claim 2: a smaller step reverses the side, and a very small one leaves the robot in place."""
     add_rows(result, finer)
-    claims, still, turned, leave = robot.claims, True, 0, True
+    claims, still, turned, leave = claims_of(robot), True, 0, True
     series = list(dict.fromkeys((row.engine, row.ulps) for row in finer))
     for engine, sign in series:
         rows = [row for row in finer if (row.engine, row.ulps) == (engine, sign)]
@@ -189,7 +195,7 @@ def kept(robot: Robot, engines: Mapping[str, Engine], steps: int = RUN_BEYOND) -
 
     acceleration_at_end: of each engine at the claimed end, under the torque that holds the posture.
     """
-    claims, at = robot.claims, held(robot, robot.claims.kept)
+    claims, at = claims_of(robot), held(robot, claims_of(robot).kept)
     rest, rows, pushed = np.zeros_like(at.q), [], {}
     for method in rk4_of_both(engines):
         tau, dynamics = (
@@ -213,7 +219,7 @@ def kept(robot: Robot, engines: Mapping[str, Engine], steps: int = RUN_BEYOND) -
 
 def check_kept(result: Result, robot: Robot, runs: KeptRuns) -> None:
     """Claim 3: held beyond the limit of RK4."""
-    claims, rows, limit, stays = robot.claims, runs.rows, runs.limit, True
+    claims, rows, limit, stays = claims_of(robot), runs.rows, runs.limit, True
     add_rows(result, rows)
     for row in (row for row in rows if row.dt < limit):
         where = f"{claims.kept}, {row.who}, dt = {row.dt:.4g} s, torque {row.torque}"
@@ -226,9 +232,9 @@ def check_kept(result: Result, robot: Robot, runs: KeptRuns) -> None:
     )
     for label, size in ends.items():
         quantity = f"acceleration that {claims.kept}'s torque gives a {claims.end} {robot.name}"
-        options = {"rule": "at least", "about": About.PREDICTION}
+        where, about = f"{claims.end}, {label}", About.PREDICTION
         leaves_end |= result.check(
-            f"{claims.end}, {label}", quantity, size, PUSHED, "rad/s2", **options
+            where, quantity, size, PUSHED, "rad/s2", rule="at least", about=about
         ).passed
     above = [row for row in rows if row.dt > limit]
     moves = bool(above) and all(row.observed is not None or (row.moved or 0.0) > MOVED for row in above)

@@ -10,6 +10,7 @@ from ...engines import LABELS, Engine
 from ...engines.mujoco.linear import left_to_itself
 from ...judge.run import diverged_at, step_in_words
 from ...robots.case import Case
+from .subjects import mujoco_of
 
 
 class OwnReset(NamedTuple):
@@ -26,7 +27,7 @@ class OwnReset(NamedTuple):
 def own_reset(case: Case, engines: Mapping[str, Engine]) -> OwnReset:
     """A free motion by MuJoCo's Euler with its automatic reset on: when MuJoCo restarts it, and when its energy is impossible."""
     dt, steps = case.scene.dt, 4 * case.steps
-    run = left_to_itself(engines["mujoco"].of(case), *case.start, case.tau, dt, steps, "Euler")
+    run = left_to_itself(mujoco_of(engines, case), *case.start, case.tau, dt, steps, "Euler")
     t = dt * np.arange(steps + 1)
     back = t[1:][np.diff(run["time"]) <= 0.0]
     return OwnReset(
@@ -39,7 +40,7 @@ def own_reset(case: Case, engines: Mapping[str, Engine]) -> OwnReset:
 def check_reset(result: Result, case: Case, run: OwnReset) -> None:
     """Where MuJoCo restarts a run, the bound on energy must have detected the failure."""
     step = step_in_words(case, case.steps)
-    if run.resets:
+    if run.first_reset is not None:
         delay = None if run.caught is None else run.caught - run.first_reset
         where = f"{case.name}, {LABELS['mujoco']} Euler, automatic reset on, {step}"
         quantity = "time from a silent failure until it is caught"

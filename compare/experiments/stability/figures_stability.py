@@ -1,10 +1,12 @@
 """Figures: step limits, also of the first screen; departure; claims."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from ...core.finding import Finding
 from ...engines import COLOURS, LABELS
@@ -12,7 +14,7 @@ from ...judge.run import LEFT, number_or_nan
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...robots import Robot
 from ..figures_overview import MOST_ROWS, chart, named_rows
-from .claims import VARIANT
+from .claims import VARIANT, claims_of
 from .departure import departure_values
 from .limits import LINEAR_DEVIATION, summary
 from .subjects import fraction, unit_of_movements
@@ -30,7 +32,7 @@ SCHEME_LOOKS = {  # colour, dash, name
 MARKS, MUJOCO_MARKS = "ov^DsP", "x+1"
 
 
-def look(name: str) -> tuple:
+def look(name: str) -> tuple[str, Any, str]:
     """Colour, dash and printed name of a method."""
     return SCHEME_LOOKS.get(name, ("black", "-", name.replace("_", " ")))
 
@@ -38,12 +40,12 @@ def look(name: str) -> tuple:
 def limits_in(
     ax: Axes,
     rows: Sequence[LimitRow],
-    known: dict,
+    known: Mapping[tuple[str, str], str],
     most: int | None = None,
     file_dt: float | None = None,
-) -> list:
+) -> list[Line2D]:
     """The limits of each scheme, predicted (line) and observed (mark); the handles of a legend. known: schemes of methods."""
-    of_scheme = {}
+    of_scheme: dict[str, list[LimitRow]] = {}
     for row in rows:
         of_scheme.setdefault(known.get((row.engine, row.method), row.method), []).append(row)
     of_scheme = dict(list(of_scheme.items())[:most])
@@ -91,8 +93,7 @@ def draw_overview(
     ax.set_xlabel("largest stable dt, s")
     looks = {"ncols": 3, "fontsize": 7.5, "handletextpad": 0.1, "columnspacing": 0.8}
     fig.legend(handles=handles[:: 2 if dt else 1], loc="outside upper center", **looks)
-    values = {"file_dt": dt, "actuators_off": bool(robot.is_read and robot.drive.actuators and not dt)}
-    return "overview_limits", fig, result.finding("overview_caption", **values, **summary(rows))
+    return "overview_limits", fig, result.finding("overview_caption", file_dt=dt, **summary(rows))
 
 
 def draw_limits(
@@ -110,13 +111,11 @@ def draw_limits(
         ax.set_title(f"{scene}, damping {damping:g}" if damping else scene)
     for ax in axes.flat[len(panels) :]:
         ax.set_visible(False)
-    fig.supxlabel("largest stable dt, s" + " (damping in N m s/rad)" * (not robot.is_read), fontsize=9)
+    fig.supxlabel("largest stable dt, s (damping in N m s/rad)", fontsize=9)
     fig.legend(handles=handles, loc="outside upper center", ncols=3)
-    values = {"deviation": LINEAR_DEVIATION, "unit": unit_of_movements(robot)}
-    values |= {"has_actuators": bool(robot.drive.actuators)}
+    values: dict[str, Any] = {"deviation": LINEAR_DEVIATION, "unit": unit_of_movements(robot)}
     first = [row for row in rows if (row.scene, row.damping, row.engine) == (*panels[0], "tmt")]
-    finite = [row for row in first if row.predicted_dt]
-    products = {look(row.method)[2]: row.predicted_dt * row.mode for row in finite}
+    products = {look(row.method)[2]: row.predicted_dt * row.mode for row in first if row.predicted_dt}
     caption = result.finding(
         "figure_limits", posture=panels[0][0], products=products, **values, **summary(rows)
     )
@@ -160,7 +159,7 @@ def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, 
 
 def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Finding]:
     """Claims 1 and 2: departure against the push of the residual, and against the number of steps."""
-    claims, rows = robot.claims, result.tables["stability_claims"]
+    claims, rows = claims_of(robot), result.tables["stability_claims"]
     finer = [row for row in rows if row.claim == 2]
     fig = Figure(figsize=(WIDTH, 3.4), layout="constrained")
     axes = fig.subplots(1, 1 + bool(finer), squeeze=False)[0]
@@ -178,14 +177,22 @@ def draw_torques(ax: Axes, rows: list[TorqueRow], robot: Robot) -> None:
     for engine, fill in (("tmt", "full"), ("mujoco", "none")):
         for side, mark, word in ((1, "^", "larger"), (-1, "v", "smaller")):
             mine = [row for row in rows if (row.engine, row.direction) == (engine, side)]
-            pushes, times = [row.push for row in mine], [row.observed for row in mine]
-            looks = {"fillstyle": fill, "markersize": 5, "label": f"{LABELS[engine]}, to {word} {symbol}"}
-            ax.plot(np.array(pushes) * 1e14, times, mark, color=COLOURS[engine], **looks)
+            pushes, times = [row.push for row in mine], [number_or_nan(row.observed) for row in mine]
+            label = f"{LABELS[engine]}, to {word} {symbol}"
+            ax.plot(
+                np.array(pushes) * 1e14,
+                times,
+                mark,
+                color=COLOURS[engine],
+                fillstyle=fill,
+                markersize=5,
+                label=label,
+            )
     predicted = sorted((row.push * 1e14, number_or_nan(row.predicted)) for row in rows)
     ax.plot(*np.array(predicted).reshape(-1, 2).T, color="black", linewidth=0.8, label="predicted")
     ax.axvline(0.0, color="black", linewidth=0.5)
     ax.set(
-        title=f"claim 1: {robot.claims.left}",
+        title=f"claim 1: {claims_of(robot).left}",
         xlabel="initial acceleration of the unstable mode, 1e-14 rad/s2",
     )
     ax.set_ylabel(f"time until a movement of {LEFT:g} rad, s")
@@ -193,7 +200,7 @@ def draw_torques(ax: Axes, rows: list[TorqueRow], robot: Robot) -> None:
 
 def draw_finer_steps(ax: Axes, rows: list[FinerRow], robot: Robot) -> None:
     """Claim 2: when and to which side the posture is left against the number of steps, the torque one ulp off."""
-    duration = robot.claims.duration
+    duration = claims_of(robot).duration
     for engine, sign in dict.fromkeys((row.engine, row.ulps) for row in rows):
         mine = [row for row in rows if (row.engine, row.ulps) == (engine, sign)]
         counts, times = [duration / row.dt for row in mine], [number_or_nan(row.observed) for row in mine]
@@ -202,6 +209,6 @@ def draw_finer_steps(ax: Axes, rows: list[FinerRow], robot: Robot) -> None:
         for row, count, time in zip(mine, counts, times):
             mark = "v" if row.direction == -1 else "^"
             ax.plot(count, time, mark, color=COLOURS[engine], fillstyle=fill, markersize=5)
-    ax.set(title=f"claim 2: {robot.claims.left}", xscale="log", xlabel=f"steps in {duration:g} s")
+    ax.set(title=f"claim 2: {claims_of(robot).left}", xscale="log", xlabel=f"steps in {duration:g} s")
     ax.set_xticks([32, 512, 8192], ["32", "512", "8192"])
     ax.minorticks_off()

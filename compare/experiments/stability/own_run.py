@@ -34,7 +34,9 @@ def begin(setup: Setup) -> list[OwnRuns]:
     reading = setup.reading
     if reading is None:
         return []
-    steps = [(AT_OWN, reading.dt, reading.integrator)] + ([(AT_REQUESTED, *setup.step)] if setup.step else [])
+    steps = [(AT_OWN, reading.dt, reading.integrator)] + (
+        [(AT_REQUESTED, *setup.request.step)] if setup.request.step else []
+    )
     starts = list(reading.keyframes)[:MOST_STARTS] or [""]
     return [
         (quantity, setup.map(partial(own_run, dt=dt, integrator=name, reading=reading), starts))
@@ -99,5 +101,7 @@ def add(result: Result, work: Sequence[OwnRuns]) -> None:
             )
         result.tables.setdefault("own_run", []).extend(rows)
         others = sum(row.outcome == rows[0].outcome for row in rows[1:])
-        values = {"requested": quantity == AT_REQUESTED, "others": others, "calm": CALM}
-        result.top.append(result.finding("own_run", run=rows[0], **values))
+        requested = quantity == AT_REQUESTED
+        result.top.append(
+            result.finding("own_run", run=rows[0], requested=requested, others=others, calm=CALM)
+        )

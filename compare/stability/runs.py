@@ -1,0 +1,121 @@
+"""What runs show: where small deviations from rest grow, the file's own run, and the largest push that is survived."""
+
+import mujoco
+import numpy as np
+
+from ..engines.mujoco.step import Step
+from .deviations import GROWN, LASTS, SMALL_PUSH, apart, grows, pushed, speeds_of, steps_in
+from .limits import COARSER, LONGEST, SHORTEST, Limit
+from .rest import Rest, rest_near
+
+BELOW, ABOVE = 0.97, 1.03  # of a limit: the steps at which runs are to differ
+WITHIN = 1.07  # fold: how near they are then
+CURVE_STEPS, LEAST_SIZES = (
+    400,
+    16,
+)  # of a run that shows how fast a push grows, and of those in which it is small
+PUSHES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # rad/s or m/s, of all speeds
+USUAL_PUSH = 0.1  # rad/s or m/s: what a robot in use meets
+CALM, CALMER = 1e-3, 0.01  # rad/s or m/s, and of the push: a speed at the end that is rest
+AS_FAST, WILD = 2.0, 1e3  # fold: of the creep; a run that is faster has failed
+FINER = 8  # the step over the one that shows whether the robot itself bears a push
+
+
+def growth_in_run(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str) -> float | None:
+    """The factor by which a small push grows in a step of a run, after its first quarter; None: no rest, or no growth."""
+    rest = rest_near(Step(model, dt, integrator), state)
+    if not rest.is_found:
+        return None
+    plain = speeds_of(rest.step.run(rest.state, CURVE_STEPS))
+    sizes = apart(rest.step.run(pushed(rest, SMALL_PUSH), len(plain)), plain, GROWN**2 * SMALL_PUSH)
+    if len(sizes) < LEAST_SIZES or not sizes.min() > 0.0:
+        return None
+    first = len(sizes) // 4
+    return float(np.exp(np.polyfit(np.arange(first, len(sizes)), np.log(sizes[first:]), 1)[0]))
+
+
+def speed_after(model: mujoco.MjModel, rest: Rest, push: float, dt: float) -> float:
+    """The largest speed, beside the creep, in the last eighth of a run after a push, by the file's own solver; inf: it fails."""
+    step = Step(model, dt, rest.step.integrator, exact=False)
+    steps = steps_in(LASTS, dt)
+    speeds = speeds_of(step.run(pushed(rest, push), steps))
+    return float(np.abs(speeds[-steps // 8 :] - rest.speeds).max()) if len(speeds) == steps else np.inf
+
+
+def calms(model: mujoco.MjModel, rest: Rest, push: float) -> bool:
+    """Whether the robot calms down after a push."""
+    return speed_after(model, rest, push, rest.step.dt) <= max(CALM, CALMER * push)
+
+
+def largest_push(model: mujoco.MjModel, rest: Rest) -> tuple[float | None, bool]:
+    """The largest push after which it calms down, rad/s or m/s, and whether it does after none larger at a finer step.
+
+    0.0: after none; None: nothing brakes it, it moves on after any push and at a finer step too.
+    """
+    survived = next((push for push in PUSHES if calms(model, rest, push)), 0.0)
+    if survived == PUSHES[0]:
+        return survived, False
+    finer = rest_near(Step(model, rest.step.dt / FINER, rest.step.integrator), rest.state)
+    if survived <= CALM and not calms(model, finer, 10.0 * CALM):
+        return None, True
+    next_larger = min(push for push in PUSHES if push > survived)
+    return survived, not calms(model, finer, next_larger)
+
+
+def own_limit(
+    model: mujoco.MjModel, state: np.ndarray, integrator: str, longest: float, creep: float
+) -> float:
+    """The longest step up to `longest`, s, at which the file's own run from a state stays still, or as slow as its creep.
+
+    By the file's own solver, without searching a rest for each step; within 7 %. 0.0: at none.
+    """
+
+    def holds(step: float) -> bool:
+        return stays_still(model, state, step, integrator, creep)
+
+    low = high = longest
+    while not holds(low):
+        low, high = low / COARSER, low
+        if low < SHORTEST:
+            return 0.0
+    while high > low * WITHIN:
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def stays_still(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, creep: float) -> bool:
+    """Whether the file's own run from where it sank to stays still."""
+    step = Step(model, dt, integrator, exact=False)
+    steps, speeds = steps_in(LASTS, dt), []
+    for data in step.run(state, steps):
+        speeds.append(np.abs(data.qvel).max())
+        if not speeds[-1] <= WILD * max(CALM, creep):
+            return False
+    return len(speeds) == steps and bool(max(speeds[-steps // 8 :]) <= max(CALM, AS_FAST * creep))
+
+
+def observed(model: mujoco.MjModel, limit: Limit, integrator: str) -> tuple[float | None, float | None]:
+    """The longest step at which runs hold and the shortest at which they fail, s, 3 % to either side of a limit.
+
+    Where they do not differ there, from the limit up or down to where they do. None: none that holds, or that fails.
+    """
+    assert limit.dt is not None
+    state, rate = limit.rest.state, limit.growth.rate
+
+    def fails(dt: float) -> bool:
+        return grows(rest_near(Step(model, dt, integrator), state), rate)
+
+    low, high = BELOW * limit.dt, ABOVE * limit.dt
+    while fails(low):
+        low, high = low / COARSER, low
+        if low < SHORTEST:
+            return None, high
+    while not fails(high):
+        low, high = high, high * COARSER
+        if high > LONGEST:
+            return low, None
+    while high > low * WITHIN:
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if fails(middle) else (middle, high)
+    return low, high

@@ -1,0 +1,241 @@
+"""Each kind of cause is named: conventions, numbers that change together, slips of the recursion, in all or in a part of h."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from models import PATHS
+
+import tmt
+from compare.diagnosis import Stated, Values, diagnose
+from compare.diagnosis.conventions import all_conventions
+from compare.diagnosis.groups import is_round
+from compare.diagnosis.likelihood import NATURAL, cost
+from compare.diagnosis.model import Equations, Layout
+from compare.diagnosis.recursion import SLIPS, Recursion, slips_of_recursion
+from compare.engines.mujoco import reading
+from compare.robots.joint_map import joint_map
+
+READ = {name: reading.read(PATHS[name]).tree for name in ("free_body", "mixed", "quadruped")}
+ARM, STONE, LEGS = tmt.ARM, READ["free_body"], READ["quadruped"]
+ROW = replace(  # three parallel hinges and slides between, two bodies alike
+    ARM, kind=("hinge", "slide", "hinge"), axis=((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+    body_names=("first", "second"), body_joint=(0, 2), offset=((0.0, 0.0, 0.0), (0.2, 0.0, -0.1), (0.0, 0.0, -0.3)),
+)  # fmt: skip
+
+
+def states(tree, count=12):
+    rng, coordinates = (
+        np.random.default_rng(1),
+        Equations(tree, np.zeros((1, 1)), np.zeros((1, 1))).coordinates,
+    )
+    q = coordinates.move(np.tile(tree.zero, (count, 1)), rng.uniform(-2.0, 2.0, (count, coordinates.nv)))
+    return q, rng.uniform(-2.0, 2.0, (count, coordinates.nv))
+
+
+def of_parts(tree, M, velocity_terms, rest, **more):
+    """The diagnosis of Mbar and h, whose parts are known as those of a function are."""
+    q, qd = states(tree)
+
+    def bias(speeds):
+        return velocity_terms * (1.0 if speeds.any() else 0.0) + rest
+
+    return diagnose(tree, Values.of(tree, q, qd, M, velocity_terms + rest), bias=bias, **more)
+
+
+def parts(tree):
+    return Equations(tree, *states(tree)).parts
+
+
+def first(diagnosis):
+    cause = diagnosis.causes[0]
+    return cause.place, cause.explains
+
+
+CONVENTIONS = [  # a model, and the cause of the convention
+    (ARM, "sense of beta and gamma"), (ARM, "unit of beta"), (ROW, "angle of gamma"), (STONE, "angular velocity of stone turn"),
+    (STONE, "linear velocity of stone x, stone y, stone z"), (STONE, "quaternion of stone turn"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("tree, place", CONVENTIONS)
+def test_a_convention_is_named(tree, place):
+    equations = Equations(tree, *states(tree))
+    convention = next(
+        convention for convention in all_conventions(equations) if convention.cause.place == place
+    )
+    inner = Equations(tree, convention.q, convention.qd)
+    found = of_parts(tree, *convention.applied(*inner.parts))
+    assert place in [cause.place for cause in found.causes]
+    M, h, rest = convention.removed(*(inner.parts[0],) * 2, inner.h, inner.parts[2])
+    there = convention.applied(M, h - rest, rest)  # there and back
+    drift = np.einsum("sij,sj->si", M - inner.parts[0], convention.drift)
+    assert np.allclose(there[0], inner.parts[0]) and np.allclose(
+        there[1] + there[2], inner.h + drift[:, :0].sum()
+    )
+
+
+def test_the_axes_of_velocities_are_those_of_the_kinetic_energy():
+    """v' M v is the same in every convention, and so is the power of gravity."""
+    equations = Equations(STONE, *states(STONE))
+    speeds = np.random.default_rng(5).normal(size=equations.qd.shape)
+    for convention in all_conventions(equations):
+        if convention.cause.kind == "axes":
+            inner = Equations(STONE, convention.q, convention.qd).parts
+            M, _, rest = convention.applied(*inner)
+            v = np.einsum("sij,sj->si", convention.S, speeds)
+            assert np.allclose(
+                np.einsum("si,sij,sj->s", speeds, M, speeds), np.einsum("si,sij,sj->s", v, inner[0], v)
+            )
+            assert np.allclose((rest * speeds).sum(axis=1), (inner[2] * v).sum(axis=1))
+
+
+def test_a_body_with_its_linear_velocity_in_its_own_axes_has_omega_x_v():
+    """m (vdot + omega x v) of a point at the CoM: the drift of the convention."""
+    point = replace(STONE, com=((0.0, 0.0, 0.0),), gravity=(0.0, 0.0, 0.0))
+    equations = Equations(point, *states(point))
+    convention = next(one for one in all_conventions(equations) if one.cause.explains == "in body axes")
+    _, velocity_terms, _ = convention.applied(*Equations(point, convention.q, convention.qd).parts)
+    omega_x_v = np.cross(equations.qd[:, 3:], equations.qd[:, :3])
+    assert np.allclose(velocity_terms[:, :3], point.mass[0] * omega_x_v)
+
+
+def test_the_order_of_many_joints_is_named_as_it_is_stated():
+    names = list(LEGS.joint_names)
+    depth = [len(LEGS.path(i)) for i in range(len(names))]
+    breadth = [names[i] for i in np.argsort(depth, kind="stable")]
+    assert len(names) > 6 and breadth != names
+    q, qd = states(LEGS)
+    other = joint_map(Equations(LEGS, q, qd).coordinates, breadth)
+    inner = Equations(LEGS, other.positions(q), other.speeds(qd))
+    given = Values.of(LEGS, q, qd, other.own_mass_matrix(inner.parts[0]), other.own_forces(inner.h))
+    found = diagnose(LEGS, given, stated=Stated(joint_map(inner.coordinates, None)))
+    assert any(cause.joints == f"joints={breadth}" for cause in found.causes)
+
+
+def test_a_convention_and_a_number_are_named_together():
+    heavy, equations = replace(ROW, mass=(1.9, 1.52)), Equations(ROW, *states(ROW))
+    convention = next(one for one in all_conventions(equations) if one.cause.place == "angle of gamma")
+    found = of_parts(ROW, *convention.applied(*Equations(heavy, convention.q, convention.qd).parts))
+    assert found.causes[0].place == "angle of gamma and mass of second"
+
+
+TENSOR = np.array(ARM.inertia[1])
+EDITS = {  # numbers of the arm: the cause
+    "axes exchanged": ({"inertia": (ARM.inertia[0], TENSOR[::-1, ::-1])}, "inertia of forearm, axes x and z exchanged"),
+    "a body left out": ({"mass": (1.9, 0.0), "inertia": (ARM.inertia[0], 0.0 * TENSOR)}, "forearm"),
+    "in mm": ({"com": 1e3 * np.array(ARM.com), "offset": 1e3 * np.array(ARM.offset)}, "all lengths"),
+    "along x": ({"gravity": (-9.81, 0.0, 0.0)}, "gravity"),
+    "another axis": ({"axis": (*ARM.axis[:2], (0.0, 0.0, 1.0))}, "axis of gamma"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fields, place", EDITS.values(), ids=EDITS)
+def test_numbers_that_change_together_are_one_cause(fields, place):
+    tree = ARM
+    for name, value in fields.items():
+        object.__setattr__(tree := replace(tree), name, np.array(value, float).tolist())
+    found = of_parts(ARM, *Equations(tree, *states(ARM)).parts)
+    assert place in [cause.place for cause in found.causes]
+
+
+def test_a_load_is_named_with_its_mass_and_place():
+    arm, point = replace(ARM, mass=(1.9, 1.5)), np.array([0.3, 0.02, 0.01])
+    m, c, I = arm.mass[1], np.array(arm.com[1]), np.array(arm.inertia[1])
+    com, load = (m * c + 0.4 * point) / (m + 0.4), np.diag([1e-3, 2e-3, 3e-3])
+    tensor = I + load
+    for mass, at in ((m, c), (0.4, point)):
+        tensor = tensor + mass * (np.dot(at - com, at - com) * np.eye(3) - np.outer(at - com, at - com))
+    loaded = replace(
+        arm, mass=(1.9, m + 0.4), com=(arm.com[0], com.tolist()), inertia=(arm.inertia[0], tensor.tolist())
+    )
+    place, explains = first(of_parts(arm, *parts(loaded)))
+    assert place == "a load on forearm" and explains.startswith(
+        "0.4 kg, CoM (0.3, 0.02, 0.01) m, xx 0.001, yy 0.002, zz 0.003"
+    )
+
+
+@pytest.mark.parametrize("tree", READ.values(), ids=READ)
+def test_the_recursion_without_a_slip_is_the_method(tree):
+    for ours, right in zip(Recursion(tree, *states(tree)).values(), parts(tree)):
+        assert np.allclose(ours, right, rtol=0.0, atol=1e-13 * np.abs(right).max())
+
+
+def test_every_slip_of_the_recursion_changes_something_in_some_model():
+    changed = set()
+    for tree in (ARM, ROW, READ["mixed"]):
+        equations = Equations(tree, *states(tree), Layout(len(tree.axis), True, False))
+        for cause, values in slips_of_recursion(equations):
+            if (np.abs(values - equations.right) > 1e-9).any():
+                changed.add(cause.place)
+    for slip in SLIPS:
+        before, _, after = slip.name.partition("{}")
+        assert any(place.startswith(before) and place.endswith(after) for place in changed), slip.name
+
+
+@pytest.mark.parametrize("place", [
+    "order of rotations at gamma: its turn before those of the joints that carry it",
+    "axis of gamma not turned to the inertial frame",
+    "convective angular acceleration omega x axis qd of gamma left out", "column of T of beta for forearm left out",
+    "moment c x F of the force at the CoM of forearm left out", "force passed on by gamma turned with R' for R",
+])  # fmt: skip
+def test_a_slip_of_the_recursion_is_named(place):
+    layout = Layout(3, True, False)
+    equations = Equations(ARM, *states(ARM), layout)
+    given = next(values for cause, values in slips_of_recursion(equations) if cause.place == place)
+    M, velocity_terms, rest = given[:, :9].reshape(-1, 3, 3), given[:, 9:12], given[:, 12:]
+    assert place in [cause.place for cause in of_parts(ARM, M, velocity_terms, rest).causes]
+
+
+def test_a_cause_in_parts_of_the_equations_alone():
+    (M, velocity_terms, rest), other = parts(ARM), parts(replace(ARM, com=(ARM.com[0], (0.0, 0.0, 0.0))))
+    assert first(of_parts(ARM, M, velocity_terms, other[2])) == ("CoM x of forearm in gravity alone", 0.0)
+    assert first(of_parts(ARM, M, other[1], rest)) == (
+        "CoM x of forearm in the velocity terms of h alone",
+        0.0,
+    )
+    assert first(of_parts(ARM, other[0], other[1], rest)) == ("CoM x of forearm, but not in gravity", 0.0)
+    heavy = parts(replace(ARM, mass=(2.0, 1.5)))
+    two = of_parts(ARM, other[0], other[1], heavy[2]).causes[0]
+    assert two.place == "mass of upper arm in gravity alone and CoM x of forearm, but not in gravity"
+
+
+def test_h_by_the_derivatives_of_a_wrong_mass_matrix_is_the_same_cause():
+    short = replace(ARM, com=(ARM.com[0], (0.1, 0.0, 0.0)))
+    (M, velocity_terms, _), (*_, rest) = parts(short), parts(ARM)
+    found = of_parts(ARM, M, velocity_terms, rest, mass_matrix=lambda q: tmt.mass_matrix(q, short))
+    assert first(found) == ("CoM x of forearm, but not in gravity", pytest.approx(0.1))
+
+
+def test_a_slip_beside_a_number():
+    tree = replace(
+        ARM, mass=(1.8, 1.5), inertia=(ARM.inertia[0], np.diag(np.diag(TENSOR)[[2, 1, 0]]).tolist())
+    )
+    assert first(of_parts(ARM, *parts(tree))) == (
+        "inertia of forearm, axes x and z exchanged and mass of upper arm",
+        "1.8",
+    )
+
+
+def test_a_length_in_mm_is_judged_on_its_own_scale():
+    tree = replace(ARM, offset=(*ARM.offset[:2], (0.0, 0.0, -300.0)))
+    place, explains = first(of_parts(ARM, *parts(tree)))
+    assert (place, explains) == ("offset z of gamma", pytest.approx(-300.0, rel=1e-9))
+
+
+def test_the_likelier_of_two_causes_comes_first():
+    equations = Equations(ARM, *states(ARM))
+    found = of_parts(ARM, *parts(replace(ARM, gravity=(0.0, 0.0, 9.81))))
+    costs = [cost(cause, equations) for cause in found.causes]
+    assert costs == sorted(costs) and costs[0] < NATURAL and found.causes[0].kind == "option"
+    assert is_round(0.73) and is_round(0.1234) and not is_round(0.12345678)
+    assert is_round(0.730001) and not is_round(0.12345 + 1e-7)
+
+
+def test_forces_of_accelerations_alone():
+    """Mbar qdd + h of a heavier arm."""
+    (q, qd), heavy = states(ARM), replace(ARM, mass=(1.9, 1.52))
+    qdd, tau = tmt.acceleration(q, qd, 0.3 * qd, heavy), 0.3 * qd
+    force = tau - np.array(ARM.damping) * qd
+    found = diagnose(ARM, Values.of(ARM, q, qd, None, force, 1e-12), qdd=qdd)
+    assert first(found) == ("mass of forearm", pytest.approx(1.52))

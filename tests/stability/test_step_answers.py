@@ -1,0 +1,131 @@
+"""The answer for a file: rows of step limits, for reports and for scripts."""
+
+import mujoco
+import numpy as np
+import pytest
+from small import HOLDING, INERTIA, KINDS, LEG, STANDING, hinge, two
+
+import compare
+from compare.engines.mujoco.reading import read
+from compare.stability.answer import Asked, StepLimitRow, answer, posture_of, postures_of
+
+KEYS = '<keyframe><key name="low" qpos="0.3 -0.2"/><key qpos="0 0"/></keyframe>'
+FOOT = STANDING.format(cone="elliptic", condim=3)
+ROW = {"posture": "p", "base": "fixed", "surroundings": "free", "integrator": "Euler", "limit": "finite", "predicted_dt": 0.01,
+       "file_dt": 0.002, "file_integrator": "Euler", "stable_at_file_dt": True}  # fmt: skip
+
+
+def test_a_script_sweeps_the_gains_of_a_compiled_model():
+    """4 I - 2 dt kv - dt^2 kp = 0."""
+    model = mujoco.MjModel.from_xml_string(hinge(20.0, 1.0))
+    for kv in (1.0, 3.0, 10.0):
+        model.actuator_biasprm[:, 2] = -kv
+        (row,) = compare.step_limits(model, integrators=["Euler"])
+        exact = (-kv + np.sqrt(kv**2 + 4.0 * INERTIA * 20.0)) / 20.0
+        assert (row.limit, row.limiting_joint, row.surroundings) == ("finite", "turn", "free")
+        assert row.predicted_dt == pytest.approx(exact, rel=3e-3)
+        assert row.stable_at_file_dt is bool(exact > 0.002) and row.largest_push is None
+    assert mujoco.MjModel.from_xml_string(hinge()).opt.timestep == model.opt.timestep == 0.002
+
+
+def test_rows_tell_of_the_robot_in_contact_and_in_the_air():
+    rows = compare.step_limits(
+        LEG.replace("<option", '<option gravity="0 0 -5"'), integrators=("Euler", "implicitfast")
+    )
+    assert [(row.surroundings, row.integrator) for row in rows] == [
+        (where, name) for where in ("contact", "air") for name in ("Euler", "implicitfast")
+    ]
+    assert {row.limit for row in rows[2:]} == {"no_rest"} and not any(
+        row.stable_at_file_dt for row in rows[2:]
+    )
+    euler = rows[0]
+    assert euler.apart == pytest.approx(0.0, abs=1e-8) and euler.moved > 1e-3 and euler.creep < 1e-9
+    (fast,) = (
+        row
+        for row in compare.step_limits(FOOT, integrators=["implicitfast"], dt=1e-3)
+        if row.surroundings != "air"
+    )
+    assert (fast.limiting_joint, fast.limiting_contact, fast.file_dt) == ("z", "floor on foot", 1e-3)
+    assert fast.creep > 1e-6 and fast.creeping_joint
+
+
+def test_runs_stand_beside_the_limit_where_they_are_asked_for():
+    (row,) = compare.step_limits(two(), integrators=["Euler"], in_runs=True)
+    assert row.observed_dt < row.predicted_dt < row.failing_dt < 1.07 * row.observed_dt
+    assert row.largest_push == 1.0 and not row.contradicted and row.smooth_dt is row.own_dt is None
+
+
+@pytest.mark.parametrize("asked, q", [
+    ("low", ()), ("qpos0", ()), ("10,-20", np.radians([10, -20])), ((10, -20), np.radians([10, -20])),
+])  # fmt: skip
+def test_a_posture_is_a_name_or_numbers(asked, q):
+    reading = read(two(HOLDING + KEYS))
+    found = posture_of(asked, reading)
+    assert found.q == pytest.approx(tuple(q)) and found.key == ("low" if asked == "low" else "")
+    assert postures_of(reading)[0].name == "low"
+
+
+@pytest.mark.parametrize("asked", ["lo", "10", "10,x", "1,2,3", (1.0,)])
+def test_a_wrong_posture_is_one_line(asked):
+    with pytest.raises(
+        ValueError, match=r"posture .* is not one of this file: expected low, .*2 numbers"
+    ) as caught:
+        compare.step_limits(two(HOLDING + KEYS), posture=asked)
+    assert "\n" not in str(caught.value)
+
+
+def test_postures_differ():
+    text = two(HOLDING.replace("60", "600") + KEYS)
+    limits = [
+        compare.step_limits(text, posture=p, integrators=["Euler"])[0]
+        for p in (None, "low", "17.18873,-11.45916", (0, 90))
+    ]
+    first, low, numbers, bent = (row.predicted_dt for row in limits)
+    assert first == low == pytest.approx(numbers, rel=5e-3) and abs(bent / low - 1.0) > 0.05
+
+
+NEAR, OFF = {"observed_dt": 0.0097, "failing_dt": 0.0103}, {"observed_dt": 0.0094, "failing_dt": 0.0103}
+NONE = {"limit": "none", "predicted_dt": None}
+
+
+@pytest.mark.parametrize("more, contradicted, longest, by_runs", [
+    ({}, False, 0.01, False), (NEAR, False, 0.01, False), (OFF, True, 0.0094, True),
+    ({"observed_dt": 0.0097, "failing_dt": 0.0106}, True, 0.0097, False), ({"failing_dt": 0.001}, True, 0.0, True),
+    (NEAR | {"own_dt": 0.004}, False, 0.004, True), (NEAR | {"own_dt": 0.0099}, False, 0.0099, False),
+    (NONE, False, np.inf, False), (NONE | {"own_dt": 0.02}, False, 0.02, True),
+    (NONE | {"limit": "below"}, False, 0.0, False), (NONE | {"limit": "saddle"}, False, 0.0, False),
+])  # fmt: skip
+def test_runs_have_the_last_word(more, contradicted, longest, by_runs):
+    row = StepLimitRow(**ROW | more)
+    assert (row.contradicted, row.longest, row.decided_by_runs) == (contradicted, longest, by_runs)
+    assert row.is_known is (row.limit != "saddle")
+
+
+@pytest.mark.parametrize("smooth, held", [(None, False), (0.0098, True), (0.0099, False)])
+def test_dry_friction_holds_if_the_limit_is_lower_without_it(smooth, held):
+    assert StepLimitRow(**ROW | {"smooth_dt": smooth}).is_held_by_friction is held
+
+
+def test_curves_have_the_growth_of_steps_and_of_runs():
+    reading = read(hinge(20.0, 5.0))
+    found = answer(
+        postures_of(reading)[0], True, reading, Asked(0.002, "Euler", ["Euler"], drawn=True, in_runs=False)
+    )
+    curve, limit = found.curves["Euler"], found.rows[0].predicted_dt
+    assert (
+        all((factor > 1.0) == (dt > limit) for dt, factor in curve.predicted) and curve.predicted[-1][1] > 1.5
+    )
+    seen = dict(curve.predicted)
+    grown = [(dt, factor) for dt, factor in curve.observed if factor > 1.0]
+    assert len(grown) > 2 and all(factor == pytest.approx(seen[dt], rel=1e-3) for dt, factor in grown)
+    assert found.cures == []
+    unstable = answer(postures_of(reading)[0], True, reading, Asked(0.03, "Euler", ["Euler"], in_runs=False))
+    assert {cure.change for cure in unstable.cures} >= {"less_kv", "more_armature"} and unstable.rows[
+        0
+    ].stable_at_file_dt is False
+
+
+def test_every_kind_of_force_has_an_answer():
+    for kind in ("a muscle", "a DC motor", "fluid", "a loaded loop", "a free caster"):
+        rows = compare.step_limits(KINDS[kind], integrators=["implicitfast"])
+        assert all(row.is_known for row in rows), kind

@@ -1,0 +1,199 @@
+"""Inverse dynamics, frames and derivatives: those of 31 digits entry by entry, and those of differences of order 8."""
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+import pytest
+from models import PATHS
+from trees import random_states, small_tree, tree_of_kinds
+
+import tmt
+from compare.engines.mujoco import read
+from compare.judge.entries import Entries
+from compare.judge.scale import EPS, FACTOR
+from tmt.compiled.evaluator import Evaluator
+from tmt.exact.many import exact_of_many
+from tmt.exact.values import distance, exact
+from tmt.methods.derivatives import is_straight
+
+CENTRAL = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}  # weights of the difference of order 8
+STEP = 0.02
+WITNESS = 1e-9  # truncation STEP^8, and 1e-15 / STEP
+FEW = ("free_body", "gripper", "pendulum_ball")
+MANY = (
+    "arm6",
+    "arm7",
+    "loop",
+    "mixed",
+    "quadruped",
+    "humanoid29_free",
+)  # they take long to trace with many digits
+STRAIGHT = [name for name, method in tmt.METHODS.items() if is_straight(method) and method.stages <= 4]
+
+
+def model(name):
+    return tmt.ARM if name == "arm" else read(PATHS[name]).tree
+
+
+def differences(tree, function, q, qd, tau):
+    """The derivative of a function of (q, qd, tau) by movements, speeds and torques, (..., 3 nv), by differences of order 8."""
+    n = len(tree.axis)
+    columns = []
+    for direction in np.eye(3 * n):
+        column = 0.0
+        for k, weight in CENTRAL.items():
+            ends = []
+            for size in (k * STEP, -k * STEP):
+                u, dqd, dtau = np.split(size * direction, 3)
+                moved = np.array(tree.coordinates.move(q.tolist(), u.tolist()))
+                ends.append(function(moved, qd + dqd, tau + dtau))
+            column = column + weight / STEP * (ends[0] - ends[1])
+        columns.append(column)
+    return np.stack(columns, axis=-1)
+
+
+def close(values, expected, scale=1.0):
+    return np.abs(values - expected).max() <= WITNESS * max(scale, np.abs(expected).max())
+
+
+@cache
+def kinds(seed=3):
+    return tree_of_kinds(np.random.default_rng(seed), bodies=3)
+
+
+@pytest.mark.parametrize(
+    "name", ["arm", *FEW, *(pytest.param(name, marks=pytest.mark.slow) for name in MANY)]
+)
+def test_derivatives_are_those_of_31_digits_entry_by_entry(name, rng):
+    """And machine code's, in closed form or by dual numbers."""
+    tree = model(name)
+    q, qd, tau = random_states(rng, tree, 3)
+    qdd, by = tmt.acceleration(q, qd, tau, tree), tmt.derivatives(q, qd, tau, tree)
+    entries = Entries(tree, q, qd)
+    scales, truth = entries.derivatives(tau, qdd, by), exact_of_many(tree, "derivatives", q, qd, tau)
+    compiled = Evaluator(tree, "derivatives").of_any(q, qd, tau)
+    for k, (values, code, scale) in enumerate(zip(by, compiled, scales, strict=True)):
+        for found in (values, code):
+            assert (truth.part(k).distance(found) <= FACTOR * EPS * scale).all()
+    given, truth = (q, qd, tau), exact_of_many(tree, "inverse_dynamics_derivatives", q, qd, tau)
+    for found in (
+        tmt.inverse_dynamics_derivatives(*given, tree),
+        Evaluator(tree, "inverse_dynamics_derivatives").of_any(*given),
+    ):
+        for k, (values, scale) in enumerate(zip(found, entries.force_rates(tau), strict=True)):
+            assert (truth.part(k).distance(values) <= FACTOR * EPS * scale).all()
+
+
+@pytest.mark.parametrize("make", [kinds, small_tree])
+def test_derivatives_are_the_limits_of_differences(make, rng):
+    """Of every kind of joint, with damping, springs, armature and gains of a controller."""
+    tree = make()
+    (q,), (qd,), (tau,) = random_states(rng, tree, 1)
+    by, n = tmt.derivatives(q, qd, tau, tree), len(qd)
+    expected = differences(tree, lambda *state: tmt.acceleration(*state, tree), q, qd, tau)
+    assert close(np.hstack(by[:3]), expected)
+    qdd = tmt.acceleration(q, qd, tau, tree)
+    expected = differences(tree, lambda *state: tmt.inverse_dynamics(*state, tree), q, qd, qdd)
+    assert close(np.hstack(by[3:]), expected[:, : 2 * n]) and close(
+        tmt.mass_matrix(q, tree), expected[:, 2 * n :]
+    )
+    assert np.allclose(by.dqdd_dtau, tmt.inverse_mass_matrix(q, tree), rtol=1e-12, atol=1e-12)
+    for values, alone in zip(by[3:], tmt.inverse_dynamics_derivatives(q, qd, qdd, tree), strict=True):
+        assert np.allclose(values, alone, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("make", [kinds, small_tree])
+def test_the_inverse_dynamics_give_the_torque_back(make, rng):
+    tree = make()
+    q, qd, tau = random_states(rng, tree, 7)
+    found = tmt.inverse_dynamics(q, qd, tmt.acceleration(q, qd, tau, tree), tree)
+    assert np.abs(found - tau).max() <= 1e-10
+    assert np.allclose(
+        tmt.inverse_mass_matrix(q, tree) @ tmt.mass_matrix(q, tree), np.eye(len(tree.axis)), atol=1e-11
+    )
+
+
+@pytest.mark.parametrize("method", tmt.METHODS)
+def test_a_and_b_are_the_limits_of_differences_of_a_step(method, rng):
+    tree, dt = small_tree(), 0.05
+    (q,), (qd,), (tau,) = random_states(rng, tree, 1)
+    A, B = tmt.step_derivatives(q, qd, tau, dt, method, tree)
+    fixed = "dopri8" if method == "dopri8_adaptive" else method  # one step of that size
+
+    def after(*state):
+        _, q_path, qd_path = tmt.simulate(*state, dt, 1, fixed, tree)
+        return np.concatenate([tree.coordinates.difference(q_path[1], reached), qd_path[1]])
+
+    reached = tmt.simulate(q, qd, tau, dt, 1, fixed, tree).q[1]
+    assert close(np.hstack([A, B]), differences(tree, after, q, qd, tau))
+
+
+@pytest.mark.parametrize("method", STRAIGHT)
+def test_a_compiled_step_has_the_derivatives_of_31_digits(method, rng):
+    q, qd, tau = random_states(rng, tmt.ARM, 2)
+    by, dt = tmt.derivatives(q, qd, tau), np.full((2, 1), 0.02)
+    entries = Entries(tmt.ARM, q, qd)
+    scale = entries.step(0.02, by, entries.derivatives(tau, tmt.acceleration(q, qd, tau), by))
+    name = f"step_derivatives:{method}"
+    truth = exact_of_many(tmt.ARM, name, q, qd, tau, dt)
+    for found in (
+        np.concatenate(tmt.step_derivatives(q, qd, tau, 0.02, method), axis=2),
+        Evaluator(tmt.ARM, name).of_any(q, qd, tau, dt),
+    ):
+        assert (truth.distance(found) <= FACTOR * EPS * scale).all()
+
+
+def test_stages_that_are_solved_for_have_the_derivatives_of_50_digits(rng):
+    tree = tmt.ARM.lock({"alpha": 0.5})
+    q, qd, tau = (values[0] for values in random_states(rng, tree, 1))
+    truth = exact(tree, q, qd, tau, step=("implicit_midpoint", 0.02)).step_derivatives
+    found = np.hstack(tmt.step_derivatives(q, qd, tau, 0.02, "implicit_midpoint", tree))
+    assert distance(found, truth).max() <= FACTOR * EPS * np.abs(found).max()
+
+
+def test_a_prepared_model_answers_derivatives_with_machine_code(rng, monkeypatch):
+    tree = dataclasses.replace(tmt.ARM, mass=(1.25, 1.5))
+    q, qd, tau = random_states(rng, tree, 3)
+    before = tmt.derivatives(q, qd, tau, tree), tmt.step_derivatives(q, qd, tau, 0.01, "rk4", tree)
+    tmt.prepare(tree, "derivatives", "step_derivatives:rk4")
+    monkeypatch.setattr(tmt.literal, "literal", None)
+    after = tmt.derivatives(q, qd, tau, tree), tmt.step_derivatives(q, qd, tau, 0.01, "rk4", tree)
+    for parts, again in zip(before, after, strict=True):
+        assert all(np.allclose(a, b, rtol=1e-11, atol=1e-11) for a, b in zip(parts, again, strict=True))
+    assert not all(map(np.array_equal, before[0], after[0]))
+
+
+def with_site(tree, joint, rng):
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    sites = {
+        "site_joint": [joint],
+        "site_offset": rng.normal(size=(1, 3)),
+        "site_turn": [turn * np.linalg.det(turn)],
+    }
+    return dataclasses.replace(tree, site_names=["tool"], **sites)
+
+
+def test_a_frame_moves_as_its_jacobian_says(rng):
+    tree = with_site(kinds(), len(kinds().kind) - 1, rng)
+    (q,), (qd,), (tau,) = random_states(rng, tree, 1)
+    found, n = tmt.frame("tool", q, qd, tree), len(qd)
+    rates = differences(tree, lambda q, *_: tmt.frame("tool", q, model=tree).position, q, qd, tau)
+    assert close(found.jacobian[:3], rates[:, :n])
+    turned = differences(tree, lambda q, *_: tmt.frame("tool", q, model=tree).rotation, q, qd, tau)
+    spin = np.einsum("ijk,lj->ilk", turned, found.rotation)
+    assert close(found.jacobian[3:], np.stack([spin[2, 1], spin[0, 2], spin[1, 0]])[:, :n])
+    changes = differences(tree, lambda q, *_: tmt.frame("tool", q, model=tree).jacobian @ qd, q, qd, tau)
+    assert close(found.convective, changes[:, :n] @ qd)
+    assert np.array_equal(tmt.frame("tool", q, model=tree).convective, np.zeros(6))
+    body = tmt.frame(tree.body_names[-1], q, model=tree)
+    assert np.allclose(body.position + body.rotation @ tree.site_offset[0], found.position, atol=1e-13)
+
+
+def test_a_locked_tree_keeps_its_sites(rng):
+    tree = with_site(tmt.ARM, 2, rng)
+    forearm = tree.lock({"alpha": 0.7, "beta": -0.4})
+    for part, whole in zip(
+        tmt.frame("tool", [0.3], model=forearm)[:2], tmt.frame("tool", [0.7, -0.4, 0.3], model=tree)[:2]
+    ):
+        assert np.allclose(part, whole, atol=1e-14)
