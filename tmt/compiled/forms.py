@@ -1,16 +1,20 @@
-"""Which form of the dynamics is traced for a tree: of the same sums in another order, that with fewer operations.
+"""Which form of the dynamics is traced for a tree: of the same sums in another order, that with the fewest operations.
 
-Up to some ten joints in a row, and for trees of short branches, those are the sums in the frames of the joints (composite.py);
-beyond, those in the axes of the world (articulated.py), whose number grows with the number of joints.
+It is counted for each quantity. Up to some ten joints in a row, and for trees of short branches, those are the sums in the frames
+of the joints (composite.py); the bias is nearly always shorter there. Mbar of long paths, and the accelerations of large trees, are
+shorter in the axes of the world (articulated.py).
 """
 
-from functools import lru_cache
+from collections.abc import Callable, Iterable
+from functools import cached_property
 
 from tmt.derivation import articulated, composite
 from tmt.derivation.dual import seeded
+from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms, reduced_force
 from tmt.derivation.quantities import QUANTITIES, State
 from tmt.derivation.scalar import Rows, Scalar, Values
+from tmt.derivation.vectors import Scalars
 from tmt.methods.dynamics import Dynamics, Held, Implicit, minus, plus
 from tmt.methods.stepping import Method
 from tmt.model.tree import Tree
@@ -18,29 +22,61 @@ from tmt.model.tree import Tree
 from .straight import Traced, trace
 from .trace import Expression
 
-# speeds: up to FEW the composite form alone is traced, from MANY on the articulated one alone
-FEW, MANY = 5, 20
 DENSE = 10  # speeds from which solving linear systems and the derivatives of the bias are loops and no longer straight lines
-DYNAMICS = ("mass_matrix", "bias", "gravity_balance")
+
+
+def mixed(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
+    """Mbar in the axes of the world, h in the frames of the joints."""
+    M, _ = articulated.mass_matrix_and_bias(tree, q, [0.0] * len(qd))
+    return M, composite.mass_matrix_and_bias(tree, q, qd)[1]
+
+
+FORMS: tuple[Terms, ...] = composite.mass_matrix_and_bias, articulated.mass_matrix_and_bias, mixed
+
+
+def shortest(candidates: Iterable[Traced]) -> Traced:
+    return min(candidates, key=lambda traced: traced.length)
+
+
+class Regrouped(State):
+    """A state whose Mbar and h are those of a form."""
+
+    def __init__(self, terms: Terms, tree: AnyTree, q: Scalars, qd: Scalars | None, tau: Scalars):
+        super().__init__(tree, q, qd, tau)
+        self.form = terms
+
+    @cached_property
+    def terms(self) -> tuple[Rows, Values]:
+        return self.form(self.tree, self.q, self.qd)
+
+    @cached_property
+    def mass_matrix(self) -> Rows:
+        return self.terms[0]
+
+    @cached_property
+    def bias(self) -> Values:
+        return self.terms[1]
+
+    @property
+    def gravity_balance(self) -> Values:
+        return self.form(self.tree, self.q, [0.0] * len(self.qd))[1]
 
 
 class Traceable(Dynamics):
-    """Mbar and h of a tree for its traced functions, in the form with fewer operations.
+    """Mbar and h of a form, for traced functions.
 
     Of more than a few speeds the derivatives of h by the speeds and the solution of linear systems are functions that are called.
     by_bodies: accelerations are those of articulated bodies, where all that a method takes implicitly acts at single joints: then
     it counts as armature.
     """
 
-    def __init__(self, tree: Tree, by_bodies: bool = False):
-        form = articulated if is_shorter_articulated(tree) else composite
-        super().__init__(form.mass_matrix_and_bias)
-        self.n, self.by_bodies, self.has_used_bodies = len(tree.axis), by_bodies, False
+    def __init__(self, tree: Tree, terms: Terms, by_bodies: bool = False):
+        super().__init__(terms)
+        self.n, self.by_bodies = len(tree.axis), by_bodies
 
     def acceleration(self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Held = None) -> Values:
         if not self.by_bodies or (implicit and not acts_at_single_joints(implicit)):
             return super().acceleration(tree, q, qd, tau, implicit)
-        self.has_used_bodies = True
         force, armature = reduced_force(tree, [0.0] * self.n, q, qd, tau), list(tree.armature)
         if implicit:
             force = minus(force, implicit.pull)
@@ -66,17 +102,10 @@ def acts_at_single_joints(implicit: Implicit) -> bool:
     return not implicit.bias_rows and all(isinstance(x, float) and x == 0.0 for x in across)
 
 
-@lru_cache(maxsize=64)
-def is_shorter_articulated(tree: Tree) -> bool:
-    """Whether Mbar and h have fewer operations in the articulated form."""
-    n = len(tree.axis)
-    if n <= FEW or n >= MANY:
-        return n >= MANY
-
-    def length(terms: Terms) -> int:
-        return len(trace("terms", (tree.coordinates.nq, n), lambda q, qd: flat(terms(tree, q, qd))).nodes)
-
-    return length(articulated.mass_matrix_and_bias) < length(composite.mass_matrix_and_bias)
+def all_dynamics(tree: Tree) -> list[Traceable]:
+    """The ways to the accelerations of a tree: by Mbar and h in each form, and by articulated bodies."""
+    by_terms = [Traceable(tree, terms) for terms in FORMS]
+    return [*by_terms, Traceable(tree, articulated.mass_matrix_and_bias, by_bodies=True)]
 
 
 def quantity(tree: Tree, name: str) -> Traced:
@@ -84,13 +113,14 @@ def quantity(tree: Tree, name: str) -> Traced:
     if name == "acceleration":
         return slope(tree, Method(), "quantity", with_step=False)
 
-    def function(q: Values, qd: Values, tau: Values) -> Values:
-        state = State(tree, q, qd if "qd" in QUANTITIES[name].takes else None, tau)
-        if name in DYNAMICS:
-            state.mass_matrix, state.bias = Traceable(tree)(tree, q, state.qd)
-        return flat(state.bias if name == "gravity_balance" else QUANTITIES[name].of(state))
+    def traced(terms: Terms) -> Traced:
+        def function(q: Values, qd: Values, tau: Values) -> Values:
+            state = Regrouped(terms, tree, q, qd if "qd" in QUANTITIES[name].takes else None, tau)
+            return flat(QUANTITIES[name].of(state))
 
-    return trace("quantity", (tree.coordinates.nq, len(tree.axis), len(tree.axis)), function)
+        return trace("quantity", (tree.coordinates.nq, len(tree.axis), len(tree.axis)), function)
+
+    return shortest(map(traced, FORMS))
 
 
 def flat(nested: Scalar) -> Values:
@@ -108,32 +138,34 @@ def slope(tree: Tree, stepping: Method, name: str = "slope", with_step: bool = T
 
         return trace(name, (nq, n, n, *[1] * with_step), function)
 
-    by_bodies = Traceable(tree, by_bodies=n > FEW)
-    first = traced(by_bodies)
-    if n >= MANY or not by_bodies.has_used_bodies:
-        return first
-    return min(traced(Traceable(tree)), first, key=lambda function: function.length)
+    return shortest(map(traced, all_dynamics(tree)))
 
 
 def directional(tree: Tree, stepping: Method) -> Traced:
     """The slope and its derivative: (q, qd, tau, dt, dq, dqd) -> (qdd, dqdd); dq (nq) is a change of the numbers in q."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
-    def both(q: Values, qd: Values, tau: Values, dt: Values, dq: Values, dqd: Values) -> Values:
-        x = seeded([*q, *qd], [*dq, *dqd])
-        slopes = stepping.slope(tree, x[:nq], x[nq:], tau, dt[0], Traceable(tree, by_bodies=n > FEW))
-        parts = [x[0].parts(value) for value in slopes]
-        return [*(value for value, _ in parts), *(slope for _, slope in parts)]
+    def traced(dynamics: Traceable) -> Traced:
+        def both(q: Values, qd: Values, tau: Values, dt: Values, dq: Values, dqd: Values) -> Values:
+            x = seeded([*q, *qd], [*dq, *dqd])
+            slopes = stepping.slope(tree, x[:nq], x[nq:], tau, dt[0], dynamics)
+            parts = [x[0].parts(value) for value in slopes]
+            return [*(value for value, _ in parts), *(slope for _, slope in parts)]
 
-    return trace("directional", (nq, n, n, 1, nq, n), both)
+        return trace("directional", (nq, n, n, 1, nq, n), both)
+
+    return shortest(map(traced, all_dynamics(tree)))
 
 
 def bias_rate(tree: Tree) -> Traced:
     """The derivative of h along a change of the speeds: (q, qd, dqd) -> dh."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
-    def function(q: Values, qd: Values, dqd: Values) -> Values:
-        rates = seeded(qd, dqd)
-        return [rates[0].parts(x)[1] for x in articulated.bias(tree, q, rates)]
+    def traced(terms: Terms) -> Traced:
+        def function(q: Values, qd: Values, dqd: Values) -> Values:
+            rates = seeded(qd, dqd)
+            return [rates[0].parts(x)[1] for x in terms(tree, q, rates)[1]]
 
-    return trace("bias_rate", (nq, n, n), function)
+        return trace("bias_rate", (nq, n, n), function)
+
+    return shortest(map(traced, (composite.mass_matrix_and_bias, articulated.mass_matrix_and_bias)))
