@@ -71,9 +71,10 @@ def test_brackets_keep_the_order_of_operations():
     traced, values = straight.trace("f", (4,), function), [1.3, -0.7, 2.1, 0.9]
     for number in (repr, lambda x: f"({x!r})"):
         syntax, names = Syntax("", "{name} = {value}", "", number=number), dict(zip("abcd", values))
-        writer = Writer(traced, list("abcd"), syntax)
-        exec("\n".join(writer.assignments), {}, names)
-        assert np.allclose([eval(text, {}, names) for text in writer.results], function(values), rtol=1e-14)
+        results = [f"out[{k}] = {{value}}" for k in range(len(traced.outputs))]
+        names["out"] = [None] * len(results)
+        exec("\n".join(line.text for line in Writer(traced, "abcd", results, syntax).lines), {}, names)
+        assert np.allclose(names["out"], function(values), rtol=1e-14)
 
 
 def test_the_header_has_the_sizes():

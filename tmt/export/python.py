@@ -33,16 +33,14 @@ def source(program: Program) -> str:
 
 def text(function: Function) -> str:
     takes, results = ", ".join(function.takes), ", ".join(function.results)
-    assignments, values = statements(function, SYNTAX)
     empty = ", ".join([f"np.empty((*batch, {function.size}))"] * len(function.results))
     shape = ", ".join(["*batch", *map(str, function.shape)])
     lines = [
         f'"""{function.title}"""',
         f"{takes}, batch = arrays({takes})",
         *(f"{x}{k} = {x}[..., {k}]" for x, k in function.used),
-        *assignments,
         f"{results} = {empty}",
-        *values,
+        *(line.text for line in statements(function, SYNTAX)),
         f"return {', '.join(f'{result}.reshape({shape})' for result in function.results)}",
     ]
     return "\n".join([f"def {function.name}({takes}):", *(f"    {line}" for line in lines)])
