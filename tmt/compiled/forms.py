@@ -1,11 +1,11 @@
 """Which form of the dynamics is traced for a tree: of the same sums in another order, that with the fewest operations.
 
 It is counted for each quantity. Up to some ten joints in a row, and for trees of short branches, those are the sums in the frames
-of the joints (composite.py); the bias is nearly always shorter there. Mbar of long paths, and the accelerations of large trees, are
-shorter in the axes of the world (articulated.py).
+of the joints (composite.py); the bias is nearly always shorter there. Mbar of long paths, and the accelerations of large trees,
+are shorter in the axes of the world (articulated.py).
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 
 from tmt.derivation import articulated, composite
@@ -74,7 +74,9 @@ class Traceable(Dynamics):
         super().__init__(terms)
         self.n, self.by_bodies = len(tree.axis), by_bodies
 
-    def acceleration(self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Held = None) -> Values:
+    def acceleration(
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
+    ) -> Values:
         if not self.by_bodies or (implicit and not acts_at_single_joints(implicit)):
             return super().acceleration(tree, q, qd, tau, implicit)
         force, armature = reduced_force(tree, [0.0] * self.n, q, qd, tau), list(tree.armature)
@@ -83,7 +85,7 @@ class Traceable(Dynamics):
             armature = plus(armature, [row[i] for i, row in enumerate(implicit.matrix)])
         return articulated.acceleration(tree, q, qd, force, armature)
 
-    def bias_rates(self, tree: Tree, q: Values, qd: Values) -> Rows:
+    def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
         if self.n <= DENSE:
             return super().bias_rates(tree, q, qd)
         rates = q[0].tape.call("bias_rates", [*q, *qd], self.n * self.n)
@@ -108,19 +110,32 @@ def all_dynamics(tree: Tree) -> list[Traceable]:
     return [*by_terms, Traceable(tree, articulated.mass_matrix_and_bias, by_bodies=True)]
 
 
-def quantity(tree: Tree, name: str) -> Traced:
-    """A quantity as a function of (q, qd, tau), flat."""
-    if name == "acceleration":
-        return slope(tree, Method(), "quantity", with_step=False)
+def quantity(
+    tree: Tree,
+    name: str,
+    more: Sequence[int] = (),
+    tree_of: Callable[[Sequence[Values]], AnyTree] | None = None,
+) -> Traced:
+    """A quantity as a function of (q, qd, tau), flat.
 
-    def traced(terms: Terms) -> Traced:
-        def function(q: Values, qd: Values, tau: Values) -> Values:
-            state = Regrouped(terms, tree, q, qd if "qd" in QUANTITIES[name].takes else None, tau)
+    tree_of: the tree, from more arrays of these sizes, which the function takes too.
+    """
+    takes, n = QUANTITIES[name].takes, len(tree.axis)
+
+    def traced(terms: Terms, by_bodies: bool = False) -> Traced:
+        def function(q: Values, qd: Values, tau: Values, *arrays: Values) -> Values:
+            model = tree_of(arrays) if tree_of else tree
+            if name == "acceleration":
+                return Traceable(tree, terms, by_bodies).acceleration(model, q, qd, tau)
+            state = Regrouped(terms, model, q, qd if "qd" in takes else None, tau)
             return flat(QUANTITIES[name].of(state))
 
-        return trace("quantity", (tree.coordinates.nq, len(tree.axis), len(tree.axis)), function)
+        return trace("quantity", (tree.coordinates.nq, n, n, *more), function)
 
-    return shortest(map(traced, FORMS))
+    candidates = [traced(terms) for terms in FORMS]
+    if name == "acceleration":
+        candidates.append(traced(articulated.mass_matrix_and_bias, by_bodies=True))
+    return shortest(candidates)
 
 
 def flat(nested: Scalar) -> Values:
@@ -128,15 +143,15 @@ def flat(nested: Scalar) -> Values:
     return [x for part in nested for x in flat(part)] if isinstance(nested, (list, tuple)) else [nested]
 
 
-def slope(tree: Tree, stepping: Method, name: str = "slope", with_step: bool = True) -> Traced:
-    """The slope of a method as a function of (q, qd, tau) and, with_step, dt."""
+def slope(tree: Tree, stepping: Method) -> Traced:
+    """The slope of a method as a function of (q, qd, tau, dt)."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
     def traced(dynamics: Traceable) -> Traced:
-        def function(q: Values, qd: Values, tau: Values, dt: Values = [0.0]) -> Values:  # noqa: B006
+        def function(q: Values, qd: Values, tau: Values, dt: Values) -> Values:
             return stepping.slope(tree, q, qd, tau, dt[0], dynamics)
 
-        return trace(name, (nq, n, n, *[1] * with_step), function)
+        return trace("slope", (nq, n, n, 1), function)
 
     return shortest(map(traced, all_dynamics(tree)))
 

@@ -8,16 +8,21 @@ from textwrap import wrap
 from typing import Any
 
 from tmt.compiled import forms
+from tmt.compiled.straight import Traced
+from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.quantities import QUANTITIES, shape_of
+from tmt.derivation.scalar import Values
 from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree, stated
 from tmt.model.values import shown
 
-from . import c, matlab, python
+from . import c, casadi, jax, matlab, python
+from .parameters import OF_BODIES, Frames, Parameters
 from .statements import Function, Program
 
 LANGUAGES: dict[str, Callable[[Program], str]] = {
     "c": c.source, "c header": c.header, "python": python.source, "matlab": matlab.source,
+    "casadi": casadi.source, "jax": jax.source,
 }  # fmt: skip
 SYMBOLIC = "latex", "html", "sympy"
 OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
@@ -42,8 +47,9 @@ SI units, angles in rad. Shapes are those of one state; ... stands for any batch
 
 
 def text(
-    model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str]
-) -> str:
+    model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str],
+    words: Sequence[str] = (), frames: Frames | None = None,
+) -> str:  # fmt: skip
     checked_model(model)
     known = [*LANGUAGES, *SYMBOLIC]
     if not isinstance(language, str) or language not in known:
@@ -58,12 +64,27 @@ def text(
     if not isinstance(single, bool) or (single and language not in ("c", "c header")):
         expected = f"single precision is True or False, and in C only (not in {language})"
         raise ValueError(f"single is {shown(single)}; {expected}")
+    parameters = checked_parameters(model, language, chosen, words, frames or {})
     lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
     if language in SYMBOLIC:
         return symbolic_text(model, language, chosen, lines)
-    functions = [function_of(model, quantity) for quantity in dict.fromkeys(chosen)]
+    if parameters.values:
+        lines += ["Parameters and their values in the model:"]
+        lines += [f"  {x}: {parameters.meanings[x]}: {list(value)}" for x, value in parameters.values.items()]
+    functions = [function_of(model, quantity, parameters) for quantity in dict.fromkeys(chosen)]
     return LANGUAGES[language](Program(name, lines, functions, single))
+
+
+def checked_parameters(
+    model: Tree, language: str, quantities: Sequence[str], words: Sequence[str], frames: Frames
+) -> Parameters:
+    parameters = Parameters(model, words, frames)
+    if words and language in SYMBOLIC:
+        raise ValueError(f"in {language} all numbers are symbols; parameters are of other languages")
+    if parameters.has_payload and (bodies := set(quantities).intersection(OF_BODIES)):
+        raise ValueError(f"{min(bodies)} has a row for each body; a payload has none")
+    return parameters
 
 
 def symbolic_text(model: Tree, language: str, quantities: tuple[str, ...], head: Sequence[str]) -> str:
@@ -107,11 +128,25 @@ def places(part: slice) -> str:
     return f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}"
 
 
-def function_of(model: Tree, name: str) -> Function:
+def function_of(model: Tree, name: str, parameters: Parameters | None = None) -> Function:
     import tmt  # for the docstring
 
+    parameters = parameters or Parameters(model, (), {})
     quantity, shape = QUANTITIES[name], shape_of(name, model)
     sizes = {"q": model.coordinates.nq, "qd": model.coordinates.nv, "tau": model.coordinates.nv}
+    sizes |= {x: len(value) for x, value in parameters.values.items()}
     title = getattr(tmt, name).__doc__.splitlines()[0]
     results, shape = (quantity.parts, shape[1:]) if quantity.parts else (("out",), shape)
-    return Function(name, title, quantity.takes, sizes, shape, results, forms.quantity(model, name))
+    takes = (*quantity.takes, *parameters.values)
+    return Function(name, title, takes, sizes, shape, results, traced(model, name, parameters))
+
+
+def traced(model: Tree, name: str, parameters: Parameters) -> Traced:
+    """A quantity as a function of its arrays and of the parameters."""
+    if not parameters.values:
+        return forms.quantity(model, name)
+
+    def tree_of(arrays: Sequence[Values]) -> AnyTree:
+        return parameters.applied(model, dict(zip(parameters.values, arrays)))
+
+    return forms.quantity(model, name, [len(value) for value in parameters.values.values()], tree_of)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from .statements import Function, Line, Program, Syntax, statements
 
-# assignments of one function, some 3,000 operations: the time of a compiler grows with the square of their number
-LONGEST = 2_000
+# assignments of one function, up to some 3,000 operations: the time of a compiler grows with the square of their number
+LONGEST = 1_000
 NAME = re.compile(r"\b[xsc]\d+\b")  # of a value
 NOT_INLINED = "#ifdef __GNUC__\n__attribute__((noinline))\n#endif"
 LEAST = 1.2e-38  # of floats: what keeps a root from zero must not become zero

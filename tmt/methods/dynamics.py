@@ -11,7 +11,6 @@ from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms as Terms
 from tmt.derivation.scalar import Rows, Scalar, Values
 from tmt.derivation.vectors import Scalars, solve, solve_any
-from tmt.model.tree import Tree
 
 
 class Implicit(NamedTuple):
@@ -36,7 +35,9 @@ class Dynamics:
         """Mbar (nv rows of nv) and h (nv,)."""
         return self.terms(tree, q, qd)
 
-    def acceleration(self, tree: Tree, q: Values, qd: Values, tau: Values, implicit: Held = None) -> Values:
+    def acceleration(
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
+    ) -> Values:
         """a (nv,) from Mbar a = Qbar, or from the linear system of a method that takes something implicitly."""
         M, h = self(tree, q, qd)
         force = method.reduced_force(tree, h, q, qd, tau)
@@ -49,7 +50,7 @@ class Dynamics:
             matrix = [plus(row, changes[i]) if i in changes else row for i, row in enumerate(matrix)]
         return self.solve_any(matrix, minus(force, implicit.pull))
 
-    def bias_rates(self, tree: Tree, q: Values, qd: Values) -> Rows:
+    def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
         return method.bias_rates(tree, q, qd, self.terms)
 
     def solve_any(self, matrix: Rows, right: Values) -> Values:
