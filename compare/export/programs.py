@@ -6,8 +6,9 @@ import runpy
 import shlex
 import shutil
 import subprocess
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -47,6 +48,7 @@ class Program:
     tree: tmt.Tree
     quantities: Sequence[str]
     single: bool
+    parameters: Mapping[str, Array] = field(default_factory=dict)  # values of further arguments
     file = ""  # that is run, where there are others with the same expressions
 
     def __post_init__(self) -> None:
@@ -114,8 +116,9 @@ class CProgram(Program):
         sizes = {"q": coordinates.nq, "qd": coordinates.nv, "tau": coordinates.nv}
         size = prod(shape_of(quantity, self.tree))
         given = [f"{x} + {sizes[x]} * i" for x in QUANTITIES[quantity].takes]
+        given += self.parameters
         given += [f"out + {size} * i + {size // parts(quantity) * k}" for k in range(parts(quantity))]
-        arguments = ", ".join(f"const {kind} *{x}" for x in STATE)
+        arguments = ", ".join(f"const {kind} *{x}" for x in (*STATE, *self.parameters))
         call = f"{self.name}_{quantity}({', '.join(given)});"
         head = f"void states_{quantity}({arguments}, {kind} *out, long n)"
         return f"{head} {{ for (long i = 0; i < n; i++) {call} }}"
@@ -124,7 +127,7 @@ class CProgram(Program):
         """A call without arguments that evaluates all states, and its output (states, size)."""
         kind = np.float32 if self.single else float
         count = len(states[0])
-        arrays = [np.ascontiguousarray(x, dtype=kind) for x in states]
+        arrays = [np.ascontiguousarray(x, dtype=kind) for x in (*states, *self.parameters.values())]
         arrays.append(np.empty((count, prod(shape_of(quantity, self.tree))), dtype=kind))
         function = self.library[f"states_{quantity}"]
 
@@ -147,8 +150,46 @@ class PythonProgram(Program):
         self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
 
     def values(self, quantity: str, states: States) -> list[Array]:
-        values = self.functions[quantity](*taken(quantity, states))
+        values = self.functions[quantity](*taken(quantity, states), *self.parameters.values())
         return list(values) if QUANTITIES[quantity].parts else [values]
+
+
+class CasadiProgram(Program):
+    """Functions of CasADi, called with numbers, state after state."""
+
+    def __post_init__(self) -> None:
+        with needed("casadi"):
+            self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
+
+    def values(self, quantity: str, states: States) -> list[Array]:
+        function, shape = self.functions[quantity], shape_of(quantity, self.tree)[parts(quantity) > 1 :]
+        rows = [function.call([*state, *self.parameters.values()]) for state in zip(*taken(quantity, states))]
+        return [np.array([part.full().reshape(shape) for part in results]) for results in zip(*rows)]
+
+
+class JaxProgram(Program):
+    """Functions of JAX, jitted, with 64 bits, called with all states at once."""
+
+    def __post_init__(self) -> None:
+        with needed("jax"):
+            self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
+
+    def values(self, quantity: str, states: States) -> list[Array]:
+        import jax
+
+        with jax.enable_x64(True):
+            arguments = [*taken(quantity, states), *self.parameters.values()]
+            values = jax.jit(self.functions[quantity])(*arguments)
+        return list(map(np.asarray, values if QUANTITIES[quantity].parts else [values]))
+
+
+@contextmanager
+def needed(package: str) -> Iterator[None]:
+    """NotRun where a package is not installed."""
+    try:
+        yield
+    except ImportError as error:
+        raise NotRun(f"{package} cannot be imported: {error}") from None
 
 
 class SymbolicProgram(Program):
@@ -186,7 +227,8 @@ class MatlabProgram(Program):
             np.ascontiguousarray(values).tofile(self.folder / f"{x}.bin")
             read = f"fread(f, [{values.shape[1]}, Inf], 'double')"
             lines.append(f"f = fopen('{x}.bin'); {x} = {read}; fclose(f);")
-        lines.append(f"[{', '.join(results)}] = {self.name}('{quantity}', {', '.join(takes)});")
+        given = [*takes, *(f"[{'; '.join(map(repr, x.tolist()))}]" for x in self.parameters.values())]
+        lines.append(f"[{', '.join(results)}] = {self.name}('{quantity}', {', '.join(given)});")
         lines += [f"f = fopen('{r}.bin', 'w'); fwrite(f, {r}, 'double'); fclose(f);" for r in results]
         (self.folder / "_states.m").write_text("\n".join(lines) + "\n", encoding="utf-8")
         self.run(self.octave, "--norc", "--quiet", "_states.m")
@@ -195,4 +237,7 @@ class MatlabProgram(Program):
         return [np.moveaxis(array, -1, 0) for array in arrays]
 
 
-PROGRAMS = {"c": CProgram, "python": PythonProgram, "matlab": MatlabProgram, "latex": SymbolicProgram}
+PROGRAMS: dict[str, type[Program]] = {
+    "c": CProgram, "python": PythonProgram, "matlab": MatlabProgram, "casadi": CasadiProgram, "jax": JaxProgram,
+    "latex": SymbolicProgram,
+}  # fmt: skip

@@ -30,7 +30,9 @@ class Differentiated(Dynamics):
         # of the last states: A (states, nv, nv) and the force (states, nv) of A a = force
         self.system: tuple[Array, Array]
 
-    def residual(self, tree: AnyTree, a: Values, q: Values, qd: Values, tau: Values, implicit: Held) -> Values:
+    def residual(
+        self, tree: AnyTree, a: Values, q: Values, qd: Values, tau: Values, implicit: Held
+    ) -> Values:
         """What a leaves of the linear system, (nv,): zero where it is the slope, and linear in a.
 
         dh/dqd a is (h(qd + a) - h(qd - a)) / 2, as h is quadratic in the speeds.
@@ -46,7 +48,9 @@ class Differentiated(Dynamics):
                 left[i] = left[i] + 0.5 * implicit.dt * (ahead[i] - behind[i])
         return left
 
-    def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None) -> Values:
+    def acceleration(
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
+    ) -> Values:
         plain = implicit._replace(pull=values_of(implicit.pull)) if implicit else None
         plain_q, plain_qd = values_of(q), values_of(qd)
         n, states = len(qd), plain_qd[0].shape
