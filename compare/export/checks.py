@@ -1,6 +1,6 @@
 """Exported equations at random states, compared with MuJoCo and exact values; what an evaluation costs."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -23,6 +23,7 @@ from ..run.reference import Compared
 from .programs import Array, CProgram, NotRun, Program, States, WrongProgram
 
 ROUNDS = 20  # of timing
+OTHER = " (p)"  # after a quantity: with other values of the parameters
 
 
 class Row(NamedTuple):
@@ -46,6 +47,10 @@ class Outcome(NamedTuple):
     not_run: str = ""  # why it was not run
     wrong: str = ""  # why it cannot run
     file: str = ""  # that was run, where there are others with the same expressions
+
+    @property
+    def has_other_parameters(self) -> bool:
+        return any(row.quantity.endswith(OTHER) for row in self.rows)
 
     @property
     def passed(self) -> bool:
@@ -90,14 +95,29 @@ class Judge:
 
 
 def checked(
-    compared: Compared, make: Callable[[], Program], quantities: Sequence[str], count: int, single: bool
-) -> tuple[Outcome, Program | None]:
-    """Run a program at random states; a float32 program is asked at states that float32 has."""
+    compared: Compared, make: Callable[[], Program], quantities: Sequence[str], count: int, single: bool,
+    other: Compared | None = None, values: Mapping[str, Array] | None = None,
+) -> tuple[Outcome, Program | None]:  # fmt: skip
+    """Run a program at random states; a float32 program is asked at states that float32 has.
+
+    other: the file with other values of the parameters, which the program is given then.
+    """
     kind, states = np.float32 if single else np.float64, random_states(compared.robot, count)
-    judge = Judge(compared, [x.astype(kind).astype(float) for x in states], float(np.finfo(kind).eps))
+    states, eps, names = (
+        [x.astype(kind).astype(float) for x in states],
+        float(np.finfo(kind).eps),
+        dict.fromkeys(quantities),
+    )
+    judge = Judge(compared, states, eps)
     try:
         program = make()
-        rows = [row for name in dict.fromkeys(quantities) for row in judge.rows(program, name)]
+        rows = [row for name in names for row in judge.rows(program, name)]
+        if other and values:
+            stated, program.parameters = program.parameters, values
+            judge = Judge(other, states, eps)
+            changed = [row for name in names for row in judge.rows(program, name)]
+            rows += [row._replace(quantity=row.quantity + OTHER) for row in changed]
+            program.parameters = stated
     except NotRun as error:
         return Outcome(not_run=str(error)), None
     except WrongProgram as error:
@@ -124,13 +144,15 @@ def worst_of(difference: Array, tolerance: Array) -> tuple[float, float]:
 def times(
     compared: Compared, program: Program | None, quantities: Sequence[str], count: int
 ) -> list[dict[str, Any]]:
-    """ns of an evaluation by C, by tmt's compiled code state after state, and by mj_forward; []: not C."""
+    """ns of an evaluation by C, also compiled for this processor, by tmt's code state after state, by mj_forward; []: not C."""
     if not isinstance(program, CProgram):
         return []
     names, (q, qd, tau) = list(dict.fromkeys(quantities)), random_states(compared.robot, count)
+    libraries = {"c": program.library} | program.faster()
     calls: dict[object, Callable[..., Any]] = {}
     for name in names:
-        calls[name, "c"], _ = program.call(name, (q, qd, tau))
+        for flag, library in libraries.items():
+            calls[name, flag], _ = program.call(name, (q, qd, tau), library)
         compiled = Evaluator(compared.robot.tree, name)
         calls[name, "tmt"] = partial(compiled.fill, False, np.empty((count, compiled.size)), q, qd, tau)
     if not MinimalCalls.unavailable():
@@ -140,4 +162,14 @@ def times(
         call()  # its code is compiled, or loaded, on the first call
     ns = {key: 1e9 * seconds / count for key, seconds in timing.fastest(calls, ROUNDS).items()}
     forward = ns.get("mujoco")
-    return [{"quantity": x, "c": ns[x, "c"], "tmt": ns[x, "tmt"], "mujoco": forward} for x in names]
+    flags = [flag for flag in libraries if flag != "c"]
+    return [
+        {
+            "quantity": x,
+            "c": ns[x, "c"],
+            "tmt": ns[x, "tmt"],
+            "mujoco": forward,
+            "faster": {flag: ns[x, flag] for flag in flags},
+        }
+        for x in names
+    ]

@@ -19,12 +19,15 @@ from numpy.typing import NDArray
 import tmt
 from tmt.compiled import Evaluator
 from tmt.derivation.quantities import QUANTITIES, shape_of
+from tmt.export import traced
+from tmt.export.parameters import Parameters
 
 from ..engines.own.functions import functions_of
 from ..robots import Robot
 
 STATE = ("q", "qd", "tau")
 MOST_SECONDS = 900.0  # of a compiler, or of a run in another language
+OF_PROCESSOR = "-mfma", "-march=native"  # which a user may add; GCC then needs -std=gnu99 or the like
 FLAGS = ("-std=c99", "-O2", "-Wall", "-fPIC", "-shared")
 
 Array = NDArray[np.floating[Any]]
@@ -49,6 +52,7 @@ class Program:
     quantities: Sequence[str]
     single: bool
     parameters: Mapping[str, Array] = field(default_factory=dict)  # values of further arguments
+    chosen: Parameters | None = None  # which these are
     file = ""  # that is run, where there are others with the same expressions
 
     def __post_init__(self) -> None:
@@ -60,6 +64,8 @@ class Program:
 
     def operations(self, quantity: str) -> int:
         """+ - * / of an evaluation; a sine, a cosine, a root count as one each."""
+        if self.chosen:
+            return traced(self.tree, quantity, self.chosen).operations
         return Evaluator(self.tree, quantity).operations
 
     def run(self, *command: str) -> str:
@@ -101,10 +107,23 @@ class CProgram(Program):
             self.compiled(compiler, "none", "#include <math.h>\nint none;")
         except (WrongProgram, OSError) as error:  # of the compiler or the folder, not of the equations
             raise NotRun(f"a C library cannot be made or loaded: {error}") from None
+        self.compiler = compiler
+        self.library = self.of_states("states")
+
+    def of_states(self, name: str, *flags: str) -> ctypes.CDLL:
+        """The functions in loops over states."""
         loops = "\n".join([f'#include "{self.name}.h"', *map(self.loop, self.quantities)])
         # the header before the source: the declarations must be those of the functions
-        header, source = f"{self.name}.h", f"{self.name}.c"
-        self.library = self.compiled(compiler, "states", loops, "-include", header, source)
+        texts = "-include", f"{self.name}.h", f"{self.name}.c"
+        return self.compiled(self.compiler, name, loops, *flags, *texts)
+
+    def faster(self) -> dict[str, ctypes.CDLL]:
+        """The functions compiled for a processor that multiplies and adds at once, as this one does, by the option for it."""
+        cpu = Path("/proc/cpuinfo")
+        if not cpu.is_file() or " fma " not in cpu.read_text(encoding="utf-8"):
+            return {}
+        names = {flag: f"states{flag.replace('=', '_')}" for flag in OF_PROCESSOR}
+        return {flag: self.of_states(name, "-ffp-contract=fast", flag) for flag, name in names.items()}
 
     def compiled(self, compiler: Sequence[str], name: str, text: str, *more: str) -> ctypes.CDLL:
         (self.folder / f"_{name}.c").write_text(f"{text}\n", encoding="utf-8")
@@ -123,13 +142,15 @@ class CProgram(Program):
         head = f"void states_{quantity}({arguments}, {kind} *out, long n)"
         return f"{head} {{ for (long i = 0; i < n; i++) {call} }}"
 
-    def call(self, quantity: str, states: States) -> tuple[Callable[[], None], Array]:
+    def call(
+        self, quantity: str, states: States, library: ctypes.CDLL | None = None
+    ) -> tuple[Callable[[], None], Array]:
         """A call without arguments that evaluates all states, and its output (states, size)."""
         kind = np.float32 if self.single else float
         count = len(states[0])
         arrays = [np.ascontiguousarray(x, dtype=kind) for x in (*states, *self.parameters.values())]
         arrays.append(np.empty((count, prod(shape_of(quantity, self.tree))), dtype=kind))
-        function = self.library[f"states_{quantity}"]
+        function = (library or self.library)[f"states_{quantity}"]
 
         def call() -> None:
             function(*(ctypes.c_void_p(x.ctypes.data) for x in arrays), ctypes.c_long(count))
