@@ -275,6 +275,7 @@ def equations(
     head: Sequence[str] = ("Not checked: compare with the model before use.",),
     parameters: Sequence[str] = (),
     frames: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
+    limit: float = 60.0,
 ) -> str:
     """The equations of a model, with its numbers, as text in another language, for use without this package.
 
@@ -301,6 +302,8 @@ def equations(
     frames : {body: (origin, axes)}
         Frames in which a body's parameters and its payload are: the origin (3,), m, and the axes (3, 3) as
         columns, in the frame of its joint, which is taken without.
+    limit : float, s
+        With symbols: the most work, counted as that of one processor core; ValueError beyond.
 
     Raises
     ------
@@ -314,4 +317,4 @@ def equations(
     """
     from tmt.export import text  # loads the compiler
 
-    return text(model, language, quantities, name, single, head, parameters, frames)
+    return text(model, language, quantities, name, single, head, parameters, frames, limit)

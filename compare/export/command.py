@@ -17,7 +17,7 @@ import tmt
 from tmt.export import is_word
 from tmt.export.parameters import Parameters
 
-from ..cli.command_line import EQUATIONS, Option, command_parser, expected
+from ..cli.command_line import EQUATIONS, Option, command_parser, expected, seconds
 from ..core.errors import Refused
 from ..core.text import block
 from ..core.words import in_one_line
@@ -45,6 +45,7 @@ OPTIONS = {
     "--name": Option(metavar="NAME"),
     "--parameters": Option(metavar="LIST"),
     "--float": Option(None),
+    "--limit": Option(seconds(1e6), "S", 60.0),
     "--out": Option(metavar="DIR"),
 }
 
@@ -89,7 +90,11 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
     quantities = (options.quantity or QUANTITIES.get(options.to, OF_MOST)).replace(" ", "").split(",")
 
     frames = parameters.frames_of(compared.reading) if compared.reading else {}
-    more: dict[str, Any] = {"parameters": words.split(",") if words else [], "frames": frames}
+    more: dict[str, Any] = {
+        "parameters": words.split(",") if words else [],
+        "frames": frames,
+        "limit": options.limit,
+    }
 
     def written(*head: str) -> dict[str, str]:
         try:

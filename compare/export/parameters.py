@@ -89,7 +89,8 @@ def changed(source: Source, tree: Tree, parameters: Parameters, values: Values) 
         elif part == "com":
             body.ipos = values[name]
         else:
-            body.iquat, body.fullinertia = [1.0, 0.0, 0.0, 0.0], values[name]
+            body.iquat, body.inertia = [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+            body.fullinertia = values[name]
     if "gravity" in values:
         spec.option.gravity = values["gravity"]
     return spec.compile()

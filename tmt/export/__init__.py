@@ -48,7 +48,7 @@ SI units, angles in rad. Shapes are those of one state; ... stands for any batch
 
 def text(
     model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str],
-    words: Sequence[str] = (), frames: Frames | None = None,
+    words: Sequence[str] = (), frames: Frames | None = None, limit: float = 60.0,
 ) -> str:  # fmt: skip
     checked_model(model)
     known = [*LANGUAGES, *SYMBOLIC]
@@ -68,7 +68,7 @@ def text(
     lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
     if language in SYMBOLIC:
-        return symbolic_text(model, language, chosen, lines)
+        return symbolic_text(model, language, chosen, lines, limit)
     if parameters.values:
         lines += ["Parameters and their values in the model:"]
         lines += [f"  {x}: {parameters.meanings[x]}: {list(value)}" for x, value in parameters.values.items()]
@@ -87,13 +87,15 @@ def checked_parameters(
     return parameters
 
 
-def symbolic_text(model: Tree, language: str, quantities: tuple[str, ...], head: Sequence[str]) -> str:
+def symbolic_text(
+    model: Tree, language: str, quantities: tuple[str, ...], head: Sequence[str], limit: float
+) -> str:
     try:
         from . import latex, page, symbols
     except ImportError:
         raise ValueError("symbolic equations need SymPy: pip install sympy") from None
     writers = {"latex": latex.latex, "html": page.page, "sympy": symbols.python_source}
-    return writers[language](symbols.symbolic(model, quantities), head)
+    return writers[language](symbols.symbolic(model, quantities, limit), head)
 
 
 def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ...]:
