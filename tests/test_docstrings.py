@@ -14,7 +14,15 @@ import tmt
 from compare.agreement import Difference
 
 FUNCTIONS = [getattr(tmt, name) for name in tmt.__all__ if inspect.isroutine(getattr(tmt, name))]
-OTHERS = [tmt.Tree, tmt.Tree.lock, tmt.Motion, compare.assert_agrees, compare.differences, Difference]
+OTHERS = [
+    tmt.Tree,
+    tmt.Tree.lock,
+    tmt.Motion,
+    compare.assert_agrees,
+    compare.differences,
+    compare.tree,
+    Difference,
+]
 
 
 @pytest.mark.parametrize("public", [*FUNCTIONS, *OTHERS], ids=lambda public: public.__qualname__)

@@ -20,8 +20,11 @@ FOREARM = '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>
 STAGES_OFF = 'contact="disable" constraint="disable"'
 BESIDE = XML.replace('<body name="fore', '</body><body name="fore')
 ON_THE_WORLD = BESIDE.replace("</body>\n    </body>", "</body>")
-GEOM = '<geom size="0.001" pos="0.2 0.2 0.2"/>'
-TOUCHING = XML.replace("</worldbody>", f"{GEOM}</worldbody>").replace(FOREARM, FOREARM + GEOM)
+FLOOR, GEOM = (
+    '<geom name="floor" type="plane" size="1 1 1" pos="0 0 {}"/>',
+    '<geom size="0.001" pos="0.2 0.2 0.2"/>',
+)
+TOUCHING = XML.replace("</worldbody>", FLOOR.format(-0.3) + "</worldbody>").replace(FOREARM, FOREARM + GEOM)
 TABLE = '<body pos="1 0 0"><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/></body></worldbody>'
 TENDON = '<tendon><fixed armature="0.1"><joint joint="beta" coef="1"/></fixed></tendon>'
 
@@ -43,13 +46,13 @@ EDITS = {  # by quantity: what is replaced by what; the causes: rank, place, sta
     "flag damper": ("<flag", '<flag damper="disable"', [(1, "flag damper", 1, 0)], f"{NOT_AT_REST} acceleration speed reduction"),
     "flag eulerdamp": ("<flag", '<flag eulerdamp="disable"', [(1, "flag eulerdamp", 1, 0)], NOT_TRIED),
     "order": (f'{ALPHA} axis="0 1 0"/>\n      {BETA} axis="1 0 0"/>', f'{BETA} axis="1 0 0"/>\n      {ALPHA} axis="0 1 0"/>',
-              [(1, "order of alpha", 0, 1), (1, "order of beta", 1, 0)], SEEN),
+              [(1, "order of the joints", "alpha, beta, gamma", "beta, alpha, gamma")], SEEN),
     "parent": (XML, ON_THE_WORLD, [(1, "parent of gamma", 1, -1)], NOT_TRIED),
     "ref": (GAMMA, f'{GAMMA} ref="0.5"', [(1, "ref of gamma", 0, 0.5)], SEEN),
     "axis": (f'{BETA} axis="1', f'{BETA} axis="-1', [(1, "axis x of beta", 1, -1)], MIRROR),
     "anchor": ('pos="0 0 -0.3"', 'pos="0 0 -0.301"', [(2, "anchor z of gamma", -0.3, -0.301)], SEEN),
     "anchor of all": ('name="upper_arm" pos="0 0 0"', 'name="upper_arm" pos="0 0 0.01"',
-                      [(2, f"anchor z of {of}", at, at + 0.01) for of, at in (("alpha", 0), ("beta", 0), ("gamma", -0.3))],
+                      [(2, "anchor of alpha and of beta and gamma with it", 0, 0.01)],
                       NO_PLACE),
     "damping": (BETA, f'{BETA} damping="0.1"', [(2, "damping of beta", 0, 0.1)], f"{NOT_AT_REST} reduction"),
     "armature": (ALPHA, f'{ALPHA} armature="0.1"', [(2, "armature of alpha", 0, 0.1)], NO_WEIGHT),
@@ -74,7 +77,8 @@ EDITS = {  # by quantity: what is replaced by what; the causes: rank, place, sta
                           [(2, "actuator armature", 0, 0.1)], NOT_TRIED),
     "tendon armature": ("</worldbody>", f"</worldbody>{TENDON}", [(2, "tendon armature", 0, 0.1)], NO_WEIGHT),
     "no forces of actuators": ("</mujoco>", '<actuator><position joint="beta" kp="3"/></actuator></mujoco>',
-                               [(2, "forces of actuators (actuator 0)", 0, pytest.approx(3.0 * pi, rel=0.05))], NOT_AT_ZERO),
+                               [(2, "forces of actuators (actuator 0 on beta)", 0, pytest.approx(3.0 * pi, rel=0.05))],
+                               NOT_AT_ZERO),
 }  # fmt: skip
 
 
@@ -162,8 +166,11 @@ def test_a_number_that_differs_fails_its_own_check_and_is_the_cause(quantity):
         else:
             raise
     assert quantity.removesuffix(" of all") in failed
-    numbers = [(c.rank, c.place, c.stated, pytest.approx(c.explains, rel=1e-14)) for c in known]
-    assert numbers == causes
+    right = [
+        (*cause, pytest.approx(number, rel=1e-14) if isinstance(number, int | float) else number)
+        for *cause, number in causes
+    ]
+    assert [(c.rank, c.place, c.stated, c.explains) for c in known] == right
 
 
 def test_causes_come_by_rank_then_by_size():
@@ -176,7 +183,7 @@ def test_causes_come_by_rank_then_by_size():
 
 def test_a_force_that_no_number_explains_is_the_cause():
     both = places(edited(SERVO, ('mass="1.5"', 'mass="1.501"')))
-    assert {*both} == {"forces of actuators (actuator 0)", "mass of forearm"}
+    assert {*both} == {"forces of actuators (actuator 0 on beta)", "mass of forearm"}
     held = "</mujoco>", '<equality><joint joint1="gamma" polycoef="0.3 0 0 0 0"/></equality></mujoco>'
     assert places(edited(held, ('constraint="disable" ', ""))) == ["forces of constraints and contacts"]
 
@@ -187,6 +194,50 @@ def test_geoms_that_cannot_touch_are_no_cause():
     for stages in ('contact="disable"', 'constraint="disable"'):
         assert places(TOUCHING.replace(STAGES_OFF, stages)) == []
     assert places(TOUCHING.replace(STAGES_OFF, "").replace("</mujoco>", excluded)) == []
+
+
+def test_contacts_are_a_cause_if_geoms_touch_in_a_scene_or_at_a_random_state():
+    (cause,) = found(TOUCHING.replace(STAGES_OFF, ""))[1]
+    assert all(word in cause.text for word in ("floor and a geom of forearm touch", " s of zero, free"))
+    setup = setup_of(TOUCHING.replace(STAGES_OFF, ""), make=Setup, states=20)
+    (cause,) = parameters.rows(replace(setup, robot=replace(ARM, scenes=()))).causes
+    assert " at q = (" in cause.text and "zero, free" not in cause.text
+    beneath = TOUCHING.replace(STAGES_OFF, "").replace(FLOOR.format(-0.3), FLOOR.format(-0.7))
+    result = parameters.rows(setup_of(beneath, make=Setup, states=20))
+    assert result.causes == [] and "nothing_touches" in [note.kind for note in result.notes]
+
+
+FINGERTIP = FOREARM.replace("0.15", "0.225").replace("1.5", "1.2")
+IN_GEOMS = '<compiler angle="radian"/>', '<geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>'
+
+
+@pytest.mark.parametrize("edits, text", [
+    ([('inertiafromgeom="false"', 'inertiafromgeom="false" settotalmass="3.5"')],
+     "all masses and inertias: 1.02941 times the stated ones"),
+    ([('mass="1.9"', 'mass="1900"'), ('mass="1.5"', 'mass="1500"')], "all masses: 1000 times the stated ones"),
+    ([('pos="0 0 -0.15"', 'pos="0 0 -150"'), ('pos="0 0 -0.3"', 'pos="0 0 -300"'), ('pos="0.15 0', 'pos="150 0')],
+     "all distances of joints and centres of mass: 1000 times the stated ones"),
+    ([('mass="1.9"', 'mass="1.5" '), ('mass="1.5" d', 'mass="1.9" d')], "mass of upper arm and forearm: exchanged"),
+    ([("0.015 0.014 0.002", "0.002 0.014 0.015")],
+     "inertia of upper arm: xx and zz exchanged, stated (0.015, 0.002), compiled (0.002, 0.015) kg m2"),
+    ([("<worldbody>", '<default><joint armature="0.01"/></default><worldbody>')],
+     "armature of alpha, beta and gamma: stated 0, compiled 0.01 kg m2"),
+    ([("0 0 -9.81", "0 -9.81 0")], "gravity: stated (0, 0, -9.81), compiled (0, -9.81, 0) m/s2"),
+    ([(BETA + ' axis="1 0 0"', BETA + ' axis="0 0 1"')], "axis of beta: stated (1, 0, 0), compiled (0, 0, 1)"),
+    ([(FOREARM, IN_GEOMS[1]), ('<compiler angle="radian" inertiafromgeom="false"/>', IN_GEOMS[0])],
+     "inertial of forearm: missing; MuJoCo takes mass 0.9613 kg (stated 1.5 kg) and inertia from its geoms"),
+])  # fmt: skip
+def test_numbers_that_are_wrong_together_are_one_cause(edits, text):
+    (cause,) = found(edited(*edits))[1]
+    assert cause.text == text and cause.place == text.partition(":")[0]
+
+
+def test_what_is_wrong_for_another_reason_stays_another_cause():
+    """One of three joints, a mass by another factor, an inertia as well."""
+    edits = (BETA, f'{BETA} armature="0.1"'), (GAMMA, f'{GAMMA} armature="0.2"')
+    assert {*places(edited(*edits))} == {"armature of beta", "armature of gamma"}
+    assert len(places(edited(('mass="1.9"', 'mass="3.8"'), ('mass="1.5"', 'mass="3.1"')))) == 2
+    assert len(places(edited((FOREARM, FINGERTIP)))) == 2
 
 
 @pytest.mark.parametrize("edits, causes", [

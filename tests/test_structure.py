@@ -16,18 +16,19 @@ from compare.experiments import Functions
 
 # what each part of compare may import of the others; of its own part: anything that makes no circle
 DIRECTIONS = {
-    "": "agreement core", "core": "", "process": "core", "robots": "tmt core", "judge": "tmt core robots",
+    "": "agreement core stability", "core": "", "process": "core", "robots": "tmt core", "judge": "tmt core robots",
     "agreement": "tmt core diagnosis engines judge robots", "engines": "tmt core robots judge process",
-    "truth": "tmt core robots", "diagnosis": "tmt core robots judge", "report": "core process robots",
-    "experiments": "tmt core robots engines truth judge diagnosis report",
-    "run": "tmt core robots engines judge process report experiments", "cli": "core experiments process report",
+    "stability": "tmt core robots engines", "truth": "tmt core robots stability",
+    "diagnosis": "tmt core robots judge", "report": "core process robots",
+    "experiments": "tmt core robots engines stability truth judge diagnosis report",
+    "run": "tmt core robots engines stability judge process report experiments", "cli": "core experiments process report",
     "fleet": "tmt core robots engines judge process report experiments run cli",
     "export": "tmt core robots engines judge process report experiments run cli",
     "__main__": "tmt core robots engines judge process report experiments run cli fleet export",
 }  # fmt: skip
 # the modules of compare, or beginnings of their names, that may import a library
 LIBRARIES = {
-    "mujoco": "engines.mujoco engines.mjx", "mujoco_warp": "engines.warp", "warp": "engines.newton engines.warp",
+    "mujoco": "engines.mujoco engines.mjx stability", "mujoco_warp": "engines.warp", "warp": "engines.newton engines.warp",
     "jax": "engines.mjx", "heyoka": "engines.heyoka", "dartpy": "engines.dart", "pybullet": "engines.pybullet",
     "newton": "engines.newton", "pinocchio": "engines.pinocchio", "pydrake": "engines.drake", "pandas": "report",
     "matplotlib": "report.style", "PIL": "report.images", "distributed": "fleet.executors", "rich": "report.terminal",

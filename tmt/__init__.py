@@ -44,7 +44,8 @@ what is wrong in the same words. Compiled code is kept on disk, see compiled/sto
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,14 +54,38 @@ from tmt.answers import answered as _answered
 from tmt.answers import prepare
 from tmt.arm import ARM
 from tmt.methods import METHODS
+from tmt.methods import method_named as _method_named
+from tmt.model.arguments import checked_model as _checked_model
 from tmt.model.tree import Tree
+from tmt.model.values import real_numbers as _real_numbers
+from tmt.model.values import shown as _shown
 from tmt.simulation import Motion, simulate
 
 __all__ = [
-    "ARM", "METHODS", "Motion", "Tree", "acceleration", "angular_velocities", "bias", "com_positions", "convective_terms",
-    "energy", "equations",
-    "gravity_balance", "jacobians", "mass_matrix", "potential_energy", "prepare", "simulate", "spring_torque",
+    "ARM", "METHODS", "Derivatives", "Frame", "Motion", "Tree", "acceleration", "angular_velocities", "bias", "com_positions",
+    "convective_terms", "derivatives", "energy", "equations", "frame", "gravity_balance", "inverse_dynamics",
+    "inverse_dynamics_derivatives", "inverse_mass_matrix", "jacobians", "mass_matrix", "potential_energy", "prepare",
+    "simulate", "spring_torque", "step_derivatives",
 ]  # fmt: skip
+
+
+class Derivatives(NamedTuple):
+    """What `derivatives` returns, arrays (..., nv, nv): the derivative of row i by column j."""
+
+    dqdd_dq: np.ndarray  # 1/s2
+    dqdd_dqd: np.ndarray  # 1/s
+    dqdd_dtau: np.ndarray  # 1/(kg m2)
+    dtau_dq: np.ndarray  # N m/rad
+    dtau_dqd: np.ndarray  # N m s/rad
+
+
+class Frame(NamedTuple):
+    """What `frame` returns, in the inertial frame."""
+
+    position: np.ndarray  # (..., 3) m
+    rotation: np.ndarray  # (..., 3, 3)
+    jacobian: np.ndarray  # (..., 6, nv)
+    convective: np.ndarray  # (..., 6)
 
 
 def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
@@ -157,6 +182,25 @@ def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     return _answered("mass_matrix", model, q)
 
 
+def inverse_mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
+    """Inverse of `mass_matrix`, 1/(kg m2), shape (..., nv, nv): the accelerations for unit torques.
+
+    Parameters
+    ----------
+    q : joint positions (..., nq), rad
+    model : Tree, default ARM
+
+    Examples
+    --------
+    >>> q = np.array([0.5, 0.3, 1.0])
+    >>> print((tmt.inverse_mass_matrix(q) @ tmt.mass_matrix(q)).round(9) + 0.0)
+    [[1. 0. 0.]
+     [0. 1. 0.]
+     [0. 0. 1.]]
+    """
+    return _answered("inverse_mass_matrix", model, q)
+
+
 def bias(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Bias h = Coriolis, centrifugal and gravity terms, N m, shape (..., nv): Mbar qdd + h = tau - D qd.
 
@@ -231,6 +275,140 @@ def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM)
     return _answered("acceleration", model, q, qd, tau)
 
 
+def inverse_dynamics(q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, model: Tree = ARM) -> np.ndarray:
+    """Torque tau = Mbar qdd + h + D qd + k (q - rest) + P q + S qd that gives accelerations qdd, N m, shape (..., nv).
+
+    The inverse of `acceleration`; nothing else is added or taken off. With damping, springs and armature it is
+    MuJoCo's qfrc_inverse without contacts, limits, friction and actuators. P, S: as in `acceleration`.
+
+    Parameters
+    ----------
+    q, qd, qdd : positions, speeds and accelerations (..., nq), (..., nv) and (..., nv), rad, rad/s and rad/s2
+    model : Tree, default ARM
+
+    Examples
+    --------
+    >>> q, qd, tau = np.array([0.5, 0.3, 1.0]), np.ones(3), np.array([1.0, 2.0, 3.0])
+    >>> print(tmt.inverse_dynamics(q, qd, tmt.acceleration(q, qd, tau)).round(9))
+    [1. 2. 3.]
+    """
+    return _answered("inverse_dynamics", model, q, qd, qdd)
+
+
+def derivatives(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM) -> Derivatives:
+    """Exact derivatives of `acceleration` by q, qd and tau, and of `inverse_dynamics` by q and qd, each (..., nv, nv).
+
+    Those of the inverse dynamics are at qdd = acceleration(q, qd, tau): dqdd/dq = -Mbar^-1 dtau/dq, and so by qd;
+    dqdd/dtau = Mbar^-1. By q means by movements: of a hinge or slide by its number in q; of a ball by turns about
+    its own three axes, for which its quaternion p changes by p o (0, u) / 2; of a free joint, three slides and a
+    ball, by the position of its origin in the inertial frame, then by turns in its own axes. MuJoCo's
+    mj_integratePos moves so, and mjd_transitionFD differentiates so.
+
+    Parameters
+    ----------
+    q, qd, tau : joint positions, speeds and torques (..., nq), (..., nv) and (..., nv), rad, rad/s and N m
+    model : Tree, default ARM
+
+    Examples
+    --------
+    >>> q, rest = np.array([0.0, 0.0, np.pi / 2]), np.zeros(3)
+    >>> by = tmt.derivatives(q, rest, rest)  # the arm hangs
+    >>> print(by.dtau_dq.round(9)[2, 2])  # 1.5 9.81 0.15
+    2.20725
+    """
+    return Derivatives(*_answered("derivatives", model, q, qd, tau))
+
+
+def inverse_dynamics_derivatives(
+    q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, model: Tree = ARM
+) -> tuple[np.ndarray, np.ndarray]:
+    """Exact derivatives of `inverse_dynamics` by q, N m/rad, and by qd, N m s/rad, each (..., nv, nv).
+
+    By q means by movements, see `derivatives`; the derivative by qdd is `mass_matrix`.
+
+    Parameters
+    ----------
+    q, qd, qdd : positions, speeds and accelerations (..., nq), (..., nv) and (..., nv), rad, rad/s and rad/s2
+    model : Tree, default ARM
+
+    Examples
+    --------
+    >>> rest = np.zeros(3)
+    >>> dtau_dq, dtau_dqd = tmt.inverse_dynamics_derivatives([0.0, 0.0, np.pi / 2], rest, rest)
+    >>> print(dtau_dq.round(9)[2, 2], dtau_dqd[2, 2])  # gravity; the arm has no damping
+    2.20725 0.0
+    """
+    return _answered("inverse_dynamics_derivatives", model, q, qd, qdd)
+
+
+def step_derivatives(
+    q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: ArrayLike, method: str = "rk4", model: Tree = ARM
+) -> tuple[np.ndarray, np.ndarray]:
+    """Exact derivatives A = dx+/dx (..., 2 nv, 2 nv) and B = dx+/dtau (..., 2 nv, nv) of one step, x = (movement, qd).
+
+    The torque is constant during the step. Movements as in `derivatives`: before the step from q, after it from
+    the q that it reaches. Of an adaptive method the step is one of its own, of that size.
+
+    Parameters
+    ----------
+    q, qd, tau : joint positions, speeds and torques (..., nq), (..., nv) and (..., nv), rad, rad/s and N m
+    dt : step (...), s, above 0
+    method : str, default "rk4"
+        A key of METHODS.
+    model : Tree, default ARM
+
+    Raises
+    ------
+    ValueError
+        Also where an implicit method does not find its stages.
+
+    Examples
+    --------
+    >>> A, B = tmt.step_derivatives([0.0, 0.0, np.pi / 2], [0.0] * 3, [0.0] * 3, 0.01, "semi_implicit_euler")
+    >>> print(A.shape, B.shape, A[2, 5].round(9))  # dq+ = dt dqd+
+    (6, 6) (6, 3) 0.01
+    """
+    _checked_model(model)
+    _method_named(method)
+    steps = _real_numbers(dt)
+    if steps is None or not steps.size or not ((steps > 0.0) & (steps < np.inf)).all():
+        raise ValueError(f"dt is {_shown(dt)}; a step in s above 0 is expected")
+    both = _answered(f"step_derivatives:{method}", model, q, qd, tau, steps[..., None])
+    return both[..., : 2 * model.coordinates.nv], both[..., 2 * model.coordinates.nv :]
+
+
+def frame(name: str, q: ArrayLike, qd: ArrayLike | None = None, model: Tree = ARM) -> Frame:
+    """Pose of a site or body, its Jacobian J (..., 6, nv) and J' qd = dJ/dt qd (..., 6), all in the inertial frame.
+
+    J qd is the velocity of the frame's origin, m/s, and then its angular velocity, rad/s: MuJoCo's mj_jac, jacp
+    above jacr. J' qd, m/s2 and rad/s2, is what both accelerations are at qdd = 0 (mj_jacDot times qd). The
+    rotation takes components in the frame to inertial ones.
+
+    Parameters
+    ----------
+    name : str
+        Of a site of the model (see Tree), or of a body: then the frame is that of its joint, with body axes.
+    q, qd : joint positions and speeds (..., nq) and (..., nv), rad and rad/s; qd by default at rest
+    model : Tree, default ARM
+
+    Examples
+    --------
+    >>> tool = dataclasses.replace(
+    ...     tmt.ARM, site_names=["tool"], site_joint=[2], site_offset=[(0.3, 0.0, 0.0)]
+    ... )
+    >>> print(tmt.frame("tool", [0.0, 0.0, 0.0], [0.0, 0.0, 2.0], tool).convective[:3] + 0.0)  # 0.3 m (2 rad/s)^2
+    [-1.2  0.   0. ]
+    """
+    _checked_model(model)
+    known = [*model.site_names, *model.body_names]
+    if not isinstance(name, str) or name not in known:
+        raise ValueError(f"there is no site or body {_shown(name)}; the model has {', '.join(known)}")
+    speeds = np.zeros(model.coordinates.nv) if qd is None else qd
+    pose, jacobian = (_answered(f"frame_{part}:{name}", model, q) for part in ("pose", "jacobian"))
+    convective = _answered(f"frame_convective:{name}", model, q, speeds)
+    return Frame(pose[..., 3], pose[..., :3], jacobian, convective)
+
+
 def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Potential energy V, J, shape (...), zero with every centre of mass at the height of the origin, and springs at rest.
 
@@ -272,9 +450,8 @@ def equations(
     *,
     name: str = "robot",
     single: bool = False,
-    head: Sequence[str] = ("Not checked: compare with the model before use.",),
+    head: Sequence[str] = ("Not checked.",),
     parameters: Sequence[str] = (),
-    frames: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
     limit: float = 60.0,
 ) -> str:
     """The equations of a model, with its numbers, as text in another language, for use without this package.
@@ -298,10 +475,8 @@ def equations(
     parameters : sequence of str
         Numbers that are further arguments of each function: "gravity" (3,); a body's name, or with ".mass"
         (1,), ".com" (3,) or ".inertia" (6,) after it; "payload" and then a body's name: what that carries
-        besides. Inertias are about the centre of mass: xx yy zz xy xz yz.
-    frames : {body: (origin, axes)}
-        Frames in which a body's parameters and its payload are: the origin (3,), m, and the axes (3, 3) as
-        columns, in the frame of its joint, which is taken without.
+        besides. They are in the frame that is the site of the body's name, else in that of its joint; inertias
+        are about the centre of mass: xx yy zz xy xz yz.
     limit : float, s
         With symbols: the most work, counted as that of one processor core; ValueError beyond.
 
@@ -317,4 +492,4 @@ def equations(
     """
     from tmt.export import text  # loads the compiler
 
-    return text(model, language, quantities, name, single, head, parameters, frames, limit)
+    return text(model, language, quantities, name, single, head, parameters, limit)

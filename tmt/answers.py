@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from tmt import literal
 from tmt.arm import ARM
 from tmt.compiled.evaluator import SMALL, Evaluator
-from tmt.derivation.quantities import QUANTITIES
+from tmt.derivation.quantities import PLAIN, QUANTITIES, is_quantity, quantity_of, what_is_known
 from tmt.model import singular
 from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree
@@ -34,7 +34,7 @@ def answered(quantity: str, model: Tree, *arguments: ArrayLike) -> Any:
     result = answers.by_machine_code(quantity, arguments) if answers else None
     if result is not None:
         return result
-    return getattr(literal, quantity)(*arguments, model)
+    return literal.literal(quantity)(*arguments, model)
 
 
 def answers_of(model: Tree) -> "Answers":
@@ -52,13 +52,15 @@ def prepare(model: Tree = ARM, *quantities: str) -> None:
     """Have machine code answer all calls of a model from now on: for many calls of one state, in a loop or a controller.
 
     Without it NumPy answers those of up to 500 states, ten times as slowly; the last bits differ. The first time on a machine all
-    take about a second for an arm and several for a humanoid.
+    take about a second for an arm and several for a humanoid; derivatives take longer and have to be named.
 
     Parameters
     ----------
     model : Tree, default ARM
     *quantities : str
-        Names of functions of `tmt`; all without any.
+        Names of functions of `tmt`; without any all but derivatives and what has an argument. That stands after a colon:
+        "step_derivatives:rk4", and for `frame` of a body or site NAME "frame_pose:NAME", "frame_jacobian:NAME" and
+        "frame_convective:NAME".
 
     Raises
     ------
@@ -73,10 +75,10 @@ def prepare(model: Tree = ARM, *quantities: str) -> None:
     [-2.20725]
     """
     checked_model(model)
-    if unknown := [name for name in quantities if not isinstance(name, str) or name not in QUANTITIES]:
-        raise ValueError(f"{shown(unknown[0])} is no quantity; known are {', '.join(QUANTITIES)}")
-    for quantity in quantities or QUANTITIES:
-        evaluator = answers_of(model).evaluators[quantity]
+    if unknown := [name for name in quantities if not is_quantity(name)]:
+        raise ValueError(f"{shown(unknown[0])} is no quantity; {what_is_known(unknown[0])}")
+    for quantity in quantities or [name for name in PLAIN if not QUANTITIES[name].is_long]:
+        evaluator = answers_of(model).evaluator(quantity)
         evaluator.loop(wide=False)  # it is compiled, or loaded
         answers_of(model).prepared[quantity] = evaluator.of_one
 
@@ -86,15 +88,20 @@ class Answers:
 
     def __init__(self, tree: Tree):
         self.tree = tree  # held, so that no other has its id
-        self.evaluators = {name: Evaluator(tree, name) for name in QUANTITIES}
+        self.evaluators: dict[str, Evaluator] = {}
         self.prepared: dict[str, Callable[..., Any]] = {}  # of one state
-        self.shapes = [(tree.coordinates.nq,), (tree.coordinates.nv,), (tree.coordinates.nv,)]
+        self.shapes = [(tree.coordinates.nq,), (tree.coordinates.nv,), (tree.coordinates.nv,), (1,)]
         self.may_be_singular = not tree.never_singular
+
+    def evaluator(self, quantity: str) -> Evaluator:
+        if quantity not in self.evaluators:
+            self.evaluators[quantity] = Evaluator(self.tree, quantity)
+        return self.evaluators[quantity]
 
     def by_machine_code(self, quantity: str, arguments: tuple[Any, ...]) -> Any:
         """The quantity of states; None where NumPy is to answer: of few states, and where something is wrong."""
         prepared = self.prepared.get(quantity)
-        may_be_singular = self.may_be_singular and quantity == "acceleration"
+        may_be_singular = self.may_be_singular and quantity in literal.SOLVED
         if prepared and not may_be_singular:
             for array, shape in zip(arguments, self.shapes):  # no generator, which takes as long as the rest
                 if type(array) is not ndarray or array.shape != shape or array.dtype is not DOUBLE:
@@ -112,11 +119,11 @@ class Answers:
         except ValueError:
             return None
         count = math.prod(batch)
-        if count == 0 or (count <= SMALL and not prepared):
+        if count == 0 or ((count <= SMALL or quantity_of(quantity).is_long) and not prepared):
             return None
         if may_be_singular and self.is_singular(arrays[0]):
             return None
-        evaluator = self.evaluators[quantity]
+        evaluator = self.evaluator(quantity)
         try:
             return evaluator.of_any(*arrays) if batch else evaluator.of_one(*arrays)
         except MemoryError:
@@ -125,6 +132,6 @@ class Answers:
     def is_singular(self, q: ndarray) -> bool:
         """Whether Mbar may be singular at a position among these, or cannot be told here."""
         q = q.reshape(-1, q.shape[-1])
-        M = self.evaluators["mass_matrix"].of_rows(np.ascontiguousarray(q))
+        M = self.evaluator("mass_matrix").of_rows(np.ascontiguousarray(q))
         n = len(self.tree.axis)
         return M is None or bool(singular.first(self.tree, q, M.reshape(-1, n, n)))

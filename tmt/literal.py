@@ -11,18 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tmt.arm import ARM
-from tmt.derivation.quantities import QUANTITIES, State
+from tmt.derivation.quantities import State, argument_of, quantity_of
 from tmt.derivation.scalar import Scalar
+from tmt.methods import method_named, transition
 from tmt.model import singular
 from tmt.model.arguments import states
 from tmt.model.tree import Tree
 
+SOLVED = ("acceleration", "inverse_mass_matrix", "derivatives")  # for which Mbar must be regular
 BEYOND = "the result is beyond the largest double; smaller numbers in the state or model are expected"
 
 
 def literal(name: str) -> Callable[..., Any]:
-    """The quantity of that name as a function of q, qd, tau (as far as it takes them) and a model."""
-    takes = QUANTITIES[name].takes
+    """The quantity of that full name as a function of what it takes and a model."""
+    takes = quantity_of(name).takes
 
     def function(*arguments: Any, model: Tree = ARM) -> Any:
         arrays, last = arguments[: len(takes)], arguments[len(takes) :]
@@ -39,15 +41,30 @@ def literal(name: str) -> Callable[..., Any]:
 
 
 def answer(name: str, tree: Tree, arrays: dict[str, ArrayLike]) -> Any:
-    """The quantity of that name at states in arrays by name, of which all are checked."""
-    scalars = states(tree, **arrays)
-    state, batch = State(tree, *scalars), scalars[0][0].shape
-    if name == "acceleration" and not tree.never_singular:
+    """The quantity of that full name at states in arrays by name, of which all are checked."""
+    quantity, scalars = quantity_of(name), states(tree, **arrays)
+    batch = scalars[0][0].shape
+    if quantity.argument == "method":
+        return step_derivatives(argument_of(name), tree, scalars, batch)
+    state = State(tree, dict(zip(arrays, scalars)), name=argument_of(name))
+    if name in SOLVED and not tree.never_singular:
         check_regular(tree, state, batch)
-    values = QUANTITIES[name].of(state)
-    if QUANTITIES[name].parts:
+    values = quantity.of(state)
+    if quantity.parts:
         return tuple(gather(part, batch) for part in values)
     return gather(values, batch, overflow=np.inf if name == "energy" else None)
+
+
+def step_derivatives(method: str, tree: Tree, scalars: list[Any], batch: tuple[int, ...]) -> np.ndarray:
+    """[A B] (..., 2 nv, 3 nv) of a step of the method of that name."""
+    q, qd, tau, dt = (np.stack(values, axis=-1) for values in scalars)
+    try:
+        values = transition(method_named(method), tree, q, qd, tau, dt[..., 0])
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        raise ValueError(f"{method} has no step of this size from a state: {error}") from None
+    if not np.isfinite(values).all():
+        raise ValueError(BEYOND)
+    return values
 
 
 def check_regular(tree: Tree, state: State, batch: tuple[int, ...]) -> None:
@@ -82,9 +99,13 @@ angular_velocities = literal("angular_velocities")
 jacobians = literal("jacobians")
 convective_terms = literal("convective_terms")
 mass_matrix = literal("mass_matrix")
+inverse_mass_matrix = literal("inverse_mass_matrix")
 bias = literal("bias")
 gravity_balance = literal("gravity_balance")
 spring_torque = literal("spring_torque")
 acceleration = literal("acceleration")
+inverse_dynamics = literal("inverse_dynamics")
+derivatives = literal("derivatives")
+inverse_dynamics_derivatives = literal("inverse_dynamics_derivatives")
 potential_energy = literal("potential_energy")
 energy = literal("energy")

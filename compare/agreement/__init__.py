@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike
 from ..core.text import block, say
 from ..judge.agree import over
 from .comparison import Comparison, State
+from .tree import tree
 from .why import Why, cause_of
 
-__all__ = ["Difference", "State", "assert_agrees", "differences"]
+__all__ = ["Difference", "State", "assert_agrees", "differences", "tree"]
 
 Model = str | PathLike[str] | object  # a path, MJCF text or an MjModel
 # a function, values, or a SymPy matrix and its symbols

@@ -60,6 +60,12 @@ class Compared(NamedTuple):
         return bool((self.ratio > 1.0).any())
 
 
+def origin_of(mjcf: Any) -> Any:
+    """What a user gives as a model: a path as a Path, MJCF text and models as they are."""
+    is_path = isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<")
+    return Path(mjcf) if is_path else mjcf
+
+
 class Comparison:
     """A user's quantities and MuJoCo's at the same states; the arguments are those of `assert_agrees`."""
 
@@ -95,9 +101,7 @@ class Comparison:
     def read(self, mjcf: Any) -> None:
         from ..engines.mujoco import engine, read  # here, so that `import compare` need not wait for it
 
-        if isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<"):
-            mjcf = Path(mjcf)
-        self.reading = cast(Any, read(mjcf))  # its source may be a model
+        self.reading = cast(Any, read(origin_of(mjcf)))  # its source may be a model
         self.robot = robot_of(self.reading, "the model")
         self.mujoco = engine(self.reading).of(self.robot.case())
         self.tree, self.coordinates = self.reading.tree, self.robot.coordinates

@@ -15,9 +15,12 @@ from ..diagnosis.cause import LEAST_STATES
 from ..diagnosis.consistency import conditions, symmetric
 from ..diagnosis.forces import LeftOver
 from ..engines.own import QUICK
+from .accelerations import CONSTANT, Affine
 from .comparison import Comparison
+from .tables import slips_of_tables
 
-SECONDS_OF_CAUSE = 10.0  # of a search
+SECONDS_OF_CAUSE = 4.5  # of a search
+SECONDS_OF_SLOPES = 1.5  # of accelerations at several torques
 
 
 class Why(NamedTuple):
@@ -29,6 +32,8 @@ class Why(NamedTuple):
 
 def cause_of(comparison: Comparison) -> Why:
     """The probable cause of what differs."""
+    if slips := slips_of_tables(comparison):
+        return Why(" ".join(map(say, slips)))
     which = some_states(comparison)
     if len(which) < min(LEAST_STATES, len(comparison.q)):
         return Why("", False)  # too few of them are numbers
@@ -59,20 +64,22 @@ def some_states(comparison: Comparison) -> ndarray:
 def of_equations(comparison: Comparison, values: Values) -> Why:
     """What a diagnosis finds in values of Mbar and h."""
     equations, coordinates, M = comparison.equations, comparison.coordinates, values.mass_matrix
-    mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), coordinates.speeds)
-    if np.isfinite(M).all() and not mirrored.is_met:
-        return Why(mirrored.text)
     if equations is not None and (equations.seconds > QUICK or not equations.has("bias")):
         equations = None  # they cannot be called some hundred times more
     bias = partial(equations.bias, values.q) if equations is not None else None
-    diagnosis = diagnose(comparison.tree, values, SECONDS_OF_CAUSE, bias, Stated(comparison.joints))
+    mass_matrix = equations.mass_matrix if equations is not None and equations.has("mass_matrix") else None
+    stated = Stated(comparison.joints)
+    diagnosis = diagnose(comparison.tree, values, SECONDS_OF_CAUSE, bias, stated, mass_matrix)
     if not diagnosis.differs:
         return Why("", False)
     broken = []
     if equations is not None and equations.has("mass_matrix") and values.are_finite and not diagnosis.causes:
         tested = conditions(equations.mass_matrix, equations.bias, coordinates, values.q, values.qd)
         broken = [condition.text for condition in tested if not condition.is_met]
-    return Why(" ".join([*broken[:1], diagnosis.sentence()]), bool(diagnosis.causes))
+    mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), coordinates.speeds)
+    if np.isfinite(M).all() and not mirrored.is_met:
+        broken = [mirrored.text]
+    return Why(" ".join([diagnosis.sentence(), *broken[:1]]), bool(diagnosis.causes))
 
 
 def beside(comparison: Comparison, values: Values, tau: ndarray, qdd: ndarray) -> str:
@@ -95,8 +102,48 @@ def of_accelerations(comparison: Comparison, values: Values, tau: ndarray, qdd: 
         return Why(left_over.sentence())
     if values.are_finite:
         return Why(say(Finding("agreement", "solved")), False)
-    alone = Values.of(tree, q, qd, None, right.bias + left_over.force, rounding)
-    alone = alone._replace(tolerances=(alone.tolerances[0], left_over.tolerance))
-    diagnosis = diagnose(tree, alone, SECONDS_OF_CAUSE, stated=Stated(comparison.joints))
+    equations = comparison.equations
+    is_asked = equations is not None and equations.has("acceleration")
+    if not is_asked or equations is None or equations.seconds * len(q) * (len(q[0]) + 1) > SECONDS_OF_SLOPES:
+        return of_forces(comparison, right, tau, qdd)
+    affine = Affine(tree, equations)
+    inputs = affine.inputs(q)
+    if inputs is not None and (np.abs(inputs - 1.0) > CONSTANT).any():
+        return of_inputs(comparison, inputs, LeftOver(tree, right, inputs * tau, qdd, rounding))
+    own = affine.values(q, qd, rounding)
+    if own is None:
+        return of_inputless(comparison, affine, right, tau, qdd)
+    functions = (own[1], Stated(comparison.joints), affine.mass_matrix) if equations.seconds <= QUICK else ()
+    diagnosis = diagnose(tree, own[0], SECONDS_OF_CAUSE, *functions)
+    return Why(diagnosis.sentence(), bool(diagnosis.causes))
+
+
+def of_inputs(comparison: Comparison, factors: ndarray, left_over: LeftOver) -> Why:
+    """Torques that act with other factors, and what else acts; left_over: with these factors."""
+    names = comparison.coordinates.speeds
+    wrong = [(names[i], float(x)) for i, x in enumerate(factors) if abs(x - 1.0) > CONSTANT]
+    text = say(Finding("agreement", "inputs", {"factors": wrong}))
+    return Why(f"{text} {left_over.sentence()}".rstrip(), left_over.ratio <= 1.0 or bool(left_over.causes))
+
+
+def of_inputless(comparison: Comparison, affine: Affine, right: Values, tau: ndarray, qdd: ndarray) -> Why:
+    """Torques of some joints that change nothing, so that the accelerations have no mass matrix."""
+    slopes, names = affine.slopes(right.q), comparison.coordinates.speeds
+    idle = ~(np.abs(slopes) > CONSTANT * np.abs(slopes).max(initial=1.0)).any(axis=(0, 1))
+    if not idle.any():
+        return Why(say(Finding("agreement", "accelerations_alone")), False)
+    text = say(Finding("agreement", "inputs", {"factors": [(names[i], 0.0) for i in np.flatnonzero(idle)]}))
+    if LeftOver(comparison.tree, right, tau * ~idle, qdd, comparison.rounding).ratio <= 1.0:
+        return Why(text)
+    more = of_forces(comparison, right, tau * ~idle, qdd)
+    return Why(f"{text} {more.text}", more.is_found)
+
+
+def of_forces(comparison: Comparison, right: Values, tau: ndarray, qdd: ndarray) -> Why:
+    """What explains accelerations by the forces Mbar qdd + h = tau - D qd - k (q - rest) that they need."""
+    left_over = LeftOver(comparison.tree, right, tau, qdd, comparison.rounding)
+    force = left_over.force + right.bias + np.einsum("sij,sj->si", right.mass_matrix, qdd)
+    alone = right._replace(bias=force, tolerances=(right.tolerances[0], left_over.tolerance))
+    diagnosis = diagnose(comparison.tree, alone, SECONDS_OF_CAUSE, stated=Stated(comparison.joints), qdd=qdd)
     text = diagnosis.sentence() if diagnosis.causes else say(Finding("agreement", "accelerations_alone"))
     return Why(text, bool(diagnosis.causes))

@@ -32,7 +32,9 @@ class Parser(argparse.ArgumentParser):
         values: dict[str, Any] = {"action": "store_true"}
         if option.type:
             values = {"type": option.type, "metavar": option.metavar, "default": option.default}
-        self.add_argument(name, help=" ".join(block(template, name.strip("-")).split()), **values)
+        self.add_argument(
+            name, help=" ".join(block(template, name.strip("-").replace("-", "_")).split()), **values
+        )
 
     def refuse_option(self, word: str, options: Sequence[str]) -> NoReturn:
         names, name = {name.strip("-"): name for name in options}, word.strip("-").split("=")[0]
@@ -55,6 +57,17 @@ def seconds(most: float) -> Callable[[str], float]:
         raise argparse.ArgumentTypeError(wrong)
 
     return time
+
+
+def gain(text: str) -> float:
+    """A type of options: a gain of a controller."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a gain: expected a number that is not negative")
+    return value
 
 
 def process_count(text: str) -> int:
@@ -92,8 +105,17 @@ OPTIONS = {
     "--reference": Option(stated_reference, "WHAT", of_every=True),
     "--joints": Option(metavar="LIST", example=" --mjcf robot.xml --reference my_equations.py:"),
     "--scenes": Option(metavar="FILE", example=" --scenes my.toml"),
+    "--engines": Option(metavar="LIST", example=" --mjcf robot.xml --engines drake,mjx"),
     "--dt": Option(seconds(5.0), "S", example=" --mjcf robot.xml --integrator Euler --dt 0.001"),
     "--integrator": Option(metavar="NAME"),
+    "--posture": Option(metavar="NAME|NUMBERS"),
+    "--control-period": Option(
+        seconds(1.0), "S", example=" --mjcf robot.xml --control-period 0.02 --delay 0.004"
+    ),
+    "--delay": Option(seconds(1.0), "S"),
+    "--kp": Option(gain, "KP"),
+    "--kv": Option(gain, "KV"),
+    "--at-speed": Option(None),
 }
 
 
@@ -143,9 +165,10 @@ def expected(word: str, known: dict[str, str], choices: str) -> str:
 def request(arguments: Sequence[str]) -> argparse.Namespace:
     """The parsed request. SystemExit: with 0 after help, with 2 and one line for what is mistyped."""
     of_all, words = parser(), list(arguments) or ["--help"]
-    if "--joints" in words[:-1]:  # its value may begin with a minus
-        at = words.index("--joints")
-        words[at : at + 2] = [f"--joints={words[at + 1]}"]
+    for option in ("--joints", "--posture"):  # their values may begin with a minus
+        if option in words[:-1]:
+            at = words.index(option)
+            words[at : at + 2] = [f"{option}={words[at + 1]}"]
     options, unknown = of_all.parse_known_args(words)
     name = options.experiment
     refuse_words(of_all, options, unknown, shlex.join(arguments))
@@ -154,7 +177,11 @@ def request(arguments: Sequence[str]) -> argparse.Namespace:
         raise SystemExit(0)
     for option in OPTIONS if name != "all" else ():
         takers = [other for other, record in EXPERIMENTS.items() if option in record.options]
-        if vars(options)[option.strip("-")] and not OPTIONS[option].of_every and name not in takers:
+        if (
+            vars(options)[option.strip("-").replace("-", "_")]
+            and not OPTIONS[option].of_every
+            and name not in takers
+        ):
             of_all.error(f"{option} is an option of {', '.join(takers)}; {name} does not take it")
     if options.joints and ":" not in (options.reference or ""):
         of_all.error("--joints needs equations of your own: --reference FILE.py:OBJECT or MODULE:OBJECT")

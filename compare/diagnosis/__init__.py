@@ -1,9 +1,13 @@
 """Why two sets of equations of motion differ, in the terms of the derivation.
 
 The right equations are those of a tree, by the TMT method; of the others only values at some states are
-known. Causes have ranks: 1 an option or a convention of a joint (order, sense, zero, unit); 2 one number, one
-term or one coefficient; 3 two of them. The search ends after the first rank in which something explains the
-values down to their tolerance, and lists all that does: M and h cannot distinguish them.
+known. Causes have ranks: 1 an option or a convention (order, senses, zeros, units, axes); 2 one number, term,
+coefficient or slip of the derivation; 3 several of them. Each kind is a record in one list: options in
+variants.py, conventions in conventions.py, numbers and terms in places.py, numbers that change together in
+edits.py and groups.py, slips in slips.py and recursion.py. The search tries them on all values, then on Mbar,
+the velocity terms and gravity of h apart, then beside a convention and in pairs, and ends after the first stage
+in which something natural explains the values down to their tolerance (likelihood.py). All that explains them is
+listed, the likeliest first: M and h cannot distinguish them.
 """
 
 from .cause import Diagnosis

@@ -31,6 +31,10 @@ class Diagnosis(NamedTuple):
     details: tuple[Detail, ...] = ()  # coefficients that differ, with both numbers or in terms
     entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[hip][knee]"
     compared: int = 0  # entries in all
+    parts: tuple[
+        str, ...
+    ] = ()  # of the equations that differ: "M", "h", or its "velocity terms" and "gravity"
+    known: tuple[str, ...] = ()  # parts that are compared
     # single changes that leave least: what they leave, a share, and whether it is within the tolerance
     nearest: tuple[tuple[str, float, bool], ...] = ()
     too_few: int = 0  # states, if they are too few for a search

@@ -78,7 +78,9 @@ class Compared:
             return {Entry("gravity", (i,)): column for i, column in enumerate(at_rest)}
         if bias is None or nv > MOST_SPEEDS:
             return {}
-        return coefficients_of(lambda speeds: np.asarray(bias(np.tile(speeds, (states, 1)))), nv)
+        return coefficients_of(
+            lambda speeds: np.stack([bias(np.tile(row, (states, 1))) for row in speeds]), nv
+        )
 
     @property
     def is_complete(self) -> bool:

@@ -160,6 +160,18 @@ def power_balance(
     return nearest("power", np.abs(power - slope) * watts, allowed * watts, (), **values)
 
 
+def follows_from(mass_matrix: OfPositions, q: ndarray, qd: ndarray, velocity_terms: ndarray) -> bool:
+    """Whether velocity terms (states, nv) are Mdot qd - d(qd' Mbar qd / 2)/dq, of hinges and slides."""
+    right, allowed = np.zeros_like(qd), np.zeros_like(qd)
+    for k, unit in enumerate(np.eye(qd.shape[1])):
+        slope, error, size = derivative(lambda t: np.asarray(mass_matrix(q + t * unit)))
+        right += qd[:, k : k + 1] * np.einsum("sij,sj->si", slope, qd)
+        right[:, k] -= np.einsum("si,sij,sj->s", qd, slope, qd) / 2.0
+        rates = np.abs(qd).sum(axis=1)
+        allowed += ((SAFETY * error + ROUNDED * size / STEP).max(axis=(1, 2)) * rates**2)[:, None]
+    return bool((np.abs(velocity_terms - right) <= allowed).all())
+
+
 def derivative(function: Callable[[float], ndarray]) -> tuple[ndarray, ndarray, ndarray]:
     """df/dt at 0 to fourth order, its error from two step sizes, and the size of f, of the shape of f."""
     values = {k: np.asarray(function(k * STEP)) for k in (-4, -2, -1, 1, 2, 4)}

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from itertools import combinations
@@ -20,7 +21,9 @@ FIRST_ROUNDS, FINALISTS = 6, 24  # after these rounds only the best go on
 CONVERGED = 1e-14  # a step of a place, of its size
 SEEN = 1e-100  # of the square of a derivative, in tolerances
 LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
-POLISHED = 24  # places with a quadratic influence that are fitted
+PROMISING = (
+    1e-4  # of the difference: places that leave more, by their first and second derivatives, are not fitted
+)
 CANDIDATES = 64  # pairs that are fitted, the most promising of all
 ROWS = 256  # of changes in one evaluation
 TURNED = np.pi * np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # more starts for the zero of a hinge
@@ -57,7 +60,7 @@ class Search:
 
     computed: the values with changes of numbers of the model, (changes, states, entries). given: (states,
     entries); NaN where nothing is given. tolerance: of each entry, (states, entries). end: the
-    time.monotonic() at which OutOfTime is raised.
+    time.process_time() at which OutOfTime is raised.
     """
 
     def __init__(
@@ -74,6 +77,14 @@ class Search:
         self.size = float(np.linalg.norm(self.off))
         self.sizes = np.array([place.size for place in self.places])
         self.is_finished = True
+
+    def within(self, entries: ndarray) -> "Search":
+        """The search of what explains some entries (entries,), whatever the others are."""
+        part = copy(self)
+        part.known, part.weight = self.known & entries, self.weight * entries
+        part.off = part.weighted(part.right)
+        part.size = float(np.linalg.norm(part.off))
+        return part
 
     def in_time(self, fits: Callable[[], list[Fitted]]) -> list[Fitted]:
         """The fits, [] where the time is over."""
@@ -102,7 +113,7 @@ class Search:
         if len(numbers) > ROWS:
             starts = range(0, len(numbers), ROWS)
             return np.concatenate([self.values(numbers[k : k + ROWS], x[k : k + ROWS]) for k in starts])
-        if time.monotonic() > self.end:
+        if time.process_time() > self.end:
             raise OutOfTime
         changes: dict[Path, ndarray] = {}
         columns = []
@@ -111,11 +122,11 @@ class Search:
                 for path, coefficient in place.moves:
                     changes.setdefault(path, np.zeros(len(numbers), x.dtype))[row] += coefficient * change
                 if place.column is not None:
-                    columns.append((row, place.entry, change * place.column))
+                    columns.append((row, change * place.column))
         values = self.computed(changes)
         values = np.array(np.broadcast_to(values, (len(numbers), *values.shape[1:])), dtype=x.dtype)
-        for row, entry, added in columns:
-            values[row, :, entry] += added
+        for row, added in columns:
+            values[row] += added
         return values
 
     def fitted(self, numbers: ndarray, x: ndarray, rounds: int = ROUNDS) -> tuple[ndarray, ndarray]:
@@ -159,41 +170,49 @@ class Search:
                 fits[key] = Fitted(tuple(self.places[k] for k in key), tuple(changes), ratio, share)
         return sorted(fits.values(), key=lambda fit: fit.ratio)
 
-    def singles(self) -> list[Fitted]:
-        """Each place alone, the smallest remainder first.
-
-        Of places with a quadratic influence the few best are fitted; directions and zeros from several starts.
-        """
-        nearest, promising, starts = nearest_changes(*self.expansion, self.off), [], []
+    def singles(self, is_thorough: bool = True) -> list[Fitted]:
+        """Each place alone; directions and zeros from several starts, if it is thorough."""
+        first, second = self.expansion
+        fits, starts = [], []
         for k, place in enumerate(self.places):
-            left, best = nearest[k]
-            if place.is_quadratic:
-                promising.append((left, k, best * place.size))
-            else:
+            left, best = nearest_change(first[k], second[k], self.off)
+            if not place.is_quadratic:
                 turned = TURNED if place.kind == OF_ZERO else (-1.0, 1.0)
-                starts += [(k, start) for start in (0.0, best * place.size, *turned)]
-        starts += [(k, start) for _, k, start in sorted(promising)[:POLISHED]]
-        numbers, x = zip(*starts)
-        return self.outcome(np.array(numbers)[:, None], np.array(x)[:, None])
+                starts += [(k, start) for start in (0.0, best * place.size, *turned)] * is_thorough
+            elif left <= PROMISING * self.size:
+                starts.append((k, best * place.size))
+            else:
+                fits.append(Fitted((place,), (best * place.size,), np.inf, left / self.size))
+        if starts:
+            numbers, x = zip(*starts)
+            fits += self.outcome(np.array(numbers)[:, None], np.array(x)[:, None])
+        return fits
 
-    @cached_property
+    @property
     def expansion(self) -> tuple[ndarray, ndarray]:
         """First and second coefficients of the values in each place's change over its size, in tolerances.
 
         (places, states, entries) each; exact for all places except directions and zeros.
         """
+        first, second = self.coefficients
+        return first * self.weight, second * self.weight
+
+    @cached_property
+    def coefficients(self) -> tuple[ndarray, ndarray]:
+        """As `expansion`, in the units of the values."""
         numbers, size = np.arange(len(self.places))[:, None], self.sizes[:, None]
         up, down = (self.values(numbers, sign * size) for sign in (1.0, -1.0))
-        return (up - down) / 2.0 * self.weight, ((up + down) / 2.0 - self.right) * self.weight
+        return (up - down) / 2.0, (up + down) / 2.0 - self.right
 
-    def pairs(self, kinds: Sequence[str]) -> list[Fitted]:
-        """Two places of some kinds together; the most promising pairs are fitted."""
+    def pairs(self, kinds: Sequence[str], others: Sequence[str]) -> list[Fitted]:
+        """Two places together, one of some kinds and one of some others; the most promising pairs are fitted."""
         columns = np.concatenate([part.reshape(len(self.places), -1) for part in self.expansion])
         lengths = np.linalg.norm(columns, axis=1)
         columns = columns / np.where(lengths > 0.0, lengths, 1.0)[:, None]
         inner, down, count = columns @ columns.T, columns @ self.off.ravel(), len(self.places)
-        active = [k for k, place in enumerate(self.places) if lengths[k] > 0.0 and place.kind in kinds]
-        pairs = np.array(list(combinations(active, 2)))
+        active = [k for k, place in enumerate(self.places) if lengths[k] > 0.0 and place.kind in others]
+        first = {k for k in active if self.places[k].kind in kinds}
+        pairs = np.array([pair for pair in combinations(active, 2) if not first.isdisjoint(pair)])
         if not len(pairs):
             return []
         spans = np.concatenate([pairs, pairs + count], axis=1)  # of the first and second coefficients of both
@@ -204,18 +223,12 @@ class Search:
         return self.outcome(np.tile(pairs[best], (2, 1)), np.concatenate([near, np.zeros_like(near)]))
 
 
-def nearest_changes(first: ndarray, second: ndarray, off: ndarray) -> list[tuple[float, float]]:
-    """What the best change x of each place leaves, |off - x first - x^2 second|, and x, a root of a cubic.
-
-    first, second: (places, states, entries), off: (states, entries), in tolerances.
-    """
-    nearest = []
-    for a, b in zip(first, second):
-        aa, ab, bb = (a * a).sum(), (a * b).sum(), (b * b).sum()
-        cubic = [2.0 * bb, 3.0 * ab, aa - 2.0 * (off * b).sum(), -(off * a).sum()]
-        roots = np.roots(cubic) if np.isfinite(cubic).all() else np.zeros(0)
-        real = [float(x.real) for x in roots if abs(x.imag) <= 1e-9 * (1.0 + abs(x))]
-        left = [(float(np.linalg.norm(off - x * a - x * x * b)), x) for x in [*real, 0.0]]
-        # of two that do the same the nearer
-        nearest.append(min(left, key=lambda left_by: (np.round(left_by[0]), abs(left_by[1]))))
-    return nearest
+def nearest_change(a: ndarray, b: ndarray, off: ndarray) -> tuple[float, float]:
+    """What the best change x of a place leaves, |off - x a - x^2 b|, and x, a root of a cubic. All (states, entries)."""
+    aa, ab, bb = (a * a).sum(), (a * b).sum(), (b * b).sum()
+    cubic = [2.0 * bb, 3.0 * ab, aa - 2.0 * (off * b).sum(), -(off * a).sum()]
+    roots = np.roots(cubic) if np.isfinite(cubic).all() else np.zeros(0)
+    real = [float(x.real) for x in roots if abs(x.imag) <= 1e-6 * (1.0 + abs(x))]
+    left = [(float(np.linalg.norm(off - x * a - x * x * b)), x) for x in [*real, 0.0]]
+    # of two that do the same the nearer
+    return min(left, key=lambda left_by: (np.round(left_by[0]), abs(left_by[1])))

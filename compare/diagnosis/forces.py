@@ -21,8 +21,8 @@ from ..judge.agree import share_of
 from ..judge.entries import Entries
 from .cause import TEMPLATE, ranked
 from .fit import Search
-from .model import ROUNDED, Values
-from .places import forces
+from .model import ROUNDED, Equations, Values
+from .places import Place, factor, forces
 from .variants import Variant, option
 
 SHARPER = 4.0  # times the tolerance: accelerations are rounded before Mbar is multiplied by them
@@ -52,18 +52,25 @@ class LeftOver:
         """What explains the force: all causes of the first rank that has one."""
         if not (np.isfinite(self.force).all() and np.isfinite(self.tolerance).all()):
             return ()
-        places, nothing = forces(self.tree, self.values.q, self.values.qd), np.zeros((1, *self.force.shape))
+        places = [*forces(self.tree, self.values.q, self.values.qd), *self.weights()]
+        nothing = np.zeros((1, *self.force.shape))
         search = Search(lambda changes: nothing, places, self.force, self.tolerance)
         if np.abs(search.off).max() <= 1.0:
             return ()
         causes = search.explained(self.options())
         causes = causes or [fit.cause for fit in search.singles() if fit.explains]
-        causes = causes or [fit.cause for fit in search.pairs(("number",)) if fit.explains]
+        causes = causes or [fit.cause for fit in search.pairs(("number",), ("number",)) if fit.explains]
         return ranked(causes)
 
     def sentence(self) -> str:
         """The causes in words; "" if there is none."""
         return say(Finding(TEMPLATE, "forces", {"list": self.causes})) if self.causes else ""
+
+    def weights(self) -> Iterator[Place]:
+        """The factor of the gravity of each body."""
+        equations = Equations(self.tree, self.values.q, self.values.qd)
+        for body, added in zip(self.tree.body_names, equations.terms["gravity"]):
+            yield factor("term", f"gravity of {body} in the acceleration", added[:, equations.in_h])
 
     def options(self) -> Iterator[Variant]:
         """Each option, and the force that is left over with it."""

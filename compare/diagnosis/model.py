@@ -8,6 +8,7 @@ imaginary change of 1e-100, exact to rounding.
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,10 +24,10 @@ from ..judge.scale import EPS, FACTOR
 from ..robots.coordinates import Coordinates
 
 FIELDS = ("offset", "axis", "com", "inertia", "mass", "gravity", "reference", "armature")
-OF_TERM = {  # of each body; the first two of Mbar
-    "translation": "T' m T of {}", "rotation": "B' I B of {}", "gravity": "gravity term T' m g of {}",
-    "convective": "convective term T' m v_conv of {}", "Euler": "Euler term B' I w_conv of {}",
-    "gyroscopic": "gyroscopic term B' (omega x I omega) of {}",
+OF_TERM = {  # of each body: T' m T and B' I B of Mbar; T' m g, T' m v_conv, B' I w_conv and B' (omega x I omega) of h
+    "translation": "translational inertia of {}", "rotation": "rotational inertia of {}", "gravity": "gravity of {}",
+    "convective": "centripetal and Coriolis forces of {}", "Euler": "moment I w_conv of {}",
+    "gyroscopic": "gyroscopic moment omega x I omega of {}",
 }  # fmt: skip
 BODY_TERMS = tuple(OF_TERM)
 VELOCITY_TERMS = BODY_TERMS[3:]
@@ -70,25 +71,82 @@ class Entry(NamedTuple):
 Changes = Mapping[Path, ndarray]  # what is added to a number, (changes,)
 
 
-class Equations:
-    """Mbar and h of a tree at states q (states, nq), qd (states, nv).
+class Layout(NamedTuple):
+    """Which numbers of Mbar and h stand in a row of values: those of Mbar, then h, or its velocity terms and h at rest.
 
-    One array of numbers for each state: the lower triangle of Mbar by rows, then h; see `entries`.
+    With accelerations qdd (states, nv) these are the forces Mbar qdd + h alone.
     """
 
-    def __init__(self, tree: tmt.Tree, q: ndarray, qd: ndarray):
+    nv: int
+    is_split: bool = False
+    is_symmetric: bool = True  # the lower triangle of Mbar by rows, else all of it
+    qdd: ndarray | None = None
+
+    @property
+    def places(self) -> tuple[ndarray, ndarray]:
+        """The rows and columns of the entries of Mbar."""
+        if self.qdd is not None:
+            return np.zeros(0, int), np.zeros(0, int)
+        if self.is_symmetric:
+            return np.tril_indices(self.nv)
+        i, j = np.indices((self.nv, self.nv))
+        return i.ravel(), j.ravel()
+
+    @property
+    def parts(self) -> dict[str, slice]:
+        """The entries of each part of the equations."""
+        n = len(self.places[0])
+        parts = {"M": slice(0, n), "h": slice(n, n + self.nv)}
+        if self.is_split:
+            parts = {
+                "M": parts["M"],
+                "velocity terms": parts["h"],
+                "gravity": slice(n + self.nv, n + 2 * self.nv),
+            }
+        return parts
+
+    @property
+    def in_M(self) -> slice:
+        return self.parts["M"]
+
+    @property
+    def in_h(self) -> slice:
+        """All entries of h."""
+        return slice(self.in_M.stop, None)
+
+    def packed(self, mass_matrix: ndarray, velocity_terms: ndarray, rest: ndarray) -> ndarray:
+        """Values (..., entries) of Mbar (..., nv, nv) and the two parts of h (..., nv)."""
+        if self.qdd is not None:  # of as many states as there are, or of all several times
+            qdd = np.resize(self.qdd, np.shape(velocity_terms)[-2:])
+            return np.einsum("...ij,...j->...i", mass_matrix, qdd) + velocity_terms + rest
+        i, j = self.places
+        of_h = [velocity_terms, rest] if self.is_split else [velocity_terms + rest]
+        return np.concatenate([np.asarray(mass_matrix)[..., i, j], *of_h], axis=-1)
+
+    def of_row(self, i: int, part: str = "h") -> list[int]:
+        """The entries of a row of h, or of one part of it."""
+        chosen = [part] if part in self.parts else list(self.parts)[1:]
+        return [self.parts[name].start + i for name in chosen]
+
+
+class Equations:
+    """Mbar and h of a tree at states q (states, nq), qd (states, nv); a row of numbers for each state, see Layout."""
+
+    def __init__(self, tree: tmt.Tree, q: ndarray, qd: ndarray, layout: Layout | None = None):
         self.tree, self.q, self.qd = tree, q, qd
         self.nv = len(tree.axis)
+        self.layout = layout or Layout(self.nv)
+        self.in_M, self.in_h = self.layout.in_M, self.layout.in_h
         self.coordinates = Coordinates(tree.joint_names, tree.kind)
         self.speeds = self.coordinates.speeds
         self.stated = {name: np.array(getattr(tree, name), float) for name in FIELDS}
-        self.triangle = np.tril_indices(self.nv)
-        self.in_M, self.in_h = slice(len(self.triangle[0])), slice(len(self.triangle[0]), None)
 
     @cached_property
     def entries(self) -> list[Entry]:
-        """The entries of a state, those of Mbar first."""
-        of_M = [Entry("M", (j, i)) for i in range(self.nv) for j in range(i + 1)]
+        """The entries of Mbar and h, those of Mbar first."""
+        of_M = [Entry("M", (int(i), int(j))) for i, j in zip(*self.layout.places)]
+        if self.layout.is_symmetric:
+            of_M = [entry._replace(at=entry.at[::-1]) for entry in of_M]
         return of_M + [Entry("h", (i,)) for i in range(self.nv)]
 
     @cached_property
@@ -103,21 +161,36 @@ class Equations:
             absent = {name: nothing for name, nothing in NOTHING.items() if name not in needed}
             gravity = self.tree.gravity if term == "gravity" else ZERO
             terms[term] = np.stack([self.summed([b._replace(**absent)], gravity)[0] for b in self.bodies])
-            terms[term][..., self.in_h if term in BODY_TERMS[:2] else self.in_M] = 0.0
+            if self.layout.qdd is None:
+                terms[term][..., self.in_h if term in BODY_TERMS[:2] else self.in_M] = 0.0
         return terms
+
+    @cached_property
+    def parts(self) -> tuple[ndarray, ndarray, ndarray]:
+        """Mbar (states, nv, nv), velocity terms of h and h at rest (states, nv), without changes."""
+        M, velocity_terms, rest = self.sums(self.bodies, self.tree.gravity, self.tree.armature)
+        rows = [
+            np.stack([np.broadcast_to(x, len(self.q)) for x in part], axis=-1)
+            for part in (*M, velocity_terms, rest)
+        ]
+        return np.stack(rows[:-2], axis=1), rows[-2], rows[-1]
 
     @cached_property
     def right(self) -> ndarray:
         """The values without changes, (states, entries)."""
-        return self.summed(self.bodies, self.tree.gravity, self.tree.armature)[0]
+        return self.layout.packed(*self.parts)
+
+    @cached_property
+    def h(self) -> ndarray:
+        return self.parts[1] + self.parts[2]
 
     @cached_property
     def coefficients(self) -> dict[Entry, ndarray]:
         """The entries of Mbar, and the coefficients of h, (states,) each."""
 
         def bias(speeds: ndarray) -> ndarray:
-            at_speeds = Equations(self.tree, self.q, np.broadcast_to(speeds, self.qd.shape))
-            return at_speeds.right[:, self.in_h]
+            q, qd = np.tile(self.q, (len(speeds), 1)), np.repeat(speeds, len(self.q), axis=0)
+            return Equations(self.tree, q, qd).h.reshape(len(speeds), *self.qd.shape)
 
         of_M = dict(zip(self.entries[self.in_M], self.right.T))
         return of_M | coefficients_of(bias, self.nv)
@@ -139,31 +212,40 @@ class Equations:
         bodies = method.bodies(Mechanism(**numbers), list(self.q.T), list(self.qd.T))
         return self.summed(bodies, numbers["gravity"], numbers["armature"])
 
-    def with_bias(self, h: ndarray) -> ndarray:
-        """The right values with another h (states, nv)."""
-        return np.concatenate([self.right[:, self.in_M], h], axis=1)
+    def with_bias(self, velocity_terms: ndarray | float, rest: ndarray | float) -> ndarray:
+        """The right values with another h, whose parts are (states, nv)."""
+        zero = 0.0 * self.qd
+        return self.layout.packed(self.parts[0], velocity_terms + zero, rest + zero)
 
-    def summed(self, bodies: Bodies, gravity: Iterable[Any], armature: Sequence[Any] = ()) -> ndarray:
-        """Mbar and h of some bodies, (changes, states, entries)."""
-        M, h = method.mass_matrix(bodies), method.bias(bodies, gravity)
+    def sums(
+        self, bodies: Bodies, gravity: Iterable[Any], armature: Sequence[Any] = ()
+    ) -> tuple[list[list[Any]], list[Any], list[Any]]:
+        """Mbar, velocity terms of h and h at rest of some bodies."""
+        M, velocity_terms = method.mass_matrix(bodies), method.bias(bodies, ZERO)
         for i, rotor in enumerate(armature):
             M[i][i] = M[i][i] + rotor
-        flat = [*(M[i][j] for i, j in zip(*self.triangle)), *h]
+        still = [b._replace(v_conv=ZERO, w_conv=ZERO, omega=ZERO) for b in bodies]
+        return M, velocity_terms, method.bias(still, gravity)
+
+    def summed(self, bodies: Bodies, gravity: Iterable[Any], armature: Sequence[Any] = ()) -> ndarray:
+        """The values of some bodies, (changes, states, entries)."""
+        M, velocity_terms, rest = self.sums(bodies, gravity, armature)
+        of_h = (
+            [velocity_terms, rest]
+            if self.layout.is_split
+            else [[v + g for v, g in zip(velocity_terms, rest)]]
+        )
+        if self.layout.qdd is not None:
+            inertial = [sum(M_ij * qdd for M_ij, qdd in zip(row, self.layout.qdd.T)) for row in M]
+            of_h = [[force + inertia for force, inertia in zip(of_h[0], inertial)]]
+        flat = [*(M[i][j] for i, j in zip(*self.layout.places)), *chain.from_iterable(of_h)]
         count = max([np.shape(value)[0] for value in flat if np.ndim(value) == 2], default=1)
         return np.stack([np.broadcast_to(value, (count, len(self.q))) for value in flat], axis=-1)
 
-    def full_mass_matrix(self, values: ndarray) -> ndarray:
-        """Mbar (..., nv, nv) of values (..., entries)."""
-        i, j = self.triangle
-        M = np.zeros((*values.shape[:-1], self.nv, self.nv), values.dtype)
-        M[..., i, j] = M[..., j, i] = values[..., self.in_M]
-        return M
-
 
 def packed(mass_matrix: ndarray, bias: ndarray) -> ndarray:
-    """Mbar (..., nv, nv) and h (..., nv) as `Equations` has them, (..., entries)."""
-    i, j = np.tril_indices(np.shape(bias)[-1])
-    return np.concatenate([np.asarray(mass_matrix)[..., i, j], bias], axis=-1)
+    """Mbar (..., nv, nv) and h (..., nv), (..., entries), by the layout without parts."""
+    return Layout(np.shape(bias)[-1]).packed(mass_matrix, bias, np.zeros_like(bias))
 
 
 class Values(NamedTuple):
@@ -203,13 +285,14 @@ class Values(NamedTuple):
 def coefficients_of(bias: Callable[[ndarray], ndarray], nv: int) -> dict[Entry, ndarray]:
     """Coefficients of h_i, (states,) each: "gravity" (i,), and "velocity" (i, j, k) of qd_j qd_k, j <= k.
 
-    bias: speeds (nv,) -> h (states, nv), of which the part that is even in the speeds is taken.
+    bias: speeds (n, nv) -> h (n, states, nv), of which the part that is even in the speeds is taken.
     """
-    unit, even, rest = np.eye(nv), {}, bias(np.zeros(nv))
+    unit, even = np.eye(nv), {}
     pairs = [(j, k) for j in range(nv) for k in range(j, nv)] if nv <= MOST_SPEEDS else []
-    for j, k in pairs:
-        speeds = unit[j] + (j != k) * unit[k]
-        even[j, k] = (bias(speeds) + bias(-speeds)) / 2.0 - rest
+    speeds = [unit[j] + (j != k) * unit[k] for j, k in pairs]
+    rest, *values = bias(np.array([0.0 * unit[0], *speeds, *(-speed for speed in speeds)]))
+    for pair, forward, back in zip(pairs, values, values[len(pairs) :]):
+        even[pair] = (forward + back) / 2.0 - rest
     mixed = {(j, k): values - even[j, j] - even[k, k] for (j, k), values in even.items() if j != k}
     found = {Entry("gravity", (i,)): rest[:, i] for i in range(nv)}
     for pair, values in (even | mixed).items():

@@ -13,22 +13,20 @@ from .places import groups
 from .variants import Variant, slip
 
 
-def slips(equations: Equations) -> Iterator[list[list[Variant]]]:
-    """For each slip: in single bodies; in all; these in M alone. The first list that explains is meant."""
-    right, in_h, bodies = equations.right, equations.in_h, groups(equations.tree)
+def slips(equations: Equations) -> Iterator[list[Variant]]:
+    """For each slip: in single bodies; in all. The first list that explains is meant."""
+    right, bodies = equations.right, groups(equations.tree)
     gravity, parts = equations.tree.gravity, np.sum(list(equations.terms.values()), axis=0)
     for name, changed in changed_bodies(equations):
         added = np.stack([equations.summed([b], gravity)[0] for b in changed]) - parts
-        variants, in_M_alone = [], []
-        for body, numbers in bodies.items():
-            values, place = right + added[numbers].sum(axis=0), name.format(body)
-            variants.append(slip(place, "no", "", values))
-            values = np.hstack([values[:, equations.in_M], right[:, in_h]])
-            in_M_alone.append(slip(f"{place} in M alone", "no", "", values))
-        count = len(parts)  # of single bodies
-        yield [variants[:count], variants[count:], in_M_alone[:count], in_M_alone[count:]]
+        variants = [
+            slip(name.format(body), "no", "", right + added[numbers].sum(axis=0))
+            for body, numbers in bodies.items()
+        ]
+        yield [*variants[: len(parts)]]
+        yield [*variants[len(parts) :]]
     if "ball" not in equations.tree.kind:
-        yield [list(lagrange(equations))]
+        yield list(lagrange(equations))
 
 
 def changed_bodies(equations: Equations) -> Iterator[tuple[str, list[method.Body]]]:
@@ -70,17 +68,46 @@ def turned(body: method.Body, R: Matrix) -> method.Body:
 
 def lagrange(equations: Equations) -> Iterator[Variant]:
     """Slips in h = Mdot qd - d(kinetic energy)/dq + dV/dq, of hinges and slides."""
-    tree, q, qd, in_h = equations.tree, equations.q, equations.qd, equations.in_h
-    rest = Equations(tree, q, 0.0 * qd).right[:, in_h]
-    slopes = Equations(tree, q + 1j * TINY * qd, qd).right.imag / TINY  # along the motion
-    Mdot_qd = np.einsum("sij,sj->si", equations.full_mass_matrix(slopes), qd)
-    gradient = Mdot_qd - (equations.right[:, in_h] - rest)
+    tree, q, qd, (M, velocity_terms, rest) = equations.tree, equations.q, equations.qd, equations.parts
+    slopes = (
+        np.stack(
+            [Equations(tree, q + 1j * TINY * unit, qd).parts[0].imag for unit in np.eye(equations.nv)],
+            axis=-1,
+        )
+        / TINY
+    )
+    Mdot_qd = np.einsum("sijk,sk,sj->si", slopes, qd, qd)
+    gradient = Mdot_qd - velocity_terms
     for name, explains, of_Mdot, of_gradient in (
         ("gradient of the kinetic energy in h", "left out", 1.0, 0.0),
+        ("gradient of the kinetic energy in h", "halved", 1.0, 0.5),
         ("gradient of the kinetic energy in h", "of the other sign", 1.0, -1.0),
+        ("gradient of the kinetic energy in h", "twice", 1.0, 2.0),
         ("Mdot qd in h", "left out", 0.0, 1.0),
         ("Mdot qd in h", "halved", 0.5, 1.0),
         ("Mdot qd in h", "halved, and no gradient of the kinetic energy", 0.5, 0.0),
     ):
-        values = equations.with_bias(of_Mdot * Mdot_qd - of_gradient * gradient + rest)
-        yield slip(name, "Mdot qd - d(qd' Mbar qd / 2)/dq", explains, values)
+        yield slip(
+            name,
+            "Mdot qd - d(qd' Mbar qd / 2)/dq",
+            explains,
+            equations.with_bias(of_Mdot * Mdot_qd - of_gradient * gradient, rest),
+        )
+    for i, j in zip(*np.tril_indices(equations.nv)):
+        for k in range(equations.nv):
+            alone = np.zeros_like(slopes)
+            alone[:, i, j, k] = slopes[:, i, j, k]
+            alone[:, j, i, k] = slopes[:, j, i, k]
+            of_slope = (
+                np.einsum("sijk,sk,sj->si", alone, qd, qd) - np.einsum("sijk,si,sj->sk", alone, qd, qd) / 2.0
+            )
+            name = f"dM[{equations.speeds[i]}][{equations.speeds[j]}]/d {equations.speeds[k]} in h"
+            for explains, factor in (
+                ("left out", 0.0),
+                ("of the other sign", -1.0),
+                ("halved", 0.5),
+                ("twice", 2.0),
+            ):
+                if of_slope.any():
+                    values = equations.with_bias(velocity_terms + (factor - 1.0) * of_slope, rest)
+                    yield slip(name, "once", explains, values)

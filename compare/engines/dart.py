@@ -56,7 +56,7 @@ class Model(OfUrdf):
             damping[self.order.v[place]] = joint.getDampingCoefficient(0)
         return damping
 
-    def bodies(self) -> list[list[Body]]:
+    def bodies(self, q: Array) -> list[list[Body]]:
         numbers = {joint.getName(): k for k, joint in self.joints.items()}
         links = []
         for node in self.skeleton.getBodyNodes():
@@ -90,9 +90,12 @@ class Model(OfUrdf):
     def set_force(self, force: Array, v: Array) -> None:
         self.skeleton.setForces(self.order.engine(self.q, force + self.rotors * v)[1])
 
+    def own_step(self) -> None:
+        self.world.step()
+
     def step(self, force: Array, v: Array) -> tuple[Array, Array]:
         self.set_force(force, v)
-        self.world.step()
+        self.own_step()
         x, self.q = self.skeleton.getPositions(), self.q.copy()
         self.q[self.order.q] = x
         for at, place in self.order.turned:

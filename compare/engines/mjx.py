@@ -1,22 +1,28 @@
 """MJX: the model that MuJoCo compiles, computed by JAX."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import cache, cached_property, partial
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tmt import Tree
 
+from ..robots.actuators import Controller
 from . import Array, Course, EngineRecord
 from .outside.model import File, Unread
 from .outside.of_compiled import METHODS as METHODS
 from .outside.of_compiled import STAGES, OfCompiled
 
+if TYPE_CHECKING:
+    from .mujoco.handed_on import Bare
+
 ENGINE = EngineRecord(
     order=60, label="MJX", colour="#332288", marker="<", package="mujoco.mjx", reads_file=True, compiles=True,
-    environment=(("JAX_ENABLE_X64", "1"), ("JAX_PLATFORMS", "cpu")),
+    environment=(("JAX_ENABLE_X64", "1"),),
 )  # fmt: skip
 # its fusions repeat what they share: an acceleration of an arm of seven hinges took 412 ms, 3 ms without them
 COMPILER = {"xla_cpu_use_fusion_emitters": False}
@@ -30,17 +36,37 @@ def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
 
 class Model(OfCompiled):
     def __init__(self, file: File, precision: str):
-        from mujoco import mjx
+        import jax
 
+        super().__init__(file, precision)
+        jax.config.update("jax_default_device", jax.devices("cpu")[0])  # of all but batches
+        self.bare = self.made_bare(None)
+        self.models = self.made_models(self.bare)
+        self.data = self.made_data(self.bare)
+
+    def made_bare(self, controller: Controller | None) -> Bare:
         from .mujoco.handed_on import Bare
 
-        self.bare, self.precision = Bare(file.path, file.names), precision
-        put = partial(mjx.put_model, impl="jax")
+        return Bare(self.file.path, self.file.names, controller=controller)
+
+    def made_models(self, bare: Bare) -> dict[str, Any]:
+        from mujoco import mjx
+
         try:
-            self.models = {method: put(self.bare.with_integrator(method)) for method in METHODS}
+            return {name: mjx.put_model(bare.with_integrator(name), impl="jax") for name in METHODS}
         except NotImplementedError as error:
             raise Unread(f"MJX does not have what it needs: {error}") from None
-        self.data = mjx.make_data(self.bare.model, impl="jax")
+
+    def made_data(self, bare: Bare) -> Any:
+        from mujoco import mjx
+
+        data = mjx.make_data(bare.model, impl="jax")
+        act = {
+            name: values + 0.0 * getattr(data, name)
+            for name, values in bare.engaged._asdict().items()
+            if name != "torque"
+        }
+        return data.replace(**act)
 
     @cached_property
     def model(self) -> Any:
@@ -54,10 +80,10 @@ class Model(OfCompiled):
     def gravity(self) -> Array:
         return np.asarray(self.models["Euler"].opt.gravity)
 
-    def set_field(self, method: str, name: str, index: Array, values: Array) -> None:
-        field = np.array(attrgetter(name)(self.models[method]))
+    def with_field(self, model: Any, name: str, index: Array, values: Array) -> Any:
+        field = np.array(attrgetter(name)(model))
         field[index] = values
-        self.models[method] = self.models[method].tree_replace({name: field})
+        return model.tree_replace({name: field})
 
     def placed(self, q: Array, *of_speeds: Array) -> list[Array]:
         """The arguments in MuJoCo's order of joints."""
@@ -82,11 +108,27 @@ class Model(OfCompiled):
     def acceleration(self, q: Array, v: Array, force: Array) -> Array:
         return self.values(q, v, force)[2]
 
+    def batch(self, course: Course) -> tuple[Callable[[], Array], str]:
+        """On the first device that JAX has, which may be a GPU."""
+        import jax
+
+        device, dt = jax.devices()[0], np.asarray(course.dt, self.precision)
+        model = self.models[course.method].tree_replace({"opt.timestep": dt})
+        arguments = model, self.data, *self.placed(course.q, course.v, course.tau)
+        on_device = jax.device_put(arguments, device)
+
+        def run() -> Array:
+            qpos, _ = functions()["worlds"](*on_device, course.steps)
+            return np.asarray(qpos.block_until_ready()[0, 0])[self.bare.qpos]
+
+        return run, str(device.device_kind)
+
     def run(self, course: Course) -> tuple[Array, int]:
         dt = np.asarray(course.dt, self.precision)
-        model = self.models[course.method].tree_replace({"opt.timestep": dt})
-        start = self.placed(course.q, course.v, course.tau)
-        path = functions()["path"](model, self.data, *start, course.every, records=len(course.times) - 1)
+        bare, model, tau = self.of_course(course)
+        data = self.data if bare is self.bare else self.made_data(bare)
+        model, start = model.tree_replace({"opt.timestep": dt}), self.placed(course.q, course.v, tau)
+        path = functions()["path"](model, data, *start, course.every, records=len(course.times) - 1)
         qpos, qvel = map(np.asarray, path)
         states = np.hstack([qpos[:, self.bare.qpos], qvel[:, self.bare.dofs]])
         return np.vstack([course.start, states]), course.steps * STAGES[course.method]
@@ -112,5 +154,10 @@ def functions() -> dict[str, Callable[..., Any]]:
 
         return jax.lax.scan(record, (qpos, qvel), None, records)[1]
 
+    worlds = jax.vmap(partial(path, records=1), in_axes=(None, None, 0, 0, 0, None))
     compiled = partial(jax.jit, compiler_options=COMPILER)
-    return {"values": compiled(values), "path": compiled(path, static_argnames="records")}
+    return {
+        "values": compiled(values),
+        "path": compiled(path, static_argnames="records"),
+        "worlds": jax.jit(worlds),
+    }

@@ -4,5 +4,5 @@ from . import EngineRecord
 
 ENGINE = EngineRecord(
     order=61, label="MJX float32", colour="#88CCEE", marker=">", package="mujoco.mjx", extra="mjx", reads_file=True,
-    compiles=True, precision="float32", module="mjx", environment=(("JAX_PLATFORMS", "cpu"),),
+    compiles=True, precision="float32", module="mjx",
 )  # fmt: skip

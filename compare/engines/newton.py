@@ -5,20 +5,49 @@ the axes of its joint; of a free body the velocity of its centre of mass and the
 v_newton = S v and a_newton = S a + c.
 """
 
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any
+
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
+from tmt import Tree
+
 from . import Array, Course, EngineRecord
-from .outside.model import Body, File, Link, Numbers, ReadModel, Unread, carried
+from .outside.model import Body, EngineError, File, Link, Numbers, OtherJoints, ReadModel, carried
+from .outside.order import near, wrong_masses
+from .warp import METHODS as OF_WARP
+from .warp import methods_for as methods_of_warp
 
 ENGINE = EngineRecord(order=70, label="Newton", colour="#999933", marker="h", package="newton",
                       reads_file=True, precision="float32")  # fmt: skip
-METHODS = {"Featherstone": (1, "newton_featherstone")}  # semi-implicit Euler whose damping is explicit
+FEATHERSTONE, BY_MUJOCO = "Featherstone", "SolverMuJoCo"  # of its solvers
 OFF = ("target_ke", "target_kd", "limit_ke", "limit_kd")  # actuators and limits
+FIELDS = "armature", "damping", "stiffness"
+USED = "implicitfast", "RK4"  # integrators of SolverMuJoCo; the others are those of MuJoCo Warp too
+UNCONSTRAINED = (
+    1 << 0 | 1 << 1 | 1 << 2 | 1 << 3 | 1 << 4
+)  # MuJoCo's flags: constraint, equality, frictionloss, limit, contact
+FLOAT32 = 1e-6  # share of the largest that a number loses
+
+
+def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
+    """Featherstone is semi-implicit Euler whose damping is explicit; SolverMuJoCo has the integrators of MuJoCo Warp."""
+    return METHODS | {
+        f"{BY_MUJOCO} {name}": kind for name, kind in methods_of_warp(tree).items() if name in USED
+    }
+
+
+METHODS = {FEATHERSTONE: (1, "newton_featherstone")} | {
+    f"{BY_MUJOCO} {name}": kind for name, kind in OF_WARP.items() if name in USED
+}
 
 
 class Model(ReadModel):
+    has_places = True
+
     def __init__(self, file: File, precision: str):
         import newton
         import warp
@@ -27,20 +56,21 @@ class Model(ReadModel):
         from .mujoco.source import Source
 
         builder, warp.config.enable_backward = newton.ModelBuilder(), False
+        newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
         if file.path.suffix == ".urdf":
             builder.add_urdf(str(file.path), floating=False)
         else:
             builder.add_mjcf(str(file.path), skip_equality_constraints=True)
-        self.newton, self.model = newton, builder.finalize(device="cpu")
+        self.newton, self.file, self.model = newton, file, builder.finalize(device="cpu")
         for name in OFF:
             getattr(self.model, f"joint_{name}").zero_()
         own = Source(file.path).model  # for the order of its joints and their `ref`
         if (self.model.joint_coord_count, self.model.joint_dof_count) != (own.nq, own.nv):
-            raise Unread(f"it has read {self.model.joint_dof_count} speeds, the file has {own.nv}")
-        firsts, children = self.model.joint_qd_start.numpy().tolist(), self.model.joint_child.numpy()
+            raise OtherJoints(f"it has {self.model.joint_dof_count} speeds, the file has {own.nv}")
+        self.firsts, self.children = self.model.joint_qd_start.numpy(), self.model.joint_child.numpy()
         coords, dofs, self.reference = {}, {}, np.zeros(own.nq)  # in Newton's vectors
-        # the first coordinate and dof of balls, and the centre of mass of a free body
-        self.turns: list[tuple[int, int, Array | None]] = []
+        # the first coordinate and dof of balls, and the body of a free joint
+        self.turns: list[tuple[int, int, int | None]] = []
         places, nq, nv = joint_places(own), 0, 0
 
         def slides_first(name: str) -> tuple[int, bool]:
@@ -51,34 +81,64 @@ class Model(ReadModel):
             is_free = kind_of(own, place.joint) == "free"
             coords[name], dofs[name] = range(nq, nq + len(place.qpos)), range(nv, nv + len(place.dofs))
             if place.kind == "ball":
-                centre = self.model.body_com.numpy()[children[firsts.index(nv - 3)]] if is_free else None
-                self.turns.append((nq, nv, centre))
+                body = self.children[self.firsts.tolist().index(nv - 3)] if is_free else None
+                self.turns.append((nq, nv, body))
             elif not is_free:
                 self.reference[nq] = own.qpos0[place.qpos.start]
             nq, nv = coords[name].stop, dofs[name].stop
         self.coords, self.dofs = ([i for name in file.names for i in of[name]] for of in (coords, dofs))
         self.joint_of = {dofs[name][-1]: joint for joint, name in enumerate(file.names)}
-        fields = "armature", "damping", "stiffness"
-        self.read = {name: getattr(self.model, f"joint_{name}").numpy().copy() for name in fields}
-        self.solver = newton.solvers.SolverFeatherstone(self.model, angular_damping=0.0)
+        self.read = {name: getattr(self.model, f"joint_{name}").numpy().copy() for name in FIELDS}
         self.state, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
+        self.solver = cache(self.made_solver)
+
+    def made_solver(self, method: str) -> Any:
+        if method == FEATHERSTONE:
+            return self.newton.solvers.SolverFeatherstone(self.model, angular_damping=0.0)
+        options = {"integrator": method.split()[-1].lower(), "disable_contacts": True}
+        solver = self.newton.solvers.SolverMuJoCo(self.model, **options)
+        solver.mjw_model.opt.disableflags |= UNCONSTRAINED
+        for prm in (solver.mjw_model.actuator_gainprm, solver.mjw_model.actuator_biasprm):
+            prm.zero_()  # with actuation disabled implicitfast would be explicit in the damping
+        return solver
 
     def fields(self) -> Numbers:
         speeds = {name: values[self.dofs] for name, values in self.read.items()}
         return {"gravity": np.ravel(self.model.gravity.numpy()), **speeds}
 
-    def bodies(self) -> list[list[Body]]:
-        model, fixed, links = self.model, self.newton.JointType.FIXED, []
-        mass, com, inertia = (getattr(model, f"body_{name}").numpy() for name in ("mass", "com", "inertia"))
-        self.newton.eval_fk(model, model.joint_q, model.joint_qd, self.state)
-        fields = model.joint_type, model.joint_parent, model.joint_child
-        kinds, parents, children = (field.numpy() for field in fields)
-        for kind, parent, child, end in zip(kinds, parents, children, model.joint_qd_start.numpy()[1:]):
-            x = self.state.body_q.numpy()[child].astype(float)
+    def links(self) -> list[Link]:
+        """Its bodies where the state has them, in the order of their joints; their names are their numbers."""
+        arrays = self.state.body_q, self.model.body_mass, self.model.body_com, self.model.body_inertia
+        numbers, links = [array.numpy().astype(float) for array in arrays], []
+        kinds, parents = self.model.joint_type.numpy(), self.model.joint_parent.numpy()
+        for kind, parent, child, end in zip(kinds, parents, self.children, self.firsts[1:]):
+            x, mass, com, inertia = (array[child] for array in numbers)
             R = Rotation.from_quat(x[3:]).as_matrix()
-            body = Body(float(mass[child]), x[:3] + R @ com[child], R @ inertia[child] @ R.T)
-            links.append(Link(child, parent, None if kind == fixed else self.joint_of[end - 1], body))
-        return carried(links, len(self.joint_of))
+            joint = None if kind == self.newton.JointType.FIXED else self.joint_of[end - 1]
+            links.append(Link(child, parent, joint, Body(mass, x[:3] + R @ com, R @ inertia @ R.T)))
+        return links
+
+    def bodies(self, q: Array) -> list[list[Body]]:
+        self.set_state(q, np.zeros(len(self.dofs)))
+        return carried(self.links(), len(self.joint_of))
+
+    def twists(self, q: Array) -> dict[int, tuple[Array, Array, Array]]:
+        """By the Jacobian of the centres of mass."""
+        self.set_state(q, np.zeros(len(self.dofs)))
+        blocks = self.newton.eval_jacobian(self.model, self.state).numpy().astype(float)
+        roots, frames = self.model.articulation_start.numpy(), self.model.joint_X_c.numpy()
+        twists, none = {}, np.zeros(3)
+        for number, link in enumerate(self.links()):
+            tree = int(np.searchsorted(roots, number, side="right")) - 1
+            J = blocks[tree, 6 * (number - roots[tree]) :]
+            for dof in range(self.firsts[number], self.firsts[number + 1]):
+                column, joint = J[:6, dof - self.firsts[roots[tree]]], self.joint_of.get(dof)
+                if joint is not None and self.file.kinds[joint] == "ball":
+                    x = self.state.body_q.numpy()[link.name].astype(float)
+                    twists[joint] = none, none, x[:3] + Rotation.from_quat(x[3:]).apply(frames[number][:3])
+                elif joint is not None:
+                    twists[joint] = column[:3], column[3:], link.body.com
+        return {joint: twist for joint, twist in twists.items() if not self.file.is_free(joint)}
 
     def mend(self, name: str, values: Array) -> bool:
         if name == "gravity":
@@ -86,15 +146,37 @@ class Model(ReadModel):
         elif name in self.read:
             self.read[name][self.dofs] = values
             getattr(self.model, f"joint_{name}").assign(self.read[name])
-        return name not in ("mass", "moments")
+        else:
+            for joint in wrong_masses(self.numbers(), self.stated, FLOAT32):
+                self.set_masses(joint)
+        return bool(near(self.numbers()[name], values, FLOAT32).all())
+
+    def set_masses(self, joint: int) -> None:
+        """Set what moves with a joint and not with the next one: all of it in the first of these bodies."""
+        self.set_state(self.stated["reference"], np.zeros(len(self.dofs)))
+        moved: dict[object, int | None] = {}
+        for link in self.links():
+            moved[link.name] = moved.get(link.parent) if link.joint is None else link.joint
+        bodies = [number for number, moved_by in moved.items() if moved_by == joint]
+        x, model = self.state.body_q.numpy().astype(float)[bodies[0]], self.model
+        R = Rotation.from_quat(x[3:]).as_matrix()
+        mass, com, inertia = (self.stated[name][joint] for name in ("mass", "com", "inertia"))
+        numbers = {"mass": mass, "com": R.T @ (com - x[:3]), "inertia": R.T @ inertia @ R}
+        numbers |= {"inv_mass": 1.0 / mass, "inv_inertia": np.linalg.inv(numbers["inertia"])}
+        for name, value in numbers.items():
+            values = getattr(model, f"body_{name}").numpy()
+            values[bodies] = 0.0
+            values[bodies[0]] = value
+            getattr(model, f"body_{name}").assign(values)
 
     def speeds(self, x: Array, v: Array) -> tuple[Array, Array]:
         """S at Newton's coordinates x, and c at the Tree's speeds v."""
         S, c = np.eye(len(v))[np.argsort(self.dofs)], np.zeros(len(v))
-        for at, dof, centre in self.turns:
+        for at, dof, body in self.turns:
             R, own = Rotation.from_quat(x[at : at + 4]).as_matrix(), slice(dof, dof + 3)
             S[own] = R @ S[own]
-            if centre is not None:
+            if body is not None:
+                centre = self.model.body_com.numpy()[body]
                 S[dof - 3 : dof] += np.cross(S[own].T, R @ centre).T
                 c[dof - 3 : dof] = np.cross(S[own] @ v, np.cross(S[own] @ v, R @ centre))
         return S, c
@@ -132,30 +214,43 @@ class Model(ReadModel):
         self.model.joint_damping.zero_()
         self.model.joint_stiffness.zero_()
         self.control.joint_f.assign(np.linalg.solve(S.T, force))
-        self.solver.step(self.state, self.next, self.control, None, 1.0)
+        self.solver(FEATHERSTONE).step(self.state, self.next, self.control, None, 1.0)
         change = self.next.joint_qd.numpy().astype(float) - self.state.joint_qd.numpy()
         return np.linalg.solve(S, change - c)
 
     def prepare(self, course: Course) -> None:
-        damping, stiffness = self.read["damping"], self.read["stiffness"]
-        self.model.joint_damping.assign(damping)
-        self.model.joint_stiffness.assign(stiffness)
-        damped = [damping[dof] for _, dof, centre in self.turns if centre is not None]
-        if any(damped) or any(stiffness[dof] for _, dof, _ in self.turns):
+        for name in ("damping", "stiffness"):
+            getattr(self.model, f"joint_{name}").assign(self.read[name])
+        damped = [self.read["damping"][dof] for _, dof, body in self.turns if body is not None]
+        if course.method == FEATHERSTONE and any(
+            (*damped, *(self.read["stiffness"][at] for _, at, _ in self.turns))
+        ):
             missing = "no springs of ball joints and no damping of free joints"
-            raise Unread(f"the Featherstone solver has {missing}")
+            raise EngineError(f"the Featherstone solver has {missing}")
+        self.solver(course.method)
+
+    def step_alone(self, course: Course) -> Callable[[], object]:
+        self.set_state(course.q, course.v)
+        return partial(self.solver(course.method).step, self.state, self.next, self.control, None, course.dt)
 
     def run(self, course: Course) -> tuple[Array, int]:
         self.prepare(course)
-        states, (S, _) = [course.start], self.set_state(course.q, course.v)
+        states, (S, _), solver = (
+            [course.start],
+            self.set_state(course.q, course.v),
+            self.solver(course.method),
+        )
+        force = course.force(course.q, course.v)
         for step in range(1, course.steps + 1):
-            self.control.joint_f.assign(np.linalg.solve(S.T, course.tau))
-            self.solver.step(self.state, self.next, self.control, None, course.dt)
+            self.control.joint_f.assign(np.linalg.solve(S.T, force))
+            solver.step(self.state, self.next, self.control, None, course.dt)
             self.state, self.next = self.next, self.state
             x, v = (values.numpy().astype(float) for values in (self.state.joint_q, self.state.joint_qd))
             S, _ = self.speeds(x, v)
             for at, _, _ in self.turns:
                 x[at : at + 4] = np.roll(x[at : at + 4], 1)
+            q, v = (x + self.reference)[self.coords], np.linalg.solve(S, v)
+            force = course.force(q, v)
             if step % course.every == 0:
-                states.append(np.concatenate([(x + self.reference)[self.coords], np.linalg.solve(S, v)]))
+                states.append(np.concatenate([q, v]))
         return np.array(states), course.steps

@@ -5,14 +5,12 @@ axes: where the Tree has v and a, it has R' v and R' a - w x R' v. Of several ro
 """
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
 from . import Array, EngineRecord
-from .outside.mjcf_text import whole_text
-from .outside.model import Body, File, Numbers, ReadModel, Unread
+from .outside.mjcf_text import original_or_copy
+from .outside.model import Body, File, Numbers, OtherJoints, OtherNames, ReadModel
 from .outside.order import near, order_of, wrong_masses
 
 ENGINE = EngineRecord(
@@ -28,7 +26,15 @@ class Model(ReadModel):
     def __init__(self, file: File, precision: str):
         import pinocchio
 
-        self.pinocchio, self.file, self.model = pinocchio, file, built(file.path)
+        self.pinocchio, self.file = pinocchio, file
+        *_, self.copied = original_or_copy(file.path, self.read)
+        self.data = self.model.createData()
+
+    def read(self, path: Path) -> None:
+        """The model of a URDF or MJCF file; Unread where its joints are not those of the compared model."""
+        is_urdf = path.suffix == ".urdf"
+        build = self.pinocchio.buildModelFromUrdf if is_urdf else self.pinocchio.buildModelFromMJCF
+        self.model, file = build(str(path)), self.file
         self.last: dict[int, int] = {}  # the number in the Tree of the last joint of each of Pinocchio's
         starts, circles, q = {}, [], 0  # where each joint begins; which angles are continuous
         for number, (name, joint) in enumerate(zip(self.model.names, self.model.joints)):
@@ -38,20 +44,18 @@ class Model(ReadModel):
             v, name = joint.idx_v, f"{name} turn" if name in file.free else name
             for part in joint.extract().joints if is_composite else [joint]:
                 if name not in file.names:
-                    raise Unread(f"joint {name!r} of Pinocchio is not in the compared model")
+                    raise OtherNames(f"the file has no joint {name!r}")
                 self.last[number] = k = file.names.index(name)
                 is_circle = part.nq == 2
                 circles += [q] if is_circle else []
                 starts[k], q, v = (q, v), q + (1 if is_circle else part.nq), v + part.nv
                 name = file.names[min(k + 1, len(file.names) - 1)]  # of the next one of a composite joint
-        self.circles = np.array(circles, int)
+        self.circles, self.starts = np.array(circles, int), starts
         if self.model.nv != file.coordinates.nv:
-            why = f"Pinocchio has {self.model.nv} speeds, the compared model {file.coordinates.nv}"
-            raise Unread(f"{why}; of several root bodies it reads the first one")
+            raise OtherJoints(f"it has {self.model.nv} speeds, the file {file.coordinates.nv}")
         self.order = order_of(
             file, starts, (0, 1, 2, 4, 5, 6, 3), range(6), in_world=False, ball_q=(1, 2, 3, 0)
         )
-        self.data = self.model.createData()
 
     def own(self, q: Array, *vectors: Array) -> list[Array]:
         """q, and vectors of speeds or forces, as Pinocchio has them."""
@@ -62,14 +66,27 @@ class Model(ReadModel):
         return [q, *placed]
 
     def fields(self) -> Numbers:
-        armature, damping, stiffness = np.zeros((3, self.model.nv))
+        armature, damping = np.zeros((2, self.model.nv))
         armature[self.order.v], damping[self.order.v] = self.model.armature, self.model.damping
         gravity = self.model.gravity.linear
-        return {"gravity": gravity, "armature": armature, "damping": damping, "stiffness": stiffness}
+        return {"gravity": gravity, "armature": armature, "damping": damping}
 
-    def bodies(self) -> list[list[Body]]:
+    def twists(self, q: Array) -> dict[int, tuple[Array, Array, Array]]:
+        """By the columns of the Jacobian in the world: velocities of the point there that is in the world's origin."""
+        J = self.pinocchio.computeJointJacobians(self.model, self.data, *self.own(q))
+        columns = np.reshape(J, (6, -1)).T
+        speeds, places = self.order.v.tolist(), self.file.coordinates.places.joints
+        twists = {k: (columns[speeds.index(places[k].qd.start)], places[k].kind) for k in self.starts}
+        balls = {k: self.data.oMi[number].translation for number, k in self.last.items()}
+        none = np.zeros(3)
+        return {
+            k: (none, none, balls[k]) if kind == "ball" else (column[:3], column[3:], none)
+            for k, (column, kind) in twists.items() if not self.file.is_free(k)
+        }  # fmt: skip
+
+    def bodies(self, q: Array) -> list[list[Body]]:
         bodies: list[list[Body]] = [[] for _ in self.file.names]
-        self.pinocchio.forwardKinematics(self.model, self.data, *self.own(self.stated["reference"]))
+        self.pinocchio.forwardKinematics(self.model, self.data, *self.own(q))
         for number, k in self.last.items():
             body, place = self.model.inertias[number], self.data.oMi[number]
             inertia = place.rotation @ body.inertia @ place.rotation.T
@@ -81,6 +98,8 @@ class Model(ReadModel):
             self.model.gravity.linear = values
         elif name == "armature":
             self.model.armature = values[self.order.v]
+        elif name == "damping":
+            self.model.damping = values[self.order.v]
         else:
             wrong, stated = wrong_masses(self.numbers(), self.stated), self.stated
             for number, k in self.last.items():
@@ -113,15 +132,3 @@ class Model(ReadModel):
         q_own, v_own, force = self.own(q, v, force)
         a_own = self.pinocchio.aba(self.model, self.data, q_own, v_own, force) - self.turning(v_own)
         return self.order.tree(q, a_own)
-
-
-def built(path: Path) -> Any:
-    """The model of a URDF or MJCF file: of that a copy without includes, which Pinocchio skips, and with a name for each body."""
-    import pinocchio
-
-    if path.suffix == ".urdf":
-        return pinocchio.buildModelFromUrdf(str(path))
-    with TemporaryDirectory() as folder:
-        copy = Path(folder) / path.name
-        copy.write_text(whole_text(path), encoding="utf-8")
-        return pinocchio.buildModelFromMJCF(str(copy))

@@ -55,7 +55,7 @@ class Model(OfUrdf):
         """Set the torques of the joints, or the largest ones of the motors that they have by default."""
         self.bullet.setJointMotorControlArray(self.robot, self.links, mode, forces=forces.tolist())
 
-    def bodies(self) -> list[list[Body]]:
+    def bodies(self, q: Array) -> list[list[Body]]:
         joints, links = {link: k for k, link in enumerate(self.links)}, []
         for link, info in enumerate(self.infos):
             mass, _, moments, *_ = self.bullet.getDynamicsInfo(self.robot, link)
@@ -93,9 +93,12 @@ class Model(OfUrdf):
             self.bullet.changeDynamics(self.robot, link, jointDamping=coefficient)
             self.bullet.resetJointState(self.robot, link, *state)
 
+    def own_step(self) -> None:
+        self.bullet.stepSimulation()
+
     def step(self, force: Array, v: Array) -> tuple[Array, Array]:
         self.apply(self.bullet.TORQUE_CONTROL, force)
-        self.bullet.stepSimulation()
+        self.own_step()
         states = self.bullet.getJointStates(self.robot, self.links)
         q, v = np.array([state[:2] for state in states]).T
         return q, v

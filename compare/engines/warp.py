@@ -1,29 +1,38 @@
 """MuJoCo Warp: the model that MuJoCo compiles, computed by Warp's kernels, in float32, here on a CPU."""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tmt import Tree
 from tmt.methods import lone_speeds
 
+from ..robots.actuators import Controller
 from . import Array, Course, EngineRecord
 from .outside.model import File, Unread
-from .outside.of_compiled import METHODS as METHODS
+from .outside.of_compiled import METHODS as OF_MJX
 from .outside.of_compiled import STAGES, OfCompiled
+
+if TYPE_CHECKING:
+    from .mujoco.handed_on import Bare
 
 ENGINE = EngineRecord(order=65, label="MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp",
                       reads_file=True, compiles=True, precision="float32")  # fmt: skip
+METHODS = OF_MJX | {"implicit": (1, "implicit"), "discrete": (1, "semi_implicit_euler")}
 
 
 def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
-    """METHODS for a Tree: implicitfast is implicit in the bias of a free body on its own, as MuJoCo's is since 4.0."""
-    return METHODS | ({"implicitfast": (1, "implicitfast")} if lone_speeds(tree) else {})
+    """METHODS for a Tree: as MuJoCo since 4.0, implicitfast and discrete are implicit in the bias of a free body on its own, and
+    discrete in springs."""
+    lone = {"implicitfast": (1, "implicitfast"), "discrete": (1, "implicitfast")} if lone_speeds(tree) else {}
+    return METHODS | lone | ({"discrete": (1, "discrete")} if tree.has_springs else {})
 
 
 class Model(OfCompiled):
@@ -35,17 +44,28 @@ class Model(OfCompiled):
         warp.set_device("cpu")
         import mujoco_warp
 
+        super().__init__(file, precision)
+        self.warp, self.engine = warp, mujoco_warp
+        self.bare = self.made_bare(None)
+        self.models = self.made_models(self.bare)
+        self.worlds: dict[
+            tuple[int, int, str], Any
+        ] = {}  # data, by MuJoCo's model, the number of states, the device
+        self.graphs: dict[tuple[Any, ...], Any] = {}
+
+    def made_bare(self, controller: Controller | None) -> Bare:
         from .mujoco.handed_on import Bare
 
-        self.warp, self.engine = warp, mujoco_warp
-        self.bare = Bare(file.path, file.names, rotors_in_joints=True)
-        self.bare.model.opt.iterations = 0  # of its solver of constraints
+        bare = Bare(self.file.path, self.file.names, rotors_in_joints=True, controller=controller)
+        if controller is None:
+            bare.model.opt.iterations = 0  # of its solver of constraints
+        return bare
+
+    def made_models(self, bare: Bare) -> dict[str, Any]:
         try:
-            self.models = {name: mujoco_warp.put_model(self.bare.with_integrator(name)) for name in METHODS}
+            return {name: self.engine.put_model(bare.with_integrator(name)) for name in METHODS}
         except NotImplementedError as error:
             raise Unread(f"MuJoCo Warp does not have what it needs: {error}") from None
-        self.worlds: dict[int, Any] = {}  # data by the number of states
-        self.graphs: dict[tuple[str, int], Any] = {}
 
     def held(self, name: str) -> Array:
         field = getattr(self.models["Euler"], name)
@@ -55,11 +75,12 @@ class Model(OfCompiled):
     def gravity(self) -> Array:
         return np.array(self.models["Euler"].opt.gravity.numpy()[0])
 
-    def set_field(self, method: str, name: str, index: Array, values: Array) -> None:
-        field = attrgetter(name)(self.models[method])
+    def with_field(self, model: Any, name: str, index: Array, values: Array) -> Any:
+        field = attrgetter(name)(model)
         numbers = field.numpy()
         numbers[0, index] = values
         field.assign(numbers)
+        return model
 
     @cached_property
     def model(self) -> Any:
@@ -68,12 +89,16 @@ class Model(OfCompiled):
         none = [self.warp.zeros_like(field) for field in (model.dof_damping, model.jnt_stiffness)]
         return replace(model, dof_damping=none[0], jnt_stiffness=none[1])
 
-    def at(self, q: Array, v: Array, force: Array) -> Any:
-        """Data of as many worlds as there are states, at these states (worlds, n)."""
-        if len(q) not in self.worlds:
+    def at(self, q: Array, v: Array, force: Array, bare: Bare | None = None) -> Any:
+        """Data of as many worlds as there are states, at these states (worlds, n). bare: with actuators that act."""
+        source = bare or self.bare
+        key = id(source), len(q), str(self.warp.get_device())
+        if key not in self.worlds:
             # njmax=0 is possible, but then Euler and implicitfast do not accelerate
-            self.worlds[len(q)] = self.engine.make_data(self.bare.model, len(q), nconmax=0, njmax=1)
-        data = self.worlds[len(q)]
+            self.worlds[key] = self.engine.make_data(source.model, len(q), nconmax=0, njmax=1)
+        data = self.worlds[key]
+        for field, values in ((data.ctrl, source.engaged.ctrl), (data.act, source.engaged.act)):
+            field.assign(np.broadcast_to(np.asarray(values, np.float32), field.shape))
         for field, values in ((data.qpos, q), (data.qvel, v), (data.qfrc_applied, force)):
             placed = np.zeros(field.shape, np.float32)
             placed[:, self.bare.qpos if field is data.qpos else self.bare.dofs] = values
@@ -82,12 +107,13 @@ class Model(OfCompiled):
 
     def replay(self, name: str, call: Callable[[Any], object], data: Any) -> Callable[[], None]:
         """A function that repeats a call for these data; the kernels that it launches are recorded once."""
-        if (name, data.nworld) not in self.graphs:
+        key = name, id(data)
+        if key not in self.graphs:
             call(data)  # compiles
             with self.warp.ScopedCapture() as capture:
                 call(data)
-            self.graphs[name, data.nworld] = capture.graph
-        return lambda: self.warp.capture_launch(self.graphs[name, data.nworld])
+            self.graphs[key] = capture.graph
+        return lambda: self.warp.capture_launch(self.graphs[key])
 
     def forward(self, q: Array, v: Array, force: Array) -> Any:
         """Data after forward dynamics at states (worlds, n)."""
@@ -108,13 +134,43 @@ class Model(OfCompiled):
     def acceleration(self, q: Array, v: Array, force: Array) -> Array:
         return self.forward(q[None], v[None], force[None]).qacc.numpy()[0, self.bare.dofs]
 
-    def run(self, course: Course) -> tuple[Array, int]:
-        model, path = self.models[course.method], [course.start]
-        start = course.q[None], course.v[None], course.tau[None]
+    def step_alone(self, course: Course) -> Callable[[], None]:
+        return self.begun(course)[0]
+
+    def begun(self, course: Course) -> tuple[Callable[[], None], Any]:
+        """A step from the start of a run and on, by the kernels that were recorded, and the data."""
+        bare, model, tau = self.of_course(course)
+        start = course.q[None], course.v[None], tau[None], bare if course.servos else None
         data = self.at(*start)
         model.opt.timestep.fill_(course.dt)
-        advance = self.replay(course.method, lambda data: self.engine.step(model, data), data)
+        call: Callable[[Any], object] = partial(self.engine.step, model)
+        advance = self.replay(course.method, call, data)
         self.at(*start)  # the recording has moved them
+        return advance, data
+
+    def batch(self, course: Course) -> tuple[Callable[[], Array], str]:
+        """On Warp's preferred device, which may be a GPU; each step is a graph of kernels that was recorded once."""
+        device = self.warp.get_preferred_device()
+        with self.warp.ScopedDevice(device):
+            model = self.models[course.method]
+            if not device.is_cpu:
+                model = self.with_all_fields(self.made_models(self.bare))[course.method]
+            data = self.at(course.q, course.v, course.tau)
+            model.opt.timestep.fill_(course.dt)
+            advance = self.replay(course.method, partial(self.engine.step, model), data)
+
+        def run() -> Array:
+            with self.warp.ScopedDevice(device):
+                self.at(course.q, course.v, course.tau)
+                for _ in range(course.steps):
+                    advance()
+                self.warp.synchronize_device(device)
+            return np.asarray(data.qpos.numpy()[0, self.bare.qpos])
+
+        return run, str(device.name)
+
+    def run(self, course: Course) -> tuple[Array, int]:
+        path, (advance, data) = [course.start], self.begun(course)
         for _ in course.times[1:]:
             for _ in range(course.every):
                 advance()

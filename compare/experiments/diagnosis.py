@@ -88,7 +88,8 @@ def diagnosed(setup: Setup) -> Found:
         stated, is_slow = Stated(dynamics.equations.joints, "option"), dynamics.equations.seconds > QUICK
     else:
         broken, too_slow, stated, is_slow = [], False, None, False
-    diagnosis = diagnose(tree, values, SECONDS, None if is_slow else partial(dynamics.bias, q), stated)
+    functions = (None, stated, None) if is_slow else (partial(dynamics.bias, q), stated, dynamics.mass_matrix)
+    diagnosis = diagnose(tree, values, SECONDS, *functions)
     right = values._replace(mass_matrix=literal.mass_matrix(q, tree), bias=literal.bias(q, qd, tree))
     ratio = float(share_of(np.abs(values.packed - right.packed), values.packed_tolerance).max())
     left_over = LeftOver(tree, values, tau, dynamics.acceleration(q, qd, tau))

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core import timing
 from ..core.check import Check, Result
 from ..engines import Dynamics, Method, Motion, Setting
 from ..judge.agree import closest
@@ -25,23 +26,25 @@ class Followed(NamedTuple):
     seconds: float  # the least of its times
     error: np.ndarray  # (65,) rad or m: the largest of all joints
     early: float  # rad or m: the largest error up to EARLY
+    scatter: float  # of its times, see timing.scatter
 
 
 def follow(
-    dynamics: Dynamics, case: Case, method: Method, setting: Setting, reference: Reference, repeat: float = 0
+    dynamics: Dynamics, case: Case, method: Method, setting: Setting, reference: Reference, rounds: int = 1
 ) -> Followed:
-    """The run of a method with a setting, timed up to 5 times while these take less than `repeat` s."""
+    """The run of a method with a setting, timed up to `rounds` times, until it is_timed."""
     run, read = dynamics.prepare(*case.start, case.tau, setting, method.name)
     times: list[float] = []
     with np.errstate(all="ignore"):  # in a run that diverges
-        while not times or (len(times) < 5 and sum(times) < repeat):
+        while len(times) < rounds and not timing.is_timed(times):
             begin = time.perf_counter()
             outcome = run()
             seconds = time.perf_counter() - begin
             motion = read(outcome)
             times.append(seconds if motion.seconds is None else motion.seconds)
         error = reference.error(motion.q)
-    return Followed(motion, min(times), error, float(error[reference.t <= EARLY].max()))
+    early = float(error[reference.t <= EARLY].max())
+    return Followed(motion, min(times), error, early, timing.scatter(times))
 
 
 def one_step(dynamics: Dynamics, states: States, tau: np.ndarray, dt: float, method: str) -> list[np.ndarray]:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 from ..core.finding import Finding
 from ..engines import Dynamics, Engine, compared, made
@@ -27,6 +27,25 @@ def nothing(*_: Any) -> None:
     """Do nothing."""
 
 
+class Request(NamedTuple):
+    """What is asked of stability for a file, beside its own step.
+
+    step: s, and an integrator of MuJoCo. posture: a name, or numbers separated by commas. control_period, delay: s, of a
+    program that commands the actuators; kp, kv: its gains for those that are no servos. at_speed: growth along a motion.
+    """
+
+    step: tuple[float, str] | None = None
+    posture: str | None = None
+    control_period: float | None = None
+    delay: float | None = None
+    kp: float | None = None
+    kv: float | None = None
+    at_speed: bool = False
+
+
+NO_REQUEST = Request()
+
+
 @dataclass(frozen=True, eq=False)
 class Setup:
     """What an experiment has.
@@ -44,7 +63,7 @@ class Setup:
     progress: Callable[[str], Any] = nothing  # reports the progress of long work
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
     alone: bool = False  # whether the experiment runs by itself, and may take longer than in `all`
-    step: tuple[float, str] | None = None  # stability: step, s, and integrator of MuJoCo to be checked
+    request: Request = NO_REQUEST  # of stability
     size: str = "full"
 
     @property

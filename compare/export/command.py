@@ -83,16 +83,15 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
     try:
         reference = "model" if path or words else None
         compared = compared_with(reference, path or str(ARM.mjcf), floating=options.floating)
+        compared = parameters.with_sites(compared)
     except ModelError as error:
         raise Refused(error) from None
     robot, name = compared.robot, options.name or identifier(Path(options.mjcf or "arm").stem)
     terminal.say_lines(compared.reference.lines if options.mjcf else ())
     quantities = (options.quantity or QUANTITIES.get(options.to, OF_MOST)).replace(" ", "").split(",")
 
-    frames = parameters.frames_of(compared.reading) if compared.reading else {}
     more: dict[str, Any] = {
         "parameters": words.split(",") if words else [],
-        "frames": frames,
         "limit": options.limit,
     }
 
@@ -114,7 +113,7 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
             Path(folder, file).write_text(text, encoding="utf-8")
         terminal.show(f"runs what was written, at {STATES} states")
         program_of = programs.PROGRAMS[options.to]
-        chosen = Parameters(robot.tree, more["parameters"], frames)
+        chosen = Parameters(robot.tree, more["parameters"])
         stated = {x: np.array(value) for x, value in chosen.values.items()}
         values = parameters.other_values(chosen)
         other = parameters.with_values(compared, chosen, values) if values else None

@@ -1,6 +1,7 @@
 """Parameters of exported equations: their frames in a file, and the file with other values of them."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -9,10 +10,11 @@ from numpy.typing import NDArray
 from tmt.export.parameters import PAYLOAD, PLACES, SIZES, Parameters
 from tmt.model.tree import Tree
 
-from ..engines.mujoco import Reading, Source, engine, read
-from ..engines.mujoco.names import element_name, joint_places
-from ..engines.mujoco.reading import carriers
+from ..engines.mujoco import Source, engine, read
+from ..engines.mujoco.names import element_name
+from ..engines.mujoco.reading import tree_with_sites
 from ..engines.mujoco.source import without_visuals
+from ..engines.mujoco.welded import compiled
 from ..robots.case import SEED
 from ..robots.file import robot_of
 from ..run.reference import Compared
@@ -22,20 +24,12 @@ Values = Mapping[str, Array]  # of arguments by name
 LENGTH = 0.1  # m: how far a mass is moved
 
 
-def frames_of(reading: Reading) -> dict[str, tuple[Array, Array]]:
-    """The frames of a file's bodies, origin and axes, in those of their joints."""
-    model, joints = reading.model, joint_places(reading.model)
-    data, carrier = mujoco.MjData(model), carriers(model, list(joints.values()))
-    data.qpos[:] = model.qpos0
-    free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
-    for start in model.jnt_qposadr[free]:  # as the Tree has it
-        data.qpos[start : start + 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-    mujoco.mj_kinematics(model, data)
-    anchors = np.array([data.xanchor[place.joint] for place in joints.values()])
-    anchors[[free[place.joint] for place in joints.values()]] = 0.0
-    places = {body: (data.xpos[body], data.xmat[body].reshape(3, 3)) for body in reading.bodies}
-    names = dict(zip(reading.bodies, reading.tree.body_names))
-    return {names[body]: (x - anchors[carrier[body]], axes) for body, (x, axes) in places.items()}
+def with_sites(compared: Compared) -> Compared:
+    """The same, with the frames of the file's bodies and sites as sites of the Tree."""
+    if compared.reading is None:
+        return compared
+    tree = tree_with_sites(compared.reading)
+    return compared._replace(robot=replace(compared.robot, tree=tree))
 
 
 def other_values(parameters: Parameters) -> Values:
@@ -61,7 +55,7 @@ def with_values(compared: Compared, parameters: Parameters, values: Values) -> C
     """What is compared, from the file with these values."""
     reading = read(changed(compared.mujoco.source, compared.robot.tree, parameters, values))
     shown = compared.robot.name
-    return compared._replace(robot=robot_of(reading, shown), mujoco=engine(reading), reading=reading)
+    return with_sites(Compared(compared.reference, robot_of(reading, shown), engine(reading), reading))
 
 
 def changed(source: Source, tree: Tree, parameters: Parameters, values: Values) -> mujoco.MjModel:
@@ -93,7 +87,7 @@ def changed(source: Source, tree: Tree, parameters: Parameters, values: Values) 
             body.fullinertia = values[name]
     if "gravity" in values:
         spec.option.gravity = values["gravity"]
-    return spec.compile()
+    return compiled(spec)
 
 
 def state_inertial(body: mujoco.MjsBody, mass: float, com: Array) -> None:

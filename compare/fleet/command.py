@@ -44,6 +44,7 @@ FLEET_OPTIONS = {
     "--dask": Option(metavar="ADDRESS"),
     "--limit": Option(cli.seconds(1e6), "S", 1800.0),
     "--since": Option(metavar="DIR"),
+    "--rubric": Option(metavar="FILE"),
 }
 
 
@@ -90,12 +91,14 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     from .cache import locked  # imports are slow
     from .executors import Cluster, Executor, Pool
     from .models import found_models
+    from .rubric import read_rubric
     from .run import Run
     from .table import changes, earlier, write_table
     from .task import FleetOptions
 
     terminal, out = Terminal(), Path(options.out)
     before = earlier(options.since) if options.since else None
+    rubric = read_rubric(options.rubric, names) if options.rubric else None
     models, left_out = found_models(options.paths)
     sent = solution_files(options.reference)
     file_options = FleetOptions(names, not options.full, options.reference, next(iter(sent), ""))
@@ -112,8 +115,11 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
                 run.carry_out(lambda rows: say_rows(terminal, rows))
         finally:
             executor.close()
-        changed = None if before is None else changes(before, run.rows)
-        summary = write_table(out, run.rows, left_out, changed, command)
+        changed, most = None if before is None else changes(before, run.rows), None
+        if rubric:
+            rubric.award(run.rows, out)
+            most = rubric.total
+        summary = write_table(out, run.rows, left_out, changed, command, most)
     terminal.say()
     terminal.say_lines(summary, "bold green" if run.is_good else "bold red")
     if changed is not None:

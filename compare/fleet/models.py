@@ -1,4 +1,7 @@
-"""The models of a fleet: all MJCF and URDF files below the given paths, except files that only other files include."""
+"""The models of a fleet: all XML, MJCF and URDF files below the given paths, except files that only other files include.
+
+A file that is no model is one of them too: the table says why it was refused.
+"""
 
 import hashlib
 import os
@@ -11,7 +14,7 @@ from ..core.errors import Refused
 from ..core.words import in_one_line, readable
 from ..process.parts import elements_of, is_pipe, needed_by
 
-MODEL_ELEMENTS = "mujoco", "robot"  # root elements of MJCF and of URDF
+PART = "mujocoinclude"  # root element of a file that is no model by itself
 
 
 class Model(NamedTuple):
@@ -47,8 +50,7 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
     files: dict[str, tuple[Path, bool]] = {}  # by the real path: the same file may be found more than once
     for path, is_named in sorted(paths_of(words), key=lambda pair: (not pair[1], pair[0].is_symlink())):
         files.setdefault(os.path.realpath(path), (path, is_named))
-    kinds = {file: kind_of(*path_and_named) for file, path_and_named in files.items()}
-    paths = {file: path for file, (path, _) in files.items() if kinds[file] in MODEL_ELEMENTS}
+    paths = {file: path for file, (path, is_named) in files.items() if is_named or not is_part(path)}
     models = {file: Model(path, needed_by(path)) for file, path in paths.items()}
     left_out = []
     users = {os.path.realpath(part): model.shown for model in models.values() for part in model.parts[1:]}
@@ -57,17 +59,15 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
             models.pop(file, None)
             left_out.append((in_one_line(path.as_posix()), f"included by {users[file]}"))
         elif file not in models:
-            why = f"root element <{in_one_line(kinds[file])}>, not <mujoco> or <robot>"
-            left_out.append((in_one_line(path.as_posix()), why))
+            left_out.append((in_one_line(path.as_posix()), f"root element <{PART}>"))
     if not models:
         raise Refused(f"no MJCF or URDF file in {', '.join(map(in_one_line, words))}")
     return sorted(models.values(), key=lambda model: model.shown), sorted(left_out)
 
 
-def kind_of(path: Path, is_named: bool) -> str:
-    """The name of the root element; MJCF's of a file that is named, or cannot be read: the table shows why."""
-    root = None if is_named else next(elements_of(path), None)
-    return MODEL_ELEMENTS[0] if root is None else root.tag
+def is_part(path: Path) -> bool:
+    root = next(elements_of(path), None)
+    return root is not None and root.tag == PART
 
 
 def paths_of(words: Iterable[str]) -> Iterator[tuple[Path, bool]]:

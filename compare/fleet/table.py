@@ -42,6 +42,7 @@ class FileRow(Row):
     same_as: str | None = None  # the file of which it is a copy
     verdict: str
     reason: str = ""
+    points: float | None = None  # of a rubric
     reference: str | None = None  # the kind of a run.reference.Reference
     joints: int | None = None
     worst_ratio: float | None = None  # largest share of a tolerance
@@ -79,7 +80,8 @@ class FileRow(Row):
 LeftOut = Sequence[tuple[str, str]]  # files that are no models, and why
 HINTS = get_type_hints(FileRow)
 FIELDS = {field.name: HINTS[field.name] for field in fields(FileRow)}
-FLEET_COLUMNS = tuple(name for name in FileRow(file="", verdict="").columns() if name != "has_report")
+HIDDEN = "has_report", "points"  # the second is shown with a rubric
+FLEET_COLUMNS = tuple(name for name in FileRow(file="", verdict="").columns() if name not in HIDDEN)
 
 
 def row_of_data(data: object) -> FileRow | None:
@@ -103,7 +105,7 @@ def judge(row: FileRow, report: Report, lost: Sequence[str], reference: Referenc
     if failed.differing:
         row.verdict = DIFFER
         names = [cause.text for cause in report.causes] or [str(failed.differing[0])]
-        reasons.append(block("fleet", "first_of", reasons=names))
+        reasons.append(block("fleet", "some_of", reasons=names))
     elif unfinished:
         row.verdict = BROKE
     elif not any(check.about == About.MODELS for check in checks):
@@ -117,7 +119,7 @@ def judge(row: FileRow, report: Report, lost: Sequence[str], reference: Referenc
         reasons += [say(Finding("verdict", kind, {"checks": getattr(failed, kind)})) for kind in kinds]
     if unfinished:
         reasons.append(block("fleet", "unfinished", reasons=unfinished))
-    row.reason = "; ".join(filter(None, (*reasons, reference.matched)))
+    row.reason = "; ".join(filter(None, (*reasons, reference.matched, *reference.otherwise)))
     row.worst_ratio = None if top is None else top.over_tolerance
     row.stable_at_file_dt, row.limit = own_step(sections)
 
@@ -135,7 +137,8 @@ def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
 
 def table_of(rows: Sequence[FileRow]) -> str:
     """fleet.csv."""
-    return files.csv(rows, FLEET_COLUMNS)
+    has_points = any(row.points is not None for row in rows)
+    return files.csv(rows, (*FLEET_COLUMNS, "points") if has_points else FLEET_COLUMNS)
 
 
 def earlier(folder: str) -> dict[str, dict[str, str]]:
@@ -172,9 +175,13 @@ def is_change(old: str, new: str) -> bool:
 
 
 def write_table(
-    out: Path, rows: Sequence[FileRow], left_out: LeftOut, changed: Sequence[str] | None, command: str
-) -> list[str]:
-    """Write fleet.csv and index.html; the lines of the summary. changed: lines of --since, None: without it."""
+    out: Path, rows: Sequence[FileRow], left_out: LeftOut, changed: Sequence[str] | None, command: str,
+    most_points: float | None = None,
+) -> list[str]:  # fmt: skip
+    """Write fleet.csv and index.html; the lines of the summary. changed: lines of --since, None: without it.
+
+    most_points: of a rubric; None: there is none.
+    """
     rows = sorted(rows, key=lambda row: row.order)
     numbers = dict(Counter(row.verdict for row in rows))  # in the order of VERDICTS
     copies = sum(row.same_as is not None for row in rows)
@@ -183,14 +190,16 @@ def write_table(
     summary = [line for line in block("fleet", "summary", **about).split("\n") if line]
     origin = {"command": command, "date": datetime.now(UTC).isoformat(timespec="seconds"), "commit": commit()}
     origin |= {OURS: installed(OURS), "mujoco": installed("mujoco")}
-    page = fleet_page(rows, summary=summary, left_out=left_out, changed=changed, origin=origin)
+    page = fleet_page(
+        rows, most_points=most_points, summary=summary, left_out=left_out, changed=changed, origin=origin
+    )
     for name, content in (("fleet.csv", table_of(rows)), ("index.html", page)):
         write_whole(out / name, content.encode("utf-8", "backslashreplace"))
     return summary
 
 
 def fleet_page(rows: Sequence[FileRow], **values: object) -> str:
-    """The page as HTML. values: summary, left_out, changed and origin, as in write_table."""
+    """The page as HTML. values: summary, left_out, changed, origin and most_points, as in write_table."""
     title, good = block("fleet", "title"), not any(row.is_bad for row in rows)
     pages = environment()
     body = pages.get_template("fleet.html.jinja").render(rows=rows, title=title, good=good, **values)

@@ -27,7 +27,10 @@ MOST_ROWS, MOST_IN_MARKDOWN = 40, 6  # of a table; its file has all
 FIRST_NOTES = 3  # of a section of the page, which folds the others
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
-MAIN_TABLES = {"what_should_i_use": "What should I use?"}  # further tables of report.md, with their titles
+MAIN_TABLES = {
+    "what_should_i_use": "What should I use?",
+    "engines_answer": "Which engine?",
+}  # further tables of report.md, with their titles
 # macros of a picture of the first screen: overview_title, overview_alternative
 WORDS = "title", "alternative"
 # columns of failing checks

@@ -1,4 +1,4 @@
-"""Actuators, tendons and gravity compensation of a robot.
+"""The actuators of a robot.
 
 The law of an actuator is MuJoCo's: force = (g0 + g1 l + g2 ldot) u + b0 + b1 l + b2 ldot, along the length l of its transmission,
 with u its control, or its activation. MuJoCo documentation, computation, actuation model.
@@ -12,7 +12,6 @@ import numpy as np
 
 Range = tuple[float, float]  # (low, high)
 Posture = str | tuple[float, ...]  # its name, or numbers
-ON_EDGE = 1e-9  # m or rad, distance from the edge of a dead band that counts as on the edge
 
 
 @dataclass(frozen=True)
@@ -29,10 +28,8 @@ class Actuator:
     gain: tuple[float, ...] = (0.0, 0.0, 0.0)  # g0, g1, g2
     bias: tuple[float, ...] = (0.0, 0.0, 0.0)  # b0, b1, b2
     dynamics: str = "none"  # or integrator, filter, filterexact: then u is the activation
-    time_constant: float = 0.0  # s, of a filter
     control_range: Range | None = None
     activation_range: Range | None = None
-    force_range: Range | None = None  # N or N m
     off: str = ""  # why it exerts no force; "": it does
     refused: str = ""  # why its law is not supported; "": it is
 
@@ -62,11 +59,6 @@ class Actuator:
     def force(self, u: float, length: float) -> float:
         return (self.gain[0] + self.gain[1] * length) * u + self.bias[0] + self.bias[1] * length
 
-    def largest(self, u: float, length: float) -> float:
-        """The largest of the terms that are added in the force."""
-        terms = self.gain[0] * u, self.gain[1] * length * u, self.bias[0], self.bias[1] * length
-        return max(map(abs, terms))
-
     def stiffness(self, u: float) -> float:
         """-d force/dl."""
         return -(self.gain[1] * u + self.bias[1])
@@ -75,67 +67,13 @@ class Actuator:
         """-d force/dldot."""
         return -(self.gain[2] * u + self.bias[2])
 
-    def is_cut(self, force: float) -> bool:
-        """Whether the force range limits a force, which is then constant."""
-        return self.force_range is not None and not self.force_range[0] < force < self.force_range[1]
-
-
-class Tendon(NamedTuple):
-    """A tendon with a spring, whose force is 0 from `low` to `high`, and a damper."""
-
-    name: str
-    number: int  # index in the model
-    moment: tuple[float, ...] | None  # (nv,), see Actuator
-    stiffness: float  # N/m, or as its length is measured
-    damping: float
-    low: float
-    high: float
-
-    def force(self, length: float) -> float:
-        return self.stiffness * (min(self.high - length, 0.0) + max(self.low - length, 0.0))
-
-    def largest(self, length: float) -> float:
-        return self.stiffness * max(abs(length), abs(self.low), abs(self.high)) if self.pulls(length) else 0.0
-
-    def pulls(self, length: float) -> bool:
-        """Whether its spring acts at a length; on the edge of the dead band it acts on one side."""
-        return not self.low + ON_EDGE < length < self.high - ON_EDGE
-
-
-class Rows(NamedTuple):
-    """c constraints of MuJoCo near a posture at rest: J qdd + R f = aref, aref = -damping J qd - stiffness r + aref at rest.
-
-    jacobian: J (c, nv); forces: f at rest, (c,) N m or N, generalized force J' f; damping (c,), 1/s; stiffness (c,), 1/s2, per
-    violation r, includes the effect of the change of R on f; softness: R (c,).
-    """
-
-    jacobian: np.ndarray
-    forces: np.ndarray
-    damping: np.ndarray
-    stiffness: np.ndarray
-    softness: np.ndarray
-
 
 @dataclass(frozen=True)
 class Drive:
-    """The actuators, tendons and gravity compensation of a robot.
-
-    controls: by posture, u of each actuator in its keyframe, or None. compensation: of each body of the Tree, the part of its
-    weight that is compensated. unknown: other elements that are left out, and why.
-    """
+    """The actuators of a robot. controls: by posture, u of each actuator in its keyframe, or None."""
 
     actuators: tuple[Actuator, ...] = ()
-    tendons: tuple[Tendon, ...] = ()
-    compensation: tuple[float, ...] = ()
     controls: Mapping[str, tuple[float | None, ...]] = field(default_factory=dict)
-    unknown: Mapping[str, str] = field(default_factory=dict)
-    explicit_damping: bool = False  # the file disables EULERDAMP
-
-    @property
-    def refused(self) -> dict[str, str]:
-        """Elements that are left out, by name, and why."""
-        actuators = {actuator.name: actuator.refused for actuator in self.actuators if actuator.refused}
-        return actuators | dict(self.unknown)
 
     @property
     def feeds_back(self) -> bool:

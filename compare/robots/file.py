@@ -42,7 +42,7 @@ class RobotFile:
     ranges: tuple[Range, ...]  # of each joint; a ball's of the angle of its turn
     integrator: str  # by MuJoCo's name
     dt: float  # s
-    drive: Drive  # actuators, tendons, gravity compensation; controls by the names of `keyframes`
+    drive: Drive  # its actuators; controls by the names of `keyframes`
 
 
 def robot_of(file: RobotFile, shown: str) -> Robot:

@@ -14,7 +14,7 @@ import numpy as np
 import tmt
 
 from ..core.words import listed, some_of
-from .coordinates import Coordinates
+from .coordinates import FREE, Coordinates, free_joints
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}
 NUMBER = r"[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -241,6 +241,19 @@ def places_of(tree: tmt.Tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.array(anchors), np.array(depths), np.array(axes)
 
 
+def named_with_kind(tree: tmt.Tree, joints: Sequence[int]) -> list[str]:
+    """Some joints with their kind: "wrist (hinge)"; the parts of a free joint as that one."""
+    of_free: dict[int, str] = {}
+    for first in free_joints(tree):
+        name = tree.joint_names[first]
+        of_free |= dict.fromkeys(range(first, first + len(FREE)), name.removesuffix(" x"))
+    names = []
+    for joint in joints:
+        named = f"{tree.joint_names[joint]} ({tree.kind[joint]})"
+        names.append(f"{of_free[joint]} (free)" if joint in of_free else named)
+    return list(dict.fromkeys(names))
+
+
 def refuse_unmatched(reference: tmt.Tree, tree: tmt.Tree, pairs: Mapping[int, int], whose: str) -> None:
     """Unmatched, if a joint is missing, additional, or of another kind."""
     wrong = []
@@ -249,8 +262,8 @@ def refuse_unmatched(reference: tmt.Tree, tree: tmt.Tree, pairs: Mapping[int, in
             expected = f"expected a {reference.kind[i]} as in {whose}"
             wrong.append(f"joint {tree.joint_names[j]} is a {tree.kind[j]}, {expected}")
     for word, joints, matched in (("missing", reference, pairs.keys()), ("additional", tree, pairs.values())):
-        named = [f"{name} ({kind})" for name, kind in zip(joints.joint_names, joints.kind)]
-        if left := [text for k, text in enumerate(named) if k not in matched]:
-            wrong.append(f"{word} joints: {some_of(left)}")
+        left = [k for k in range(len(joints.joint_names)) if k not in matched]
+        if left:
+            wrong.append(f"{word} joints: {some_of(named_with_kind(joints, left))}")
     if wrong:
         raise Unmatched("; ".join(wrong))

@@ -99,7 +99,7 @@ class Robot:
     # (answers by item, dynamics by engine) -> Findings about the printed results
     remarks: Callable[[Mapping[str, Any], Mapping[str, Any]], list[Finding]] | None = None
     features: tuple[Feature, ...] = ()  # of a file; its numbers are those that MuJoCo compiled
-    drive: Drive = field(default_factory=Drive)  # forces other than gravity and springs of joints
+    drive: Drive = field(default_factory=Drive)  # its actuators
     stated_in: str = ""  # another file, the solution, with the numbers for this one; "": none
     features_stated: tuple[Feature, ...] = ()  # of the solution, as `features`
     own: tuple[str, ...] = ()  # functions of a user's equations, "mass_matrix" ...; (): tmt's are compared

@@ -62,7 +62,7 @@ def compute(
 ) -> Written:
     """Run the experiments and write the report to a folder; see write_report."""
     is_alone, robot, started = options.experiment != "all", compared.robot, time.perf_counter()
-    step = compared.integrator_step(options.dt, options.integrator)
+    request = compared.request_of(options)
     terminal.say_lines(compared.reference.lines)
     if robot.coordinates.nv > MOST_SPEEDS:
         terminal.say(say(Finding("shared", "large", {"speeds": robot.coordinates.nv, "most": MOST_SPEEDS})))
@@ -76,8 +76,13 @@ def compute(
         reasons = {name: say(reason) for name in names if (reason := skipped(name, robot))}
         names = [name for name in names if name not in reasons]
         origin = provenance(command, robot.mjcf, compared.reference.file, SEED)  # of the model as it was read
-        more = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
-        setup = examine.setup_of(compared, options.quick, alone=is_alone, step=step, **more)
+        more = {
+            "map": workers.map,
+            "quiet": workers.quiet,
+            "progress": terminal.show,
+            "chosen": options.engines,
+        }
+        setup = examine.setup_of(compared, options.quick, alone=is_alone, request=request, **more)
         for name, said in reasons.items():
             terminal.say(block("run", "skipped", name=name, reason=said))
         terminal.how_far = partial(examine.progress, workers.clock, names)

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple, TypeVar
 
 from ..core.cause import Cause
 from ..core.check import ENDS, About, Result
-from ..core.errors import described
+from ..core.errors import Refused, described
 from ..core.finding import Finding
 from ..core.text import block, say
+from ..engines import RECORDS
 from ..engines.own import Problem
 from ..experiments import EXPERIMENTS, TIMED, Experiment, functions, module
 from ..experiments.setup import Setup, engines
@@ -38,11 +39,22 @@ class Examined(NamedTuple):
     needless: dict[str, str]  # experiments that were skipped, and why
 
 
-def setup_of(compared: Compared, is_quick: bool, **more: Any) -> Setup:
-    """What the experiments need. more: further fields of Setup."""
+def setup_of(compared: Compared, is_quick: bool, chosen: str | None = None, **more: Any) -> Setup:
+    """What the experiments need. chosen: the engines of --engines; more: further fields of Setup."""
     make = Setup.quick if is_quick else Setup
     of_run = engines(compared.mujoco, compared.reference.own)
+    if chosen:
+        others = not_chosen(chosen)
+        of_run = {name: engine for name, engine in of_run.items() if name not in others}
     return make(compared.robot, of_run, reading=compared.reading, **more)
+
+
+def not_chosen(chosen: str) -> set[str]:
+    """The engines that read files and are not among names separated by commas. Refused: a name is none of these."""
+    known, names = [name for name, record in RECORDS.items() if record.reads_file], chosen.split(",")
+    if unknown := [name for name in names if name not in known]:
+        raise Refused(block("run", "no_engine", name=unknown[0], known=known))
+    return {*known} - {*names}
 
 
 def examine(names: Sequence[str], setup: Setup, *place: Any) -> Examined:

@@ -1,5 +1,8 @@
 """The reference of a file: the arm's stated numbers, those of a solution, tmt's equations for the model, or a user's own."""
 
+import argparse
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -11,15 +14,18 @@ from ..core.words import in_one_line
 from ..engines import Engine
 from ..engines.mujoco import ModelError, Mujoco, Reading, Source, engine, has_hinges, parse, read
 from ..engines.mujoco.names import integrator_by_name
-from ..engines.mujoco.parameters import of_source, remarks
+from ..engines.mujoco.parameters import of_source, of_welded, remarks
 from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import OwnFileError, aside, own_object, raised_in
+from ..experiments.setup import Request
 from ..robots import Robot
 from ..robots.actuators import Drive
 from ..robots.arm import ARM
 from ..robots.case import SEED
 from ..robots.file import robot_of, robot_of_solution
 from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, matched_joints
+from ..robots.placement import placed
+from ..stability.answer import posture_of
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 SOLUTION = "solution"  # the kind of reference that is another file
@@ -42,6 +48,9 @@ class Reference(NamedTuple):
     source: str = ""  # the solution, or the place of own equations, as given, in one line
     own: Own | None = None  # the engine of these equations
     renamed: tuple[str, ...] = ()  # "wrist as hand": joints matched under other names
+    otherwise: tuple[
+        str, ...
+    ] = ()  # what the file models in another way, without another motion, a line each
 
     @property
     def name(self) -> str:
@@ -56,7 +65,13 @@ class Reference(NamedTuple):
         """The first lines of the output and of the report."""
         other = REFERENCES.get(self.kind, self.source.removesuffix(":"))
         first = f"reference: {self.kind}; {self.file} compared with {other}"
-        lines = first, self.matched, *self.remarks, *(f"MuJoCo warns: {line}" for line in self.warnings)
+        lines = (
+            first,
+            self.matched,
+            *self.otherwise,
+            *self.remarks,
+            *(f"MuJoCo warns: {line}" for line in self.warnings),
+        )
         return tuple(in_one_line(line) for line in lines if line)
 
 
@@ -66,18 +81,31 @@ class Compared(NamedTuple):
     mujoco: Mujoco
     reading: Reading | None  # None: the robot's numbers are stated
 
-    def integrator_step(self, dt: float | None, integrator: str | None) -> tuple[float, str] | None:
-        """The step, s, and the integrator of --dt and --integrator, the file's where one is None; None: both are."""
-        if dt is None and integrator is None:
-            return None
-        if self.reading is None:
-            stated = f"the numbers of {self.robot.name} are stated"
-            raise ModelError(f"--dt and --integrator need a robot's file; {stated}")
+    def request_of(self, options: argparse.Namespace) -> Request:
+        """What the options ask of stability; ModelError, in one line, for what needs a file or is not of this one."""
+        asked = {name: getattr(options, name) for name in (*Request._fields[1:], "dt", "integrator")}
+        given = [f"--{name.replace('_', '-')}" for name, value in asked.items() if value]
+        if given and self.reading is None:
+            need = "needs" if len(given) == 1 else "need"
+            raise ModelError(
+                f"{' and '.join(given)} {need} a robot's file; the numbers of {self.robot.name} are stated"
+            )
+        dt, integrator = asked.pop("dt"), asked.pop("integrator")
+        if self.reading is None or not given:
+            return Request()
+        for name in ("delay", "kp"):
+            if asked[name] and not asked["control_period"]:
+                raise ModelError(f"--{name} is of a program with a --control-period")
+        if asked["kv"] and not asked["kp"]:
+            raise ModelError("--kv needs --kp")
         try:
             name = integrator_by_name(integrator or self.reading.integrator)
+            if asked["posture"]:
+                posture_of(asked["posture"], self.reading)
         except ValueError as error:
-            raise ModelError(f"--integrator: {error}") from None
-        return self.reading.dt if dt is None else dt, name
+            raise ModelError(f"{' '.join(given)}: {error}") from None
+        step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
+        return Request(step, **asked)
 
 
 def compared_with(
@@ -92,23 +120,23 @@ def compared_with(
     """
     source, shown = Source(Path(path or ARM.mjcf), floating), in_one_line(shown or path or "mjcf/arm.xml")
     if reference == "arm" or (reference is None and (path is None or has_hinges(source, ARM.joints))):
-        robot, renamed = replace(ARM, mjcf=Path(path or ARM.mjcf)), Matched(ARM.joints, ()).renamed
-        if not has_hinges(source, ARM.joints):
-            names, renamed = joints_matched(ARM, read(source), shown, "the arm")
-            robot = robot.with_joints(names)
-        said = tuple(map(say, of_source(source))) if path else ()
-        of_arm = Reference("arm", shown, said, source.warnings, renamed=renamed)
-        return Compared(of_arm, robot, parse(source, robot.tree), None)
+        return with_arm(source, path, shown)
     reading = read(source)
     said = tuple(map(say, remarks(reading, has_scenes=True)))
     of_file = Reference("model", shown, said, reading.warnings, source=in_one_line(reference or ""))
     if reference and is_solution(reference):
-        stated = read(Path(solution or reference))
+        other = Source(Path(solution or reference))
+        stated = read(other)
         names, renamed = joints_matched(stated, reading, shown, of_file.source)
+        if bodies_on(stated, names) != bodies_on(reading, reading.tree.joint_names):
+            source, other = source.joined(), other.joined()
+            reading, stated = read(source), read(other)
+        placement = placed(replace(stated.tree, joint_names=names), reading.tree)
         # its actuators do not act: those of the file may differ
-        stated = replace(stated, tree=replace(stated.tree, joint_names=names), drive=Drive())
+        stated = replace(stated, tree=placement.tree, drive=Drive())
         robot = robot_of_solution(reading, shown, stated, of_file.source)
-        of_file = of_file._replace(kind=SOLUTION, renamed=renamed)
+        otherwise = tuple(map(say, placement.remarks() + of_welded(source)))
+        of_file = of_file._replace(kind=SOLUTION, renamed=renamed, otherwise=otherwise)
         return Compared(of_file, robot, engine(reading, stated), reading)
     robot, mujoco = robot_of(reading, shown), engine(reading)
     if reference in (None, "model"):
@@ -116,6 +144,24 @@ def compared_with(
     own = own_engine(reference, robot, mujoco, joints)
     robot = replace(robot, own=tuple(own.equations.functions))
     return Compared(of_file._replace(kind="own", own=own), robot, mujoco, reading)
+
+
+def with_arm(source: Source, path: Text, shown: str) -> Compared:
+    """A file (None: the arm's) and the arm's stated numbers, placed as in the file, whose welded bodies are one."""
+    if path is None:
+        return Compared(Reference("arm", shown, (), source.warnings), ARM, parse(source, ARM.tree), None)
+    said = tuple(map(say, of_source(source)))
+    source, robot, names = source.joined(), replace(ARM, mjcf=Path(path)), Matched(ARM.joints, ())
+    reading = read(source)
+    if not has_hinges(source, ARM.joints):
+        names = joints_matched(ARM, reading, shown, "the arm")
+    robot = robot.with_joints(names.names)
+    placement = placed(robot.tree, reading.tree)
+    if not placement.is_same:
+        robot = replace(robot, tree=placement.tree, landmarks=None)  # which are those of the stated place
+    otherwise = tuple(map(say, placement.remarks() + of_welded(source)))
+    of_arm = Reference("arm", shown, said, source.warnings, renamed=names.renamed, otherwise=otherwise)
+    return Compared(of_arm, robot, parse(source, robot.tree), None)
 
 
 def is_solution(reference: str | None) -> bool:
@@ -128,6 +174,11 @@ def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose:
         return matched_joints(stated.tree, reading.tree, whose)
     except Unmatched as error:
         raise JointsDiffer(shown, whose, str(error)) from None
+
+
+def bodies_on(reading: Reading, names: Sequence[str]) -> Counter[str]:
+    """How many bodies with mass are on each joint, by names of the joints in the order of its Tree."""
+    return Counter(names[joint] for joint in reading.tree.body_joint)
 
 
 def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None) -> Own:

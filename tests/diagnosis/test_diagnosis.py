@@ -63,7 +63,7 @@ def added(column, force, factor=1.0):
 
 CAUSES = {  # the given values, or the tree whose values these are: rank, place and what explains it; whether it is the only one
     "a number": (HEAVY, 2, "mass of forearm", 1.52, True),
-    "two masses exchanged": (replace(ARM, mass=ARM.mass[::-1]), 3, "mass of upper arm and mass of forearm", "1.5 and 1.9", False),
+    "two masses exchanged": (replace(ARM, mass=ARM.mass[::-1]), 2, "masses of upper arm and forearm", "exchanged", True),
     "damping in h": (added(7, 0.1 * QD[:, 1]), 2, "damping of beta in h", 0.1, True),
     "a factor of both": (added(slice(None), 0.0, 1.25), 2, "all of M and h", 1.25, False),
     "a factor of a row": (added(7, 0.0, 1.25), 2, "h[beta]", 1.25, False),
@@ -80,9 +80,10 @@ CAUSES = {  # the given values, or the tree whose values these are: rank, place 
 @pytest.mark.parametrize("given, rank, place, explains, alone", CAUSES.values(), ids=CAUSES)
 def test_a_cause_is_named_with_its_value_and_its_rank(given, rank, place, explains, alone):
     causes = diagnosis(given, DAMPED if "D qd" in place else ARM).causes
-    assert {(cause.rank, cause.tied) for cause in causes} == {(rank, len(causes) - 1)}
+    assert {cause.tied for cause in causes} == {len(causes) - 1}
     assert len(causes) == 1 or not alone
     (cause,) = (cause for cause in causes if cause.place == place)
+    assert cause.rank == rank
     assert cause.explains == (explains if isinstance(explains, str) else pytest.approx(explains, rel=1e-9))
     assert cause.left_over < 1e-11
 
@@ -94,7 +95,7 @@ def test_angles_to_the_world_are_an_option_of_parallel_hinges():
     turns = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 1.0, 1.0]])  # joint angles from angles
     M, h = tmt.mass_matrix(Q @ turns.T, row), tmt.bias(Q @ turns.T, QD @ turns.T, row)
     given = Values.of(row, Q, QD, turns.T @ M @ turns, h @ turns, rounding=640.0 * EPS)
-    assert "angles" in {cause.place for cause in diagnose(row, given).causes}
+    assert "angle of beta and gamma" in {cause.place for cause in diagnose(row, given).causes}
 
 
 def test_what_nothing_explains_names_the_entries():
@@ -154,10 +155,10 @@ def told(changes, bias=lambda q, qd: tmt.bias(q, qd, TREE)):
 
 
 LOWER, ANGLE = 4.905 * (np.sin(HIP - KNEE) - np.sin(HIP + KNEE)), 14.715 * (HIP - np.sin(HIP))
-BOTH, SINES = ["h[hip], gravity", "h[knee], gravity"], [" 4.905 sin(hip - knee) ", " 4.905 sin(hip + knee)"]
+SINES = [" 4.905 sin(hip - knee) ", " 4.905 sin(hip + knee)"]
 TERMS = {  # what is added: the coefficients that are named, and what is said of each: of yours, of the right one
     "a factor": ({M00: -0.7 * np.cos(KNEE)}, ["M[hip][hip]"], [" 0.3 cos(knee) ", " cos(knee)"]),
-    "another angle": ({H0: LOWER, H1: LOWER}, BOTH, SINES),
+    "another angle": ({H0: LOWER}, ["h[hip], gravity"], SINES),
     "an angle for its sine": ({H0: ANGLE}, ["h[hip], gravity"], [" 14.715 hip ", " 14.715 sin(hip)"]),
 }
 
@@ -174,7 +175,7 @@ def test_a_wrong_term_is_named(changes, names, numbers):
 @pytest.mark.parametrize("added, factor, places", [
     (-2.0, -1.0, {"mass of lower * (offset of knee)^2 in M[hip][hip]"}),
     (np.cos(KNEE), 2.0, {"mass of lower * offset of knee * CoM of lower in M[hip][hip]"}),
-    (-0.1, 0.0, {"B' I B of lower in M[hip][hip]", "B' I B of upper in M[hip][hip]"}),
+    (-0.1, 0.0, {"rotational inertia of lower in M[hip][hip]", "rotational inertia of upper in M[hip][hip]"}),
 ])  # fmt: skip
 def test_a_slip_in_one_part_of_M_comes_before_unusual_factors_of_other_terms(added, factor, places):
     causes = told({M00: added}).causes

@@ -6,13 +6,11 @@ import pytest
 from edited import setup_of_file
 from files import TENDON, TWO, mjcf
 from models import PATHS
-from servo_models import FILTERED, hinge, posture_of
 
 import tmt
 from compare.engines.mujoco import read
-from compare.engines.mujoco.acting import Acting, add_armature
+from compare.engines.mujoco.variants import add_armature
 from compare.engines.tmt import Tmt
-from compare.experiments.stability.servos.predicted import acting_at
 
 SITES = TWO.replace("<geom", '<site name="s" pos="0.1 0 0"/><geom', 1)
 REFUSED = {  # actuator, and a word of why it takes no part
@@ -69,16 +67,8 @@ def text_of(actuators='<motor joint="k"/>', tendon="", content=TWO, keys=""):
 def test_a_law_that_is_not_known_is_refused_by_name_and_the_rest_is_done(text):
     more = text.replace(" ", ' name="x" ', 1)
     drive = read(text_of('<position name="p" joint="j" kp="5"/>' + more, content=SITES)).drive
-    assert drive.refused.keys() == {"x"} and REFUSED[text] in drive.refused["x"]
-    assert [one.name for one in drive.actuators if one.is_servo] == ["p"]
-
-
-@pytest.mark.parametrize("what", ["stiffness", "damping"])
-def test_springs_and_dampers_that_are_not_linear_are_named(what):
-    joint, tendon = TWO.replace('name="j"', f'name="j" {what}="1 2"'), f'{what}="1 2"'
-    drive = read(text_of(tendon=tendon, content=joint)).drive
-    assert drive.refused.keys() == {"joint j", "tendon t"}
-    assert all(what in why for why in drive.refused.values())
+    known, other = drive.actuators
+    assert (known.name, known.is_servo, known.refused) == ("p", True, "") and REFUSED[text] in other.refused
 
 
 @pytest.mark.parametrize("actuators, key, expected", [
@@ -103,7 +93,7 @@ def test_armature_is_added_to_bodies_whose_inertia_never_changes():
     free = '<body><freejoint/><geom size="0.1"/></body>'
     reading = read(mjcf(free + '<body><joint type="slide"/><geom size="0.1"/></body>' + TWO))
     heavy = mujoco.MjModel.__copy__(reading.model)
-    add_armature(heavy, list(range(heavy.nv)), 2.0)
+    add_armature(heavy, np.full(heavy.nv, 2.0))
     added = mass_matrix(heavy) - mass_matrix(reading.model)
     assert added == pytest.approx(2.0 * np.eye(heavy.nv), abs=1e-12)
 
@@ -115,24 +105,6 @@ def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
     reading, model = read(text), mujoco.MjModel.from_xml_string(text)
     assert [one.moment for one in reading.drive.actuators[1:]] == [(3.0, 0.0), (5.0, 10.0)]
     assert tmt.mass_matrix(np.zeros(2), reading.tree) == pytest.approx(mass_matrix(model))
-    _, moments = Acting(model, reading.drive).along(np.zeros(2))
-    assert moments[1:].tolist() == [[3.0, 0.0], [5.0, 10.0]]
-
-
-@pytest.mark.parametrize("integrator", ["Euler", "RK4"])
-def test_a_run_in_parts_is_the_run_that_steps_make(integrator):
-    at, reading = posture_of(hinge(actuator=FILTERED.format(kind="filter", constant=0.01)))
-    acting, u, jump = acting_at(reading, at), np.array([0.3]), np.array([0.1])
-    parts = list(acting.deviations(at.q, u, 0.004, integrator, [3, 5], 1e-3, 2e-3, 0.05, jump))
-    assert [part.shape for part in parts] == [(3, 2), (5, 2)]
-    model, data = acting.at(at.q, u + jump, 0.004, integrator)
-    assert data.ctrl[0] == data.act[0] == pytest.approx(0.4)
-    data.qpos += 1e-3
-    data.qvel[:] = 2e-3
-    data.act += 0.05
-    for found in np.concatenate(parts):
-        mujoco.mj_step(model, data)
-        assert found == pytest.approx([data.qpos[0] - at.q[0], data.act[0] - 0.4], rel=1e-12)
 
 
 @pytest.mark.parametrize("name", LAWS)

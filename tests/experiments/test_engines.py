@@ -16,7 +16,7 @@ from edited import setup_of
 from compare import engines
 from compare.core.check import About, Result
 from compare.engines import EngineRecord, Method
-from compare.engines.outside.model import combined, numbers_of, size_of
+from compare.engines.outside.model import FROM_FILE, combined, numbers_of, size_of
 from compare.engines.tmt import TmtDynamics
 from compare.experiments.engines import EnginesResult, compare_numbers, compare_quantities, integrators
 from compare.judge.entries import Entries
@@ -69,7 +69,7 @@ class Model(ReadModel):
         return tmt.acceleration(q, v, force, dataclasses.replace(self.tree, damping=[0.0] * len(v)))
 
     def run(self, course):
-        q, v, tau, times, steps, method, tolerance = course
+        q, v, tau, times, steps, method, tolerance, _ = course
         method = {{"Euler": "{euler}", "free": "dopri8_adaptive"}}.get(method, method)
         steps = steps or len(times) - 1
         m = tmt.simulate(q, v, tau, times[-1] / steps, steps, method, self.tree, tolerance)
@@ -134,6 +134,7 @@ def test_each_seeded_error_fails_its_own_checks_and_no_others(report):
     failed = {}
     for check in checks:
         if not check["passed"]:
+            assert check["scene"], check
             failed.setdefault(check["scene"].split()[0].rstrip(","), set()).add(check["quantity"])
     assert "Right" not in failed and "Upside" not in failed
     assert failed["Heavy"] == {"mass as read", "Mbar to exact", "bias to exact", "qdd to exact"}
@@ -150,18 +151,39 @@ def test_what_is_read_differently_is_a_row_and_says_whether_it_was_set(report):
     numbers = float(heavy["read"]), float(heavy["compared"]), heavy["set_by_this_program"]
     assert numbers == (1.001, 1.0, "false")
     assert ("Blind", "", "") in rows and rows["Blind", "", ""]["why_not"]  # it cannot read the file
-    assert {engine for engine, *_ in rows} == {"Upside", "Heavy", "Blind"}
+    (axis,) = (row for (engine, number, _), row in rows.items() if (engine, number) == ("Tilted", "axis"))
+    assert float(axis["read"]) == pytest.approx(1e-6)  # of its three numbers that which differs
+    assert {engine for engine, *_ in rows} == {"Upside", "Heavy", "Blind", "Tilted", "Slow"}
+
+
+def test_two_verdicts_stand_side_by_side(report):
+    """As read, and as set: gravity can be set, mass and axis cannot; who takes no part is not counted among those who agree."""
+    rows = {row["engine"]: row for row in table(report[0], "engines_answer")}
+    verdicts = {
+        label: (rows[label]["as_read"], rows[label]["as_set"]) for label in ("Right", "Upside", "Heavy")
+    }
+    assert verdicts == {
+        "Right": ("same", "same"),
+        "Upside": ("gravity", "same"),
+        "Heavy": ("mass", "not set"),
+    }
+    assert rows["Later"]["as_set"] == "same" and "Blind" not in rows
+    shares = {(row["engine"], row["quantity"]): row for row in table(report[0], "engines")}
+    assert float(shares["Upside", "bias"]["as_read_over_bar"]) > 1e6
+    assert float(shares["Upside", "bias"]["difference_over_bar"]) < 1.0
+    assert rows["Right"]["within_1e_9"] and float(rows["Right"]["floor_rad"]) < 1e-9
 
 
 def test_orders_are_measured_and_what_does_not_answer_or_cannot_be_set_does_not_run(report):
     assert "Slow: no answer within 6 s" in (report[0] / "report.md").read_text()
     rows = table(report[0], "engines_methods")
-    assert {row["engine"] for row in rows} == {"Right", "Tilted", "Upside", "Bare", "Later", "MuJoCo", "TMT"}
+    assert {row["engine"] for row in rows} == {"Right", "Upside", "Bare", "Later", "MuJoCo", "TMT"}
     errors = {row["dt_s"]: float(row["worst_error_rad"]) for row in rows
               if row["engine"] == "Right" and row["method"] == "rk4"}  # fmt: skip
     assert len(errors) > 2 and min(errors.values()) < max(errors.values()) / 100.0
-    assert "Heavy" in report[1] and "1 more" not in report[1].splitlines()[0]
-    assert "gravity of Upside" in " ".join(report[1].split())  # the answer says what this program has set
+    said = " ".join(report[1].split())
+    assert "Upside, as read: gravity differs; as set: the same equations" in said
+    assert "Heavy, as read: mass differs; as set: it cannot all be set" in said
 
 
 def other(lacking="", **functions):
@@ -188,7 +210,7 @@ def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, p
     compare_quantities(result, setup_of(), record, other(**{quantity: wrong}))
     assert [check.quantity for check in result.checks if not check.passed] == [f"{name} to exact"] * fails
     assert all(check.about is About.ENGINE for check in result.checks)
-    assert [note.kind for note in result.notes] == ["cause"] * fails
+    assert result.rows[0].as_read_over_bar == result.rows[0].difference_over_bar  # nothing is set
 
 
 def test_an_engine_without_a_function_is_not_judged_by_it():
@@ -207,7 +229,8 @@ def test_a_number_as_read_just_inside_and_just_outside(number):
         size = size_of(stated, number) or 1.0
         is_none = not stated[number].any()
         read[number][..., -1] += off * RECORDS["float64"].eps * size * (differs or not is_none)
-        reading = {"read": read, "stated": stated, "mended": {number: True} if differs else {}}
+        reading = {"read": read, "stated": stated, "mended": {number: True} if differs else {}, "copied": None,
+                   "way": FROM_FILE, "lacking": (), "unwritten": ()}  # fmt: skip
         compare_numbers(result, ARM, RECORDS["float64"], reading)
         failed = [f"{number} as read"] * (differs and number in ("mass", "moments"))
         assert [check.quantity for check in result.checks if not check.passed] == failed

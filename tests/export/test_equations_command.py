@@ -13,6 +13,7 @@ from models import PATHS
 import compare
 import tmt
 from compare.__main__ import main
+from compare.experiments.quantities import QUANTITIES as COMPARED
 from compare.export import checks
 from compare.export.command import FILES, identifier
 from compare.export.programs import PROGRAMS, NotRun, Program, PythonProgram, WrongProgram
@@ -88,7 +89,7 @@ def test_states_are_spread_within_the_ranges_and_those_of_floats_are_floats():
 
     class Seen(Altered):
         def values(self, quantity, states):
-            seen.append(states)
+            seen.append(states[:3])
             return super().values(quantity, states)
 
     compared = compared_with("model", str(PATHS["arm7"]))
@@ -116,7 +117,7 @@ def test_what_is_judged_is_what_was_written(language, tmp_path):
     assert [row.passed for row in outcome.rows] == [True, False] and outcome.rows[0].operations > 10
 
 
-@pytest.mark.parametrize("name", QUANTITIES)
+@pytest.mark.parametrize("name", {quantity.function for quantity in COMPARED.values()})
 def test_each_quantity_has_a_counterpart_in_mujoco(name):
     compared = compared_with("model", str(PATHS["mixed"]))
     outcome = outcome_of(partial(Altered, compared.robot.tree, "", 0.0), name, compared=compared)

@@ -84,9 +84,11 @@ def report(tmp_path, name):
 
 def test_files_agree_or_are_refused_with_the_reason(fleet, tmp_path):
     found = fleet({
-        "good.xml": PENDULUM.format(0.1), "broken.xml": "<mujoco><worldbody>", "none.xml": "<mujoco/>",
+        "good.xml": PENDULUM.format(0.1), "broken.xml": "<mujoco><worldbody>", "none.xml": "<mujoco/>", "words.xml": "no model",
+        "page.xml": "<!DOCTYPE html>\n<html><p>Sign in<br></html>",
     }, ["parameters"])  # fmt: skip
-    assert found.verdicts == {"good.xml": ITSELF, "broken.xml": REFUSED, "none.xml": REFUSED}
+    refused = dict.fromkeys(["broken.xml", "none.xml", "page.xml", "words.xml"], REFUSED)
+    assert found.verdicts == {"good.xml": ITSELF, **refused} and "<html>" in found.rows["page.xml"].reason
     assert "joint" in found.rows["none.xml"].reason and len(found.rows["broken.xml"].sha256) == 64
     assert found.rows["good.xml"].joints == 1 and found.rows["good.xml"].seconds > 0.0 and found.of.is_good
     assert (report(tmp_path, "good.xml") / "index.html").is_file() and not found.rows["none.xml"].has_report

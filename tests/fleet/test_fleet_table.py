@@ -124,7 +124,7 @@ def test_a_verdict_a_step_or_a_limit_that_is_another_is_told(before, now, named,
 
 
 def page_of(rows, **more):
-    given = {"summary": [], "left_out": (), "changed": None, "origin": {}}
+    given = {"summary": [], "left_out": (), "changed": None, "origin": {}, "most_points": None}
     return table.fleet_page(rows=rows, **given | more)
 
 

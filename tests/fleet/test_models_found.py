@@ -41,15 +41,15 @@ def test_a_folder_gives_its_mjcf_at_any_depth_and_nothing_else(here):
     here(["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/folder.xml/h.xml"])
     here(["m/.git/f.xml", "m/b/.g.xml", "m/mesh.obj"])
     here(["m/robot.urdf", "m/robot.urdf.xml"], "<robot name='x'/>")
-    here(["m/robot.urdf.xacro", "m/world.sdf.xml"], "<sdf/>")
+    here(["m/robot.urdf.xacro", "m/world.sdf.xml"], "<sdf/>")  # the second is refused
     here("m/part.xml", "<mujocoinclude><body>")
     here(["m/none.xml", "m/words.xml"], "alpha turns")  # these are refused
     if hasattr(os, "mkfifo"):
         os.mkfifo("m/pipe.xml")
     found = ["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/folder.xml/h.xml", "m/none.xml", "m/robot.urdf",
-             "m/robot.urdf.xml", "m/words.xml"]  # fmt: skip
-    assert names("m") == found and "<sdf>" in left_out("m")["m/world.sdf.xml"]
-    assert names("m/world.sdf.xml") == ["m/world.sdf.xml"]  # what is named is a model
+             "m/robot.urdf.xml", "m/words.xml", "m/world.sdf.xml"]  # fmt: skip
+    assert names("m") == found and left_out("m") == {"m/part.xml": "root element <mujocoinclude>"}
+    assert names("m/part.xml") == ["m/part.xml"]  # what is named is a model
     if hasattr(os, "mkfifo"):
         with pytest.raises(Refused, match="not a regular file"):
             names("m/pipe.xml")

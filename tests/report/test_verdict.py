@@ -19,7 +19,7 @@ from compare.experiments.parameters.numbers import NumberRow
 from compare.experiments.published import PrintedRow
 from compare.experiments.speed import advice
 from compare.experiments.speed.runs import SpeedResult, SpeedRow
-from compare.experiments.stability.tables import LimitRow, StabilityResult, StepLimitRow
+from compare.experiments.stability.tables import LimitRow, StabilityResult
 from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.agree import AgreementRow
 from compare.report.questions import answers
@@ -28,6 +28,7 @@ from compare.report.verdict import failures, headline, outcome, passed, standing
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.run.examine import say_outcome, section_with
+from compare.stability.answer import StepLimitRow
 
 CAUSE = {"rank": 2, "experiment": "parameters", "text": "mass of forearm: stated 1"}
 OWN_STEP = ("stable at its own step", 0.002, 0.00111, "at most", False, About.STEP)
@@ -254,9 +255,10 @@ def test_limits_are_counted_and_drawn_where_they_are_predicted_and_observed():
 
 
 def test_where_the_robot_has_servos_the_limits_with_them_are_drawn():
-    row = StepLimitRow(posture="s", base="fixed", integrator="Euler", limit="finite", predicted_dt=0.1, file_dt=0.002, mode=9.0,
-                       file_integrator="Euler", stable_at_file_dt=True, limiting_joint="j", mode_kind="real")  # fmt: skip
-    rows = [replace(row, observed_dt=dt) for dt in (None, 0.1009, 0.1011)] + [replace(row, limit="saddle")]
+    row = StepLimitRow(posture="s", base="fixed", surroundings="free", integrator="Euler", limit="finite", predicted_dt=0.1,
+                       file_dt=0.002, file_integrator="Euler", stable_at_file_dt=True)  # fmt: skip
+    other = replace(row, observed_dt=0.001, failing_dt=0.0011)  # runs fail at the file's step
+    rows = [row, replace(row, observed_dt=0.1009), other, replace(row, limit="saddle")]
     result = StabilityResult("stability", rows=[STEP], centres=("s",), tables={"step_limits": rows})
     robot = replace(ARM, drive=robot_of(read(PATHS["arm7"]), "arm7.xml").drive)
-    assert {("s", to_hex(ORANGE), 0.1009), ("X", to_hex(RED), 0.1011)} <= marks("stability", result, robot)
+    assert {("s", to_hex(ORANGE), 0.1009), ("X", to_hex(RED), 0.001)} <= marks("stability", result, robot)

@@ -14,14 +14,20 @@ from hypothesis.extra.numpy import arrays
 
 import tmt
 from tmt.compiled import Evaluator, runner_of
-from tmt.derivation.quantities import QUANTITIES
+from tmt.derivation.quantities import PLAIN, QUANTITIES
 from tmt.methods import METHODS
 
 REST = np.zeros(3)
+TOOL = dataclasses.replace(tmt.ARM, site_names=["tool"], site_joint=[2])
 
 
 def moved(dt=0.1, steps=10, method="rk4", q=REST, qd=REST, tau=REST, **more):
     return tmt.simulate(q, qd, tau, dt, steps, method, **more)
+
+
+def stepped(name, value):
+    """A step with another argument."""
+    return tmt.step_derivatives(**{"q": REST, "qd": REST, "tau": REST, "dt": 0.1} | {name: value})
 
 
 def refused(call, *arguments) -> str:
@@ -60,6 +66,10 @@ SAID = [  # calls that are refused, and a word of what is said
     (lambda: moved(1e308, 100), "largest double"),
     *((lambda n=n: moved(1e-30, n, every=n), "steps is") for n in (0, 2**63, 10**400)),
     (lambda: moved(method="rk5"), "rk4, rk4_mean_speed, dopri8"),
+    (lambda: tmt.frame("hand", REST), "upper arm, forearm"),
+    (partial(stepped, "method", "taylor"), "dopri8"), (partial(stepped, "dt", -0.1), "dt is"),
+    (lambda: tmt.prepare(tmt.ARM, "step_derivatives:implicit_midpoint"), "NumPy alone"),
+    (partial(with_field(tmt.ARM, "site_names"), ["tool"]), "site_joint"),
     (lambda: moved(method="dopri8_adaptive", tolerance=0.0), "tolerance"),
     *((lambda every=every: moved(every=every), "every is") for every in (3, 0)),
     (lambda: moved(1e-3, 10**12), "4.8e+04 GB"),
@@ -95,13 +105,16 @@ NONSENSE = [
 
 
 PLACES = {
-    **{name: partial(getattr(tmt, name), *[REST] * (len(of.takes) - 1)) for name, of in QUANTITIES.items()},
+    **{name: partial(getattr(tmt, name), *[REST] * (len(QUANTITIES[name].takes) - 1)) for name in PLAIN},
+    "name of a frame": lambda name: tmt.frame(name, REST),
+    "speeds of a frame": lambda qd: tmt.frame("forearm", REST, qd),
+    **{f"{name} of a step": partial(stepped, name) for name in ("q", "qd", "tau", "dt", "method", "model")},
     **{name: lambda value, name=name: moved(**{name: value}) for name in ("q", "qd", "tau", "dt", "steps", "method", "model")},
     "tolerance": lambda value: moved(method="dopri8_adaptive", tolerance=value),
     "model of a quantity": lambda model: tmt.mass_matrix(REST, model=model),
     "lock": tmt.ARM.lock,
     "angle": lambda angle: tmt.ARM.lock({"beta": angle}),
-    **{f"Tree.{field.name}": with_field(tmt.ARM, field.name) for field in dataclasses.fields(tmt.Tree)},
+    **{f"Tree.{field.name}": with_field(TOOL, field.name) for field in dataclasses.fields(tmt.Tree)},
     **{f"method.{part}": with_field(METHODS["dopri8_adaptive"], part) for part in ("order", "A", "b", "c", "errors")},
     "A of an implicit method": with_field(METHODS["implicit_midpoint"], "A"),
     "tree of an evaluator": lambda tree: Evaluator(tree, "acceleration"),

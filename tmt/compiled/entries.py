@@ -1,11 +1,13 @@
 """The functions by which a compiled quantity is called: of one state, and of many.
 
-one(q, qd, tau, out): a state; whether it is wrong: a number that the quantity takes or gives is not finite, a quaternion not
-of length 1. rows(q, qd, tau, out, count, of_q, of_qd, of_tau): states one after the other, of_q numbers from each q to the next
-(0: the same for all); how often some were wrong.
+one(q, qd, tau, dt, out): a state; whether it is wrong: a number that the quantity takes or gives is not finite, a quaternion
+not of length 1. Where a quantity takes qdd, that is in the place of tau. rows(q, qd, tau, dt, out, count, of_q, of_qd, of_tau,
+of_dt): states one after the other, of_q numbers from each q to the next (0: the same for all); how often some were wrong.
 """
 
-from tmt.derivation.quantities import QUANTITIES
+from itertools import accumulate
+
+from tmt.derivation.quantities import quantity_of
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.tree import Tree
 
@@ -15,7 +17,7 @@ from .straight import Traced, functions
 
 INLINED = 600  # nodes that are put in the place of a call
 SHORTEST, LONGEST = (1.0 - CLOSE_TO_ONE) ** 2, (1.0 + CLOSE_TO_ONE) ** 2
-ARRAYS = ("q", "qd", "tau")
+ARRAYS = ("q", "qd", "tau", "dt")
 
 
 def source(tree: Tree, quantity: str, width: int) -> str:
@@ -31,10 +33,10 @@ class Entries:
 
     def __init__(self, tree: Tree, quantity: str, traced: Traced, width: int):
         self.tree, self.width, self.kind = tree, width, wide(DOUBLE, width)
-        self.sizes = tree.coordinates.nq, tree.coordinates.nv, tree.coordinates.nv
-        self.begins = 0, self.sizes[0], self.sizes[0] + self.sizes[1]  # of q, qd, tau in a state
+        self.sizes = tree.coordinates.nq, tree.coordinates.nv, tree.coordinates.nv, 1
+        self.begins = list(accumulate(self.sizes, initial=0))  # of q, qd, tau, dt in a state
         self.count, self.results = sum(self.sizes), len(traced.outputs)
-        self.taken = sum(size for name, size in zip(ARRAYS, self.sizes) if name in QUANTITIES[quantity].takes)
+        self.taken = self.begins[len(quantity_of(quantity).takes)]
         self.balls = [joint.q.start for joint in tree.coordinates.balls]
 
     def wrong(self, code: Code, state: Value, out: Value) -> Value:

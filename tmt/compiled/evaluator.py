@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tmt.derivation.quantities import QUANTITIES, shape_of
+from tmt.derivation.quantities import is_quantity, quantity_of, shape_of, what_is_known
 from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree
 from tmt.model.values import shown
@@ -26,7 +26,7 @@ TOGETHER = 32  # states that are not parted
 
 
 class Evaluator:
-    """One quantity of a tree, flat, `size` numbers for each state: what it takes stands in q (nq), qd and tau (nv).
+    """One quantity of a tree, flat, `size` numbers for each state: it takes q (nq), qd and tau or qdd (nv), dt (1).
 
     Arrays are contiguous and float64: their shapes are not checked. Numbers are computed as they are: of angles beyond 2^49 rad
     results are NaN.
@@ -34,11 +34,11 @@ class Evaluator:
 
     def __init__(self, tree: Tree, quantity: str):
         checked_model(tree)
-        if not isinstance(quantity, str) or quantity not in QUANTITIES:
-            raise ValueError(f"quantity is {shown(quantity)}; known are {', '.join(QUANTITIES)}")
+        if not is_quantity(quantity):
+            raise ValueError(f"quantity is {shown(quantity)}; {what_is_known(quantity)}")
         self.tree, self.quantity = tree, quantity
-        self.sizes = tree.coordinates.nq, tree.coordinates.nv, tree.coordinates.nv
-        self.shape, self.has_parts = shape_of(quantity, tree), bool(QUANTITIES[quantity].parts)
+        self.sizes = tree.coordinates.nq, tree.coordinates.nv, tree.coordinates.nv, 1
+        self.shape, self.has_parts = shape_of(quantity, tree), bool(quantity_of(quantity).parts)
         self.size = math.prod(self.shape)
         self.rest = [bytes(8 * size) for size in self.sizes]  # at rest, without torque
         self.local = threading.local()
@@ -56,14 +56,14 @@ class Evaluator:
 
     @cached_property
     def one_state(self) -> Callable[..., int]:
-        return self.scalar.function("one", WHOLE, *[ctypes.c_char_p] * 3, POINTER, keeps_lock=True)
+        return self.scalar.function("one", WHOLE, *[ctypes.c_char_p] * 4, POINTER, keeps_lock=True)
 
     def loop(self, wide: bool) -> Callable[..., int]:
         if wide not in self.loops:
             from .machine import lanes
 
             library = self.library(lanes()) if wide else self.scalar
-            self.loops[wide] = library.function("rows", WHOLE, *[POINTER] * 4, *[WHOLE] * 4)
+            self.loops[wide] = library.function("rows", WHOLE, *[POINTER] * 5, *[WHOLE] * 5)
         return self.loops[wide]
 
     def of_one(self, *arrays: np.ndarray) -> Any:
@@ -91,7 +91,7 @@ class Evaluator:
     def of_rows(self, q: np.ndarray, *rates: np.ndarray) -> np.ndarray | None:
         """The quantity of rows of states, (N, size), some in each thread; of rates one row may stand for all. None as above."""
         count, n = len(q), len(self.tree.axis)
-        arrays = [q, *rates, *[np.zeros((1, size)) for size in self.sizes[1 + len(rates) :]]]
+        arrays = [q, *rates]
         out = np.empty((count, self.size))
         wide = count > SMALL or True in self.loops
         self.loop(wide)  # is compiled once, before any thread asks for it
@@ -103,7 +103,8 @@ class Evaluator:
         return out if all(in_threads(fill, count, threads, TOGETHER, threads)) else None
 
     def fill(self, wide: bool, out: np.ndarray, *arrays: np.ndarray) -> bool:
-        """Fill rows out (N, size) of q (N, nq), qd and tau (N, nv), or one row for all, in one thread; False: some are wrong."""
+        """Fill rows out (N, size) of q (N, nq), qd, tau (N, nv), or one row for all, in one thread; False: some are wrong."""
+        arrays = (*arrays, *[np.zeros((1, size)) for size in self.sizes[len(arrays) :]])
         steps = [0 if len(array) == 1 else array.shape[1] for array in arrays]
         return self.loop(wide)(*(x.ctypes.data for x in (*arrays, out)), len(out), *steps) == 0
 

@@ -6,22 +6,24 @@ are shorter in the axes of the world (articulated.py).
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
 
-from tmt.derivation import articulated, composite
+from tmt.derivation import articulated, composite, linearized
 from tmt.derivation.dual import seeded
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms, reduced_force
-from tmt.derivation.quantities import QUANTITIES, State
+from tmt.derivation.quantities import Form, State, Step, argument_of, quantity_of
 from tmt.derivation.scalar import Rows, Scalar, Values
 from tmt.derivation.vectors import Scalars
-from tmt.methods.dynamics import Dynamics, Held, Implicit, minus, plus
+from tmt.methods import Linearized, method_named, one_step
+from tmt.methods.derivatives import is_straight
+from tmt.methods.dynamics import Dynamics, Held, acts_at_single_joints, minus, plus
 from tmt.methods.stepping import Method
 from tmt.model.tree import Tree
 
 from .straight import Traced, trace
 from .trace import Expression
 
+MANY = 20  # speeds from which derivatives are not traced by dual numbers
 DENSE = 10  # speeds from which solving linear systems and the derivatives of the bias are loops and no longer straight lines
 
 
@@ -31,35 +33,16 @@ def mixed(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
     return M, composite.mass_matrix_and_bias(tree, q, qd)[1]
 
 
-FORMS: tuple[Terms, ...] = composite.mass_matrix_and_bias, articulated.mass_matrix_and_bias, mixed
+FORMS = (
+    Form(composite.mass_matrix_and_bias, composite.generalized_force),
+    Form(articulated.mass_matrix_and_bias, articulated.generalized_force, linearized.rates),
+    Form(mixed, composite.generalized_force, linearized.rates),
+)
+LONG_FORMS = (*FORMS[1:], FORMS[0]._replace(rates=linearized.rates))  # of derivatives
 
 
 def shortest(candidates: Iterable[Traced]) -> Traced:
     return min(candidates, key=lambda traced: traced.length)
-
-
-class Regrouped(State):
-    """A state whose Mbar and h are those of a form."""
-
-    def __init__(self, terms: Terms, tree: AnyTree, q: Scalars, qd: Scalars | None, tau: Scalars):
-        super().__init__(tree, q, qd, tau)
-        self.form = terms
-
-    @cached_property
-    def terms(self) -> tuple[Rows, Values]:
-        return self.form(self.tree, self.q, self.qd)
-
-    @cached_property
-    def mass_matrix(self) -> Rows:
-        return self.terms[0]
-
-    @cached_property
-    def bias(self) -> Values:
-        return self.terms[1]
-
-    @property
-    def gravity_balance(self) -> Values:
-        return self.form(self.tree, self.q, [0.0] * len(self.qd))[1]
 
 
 class Traceable(Dynamics):
@@ -70,7 +53,7 @@ class Traceable(Dynamics):
     it counts as armature.
     """
 
-    def __init__(self, tree: Tree, terms: Terms, by_bodies: bool = False):
+    def __init__(self, tree: AnyTree, terms: Terms, by_bodies: bool = False):
         super().__init__(terms)
         self.n, self.by_bodies = len(tree.axis), by_bodies
 
@@ -98,44 +81,54 @@ class Traceable(Dynamics):
         return tape.call("solution", [*(x for row in matrix for x in row), *right], self.n)
 
 
-def acts_at_single_joints(implicit: Implicit) -> bool:
-    """Whether what a method takes implicitly is diagonal."""
-    across = [x for i, row in enumerate(implicit.matrix) for j, x in enumerate(row) if i != j]
-    return not implicit.bias_rows and all(isinstance(x, float) and x == 0.0 for x in across)
-
-
-def all_dynamics(tree: Tree) -> list[Traceable]:
+def all_dynamics(tree: AnyTree) -> list[Traceable]:
     """The ways to the accelerations of a tree: by Mbar and h in each form, and by articulated bodies."""
-    by_terms = [Traceable(tree, terms) for terms in FORMS]
+    by_terms = [Traceable(tree, form.terms) for form in FORMS]
     return [*by_terms, Traceable(tree, articulated.mass_matrix_and_bias, by_bodies=True)]
 
 
-def quantity(
-    tree: Tree,
-    name: str,
-    more: Sequence[int] = (),
-    tree_of: Callable[[Sequence[Values]], AnyTree] | None = None,
-) -> Traced:
-    """A quantity as a function of (q, qd, tau), flat.
+TreeOf = Callable[[Sequence[Values]], AnyTree]
 
-    tree_of: the tree, from more arrays of these sizes, which the function takes too.
+
+def quantity(tree: Tree, name: str, more: Sequence[int] = (), tree_of: TreeOf | None = None) -> Traced:
+    """A quantity, by its full name, as a function of (q, qd, tau or qdd, dt), flat.
+
+    more: the sizes of further arrays, from which tree_of makes the tree.
     """
-    takes, n = QUANTITIES[name].takes, len(tree.axis)
+    row, (nq, n) = quantity_of(name), (tree.coordinates.nq, len(tree.axis))
+    sizes = nq, n, n, 1, *more
 
-    def traced(terms: Terms, by_bodies: bool = False) -> Traced:
-        def function(q: Values, qd: Values, tau: Values, *arrays: Values) -> Values:
-            model = tree_of(arrays) if tree_of else tree
-            if name == "acceleration":
-                return Traceable(tree, terms, by_bodies).acceleration(model, q, qd, tau)
-            state = Regrouped(terms, model, q, qd if "qd" in takes else None, tau)
-            return flat(QUANTITIES[name].of(state))
+    def model_of(arrays: Sequence[Values]) -> AnyTree:
+        return tree_of(arrays[4:]) if tree_of else tree
 
-        return trace("quantity", (tree.coordinates.nq, n, n, *more), function)
+    def in_form(form: Form) -> Traced:
+        def function(*arrays: Values) -> Values:
+            model, argument = model_of(arrays), argument_of(name)
+            step = straight_step(model, argument, form) if row.argument == "method" else None
+            return flat(row.of(State(model, dict(zip(row.takes, arrays)), form, argument, step)))
 
-    candidates = [traced(terms) for terms in FORMS]
+        return trace("quantity", sizes, function)
+
+    def by_dynamics(dynamics: Traceable) -> Traced:
+        def function(*arrays: Values) -> Values:
+            q, qd, tau, *_ = arrays
+            return dynamics.acceleration(model_of(arrays), q, qd, tau)
+
+        return trace("quantity", sizes, function)
+
     if name == "acceleration":
-        candidates.append(traced(articulated.mass_matrix_and_bias, by_bodies=True))
-    return shortest(candidates)
+        return shortest(map(by_dynamics, all_dynamics(tree)))
+    by_dual_numbers = FORMS[: n < MANY]
+    return shortest(map(in_form, (*by_dual_numbers, *LONG_FORMS) if row.is_long else FORMS))
+
+
+def straight_step(tree: AnyTree, name: str, form: Form) -> Step:
+    """A step of the method of that name without loops; ValueError of one that solves its stages."""
+    stepping = method_named(name)
+    if not is_straight(stepping):
+        raise ValueError(f"a step of {name} is no fixed row of operations: NumPy alone gives its derivatives")
+    dynamics = Linearized(form)
+    return lambda q, qd, tau, dt: one_step(stepping, tree, q, qd, tau, dt, dynamics)
 
 
 def flat(nested: Scalar) -> Values:
@@ -176,11 +169,11 @@ def bias_rate(tree: Tree) -> Traced:
     """The derivative of h along a change of the speeds: (q, qd, dqd) -> dh."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
-    def traced(terms: Terms) -> Traced:
+    def traced(form: Form) -> Traced:
         def function(q: Values, qd: Values, dqd: Values) -> Values:
             rates = seeded(qd, dqd)
-            return [rates[0].parts(x)[1] for x in terms(tree, q, rates)[1]]
+            return [rates[0].parts(x)[1] for x in form.terms(tree, q, rates)[1]]
 
         return trace("bias_rate", (nq, n, n), function)
 
-    return shortest(map(traced, (composite.mass_matrix_and_bias, articulated.mass_matrix_and_bias)))
+    return shortest(map(traced, FORMS[:2]))

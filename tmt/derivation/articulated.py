@@ -15,13 +15,14 @@ and force of S along the directions inward. The number of operations of the acce
 of Mbar with n times the length of the paths to the world.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 from tmt.derivation.scalar import Scalar, Values
 
-from .composite import Distribution, rounded_once, turning
+from .composite import Distribution, rounded, turning
 from .mechanism import AnyTree, turn_in_parent
-from .method import reduced_force
+from .method import reduced_force, with_rotors
 from .vectors import IDENTITY, ZERO, Matrix, Scalars, Vector, outer
 
 
@@ -169,24 +170,37 @@ def bias(tree: AnyTree, q: Scalars, qd: Scalars) -> list[Scalar]:
     return along(*carried(tree, q, qd))
 
 
+def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> list[Scalar]:
+    """Mbar qdd + h (nv, N m), as in method.py."""
+    return with_rotors(tree, along(*carried(tree, q, qd, qdd)), qdd)
+
+
 def along(frames: list[Frame], rigid: list[Rigid]) -> list[Scalar]:
     """h: moment and force of what is carried along each speed's direction."""
     directions = [(direction, body) for frame, body in zip(frames, rigid) for direction in frame.directions]
     return [direction.power(body.n, body.f) for direction, body in directions]
 
 
-def carried(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[Frame], list[Rigid]]:
+def carried(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars = ()) -> tuple[list[Frame], list[Rigid]]:
     """The frames of all joints, and all that each carries."""
-    frames, rigid = outward(tree, q, qd)
+    frames, rigid = outward(tree, q, qd, qdd)
+    return frames, gathered(tree, rigid)
+
+
+def gathered(tree: AnyTree, own: list[Rigid]) -> list[Rigid]:
+    """All that each joint carries, from what it carries itself."""
+    rigid = list(own)
     for i in reversed(range(len(rigid))):
         if tree.parent[i] >= 0:
             rigid[tree.parent[i]] = rigid[tree.parent[i]].plus(rigid[i])
-    return frames, rigid
+    return rigid
 
 
-def outward(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[Frame], list[Rigid]]:
-    """The frames of all joints, and what each carries itself."""
-    distributions = rounded_once(tree, float)[0]
+def outward(
+    tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars = (), number: Callable[..., Scalar] = float
+) -> tuple[list[Frame], list[Rigid]]:
+    """The frames of all joints, and what each carries itself; qdd: (), none; number: as in composite.py."""
+    distributions = rounded(tree, number)[0]
     frames: list[Frame] = []
     rigid: list[Rigid] = []
     world = Frame(IDENTITY, ZERO, ZERO, ZERO, Vector(*tree.gravity) * -1.0, [])
@@ -202,6 +216,7 @@ def outward(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[Frame], list[R
             axis = p.turn @ axes[0]
             r = r if still else r + axis * (q[joint.q.start] - tree.reference[i])
             a = p.a + p.omega.cross(axis) * (2.0 * qd[joint.qd.start])  # Coriolis
+            a = a + axis * qdd[joint.qd.start] if qdd else a
             frame = Frame(p.turn, r, p.omega, p.omegad, a, [Direction(ZERO, axis)])
         else:
             turn = p.turn @ turn_in_parent(tree, i, q)
@@ -209,6 +224,7 @@ def outward(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[Frame], list[R
             axes = [carrier @ axis for axis in axes]
             spin = sum((axis * rate for axis, rate in zip(axes, qd[joint.qd])), ZERO)
             omega, omegad = p.omega + spin, p.omegad + p.omega.cross(spin)
+            omegad = sum((axis * rate for axis, rate in zip(axes, qdd[joint.qd])), omegad)
             # the acceleration is handed on where the joint is
             a = p.a + turning(p.omega, p.omegad) @ r - turning(omega, omegad) @ r
             frame = Frame(turn, r, omega, omegad, a, [Direction(axis, r.cross(axis)) for axis in axes])

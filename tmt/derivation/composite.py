@@ -23,7 +23,10 @@ import mpmath
 from tmt.derivation.scalar import Scalar
 
 from .mechanism import AnyTree, origin_in_parent, turn_in_parent
+from .method import with_rotors
 from .vectors import ZERO, Matrix, Scalars, Vector, outer, total_vector
+
+Placement = tuple[Vector, Matrix]  # origin (m) and turn of a frame in its parent's
 
 
 class Distribution(NamedTuple):
@@ -150,8 +153,8 @@ class Motion(NamedTuple):
     P: Matrix
 
 
-def motions(tree: AnyTree, placements: list[tuple[Vector, Matrix]], qd: Scalars) -> list[Motion]:
-    """The motions of the joints' frames; placements: origin and turn of each in its parent's."""
+def motions(tree: AnyTree, placements: list[Placement], qd: Scalars, qdd: Scalars = ()) -> list[Motion]:
+    """The motions of the joints' frames; qdd: (), none."""
     result: list[Motion] = []
     for i, (joint, (offset, turn)) in enumerate(zip(tree.coordinates.joints, placements)):
         a, omega, omegad = Vector(*tree.gravity) * -1.0, ZERO, ZERO
@@ -165,6 +168,10 @@ def motions(tree: AnyTree, placements: list[tuple[Vector, Matrix]], qd: Scalars)
             a = a + omega.cross(moving * 2.0)
         else:
             a, omegad, omega = turn.transposed @ a, omegad + omega.cross(moving), omega + moving
+        if qdd:
+            axes = zip(tree.axis[joint.qd], qdd[joint.qd])
+            more = total_vector(Vector(*axis) * rate for axis, rate in axes)
+            a, omegad = (a + more, omegad) if joint.kind == "slide" else (a, omegad + more)
         result.append(Motion(a, omega, omegad, turning(omega, omegad)))
     return result
 
@@ -173,31 +180,17 @@ def mass_matrix_and_bias(
     tree: AnyTree, q: Scalars, qd: Scalars, number: Callable[..., Scalar] = float
 ) -> tuple[list[list[Scalar]], list[Scalar]]:
     """Mbar and h, as in method.py; number: float or mpmath.mpf, to which what is exact is rounded once."""
-    n, joints = len(tree.axis), tree.coordinates.joints
+    n, joints, placements = len(tree.axis), tree.coordinates.joints, placed(tree, q)
     axes = [Vector(*axis) for axis in tree.axis]
-    placements = [(origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)) for i in range(len(joints))]
-    # fractions take their time; other numbers than floats may be rounded to other digits from call to call
-    parts = rounded_once if number is float and isinstance(tree, Hashable) else rounded_once.__wrapped__
-    own, uneven, even = map(list, parts(tree, number))
-
-    def component(k: int, kind: str, force: Vector, moment: Vector) -> Scalar:
-        """That of a force and a moment along or about the axis of a speed."""
-        return axes[k].dot(force if kind == "slide" else moment)
-
-    # inward: force and moment on all that a joint carries, and its mass
-    # what is even about a hinge is not turned
-    h: list[Scalar] = [0.0] * n
+    own, uneven, even = map(list, rounded(tree, number))
+    # inward: the mass that a joint carries; what is even about a hinge is not turned
     M: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
-    forces, moments, moving = [ZERO] * len(joints), [ZERO] * len(joints), motions(tree, placements, qd)
     for i in reversed(range(len(joints))):
-        kind, parent, a, P = joints[i].kind, tree.parent[i], moving[i].a, moving[i].P
-        forces[i] = forces[i] + own[i].mass * a + P @ own[i].moment
-        moments[i] = moments[i] + vee(P @ own[i].second) + own[i].moment.cross(a)
+        kind, parent = joints[i].kind, tree.parent[i]
         carried = uneven[i].plus(even[i])
         for k in joints[i].speeds:
-            h[k] = component(k, kind, forces[i], moments[i])
             force, moment = carried.at_unit_acceleration(kind, axes[k])
-            M[k][k] = component(k, kind, force, moment)
+            M[k][k] = axes[k].dot(force if kind == "slide" else moment)
             if tree.armature[k]:
                 M[k][k] = M[k][k] + tree.armature[k]
             for other in range(joints[i].qd.start, k):  # of the same ball
@@ -206,14 +199,52 @@ def mass_matrix_and_bias(
             while tree.parent[j] >= 0:
                 force, moment = handed_down(*placements[j], force, moment)
                 j = tree.parent[j]
+                acts = force if joints[j].kind == "slide" else moment
                 for other in joints[j].speeds:
-                    M[k][other] = M[other][k] = component(other, joints[j].kind, force, moment)
+                    M[k][other] = M[other][k] = axes[other].dot(acts)
+        if parent >= 0:
+            offset, turn = placements[i]
+            uneven[parent] = uneven[parent].plus(uneven[i].turned(turn).plus(even[i]).moved(offset))
+    return M, inward(tree, placements, motions(tree, placements, qd), own)
+
+
+def generalized_force(
+    tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Callable[..., Scalar] = float
+) -> list[Scalar]:
+    """Mbar qdd + h (nv, N m), as in method.py."""
+    placements = placed(tree, q)
+    own, moving = rounded(tree, number)[0], motions(tree, placements, qd, qdd)
+    return with_rotors(tree, inward(tree, placements, moving, own), qdd)
+
+
+def placed(tree: AnyTree, q: Scalars) -> list[Placement]:
+    """Origin and turn of each joint's frame in its parent's."""
+    return [(origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)) for i in range(len(tree.parent))]
+
+
+def inward(
+    tree: AnyTree, placements: list[Placement], moving: list[Motion], own: list[Distribution]
+) -> list[Scalar]:
+    """Force and moment on all that each joint carries, along and about its axes, (nv,)."""
+    result: list[Scalar] = [0.0] * len(tree.axis)
+    forces, moments = [ZERO] * len(own), [ZERO] * len(own)
+    for i, joint in reversed(list(enumerate(tree.coordinates.joints))):
+        parent, a, P = tree.parent[i], moving[i].a, moving[i].P
+        forces[i] = forces[i] + own[i].mass * a + P @ own[i].moment
+        moments[i] = moments[i] + vee(P @ own[i].second) + own[i].moment.cross(a)
+        for k in joint.speeds:
+            result[k] = Vector(*tree.axis[k]).dot(forces[i] if joint.kind == "slide" else moments[i])
         if parent >= 0:
             offset, turn = placements[i]
             force, moment = handed_down(offset, turn, forces[i], moments[i])
             forces[parent], moments[parent] = forces[parent] + force, moments[parent] + moment
-            uneven[parent] = uneven[parent].plus(uneven[i].turned(turn).plus(even[i]).moved(offset))
-    return M, h
+    return result
+
+
+def rounded(tree: AnyTree, number: Callable[..., Scalar]) -> tuple[list[Distribution], ...]:
+    """As rounded_once: fractions take their time, but other numbers than floats may have other digits from call to call."""
+    parts = rounded_once if number is float and isinstance(tree, Hashable) else rounded_once.__wrapped__
+    return parts(tree, number)
 
 
 @lru_cache(maxsize=64)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from tmt.derivation.scalar import Scalar
 
@@ -11,6 +12,7 @@ from .coordinates import Coordinates, coordinates_of
 from .vectors import IDENTITY, Matrix, Scalars, Vector, rotation, turn_of
 
 Number = TypeVar("Number")
+UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 Names = tuple[str, ...]
 Indices = tuple[int, ...]
 Numbers = tuple[Number, ...]
@@ -39,6 +41,10 @@ class Mechanism(Generic[Number]):
     reference: Numbers[Number] = ()
     position_gain: Rows[Number] = ()
     speed_gain: Rows[Number] = ()
+    site_names: Names = ()
+    site_joint: Indices = ()
+    site_offset: Rows[Number] = ()
+    site_turn: tuple[Rows[Number], ...] = ()
 
     @property
     def coordinates(self) -> Coordinates:
@@ -53,6 +59,15 @@ class Mechanism(Generic[Number]):
     def has_gains(self) -> bool:
         return bool(self.position_gain or self.speed_gain)
 
+    def site_of(self, name: str) -> Site:
+        """The site of that name, or the frame of the joint that carries the body of that name; KeyError if there is neither."""
+        if name in self.site_names:
+            k = self.site_names.index(name)
+            return Site(self.site_joint[k], self.site_offset[k], self.site_turn[k])
+        if name not in self.body_names:
+            raise KeyError(name)
+        return Site(self.body_joint[self.body_names.index(name)], (0.0,) * 3, UNIT)
+
     def path(self, joint: int) -> list[int]:
         """The joint and those before it, from the tip inward; none of -1, the world."""
         joints = []
@@ -65,6 +80,14 @@ class Mechanism(Generic[Number]):
         """Which of the n joints move the body: those on its path to the world."""
         path = self.path(self.body_joint[body])
         return [joint in path for joint in range(len(self.parent))]
+
+
+class Site(NamedTuple):
+    """A frame that is fixed to that of a joint, -1: to the world."""
+
+    joint: int
+    offset: Sequence[Scalar]  # of its origin, in the frame of the joint, m
+    turn: Sequence[Sequence[Scalar]]  # its axes as columns, in the frame of the joint
 
 
 AnyTree = Mechanism[Scalar]

@@ -63,11 +63,22 @@ class Body(NamedTuple):
     inertia: Matrix  # body axes
 
 
+class Placed(NamedTuple):
+    """A frame that a joint carries: nested lists of scalars, in the inertial frame."""
+
+    pose: Rows  # (3, 4): the axes of the frame as columns, and its origin, m
+    jacobian: Rows  # (6, nv): velocity of the origin, m/s, and angular velocity, rad/s, for unit speeds
+    convective: Values  # (6,): d(J qd)/dq qd, m/s2 and rad/s2
+
+
 WORLD = Frame(ZERO, IDENTITY, [], False, ZERO, ZERO, ZERO)
 
 
-def joint_frames(tree: AnyTree, q: Scalars, qd: Scalars | None = None) -> list[Frame]:
-    """The n joints' frames at positions q (rad, m) and speeds qd (per s, default at rest), walked outward."""
+def joint_frames(tree: AnyTree, q: Scalars, qd: Scalars | None = None, qdd: Scalars = ()) -> list[Frame]:
+    """The n joints' frames at positions q (rad, m) and speeds qd (per s, default at rest), walked outward.
+
+    With qdd (per s2) origin_conv and omega_conv are the accelerations themselves.
+    """
     qd = [0.0] * len(tree.axis) if qd is None else qd
     frames: list[Frame] = []
     for i, joint in enumerate(tree.coordinates.joints):
@@ -77,6 +88,7 @@ def joint_frames(tree: AnyTree, q: Scalars, qd: Scalars | None = None) -> list[F
         if joint.kind == "slide":
             axis = parent.turn @ axes[0]
             origin_conv = origin_conv + parent.omega.cross(axis * (qd[joint.qd.start] * 2.0))  # Coriolis
+            origin_conv = origin_conv + axis * qdd[joint.qd.start] if qdd else origin_conv
             moved = parent._replace(origin=origin, axes=[axis], slides=True, origin_conv=origin_conv)
             frames.append(moved)
             continue
@@ -85,6 +97,7 @@ def joint_frames(tree: AnyTree, q: Scalars, qd: Scalars | None = None) -> list[F
         axes = [carrier @ axis for axis in axes]
         spin = total_vector(axis * rate for axis, rate in zip(axes, qd[joint.qd]))
         omega, omega_conv = parent.omega + spin, parent.omega_conv + parent.omega.cross(spin)
+        omega_conv = sum((axis * rate for axis, rate in zip(axes, qdd[joint.qd])), omega_conv)
         frames.append(Frame(origin, turn, axes, False, omega, origin_conv, omega_conv))
     return frames
 
@@ -96,9 +109,12 @@ def carried(frame: Frame, point: Vector) -> tuple[Vector, Vector]:
     return frame.origin + r, frame.origin_conv + turning
 
 
-def bodies(tree: AnyTree, q: Scalars, qd: Scalars | None = None) -> list[Body]:
-    """T_b, B_b and the convective terms of every body, at positions q and speeds qd (default at rest)."""
-    frames = joint_frames(tree, q, qd)
+def bodies(tree: AnyTree, q: Scalars, qd: Scalars | None = None, qdd: Scalars = ()) -> list[Body]:
+    """T_b, B_b and the convective terms of every body, at positions q and speeds qd (default at rest).
+
+    With qdd v_conv and w_conv are the accelerations themselves: the bias of such bodies is Mbar qdd + h without the armature.
+    """
+    frames = joint_frames(tree, q, qd, qdd)
     result = []
     for b, joint in enumerate(tree.body_joint):
         frame = frames[joint] if joint >= 0 else WORLD
@@ -111,6 +127,20 @@ def bodies(tree: AnyTree, q: Scalars, qd: Scalars | None = None) -> list[Body]:
         omega, w_conv = to_body @ frame.omega, to_body @ frame.omega_conv
         result.append(Body(x, T, B, omega, v_conv, w_conv, tree.mass[b], Matrix(tree.inertia[b])))
     return result
+
+
+def placed_frame(tree: AnyTree, name: str, q: Scalars, qd: Scalars | None = None) -> Placed:
+    """The site or body of that name of a tree; of a body the frame of its joint."""
+    frames, site = joint_frames(tree, q, qd), tree.site_of(name)
+    carrier = frames[site.joint] if site.joint >= 0 else WORLD
+    x, x_conv = carried(carrier, Vector(*site.offset))
+    turn, path = carrier.turn @ Matrix(site.turn), tree.path(site.joint)
+    columns: Rows = []
+    for i, mover in enumerate(frames):
+        moving = [mover.column(axis, x, IDENTITY) if i in path else (ZERO, ZERO) for axis in mover.axes]
+        columns += [[*linear, *angular] for linear, angular in moving]
+    pose = [[*row, component] for row, component in zip(turn, x)]
+    return Placed(pose, [list(row) for row in zip(*columns)], [*x_conv, *carrier.omega_conv])
 
 
 def mass_matrix(parts: Sequence[Body], armature: Scalars = ()) -> list[list[Scalar]]:
@@ -145,6 +175,21 @@ def bias(parts: Sequence[Body], gravity: Iterable[Scalar]) -> list[Scalar]:
 def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[list[Scalar]], list[Scalar]]:
     parts = bodies(tree, q, qd)
     return mass_matrix(parts, tree.armature), bias(parts, tree.gravity)
+
+
+def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> list[Scalar]:
+    """Mbar qdd + h (nv, N m)."""
+    return with_rotors(tree, bias(bodies(tree, q, qd, qdd), tree.gravity), qdd)
+
+
+def with_rotors(tree: AnyTree, force: Scalars, qdd: Scalars) -> list[Scalar]:
+    """A force (nv,) and that which accelerates the armature."""
+    return [f + rotor * a if rotor else f for f, rotor, a in zip(force, tree.armature, qdd)]
+
+
+def inverse_dynamics(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars) -> list[Scalar]:
+    """tau = Mbar qdd + h + D qd + k (q - rest) + P q + S qd (nv, N m), from force = Mbar qdd + h."""
+    return [x * -1.0 for x in reduced_force(tree, force, q, qd, [0.0] * len(qd))]
 
 
 def bias_rates(tree: AnyTree, q: Scalars, qd: Scalars, terms: Terms = mass_matrix_and_bias) -> Rows:

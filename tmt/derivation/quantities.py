@@ -4,46 +4,123 @@ The literal form (literal.py), the compiled one (compiled/evaluator.py) and the 
 (exact/values.py) are all served from it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.scalar import Rows, Scalar, Values
 
 from . import method
+from .dual import jacobian, unit_vectors
 from .mechanism import AnyTree
-from .vectors import ZERO, Scalars, solve
+from .vectors import ZERO, Factors, Scalars
+
+Step = Callable[
+    [Values, Values, Values, Scalar], tuple[Values, Values]
+]  # of q, qd, tau, dt: q, qd one dt later
+Rates = tuple[Rows, Rows]  # by movements and by speeds
+
+
+class Form(NamedTuple):
+    """Mbar and h, and Mbar qdd + h, as sums in one order."""
+
+    terms: Callable[..., tuple[Rows, Values]]
+    generalized_force: Callable[..., Values]
+    rates: Callable[..., Rates] | None = (
+        None  # of Mbar qdd + h by movements and speeds; None: by dual numbers
+    )
+
+
+LITERAL = Form(method.mass_matrix_and_bias, method.generalized_force)
 
 
 class State:
-    """A state of a tree, by default at rest and without torque, and what follows from it: each part once."""
+    """A state of a tree, and what follows from it: each part once.
 
-    def __init__(self, tree: AnyTree, q: Scalars, qd: Scalars | None = None, tau: Scalars | None = None):
+    given: q and, by default at rest and without torque, qd and tau; qdd, by default those under tau; dt of a step. name: of the
+    frame that is asked for.
+    """
+
+    def __init__(
+        self, tree: AnyTree, given: Mapping[str, Scalars], form: Form = LITERAL, name: str = "", step: Step | None = None
+    ):  # fmt: skip
         nothing = [0.0] * len(tree.axis)
-        self.tree, self.q, self.moves = tree, q, qd is not None
-        self.qd, self.tau = qd or nothing, tau or nothing
+        self.tree, self.q, self.moves = tree, given["q"], "qd" in given
+        self.qd, self.tau = given.get("qd", nothing), given.get("tau", nothing)
+        self.form, self.name, self.step, self.given = form, name, step, given
 
     @cached_property
     def bodies(self) -> list[method.Body]:
         return method.bodies(self.tree, self.q, self.qd if self.moves else None)
 
     @cached_property
-    def mass_matrix(self) -> list[list[Scalar]]:
-        return method.mass_matrix(self.bodies, self.tree.armature)
+    def mass_matrix(self) -> Rows:
+        if self.form is LITERAL:
+            return method.mass_matrix(self.bodies, self.tree.armature)
+        return self.form.terms(self.tree, self.q, self.qd)[0]
 
     @cached_property
-    def bias(self) -> list[Scalar]:
-        return method.bias(self.bodies, self.tree.gravity)
+    def bias(self) -> Values:
+        if self.form is LITERAL:
+            return method.bias(self.bodies, self.tree.gravity)
+        return self.form.terms(self.tree, self.q, self.qd)[1]
 
     @property
-    def gravity_balance(self) -> list[Scalar]:
+    def gravity_balance(self) -> Values:
+        if self.form is not LITERAL:
+            return self.form.terms(self.tree, self.q, [0.0] * len(self.qd))[1]
         at_rest = [b._replace(omega=ZERO, v_conv=ZERO, w_conv=ZERO) for b in self.bodies]
         return method.bias(at_rest, self.tree.gravity)
 
+    @cached_property
+    def factors(self) -> Factors:
+        return Factors(self.mass_matrix)
+
     @property
-    def acceleration(self) -> list[Scalar]:
+    def acceleration(self) -> Values:
         Qbar = method.reduced_force(self.tree, self.bias, self.q, self.qd, self.tau)
-        return solve(self.mass_matrix, Qbar)
+        return self.factors.solve(Qbar)
+
+    @cached_property
+    def qdd(self) -> Values:
+        return list(self.given["qdd"]) if "qdd" in self.given else self.acceleration
+
+    @property
+    def inverse_dynamics(self) -> Values:
+        return method.inverse_dynamics(self.tree, self.q, self.qd, self.force(self.q, self.qd))
+
+    def force(self, q: Scalars, qd: Scalars) -> Values:
+        """Mbar qdd + h."""
+        return self.form.generalized_force(self.tree, q, qd, self.qdd)
+
+    @property
+    def force_rates(self) -> Rates:
+        """Derivatives of Mbar qdd + h by movements of q and by qd, (nv, nv) each."""
+        if self.form.rates is None:
+            return self.by_movement_and_speed(self.force)
+        return self.form.rates(self.tree, self.q, self.qd, self.qdd)
+
+    @cached_property
+    def torque_rates(self) -> Rates:
+        """The same of the inverse dynamics."""
+        nothing = [0.0] * len(self.qd)
+        passive = self.by_movement_and_speed(lambda q, qd: method.inverse_dynamics(self.tree, q, qd, nothing))
+        by_movement, by_speed = map(added, self.force_rates, passive)
+        return by_movement, by_speed
+
+    def by_movement_and_speed(self, function: Callable[[Values, Values], Values]) -> Rates:
+        """Derivatives of a function of q and qd by dual numbers, (nv rows of nv) each."""
+        coordinates, n = self.tree.coordinates, len(self.qd)
+        moved = [coordinates.component_rates(self.q, u) for u in unit_vectors(n)]
+        q, qd = list(self.q), list(self.qd)
+        return jacobian(lambda x: function(x, qd), q, moved), jacobian(lambda x: function(q, x), qd)
+
+    @property
+    def derivatives(self) -> list[Rows]:
+        """dqdd/dq, dqdd/dqd, dqdd/dtau, dtau/dq, dtau/dqd: from Mbar dqdd = dtau at the accelerations."""
+        solved = [self.factors.solve_columns(rows) for rows in self.torque_rates]
+        changes = [[[x * -1.0 for x in row] for row in rows] for rows in solved]
+        return [*changes, self.factors.inverted(), *self.torque_rates]
 
     @property
     def potential_energy(self) -> Scalar:
@@ -53,18 +130,48 @@ class State:
     def energy(self) -> Scalar:
         return self.potential_energy + method.kinetic(self.bodies, self.qd, self.tree.armature)
 
+    @cached_property
+    def frame(self) -> method.Placed:
+        return method.placed_frame(self.tree, self.name, self.q, self.qd if self.moves else None)
+
+    @property
+    def step_derivatives(self) -> Rows:
+        """[A B], (2 nv, 3 nv): of the state after a step by a state (movement, qd) and the torque before it, by dual numbers."""
+        assert self.step is not None
+        step, coordinates, dt = self.step, self.tree.coordinates, self.given["dt"][0]
+        nq, n, nothing = len(self.q), len(self.qd), [0.0] * len(self.q)
+        directions = [[*coordinates.component_rates(self.q, u), *[0.0] * (2 * n)] for u in unit_vectors(n)]
+        directions += [[*nothing, *u] for u in unit_vectors(2 * n)]
+        q, _ = step(list(self.q), list(self.qd), list(self.tau), dt)
+
+        def after(x: Values) -> Values:
+            return [value for part in step(x[:nq], x[nq : nq + n], x[nq + n :], dt) for value in part]
+
+        columns = zip(*jacobian(after, [*self.q, *self.qd, *self.tau], directions))
+        moved = [[*coordinates.tangent(q, list(column[:nq])), *column[nq:]] for column in columns]
+        return [list(row) for row in zip(*moved)]
+
+
+def added(first: Rows, second: Rows) -> Rows:
+    return [[x + y for x, y in zip(*rows)] for rows in zip(first, second)]
+
 
 class Quantity(NamedTuple):
     """A quantity of a state."""
 
-    takes: tuple[str, ...]  # of "q", "qd", "tau"
-    shape: tuple[int | str, ...]  # m bodies, nv speeds
+    takes: tuple[str, ...]  # of "q", "qd", "tau" or "qdd", "dt"
+    shape: tuple[int | str, ...]  # m bodies, nv speeds; 2nv and 3nv
     unit: str
     of: Callable[[State], Any]  # -> nested lists of scalars in that shape
     parts: tuple[str, ...] = ()  # the names of the arrays of which there are several, in that order
+    # what its full name says after a colon, as in frame_pose:hand and step_derivatives:rk4: a frame or a method
+    argument: str = ""
+    is_long: bool = False  # it has many operations: it is compiled only where it is asked for by name
+    title: str = ""  # what it is, where no public function of its name says so
 
 
-Q, QD, TAU = ("q",), ("q", "qd"), ("q", "qd", "tau")
+Q, QD, TAU, QDD = ("q",), ("q", "qd"), ("q", "qd", "tau"), ("q", "qd", "qdd")
+BY_STATE = "dqdd_dq", "dqdd_dqd", "dqdd_dtau", "dtau_dq", "dtau_dqd"
 QUANTITIES = {
     "com_positions": Quantity(Q, ("m", 3), "m", lambda s: [list(b.x) for b in s.bodies]),
     "angular_velocities": Quantity(QD, ("m", 3), "rad/s", lambda s: [list(b.omega) for b in s.bodies]),
@@ -78,15 +185,61 @@ QUANTITIES = {
         ("v_conv", "w_conv"),
     ),
     "mass_matrix": Quantity(Q, ("nv", "nv"), "kg m2", lambda s: s.mass_matrix),
+    "inverse_mass_matrix": Quantity(Q, ("nv", "nv"), "1/(kg m2)", lambda s: s.factors.inverted()),
     "bias": Quantity(QD, ("nv",), "N m", lambda s: s.bias),
     "gravity_balance": Quantity(Q, ("nv",), "N m", lambda s: s.gravity_balance),
     "spring_torque": Quantity(Q, ("nv",), "N m", lambda s: method.spring_torque(s.tree, s.q)),
     "acceleration": Quantity(TAU, ("nv",), "rad/s2", lambda s: s.acceleration),
+    "inverse_dynamics": Quantity(QDD, ("nv",), "N m", lambda s: s.inverse_dynamics),
+    "derivatives": Quantity(TAU, (5, "nv", "nv"), "SI", lambda s: s.derivatives, BY_STATE, is_long=True),
+    "inverse_dynamics_derivatives": Quantity(
+        QDD, (2, "nv", "nv"), "N m/rad; N m s/rad", lambda s: list(s.torque_rates), BY_STATE[3:], is_long=True
+    ),
     "potential_energy": Quantity(Q, (), "J", lambda s: s.potential_energy),
     "energy": Quantity(QD, (), "J", lambda s: s.energy),
+    "frame_pose": Quantity(
+        Q, (3, 4), "1; m", lambda s: s.frame.pose, argument="frame",
+        title="Axes of a frame as columns and its origin, m, inertial frame, shape (3, 4).",
+    ),
+    "frame_jacobian": Quantity(
+        Q, (6, "nv"), "m/rad; 1", lambda s: s.frame.jacobian, argument="frame",
+        title="Velocity of a frame's origin, then its angular velocity, for unit speeds, inertial frame, shape (6, nv).",
+    ),
+    "frame_convective": Quantity(
+        QD, (6,), "m/s2; rad/s2", lambda s: s.frame.convective, argument="frame",
+        title="Accelerations of a frame at qdd = 0, of its origin and angular, inertial frame, shape (6,).",
+    ),
+    "step_derivatives": Quantity(
+        (*TAU, "dt"), ("2nv", "3nv"), "SI", lambda s: s.step_derivatives, argument="method", is_long=True
+    ),
 }  # fmt: skip
+PLAIN = tuple(name for name, quantity in QUANTITIES.items() if not quantity.argument)  # that need no argument
+
+
+def quantity_of(name: str) -> Quantity:
+    """The row of a quantity, by its name or its full name."""
+    return QUANTITIES[name.partition(":")[0]]
+
+
+def is_quantity(name: object) -> bool:
+    """Whether it is the full name of a quantity, as text."""
+    if not isinstance(name, str) or name.partition(":")[0] not in QUANTITIES:
+        return False
+    return bool(quantity_of(name).argument) == (":" in name)
+
+
+def what_is_known(name: object) -> str:
+    """What a message says of a name that is no quantity's."""
+    if isinstance(name, str) and name in QUANTITIES:
+        return f"the name of a {QUANTITIES[name].argument} is expected after a colon, {name}:NAME"
+    return f"known are {', '.join(PLAIN)}"
+
+
+def argument_of(name: str) -> str:
+    return name.partition(":")[2]
 
 
 def shape_of(name: str, tree: AnyTree) -> tuple[int, ...]:
-    sizes = {"m": len(tree.mass), "nv": len(tree.axis)}
-    return tuple(size if isinstance(size, int) else sizes[size] for size in QUANTITIES[name].shape)
+    n = len(tree.axis)
+    sizes = {"m": len(tree.mass), "nv": n, "2nv": 2 * n, "3nv": 3 * n}
+    return tuple(size if isinstance(size, int) else sizes[size] for size in quantity_of(name).shape)

@@ -128,29 +128,49 @@ def turn_of(quaternion: Iterable[Scalar]) -> Matrix:
     return Matrix([first, second, third])
 
 
-def solve(matrix: Sequence[Scalars], right: Scalars) -> Values:
-    """Solution x of `matrix` x = `right`, for a symmetric positive definite matrix given by rows.
+class Factors:
+    """A symmetric positive definite matrix, given by rows, as U D U', from the last row to the first.
 
-    Factorised as U D U' from the last row to the first, without square roots or pivots (none are needed: it
-    is positive definite). In that order a joint meets only its ancestors: zeros between branches stay zeros,
-    as in MuJoCo.
+    Without square roots or pivots (none are needed: it is positive definite). In that order a joint meets only its ancestors:
+    zeros between branches stay zeros, as in MuJoCo.
     """
-    n = len(right)
-    scaled: Rows = [[None] * n for _ in range(n)]  # U D
-    upper: Rows = [[None] * n for _ in range(n)]
-    inverse: Values = [None] * n  # of D
-    for j in reversed(range(n)):
-        behind = range(j + 1, n)
-        inverse[j] = 1.0 / (matrix[j][j] - total(scaled[j][k] * upper[j][k] for k in behind))
-        for i in range(j):
-            scaled[i][j] = matrix[i][j] - total(scaled[i][k] * upper[j][k] for k in behind)
-            upper[i][j] = scaled[i][j] * inverse[j]
-    x = list(right)
-    for i in reversed(range(n)):
-        x[i] = x[i] - total(upper[i][k] * x[k] for k in range(i + 1, n))
-    for i in range(n):
-        x[i] = x[i] * inverse[i] - total(upper[k][i] * x[k] for k in range(i))
-    return x
+
+    def __init__(self, matrix: Sequence[Scalars]):
+        n = len(matrix)
+        scaled: Rows = [[None] * n for _ in range(n)]  # U D
+        upper: Rows = [[None] * n for _ in range(n)]
+        inverse: Values = [None] * n  # of D
+        for j in reversed(range(n)):
+            behind = range(j + 1, n)
+            inverse[j] = 1.0 / (matrix[j][j] - total(scaled[j][k] * upper[j][k] for k in behind))
+            for i in range(j):
+                scaled[i][j] = matrix[i][j] - total(scaled[i][k] * upper[j][k] for k in behind)
+                upper[i][j] = scaled[i][j] * inverse[j]
+        self.upper, self.inverse = upper, inverse
+
+    def solve(self, right: Scalars) -> Values:
+        """Solution x of matrix x = right."""
+        n, x = len(right), list(right)
+        for i in reversed(range(n)):
+            x[i] = x[i] - total(self.upper[i][k] * x[k] for k in range(i + 1, n))
+        for i in range(n):
+            x[i] = x[i] * self.inverse[i] - total(self.upper[k][i] * x[k] for k in range(i))
+        return x
+
+    def solve_columns(self, right: Sequence[Scalars]) -> Rows:
+        """Solution X of matrix X = right, both by rows."""
+        return [list(row) for row in zip(*[self.solve(column) for column in zip(*right)])]
+
+    def inverted(self) -> Rows:
+        """The inverse of the matrix, by rows: one half is computed, and is the other."""
+        n = len(self.inverse)
+        columns = [self.solve([1.0 if i == j else 0.0 for i in range(n)]) for j in range(n)]
+        return [[columns[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
+
+
+def solve(matrix: Sequence[Scalars], right: Scalars) -> Values:
+    """Solution x of `matrix` x = `right`, for a symmetric positive definite matrix given by rows."""
+    return Factors(matrix).solve(right)
 
 
 def solve_any(matrix: Sequence[Scalars], right: Scalars) -> Values:

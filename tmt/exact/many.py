@@ -1,18 +1,25 @@
 """A quantity of many states in pairs of doubles, some 31 digits: what values in doubles are compared with."""
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import mpmath
 import numpy as np
 
-from tmt.compiled.forms import flat
+from tmt.compiled.forms import flat, straight_step
 from tmt.compiled.trace import Tape
-from tmt.derivation.quantities import QUANTITIES, State, shape_of
+from tmt.derivation import composite, linearized
+from tmt.derivation.quantities import Form, State, argument_of, quantity_of, shape_of
 from tmt.exact import series
 from tmt.exact.motion import DIGITS, FORMS, Equations, program
 from tmt.exact.tree import exact_tree
 from tmt.model.tree import Tree
+
+EXACT = Form(
+    FORMS["composite"],
+    partial(composite.generalized_force, number=mpmath.mpf),
+    partial(linearized.rates, number=mpmath.mpf),
+)
 
 
 class Pairs(NamedTuple):
@@ -31,9 +38,12 @@ class Pairs(NamedTuple):
             return np.abs((values - self.high) - self.low)
 
 
-def exact_of_many(tree: Tree, name: str, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> Pairs:
-    """A quantity at q (states, nq), qd, tau (states, nv): doubles, taken as exact. Shapes and units as in `tmt`."""
-    states, shape = np.concatenate([q, qd, tau], axis=1), shape_of(name, tree)
+def exact_of_many(tree: Tree, name: str, q: np.ndarray, *rates: np.ndarray) -> Pairs:
+    """A quantity, by its full name, at q (states, nq) and qd, tau or qdd (states, nv), dt (states, 1): doubles, taken as exact.
+
+    Shapes and units as in `tmt`.
+    """
+    states, shape = np.concatenate([q, *rates], axis=1), shape_of(name, tree)
     equations, rows = traced(tree, name)
     high, low = equations.tables(states.shape[1], 2)
     values = np.empty((2, len(states), len(rows)))
@@ -47,12 +57,14 @@ def exact_of_many(tree: Tree, name: str, q: np.ndarray, qd: np.ndarray, tau: np.
 @lru_cache(maxsize=64)
 def traced(tree: Tree, name: str) -> tuple[Equations, list[int]]:
     """The operations of a quantity, and the rows of its numbers."""
-    tape, n = Tape(mpmath.mpf), len(tree.axis)
+    tape, n, row = Tape(mpmath.mpf), len(tree.axis), quantity_of(name)
     with mpmath.workdps(DIGITS):
-        sizes = {"q": tree.coordinates.nq, "qd": n, "tau": n}
-        q, qd, tau = (tape.inputs(*(f"{array}{i}" for i in range(size))) for array, size in sizes.items())
-        state = State(exact_tree(tree, mpmath.mpf), q, qd, tau)
-        state.mass_matrix, state.bias = FORMS["composite"](state.tree, q, qd)
-        results = [tape.lift(x) for x in flat(QUANTITIES[name].of(state))]
-        equations, row = program(tape, [*q, *qd, *tau], results)
-    return equations, [row[x.i] for x in results]
+        exact = exact_tree(tree, mpmath.mpf)
+        sizes = {"q": tree.coordinates.nq, "qd": n, "tau": n, "qdd": n, "dt": 1}
+        takes = row.takes if len(row.takes) > 2 else ("q", "qd", "tau")
+        given = {array: tape.inputs(*(f"{array}{i}" for i in range(sizes[array]))) for array in takes}
+        step = straight_step(exact, argument_of(name), EXACT) if row.argument == "method" else None
+        state = State(exact, given, EXACT, argument_of(name), step)
+        results = [tape.lift(x) for x in flat(row.of(state))]
+        equations, places = program(tape, [x for part in given.values() for x in part], results)
+    return equations, [places[x.i] for x in results]

@@ -4,20 +4,21 @@ import hashlib
 import keyword
 import re
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from textwrap import wrap
 from typing import Any
 
 from tmt.compiled import forms
 from tmt.compiled.straight import Traced
 from tmt.derivation.mechanism import AnyTree
-from tmt.derivation.quantities import QUANTITIES, shape_of
+from tmt.derivation.quantities import QUANTITIES, is_quantity, quantity_of, shape_of, what_is_known
 from tmt.derivation.scalar import Values
 from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree, stated
 from tmt.model.values import shown
 
 from . import c, casadi, jax, matlab, python
-from .parameters import OF_BODIES, Frames, Parameters
+from .parameters import OF_BODIES, Parameters
 from .statements import Function, Program
 
 LANGUAGES: dict[str, Callable[[Program], str]] = {
@@ -48,13 +49,13 @@ SI units, angles in rad. Shapes are those of one state; ... stands for any batch
 
 def text(
     model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str],
-    words: Sequence[str] = (), frames: Frames | None = None, limit: float = 60.0,
+    words: Sequence[str] = (), limit: float = 60.0,
 ) -> str:  # fmt: skip
     checked_model(model)
     known = [*LANGUAGES, *SYMBOLIC]
     if not isinstance(language, str) or language not in known:
         raise ValueError(f"language is {shown(language)}; expected one of {', '.join(known)}")
-    chosen = checked_quantities(quantities, OF_SYMBOLS if language in SYMBOLIC else tuple(QUANTITIES))
+    chosen = checked_quantities(quantities, OF_SYMBOLS if language in SYMBOLIC else ())
     if not isinstance(head, list | tuple) or not all(isinstance(line, str) for line in head):
         raise ValueError(f"head is {shown(head)}; a sequence of lines is expected")
     is_name = isinstance(name, str) and re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name)
@@ -64,7 +65,7 @@ def text(
     if not isinstance(single, bool) or (single and language not in ("c", "c header")):
         expected = f"single precision is True or False, and in C only (not in {language})"
         raise ValueError(f"single is {shown(single)}; {expected}")
-    parameters = checked_parameters(model, language, chosen, words, frames or {})
+    parameters = checked_parameters(model, language, chosen, words)
     lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
     if language in SYMBOLIC:
@@ -77,9 +78,9 @@ def text(
 
 
 def checked_parameters(
-    model: Tree, language: str, quantities: Sequence[str], words: Sequence[str], frames: Frames
+    model: Tree, language: str, quantities: Sequence[str], words: Sequence[str]
 ) -> Parameters:
-    parameters = Parameters(model, words, frames)
+    parameters = Parameters(model, words)
     if words and language in SYMBOLIC:
         raise ValueError(f"in {language} all numbers are symbols; parameters are of other languages")
     if parameters.has_payload and (bodies := set(quantities).intersection(OF_BODIES)):
@@ -100,10 +101,11 @@ def symbolic_text(
 
 def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ...]:
     chosen = tuple(quantities) if isinstance(quantities, list | tuple) else (quantities,)
-    wrong = [quantity for quantity in chosen if not isinstance(quantity, str) or quantity not in choices]
+    wrong = [x for x in chosen if not is_quantity(x) or (choices and x not in choices)]
     if wrong or not chosen:
         what = wrong[0] if wrong else ()
-        raise ValueError(f"quantity is {shown(what)}; expected some of {', '.join(choices)}")
+        expected = f"expected some of {', '.join(choices)}" if choices else what_is_known(what)
+        raise ValueError(f"quantity is {shown(what)}; {expected}")
     return chosen
 
 
@@ -133,19 +135,26 @@ def places(part: slice) -> str:
 def function_of(model: Tree, name: str, parameters: Parameters | None = None) -> Function:
     import tmt  # for the docstring
 
-    parameters = parameters or Parameters(model, (), {})
-    quantity, shape = QUANTITIES[name], shape_of(name, model)
-    sizes = {"q": model.coordinates.nq, "qd": model.coordinates.nv, "tau": model.coordinates.nv}
+    parameters = parameters or Parameters(model, ())
+    quantity, shape, nv = quantity_of(name), shape_of(name, model), model.coordinates.nv
+    third = "qdd" if "qdd" in quantity.takes else "tau"
+    sizes = {"q": model.coordinates.nq, "qd": nv, third: nv, "dt": 1}
     sizes |= {x: len(value) for x, value in parameters.values.items()}
-    title = getattr(tmt, name).__doc__.splitlines()[0]
+    title = quantity.title or getattr(tmt, name.partition(":")[0]).__doc__.splitlines()[0]
     results, shape = (quantity.parts, shape[1:]) if quantity.parts else (("out",), shape)
-    takes = (*quantity.takes, *parameters.values)
-    return Function(name, title, takes, sizes, shape, results, traced(model, name, parameters))
+    takes, operations = (*quantity.takes, *parameters.values), traced(model, name, parameters)
+    return Function(identifier(name), title, takes, sizes, shape, results, operations)
 
 
-def traced(model: Tree, name: str, parameters: Parameters) -> Traced:
+def identifier(name: str) -> str:
+    """The name of the function of a quantity."""
+    return re.sub(r"\W", "_", name, flags=re.ASCII)
+
+
+@lru_cache(maxsize=16)
+def traced(model: Tree, name: str, parameters: Parameters | None) -> Traced:
     """A quantity as a function of its arrays and of the parameters."""
-    if not parameters.values:
+    if parameters is None or not parameters.values:
         return forms.quantity(model, name)
 
     def tree_of(arrays: Sequence[Values]) -> AnyTree:

@@ -6,7 +6,7 @@ from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from tmt.derivation.mechanism import AnyTree, Mechanism
 from tmt.derivation.scalar import Values
@@ -31,22 +31,20 @@ class Frame(NamedTuple):
     axes: NDArray[np.float64]
 
 
-# of bodies by name, in which their parameters are; else that of the joint
-Frames = Mapping[str, tuple[ArrayLike, ArrayLike]]
-
-
 class Parameters:
     """The arguments that stand for chosen numbers of a Tree.
 
-    words: "gravity"; a body, or BODY.mass, BODY.com, BODY.inertia; "payload" and a body: what that carries besides. values: by
-    the names of the arguments, those of the Tree. meanings: of each. ValueError for a word that is none of these.
+    words: "gravity"; a body, or BODY.mass, BODY.com, BODY.inertia; "payload" and a body: what that carries besides. They are in
+    the frame that is the site of the body's name, else in that of its joint. values: by the names of the arguments, those of the
+    Tree. meanings: of each. ValueError for a word that is none of these.
     """
 
-    def __init__(self, tree: Tree, words: Sequence[str], frames: Frames):
+    def __init__(self, tree: Tree, words: Sequence[str]):
         self.values: dict[str, tuple[float, ...]] = {}
         self.meanings: dict[str, str] = {}
         self.places: dict[str, tuple[str, int]] = {}  # part and body of an argument
-        self.frames, self.carriers = frames, list(range(len(tree.mass)))
+        self.sites = dict(zip(tree.site_names, zip(tree.site_offset, tree.site_turn)))
+        self.carriers, self.key = list(range(len(tree.mass))), (tree, *words)
         self.has_payload, remaining = False, list(words)
         while remaining:
             word = remaining.pop(0)
@@ -62,6 +60,12 @@ class Parameters:
             else:
                 expected = f"gravity, payload,BODY, BODY or BODY.mass, .com, .inertia; {tree.body_names}"
                 raise ValueError(f"{word!r} is no parameter; expected {expected}")
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Parameters) and self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.key)
 
     def add(self, name: str, values: Sequence[float], meaning: str) -> None:
         self.values[name], self.meanings[name] = tuple(map(float, values)), meaning
@@ -92,7 +96,7 @@ class Parameters:
             self.add(f"{PAYLOAD}_{part}", [0.0] * size, meaning)
 
     def frame(self, name: str) -> Frame:
-        origin, axes = self.frames.get(name, (np.zeros(3), np.eye(3)))
+        origin, axes = self.sites.get(name, (np.zeros(3), np.eye(3)))
         return Frame(np.array(origin, dtype=float), np.array(axes, dtype=float))
 
     def applied(self, tree: Tree, values: Mapping[str, Values]) -> AnyTree:

@@ -95,7 +95,7 @@ def derived(names: Names, quantities: Sequence[str], limit: float, note: str) ->
     def column(entries: Values) -> Expression:
         return sympy.Matrix([expression(entry) for entry in entries])
 
-    state = State(names.mechanism(ring.scalar), variables)
+    state = State(names.mechanism(ring.scalar), {"q": variables})
     derivations: dict[str, Callable[[], Expression]] = {
         "mass_matrix": lambda: symmetric(state.mass_matrix, expression),
         "gravity_balance": lambda: column(state.gravity_balance),

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from tmt.derivation.coordinates import FLAT
 from tmt.derivation.scalar import Rows, Scalar, Values
 from tmt.methods import dop853
+from tmt.methods.derivatives import Linearized as Linearized
 from tmt.methods.derivatives import amplification as amplification
 from tmt.methods.derivatives import one_step as one_step
+from tmt.methods.derivatives import transition as transition
 from tmt.methods.implicit import ImplicitRungeKutta
 from tmt.methods.semi_implicit import SemiImplicitEuler as SemiImplicitEuler
 from tmt.methods.semi_implicit import by_speed as by_speed

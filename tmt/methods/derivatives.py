@@ -4,7 +4,10 @@ A slope a solves residual(a, x) = 0, which is linear in a; so da/dx = -A^-1 dres
 dual numbers need not go through the solution, nor through derivatives of derivatives.
 """
 
+from collections.abc import Callable
+from functools import partial
 from inspect import signature
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,10 +15,12 @@ from tmt.derivation import composite
 from tmt.derivation.dual import Dual, seeded
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import reduced_force
+from tmt.derivation.quantities import Form, State, added
 from tmt.derivation.scalar import Rows, Scalar, Values
-from tmt.methods.dynamics import Dynamics, Held, Terms, minus, plus
-from tmt.methods.stepping import Method, State, stepped
-from tmt.model.tree import Tree
+from tmt.derivation.vectors import Factors, solve_any
+from tmt.methods.dynamics import Dynamics, Held, Implicit, Terms, acts_at_single_joints, minus, plus
+from tmt.methods.stepping import Method, stepped
+from tmt.methods.stepping import State as Reached
 
 Array = np.ndarray
 FEW_SPEEDS = 4  # up to which dual numbers go through the solution of the linear system too
@@ -52,14 +57,14 @@ class Differentiated(Dynamics):
         self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
     ) -> Values:
         plain = implicit._replace(pull=values_of(implicit.pull)) if implicit else None
-        plain_q, plain_qd = values_of(q), values_of(qd)
+        plain_q, plain_qd, plain_tau = values_of(q), values_of(qd), values_of(tau)
         n, states = len(qd), plain_qd[0].shape
         unknown = seeded(np.zeros((n, *states)), np.eye(n)[..., None])
-        left = self.residual(tree, unknown, plain_q, plain_qd, tau, plain)
+        left = self.residual(tree, unknown, plain_q, plain_qd, plain_tau, plain)
         A = np.array([np.broadcast_to(row.slope, (n, *states)) for row in left]).transpose(2, 0, 1)
         self.system = A, -np.array([np.broadcast_to(row.value, states) for row in left]).T
         a = np.linalg.solve(A, self.system[1][..., None])[..., 0].T.copy()
-        dual = next((x for x in (*q, *qd) if isinstance(x, Dual)), None)
+        dual = next((x for x in (*q, *qd, *tau) if isinstance(x, Dual)), None)
         if dual is None:
             return list(a)
         left = self.residual(tree, list(a), q, qd, tau, implicit)
@@ -70,8 +75,8 @@ class Differentiated(Dynamics):
 
 
 def one_step(
-    stepping: Method, tree: Tree, q: Values, qd: Values, tau: Values, dt: Scalar, *terms: Terms
-) -> State:
+    stepping: Method, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar, *terms: Terms
+) -> Reached:
     """The state (q, qd) of a tree one dt later by a method, over any scalar; terms: in place of the literal ones."""
     return stepped(stepping, tree, lambda q, qd: stepping.slope(tree, q, qd, tau, dt, *terms), q, qd, dt)
 
@@ -81,35 +86,131 @@ def takes_terms(stepping: Method) -> bool:
     return len(signature(stepping.slope).parameters) > 5  # tree, q, qd, tau, dt
 
 
-def amplification(stepping: Method, tree: Tree, q: Array, qd: Array, tau: Array, dt: float | Array) -> Array:
+class Change(NamedTuple):
+    """Accelerations at a state and torque, and what changes them: matrix da = dtau - by_movement dq - by_speed dqd."""
+
+    a: Values
+    by_movement: Rows
+    by_speed: Rows
+    solve: Callable[[Values], Values]  # the linear system
+
+
+class Linearized(Dynamics):
+    """Accelerations of dual numbers over any scalar, with the derivatives of the linear system by those of Mbar qdd + h."""
+
+    def __init__(self, form: Form):
+        super().__init__(form.terms)
+        self.form = form
+        self.changes: dict[
+            tuple[Scalar, ...], Change
+        ] = {}  # all directions of dual numbers meet the same states
+
+    def acceleration(
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
+    ) -> Values:
+        plain_q, plain_qd, plain_tau = values_of(q), values_of(qd), values_of(tau)
+        key = tuple(x.i if hasattr(x, "i") else x for x in (*plain_q, *plain_qd, *plain_tau))
+        if key not in self.changes:
+            self.changes[key] = self.change(tree, plain_q, plain_qd, plain_tau, implicit)
+        change = self.changes[key]
+        dual = next((x for x in (*q, *qd, *tau) if isinstance(x, Dual)), None)
+        if dual is None:
+            return change.a
+        dq, dqd, right = ([dual.parts(x)[1] for x in part] for part in (q, qd, tau))
+        moved = tree.coordinates.tangent(plain_q, dq)
+        right = minus(right, plus(times(change.by_movement, moved), times(change.by_speed, dqd)))
+        if implicit:
+            right = minus(right, [dual.parts(x)[1] for x in implicit.pull])
+        return [Dual(value, slope, dual.level) for value, slope in zip(change.a, change.solve(right))]
+
+    def change(self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held) -> Change:
+        plain = implicit._replace(pull=values_of(implicit.pull)) if implicit else None
+        a = super().acceleration(tree, q, qd, tau, plain)
+        state = State(tree, {"q": q, "qd": qd, "qdd": a}, self.form)
+        matrix, (by_movement, by_speed) = state.mass_matrix, state.torque_rates
+        if implicit is None:
+            return Change(a, by_movement, by_speed, Factors(matrix).solve)
+        matrix = added(matrix, implicit.matrix)
+        if acts_at_single_joints(implicit):
+            return Change(a, by_movement, by_speed, Factors(matrix).solve)
+        if implicit.bias_rows:
+            held, more, faster = self.of_bias(tree, q, qd, a, implicit)
+            matrix, by_movement, by_speed = map(added, (matrix, by_movement, by_speed), (held, more, faster))
+        return Change(a, by_movement, by_speed, partial(solve_any, matrix))
+
+    def of_bias(self, tree: AnyTree, q: Values, qd: Values, a: Values, implicit: Implicit) -> list[Rows]:
+        """dt dh/dqd in the rows that are implicit, and the derivatives of dt dh/dqd a by movements and by speeds."""
+        rest, half = [0.0] * len(qd), [0.5] * len(qd)
+        speeds = qd, plus(qd, a), minus(qd, a)
+        now, ahead, behind = [
+            State(tree, {"q": q, "qd": v, "qdd": rest}, self.form).force_rates for v in speeds
+        ]
+        dts = [implicit.dt if i in implicit.bias_rows else 0.0 for i in range(len(qd))]
+        changes = [scaled(half, [minus(*rows) for rows in zip(*pair)]) for pair in zip(ahead, behind)]
+        return [scaled(dts, rows) for rows in (now[1], *changes)]
+
+
+def scaled(factors: Values, rows: Rows) -> Rows:
+    return [[factor * x for x in row] for factor, row in zip(factors, rows)]
+
+
+def is_straight(stepping: Method) -> bool:
+    """Whether a step is a fixed row of operations, the slope of which takes other terms."""
+    return takes_terms(stepping) and not stepping.solves_stages
+
+
+def amplification(
+    stepping: Method, tree: AnyTree, q: Array, qd: Array, tau: Array, dt: float | Array
+) -> Array:
     """The exact Jacobian of one step of a method, d(q, qd)+/d(q, qd), shape (..., 2 nv, 2 nv), for movements of q.
 
     q (..., nq), qd (..., nv): states, rad and rad/s; tau: torque (nv,), N m; dt: step in s, one for all or (...). At an
     equilibrium it is what a step does to a small deviation: its eigenvalues are the growth of each mode per step. By dual
     numbers, all directions at once; so it holds for partitioned and implicit methods too.
     """
-    nv, torque = tree.coordinates.nv, [float(t) for t in tau]
-    batch = np.broadcast_shapes(np.shape(q)[:-1], np.shape(qd)[:-1], np.shape(dt))
-    q, qd = (np.broadcast_to(x, (*batch, np.shape(x)[-1])).reshape(-1, np.shape(x)[-1]) for x in (q, qd))
+    return transition(stepping, tree, q, qd, np.array(tau, float), dt, by_torque=False)
+
+
+def transition(
+    stepping: Method,
+    tree: AnyTree,
+    q: Array,
+    qd: Array,
+    tau: Array,
+    dt: float | Array,
+    by_torque: bool = True,
+) -> Array:
+    """The same by q, qd and then tau (..., nv), each a column: (..., 2 nv, 3 nv) or, not by_torque, (..., 2 nv, 2 nv)."""
+    nv = tree.coordinates.nv
+    width = (2 + by_torque) * nv
+    batch = np.broadcast_shapes(*(np.shape(x)[:-1] for x in (q, qd, tau)), np.shape(dt))
+    states = [
+        np.broadcast_to(x, (*batch, np.shape(x)[-1])).reshape(-1, np.shape(x)[-1]) for x in (q, qd, tau)
+    ]
     steps, size = np.broadcast_to(dt, batch).reshape(-1), max(1, PART // nv)
-    parts = [slice(k, k + size) for k in range(0, len(qd), size)]
-    jacobians = [of_part(stepping, tree, q[part], qd[part], torque, steps[part]) for part in parts]
-    return np.concatenate([np.empty((0, 2 * nv, 2 * nv)), *jacobians]).reshape(*batch, 2 * nv, 2 * nv)
+    parts = [slice(k, k + size) for k in range(0, len(steps), size)]
+    jacobians = []
+    for part in parts:
+        some_q, some_qd, some_tau = (x[part] for x in states)
+        jacobians.append(of_part(stepping, tree, some_q, some_qd, some_tau, steps[part], width))
+    return np.concatenate([np.empty((0, 2 * nv, width)), *jacobians]).reshape(*batch, 2 * nv, width)
 
 
-def of_part(stepping: Method, tree: Tree, q: Array, qd: Array, tau: list[float], dt: Array) -> Array:
-    """The same of a few states: q (states, nq), qd (states, nv), dt (states,)."""
+def of_part(stepping: Method, tree: AnyTree, q: Array, qd: Array, tau: Array, dt: Array, width: int) -> Array:
+    """The same of a few states: q (states, nq), qd and tau (states, nv), dt (states,); width: how many columns."""
     joints, nv, nq = tree.coordinates, qd.shape[1], q.shape[1]
-    start = [*q.T.copy(), *qd.T.copy()]
-    directions = np.eye(2 * nv)[..., None]  # component, direction, state
-    state = seeded(start, [*joints.component_rates(start[:nq], directions[:nv]), *directions[nv:]])
+    start = [*q.T.copy(), *qd.T.copy(), *tau.T.copy()]
+    directions = np.eye(width)[..., None]  # component, direction, state
+    moved = [*joints.component_rates(start[:nq], directions[:nv]), *directions[nv:]]
+    state = [*seeded(start[: len(moved)], moved), *start[len(moved) :]]
     # the Jacobian of stages that are solved for is by dual numbers of dual numbers
     through_solution = nv <= FEW_SPEEDS or stepping.solves_stages
     terms = composite.mass_matrix_and_bias if through_solution else Differentiated()
     regrouped = [terms] if takes_terms(stepping) else []
-    new_q, new_qd = one_step(stepping, tree, state[:nq], state[nq:], tau, dt, *regrouped)
+    torque = state[nq + nv :]
+    new_q, new_qd = one_step(stepping, tree, state[:nq], state[nq : nq + nv], torque, dt, *regrouped)
     moved = joints.tangent([x.value for x in new_q], [x.slope for x in new_q])
-    slopes = [np.broadcast_to(slope, (2 * nv, len(dt))) for slope in (*moved, *(x.slope for x in new_qd))]
+    slopes = [np.broadcast_to(slope, (width, len(dt))) for slope in (*moved, *(x.slope for x in new_qd))]
     return np.array(slopes).transpose(2, 0, 1)
 
 

@@ -25,6 +25,12 @@ class Implicit(NamedTuple):
 Held = Implicit | None
 
 
+def acts_at_single_joints(implicit: Implicit) -> bool:
+    """Whether what a method takes implicitly is diagonal."""
+    across = [x for i, row in enumerate(implicit.matrix) for j, x in enumerate(row) if i != j]
+    return not implicit.bias_rows and all(isinstance(x, float) and x == 0.0 for x in across)
+
+
 class Dynamics:
     """Accelerations from Mbar and h, which `terms` gives."""
 

@@ -6,10 +6,10 @@ from functools import lru_cache
 from typing import TypeVar
 
 from tmt.derivation.coordinates import FLAT
+from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.scalar import Scalar, Values
 from tmt.methods.dynamics import LITERAL, Implicit, Terms, dynamics_of
 from tmt.methods.stepping import Joints, Method, Slope, State, advance, increments
-from tmt.model.tree import Tree
 
 T = TypeVar("T")
 Gains = Sequence[Sequence[float]]
@@ -35,7 +35,7 @@ class SemiImplicitEuler(Method):
 
     damps_implicitly = True
 
-    def gains_held(self, tree: Tree) -> tuple[Gains, Gains]:
+    def gains_held(self, tree: AnyTree) -> tuple[Gains, Gains]:
         """The implicit entries of a controller's gains, of position and of speed: (nv, nv) each, () where there are none."""
         if self.implicit_springs:
             return (tree.position_gain, tree.speed_gain)
@@ -44,7 +44,7 @@ class SemiImplicitEuler(Method):
         connected = zip(tree.speed_gain, on_one_path(tree))
         return (), tuple([gain if is_on else 0.0 for gain, is_on in zip(*rows)] for rows in connected)
 
-    def held(self, tree: Tree) -> tuple[Gains, Gains]:
+    def held(self, tree: AnyTree) -> tuple[Gains, Gains]:
         """All that acts implicitly, as stiffness and as damping, (nv, nv) each."""
         n = len(tree.axis)
         has_stiffness = self.implicit_springs and tree.has_springs
@@ -52,7 +52,7 @@ class SemiImplicitEuler(Method):
         position_gain, speed_gain = self.gains_held(tree)
         return with_diagonal(position_gain, stiffness), with_diagonal(speed_gain, tree.damping)
 
-    def implicit(self, tree: Tree, qd: Values, dt: Scalar) -> Implicit:
+    def implicit(self, tree: AnyTree, qd: Values, dt: Scalar) -> Implicit:
         """What the linear system above has beside Mbar and Qbar."""
         (stiff, damped), powers, moved = self.held(tree), (dt, dt * dt), [dt * v for v in qd]
         matrix = [[weighted(entry, powers) for entry in zip(*rows)] for rows in zip(damped, stiff)]
@@ -61,7 +61,7 @@ class SemiImplicitEuler(Method):
         return Implicit(matrix, pull, dt, frozenset(range(len(qd))) if self.implicit_bias else alone)
 
     def slope(
-        self, tree: Tree, q: Values, qd: Values, tau: Values, dt: Scalar, terms: Terms = LITERAL
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar, terms: Terms = LITERAL
     ) -> Values:
         return dynamics_of(terms).acceleration(tree, q, qd, tau, self.implicit(tree, qd, dt))
 
@@ -78,7 +78,7 @@ def with_diagonal(gains: Gains, diagonal: Sequence[float]) -> Gains:
     return rows
 
 
-def by_speed(tree: Tree, of_joints: Iterable[T]) -> list[T]:
+def by_speed(tree: AnyTree, of_joints: Iterable[T]) -> list[T]:
     """For each speed the value of its joint."""
     pairs = zip(of_joints, tree.coordinates.joints)
     return [value for value, joint in pairs for _ in joint.speeds]
@@ -90,7 +90,7 @@ def weighted(row: Sequence[float], values: Sequence[Scalar]) -> Scalar:
 
 
 @lru_cache(maxsize=64)
-def on_one_path(tree: Tree) -> list[list[bool]]:
+def on_one_path(tree: AnyTree) -> list[list[bool]]:
     """Whether the joints of two speeds lie on one path to the world, (nv, nv)."""
     before = [{i} for i in range(len(tree.parent))]
     for i, parent in enumerate(tree.parent):
@@ -100,7 +100,7 @@ def on_one_path(tree: Tree) -> list[list[bool]]:
 
 
 @lru_cache(maxsize=64)
-def lone_speeds(tree: Tree) -> frozenset[int]:
+def lone_speeds(tree: AnyTree) -> frozenset[int]:
     """The speeds of free bodies that stand alone: three slides and a ball from the world, and nothing on them."""
     lone: set[int] = set()
     for i in range(3, len(tree.kind)):

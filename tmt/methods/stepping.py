@@ -8,9 +8,9 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 from tmt.derivation.coordinates import FLAT, Coordinates, Flat
+from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.scalar import Scalar, Values
 from tmt.methods.dynamics import LITERAL, Terms, dynamics_of
-from tmt.model.tree import Tree
 from tmt.model.values import shown
 
 Slope = Callable[[Values, Values], Values]
@@ -56,7 +56,7 @@ class Method:
         return len(positions)
 
     def slope(
-        self, tree: Tree, q: Values, qd: Values, tau: Values, dt: Scalar, terms: Terms = LITERAL
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar, terms: Terms = LITERAL
     ) -> Values:
         """qdd from Mbar qdd = tau - D qd - h; terms: Dynamics, or a function that gives Mbar and h."""
         return dynamics_of(terms).acceleration(tree, q, qd, tau)
@@ -66,7 +66,7 @@ class Method:
         raise NotImplementedError
 
 
-def stepped(stepping: Method, tree: Tree, slope: Slope, q: Values, qd: Values, dt: Scalar) -> State:
+def stepped(stepping: Method, tree: AnyTree, slope: Slope, q: Values, qd: Values, dt: Scalar) -> State:
     """The state (q, qd) of a tree one dt later by a method that asks `slope(q, qd)`."""
     joints = tree.coordinates
     return stepping.step(slope, q, qd, dt, joints) if joints.balls else stepping.step(slope, q, qd, dt)

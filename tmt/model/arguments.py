@@ -35,8 +35,8 @@ def states(model: Tree, **arrays: ArrayLike) -> list[list[Array]]:
 
 
 def _state(model: Tree, name: str, values: ArrayLike) -> Array:
-    """The values as an array (..., nq) of q, or (..., nv) of qd and tau."""
-    n = model.coordinates.nq if name == "q" else model.coordinates.nv
+    """The values as an array (..., nq) of q, (..., 1) of dt, or (..., nv)."""
+    n = {"q": model.coordinates.nq, "dt": 1}.get(name, model.coordinates.nv)
     array = real_numbers(values)
     if array is None:
         raise ValueError(f"{name} is {shown(values)}; real numbers of shape (..., {n}) are expected")

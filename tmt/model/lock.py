@@ -46,6 +46,10 @@ class Carrier(NamedTuple):
         turned = np.array([list(row) for row in self.turn @ Matrix(tensor) @ self.turn.transposed])
         return (turned + turned.T) / 2.0
 
+    def turned(self, axes: Sequence[Sequence[float]]) -> Any:
+        """Axes, as columns, in those of the free joint's frame."""
+        return tuple(tuple(row) for row in self.turn @ Matrix(axes))
+
     def onward(self, origin: Vector, turn: Matrix) -> Carrier:
         """The same of another frame, which is fixed in this one."""
         turned = self.turn if turn is IDENTITY else self.turn @ turn
@@ -83,6 +87,7 @@ def locked(tree: Tree, angles: Mapping[str, Any]) -> Tree:
         else:
             frames.append(before[i].onward(*_fixed(tree, i, q)))
     carried = [frames[joint] if joint >= 0 else WORLD for joint in tree.body_joint]
+    of_sites = [frames[joint] if joint >= 0 else WORLD for joint in tree.site_joint]
     return replace(
         tree,
         joint_names=chosen(names, free),
@@ -100,6 +105,9 @@ def locked(tree: Tree, angles: Mapping[str, Any]) -> Tree:
         reference=chosen(tree.reference, free),
         position_gain=tuple(chosen(row, speeds) for row in chosen(tree.position_gain, speeds)),
         speed_gain=tuple(chosen(row, speeds) for row in chosen(tree.speed_gain, speeds)),
+        site_joint=tuple(carrier.joint for carrier in of_sites),
+        site_offset=tuple(carrier.point(offset) for carrier, offset in zip(of_sites, tree.site_offset)),
+        site_turn=tuple(carrier.turned(turn) for carrier, turn in zip(of_sites, tree.site_turn)),
     )
 
 

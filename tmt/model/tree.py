@@ -19,7 +19,9 @@ from .lock import CLOSE_TO_ONE, locked
 from .renamed import accepts_former_names
 from .values import listed, names, numbers_of, shown
 
-OPTIONAL = ("reference", "armature", "stiffness", "rest")  # fields that may be left out
+# fields that may be left out
+OPTIONAL = ("reference", "armature", "stiffness", "rest", "site_offset", "site_turn")
+ABSENT = {"site_turn": np.eye(3)}  # what stands for them, where it is not zero
 GAINS = ("position_gain", "speed_gain")  # and those of a controller, which are () where there is none
 NOT_NEGATIVE = {"mass": "kg", "damping": "N m s/rad", "armature": "kg m2", "stiffness": "N m/rad"}
 NAMES_SHOWN = 60  # characters
@@ -72,6 +74,14 @@ class Tree(Mechanism[float]):
     position_gain, speed_gain : (nv, nv), N m/rad or N/m, and N m s/rad or N s/m, optional
         Of a linear controller of hinges and slides: torque = tau - position_gain @ q - speed_gain @ qd, q as
         it stands.
+    site_names : (k,), optional
+        Of further frames for `frame`, each fixed to that of a joint.
+    site_joint : (k,), optional
+        Index of that joint; -1: fixed to the world.
+    site_offset : (k, 3), m, optional
+        From the origin of the joint's frame to the site's, in the frame of the joint; (): zero.
+    site_turn : (k, 3, 3), optional
+        The axes of the site as columns, in the frame of the joint; (): parallel to it.
 
     Raises
     ------
@@ -94,18 +104,20 @@ class Tree(Mechanism[float]):
     def __post_init__(self) -> None:
         for name in ("joint_names", "body_names"):
             self._set(name, names(name, getattr(self, name)))
-        n, m = len(self.joint_names), len(self.body_names)
+        self._set("site_names", names("site_names", self.site_names))
+        n, m, k = len(self.joint_names), len(self.body_names), len(self.site_names)
         self._set("kind", _kinds(self.kind, n))
         nq, nv = self.coordinates.nq, self.coordinates.nv
         shapes = {
             "parent": (n,), "offset": (n, 3), "axis": (nv, 3), "damping": (nv,),
             "body_joint": (m,), "mass": (m,), "com": (m, 3), "inertia": (m, 3, 3), "gravity": (3,),
             "reference": (n,), "armature": (nv,), "stiffness": (n,), "rest": (nq,),
+            "site_joint": (k,), "site_offset": (k, 3), "site_turn": (k, 3, 3),
         }  # fmt: skip
         for name, shape in shapes.items():
             value = getattr(self, name)
             if name in OPTIONAL and isinstance(value, tuple | list) and not value:
-                value = self.zero if name == "rest" else (0.0,) * shape[0]
+                value = self.zero if name == "rest" else np.broadcast_to(ABSENT.get(name, 0.0), shape)
             self._set(name, numbers_of(name, value, shape))
         for name in GAINS:
             self._set(name, _gain(name, getattr(self, name), self.coordinates))
@@ -113,6 +125,9 @@ class Tree(Mechanism[float]):
             raise ValueError("a Tree needs at least one joint and one body")
         self._set("parent", _indices("parent", self.parent, range(n)))
         self._set("body_joint", _indices("body_joint", self.body_joint, [n] * m))
+        self._set("site_joint", _indices("site_joint", self.site_joint, [n] * k))
+        for name, turn in zip(self.site_names, self.site_turn):
+            _check_axes(f"Tree.site_turn of {name!r}", np.array(turn).T)
         self._set("axis", tuple(_direction(i, axis) for i, axis in enumerate(self.axis)))
         for name, unit in NOT_NEGATIVE.items():
             if min(getattr(self, name)) < 0.0:
@@ -216,13 +231,16 @@ def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows[float]:
 
 
 def _check_ball(i: int, axes: NDArray[np.float64], reference: float, rest: Numbers[float]) -> None:
-    if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0.0:
-        expected = "a right-handed frame is expected"
-        raise ValueError(f"the axes of joint {i}, a ball, are {axes.tolist()}; {expected}")
+    _check_axes(f"the axes of joint {i}, a ball,", axes)
     if reference:
         raise ValueError(f"Tree.reference[{i}] is {reference:g}; 0 is expected of a ball")
     if abs(math.hypot(*rest) - 1.0) > CLOSE_TO_ONE:
         raise ValueError(f"Tree.rest of joint {i}, a ball, is {rest}; a quaternion of length 1 is expected")
+
+
+def _check_axes(whose: str, axes: NDArray[np.float64]) -> None:
+    if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0.0:
+        raise ValueError(f"{whose} are {axes.tolist()}; a right-handed frame is expected")
 
 
 def _direction(i: int, axis: Numbers[float]) -> Numbers[float]:

@@ -4,14 +4,18 @@ Each hinge and slide has a rotor in place of the file's actuators, and one of Dr
 armature and the stiffness that its parser has dropped.
 """
 
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tmt import Tree
 
 from .. import Array, Course, EngineRecord
-from ..outside.model import Body, File, Numbers, ReadModel, Unread
+from ..outside.mjcf_text import original_or_copy
+from ..outside.model import Body, File, Numbers, ReadModel
 from ..outside.order import near, order_of, wrong_masses
 from .plant import (
     bodies_of,
@@ -21,7 +25,8 @@ from .plant import (
     joint_numbers,
     parsed,
     set_masses,
-    with_turned_force,
+    twists_of,
+    with_force,
 )
 
 ENGINE = EngineRecord(
@@ -49,17 +54,21 @@ class Model(ReadModel):
     has_places = True
 
     def __init__(self, file: File, precision: str):
-        if file.kinds.count("ball") > len(file.free):
-            raise Unread("ball joints become three angles")
         self.file = file
         self.inertias: dict[Any, Any] = {}  # of bodies that are mended
         self.simulators: dict[Any, tuple[Any, Any, Any]] = {}
-        plant, rotors = parsed(file, 0.0)
-        plant.Finalize()
-        self.joints = joint_numbers(plant, file)
+        read, self.source, self.copied = original_or_copy(file.path, self.plant_of)
+        plant, rotors, self.joints = read
         joints = {k: plant.get_joint(index) for index, k in self.joints.items()}
         starts = {k: (joint.position_start(), joint.velocity_start()) for k, joint in joints.items()}
-        self.order = order_of(file, starts, (3, 4, 5, 6, 0, 1, 2), (3, 4, 5, 0, 1, 2), in_world=True)
+        free, balls = ((3, 4, 5, 6, 0, 1, 2), (3, 4, 5, 0, 1, 2)), (0, 1, 2)
+        self.order = order_of(file, starts, *free, in_world=True, ball_q=balls, turned_balls=True)
+        places = file.coordinates.places.joints
+        # of each ball: its angles in Drake's q, its quaternion in the Tree's, its speeds
+        self.balls = [
+            (slice(q, q + 3), places[k].q, slice(v, v + 3)) for k, (q, v) in starts.items()
+            if places[k].kind == "ball" and not file.is_free(k)
+        ]  # fmt: skip
         armature, damping, stiffness = np.zeros((3, file.coordinates.nv))
         for joint in joints.values():
             place = self.order.v[joint.velocity_start() :][: joint.num_velocities()]
@@ -68,20 +77,50 @@ class Model(ReadModel):
                      "stiffness": stiffness}  # fmt: skip
         self.settle()
 
+    def plant_of(self, path: Path) -> tuple[Any, dict[str, float], dict[Any, int]]:
+        plant, rotors = parsed(self.file, path, 0.0)
+        plant.Finalize()
+        return plant, rotors, joint_numbers(plant, self.file)
+
+    def in_drake(self, q: Array, *vectors: Array) -> list[Array]:
+        """q, and vectors of speeds or forces, as Drake has them: of a ball roll, pitch, yaw."""
+        placed = self.order.engine(q, *vectors)
+        for angles, quaternion, _ in self.balls:
+            placed[0][angles] = Rotation.from_quat(np.roll(q[quaternion], -1)).as_euler("xyz")
+        return placed
+
+    def in_tree(self, q: Array) -> Array:
+        """Drake's positions (nq,) as those of the Tree."""
+        placed = np.zeros(self.file.coordinates.nq)
+        placed[self.order.q] = q
+        for angles, quaternion, _ in self.balls:
+            placed[quaternion] = np.roll(Rotation.from_euler("xyz", q[angles]).as_quat(), 1)
+        for _, quaternion in self.order.turned:
+            placed[quaternion] /= np.linalg.norm(placed[quaternion])
+        return placed
+
     def fields(self) -> Numbers:
         return self.used
 
-    def bodies(self) -> list[list[Body]]:
-        self.plant.SetPositions(self.context, *self.order.engine(self.stated["reference"]))
+    def bodies(self, q: Array) -> list[list[Body]]:
+        self.plant.SetPositions(self.context, *self.in_drake(q))
         of_joints = bodies_of(self.plant, self.joints)
         joints = range(len(self.file.names))
         return [[in_world(self.context, body) for body in of_joints.get(k, ())] for k in joints]
 
+    def twists(self, q: Array) -> dict[int, tuple[Array, Array, Array]]:
+        self.plant.SetPositions(self.context, *self.in_drake(q))
+        return twists_of(self.context, {k: self.plant.get_joint(index) for index, k in self.joints.items()})
+
     def mend(self, name: str, values: Array) -> bool:
-        if name in self.used:  # a free body has no rotor and no spring, and its damping is in other axes
+        if (
+            name in self.used
+        ):  # a free body has no rotor and no spring, and its damping is in other axes; as a ball's rotor
             wrong, self.used[name] = values != self.used[name], values
             self.settle()
-            return name == "gravity" or not any(wrong[self.order.v[at]].any() for at, _ in self.order.turned)
+            balls = [speeds for *_, speeds in self.balls] if name == "damping" else []
+            turned = [at for at, _ in self.order.turned if at not in balls]
+            return name == "gravity" or not any(wrong[self.order.v[at]].any() for at in turned)
         joints = wrong_masses(self.numbers(), self.stated)
         for k, bodies in bodies_of(self.plant, self.joints).items():
             if k in joints and bodies:
@@ -93,7 +132,7 @@ class Model(ReadModel):
     def settle(self) -> None:
         """Make the plant of single states, without damping and springs, which act as part of the force there."""
         self.simulators.clear()
-        self.plant = finished(self.file, 0.0, self.joints, self.used, None)
+        self.plant = finished(self.file, self.source, 0.0, self.joints, self.used, None)
         self.context = self.plant.CreateDefaultContext()
         self.set_numbers(self.plant, self.context, acts=False)
         self.force = fixed_force(self.plant, self.context)
@@ -108,16 +147,16 @@ class Model(ReadModel):
             plant.get_body(index).SetSpatialInertiaInBodyFrame(context, inertia)
 
     def mass_matrix(self, q: Array) -> Array:
-        self.plant.SetPositions(self.context, *self.order.engine(q))
+        self.plant.SetPositions(self.context, *self.in_drake(q))
         return self.order.tree_matrix(q, self.plant.CalcMassMatrix(self.context))
 
     def bias(self, q: Array, v: Array) -> Array:
-        self.plant.SetPositionsAndVelocities(self.context, np.concatenate(self.order.engine(q, v)))
+        self.plant.SetPositionsAndVelocities(self.context, np.concatenate(self.in_drake(q, v)))
         gravity = self.plant.CalcGravityGeneralizedForces(self.context)
         return self.order.tree(q, self.plant.CalcBiasTerm(self.context) - gravity)
 
     def acceleration(self, q: Array, v: Array, force: Array) -> Array:
-        q_drake, v_drake, force = self.order.engine(q, v, force)
+        q_drake, v_drake, force = self.in_drake(q, v, force)
         self.plant.SetPositionsAndVelocities(self.context, np.concatenate([q_drake, v_drake]))
         self.force.SetFromVector(force)
         return self.order.tree(q, self.forward_dynamics.Eval(self.context))
@@ -131,12 +170,12 @@ class Model(ReadModel):
 
         tau, method, tolerance = course.tau, course.method, course.tolerance
         dt = course.dt if course.steps else None
-        key = method, tuple(tau), dt, tolerance
+        key = method, tuple(tau), dt, tolerance, bool(course.servos)
         if key not in self.simulators:
             of_plant = course.dt if method == "discrete" else 0.0
-            plant = finished(self.file, of_plant, self.joints, self.used, self.stated["rest"])
-            turns = any(tau[self.order.v[at]].any() for at, _ in self.order.turned)
-            system = with_turned_force(plant, self.order, tau) if turns else plant
+            plant = finished(self.file, self.source, of_plant, self.joints, self.used, self.stated["rest"])
+            turns = bool(course.servos) or any(tau[self.order.v[at]].any() for at, _ in self.order.turned)
+            system = with_force(plant, partial(self.force_at, course)) if turns else plant
             simulator = Simulator(system)
             context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
             self.set_numbers(plant, context, acts=True)
@@ -151,9 +190,16 @@ class Model(ReadModel):
             self.simulators[key] = simulator, plant, context
         return self.simulators[key]
 
+    def force_at(self, course: Course, state: Array) -> Array:
+        """The force of a course at Drake's q and v, which on a free body is in world axes."""
+        nq = self.plant.num_positions()
+        q = self.in_tree(state[:nq])
+        force: Array = self.in_drake(q, course.force(q, self.order.tree(q, state[nq:])))[1]
+        return force
+
     def run(self, course: Course) -> tuple[Array, int]:
         simulator, plant, context = self.simulator(course)
-        q, v = self.order.engine(course.q, course.v)
+        q, v = self.in_drake(course.q, course.v)
         simulator.get_mutable_context().SetTime(0.0)
         plant.SetPositionsAndVelocities(context, np.concatenate([q, v]))
         simulator.get_mutable_integrator().ResetStatistics()
@@ -166,5 +212,8 @@ class Model(ReadModel):
                 break
             states.append(plant.GetPositionsAndVelocities(context))
         evaluations = simulator.get_integrator().get_num_derivative_evaluations()
-        path = self.order.tree_states(*np.split(np.array(states), [len(q)], axis=1))
-        return path, course.steps if is_discrete else evaluations
+        of_drake, path = np.split(np.array(states), [len(q)], axis=1), []
+        for x, speeds in zip(*of_drake):
+            q = self.in_tree(x)
+            path.append(np.concatenate([q, self.order.tree(q, speeds)]))
+        return np.array(path), course.steps if is_discrete else evaluations

@@ -1,29 +1,29 @@
 """A file as Drake reads it: the plant, its joints, and the masses that they move."""
 
 import logging
-import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 
 from .. import Array
-from ..outside.mjcf_text import whole_text
-from ..outside.model import Body, File, Numbers, Unread
-from ..outside.order import Order
+from ..outside.model import Body, File, Numbers, OtherJoints, OtherNames
 
 
-def parsed(file: File, dt: float) -> tuple[Any, dict[str, float]]:
-    """A plant that is not final, without actuators and limits; and the reflected inertia of each joint that has one, by name."""
+def parsed(file: File, source: Path | str, dt: float) -> tuple[Any, dict[str, float]]:
+    """A plant that is not final, without actuators and limits; and the reflected inertia of each joint that has one, by name.
+
+    source: the path of what Drake reads, or MJCF text.
+    """
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
     logging.getLogger("drake").setLevel(logging.CRITICAL)  # set by importing pydrake
     plant = MultibodyPlant(dt)
     parser = Parser(plant)
-    text = needs_text(file) and whole_text(file.path)
-    instances = parser.AddModelsFromString(text, "xml") if text else parser.AddModels(str(file.path))
+    is_path = isinstance(source, Path)
+    instances = parser.AddModels(str(source)) if is_path else parser.AddModelsFromString(source, "xml")
     if not file.free:  # a URDF's first body, which MuJoCo fixes to the world
         bodies = {body for instance in instances for body in plant.GetBodyIndices(instance)}
         for body in bodies - {joint.child_body().index() for joint in joints_of(plant)}:
@@ -41,21 +41,13 @@ def parsed(file: File, dt: float) -> tuple[Any, dict[str, float]]:
     return plant, rotors
 
 
-def needs_text(file: File) -> bool:
-    """Whether an MJCF file has no name of the model, which Drake needs, joints without a name, or meshes or includes."""
-    if file.path.suffix == ".urdf":
-        return False
-    root = ElementTree.parse(file.path).getroot()
-    has_unnamed = any(re.fullmatch(r"joint \d+", name) for name in file.names)
-    has_parts = any(part.tag in ("mesh", "include") for part in root.iter())
-    return has_unnamed or has_parts or "model" not in root.attrib
-
-
-def finished(file: File, dt: float, joints: Mapping[Any, int], numbers: Numbers, rest: Array | None) -> Any:
+def finished(
+    file: File, source: Path | str, dt: float, joints: Mapping[Any, int], numbers: Numbers, rest: Array | None
+) -> Any:
     """A final plant with the gravity and armature of `numbers`, and, unless `rest` is None, with its springs."""
     from pydrake.multibody.tree import PrismaticSpring, RevoluteSpring
 
-    plant, springs = parsed(file, dt)[0], {"revolute": RevoluteSpring, "prismatic": PrismaticSpring}
+    plant, springs = parsed(file, source, dt)[0], {"revolute": RevoluteSpring, "prismatic": PrismaticSpring}
     plant.mutable_gravity_field().set_gravity_vector(numbers["gravity"])
     for joint in joints_of(plant):
         if joint.type_name() not in springs:
@@ -77,16 +69,16 @@ def joint_numbers(plant: Any, file: File) -> dict[Any, int]:
     """The number in the Tree of each of Drake's joints that move, by its index; of a free body that of its ball."""
     joints = joints_of(plant)
     free = [joint.index() for joint in joints if joint.num_velocities() == 6]  # called as their bodies
-    names = {joint.index(): joint.name() for joint in joints if joint.num_velocities() == 1}
+    names = {joint.index(): joint.name() for joint in joints if joint.num_velocities() in (1, 3)}
     names |= zip(free, [f"{name} turn" for name in file.free])
     expected = {name: k for k, name in enumerate(file.names)}
     for name in file.free:
         for part in "xyz":
             del expected[f"{name} {part}"]
     if len(free) != len(file.free) or plant.num_velocities() != file.coordinates.nv:
-        raise Unread(f"Drake has {plant.num_velocities()} speeds, the compared model {file.coordinates.nv}")
+        raise OtherJoints(f"it has {plant.num_velocities()} speeds, the file {file.coordinates.nv}")
     if missing := [name for name in expected if name not in names.values()]:
-        raise Unread(f"Drake has no joint of the name {missing[0]!r}")
+        raise OtherNames(f"it has no joint {missing[0]!r}")
     return {index: expected[name] for index, name in names.items()}
 
 
@@ -126,26 +118,35 @@ def set_masses(context: Any, bodies: list[Any], stated: Body) -> dict[Any, Any]:
     return {body.index(): SpatialInertia.Zero() for body in bodies} | {bodies[0].index(): together}
 
 
+def twists_of(context: Any, joints: Mapping[int, Any]) -> dict[int, tuple[Array, Array, Array]]:
+    """ReadModel.twists of joints by their numbers in the Tree."""
+    twists = {}
+    for k, joint in joints.items():
+        pose, kind, none = joint.frame_on_child().CalcPoseInWorld(context), joint.type_name(), np.zeros(3)
+        axes = {"revolute": "revolute_axis", "prismatic": "translation_axis"}
+        axis = pose.rotation().matrix() @ getattr(joint, axes[kind])() if kind in axes else none
+        velocity = (axis, none) if kind == "prismatic" else (none, axis)
+        if joint.num_velocities() < 6:  # not of a free body
+            twists[k] = *velocity, pose.translation()
+    return twists
+
+
 def fixed_force(plant: Any, context: Any) -> Any:
     """The vector of generalized forces in a context, in Drake's order and axes."""
     port = plant.get_applied_generalized_force_input_port()
     return port.FixValue(context, np.zeros(plant.num_velocities())).GetMutableData().get_mutable_value()
 
 
-def with_turned_force(plant: Any, order: Order, force: Array) -> Any:
-    """A system of the plant and of forces that turn with its free bodies: (nv,), constant as the Tree has it.
-
-    Drake's force on a free body is in world axes. These are computed in Python at each evaluation.
-    """
+def with_force(plant: Any, force: Callable[[Array], Array]) -> Any:
+    """A system of the plant and of a force, (nv,) in Drake's axes, of Drake's q and v, computed in Python at each evaluation."""
     from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
     def turned(context: Any, output: Any) -> None:
-        q = order.tree_position(forces.get_input_port().Eval(context)[: len(order.q)])
-        output.SetFromVector(order.engine(q, force)[1])
+        output.SetFromVector(force(forces.get_input_port().Eval(context)))
 
     forces, builder = LeafSystem(), DiagramBuilder()
     forces.DeclareVectorInputPort("state", plant.num_multibody_states())
-    forces.DeclareVectorOutputPort("force", len(order.v), turned)
+    forces.DeclareVectorOutputPort("force", plant.num_velocities(), turned)
     builder.AddSystem(plant)
     builder.AddSystem(forces)
     builder.Connect(plant.get_state_output_port(), forces.get_input_port())

@@ -1,13 +1,13 @@
-"""The actuators, tendons and gravity compensation of a compiled model."""
+"""The actuators of a compiled model."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from ...robots.actuators import Actuator, Drive, Tendon
-from .names import OF_A_JOINT, control_of, element_name, names_where, number_of_actuators, on, output_of
+from ...robots.actuators import Actuator, Drive
+from .names import OF_A_JOINT, control_of, element_name, number_of_actuators, on, output_of
 from .source import Source
 
 WITH_LENGTH = "JOINT", "JOINTINPARENT", "SLIDERCRANK", "TENDON", "SITE"  # transmissions
@@ -16,25 +16,14 @@ BIASES = {"NONE": 0, "AFFINE": 3}
 DYNAMICS = {"NONE": "none", "INTEGRATOR": "integrator", "FILTER": "filter", "FILTEREXACT": "filterexact"}
 NAMED_LAWS = {"DCMOTOR": "a DC motor", "USER": "a user-defined law"}
 GROUPS = 31  # that can be switched off
-# springs and dampers that are left out where these fields are not 0: by element
-NOT_LINEAR = {
-    "joint": ("jnt_stiffnesspoly", "dof_dampingpoly", "jnt_springyield"),
-    "tendon": ("tendon_stiffnesspoly", "tendon_dampingpoly", "tendon_springyield", "tendon_actfrclimited"),
-}
 
 
-def drive_of(source: Source, bodies: Sequence[int], keys: Mapping[int, str]) -> Drive:
-    """What drives a compiled model. bodies: of the Tree, by number; keys: names of keyframes."""
+def drive_of(source: Source, keys: Mapping[int, str]) -> Drive:
+    """What drives a compiled model. keys: names of keyframes."""
     model = source.model
-    passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
-    tendons = [tendon_of(model, i) for i in range(model.ntendon)]
     return Drive(
         actuators=tuple(actuator(model, i) for i in range(number_of_actuators(model))),
-        tendons=tuple(tendon for tendon in tendons if tendon.stiffness or tendon.damping),
-        compensation=tuple(map(float, model.body_gravcomp[list(bodies)] * passive)),
         controls={keys[k]: u for k, u in stated_controls(source).items() if k in keys},
-        unknown=unknown_springs(model),
-        explicit_damping=not on(model, "EULERDAMP"),
     )
 
 
@@ -44,7 +33,6 @@ def actuator(m: mujoco.MjModel, i: int) -> Actuator:
     dynamics = kind(mujoco.mjtDyn, m.actuator_dyntype[i])
     place, inputs = control_of(m, i)
     joint, moment = moment_of(m, i)
-    filters = dynamics in ("FILTER", "FILTEREXACT")
     clamped = inputs and on(m, "CLAMPCTRL") and m.actuator_ctrllimited[place]
     return Actuator(
         name=element_name(m, "actuator", i),
@@ -53,22 +41,11 @@ def actuator(m: mujoco.MjModel, i: int) -> Actuator:
         gain=law(m.actuator_gainprm[i], GAINS.get(gain, 0)),
         bias=law(m.actuator_biasprm[i], BIASES.get(bias, 0)),
         dynamics=DYNAMICS.get(dynamics, "none"),
-        time_constant=max(float(m.actuator_dynprm[i, 0]), mujoco.mjMINVAL) if filters else 0.0,
         control_range=tuple(m.actuator_ctrlrange[place].tolist()) if clamped else None,
         activation_range=tuple(m.actuator_actrange[i].tolist()) if m.actuator_actlimited[i] else None,
-        force_range=force_range(m, i),
         off=off(m, i),
         refused=refused(m, i, gain, bias, dynamics, inputs),
     )
-
-
-def force_range(m: mujoco.MjModel, i: int) -> tuple[float, float] | None:
-    """Of an actuator at a joint also that of the joint over the gear, as if no other actuator were at it; None: no range."""
-    j, gear = int(m.actuator_trnid[i, 0]), float(m.actuator_gear[output_of(m, i), 0])
-    ranges = [m.actuator_forcerange[i]] if m.actuator_forcelimited[i] else []
-    if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT and m.jnt_actfrclimited[j] and gear:
-        ranges.append(np.sort(m.jnt_actfrcrange[j] / gear))
-    return (float(max(low for low, _ in ranges)), float(min(high for _, high in ranges))) if ranges else None
 
 
 def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inputs: int) -> str:
@@ -123,26 +100,6 @@ def tendon_moment(m: mujoco.MjModel, i: int) -> np.ndarray | None:
             return None
         moment[m.jnt_dofadr[m.wrap_objid[k]]] += m.wrap_prm[k]
     return moment
-
-
-def tendon_of(m: mujoco.MjModel, i: int) -> Tendon:
-    """The spring and the damper of a tendon."""
-    moment, name = tendon_moment(m, i), element_name(m, "tendon", i)
-    stiffness, damping = m.tendon_stiffness[i] * on(m, "SPRING"), m.tendon_damping[i] * on(m, "DAMPER")
-    everywhere = None if moment is None else tuple(moment.tolist())
-    return Tendon(
-        name, i, everywhere, float(stiffness), float(damping), *map(float, m.tendon_lengthspring[i])
-    )
-
-
-def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
-    """What is left out of joints and tendons, by name, and the field that is not 0: not linear, or a tendon's force range."""
-    reasons = {}
-    for element, fields in NOT_LINEAR.items():
-        for field in fields:
-            for name in names_where(m, field, np.asarray(getattr(m, field, ())) != 0):
-                reasons[f"{element} {name}"] = f"{field} is not 0"
-    return reasons
 
 
 def stated_controls(source: Source) -> dict[int, tuple[float | None, ...]]:

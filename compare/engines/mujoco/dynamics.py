@@ -16,7 +16,19 @@ from numpy.typing import ArrayLike
 
 from ...robots.case import Case
 from .. import GRID, Motion, Prepared, Setting, Tolerance, as_far_as_it_goes, rows_of_states
-from .names import EVALUATIONS, INTEGRATORS, bit, element_name, joint_places, moving, number_of_actuators
+from .inventory import contact_pairs
+from .names import (
+    EVALUATIONS,
+    INTEGRATORS,
+    OF_A_JOINT,
+    bit,
+    element_name,
+    joint_name,
+    joint_places,
+    moving,
+    number_of_actuators,
+    on,
+)
 
 Array = np.ndarray | float
 Pair = tuple[np.ndarray, np.ndarray]
@@ -129,9 +141,41 @@ class MujocoDynamics:
         return self._each(torque, q, v, a)  # a travels in the place of tau
 
     def acting_actuators(self, q: Array, v: Array) -> list[str]:
-        """The names of the actuators that exert a force at a state."""
-        forces = self._each(lambda d: d.actuator_force, q, v).reshape(-1, number_of_actuators(self.model))
-        return [element_name(self.model, "actuator", i) for i in np.flatnonzero(forces.any(axis=0)).tolist()]
+        """The names of the actuators that exert a force at a state, and their joints."""
+        m = self.model
+        forces = self._each(lambda d: d.actuator_force, q, v).reshape(-1, number_of_actuators(m))
+        names = {i: element_name(m, "actuator", i) for i in np.flatnonzero(forces.any(axis=0)).tolist()}
+        joints = {
+            i: m.actuator_trnid[i, 0] for i in names if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT
+        }
+        return [f"{name} on {joint_name(m, joints[i])}" if i in joints else name for i, name in names.items()]
+
+    def additional_bodies(self) -> list[tuple[str, float]]:
+        """Bodies with mass, kg, that are not among those of the case, by name."""
+        masses = enumerate(self.model.body_mass.tolist())
+        others = {body: mass for body, mass in masses if mass and body not in self.bodies}
+        return [(element_name(self.model, "body", body), mass) for body, mass in others.items()]
+
+    @property
+    def may_touch(self) -> bool:
+        """Whether contacts are in force, and some geoms may touch."""
+        m = self.model
+        return on(m, "CONTACT") and on(m, "CONSTRAINT") and len(contact_pairs(m)) > 0
+
+    def touching(self, q: np.ndarray) -> list[set[tuple[str, str]]]:
+        """The pairs of geoms with a contact at each position, (states, nq), by name."""
+        return [self.touching_now(self.forward(state)) for state in q]
+
+    def touching_now(self, data: mujoco.MjData) -> set[tuple[str, str]]:
+        pairs = data.contact.geom[data.contact.efc_address >= 0]
+        return {(self.geom_name(one), self.geom_name(other)) for one, other in pairs.tolist()}
+
+    def geom_name(self, number: int) -> str:
+        """The name of a geom, else that of its body."""
+        name, body = self.model.geom(number).name, int(self.model.geom_bodyid[number])
+        return name or (
+            f"a geom of {element_name(self.model, 'body', body)}" if body else "a geom of the world"
+        )
 
     def other_forces(self, q: Array, v: Array) -> dict[str, np.ndarray]:
         """Forces that the case's equations do not have, by source, N m, (..., nv) each."""
@@ -197,8 +241,8 @@ class MujocoDynamics:
         return states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs], ended
 
     def runner(
-        self, state: tuple[Array, Array, Array], dt: float, steps: int, method: str, tolerance: Tolerance
-    ) -> tuple[np.ndarray, Callable[[], np.ndarray]]:
+        self, state: tuple[Array, Array, Array], dt: float, steps: int, method: str, tolerance: Tolerance, threads: int = 1
+    ) -> tuple[np.ndarray, Callable[[], np.ndarray]]:  # fmt: skip
         """The first states, time first, and a call that runs MuJoCo's C loop from them; it returns (runs, steps, ...)."""
         if tolerance is not None:
             raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
@@ -220,8 +264,10 @@ class MujocoDynamics:
         controls = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
         options = {"control_spec": controls, "nstep": steps, "state": states, "sensordata": sensors}
 
+        of_threads = [data, *(mujoco.MjData(model) for _ in range(threads - 1))]
+
         def run() -> np.ndarray:
-            rollout([model] * runs, [data], starts, torques, skip_checks=True, **options)
+            rollout([model] * runs, of_threads, starts, torques, skip_checks=True, **options)
             return states
 
         return starts, run

@@ -9,7 +9,10 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...robots.actuators import Controller
 from ..outside.model import combined
+from .dynamics import Engaged
+from .engine import engaged
 from .inventory import switch_off, take_away
 from .names import INTEGRATORS, bit, joint_name, joint_places, kind_of, matrix, rotors, tensor
 from .reading import carriers
@@ -119,12 +122,21 @@ def unused(name: str, names: list[str]) -> str:
 class Bare:
     """The compiled model of a file with all that a Tree does not have taken away or switched off.
 
-    names: of the Tree's joints. rotors_in_joints: the armature of actuators is that of their joints.
-    qpos (nq,), dofs (nv,): the indices of the Tree's coordinates and speeds in MuJoCo's.
+    names: of the Tree's joints. rotors_in_joints: the armature of actuators is that of their joints. controller: of the
+    actuators that act, with `engaged` controls; None: none does. qpos (nq,), dofs (nv,): the indices of the Tree's coordinates
+    and speeds in MuJoCo's.
     """
 
-    def __init__(self, path: Path, names: Sequence[str], rotors_in_joints: bool = False):
-        self.model = Source(path).without({}, bare=True)
+    engaged = Engaged()
+
+    def __init__(
+        self,
+        path: Path,
+        names: Sequence[str],
+        rotors_in_joints: bool = False,
+        controller: Controller | None = None,
+    ):
+        self.model = Source(path).without({}, bare=controller is None)
         switch_off(self.model)
         self.model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
         # its solver starts from the unconstrained acceleration
@@ -136,7 +148,12 @@ class Bare:
             self.model.actuator_armature[:] = 0.0
         # with this flag MuJoCo Warp's implicitfast is explicit in the damping; actuators with armature are still there
         self.model.opt.disableflags &= ~bit("ACTUATION")
-        self.model.actuator_gainprm[:] = self.model.actuator_biasprm[:] = 0.0
+        idle = np.ones(self.model.nu, bool)
+        if controller:
+            self.engaged = engaged(self.model, controller)
+            self.model.opt.disableactuator = 0  # not every engine has groups
+            idle = np.array([control is None for control in controller.controls])
+        self.model.actuator_gainprm[idle] = self.model.actuator_biasprm[idle] = 0.0
         # MJX refuses pairs even if there are no contacts
         self.model.geom_contype[:] = self.model.geom_conaffinity[:] = 0
         places = joint_places(self.model)

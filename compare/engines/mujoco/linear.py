@@ -49,8 +49,12 @@ class WholeRun(NamedTuple):
     failed_at: float | None  # s: MuJoCo warns of a bad number, resets it where it may; None: it runs on
 
 
-def start_of(model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray) -> np.ndarray:
+def start_of(
+    model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray, q: np.ndarray | None = None
+) -> np.ndarray:
     """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) rad/s and m/s added to its speeds.
+
+    q: other positions, (nq,), at rest.
 
     Where no controls are stated the targets of servos are the posture.
     """
@@ -58,6 +62,8 @@ def start_of(model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray) ->
     if key:
         names = [element_name(model, "key", k) for k in range(model.nkey)]
         mujoco.mj_resetDataKeyframe(model, data, names.index(key))
+    if q is not None:
+        data.qpos[:], data.qvel[:] = q, 0.0
     data.qvel[:] += push
     mujoco.mj_fwdPosition(model, data)
     lengths = [data.actuator_length[output_of(model, i)] for i in range(len(drive.actuators))]

@@ -53,6 +53,15 @@ def element_name(m: mujoco.MjModel, kind: str, number: Integer) -> str:
     return name
 
 
+def contact_name(m: mujoco.MjModel, d: mujoco.MjData, number: int) -> str:
+    """The two geoms of a contact of the data, or their bodies where they have no names."""
+    names = []
+    for geom in d.contact.geom[number]:
+        stated = m.geom(int(geom)).name
+        names.append(stated or element_name(m, "body", m.geom_bodyid[geom]))
+    return f"{names[0]} on {names[1]}" if names[0] != names[1] else names[0]
+
+
 def joint_name(m: mujoco.MjModel, number: Integer) -> str:
     return element_name(m, "joint", number)
 
@@ -139,14 +148,21 @@ def rotors(m: mujoco.MjModel) -> np.ndarray:
 
     MuJoCo takes the first number of the gear for every speed of the joint.
     """
-    diagonal = np.zeros(m.nv)
     for i in map(int, np.flatnonzero(getattr(m, "actuator_armature", np.zeros(0)))):
         if mujoco.mjtTrn(m.actuator_trntype[i]) not in OF_A_JOINT:
             name = element_name(m, "actuator", i)
             why = "has armature and acts on no joint; only that of joints is compared"
             raise ValueError(f"actuator {name!r} {why}")
-        added = m.actuator_armature[i] * m.actuator_gear[output_of(m, i), 0] ** 2
-        diagonal[m.dof_jntid == m.actuator_trnid[i, 0]] += added
+    return reflected(m, "actuator_armature")
+
+
+def reflected(m: mujoco.MjModel, field: str) -> np.ndarray:
+    """A number of the actuators at joints, times gear squared, at the speeds of their joints, (nv,)."""
+    diagonal = np.zeros(m.nv)
+    for i in map(int, np.flatnonzero(getattr(m, field, np.zeros(0)))):
+        if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT:
+            added = getattr(m, field)[i] * m.actuator_gear[output_of(m, i), 0] ** 2
+            diagonal[m.dof_jntid == m.actuator_trnid[i, 0]] += added
     return diagonal
 
 

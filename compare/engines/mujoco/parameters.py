@@ -224,6 +224,20 @@ def remarks(reading: Reading, has_scenes: bool) -> list[Finding]:
     return findings
 
 
+def of_welded(source: Source) -> list[Finding]:
+    """Which bodies are one with another, of a Source that is joined; links without mass."""
+    model, findings = source.model, []
+    names = {body: element_name(model, "body", body) for body in range(model.nbody)}
+    if pairs := [f"{names[body]} on {names[base]}" for body, base in source.welded.items() if base]:
+        findings.append(Finding("remarks", "welded", {"pairs": pairs}))
+    if fixed := [names[body] for body, base in source.welded.items() if not base]:
+        findings.append(Finding("remarks", "fixed", {"bodies": fixed}))
+    light = [body for body in sorted(set(model.jnt_bodyid.tolist())) if not model.body_mass[body]]
+    if light:
+        findings.append(Finding("remarks", "massless", {"links": [names[body] for body in light]}))
+    return findings
+
+
 def of_source(source: Source) -> list[Finding]:
     """What is fixed of a URDF; for each option by which the compiler changed stated numbers, where it did, by quantity."""
     model, findings = source.model, []

@@ -1,7 +1,7 @@
 """A file read as a Tree: the model as MuJoCo compiled it; all that the Tree does not have is listed and switched off."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 import tmt
 
 from ...robots.file import RobotFile
+from ...robots.joint_map import places_of
 from .actuators import drive_of
 from .engine import Mujoco
 from .inventory import features, refuse, refuse_numbers, take_away, usable_keys
@@ -67,7 +68,7 @@ def read(origin: Source | Path | str | mujoco.MjModel) -> Reading:
         ranges=tuple(ranges[place.joint] for place in joints.values()),
         integrator=names_of_members.get(integrator, integrator.name.removeprefix("mjINT_")),
         dt=float(model.opt.timestep),
-        drive=drive_of(source, bodies, keys),
+        drive=drive_of(source, keys),
         bodies=tuple(bodies),
         source=source,
     )
@@ -81,12 +82,8 @@ def tree_of(compiled: mujoco.MjModel, joints: Mapping[str, Place], bodies: Seque
     """
     model, places = mujoco.MjModel.__copy__(compiled), list(joints.values())
     take_away(model)  # what a flag of the file disables is zero
-    data, carrier = mujoco.MjData(model), carriers(model, places)
-    data.qpos[:] = model.qpos0
+    data, carrier = at_reference(model), carriers(model, places)
     free = {place.joint for place in places if kind_of(model, place.joint) == "free"}
-    for start in model.jnt_qposadr[list(free)]:  # at the origin and not turned
-        data.qpos[start : start + 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-    mujoco.mj_kinematics(model, data)
     parents, anchors, axes, reference = [], [], [], []
     for i, place in enumerate(places):
         body, first = model.jnt_bodyid[place.joint], model.jnt_dofadr[place.joint]
@@ -124,6 +121,42 @@ def tree_of(compiled: mujoco.MjModel, joints: Mapping[str, Place], bodies: Seque
         "reference": reference,
     }
     return tmt.Tree(**numbers)
+
+
+def at_reference(model: mujoco.MjModel) -> mujoco.MjData:
+    """The model at the reference position, free bodies at the origin and not turned."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = model.qpos0
+    for start in model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]:
+        data.qpos[start : start + 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    mujoco.mj_kinematics(model, data)
+    return data
+
+
+def tree_with_sites(reading: Reading) -> tmt.Tree:
+    """The Tree, with the frames of all bodies and sites of the file as its sites.
+
+    A body's frame has its name; a site's `NAME site`, where a body has the name.
+    """
+    model = reading.model
+    data, carrier = at_reference(model), carriers(model, list(joint_places(model).values()))
+    origins = [*places_of(reading.tree)[0], np.zeros(3)]
+    bodies = {element_name(model, "body", body): body for body in range(1, model.nbody)}
+    names, joints = list(bodies), [carrier[body] for body in bodies.values()]
+    positions, turns = list(data.xpos[1:]), list(data.xmat[1:])
+    for site in range(model.nsite):
+        name = element_name(model, "site", site)
+        names.append(f"{name} site" if name in bodies else name)
+        joints.append(carrier[model.site_bodyid[site]])
+        positions.append(data.site_xpos[site])
+        turns.append(data.site_xmat[site])
+    sites: dict[str, Any] = {
+        "site_names": names,
+        "site_joint": joints,
+        "site_offset": [position - origins[joint] for position, joint in zip(positions, joints)],
+        "site_turn": [turn.reshape(3, 3) for turn in turns],
+    }
+    return replace(reading.tree, **sites)
 
 
 def carriers(model: mujoco.MjModel, places: Sequence[Place]) -> list[int]:

@@ -9,6 +9,7 @@ import os
 import re
 import warnings
 from collections.abc import Collection, Mapping
+from copy import copy
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -17,7 +18,9 @@ import mujoco
 import numpy as np
 
 from ...process.parts import is_pipe, named_by
-from .names import aligns, joint_name, joint_places, kind_of, parts_of, rotors
+from .inventory import contact_pairs
+from .names import aligns, element_name, joint_name, joint_places, kind_of, parts_of, rotors
+from .welded import compiled, join, welded_bodies
 
 FROM_GEOMS = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
 PARTS_OF_FREE = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]
@@ -27,8 +30,10 @@ UNREAD = (
 )  # by MuJoCo, of a mesh that is not there or in another format
 ADVICE = {  # by what MuJoCo says of a file that it cannot compile
     "which cannot be read": "package://NAME/... is looked for in a folder NAME beside the file or above it, else beside the file",
+    "must have positive eigenvalues": "the order of fullinertia is xx, yy, zz, xy, xz, yz",
     "mass and inertia of moving bodies": "boundmass and boundinertia of <compiler> give some, or both joints in one body",
 }
+ROOT_ELEMENT = re.compile(r"(?:\ufeff|\s|<[?!][^>]*>)*<([A-Za-z][\w.:-]*)")
 Positions = Mapping[str, float | tuple[float, ...]]  # of joints by name: rad, m or a quaternion
 
 
@@ -54,6 +59,7 @@ class Source:
         self.warnings: tuple[str, ...] = ()
         self.missing: tuple[str, ...] = ()
         self.floating = floating
+        self.welded: dict[int, int] = {}
         self._spec: mujoco.MjSpec | None = None
         if isinstance(origin, mujoco.MjModel):
             self.model = mujoco.MjModel.__copy__(origin)
@@ -79,7 +85,9 @@ class Source:
         except UnicodeDecodeError:
             raise ModelError(f"{self} has names that are not UTF-8; save it as UTF-8") from None
         except ValueError as error:
-            is_model = "<mujoco" in self.text or "<robot" in self.text
+            is_model, root = "<mujoco" in self.text or "<robot" in self.text, ROOT_ELEMENT.match(self.text)
+            if root and not is_model:
+                raise ModelError(f"{self} is not MJCF or URDF: its root element is <{root[1]}>") from None
             problem = f"MuJoCo cannot compile {self}" if is_model else f"{self} is not MJCF"
             advice = "".join(f"; {text}" for part, text in ADVICE.items() if part in str(error))
             raise ModelError(f"{problem}: {error}{advice}") from None
@@ -94,7 +102,7 @@ class Source:
         """The spec of the model, without what is only drawn, and without meshes that cannot be read."""
         spec = without_visuals(stated.copy())
         try:
-            self.model = spec.compile()
+            self.model = compiled(spec)
         except ValueError as error:
             if not is_unread(error):
                 raise
@@ -102,7 +110,7 @@ class Source:
             self.missing = tuple(asset.file for asset in files)
             leave_out(stated, self.missing)
             spec = without_visuals(stated.copy())
-            self.model = spec.compile()
+            self.model = compiled(spec)
         return spec
 
     def __str__(self) -> str:
@@ -124,6 +132,13 @@ class Source:
                 leave_out(self._spec, self.missing)
         return self._spec
 
+    def joined(self) -> "Source":
+        """The same, with the mass of bodies that are welded to a moving one in that one."""
+        other = copy(self)
+        other.model, other.welded = mujoco.MjModel.__copy__(self.model), welded_bodies(self.model)
+        join(other.model, other.welded)
+        return other
+
     def without(self, positions: Positions, bare: bool = False) -> mujoco.MjModel:
         """The compiled model without the joints named in `positions`, see names.joint_places.
 
@@ -137,9 +152,11 @@ class Source:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the compiler's, of the file as it is
-                return compiled_without(without_visuals(self.spec.copy()), positions, bare)
+                model = compiled_without(without_visuals(self.spec.copy()), positions, bare)
         except ValueError as error:
             raise ModelError(f"MuJoCo cannot compile {self} with locked joints {names}: {error}") from None
+        join(model, self.welded)
+        return model
 
 
 def text_of(path: Path) -> str:
@@ -260,7 +277,7 @@ def without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
 
 def compiled_without(spec: mujoco.MjSpec, positions: Positions, bare: bool) -> mujoco.MjModel:
     """The model whose bodies and other joints are placed as mj_kinematics places them with the joints locked."""
-    model = spec.compile()
+    model = compiled(spec)
     data, places = mujoco.MjData(model), joint_places(model)
     data.qpos[:] = model.qpos0
     for name, place in places.items():
@@ -290,7 +307,17 @@ def compiled_without(spec: mujoco.MjSpec, positions: Positions, bare: bool) -> m
                 armature = model.dof_armature + rotors(model)  # of actuators too, which are deleted
                 add_parts(body, joint, float(armature[model.jnt_dofadr[i]]), positions, axes)
     clear(spec, removed, bare)
-    smaller = spec.compile()
+    smaller = compiled(spec)
+    if not bare and (touching := pairs_of_bodies(smaller) - pairs_of_bodies(model)):
+        for body in spec.bodies:
+            body.name = element_name(smaller, "body", body.id)
+        for (
+            one,
+            other,
+        ) in touching:  # they are neighbours, whose contacts MuJoCo leaves out unless one of them is fixed
+            names = (element_name(smaller, "body", number) for number in (one, other))
+            spec.add_exclude(**dict(zip(("bodyname1", "bodyname2"), names)))
+        smaller = compiled(spec)
     # of springdamper the compiler chooses both by the inertia
     for name, place in joint_places(smaller).items():
         before = places[name]
@@ -298,6 +325,12 @@ def compiled_without(spec: mujoco.MjSpec, positions: Positions, bare: bool) -> m
         smaller.dof_damping[place.dofs] = model.dof_damping[before.dofs]
         smaller.jnt_stiffness[place.joint] = model.jnt_stiffness[before.joint]
     return smaller
+
+
+def pairs_of_bodies(model: mujoco.MjModel) -> set[tuple[int, int]]:
+    """The bodies whose geoms may touch, by number, the smaller one first."""
+    pairs = np.sort(model.geom_bodyid[contact_pairs(model)], axis=1)
+    return set(map(tuple, pairs.tolist()))
 
 
 def add_parts(

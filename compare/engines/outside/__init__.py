@@ -13,6 +13,7 @@ A process of its own keeps an engine's threads, its precision and a crash away f
 
 import importlib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache, cached_property
 from operator import attrgetter
 from pathlib import Path
@@ -21,10 +22,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+import tmt
+
 from ...core.words import listed
 from ...process.workers import Beginning, WorkerEnded, Workers
 from ...robots.case import Case
-from .. import RECORDS, Array, Course, Engine, Method, Motion, OneByOne, Prepared, Setting
+from .. import RECORDS, Array, Course, Engine, Method, Motion, OneByOne, Prepared, Servos, Setting
 from . import answers
 from .model import EngineError, File, Reading, TooLong, passive
 
@@ -59,14 +62,19 @@ class Outside(Engine):
     def of(self, case: Case) -> "OutsideDynamics":
         return OutsideDynamics(self.name, case)
 
+    def as_read(self, case: Case) -> "OutsideDynamics":
+        """The dynamics of what the engine has read, nothing of which is set."""
+        return OutsideDynamics(self.name, case, is_set=False)
+
 
 class OutsideDynamics(OneByOne):
     """A case in an outside engine: a robot without locked joints and without servos."""
 
     seconds_prepared: float | None = None  # of compilation, where it compiles
 
-    def __init__(self, name: str, case: Case):
+    def __init__(self, name: str, case: Case, is_set: bool = True):
         self.name, self.case, self.tree, self.coordinates = name, case, case.tree, case.coordinates
+        self.is_set = is_set
         self.file = File(Path(case.robot.mjcf).resolve(), case.joints, case.coordinates.all_kinds)
 
     @cached_property
@@ -78,7 +86,9 @@ class OutsideDynamics(OneByOne):
 
         A process reads the file once, and again if it is a new one.
         """
-        call = process(self.name).submit(answers.answer, act, self.name, self.file, self.tree, *arguments)
+        call = process(self.name).submit(
+            answers.answer, act, self.name, self.file, self.tree, self.is_set, *arguments
+        )
         try:
             return call.result()
         except TimeoutError:
@@ -98,7 +108,19 @@ class OutsideDynamics(OneByOne):
         return self.rows("bias", q, v)
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
-        return self.rows("acceleration", q, v, tau - passive(self.tree, q, v))
+        return self.rows("acceleration", q, v, tau - passive(self.acting, q, v))
+
+    @property
+    def acting(self) -> tmt.Tree:
+        """The Tree with the damping and springs of the joints that act: where nothing is set, those that the engine has read."""
+        if self.is_set:
+            return self.tree
+        none = np.zeros(self.coordinates.nv)
+        acting = {"damping": none, "stiffness": none} | self.reading["read"]
+        acting |= dict.fromkeys(self.reading["lacking"], none)
+        joints = self.tree.coordinates.joints
+        stiffness = tuple(float(acting["stiffness"][joint.qd.start]) for joint in joints)
+        return replace(self.tree, damping=tuple(acting["damping"].tolist()), stiffness=stiffness)
 
     def has(self, quantity: str) -> bool:
         return quantity in self.reading["has"]
@@ -108,17 +130,37 @@ class OutsideDynamics(OneByOne):
             raise EngineError(f"it has read another {listed(different)}, which cannot be set")
         return super().prepare(q, v, tau, setting, method)
 
+    def batch(
+        self, start: tuple[Array, Array, Array], dt: float, steps: int, method: str
+    ) -> tuple[float, float, str, Array]:
+        """Seconds of preparation and of steps of many worlds, from q, v and under tau, (worlds, n); the device; q of one."""
+        times = np.array([0.0, dt * steps])
+        return self.ask(answers.batched, Course(*start, times, steps, method))
+
     def prepared(self, course: Course) -> Prepared:
-        self.seconds_prepared = self.ask(answers.prepared, course)
+        course = course._replace(servos=servos_of(self.case))
+        self.seconds_prepared, step_alone = self.ask(answers.prepared, course)
+        alone = None if step_alone is None else step_alone * course.steps
 
         def run() -> answers.Run:
             return self.ask(answers.ran, course)
 
         def read(run: answers.Run) -> Motion:
             motion, steps = course.motion(run.states, run.why), course.steps or None
-            return motion._replace(evaluations=run.evaluations, seconds=run.seconds, steps=steps)
+            motion = motion._replace(evaluations=run.evaluations, seconds=run.seconds, steps=steps)
+            return motion._replace(seconds_alone=alone)
 
         return run, read
+
+
+def servos_of(case: Case) -> Servos | None:
+    """The servos that act in a case, None if none does."""
+    if case.controller is None:
+        return None
+    coordinates, (*_, positions, speeds) = case.coordinates, case.controller
+    gains = np.zeros((coordinates.nv, coordinates.nq))
+    gains[:, coordinates.places.first_positions] = positions
+    return Servos(case.controller, gains, speeds)
 
 
 @cache

@@ -10,11 +10,12 @@ import numpy as np
 
 import tmt
 
+from ...core import timing
 from ...core.errors import described
 from ...core.words import in_one_line
 from ...judge.scale import FACTOR
 from .. import RECORDS, Array, Course
-from .model import EngineError, File, ReadModel, Unread, numbers_of, size_of
+from .model import EngineError, File, Numbers, ReadModel, Unread, numbers_of, size_of
 
 LIMIT = 120.0  # s, of an answer: compiling a large model may take hours
 QUANTITIES = "mass_matrix", "bias", "acceleration"
@@ -28,11 +29,11 @@ class Run(NamedTuple):
     why: str  # why it may have ended early
 
 
-def answer(act: Callable[..., T], name: str, file: File, tree: tmt.Tree, *arguments: Any) -> T:
+def answer(act: Callable[..., T], name: str, file: File, tree: tmt.Tree, is_set: bool, *arguments: Any) -> T:
     """What a function of an engine's model of a file returns; EngineError with the reason, in one line, where it raises."""
     kind: type[EngineError] = Unread
     try:
-        model = read(name, file, tree)
+        model = read(name, file, tree, is_set)
         kind = EngineError
         return act(model, *arguments)
     except EngineError:
@@ -42,26 +43,35 @@ def answer(act: Callable[..., T], name: str, file: File, tree: tmt.Tree, *argume
 
 
 @cache
-def read(name: str, file: File, tree: tmt.Tree) -> ReadModel:
-    """The model of an engine, in which the numbers that differ from those of the Tree are mended; once in a process."""
+def read(name: str, file: File, tree: tmt.Tree, is_set: bool) -> ReadModel:
+    """The model of an engine; is_set: the numbers that differ from those of the Tree are set. Once in a process."""
     begin = time.perf_counter()
     record = RECORDS[name]
     module = importlib.import_module(f"..{record.module or name}", __package__)
     kind: type[ReadModel] = module.Model
-    model, stated = kind(file, record.precision), numbers_of(tree)
-    model.stated = stated
+    model = kind(file, record.precision)
+    model.stated = stated = numbers_of(tree)
     numbers = {number: np.array(values, float) for number, values in model.numbers().items()}
-    mended = {}
     for number, values in numbers.items():
         if np.shape(values) != np.shape(stated[number]):
             raise Unread(f"{number}: {len(values)} values, {len(stated[number])} in the compared model")
-        tolerance = FACTOR * record.eps * size_of(stated, number)
-        if not np.abs(values - stated[number]).max(initial=0.0) <= tolerance:
-            mended[number] = number in model.drops or model.mend(number, stated[number])
-    has = {quantity for quantity in QUANTITIES if gives(model, quantity)}
-    seconds = time.perf_counter() - begin
-    model.reading = {"read": numbers, "stated": stated, "mended": mended, "seconds": seconds, "has": has}
+    eps = FACTOR * record.eps
+    differing = [name for name in numbers if is_another(numbers[name], stated, name, eps)]
+    mended = {number: is_set and model.mend(number, stated[number]) for number in differing}
+    unwritten = tuple(number for number in model.unwritten if mended.get(number))
+    model.reading = {
+        "read": numbers, "stated": stated, "copied": model.copied, "way": model.way, "unwritten": unwritten,
+        "mended": {number: is_right for number, is_right in mended.items() if number not in unwritten},
+        "lacking": tuple(number for number in model.drops if stated[number].any()),
+        "has": {quantity for quantity in QUANTITIES if gives(model, quantity)},
+        "seconds": time.perf_counter() - begin,
+    }  # fmt: skip
     return model
+
+
+def is_another(values: np.ndarray, stated: Numbers, number: str, eps: float) -> bool:
+    """Whether numbers that were read differ from those of the Tree by more than rounding."""
+    return not np.abs(values - stated[number]).max(initial=0.0) <= eps * size_of(stated, number)
 
 
 def gives(model: ReadModel, quantity: str) -> bool:
@@ -75,11 +85,33 @@ def each(model: ReadModel, quantity: str, *values: Array) -> Array:
     return np.array([getattr(model, quantity)(*state) for state in zip(*values)], dtype=float)
 
 
-def prepared(model: ReadModel, course: Course) -> float:
-    """Seconds until a run could begin."""
+def prepared(model: ReadModel, course: Course) -> tuple[float, float | None]:
+    """Seconds until a run could begin; and of a step without what Python does around it, None where that is nothing."""
     begin = time.perf_counter()
     model.prepare(course)
-    return time.perf_counter() - begin
+    seconds = time.perf_counter() - begin
+    step = model.step_alone(course) if course.steps else None
+    return seconds, None if step is None else seconds_of_step(step)
+
+
+def seconds_of_step(step: Callable[[], object]) -> float:
+    """The least time of a step, in runs of several steps."""
+    count = 1 + int(timing.WARM / timing.fastest({"": step}, 3)[""])
+
+    def steps() -> None:
+        for _ in range(count):
+            step()
+
+    return timing.fastest({"": steps}, 5)[""] / count
+
+
+def batched(model: ReadModel, course: Course) -> tuple[float, float, str, np.ndarray]:
+    """Seconds of preparation and of the steps of many worlds, the device, and q of the first world."""
+    begin = time.perf_counter()
+    run, device = model.batch(course)
+    q = run()
+    seconds = time.perf_counter() - begin
+    return seconds, timing.fastest({"": run}, 5)[""], device, q
 
 
 def ran(model: ReadModel, course: Course) -> Run:

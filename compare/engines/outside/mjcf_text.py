@@ -1,15 +1,46 @@
 """MJCF with all of its includes in one text, for engines that cannot read them or need names."""
 
+from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Generic, NamedTuple, TypeVar
 from xml.etree import ElementTree
 
 import numpy as np
 
-from .model import Unread
+from ...core.errors import described
+from .model import OtherJoints, OtherNames, Unread
 
+Model = TypeVar("Model")
+REFUSED = "Refused"  # the kind of an error that the engine raises
 FROM_FILES = "mesh", "hfield"  # of geoms
 # of a body in the compiled model
 FIELDS = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}
+
+
+class Copied(NamedTuple, Generic[Model]):
+    """What an engine has read."""
+
+    model: Model
+    source: Path | str  # the file, or the text of its copy
+    why: tuple[str, str] | None = None  # kind and message of the error about the file; None: it is no copy
+
+
+def original_or_copy(path: Path, read: Callable[[Path], Model]) -> Copied[Model]:
+    """What an engine reads of a file, or, if it raises, of a copy with `whole_text`; of a URDF there is none."""
+    try:
+        return Copied(read(path), path)
+    except Exception as error:
+        if path.suffix == ".urdf":
+            raise
+        is_known = isinstance(error, OtherJoints | OtherNames)
+        kind, text = type(error).__name__ if is_known else REFUSED, str(error)
+        message = text if is_known else described(error, with_place=False)
+    text = whole_text(path)
+    with TemporaryDirectory() as folder:
+        copy = Path(folder) / path.name
+        copy.write_text(text, encoding="utf-8")
+        return Copied(read(copy), text, (kind, " ".join(message.split())))
 
 
 def whole_text(path: Path) -> str:

@@ -1,6 +1,6 @@
 """What an engine has made of a robot's file: the class that its module derives, and the numbers of a Tree in the same shapes."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import ClassVar, NamedTuple, TypedDict
@@ -8,13 +8,16 @@ from typing import ClassVar, NamedTuple, TypedDict
 import numpy as np
 
 import tmt
+from tmt.derivation.method import joint_frames
 from tmt.methods import by_speed
 
-from ...robots.coordinates import Coordinates
-from ...robots.joint_map import places_of
+from ...robots.case import SEED
+from ...robots.coordinates import Coordinates, free_joints
 from .. import Array, Course
 
 Numbers = Mapping[str, Array]
+# what an engine reads: the robot's file, the model that MuJoCo compiled, or a URDF that this program writes of that
+FROM_FILE, FROM_COMPILED, FROM_URDF = "file", "compiled", "urdf"
 
 
 class File(NamedTuple):
@@ -63,7 +66,23 @@ class EngineError(ValueError):
 
 
 class Unread(EngineError):
-    """An engine cannot read a file."""
+    """An engine cannot read a file; the message is the engine's."""
+
+
+class OtherJoints(EngineError):
+    """An engine has read other joints than the file has."""
+
+
+class OtherNames(EngineError):
+    """An engine gives a joint another name, by which this program does not find it."""
+
+
+class Unasked(EngineError):
+    """This program does not ask an engine about such a robot: a limit of its module here, not of the engine."""
+
+
+class Unwritten(EngineError):
+    """A URDF cannot have what the robot has; the engine was not asked."""
 
 
 class TooLong(EngineError):
@@ -75,6 +94,12 @@ class Reading(TypedDict):
 
     read: dict[str, Array]
     stated: Numbers
+    copied: (
+        tuple[str, str] | None
+    )  # of the error for which the engine has read a copy, see mjcf_text: its kind, its message
+    way: str  # ReadModel.way
+    lacking: tuple[str, ...]  # ReadModel.drops that the robot has
+    unwritten: tuple[str, ...]  # ReadModel.unwritten that differ, and are set now
     mended: dict[str, bool]  # of the numbers that differ: whether they are set now
     seconds: float  # until the model was there
     has: set[str]  # the quantities that it gives
@@ -90,7 +115,10 @@ class ReadModel:
 
     # numbers of the Tree that its equations do not have at all: they act as part of the torque
     drops: ClassVar[tuple[str, ...]] = ()
-    has_places: ClassVar[bool] = False  # whether `bodies` are where `numbers` says for com and inertia
+    way: ClassVar[str] = FROM_FILE
+    unwritten: ClassVar[tuple[str, ...]] = ()  # numbers that a URDF cannot state
+    has_places: ClassVar[bool] = False  # whether it tells where bodies and joints are
+    copied: tuple[str, str] | None = None  # why it has read a copy of the file
     stated: Numbers = MappingProxyType({})  # before its numbers are read: numbers_of the Tree
     reading: Reading
 
@@ -109,18 +137,44 @@ class ReadModel:
         gravity (3,) m/s2; mass (joints,) kg and moments (joints, 3) kg m2, ascending: of all bodies together that move with a
         joint and not with the next one, 0 if there is none, about their common centre of mass; armature, damping, stiffness
         (nv,); rest (nq,) rad, m and quaternions: where the springs are without force. Of the same bodies com (joints, 3) m, the
-        centre of mass, and inertia (joints, 3, 3) kg m2 about it: in the world, at the positions `reference` of `stated`.
+        centre of mass, and inertia (joints, 3, 3) kg m2 about it: in the world, at the positions `reference` of `stated`. Of
+        the joints there axis (joints, 3) and anchor (joints, 3) m, on the axis of a hinge next to the stated one, at the
+        centre of a ball; 0 where that says nothing. com_moved, axis_moved and anchor_moved are those at the positions `moved`.
         """
-        mass, com, inertia = map(np.array, zip(*map(combined, self.bodies())))
-        places = {"com": com, "inertia": inertia} if self.has_places else {}
-        return {**self.fields(), "mass": mass, **places, "moments": np.linalg.eigvalsh(inertia)}
+        q = self.stated["reference"] if self.has_places else np.zeros(0)
+        mass, com, inertia = map(np.array, zip(*map(combined, self.bodies(q))))
+        numbers = {**self.fields(), "mass": mass, "moments": np.linalg.eigvalsh(inertia)}
+        if self.has_places:
+            numbers |= {"com": com, "inertia": inertia, **self.lines(q, "")}
+            moved = self.stated["moved"]
+            bodies = map(combined, self.bodies(moved))
+            numbers |= {"com_moved": np.array([body.com for body in bodies]), **self.lines(moved, "_moved")}
+        return numbers
+
+    def lines(self, q: Array, ending: str) -> Numbers:
+        """axis and anchor of `numbers` at positions q."""
+        axis, anchor = (self.stated[f"{name}{ending}"].copy() for name in ("axis", "anchor"))
+        for joint, (linear, angular, point) in self.twists(q).items():
+            if not axis[joint].any():  # a ball
+                anchor[joint] = point * anchor[joint].any()
+                continue
+            axis[joint] = angular if angular.any() else linear
+            if angular.any():
+                on_axis = point + np.cross(angular, linear)
+                anchor[joint] = on_axis + (anchor[joint] - on_axis) @ angular * angular
+        return {f"axis{ending}": axis, f"anchor{ending}": anchor}
+
+    def twists(self, q: Array) -> Mapping[int, tuple[Array, Array, Array]]:
+        """Of joints of the Tree, at positions q: velocity of a point of the moved body per unit of speed, angular velocity, and
+        the point, in the world; of a ball zero, zero and its centre."""
+        raise NotImplementedError
 
     def fields(self) -> Numbers:
         """What it has read that is not of bodies."""
         raise NotImplementedError
 
-    def bodies(self) -> Sequence[Sequence[Body]]:
-        """Of each joint the bodies that move with it and not with the next one."""
+    def bodies(self, q: Array) -> Sequence[Sequence[Body]]:
+        """Of each joint the bodies that move with it and not with the next one; where has_places at positions q."""
         raise NotImplementedError
 
     def mend(self, name: str, values: Array) -> bool:
@@ -142,6 +196,17 @@ class ReadModel:
     def prepare(self, course: Course) -> None:
         """What a run needs that does not depend on its start and length: objects, compiled code."""
 
+    def step_alone(self, course: Course) -> Callable[[], object] | None:
+        """A function that makes a step of a run once more, and nothing else; None: no Python runs between steps."""
+        return None
+
+    def batch(self, course: Course) -> tuple[Callable[[], Array], str]:
+        """A function that follows many worlds to the end of a course and returns q of the first, and the device's name.
+
+        q, v and tau of the course are those of the worlds, (worlds, n).
+        """
+        raise NotImplementedError
+
     def run(self, course: Course) -> tuple[Array, int | None]:
         """States (nq + nv,) at the times as (times, nq + nv), fewer if it breaks off; and its evaluations.
 
@@ -152,15 +217,16 @@ class ReadModel:
 
 def numbers_of(tree: tmt.Tree) -> dict[str, Array]:
     """The Tree's numbers in the shapes of ReadModel.numbers; and about_origin (joints,): mass x com^2 from the joint, kg m2."""
-    nv = tree.coordinates.nv
-    origins, *_ = places_of(tree)  # of the joints, at the reference positions
-    groups: list[list[Body]] = [[] for _ in tree.kind]
-    for body, joint in enumerate(tree.body_joint):
-        if joint >= 0:
-            com = origins[joint] + tree.com[body]
-            groups[joint].append(Body(tree.mass[body], com, np.array(tree.inertia[body])))
-    mass, com, inertia = (np.array(values) for values in zip(*map(combined, groups)))
+    nv, zero = tree.coordinates.nv, np.array(tree.zero)
+    moved = Coordinates(tree.joint_names, tree.kind).random(np.random.default_rng(SEED), 1)[0]
+    (mass, com, inertia, origins, axis), of_moved = placed(tree, zero), placed(tree, moved)
     numbers = {"mass": mass, "com": com, "moments": np.linalg.eigvalsh(inertia), "inertia": inertia}
+    numbers |= {"axis": axis, "com_moved": of_moved[1], "axis_moved": of_moved[4], "moved": moved}
+    has_anchor = np.array([[kind != "slide"] for kind in tree.kind])
+    numbers |= {"anchor": origins * has_anchor, "anchor_moved": of_moved[3] * has_anchor}
+    for first in free_joints(tree):  # their speeds are in no engine those of an axis
+        for name in ("axis", "anchor", "axis_moved", "anchor_moved"):
+            numbers[name][first : first + 4] = 0.0
     speeds = {"armature": tree.armature, "damping": tree.damping, "stiffness": by_speed(tree, tree.stiffness)}
     for name, values in speeds.items():
         numbers[name] = np.broadcast_to(np.array(values or 0.0, float), nv)
@@ -169,9 +235,26 @@ def numbers_of(tree: tmt.Tree) -> dict[str, Array]:
     return numbers | {name: np.array(values, float) for name, values in others.items()}
 
 
+def placed(tree: tmt.Tree, q: Array) -> tuple[Array, ...]:
+    """mass, com and inertia of ReadModel.numbers at positions q of a Tree; origin and axis of each joint, (joints, 3)."""
+    frames = joint_frames(tree, q.tolist())
+    origins = np.array([[*frame.origin] for frame in frames])
+    turns = np.array([[[*row] for row in frame.turn] for frame in frames])
+    axes = [[0.0] * 3 if kind == "ball" else [*frame.axes[0]] for kind, frame in zip(tree.kind, frames)]
+    groups: list[list[Body]] = [[] for _ in frames]
+    for body, joint in enumerate(tree.body_joint):
+        if joint >= 0:
+            turn, inertia = turns[joint], np.array(tree.inertia[body])
+            com = origins[joint] + turn @ tree.com[body]
+            groups[joint].append(Body(tree.mass[body], com, turn @ inertia @ turn.T))
+    return *map(np.array, zip(*map(combined, groups))), origins, np.array(axes)
+
+
 def size_of(stated: Numbers, number: str) -> float:
     """The size of what is added where an engine reads a number: it may keep inertias about the origin of a joint."""
     sizes = [np.abs(stated[number]).max(initial=0.0)]
+    if number.startswith(("com", "anchor")):  # each is a sum along the tree
+        sizes += [np.abs(stated[name]).max(initial=0.0) for name in ("com", "anchor")]
     if number in ("moments", "inertia"):
         sizes.append(stated["about_origin"].max(initial=0.0))
     return float(sum(sizes))

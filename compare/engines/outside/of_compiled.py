@@ -2,23 +2,62 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...robots.actuators import Controller
 from .. import GRID, Array, Course
-from .model import Numbers, ReadModel
+from .model import FROM_COMPILED, File, Numbers, ReadModel
 
 if TYPE_CHECKING:
     from ..mujoco.handed_on import Bare
 
 METHODS = {"Euler": (1, "semi_implicit_euler"), "implicitfast": (1, "semi_implicit_euler"), "RK4": (4, "rk4")}
-STAGES = {"Euler": 1, "implicitfast": 1, "RK4": 4}
+STAGES = {"Euler": 1, "implicitfast": 1, "implicit": 1, "discrete": 1, "RK4": 4}
 
 
 class OfCompiled(ReadModel):
+    way = FROM_COMPILED
     bare: Bare
     models: dict[str, Any]  # the engine's, by the names of METHODS
+
+    def __init__(self, file: File, precision: str):
+        self.file, self.precision = file, precision
+        self.controllers: dict[tuple[float | None, ...], Controller] = {}
+        self.fields_set: dict[
+            str, tuple[Array, Array]
+        ] = {}  # by MuJoCo's names: indices, and the values that are set there
+        self.driven = cache(self.made_driven)
+
+    def made_bare(self, controller: Controller | None) -> Bare:
+        """The model that the engine takes, whose actuators act if there is a controller."""
+        raise NotImplementedError
+
+    def made_models(self, bare: Bare) -> dict[str, Any]:
+        """The engine's models of it by the names of METHODS; Unread if it does not have what that needs."""
+        raise NotImplementedError
+
+    def made_driven(self, key: tuple[float | None, ...]) -> tuple[Bare, dict[str, Any]]:
+        """Models in which the actuators act with these controls, with all that is set in the others."""
+        bare = self.made_bare(self.controllers[key])
+        return bare, self.with_all_fields(self.made_models(bare))
+
+    def with_all_fields(self, models: dict[str, Any]) -> dict[str, Any]:
+        """Models with all that is set in `models`."""
+        for name, place in self.fields_set.items():
+            models = {method: self.with_field(model, name, *place) for method, model in models.items()}
+        return models
+
+    def of_course(self, course: Course) -> tuple[Bare, Any, Array]:
+        """The models that a course needs: MuJoCo's, the engine's; and the torque that is applied beside its actuators, (nv,)."""
+        if course.servos is None:
+            return self.bare, self.models[course.method], course.tau
+        controller = course.servos.controller
+        self.controllers[controller.controls] = controller
+        bare, models = self.driven(controller.controls)
+        return bare, models[course.method], course.tau - controller.torque
 
     def held(self, name: str) -> Array:
         """A field of the engine's models by MuJoCo's name of it."""
@@ -34,12 +73,16 @@ class OfCompiled(ReadModel):
         dofs, joints = self.bare.dofs, self.bare.model.dof_jntid[self.bare.dofs]
         places = {"armature": ("dof_armature", dofs), "damping": ("dof_damping", dofs)}
         places |= {"stiffness": ("jnt_stiffness", joints), "gravity": ("opt.gravity", np.arange(3))}
-        for method in self.models if name in places else ():
-            self.set_field(method, *places[name], values)
+        if name in places:
+            field, index = places[name]
+            self.fields_set[field] = index, values
+            self.models = {
+                kind: self.with_field(model, field, index, values) for kind, model in self.models.items()
+            }
         return name in places
 
-    def set_field(self, method: str, name: str, index: Array, values: Array) -> None:
-        """Set a field of the engine's model for a method, by MuJoCo's name of it."""
+    def with_field(self, model: Any, name: str, index: Array, values: Array) -> Any:
+        """One of the engine's models in which a field, by MuJoCo's name of it, has these values at indices."""
         raise NotImplementedError
 
     def prepare(self, course: Course) -> None:

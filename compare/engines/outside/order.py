@@ -15,7 +15,7 @@ Starts = Mapping[int, tuple[int, int]]
 class Order(NamedTuple):
     q: Array  # the place in the Tree's q of each of the engine's numbers
     v: Array  # (nv,) the same in v
-    # of each free body: speeds of the engine, the quaternion in the Tree's q
+    # of each free body, and of balls where that is so: speeds of the engine, the quaternion in the Tree's q
     turned: tuple[tuple[slice, slice], ...]
     # those speeds are in world axes where the Tree's are in body axes; False: the other way round
     in_world: bool
@@ -40,28 +40,16 @@ class Order(NamedTuple):
     def tree_matrix(self, q: Array, matrix: Array) -> Array:
         return self.tree(q, self.tree(q, matrix).T)
 
-    def tree_position(self, q: Array) -> Array:
-        placed = np.empty_like(q)
-        placed[self.q] = q
-        return placed
-
-    def tree_states(self, q: Array, v: Array) -> Array:
-        """States of the engine, (times, nq) and (times, nv), as those of the Tree, with quaternions of length 1."""
-        states = np.empty((len(q), len(self.q) + len(self.v)))
-        states[:, self.q] = q
-        for _, place in self.turned:
-            states[:, place] /= np.linalg.norm(states[:, place], axis=1, keepdims=True)
-        states[:, len(self.q) :] = [self.tree(*row) for row in zip(states, v)]
-        return states
-
 
 def order_of(
-    file: File, starts: Starts, free_q: Places, free_v: Places, in_world: bool, ball_q: Places = (0, 1, 2, 3)
-) -> Order:
+    file: File, starts: Starts, free_q: Places, free_v: Places, in_world: bool, ball_q: Places = (0, 1, 2, 3),
+    turned_balls: bool = False,
+) -> Order:  # fmt: skip
     """The order of an engine.
 
     starts: where the engine's q and v of a joint begin, by its number in the Tree, of a free joint by that of its ball; free_q,
-    free_v, ball_q: of a free joint and of a ball, the Tree's numbers in the engine's order.
+    free_v, ball_q: of a free joint and of a ball, the Tree's numbers in the engine's order; turned_balls: a ball's speeds are
+    in the axes of the body that carries it.
     """
     q: dict[int, int] = {}
     v: dict[int, int] = {}
@@ -74,6 +62,7 @@ def order_of(
             of_q, of_v = of_q[0] - 3 + np.array(free_q), of_v[0] - 3 + np.array(free_v)
         elif joint.kind == "ball":
             of_q = of_q[list(ball_q)]
+            turned += [(slice(start_v, start_v + 3), joint.q)] * turned_balls
         q |= enumerate(of_q, start_q)
         v |= enumerate(of_v, start_v)
     in_q, in_v = (np.array([place for _, place in sorted(places.items())], int) for places in (q, v))
@@ -89,14 +78,14 @@ def rotation(quaternion: Array, is_forward: bool = True) -> Array:
                      [s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)]])  # fmt: skip
 
 
-def near(read: Array, stated: Array) -> Array:
-    """Whether numbers that an engine has read are those stated, for each joint."""
+def near(read: Array, stated: Array, share: float = 1e-13) -> Array:
+    """Whether numbers that an engine has read are those stated, but for a share of the largest, for each joint."""
     size = np.abs(stated).max(initial=0.0)
-    is_near: Array = (np.abs(read - stated) <= 1e-13 * size).reshape(len(stated), -1)
+    is_near: Array = (np.abs(read - stated) <= share * size).reshape(len(stated), -1)
     return np.asarray(is_near.all(axis=1))
 
 
-def wrong_masses(read: Numbers, stated: Numbers) -> list[int]:
+def wrong_masses(read: Numbers, stated: Numbers, share: float = 1e-13) -> list[int]:
     """The joints with another mass or other moments. Where only com and inertia differ, bodies are at another place."""
-    are_right = near(read["mass"], stated["mass"]) & near(read["moments"], stated["moments"])
+    are_right = near(read["mass"], stated["mass"], share) & near(read["moments"], stated["moments"], share)
     return [int(joint) for joint in np.flatnonzero(~are_right)]

@@ -1,50 +1,35 @@
 """The integrators of other engines: one step against the same scheme of tmt, errors and orders."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from tmt.methods import METHODS
 
+from ...core import timing
 from ...core.check import About, Result
-from ...core.rows import Row, column
 from ...engines import GRID, LABELS, RECORDS, Engine, Method, Setting
-from ...engines.outside.model import TooLong, Unread
+from ...engines.outside.model import EngineError, TooLong
 from ...judge.agree import closest
 from ...judge.order import MeasuredOrder, check_order, measured_order
 from ...judge.rounding import step_rounding
 from ...judge.scale import EPS
 from ...robots.case import Case
-from ...truth.reference import has_no_reference, reference
 from ..followed import EARLY, REGULAR, differences, follow, one_step
 from ..setup import Setup
+from .motion import free_scene, reference
+from .tables import MethodRow
 
-STEP = 2.0**-7  # s: of single steps, a number that float32 has
+STEP = 2.0**-7  # s: the longest single step; a power of two, which float32 has
+MOST_ROUNDING = 1e-3  # rad or m: a step in which rounding may grow further is not compared
 STATES = 8  # from which single steps are compared
 FINER = (1, 2, 4, 8, 16, 32, 64)  # steps of the runs, as multiples of GRID or of the scene's own
-SHORT = 0.1  # s: a shorter run is timed several times
+ROUNDS = 5  # most runs by which one is timed
 LONGEST = 1.0  # s: after a run that takes longer, no finer one is made
-KNOWN = {"mujoco": ("Euler", "RK4"), "tmt": ("rk4", "dopri8_adaptive")}
+KNOWN = {"mujoco": ("Euler", "implicitfast", "discrete", "RK4"), "tmt": ("rk4", "dopri8_adaptive")}
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 CLEAR = 100.0  # eps, and an eps of each step: a larger error falls with its order
 LEAST_RUNS = 4  # with regular errors, that measure an order
-
-
-@dataclass(kw_only=True)
-class MethodRow(Row):
-    scene: str
-    engine: str
-    method: str
-    scheme: str
-    dt: float | None = column("s", digits=5)
-    tolerance: float | None
-    worst_error: float | None = column("rad")
-    seconds: float
-    seconds_prepared: float | None
-    ended: str | None
-    order: int | None
-    measured_order: float | None = None
 
 
 def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
@@ -56,29 +41,24 @@ def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
             if method.scheme in METHODS and not method.adaptive:
                 compare_steps(result, setup, engine, method)
             measured = add_runs(result, setup, case, engine, method) if case else None
-        except (TooLong, Unread) as error:
-            result.find("left_out", what=method.label, reason=str(error))
-            break
+        except EngineError as error:
+            result.find("left_out", what=method.label, reason=str(error).rstrip("."))
+            if isinstance(error, TooLong):
+                break
+            continue
         if case and measured and method.order:
             where, note = f"{case.name}, {method.label}", f"{measured.order:.2f}"
             check_order(result, where, method.order, measured.order, note=note)
 
 
 def follow_known(result: Result, setup: Setup) -> None:
-    """The runs of MuJoCo and tmt, with which those of other engines are compared in the figure."""
+    """The runs of MuJoCo and tmt in the free scene, with which those of other engines are compared."""
     case = free_scene(setup)
     if case:
         for engine, methods in KNOWN.items():
-            for method in methods:
-                add_runs(result, setup, case, setup.engines[engine], setup.engines[engine].methods[method])
-
-
-def free_scene(setup: Setup) -> Case | None:
-    """The first scene without locked joints and servos, better a regular one; None: no reference."""
-    cases = [case for case in setup.robot.cases_of_torque if not case.scene.locked and not case.is_held]
-    if has_no_reference(setup.robot):
-        return None
-    return next((case for case in cases if "regular" in case.scene.tags), next(iter(cases), None))
+            known = setup.engines[engine].methods
+            for method in [known[name] for name in methods if name in known]:
+                add_runs(result, setup, case, setup.engines[engine], method)
 
 
 def compare_steps(result: Result, setup: Setup, engine: Engine, method: Method) -> None:
@@ -86,14 +66,23 @@ def compare_steps(result: Result, setup: Setup, engine: Engine, method: Method) 
     sample, record = setup.random, RECORDS[engine.name]
     q, v = (values[:STATES].astype(record.precision).astype(float) for values in (sample.q, sample.qd))
     case, tau = setup.robot.case(), np.zeros(setup.robot.coordinates.nv)
-    twin = one_step(setup.engines["tmt"].of(case), (q, v), tau, STEP, method.scheme)
-    stepped = one_step(engine.of(case), (q, v), tau, STEP, method.name)
+    dt = step_of(setup)
+    tolerance = step_rounding(METHODS[method.scheme], case.tree, q, v, tau, dt) * record.eps / EPS
+    if not tolerance.max() <= MOST_ROUNDING:
+        result.find("left_out", what=f"One step of {method.label}", reason="rounding grows too far in it")
+        return
+    twin = one_step(setup.engines["tmt"].of(case), (q, v), tau, dt, method.scheme)
+    stepped = one_step(engine.of(case), (q, v), tau, dt, method.name)
     difference = differences(case.coordinates, stepped, twin)
-    tolerance = step_rounding(METHODS[method.scheme], case.tree, q, v, tau, STEP) * record.eps / EPS
     worst = closest(difference, tolerance)
     where, note = LABELS[engine.name], sample.describe(worst[0])
     what = f"one step of {method.name}, compared with tmt's {method.scheme}"
     result.check(where, what, difference[worst], tolerance[worst], "", note, True, about=About.ENGINE)
+
+
+def step_of(setup: Setup) -> float:
+    """The length of a single step, s: STEP, or the longest power of two that is not longer than the file's own step."""
+    return min(STEP, 2.0 ** np.floor(np.log2(setup.reading.dt))) if setup.reading else STEP
 
 
 def add_runs(
@@ -107,7 +96,7 @@ def add_runs(
     rows, steps, errors = [], [], []
     for setting in settings:
         dynamics = engine.of(case)
-        run = follow(dynamics, case, method, setting, reference(case), repeat=SHORT)
+        run = follow(dynamics, case, method, setting, reference(case), rounds=ROUNDS)
         row = MethodRow(
             scene=case.name,
             engine=LABELS[engine.name],
@@ -117,6 +106,9 @@ def add_runs(
             tolerance=setting.tolerance,
             worst_error=None if run.motion.ended else float(run.error.max()),
             seconds=run.seconds,
+            seconds_alone=run.motion.seconds_alone,
+            scatter=run.scatter,
+            steady=run.scatter <= timing.STEADY,
             seconds_prepared=getattr(dynamics, "seconds_prepared", None),
             ended=None if run.motion.ended is None else str(run.motion.ended),
             order=method.order,

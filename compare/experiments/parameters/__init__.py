@@ -1,6 +1,7 @@
 """The compiled model compared with the stated numbers, with those of a solution, or with those that its file states."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, cast
 
@@ -11,7 +12,8 @@ import tmt
 from ...core.cause import Cause
 from ...core.check import Result
 from ...core.finding import Finding
-from ...engines.mujoco import Reading
+from ...core.text import block
+from ...engines.mujoco import Mujoco, Reading
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.inventory import LEFT_OUT, MODELLED
 from ...engines.mujoco.parameters import STATED_FLAGS, Stated, lengths, parameters, stated_numbers
@@ -22,6 +24,8 @@ from ...robots.joint_map import places_of
 from .. import Experiment
 from ..setup import Setup
 from . import numbers
+from .common import Numbers, causes_in_common
+from .contacts import touches
 from .numbers import ABSENT, OF_BODIES, UNITS, FeatureRow, NumberRow
 
 EXPERIMENT = Experiment(order=10, serves_own=False, states_causes=True)
@@ -42,13 +46,25 @@ def rows(setup: Setup) -> Result:
     dynamics = cast(MujocoDynamics, setup.compared()["mujoco"])
     joints = dict(enumerate(("the world", *robot.joints), start=-1))
     slides = {name for name, kind in zip(robot.joints, robot.tree.kind) if kind == "slide"}
+    touching = touches(setup, dynamics) if not robot.is_read else []
+    compared = []
     for number in stated_numbers(reading.source) if is_of_file else beside_stated(setup, dynamics):
+        if number.quantity == "contact pairs":
+            number = number._replace(compiled=[float(len(touching))])
         # the first part of a free joint is a slide
         unit = numbers.unit_of(number.quantity, bool(slides & {number.place, f"{number.place} x"}))
         result.rows += numbers.rows_of(number, unit, number.why if is_of_file else None)
         if number.stated is not None and not number.why:
             words = joints if number.quantity == "parent" else {}
-            result.causes += numbers.compare_number(result, number, unit, words)
+            causes = numbers.compare_number(result, number, unit, words)
+            compared.append(Numbers(number, unit, causes))
+    result.causes = causes_in_common(compared, () if is_of_file else without_inertial(setup, dynamics))
+    texts = {"contact pairs": block("parameters", "touching", touching=touching[:3])} if touching else {}
+    if not robot.is_read and dynamics.may_touch and not touching:
+        result.find("nothing_touches", states=len(setup.random.q))
+    if extra := dynamics.additional_bodies():
+        texts["other mass"] = block("parameters", "additional", bodies=extra)
+    result.causes = [replace(each, text=texts.get(each.quantity, each.text)) for each in result.causes]
     if robot.stated_in:
         result.causes += compare_features(result, robot)
     forces = numbers.check_forces(result, setup.random, dynamics)
@@ -65,6 +81,16 @@ def rows(setup: Setup) -> Result:
 
     result.causes = sorted(result.causes, key=order)
     return result
+
+
+def without_inertial(setup: Setup, dynamics: MujocoDynamics) -> list[str]:
+    """The bodies of the robot, by its names, whose mass the compiler takes from geoms, because the file states no inertial."""
+    source = setup.engines["mujoco"].source if isinstance(setup.engines["mujoco"], Mujoco) else None
+    if source is None or source.spec is None:
+        return []
+    stated = dict(zip(source.bodies, (body.explicitinertial for body in source.spec.bodies)))
+    names = zip(setup.robot.tree.body_names, dynamics.bodies)
+    return [name for name, body in names if not stated[body] and body not in source.welded.values()]
 
 
 def beside_stated(setup: Setup, dynamics: MujocoDynamics) -> Iterator[Stated]:

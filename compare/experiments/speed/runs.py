@@ -145,7 +145,7 @@ def gained_nothing(error: float, work: int, best: float, last: int, floor: float
 def measured(scene: SceneRuns, engine: Engine, method: Method, setting: Setting) -> Run:
     """One run. With a reference in doubles, errors below the floor of the scene are set to it."""
     case, reference = scene.case, scene.reference
-    motion, seconds, errors, early = follow(engine.of(case), case, method, setting, reference)
+    motion, seconds, errors, early, _ = follow(engine.of(case), case, method, setting, reference)
     least, unit = scene.floor if reference.why else 0.0, movement_unit(case.robot.coordinates)
     dt = setting.duration / setting.steps if setting.steps else None
     row = SpeedRow(case.name, method.engine, method.name, dt, setting.tolerance, motion.steps, unit=unit)

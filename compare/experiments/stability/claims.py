@@ -13,7 +13,7 @@ from ...core.check import About, Result
 from ...engines import LABELS, Engine
 from ...judge.run import LEFT, departure, deviation, number_or_none
 from ...robots import Robot
-from ...truth.linear import Held, held
+from ...stability.held import Held, held
 from .departure import check_row, own_torque, predicted, residual, variants
 from .subjects import fraction, rk4_of_both
 from .tables import ClaimRow, FinerRow, KeptRow, TorqueRow

@@ -8,7 +8,7 @@ import numpy as np
 from ...core.check import About, Result
 from ...engines import Engine, Method
 from ...judge.run import LEFT, departure
-from ...truth.linear import NEGLIGIBLE, Held
+from ...stability.held import NEGLIGIBLE, Held
 from .subjects import unit_of_movements
 from .tables import DepartureRow, TorqueRow
 
@@ -16,9 +16,6 @@ Departure = DepartureRow | TorqueRow  # with a predicted and an observed time
 
 LONGEST_DEPARTURE = 12.0  # s
 PERTURBATIONS = tuple(10.0**-k for k in (2, 4, 6, 8, 10, 12))  # rad, of the angles at the start
-ABOVE_ROUNDING = (
-    1e-7  # rad: of a file's robot only larger perturbations, which rounding of its forces does not change
-)
 # rad, as the error of torque that moves the equilibrium as far; less is a few ulps
 TORQUE_ERRORS = (1e-13, 1e-14, 3e-15)
 DEPARTURE_TOLERANCE = 0.03  # s, or one step: how near the prediction an observed departure is to be
@@ -58,25 +55,14 @@ def is_led(at: Held, scheme: str, dt: float) -> bool:
     return bool(np.isclose(at.growing_rate(scheme, dt), np.abs(at.modes[0][0]), rtol=NEGLIGIBLE))
 
 
-def curved_by(at: Held) -> float:
-    """How far a departure may be from that of the linear map because forces are not linear over 0.1 rad, s.
-
-    By the second derivative of the force along the mode, relative to the linear force 0.1 rad away, over the rate.
-    """
-    rate = at.modes[0][0]
-    curved = np.linalg.solve(at.mass_matrix, at.curvature(at.shapes[: at.nv, 0].real)) * LEFT**2 / 2
-    return float(np.abs(curved).max() / (abs(rate) ** 2 * LEFT) / rate.real)
-
-
 def departures(
     dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]
 ) -> list[DepartureRow]:
     """Rows for tables/departure.csv: every method that is led and every perturbation at one dt, from one saddle."""
     (rate, *_), vectors = at.modes
     shape, robot = vectors[: at.nv, 0].real / np.abs(vectors[: at.nv, 0]).max(), at.case.robot
-    rows, allowed = [], usually_near(dt) + curved_by(at) if robot.is_read else None
+    rows = []
     sizes = [(size, True) for size in PERTURBATIONS] + [(size, False) for size in TORQUE_ERRORS]
-    sizes = [(size, is_push) for size, is_push in sizes if size > ABOVE_ROUNDING or not robot.is_read]
     moved = np.array([size * shape * is_push for size, is_push in sizes])
     # an error of torque that moves the equilibrium by size x shape, as far as doubles can say it
     errors = np.array(
@@ -86,18 +72,14 @@ def departures(
         torques = own_torque(method, engines, at) + errors
         expected = predicted(at, method.scheme, dt, moved, residual(method, engines, at, torques))
         steps = round(LONGEST_DEPARTURE / dt)
-        if allowed and None not in expected:
-            steps = min(steps, round((max(expected) + 2.0 * allowed) / dt))
         with np.errstate(over="ignore", invalid="ignore"):
             dynamics = engines[method.engine].of(at.case)
             motion = dynamics.run(at.moved(moved), np.zeros_like(moved), torques, dt, steps, method.name)
         for (size, is_push), time, path in zip(sizes, expected, motion.q):
-            if allowed and allowed >= (time or LONGEST_DEPARTURE):
-                continue  # any departure would be as predicted
             rows.append(DepartureRow(
                 scene=at.name + ("" if is_push else ", torque off"), engine=method.engine, method=method.name,
                 dt=dt, perturbation=size, unit=unit_of_movements(robot), predicted=time,
-                observed=departure(motion.t, path, at.case.coordinates), allowed=allowed,
+                observed=departure(motion.t, path, at.case.coordinates),
             ))  # fmt: skip
     return rows
 
@@ -130,14 +112,8 @@ def check_row(result: Result, where: str, row: Departure) -> None:
 
 
 def near(row: Departure) -> float:
-    """How near its prediction a departure is to be, s: as its row says."""
-    allowed = row.allowed if isinstance(row, DepartureRow) else None
-    return usually_near(row.dt) if allowed is None else allowed
-
-
-def usually_near(dt: float) -> float:
-    """One step or 0.03 s."""
-    return max(DEPARTURE_TOLERANCE, dt) * (1.0 + 1e-9)
+    """How near its prediction a departure is to be: one step or 0.03 s."""
+    return max(DEPARTURE_TOLERANCE, row.dt) * (1.0 + 1e-9)
 
 
 def departure_values(rows: list[DepartureRow]) -> dict:
@@ -156,8 +132,6 @@ def own_torque(method: Method, engines: Mapping[str, Engine], at: Held) -> np.nd
     MuJoCo's is its own bias. TMT's is sought among the torques within two ulps of its reference torque: the one whose
     residual is least; compiled code regroups the sums, and there may be no double that it takes for its bias.
     """
-    if at.case.robot.is_read:  # its perturbations are far above such differences
-        return at.tau
     if method.engine == "mujoco":
         return engines["mujoco"].of(at.case).gravity_balance(at.q)
     tau = variants(at.tau, 2)

@@ -91,8 +91,7 @@ def draw_overview(
     ax.set_xlabel("largest stable dt, s")
     looks = {"ncols": 3, "fontsize": 7.5, "handletextpad": 0.1, "columnspacing": 0.8}
     fig.legend(handles=handles[:: 2 if dt else 1], loc="outside upper center", **looks)
-    values = {"file_dt": dt, "actuators_off": bool(robot.is_read and robot.drive.actuators and not dt)}
-    return "overview_limits", fig, result.finding("overview_caption", **values, **summary(rows))
+    return "overview_limits", fig, result.finding("overview_caption", file_dt=dt, **summary(rows))
 
 
 def draw_limits(
@@ -110,10 +109,9 @@ def draw_limits(
         ax.set_title(f"{scene}, damping {damping:g}" if damping else scene)
     for ax in axes.flat[len(panels) :]:
         ax.set_visible(False)
-    fig.supxlabel("largest stable dt, s" + " (damping in N m s/rad)" * (not robot.is_read), fontsize=9)
+    fig.supxlabel("largest stable dt, s (damping in N m s/rad)", fontsize=9)
     fig.legend(handles=handles, loc="outside upper center", ncols=3)
     values = {"deviation": LINEAR_DEVIATION, "unit": unit_of_movements(robot)}
-    values |= {"has_actuators": bool(robot.drive.actuators)}
     first = [row for row in rows if (row.scene, row.damping, row.engine) == (*panels[0], "tmt")]
     finite = [row for row in first if row.predicted_dt]
     products = {look(row.method)[2]: row.predicted_dt * row.mode for row in finite}

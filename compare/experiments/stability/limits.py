@@ -5,13 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tmt.methods import METHODS
-
 from ...core.check import About, Result
 from ...engines import Engine, Method
-from ...judge.rounding import slope_rounding
-from ...judge.scale import FACTOR
-from ...truth.linear import Held
+from ...stability.held import Held
 from .tables import LimitRow
 
 LINEAR_DEVIATION = 1e-6  # rad, at the start
@@ -31,14 +27,13 @@ TRIED_OF_FASTEST = np.array(
 BISECTED = 1e-4  # relative, to which it is then bisected
 LIMIT_TOLERANCE = 1e-3  # relative, of an observed limit to the predicted one
 KINDS = {"never_fails": "never fails", "always_fails": "fails at every step", "finite": "has a limit"}
-MOST_TOLERANCE = 0.1  # relative: limits of a file's robot that runs show less exactly are not observed
 
 
 class Observed(NamedTuple):
-    """A limit, and what runs show: of which kind it is, None: not observed; how far it may be from the predicted one."""
+    """A limit, the kind of it that runs show, and how far the observed one may be from the predicted one."""
 
     row: LimitRow
-    kind: str | None
+    kind: str
     tolerance: float
 
 
@@ -46,21 +41,16 @@ def limit_rows(
     at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...], steps: int = GROWTH_STEPS
 ) -> list[Observed]:
     """The limits of one posture, predicted and observed."""
-    rows, fastest, is_read = [], np.abs(at.modes[0]).max(), at.case.robot.is_read
+    rows, fastest = [], np.abs(at.modes[0]).max()
     for method in methods:
         kind, predicted = at.limit(method.scheme)
-        rate, tolerance, duration, tried = fastest, LIMIT_TOLERANCE, np.inf, TRIED_OF_FASTEST / fastest
+        rate, tolerance, tried = fastest, LIMIT_TOLERANCE, TRIED_OF_FASTEST / fastest
         if kind != "never_fails":  # just above the limit its mode grows fastest
             rate = at.growing_rate(method.scheme, 1.001 * predicted if predicted else tried[0])
         if predicted:
             tolerance = limit_tolerance(at, method.scheme, predicted, steps)
-            duration, tried = predicted * quarter_of(at, predicted, steps), predicted * TRIED_ABOUT
-        if kind == "always_fails":
-            duration = tried[0] * quarter_of(at, tried[0], steps)
-            tolerance = LIMIT_TOLERANCE if growth_shows(at, method.scheme, tried[0], steps) else np.inf
-        seen, observed = None, None
-        if not is_read or is_shown(at, tolerance, duration, rate):
-            seen, observed = observed_limit(method, engines, at, steps, tried)
+            tried = predicted * TRIED_ABOUT
+        seen, observed = observed_limit(method, engines, at, steps, tried)
         row = LimitRow(
             scene=at.name, engine=method.engine, method=method.name, damping=at.case.scene.damping, mode=rate,
             predicted_dt=predicted, observed_dt=observed, limit=kind,
@@ -126,9 +116,9 @@ def is_seen(rates: np.ndarray, small: float, duration: float) -> np.ndarray:
 
 
 def quarter_of(at: Held, dt: float, steps: int) -> int:
-    """Steps of a quarter of a run: a quarter of `steps`; of the arm also at least a swing of the slowest mode."""
+    """Steps of a quarter of a run: a quarter of `steps`, and at least a swing of the slowest mode."""
     swings = at.modes[0].imag[at.modes[0].imag > 1e-3]
-    if at.case.robot.is_read or not len(swings):
+    if not len(swings):
         return steps // 4
     return max(steps // 4, int(np.ceil(2.0 * np.pi / (swings.min() * dt))))
 
@@ -149,21 +139,6 @@ def growth_shows(at: Held, scheme: str, dt: float, steps: int) -> bool:
     return bool(at.growth(scheme, dt) ** (2 * quarter_of(at, dt, steps)) > 1.0 + GROWTH_MARGIN)
 
 
-def is_shown(at: Held, tolerance: float, duration: float = np.inf, rate: float = np.nan) -> bool:
-    """Whether runs show a limit: within a tenth, the mode of this rate, 1/s, in a quarter of this duration, s, despite rounding.
-
-    One eps of the forces pushes a mode of the rate r by an acceleration, and its equilibrium by that over r^2.
-    """
-    modes = at.modes[0][~at.without_stiffness]
-    slow = np.isclose(np.abs(modes), rate)[~is_seen(modes, at.small, duration)].any()
-    pushed = (
-        slope_rounding(METHODS["rk4"], at.tree, at.q[None], np.zeros((1, at.nv)), at.tau, 1.0)[2].max()
-        / FACTOR
-    )
-    lost = pushed > GROWTH_MARGIN * LINEAR_DEVIATION * np.abs(modes).min(initial=np.inf) ** 2
-    return not (tolerance > MOST_TOLERANCE or slow or lost)
-
-
 def grows(early: np.ndarray, late: np.ndarray) -> bool:
     """Whether a deviation grows, by the shares of its modes in the second and the last quarter of a run.
 
@@ -179,14 +154,11 @@ def grows(early: np.ndarray, late: np.ndarray) -> bool:
 
 
 def check_limits(result: Result, limits: Sequence[Observed]) -> None:
-    """The table of limits, and a check of each that runs show."""
-    not_shown = []
+    """The table of limits, and a check of each."""
     for row, kind, tolerance in limits:
         where = f"{row.scene}, {row.who}, damping {row.damping:g}"
         result.rows.append(row)
-        if kind is None:
-            not_shown.append(where)
-        elif row.limit == "finite":
+        if row.limit == "finite":
             note, about = "" if kind == "finite" else f"observed: {KINDS[kind]}", About.PREDICTION
             what = "limit, observed / predicted - 1"
             row.passed = result.check(where, what, row.apart, tolerance, "", note, about=about).passed
@@ -197,8 +169,6 @@ def check_limits(result: Result, limits: Sequence[Observed]) -> None:
     result.shown = [
         name for row in result.rows[:1] for name in row.record() if name not in ("criterion", "passed")
     ]
-    if not_shown:
-        result.find("not_observed", where=not_shown)
 
 
 def summary(rows: Sequence[LimitRow]) -> dict:

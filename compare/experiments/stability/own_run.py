@@ -34,7 +34,9 @@ def begin(setup: Setup) -> list[OwnRuns]:
     reading = setup.reading
     if reading is None:
         return []
-    steps = [(AT_OWN, reading.dt, reading.integrator)] + ([(AT_REQUESTED, *setup.step)] if setup.step else [])
+    steps = [(AT_OWN, reading.dt, reading.integrator)] + (
+        [(AT_REQUESTED, *setup.request.step)] if setup.request.step else []
+    )
     starts = list(reading.keyframes)[:MOST_STARTS] or [""]
     return [
         (quantity, setup.map(partial(own_run, dt=dt, integrator=name, reading=reading), starts))

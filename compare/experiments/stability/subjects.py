@@ -7,19 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-import tmt
-
 from ...engines import Engine, Method, one_of_each_scheme, same_scheme
 from ...robots import Robot
 from ...robots.case import Case
-from ...robots.coordinates import floats
-from ...truth.linear import held, posture_names
-from ...truth.servos import at_rest
+from ...stability.held import held, posture_names
 
 DAMPINGS = (0.0, 0.5, 50.0)  # N m s/rad, added
 SCHEMES = ("rk4", "explicit_euler", "semi_implicit_euler", "implicit", "implicit_midpoint")  # tmt's names
 MOST_POSTURES = 6  # the first of the named postures
-REST = "rest"  # the posture at which a file's robot rests without torque
 
 
 class Subjects(NamedTuple):
@@ -30,31 +25,24 @@ class Subjects(NamedTuple):
 
 @lru_cache(maxsize=64)
 def subjects_of(robot: Robot) -> Subjects:
-    """What is examined of a robot; of a file's one centre and one saddle, and the rest to which it sinks."""
+    """What is examined of a robot whose numbers are stated."""
     names = posture_names(robot)[:MOST_POSTURES]
     postures, positions = (
         {name: of[name] for name in names if name in of} for of in (robot.postures, robot.positions)
     )
-    if robot.is_read and not floats(robot.tree):
-        rest = at_rest(robot.tree, robot.posture(names[0]))
-        known = (
-            robot.coordinates.difference(rest, robot.posture(name)) for name in names if rest is not None
-        )
-        if rest is not None and min(np.abs(apart).max() for apart in known) > 1e-6:
-            positions[REST if REST not in names else f"{REST} without torque"] = tuple(map(float, rest))
     robot = replace(robot, postures=postures, positions=positions)
     at = {name: held(robot, name) for name in posture_names(robot)}
     centres = [name for name in at if at[name].stays and not at[name].without_stiffness.all()]
     saddles = [name for name in at if at[name].kind == "saddle"]
     centres = tuple(sorted(centres, key=lambda name: name != robot.kinds.get("centre")))
     saddles = tuple(sorted(saddles, key=lambda name: name != robot.kinds.get("saddle")))
-    return Subjects(robot, centres[:1], saddles[:1]) if robot.is_read else Subjects(robot, centres, saddles)
+    return Subjects(robot, centres, saddles)
 
 
 def methods_of(
     engines: Mapping[str, Engine], robot: Robot, schemes: tuple[str, ...] = ()
 ) -> tuple[Method, ...]:
-    """The fixed-step methods of tmt and of MuJoCo; of a file's robot without tmt's that solve stages.
+    """The fixed-step methods of tmt and of MuJoCo.
 
     schemes: only these, and of MuJoCo's methods that are the same scheme only the first.
     """
@@ -63,7 +51,6 @@ def methods_of(
         method
         for method in (*ours, *(one_of_each_scheme(mujoco) if schemes else mujoco.methods.values()))
         if not method.adaptive and (not schemes or method.scheme in schemes)
-        if not (robot.is_read and method.engine == "tmt" and tmt.METHODS[method.name].solves_stages)
     )
 
 

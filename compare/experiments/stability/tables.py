@@ -1,12 +1,11 @@
 """The rows of the tables of stability, and its result."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 from ...core.check import Result
 from ...core.rows import Column, Row, column
 from ...engines import LABELS
+from ...stability.answer import Curve
 
 STEP_DIGITS = 5  # of a step in a report
 
@@ -58,7 +57,6 @@ class DepartureRow(OfMethod):
     perturbation: float
     predicted: float | None = column("s")
     observed: float | None = column("s")
-    allowed: float | None = column("s", optional=True)  # how near the prediction it is to be, if not usual
     unit: str = "rad"
 
     def columns(self) -> dict[str, tuple[str, Column]]:
@@ -137,48 +135,8 @@ class OwnRunRow(Row):
     finer_rms_speed: float | None
 
 
-@dataclass(kw_only=True)
-class StepLimitRow(Row):
-    """The step limit with a robot's own servos at a posture: step_limits.csv. The last columns are those of its own run."""
-
-    posture: str
-    base: str
-    integrator: str
-    limit: str  # "finite", "none", or why there is none
-    predicted_dt: float | None = time_step()
-    observed_dt: float | None = time_step(default=None)
-    file_dt: float = column("s")
-    file_integrator: str
-    stable_at_file_dt: bool | None
-    limiting_joint: str | None
-    mode: float | None = column("per_s")
-    mode_kind: str | None
-    step_response_error: float | None = None
-    full_model_rms_speed: float | None = None
-    full_model_warnings: int | None = None
-    full_model_resets: int | None = None
-    full_model_calm: bool | None = None
-
-    @property
-    def apart(self) -> float | None:
-        """How far the observed limit is from the predicted one, relative; None if one of them is missing."""
-        return relative_difference(self.observed_dt, self.predicted_dt)
-
-    def add_own_run(self, run: OwnRunRow) -> None:
-        self.full_model_rms_speed, self.full_model_calm = run.full_model_rms_speed, run.full_model_calm
-        self.full_model_warnings, self.full_model_resets = run.full_model_warnings, run.full_model_resets
-
-
-class StepResponse(NamedTuple):
-    """Error over step of each integrator at a posture, for the figure."""
-
-    posture: str
-    rows: Sequence[StepLimitRow]
-    lines: dict[str, list[tuple[float, float]]]
-
-
 @dataclass
 class StabilityResult(Result):
     centres: tuple[str, ...] = ()  # stable postures
     schemes: dict[tuple[str, str], str] = field(default_factory=dict)  # by engine and method
-    step_response: StepResponse | None = None
+    growth: dict[str, dict[str, Curve]] = field(default_factory=dict)  # by surroundings and integrator

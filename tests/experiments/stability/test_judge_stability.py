@@ -2,29 +2,25 @@
 
 import numpy as np
 import pytest
-from edited import setup_of_file
 from judged import BOTH, INSIDE, OUTSIDE, only
-from models import PATHS
 
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments.stability import claims, departure, equilibria, failure, limits
 from compare.experiments.stability.tables import DepartureRow, FinerRow, KeptRow, LimitRow, TorqueRow
 from compare.robots.arm import ARM
-from compare.truth.linear import held
+from compare.stability.held import held
 
 RK4 = (Tmt().methods["rk4"], INTEGRATORS["RK4"])
 NAMES = (*(f"{claims.VARIANT} {k}" for k in range(1, 28)), claims.NEAREST, *claims.CLEAR_TORQUES)
 FREE = ARM.case("bent, free", posture="bent")
 
 
-@pytest.mark.parametrize("off, rounded, passes", [
-    (INSIDE * 64 * 2.0**-52 * 3.0 * 7.0 / 1e-6, 0.0, True), (OUTSIDE * 64 * 2.0**-52 * 3.0 * 7.0 / 1e-6, 0.0, False),
-    (INSIDE * 1e-9 / 1e-6, 1e-9, True), (OUTSIDE * 1e-9 / 1e-6, 1e-9, False), (np.nan, 0.0, False),
-])  # fmt: skip
-def test_amplification_within_the_rounding_of_a_quotient_or_of_a_step(result, off, rounded, passes):
+@pytest.mark.parametrize("share, passes", [(INSIDE, True), (OUTSIDE, False), (np.nan, False)])
+def test_amplification_within_the_rounding_of_a_quotient(result, share, passes):
     ours, q = np.diag([3.0, -7.0]), np.array([1.0, -2.0])
-    equilibria.check_amplification(result, "", q, ours, ours + [[0.0, off], [0.0, 0.0]], rounded)
+    off = share * 64 * 2.0**-52 * 3.0 * 7.0 / 1e-6
+    equilibria.check_amplification(result, "", q, ours, ours + [[0.0, off], [0.0, 0.0]])
     assert only(result) is passes
 
 
@@ -50,13 +46,6 @@ def test_kind_of_limit_is_as_predicted(result, kind, seen, passes):
     assert only(result) is passes
 
 
-def test_what_no_run_decides_is_not_checked(result):
-    rows = [limit_row(), limit_row(observed=None, seen=None, method="implicit")]
-    limits.check_limits(result, rows)
-    assert only(result) and [row.passed for row in result.rows] == [True, None]
-    assert result.notes[0].values["where"] == ["bent, TMT implicit, damping 0"]
-
-
 @pytest.mark.parametrize("early, late, grown", [
     (1.0, 1.0009, False), (1.0, 1.0011, True),
     (1e-4, 0.9e-3, False), (1e-4, 1.1e-3, True),  # what has decayed leaves rounding
@@ -72,20 +61,6 @@ def test_a_slow_mode_that_does_not_grow_by_itself_is_not_seen_in_a_short_run():
     assert limits.is_seen(np.array([0.01j]), 1e-6, 10.0).all()  # there is no other
 
 
-def test_a_limit_that_runs_show_no_nearer_than_a_tenth_is_not_decided_by_them():
-    arm7 = held(setup_of_file(PATHS["arm7"]).robot, "ready")
-    assert limits.is_shown(arm7, 0.0999) and not limits.is_shown(arm7, 0.1001)
-
-
-@pytest.mark.parametrize("stiffness, shown", [(9.8101, True), (9.810001, False)])
-def test_a_limit_is_not_decided_by_runs_in_which_a_slow_mode_is_lost_in_rounding(stiffness, shown):
-    """An inverted pendulum of 9.81 N m/rad that its spring just balances."""
-    joint = f'<joint name="swing" axis="0 1 0" stiffness="{stiffness}"/>'
-    body = f'<body>{joint}<geom type="sphere" size="0.1" pos="0 0 0.5" mass="2"/></body>'
-    setup = setup_of_file(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
-    assert limits.is_shown(held(setup.robot, "qpos0"), 1e-3) is shown
-
-
 def departure_row(observed, predicted, **more):
     usual = {"scene": "ball catch", "engine": "tmt", "method": "rk4", "dt": 0.01, "perturbation": 1e-6}
     return DepartureRow(**usual | {"predicted": predicted, "observed": observed} | more)
@@ -94,7 +69,6 @@ def departure_row(observed, predicted, **more):
 @pytest.mark.parametrize("observed, predicted, more, passes", [
     *((2.0 + off, 2.0, {}, passes) for off, passes in ((0.0299, True), (0.0301, False), (-0.0299, True), (-0.0301, False))),
     (2.0 + INSIDE * 5 / 64, 2.0, {"dt": 5 / 64}, True), (2.0 + OUTSIDE * 5 / 64, 2.0, {"dt": 5 / 64}, False),
-    (2.199, 2.0, {"allowed": 0.2}, True), (2.201, 2.0, {"allowed": 0.2}, False),  # a row may say how near
     (None, None, {}, True), (1.0, None, {}, False), (None, 1.0, {}, False),
 ])  # fmt: skip
 def test_departure_within_one_step_or_three_hundredths(result, observed, predicted, more, passes):

@@ -13,7 +13,7 @@ EDITS = (
     ("fleet.table", "own_step", "all(stable)", "any(stable)", "one posture at which the step is stable is enough"),
     ("fleet.table", "own_step", "min(finite, default=None)", "max(finite, default=None)", "the largest of the limits"),
     ("fleet.table", "own_step", 'row.integrator == row.file_integrator', "True", "limits of any integrator"),
-    ("command_line", "request", "'--joints' in words[:-1]", "False", "a first joint of the other sense is an option"),
+    ("command_line", "request", "option in words[:-1]", "False", "a first joint of the other sense is an option"),
     ("command_line", "process_count", "0 < int(text) <= 1024", "True", "a fleet may have no process"),
     ("command_line", "seconds", "1e-6 <= float(text) <= most", "float(text) <= most", "a step may be negative"),
     ("command_line", "expected", "word.casefold()", "word", "a word in capitals is near to none"),
@@ -32,5 +32,8 @@ EDITS = (
     ("fleet.table", "is_change", "old != new", "False", "no verdict has changed"),
     ("fleet.table", "FileRow.is_bad", "self.verdict in BAD_VERDICTS", "False", "always good"),
     ("fleet.cache", "program", "path.suffix in _1", "False", "any program is the same"),
+    ("fleet.rubric", "is_earned", "bool(about) and all(about)", "all(about)", "points for what was not checked"),
+    ("fleet.rubric", "is_earned", "all(about)", "any(about)", "points for one check of several"),
+    ("fleet.rubric", "Entry.is_about", "check['experiment'] == self.experiment and _1", "_1", "points for any experiment"),
     ("fleet.run", "Run.receive", "verdict=BROKE", "verdict='agree'", "a crash agrees"),
 )  # fmt: skip

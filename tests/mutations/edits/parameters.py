@@ -13,6 +13,15 @@ EDITS = (
          f"{name} is read as stated")
         for name in READ
     ),
+    ("robots.placement", "turned", "same.sum() > best", "same.sum() >= best", "a robot is turned though no more is the same"),
+    ("robots.placement", "placed", "is_on_axis and _1", "_1", "an anchor may be anywhere"),
+    ("robots.placement", "directions", "np.zeros((3, 3))", "np.eye(3)", "the anchor of a ball may be anywhere"),
+    ("mujoco.welded", "join", "masses.sum()", "masses.max()", "the mass of one body is that of several", 1),
+    ("mujoco.welded", "compiled", "not model.body_subtreemass[body]", "False", "a link may move without mass"),
+    ("mujoco.source", "compiled_without", "not bare and _1", "False", "neighbours touch where joints are locked"),
+    ("parameters.contacts", "touches", "not dynamics.may_touch", "True", "nothing touches"),
+    ("parameters.common", "common_factor", "is_common and _1", "_1", "any factor is a common one"),
+    ("parameters.common", "alike", "is_near(_1, first.stated) and is_near(_2, first.compiled)", "True", "all wrong numbers are one cause"),
     ("parameters", "beside_stated", "FACTOR * EPS * _1", "1e-3 * _1", "a number may be off by a thousandth"),
     ("parameters", "rows", "sorted(result.causes, key=_1)", "result.causes", "causes in the order of finding"),
     ("parameters.numbers", "compare_number", "quantity in OPTIONS", "False", "an option is no cause of rank 1"),

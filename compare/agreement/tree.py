@@ -1,0 +1,50 @@
+"""A robot's file as a Tree of tmt."""
+
+from __future__ import annotations  # so that help() shows the short names of types
+
+import warnings
+from os import PathLike
+from typing import Any
+
+import tmt
+
+from ..core.finding import Finding
+from ..core.text import say
+from ..engines.mujoco import read, tree_with_sites
+from .comparison import origin_of
+
+
+def tree(mjcf: str | PathLike[str] | Any) -> tmt.Tree:
+    """The Tree of a robot's file: its joints and bodies with the numbers that MuJoCo compiles.
+
+    Joints and bodies have the names and the order of the file; a free joint b is three slides b x, b y, b z and a
+    ball b turn, with q, qd and tau as in MuJoCo. The frames of all bodies and sites are its sites, for `tmt.frame`.
+
+    Parameters
+    ----------
+    mjcf : path of MJCF or URDF, MJCF text or MjModel
+
+    Raises
+    ------
+    ValueError
+        For a model that cannot be read, or that has what no Tree can have, such as armature of tendons.
+
+    Warns
+    -----
+    UserWarning
+        One line with all that the file has and the Tree has not: contacts, limits, friction, actuators, equalities,
+        tendons, fluid, gravity compensation.
+
+    Examples
+    --------
+    >>> inertia = '<inertial pos="0 0 -0.5" mass="2" diaginertia="0.1 0.1 0.01"/><site name="tip" pos="0 0 -1"/>'
+    >>> mjcf = f'<mujoco><worldbody><body><joint name="hip" axis="0 1 0"/>{inertia}</body></worldbody></mujoco>'
+    >>> pendulum = compare.tree(mjcf)
+    >>> print(tmt.frame("tip", [np.pi / 2], model=pendulum).position.round(9) + 0.0)
+    [-1.  0.  0.]
+    """
+    reading = read(origin_of(mjcf))
+    if off := [item for item in reading.features if item.treatment in ("switched_off", "open_tree")]:
+        values = {"model": reading.name or str(reading.source), "features": off}
+        warnings.warn(say(Finding("remarks", "left_out", values)), stacklevel=2)
+    return tree_with_sites(reading)

@@ -1,0 +1,279 @@
+"""Conventions in which right equations look different: order, senses, zeros and units of the joints, angles from the
+world, quaternions, axes of velocities.
+
+A convention says at which state of the model the equations are, and how the user's speeds become the model's:
+qd = S v, so that M = S' Mbar S and h = S' (h + Mbar drift), with drift = dS/dt v. Each kind is one function in KINDS.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations, product
+
+import numpy as np
+from numpy import ndarray
+
+import tmt
+from tmt.derivation.mechanism import turn_in_parent
+from tmt.derivation.vectors import Matrix
+
+from ..core.cause import Cause
+from ..core.words import listed
+from ..robots.joint_map import PER_UNIT, Joint, JointMap
+from .model import Equations
+
+PARALLEL = 1e-9  # of a cosine from 1
+MOST_PERMUTED = 6  # joints in all orders; of more, orders in which programs count, and two exchanged
+MOST_TURNED = 10  # joints with all combinations of senses
+MOST_OF_BOTH = 4  # joints whose order and senses are tried together
+MOST_ABSOLUTE = 6  # angles of which each may be measured from the world
+SIDES = re.compile(r"(?<![a-z])(left|right|l|r)(?![a-z])|^([fhbr]?)([lr])(?=_)", re.IGNORECASE)
+OTHER_SIDE = {"left": "right", "right": "left", "l": "r", "r": "l"}
+
+
+@dataclass(frozen=True)
+class Convention:
+    """The joints of right equations as a user may take them, at the states of a comparison."""
+
+    cause: Cause
+    q: ndarray  # (states, nq), of the model
+    qd: ndarray  # (states, nv), of the model
+    S: ndarray  # (states, nv, nv)
+    drift: ndarray  # (states, nv)
+    joints: JointMap | None = None  # how it is to be stated; None: it cannot be
+
+    def first(self, states: int) -> "Convention":
+        """At the first states."""
+        arrays = {name: getattr(self, name)[:states] for name in ("q", "qd", "S", "drift")}
+        return replace(self, **arrays)
+
+    def applied(self, M: ndarray, velocity_terms: ndarray, rest: ndarray) -> tuple[ndarray, ndarray, ndarray]:
+        """The model's Mbar, velocity terms and h at rest as they are in this convention."""
+        St = np.swapaxes(self.S, 1, 2)
+        moved = velocity_terms + np.einsum("sij,sj->si", M, self.drift)
+        return St @ M @ self.S, np.einsum("sij,sj->si", St, moved), np.einsum("sij,sj->si", St, rest)
+
+    def removed(
+        self, M: ndarray, right: ndarray, h: ndarray, rest: ndarray
+    ) -> tuple[ndarray, ndarray, ndarray]:
+        """Given Mbar, h and h at rest, which are in this convention, as the model has them. right: the model's Mbar."""
+        back = np.linalg.inv(self.S)
+        transposed = np.swapaxes(back, 1, 2)
+        M = transposed @ M @ back
+        known = np.where(np.isfinite(M), M, right)
+        moved = np.einsum("sij,sj->si", transposed, h) - np.einsum("sij,sj->si", known, self.drift)
+        return M, moved, np.einsum("sij,sj->si", transposed, rest)
+
+
+def all_conventions(equations: Equations) -> Iterator[Convention]:
+    for kind in KINDS:
+        yield from kind(equations)
+
+
+def values_in(equations: Equations, those: Sequence[Convention]) -> Iterator[ndarray]:
+    """The values in each convention, (states, entries), evaluated together."""
+    if not those:
+        return
+    q, qd = (np.concatenate([getattr(one, name) for one in those]) for name in ("q", "qd"))
+    parts = Equations(equations.tree, q, qd, equations.layout).parts
+    count = len(those[0].q)
+    for k, convention in enumerate(those):
+        yield equations.layout.packed(
+            *convention.applied(*(part[k * count : (k + 1) * count] for part in parts))
+        )
+
+
+def stated(
+    equations: Equations, kind: str, place: str, was: str, explains: str, joints: Iterable[Joint]
+) -> Convention:
+    """A convention that can be stated by the joints."""
+    joint_map, identity = JointMap(equations.coordinates, list(joints)), np.eye(equations.nv)
+    cause = Cause(rank=1, kind=kind, place=place, stated=was, explains=explains)
+    S = np.broadcast_to(joint_map.own_forces(identity), (len(equations.q), *identity.shape))
+    q, qd = joint_map.positions(equations.q), joint_map.speeds(equations.qd)
+    return Convention(cause, q, qd, S, 0.0 * qd, joint_map)
+
+
+def joints_of(equations: Equations) -> dict[str, Joint]:
+    coordinates = equations.coordinates
+    kinds = zip(coordinates.names, coordinates.all_kinds)
+    return {name: Joint(name, slides=kind == "slide") for name, kind in kinds}
+
+
+def senses(equations: Equations) -> Iterator[Convention]:
+    """The senses of any number of joints, those of hinges before those with slides."""
+    right = joints_of(equations)
+    for chosen in chosen_senses(equations):
+        turned = right | {name: right[name]._replace(sign=-1.0) for name in chosen}
+        yield stated(equations, "sign", f"sense of {listed(chosen)}", "+", "-", turned.values())
+
+
+def chosen_senses(equations: Equations) -> list[tuple[str, ...]]:
+    """Joints that may be turned together; of many joints one, and all hinges."""
+    coordinates = equations.coordinates
+    kinds = dict(zip(coordinates.names, coordinates.all_kinds))
+    straight = [name for name, kind in kinds.items() if kind != "ball"]
+    hinges = [name for name in straight if kinds[name] == "hinge"]
+    most = len(straight) if len(straight) <= MOST_TURNED else 1
+    chosen = [names for count in range(1, most + 1) for names in combinations(straight, count)]
+    if most == 1:
+        chosen.append(tuple(hinges))
+    return sorted(chosen, key=lambda names: (len(names), sum(kinds[name] == "slide" for name in names)))
+
+
+def orders(equations: Equations) -> Iterator[Convention]:
+    """The order of the joints, and for a few of them their senses too."""
+    right = joints_of(equations)
+    names = list(right)
+    in_order = ", ".join(names)
+    all_orders = permutations(names) if len(names) <= MOST_PERMUTED else named_orders(equations.tree)
+    of_senses = chosen_senses(equations) if len(names) <= MOST_OF_BOTH else []
+    for order in all_orders:
+        if list(order) == names:
+            continue
+        in_other = [right[name] for name in order]
+        yield stated(equations, "order", "order of the joints", in_order, ", ".join(order), in_other)
+        for chosen in of_senses:
+            both = [right[name]._replace(sign=-1.0 if name in chosen else 1.0) for name in order]
+            named = ", ".join(map(str, both))
+            convention = stated(equations, "order", "order and senses of the joints", in_order, named, both)
+            yield replace(convention, cause=replace(convention.cause, rank=3))
+
+
+def named_orders(tree: tmt.Tree) -> Iterator[list[str]]:
+    """Orders in which programs count joints: breadth first, by the alphabet, sides exchanged, reversed; two exchanged."""
+    names, depth = list(tree.joint_names), [0] * len(tree.parent)
+    for i, parent in enumerate(tree.parent):
+        depth[i] = depth[parent] + 1 if parent >= 0 else 0
+    breadth = [names[i] for i in np.argsort(depth, kind="stable")]
+    mirrored = [SIDES.sub(other_side, name) for name in names]
+    for order in (
+        breadth,
+        sorted(names),
+        mirrored,
+        names[::-1],
+        sorted(breadth, key=lambda name: depth[names.index(name)]),
+    ):
+        if sorted(order) == sorted(names):
+            yield order
+    by_side = sorted(names, key=lambda name: SIDES.sub(other_side, name))
+    yield by_side
+    yield [names[i] for i in sorted(range(len(names)), key=lambda i: (depth[i], names[i]))]
+    for i, j in combinations(range(len(names)), 2):
+        exchanged = list(names)
+        exchanged[i], exchanged[j] = names[j], names[i]
+        yield exchanged
+
+
+def other_side(match: re.Match[str]) -> str:
+    """The name of the other side: left for right, FR for FL."""
+    word, before, letter = match.groups()
+    other = OTHER_SIDE[(word or letter).lower()]
+    cased = other.upper() if (word or letter).isupper() else other
+    return (before or "") + cased
+
+
+def units(equations: Equations) -> Iterator[Convention]:
+    right = joints_of(equations)
+    hinges = [name for name, kind in zip(right, equations.coordinates.all_kinds) if kind == "hinge"]
+    places = {name: [name] for name in hinges} | ({"all hinges": hinges} if len(hinges) > 1 else {})
+    for (place, those), unit in product(places.items(), filter(None, PER_UNIT)):
+        in_unit = right | {name: right[name]._replace(unit=unit) for name in those}
+        yield stated(equations, "unit", f"unit of {place}", "rad", unit, in_unit.values())
+
+
+def from_the_world(equations: Equations) -> Iterator[Convention]:
+    """Angles measured from the world instead of from the body before, of any of the hinges with parallel axes."""
+    tree, nv = equations.tree, equations.nv
+    before = {i: hinge_before(tree, i) for i in range(len(tree.parent))}
+    chained = [i for i, (parent, _) in before.items() if parent >= 0]
+    counts = range(1, len(chained) + 1) if len(chained) <= MOST_ABSOLUTE else (1, len(chained))
+    absolute = np.eye(nv)
+    starts = [joint.qd.start for joint in tree.coordinates.joints]
+    for i in range(len(tree.parent)):
+        parent, along = before[i]
+        if parent >= 0:
+            absolute[starts[i]] += along * absolute[starts[parent]]
+    for chosen in (those for count in counts for those in combinations(chained, count)):
+        own = np.eye(nv)
+        own[[starts[i] for i in chosen]] = absolute[[starts[i] for i in chosen]]
+        A, q = np.linalg.inv(own), equations.q.copy()
+        qs = [tree.coordinates.joints[i].q.start for i in range(len(tree.parent))]
+        hinges = [i for i, kind in enumerate(tree.kind) if kind == "hinge"]
+        rows = [starts[i] for i in hinges]
+        q[:, [qs[i] for i in hinges]] = q[:, [qs[i] for i in hinges]] @ A[np.ix_(rows, rows)].T
+        S = np.broadcast_to(A, (len(q), nv, nv))
+        names = listed([tree.joint_names[i] for i in chosen])
+        bodies = [next((body for body, joint in zip(tree.body_names, tree.body_joint) if joint == before[i][0]), "")
+                  for i in chosen]  # fmt: skip
+        explains = "measured from the world" + (
+            f", not from {bodies[0]}" if len(chosen) == 1 and bodies[0] else ""
+        )
+        cause = Cause(rank=1, kind="angles", place=f"angle of {names}", stated="between a body and the one before",
+                      explains=explains)  # fmt: skip
+        yield Convention(cause, q, equations.qd @ A.T, S, 0.0 * equations.qd)
+
+
+def hinge_before(tree: tmt.Tree, i: int) -> tuple[int, float]:
+    """The hinge that carries hinge i and is parallel to it, and the cosine of their axes; -1: there is none."""
+    parent = tree.parent[i] if tree.kind[i] == "hinge" else -1
+    while parent >= 0 and tree.kind[parent] == "slide":
+        parent = tree.parent[parent]
+    if parent < 0 or tree.kind[parent] != "hinge":
+        return -1, 0.0
+    joints = tree.coordinates.joints
+    along = float(np.dot(tree.axis[joints[i].qd.start], tree.axis[joints[parent].qd.start]))
+    return (parent, float(np.sign(along))) if abs(abs(along) - 1.0) < PARALLEL else (-1, 0.0)
+
+
+def of_balls(equations: Equations) -> Iterator[Convention]:
+    """Of each ball and free joint: axes of the velocities, order and sense of the quaternion."""
+    tree, (q, qd), nv = equations.tree, (equations.q, equations.qd), equations.nv
+    zero, identity = 0.0 * qd, np.broadcast_to(np.eye(nv), (len(qd), nv, nv))
+    for i, joint in enumerate(tree.coordinates.joints):
+        if joint.kind != "ball":
+            continue
+        name = tree.joint_names[i]
+        R = matrices(turn_in_parent(tree, i, list(q.T)), len(q))
+        slides = [k for k in range(i - 3, i) if k >= 0 and tree.kind[k] == "slide"]
+        v = slice(tree.coordinates.joints[slides[0]].qd.start, joint.qd.start) if len(slides) == 3 else None
+        root = ", ".join(tree.joint_names[k] for k in slides)
+        world, linear, drift = identity.copy(), identity.copy(), zero.copy()
+        world[:, joint.qd, joint.qd] = np.swapaxes(R, 1, 2)
+        turned = qd.copy()
+        turned[:, joint.qd] = np.einsum("sji,sj->si", R, qd[:, joint.qd])
+        frames = [("angular velocity", name, "in world axes", turned, world, zero)]
+        if v is not None:
+            linear[:, v, v] = R
+            moved = qd.copy()
+            moved[:, v] = np.einsum("sij,sj->si", R, qd[:, v])
+            drift[:, v] = np.einsum("sij,sj->si", R, np.cross(qd[:, joint.qd], qd[:, v]))
+            frames.append(("linear velocity", root, "in body axes", moved, linear, drift))
+        for what, where, explains, speeds, S, drift_of in frames:
+            cause = Cause(rank=1, kind="axes", place=f"{what} of {where}", stated="", explains=explains)
+            yield Convention(cause, q, speeds, S, drift_of)
+        scalar_last, inverse = q.copy(), q.copy()
+        scalar_last[:, joint.q] = np.roll(q[:, joint.q], 1, axis=1)
+        inverse[:, joint.q] = q[:, joint.q] * [1.0, -1.0, -1.0, -1.0]
+        for explains, positions in {
+            "read as x, y, z, w": scalar_last,
+            "of the inverse rotation": inverse,
+        }.items():
+            cause = Cause(
+                rank=1, kind="axes", place=f"quaternion of {name}", stated="w, x, y, z", explains=explains
+            )
+            yield Convention(cause, positions, qd, identity, zero)
+
+
+def matrices(turn: Matrix, count: int) -> ndarray:
+    """A rotation matrix of scalars (states,) as an array (states, 3, 3)."""
+    return np.moveaxis(np.array([[np.broadcast_to(x, count) for x in row] for row in turn]), 2, 0)
+
+
+KINDS: tuple[Callable[[Equations], Iterator[Convention]], ...] = (
+    senses,
+    orders,
+    units,
+    from_the_world,
+    of_balls,
+)

@@ -1,0 +1,107 @@
+"""Forces of a compiled model near a state, linear in its deviation: actuators, springs and dampers, rows of constraints."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from .step import NUDGE, Step
+
+QUADRATIC = int(mujoco.mjtConstraintState.mjCNSTRSTATE_QUADRATIC)  # a row whose force is linear
+
+
+class Rows(NamedTuple):
+    """Rows of constraints at a state, k of them: J qdd + R f = aref. The generalized force is J' f.
+
+    J: (k, nv); R, aref, f: (k,); contact: the number of the contact of each, -1 of other rows, (k,).
+    """
+
+    J: np.ndarray
+    R: np.ndarray
+    aref: np.ndarray
+    f: np.ndarray
+    contact: np.ndarray
+
+
+class Forces(NamedTuple):
+    """Forces near a state, and their derivatives by its deviation (n of them).
+
+    smooth: d(actuators + springs and dampers), (nv, n). rows: that act at the state. dJf: d(J' f) with constant f, (nv, nv);
+    dR, daref: (k, n).
+    """
+
+    smooth: np.ndarray
+    rows: Rows
+    dJf: np.ndarray
+    dR: np.ndarray
+    daref: np.ndarray
+
+
+def rows(step: Step, on: np.ndarray | None = None) -> Rows | None:
+    """Rows of the data of a step after mj_forward; on: which, (all,), by default those whose force is linear.
+
+    None: their number is another one than that of `on`.
+    """
+    m, d = step.model, step.data
+    if on is None:
+        on = d.efc_state == QUADRATIC
+    if len(on) != d.nefc:
+        return None
+    J = np.zeros((d.nefc, m.nv))
+    if mujoco.mj_isSparse(m):
+        mujoco.mju_sparse2dense(J, d.efc_J, d.efc_J_rownnz, d.efc_J_rowadr, d.efc_J_colind)
+    else:
+        J[:] = d.efc_J.reshape(J.shape)
+    contact = np.full(d.nefc, -1)
+    for number, (address, size) in enumerate(zip(d.contact.efc_address, d.contact.dim)):
+        if address >= 0:
+            count = 2 * (size - 1) if m.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and size > 1 else size
+            contact[address : address + count] = number
+    return Rows(J[on], d.efc_R[on].copy(), d.efc_aref[on].copy(), d.efc_force[on].copy(), contact[on])
+
+
+def rows_at(step: Step, state: np.ndarray) -> tuple[np.ndarray, Rows]:
+    """The mass matrix, (nv, nv), and all rows at a state."""
+    step.put(state)
+    mujoco.mj_forward(step.model, step.data)
+    acting = rows(step, np.ones(step.data.nefc, bool))
+    assert acting is not None
+    M = np.zeros((step.model.nv, step.model.nv))
+    mujoco.mj_fullM(step.model, step.data, M)
+    return M, acting
+
+
+def forces_near(step: Step, state: np.ndarray) -> Forces | None:
+    """The forces near a state at rest; None where rows begin or cease within the nudge: the edge of a contact or limit."""
+    nv, size = step.model.nv, step.size
+
+    def smooth() -> np.ndarray:
+        return step.data.qfrc_actuator + step.data.qfrc_passive
+
+    step.put(state)
+    mujoco.mj_forward(step.model, step.data)
+    on = step.data.efc_state == QUADRATIC
+    acting = rows(step, on)
+    assert acting is not None
+    forces = Forces(
+        np.zeros((nv, size)),
+        acting,
+        np.zeros((nv, nv)),
+        np.zeros((len(acting.R), size)),
+        np.zeros((len(acting.R), size)),
+    )
+    for column, direction in enumerate(NUDGE * np.eye(size)):
+        ends = []
+        for by in (direction, -direction):
+            step.put(state, by)
+            mujoco.mj_forward(step.model, step.data)
+            ends.append((smooth(), rows(step, on)))
+        (force, ahead), (opposite, behind) = ends
+        if ahead is None or behind is None:
+            return None
+        forces.smooth[:, column] = (force - opposite) / (2.0 * NUDGE)
+        forces.dR[:, column] = (ahead.R - behind.R) / (2.0 * NUDGE)
+        forces.daref[:, column] = (ahead.aref - behind.aref) / (2.0 * NUDGE)
+        if column < nv:
+            forces.dJf[:, column] = (ahead.J - behind.J).T @ acting.f / (2.0 * NUDGE)
+    return forces

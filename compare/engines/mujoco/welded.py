@@ -1,0 +1,65 @@
+"""Bodies of a compiled model that are welded to one another, or have no mass, as one body."""
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from .names import element_name, tensor
+
+# kg and kg m2: more than the least mass that MuJoCo compiles, less than the rounding of any other
+LEAST = 1e-14
+NO_MASS = "mass and inertia of moving bodies"  # in MuJoCo's message
+
+
+def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """The model of a spec, also where a link without mass, of which MuJoCo makes none, carries others; ValueError as MuJoCo's."""
+    try:
+        return spec.compile()
+    except ValueError as error:
+        if NO_MASS not in str(error) or spec.compiler.settotalmass > 0.0:
+            raise
+    stated = spec.compiler.boundmass, spec.compiler.boundinertia
+    spec.compiler.boundmass = spec.compiler.boundinertia = LEAST
+    model = spec.compile()
+    spec.compiler.boundmass, spec.compiler.boundinertia = stated
+    model.body_mass[model.body_mass == LEAST] = 0.0
+    model.body_inertia[model.body_inertia == LEAST] = 0.0
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    if empty := [int(body) for body in model.jnt_bodyid if not model.body_subtreemass[body]]:
+        raise ValueError(
+            f"{element_name(model, 'body', empty[0])} moves, and neither it nor what it carries has mass"
+        )
+    return model
+
+
+def welded_bodies(model: mujoco.MjModel) -> dict[int, int]:
+    """The bodies with mass that have no joint, and the body with one to which they are fixed, 0: the world, by number."""
+    massive = (model.body_mass > 0.0) | (model.body_inertia > 0.0).any(axis=1)
+    bodies = np.flatnonzero(massive & (model.body_weldid != np.arange(model.nbody)))
+    return {int(body): int(model.body_weldid[body]) for body in bodies}
+
+
+def join(model: mujoco.MjModel, welded: Mapping[int, int]) -> None:
+    """Give each body the mass, the centre of mass and the inertia of those that are welded to it, which lose theirs."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    fixed = [body for body, base in welded.items() if not base]
+    model.body_mass[fixed], model.body_inertia[fixed] = 0.0, 0.0
+    for base in set(welded.values()) - {0}:
+        group = [base, *(body for body, onto in welded.items() if onto == base)]
+        masses, centres = model.body_mass[group], data.xipos[group]
+        com, total = masses @ centres / masses.sum(), np.zeros((3, 3))
+        for body, mass, centre in zip(group, masses, centres - com):
+            total += tensor(data.ximat[body].reshape(3, 3), model.body_inertia[body])
+            total += mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        turn = data.xmat[base].reshape(3, 3)
+        moments, axes = np.linalg.eigh(turn.T @ total @ turn)
+        axes[:, 0] *= np.sign(np.linalg.det(axes))
+        model.body_mass[group], model.body_inertia[group] = 0.0, 0.0
+        model.body_mass[base], model.body_inertia[base] = masses.sum(), moments
+        model.body_ipos[base] = turn.T @ (com - data.xpos[base])
+        mujoco.mju_mat2Quat(model.body_iquat[base], axes.ravel())
+        model.body_sameframe[base] = model.body_simple[base] = 0
+        model.dof_simplenum[:] = 0
+    mujoco.mj_setConst(model, mujoco.MjData(model))

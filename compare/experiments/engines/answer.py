@@ -1,0 +1,86 @@
+"""Which engine: two verdicts of each, and the cheapest of its methods for three errors."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ...engines import LABELS
+from ...judge.run import movement_unit
+from ...robots.case import Case
+from .tables import AnswerRow, EnginesResult, MethodRow
+
+TARGETS = {"1e_3": 1e-3, "1e_6": 1e-6, "1e_9": 1e-9}  # rad or m, the largest error of a motion
+SAME, OTHER, NOT_SET = "same", "differs", "not set"  # verdicts on the equations
+
+
+def add_answer(result: EnginesResult, case: Case | None) -> None:
+    """The rows of all engines, the headline and the sentences of the first screen."""
+    labels = [*dict.fromkeys(row.engine for row in result.rows)]
+    verdicts = {label: as_read(result, label) for label in labels}
+    sets = {label: as_set(result, label) for label in labels}
+    precisions = {row.engine: row.precision for row in result.rows}
+    runs: dict[str, list[MethodRow]] = {}
+    for row in result.tables["engines_methods"]:
+        runs.setdefault(row.engine, []).append(row)
+    known = [label for label in (LABELS["mujoco"], LABELS["tmt"]) if label in runs]
+    for label in [*known, *labels]:
+        of_label: dict[str, Any] = {"engine": label, "precision": precisions.get(label, "float64")}
+        of_label |= {"as_read": verdicts.get(label, SAME), "as_set": sets.get(label, SAME)}
+        of_runs = cheapest_of(runs.get(label, []), case.duration if case else 1.0)
+        result.tables["engines_answer"].append(AnswerRow(**of_label, **of_runs))
+    values: dict[str, Any] = {"as_read": verdicts, "as_set": sets, "not_asked": result.not_asked}
+    values |= {"by_urdf": result.by_urdf, "by_compiled": result.by_compiled}
+    result.headline = result.finding("headline", **values)
+    result.top.append(result.finding("answer", **values, set_here=result.mended))
+    if case and result.tables["engines_methods"]:
+        rows = result.tables["engines_answer"]
+        cheapest = {name: cheapest_engine(rows, name) for name in TARGETS}
+        about: dict[str, Any] = {
+            "scene": case.name,
+            "duration": case.duration,
+            "unit": movement_unit(case.coordinates),
+        }
+        result.top.append(result.finding("cheapest", cheapest=cheapest, targets=TARGETS, **about))
+        result.top += [result.finding("engine", row=row, targets=TARGETS) for row in rows]
+
+
+def as_read(result: EnginesResult, label: str) -> str:
+    """What a user gets who loads the file: same, or what differs."""
+    differing = result.otherwise.get(label, [])
+    rows = [row for row in result.rows if row.engine == label]
+    shares = [row.as_read_over_bar for row in rows if row.as_read_over_bar is not None]
+    if differing:
+        return ", ".join(differing)
+    return SAME if all(share <= 1.0 for share in shares) else OTHER
+
+
+def as_set(result: EnginesResult, label: str) -> str:
+    """Whether the equations are the same with the numbers that this program could set."""
+    if all(row.passed for row in result.rows if row.engine == label):
+        return SAME
+    numbers = {
+        row.number
+        for row in result.tables["engines_read"]
+        if row.engine == label and not row.set_by_this_program
+    }
+    return NOT_SET if numbers else OTHER
+
+
+def cheapest_of(runs: Sequence[MethodRow], duration: float) -> Mapping[str, Any]:
+    """The fields of an AnswerRow of methods: the cheapest for each target, and the smallest error."""
+    ended = [row for row in runs if row.worst_error is not None]
+    fields: dict[str, Any] = {}
+    for name, target in TARGETS.items():
+        reached = [row for row in ended if row.worst_error is not None and row.worst_error <= target]
+        best = min(reached, key=lambda row: row.own_seconds, default=None)
+        fields[f"within_{name}"] = best and best.method
+        fields[f"within_{name}_cost"] = best and 1e3 * best.own_seconds / duration
+    least = min(ended, key=lambda row: row.worst_error or 0.0, default=None)
+    return fields | {"floor": least and least.worst_error, "floor_method": least and least.method}
+
+
+def cheapest_engine(rows: Sequence[AnswerRow], name: str) -> tuple[AnswerRow, str, float] | None:
+    """The cheapest engine for a target, its method and its cost; None: none reaches it."""
+    field = f"within_{name}"
+    reached = [row for row in rows if getattr(row, field)]
+    best = min(reached, key=lambda row: float(getattr(row, f"{field}_cost")), default=None)
+    return None if best is None else (best, getattr(best, field), getattr(best, f"{field}_cost"))

@@ -1,0 +1,105 @@
+"""What each engine has read: the numbers that differ from the compiled model, body by body and joint by joint, and why."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...core.check import About
+from ...core.words import some_of
+from ...engines import EngineRecord
+from ...engines.outside.model import FROM_COMPILED, FROM_URDF, OtherNames, Reading, size_of
+from ...judge.scale import FACTOR
+from ...robots import Robot
+from .causes import Cause, Entry, Text, cause_of
+from .tables import EnginesResult, ReadRow
+
+UNITS = {"gravity": "m/s2", "mass": "kg", "moments": "kg m2", "com": "m", "inertia": "kg m2", "axis": "", "anchor": "m",
+         "armature": "kg m2", "damping": "N m s/rad", "stiffness": "N m/rad"}  # fmt: skip
+OF_BODIES = "mass", "moments"  # no convention makes these differ
+ENTRIES = {"mass": 1, "moments": 3, "com": 3, "inertia": 9, "axis": 3, "anchor": 3}  # of a joint
+OF_JOINTS = "axis", "anchor"
+FOLLOWS = {"inertia": "moments", "com_moved": "com", "axis_moved": "axis", "anchor_moved": "anchor"}
+REFUSED = "refused"  # in place of a number: the file itself
+AS_READ = "as read"  # checks of numbers
+
+
+def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, reading: Reading) -> None:
+    """Rows of what the engine has read differently, and checks of the masses and moments of inertia."""
+    label = record.label
+    if reading["copied"]:
+        kind, message = reading["copied"]
+        result.find("copied", engine=label, error=kind, reason=message.rstrip("."))
+        result.otherwise[label] = [REFUSED] if kind != OtherNames.__name__ else []
+    if reading["way"] == FROM_URDF:
+        result.by_urdf.append(label)
+    if reading["way"] == FROM_COMPILED:
+        result.by_compiled.append(label)
+    if reading["lacking"]:
+        result.find("lacking", engine=label, numbers=list(reading["lacking"]))
+        result.otherwise.setdefault(label, []).extend(f"no {number}" for number in reading["lacking"])
+    for number in reading["read"]:
+        if number in OF_BODIES:
+            what, most = f"{number} {AS_READ}", largest_difference(reading, number)
+            tolerance = tolerance_of(reading, record, number)
+            result.check(label, what, most, tolerance, UNITS[number], "", True, about=About.ENGINE)
+        is_said = number in reading["lacking"] or FOLLOWS.get(number) in reading["mended"]
+        if number in reading["mended"] and not is_said:
+            add_differing(result, robot, record, reading, number)
+
+
+def largest_difference(reading: Reading, number: str) -> float:
+    return float(np.abs(reading["read"][number] - reading["stated"][number]).max(initial=0.0))
+
+
+def tolerance_of(reading: Reading, record: EngineRecord, number: str) -> float:
+    return FACTOR * record.eps * size_of(reading["stated"], number)
+
+
+def add_differing(
+    result: EnginesResult, robot: Robot, record: EngineRecord, reading: Reading, number: str
+) -> None:
+    """Rows and a finding of a number that an engine has read differently, with the cause of each entry."""
+    values, stated = (np.ravel(reading[which][number]) for which in ("read", "stated"))
+    quantity, label, is_set = number.removesuffix("_moved"), record.label, reading["mended"][number]
+    names, joints = named_after(robot, quantity)
+    differs = ~(np.abs(values - stated) <= tolerance_of(reading, record, number))
+    wrong, places = {names[place] for place in np.flatnonzero(differs)}, np.flatnonzero(differs).tolist()
+    text, rows = Text(robot.mjcf), []
+    causes: dict[Cause | None, str] = {}
+    for place in places:
+        cause = cause_of(Entry(text, reading, number, names[place], joints[place], wrong))
+        causes.setdefault(cause, names[place])
+        pair = float(values[place]), float(stated[place])
+        rows.append(
+            ReadRow(label, number, names[place], *pair, UNITS[quantity], is_set, cause and str(cause))
+        )
+    result.tables["engines_read"] += rows
+    result.find("read_differently", engine=label, rows=rows, number=number, mended=is_set, count=len(wrong))
+    for cause in causes:
+        result.find("cause", engine=label, cause=cause, number=quantity)
+    what = result.otherwise.setdefault(label, [])
+    what += [] if quantity in what else [quantity]
+    if is_set:
+        result.mended.setdefault(label, []).append(number)
+
+
+def named_after(robot: Robot, number: str) -> tuple[list[str], list[int]]:
+    """What each entry of a number belongs to, a body, a joint or an axis, and the joint of the Tree in whose row it is."""
+    if number == "gravity":
+        return list("xyz"), [0, 0, 0]
+    places = robot.coordinates.places.joints
+    if number not in ENTRIES:
+        joints = [k for k, joint in enumerate(places) for _ in range(joint.qd.stop - joint.qd.start)]
+        return list(robot.coordinates.speeds), joints
+    names = list(robot.joints) if number in OF_JOINTS else bodies_of(robot)
+    joints = np.repeat(np.arange(len(names)), ENTRIES[number]).tolist()
+    return [names[joint] for joint in joints], joints
+
+
+def bodies_of(robot: Robot) -> Sequence[str]:
+    """The bodies that move with each joint and not with the next one; the joint where there is none."""
+    bodies: list[list[str]] = [[] for _ in robot.joints]
+    for body, joint in zip(robot.tree.body_names, robot.tree.body_joint):
+        if joint >= 0:
+            bodies[joint].append(body)
+    return [some_of(names) or joint for names, joint in zip(bodies, robot.joints)]

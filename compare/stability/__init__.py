@@ -1,0 +1,1 @@
+"""Which step is stable: rest, the step linearised there, its growth, limits, cures, and what runs show."""

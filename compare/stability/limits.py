@@ -1,0 +1,106 @@
+"""The largest stable step of an integrator at the rest of a model, by the derivative of MuJoCo's own step."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from ..engines.mujoco.step import Step, distance
+from .growth import GROWS, Growth, growth
+from .rest import Rest, rest_near
+
+LONGEST, SHORTEST = 0.4, 1e-6  # s: steps that are tried
+COARSER = 1.5  # fold, from one tried step to the next
+REFINED = 2e-3  # of a limit
+SLOW = 1.2  # a factor below: of what grows little in a step
+BY_ITSELF = 0.7, 1.4  # of its rate at a coarser step: a slow growth whose rate stays is none of the step
+SADDLE = 0.1  # 1/s: what grows by itself and slower is a drift
+GIVES_WAY = (
+    0.3  # rad or m: a rest so far from where the search began is another one: soft constraints have given way
+)
+BESIDE_DRIFT = 2.0  # fold: what grows faster than a drift
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A step that was tried: its rest, and what grows there. drift: the rate of what grows by itself, 1/s."""
+
+    dt: float
+    rest: Rest
+    growth: Growth
+    drift: float
+    moved: float  # rad or m, of the rest from the state from which it was sought
+
+    @property
+    def spectral_radius(self) -> float:
+        """Of the derivative, with neutral modes and noise."""
+        return float(np.abs(np.linalg.eigvals(self.rest.A)).max())
+
+    @property
+    def is_stable(self) -> bool:
+        stays = self.rest.is_found and self.moved <= GIVES_WAY
+        return stays and self.growth.rate <= max(GROWS, BESIDE_DRIFT * self.drift)
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The largest stable step of an integrator.
+
+    kind: finite; none, stable up to LONGEST; below, not stable at SHORTEST; saddle, something grows at any step, at the rate
+    of `growth`; no rest, none was found.
+    dt: s, of a finite one. growth: of what grows just beyond. rest: the one just below the limit, else at the last step tried.
+    first: the step with which the search began.
+    """
+
+    kind: str
+    dt: float | None
+    growth: Growth
+    rest: Rest
+    first: Tried
+
+
+def tried(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, drift: float = 0.0) -> Tried:
+    """The rest near a state at a step, and its growth. drift: the rate of what grows by itself, 1/s."""
+    rest = rest_near(Step(model, dt, integrator), state)
+    return Tried(
+        dt, rest, growth(rest), drift, float(np.abs(distance(model, state, rest.state)).max(initial=0.0))
+    )
+
+
+def limit(
+    model: mujoco.MjModel, state: np.ndarray, integrator: str, first: float, drift: float = 0.0
+) -> Limit:
+    """The limit near a step `first`, s: from there upwards to what fails, or downwards to what holds, then by bisection."""
+    at = began = tried(model, state, first, integrator, drift)
+    stable, failing = (at, None) if at.is_stable else (None, at)
+    while failing is None and at.dt < LONGEST:
+        at = tried(model, at.rest.state, min(at.dt * COARSER, LONGEST), integrator, drift)
+        stable, failing = (at, None) if at.is_stable else (stable, at)
+    while stable is None and at.dt > SHORTEST:
+        finer = tried(model, state, at.dt / COARSER**2, integrator, drift)
+        if finer.is_stable:
+            stable = finer
+        elif grows_by_itself(at, finer):
+            if finer.growth.rate > SADDLE:
+                return Limit("saddle", None, finer.growth, finer.rest, began)
+            return limit(model, state, integrator, first, finer.growth.rate)
+        elif not (at.rest.is_found or finer.rest.is_found):
+            return Limit("no rest", None, finer.growth, finer.rest, began)
+        else:
+            failing = finer
+        at = finer
+    if stable is None:
+        return Limit("below", None, at.growth, at.rest, began)
+    if failing is None:
+        return Limit("none", None, stable.growth, stable.rest, began)
+    while failing.dt > stable.dt * (1.0 + REFINED):
+        middle = tried(model, stable.rest.state, float(np.sqrt(stable.dt * failing.dt)), integrator, drift)
+        stable, failing = (middle, failing) if middle.is_stable else (stable, middle)
+    return Limit("finite", stable.dt, failing.growth, stable.rest, began)
+
+
+def grows_by_itself(coarse: Tried, fine: Tried) -> bool:
+    """Whether something grows slowly, and as fast at a finer step."""
+    low, high = BY_ITSELF
+    kept = low * coarse.growth.rate < fine.growth.rate < high * coarse.growth.rate
+    return kept and fine.rest.is_found and coarse.growth.factor < SLOW

@@ -1,0 +1,132 @@
+"""The step at rest: cases that are known exactly, and the closed form beside the differences of MuJoCo's own step."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small import INERTIA, KINDS, LEG, hinge, limit_of, place_of, rest_of, sphere
+
+from compare.engines.mujoco.forces import forces_near
+from compare.stability.closed_form import matrix, radius
+from compare.stability.growth import growth
+from compare.stability.place import in_the_air_at
+
+SAME = 1e-6  # of the largest entry of a step: central differences, and steps of RK4 that are no linear map
+EVERY = ("Euler", "implicitfast", "implicit", "RK4")
+
+
+def size(A):
+    return float(np.abs(np.linalg.eigvals(A)).max())
+
+
+@pytest.mark.parametrize("dampratio", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+def test_the_limit_of_a_sphere_on_a_plane_is_known_to_seven_digits(dampratio, integrator):
+    """4 - 4 x - x^2 / z^2 = 0, x = dt / timeconst: 0.828427 at z = 1."""
+    z, text = dampratio, sphere(0.02, dampratio)
+    x = 2.0 * z**2 * (np.sqrt(1.0 + 1.0 / z**2) - 1.0)
+    sizes = [size(rest_of(text, by * x * 0.02, integrator).A) - 1.0 for by in (1 - 2e-7, 1 + 2e-7)]
+    assert sizes[0] < -1e-7 and sizes[1] > 1e-7
+    found = limit_of(text, integrator, 0.005)
+    assert found.kind == "finite" and found.dt == pytest.approx(x * 0.02, rel=3e-3)
+
+
+def test_the_limit_of_a_critically_damped_sphere_under_rk4_is_that_of_a_decay():
+    assert limit_of(sphere(), "RK4", 0.005).dt == pytest.approx(2.785293563 * 0.02, rel=3e-3)
+
+
+def test_a_floor_raises_the_limit_of_euler_and_lowers_that_of_implicitfast():
+    """In the air the masses 5 and 0.1 kg on one servo have 4 m +- 2 dt kv - dt^2 kp = 0."""
+    m, kv, kp = 5.0 * 0.1 / 5.1, 20.0, 2000.0
+    standing = {name: limit_of(LEG, name) for name in ("Euler", "implicitfast")}
+    for name, sign, least, most in (("Euler", -1.0, 1.5, 10.0), ("implicitfast", 1.0, 0.1, 0.5)):
+        air = (sign * kv + np.sqrt(kv**2 + 4.0 * m * kp)) / kp
+        assert least < standing[name].dt / air < most
+        weightless = LEG.replace("<option", '<option gravity="0 0 0"').replace(
+            'name="foot"', 'contype="0" conaffinity="0"'
+        )
+        assert limit_of(weightless, name).dt == pytest.approx(air, rel=3e-3)
+    for dt in (1e-3, 4e-3):
+        rest = rest_of(LEG, dt)
+        ours = matrix(rest, place_of(LEG).tree, forces_near(rest.step, rest.state))
+        assert np.abs(ours - rest.A).max() < 1e-8
+
+
+@pytest.mark.parametrize("impratio, timeconst", [(1.0, 0.02), (7.0, 0.05)])
+def test_one_sticking_contact_creeps_at_a_known_speed(impratio, timeconst):
+    """g_t (1 - d) / (d b impratio), b = 2 / (d timeconst)."""
+    pull, d = 0.3, 0.9
+    text = sphere(timeconst, impratio=impratio, pull=pull, condim=3, x="")
+    for dt, integrator in ((0.001, "Euler"), (0.003, "RK4")):
+        creep = pull * (1.0 - d) / (d * 2.0 / (d * timeconst) * impratio)
+        assert rest_of(text, dt, integrator).speeds == pytest.approx([0.0, creep], rel=1e-7, abs=1e-12)
+
+
+def test_limits_of_one_hinge_are_those_of_the_formula():
+    """4 I + 2 dt (implicit - explicit) - dt^2 kp = 0; a filter that is too fast for the step: twice its time."""
+    kp, kv = 20.0, 5.0
+    for integrator, off in (("Euler", -kv), ("implicitfast", kv)):
+        exact = (off + np.sqrt(off**2 + 4.0 * INERTIA * kp)) / kp
+        found = limit_of(hinge(kp, kv), integrator)
+        assert (found.kind, found.dt) == (
+            ("finite", pytest.approx(exact, rel=3e-3)) if exact < 0.1 else ("none", None)
+        )
+    filtered = '<general joint="turn" dyntype="filter" dynprm="0.004" gainprm="20" biastype="affine" biasprm="0 -20 -0.1"/>'
+    assert limit_of(hinge(actuator=filtered), "implicitfast").dt == pytest.approx(0.008, rel=3e-3)
+    exactly = filtered.replace('"filter"', '"filterexact"')
+    assert limit_of(hinge(actuator=exactly), "implicitfast").kind == "finite"
+    assert limit_of(hinge(actuator=exactly), "implicitfast").dt > 0.05
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_closed_form_is_the_derivative_of_mujocos_own_step(kind):
+    place, known = place_of(KINDS[kind]), 0
+    for integrator in EVERY:
+        rest = rest_of(KINDS[kind], 2e-3, integrator)
+        assert rest.is_found
+        forces = forces_near(rest.step, rest.state)
+        ours = matrix(rest, place.tree, forces)
+        n = len(ours)  # RK4: without activations
+        assert np.abs(ours - rest.A[:n, :n]).max() < SAME * np.abs(rest.A).max(), integrator
+        known = len(forces.rows.R)
+        if kind == "a loaded loop":
+            assert np.abs(forces.rows.f).max() > 1.0
+    rows = {
+        "a loaded loop": 3,
+        "a limit": 1,
+        "friction loss": 1,
+        "a box": 12,
+        "a free caster": 9,
+        "the two-mass leg": 1,
+    }
+    rows |= {f"{cone}, condim {d}": count for cone, counts in (("elliptic", (1, 3, 6)), ("pyramidal", (1, 4, 10)))
+             for d, count in zip((1, 3, 6), counts)}  # fmt: skip
+    assert known == rows.get(kind, 0)
+
+
+def test_no_closed_form_of_discrete_or_at_the_edge_of_a_limit():
+    place = place_of(LEG)
+    assert radius(rest_of(LEG), place.tree) is not None
+    assert "discrete" not in EVERY and radius(rest_of(LEG, integrator="discrete"), place.tree) is None
+    touching = hinge(joint='range="-1 0" limited="true"').replace(
+        "<mujoco>", '<mujoco><compiler angle="radian"/>'
+    )
+    assert radius(rest_of(touching), place_of(touching).tree) is None
+
+
+def test_a_wrong_mass_is_seen_in_the_closed_form():
+    place, rest = place_of(LEG), rest_of(LEG)
+    heavy = replace(place.tree, mass=(5.001, 0.1))
+    assert abs(radius(rest, place.tree) / size(rest.A) - 1.0) < 1e-8
+    forces = forces_near(rest.step, rest.state)
+    assert np.abs(matrix(rest, heavy, forces) - rest.A).max() > 1e-6
+
+
+def test_noise_of_differences_and_what_nothing_holds_never_grow():
+    """Sliding, yaw, a free caster and its wheel: eigenvalues 1, twice each."""
+    for text in (KINDS["a box"], KINDS["a free caster"]):
+        for integrator in EVERY:
+            for dt in (1e-4, 2e-3, 0.05):
+                assert growth(rest_of(text, dt, integrator)).factor == 1.0
+        assert limit_of(text).kind == "none"
+    assert in_the_air_at(place_of(KINDS["a box"]), "").surroundings == "air"

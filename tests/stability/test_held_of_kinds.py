@@ -1,0 +1,120 @@
+"""The linearised equations and what a step does to them: slides, balls, springs, damping, bodies that float."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from models import PATHS, random_tree
+from servo_models import robot
+from trees import exact_swing
+
+import tmt
+from compare.robots.arm import ARM
+from compare.robots.coordinates import floats
+from compare.stability.held import Held, held, holding, moving, posture_names, slopes
+from compare.truth.pendulum import pendulum, swing
+from tmt import METHODS
+from tmt.exact.values import distance
+from tmt.methods import amplification
+
+FIXED = [name for name, method in METHODS.items() if not method.adaptive]
+PENDULUM = """<mujoco><worldbody><body name="bob"><joint name="turn" type="ball"/>
+  <geom type="sphere" size="0.1" pos="0 0 -0.5" mass="2"/></body></worldbody></mujoco>"""
+CART = """<mujoco><option gravity="0 0 0"/><worldbody><body name="cart"><joint name="rail" type="slide" damping="6"/>
+  <geom type="sphere" size="0.1" mass="2"/></body></worldbody></mujoco>"""
+
+
+def stiffness(tree, q):
+    """d(holding torque)/dq by dual numbers."""
+    moved = moving(tree, q, np.eye(tree.coordinates.nv))
+    return np.array(slopes(moved, holding(tree, moved)))
+
+
+@pytest.fixture(scope="module")
+def robots():
+    sources = {name: PATHS[name] for name in ("gripper", "pendulum_ball", "free_body")}
+    sources |= {"random": random_tree(3, joints=4), "pendulum": PENDULUM, "cart": CART}
+    return {name: robot(source) for name, source in sources.items()}
+
+
+@pytest.fixture(scope="module")
+def on_servos(robots):
+    """The gripper where its servos, a tendon's among them, hold it at rest."""
+    case = robots["gripper"].case("on servos", posture="open", torque="servos", gravity=False)
+    end = tmt.simulate(*case.start, case.tau, 5e-3, 4000, "implicitfast", case.tree).q[-1]
+    for _ in range(3):  # Newton's method, with the derivative that is tested
+        left = case.tau - np.array(holding(case.tree, list(end)), float)
+        end = end + np.linalg.solve(stiffness(case.tree, end), left)
+    assert np.abs(left).max() < 1e-9
+    fields = {name: getattr(case, name) for name in ("tree", "tau", "coordinates", "scene")}
+    return Held(SimpleNamespace(q=end, **fields))
+
+
+@pytest.fixture
+def at(robots, on_servos, name):
+    """The posture of a test that has the name of a robot."""
+    return on_servos if name == "on servos" else held(robots[name], posture_names(robots[name])[0])
+
+
+@pytest.mark.parametrize("name", ["gripper", "pendulum_ball", "random", "on servos"])
+def test_the_matrix_is_the_derivative_of_the_acceleration_by_movements(at):
+    n, nudge, ends = at.nv, 1e-6 * np.eye(at.nv), []
+    for sign in (1.0, -1.0):
+        by_q = tmt.acceleration(at.moved(sign * nudge), np.zeros((n, n)), np.tile(at.tau, (n, 1)), at.tree)
+        by_v = tmt.acceleration(np.tile(at.q, (n, 1)), sign * nudge, np.tile(at.tau, (n, 1)), at.tree)
+        ends.append(np.concatenate([by_q, by_v]))
+    differenced = (ends[0] - ends[1]).T / 2e-6
+    assert np.abs(at.matrix[n:] - differenced).max() < 1e-7 * np.abs(at.matrix).max()
+    left = at.mass_matrix @ at.matrix[n:, :n] + stiffness(at.tree, at.q)
+    assert np.abs(left).max() < 1e-9 * np.abs(at.matrix).max()
+
+
+@pytest.mark.parametrize("name", ["gripper", "pendulum_ball", "on servos"])
+@pytest.mark.parametrize("method", FIXED)
+def test_a_step_is_the_amplification_of_the_methods_own_step(robots, at, name, method):
+    if METHODS[method].solves_stages and at.tree.coordinates.balls:
+        at = held(robots["pendulum"], "qpos0")
+    dt = {"gripper": 0.05}.get(name, 0.02)
+    exact = amplification(METHODS[method], at.tree, at.q, np.zeros(at.nv), at.tau, dt)
+    assert np.abs(at.step(method, dt) - exact).max() < 1e-11 * np.abs(exact).max()
+    growth = np.abs(np.linalg.eigvals(exact)).max()
+    assert at.growth(method, dt) == pytest.approx(growth, abs=1e-6)
+
+
+def test_a_spherical_pendulum_swings_alike_to_both_sides_and_spins_freely(robots):
+    at = held(robots["pendulum"], "qpos0")
+    inertia = 2 * 0.5**2 + 0.4 * 2 * 0.1**2
+    swings = at.modes[0].imag[at.modes[0].imag > 1e-6]
+    assert swings == pytest.approx(2 * [np.sqrt(2 * 9.81 * 0.5 / inertia)])
+    assert at.kind == "marginal" and at.stays and at.without_stiffness.sum() == 2
+
+
+def test_the_limit_of_a_mode_that_only_decays_is_that_of_its_rate(robots):
+    """Where damping is implicit there is none."""
+    at = held(robots["cart"], "qpos0")
+    for method, limit in (("rk4", 2.785293563), ("explicit_euler", 2.0)):
+        assert at.limit(method) == ("finite", pytest.approx(limit / 3.0, rel=1e-6))
+    assert at.limit("semi_implicit_euler") == ("never_fails", None)
+
+
+def test_a_free_body_is_held_without_gravity_and_no_mode_of_it_grows(robots):
+    assert floats(robots["free_body"].tree) and not floats(robots["pendulum"].tree)
+    at = held(robots["free_body"], "qpos0")
+    assert not at.case.scene.gravity and not at.tau.any() and at.stays and at.without_stiffness.all()
+    for method in ("rk4", "semi_implicit_euler", "gauss_legendre_4"):
+        assert at.limit(method) == ("never_fails", None)
+
+
+def test_the_swing_is_its_elliptic_function():
+    tree = next(case for case in ARM.cases if len(case.joints) == 1).tree
+    hanging, frequency = pendulum(tree)
+    assert hanging == pytest.approx(np.pi / 2)
+    assert frequency**2 == pytest.approx(41.8436, abs=5e-5)  # the assignment's f1
+    t = np.linspace(0.0, 3.0, 61)
+    for q, qd in ((0.0, 0.0), (0.3, 4.0), (2.0, -7.0), (8.0, 1.0)):
+        exact = swing(t, q, qd, hanging, frequency)
+        assert exact[0] == pytest.approx(q) and np.ptp(exact) > 0.3
+        assert distance(exact, exact_swing(t, q, qd, hanging, frequency)).max() < 1e-14 * (1.0 + 30.0)
+        _, path, _ = tmt.simulate([q], [qd], [0.0], 3.0 / 3000, 3000, model=tree)
+        assert np.abs(path[::50, 0] - exact).max() < 2e-9
+    assert np.isnan(swing(t, 0.0, 20.0, hanging, frequency)).all()  # turns over

@@ -1,0 +1,216 @@
+"""What runs show: limits, growth, pushes; dry friction; controllers at their own rate; motions; and changes that help."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from small import HOLDING, INERTIA, KINDS, STANDING, hinge, limit_of, place_of, rest_of, two
+
+from compare.engines.mujoco.step import Step
+from compare.engines.mujoco.variants import (
+    with_armature,
+    with_impratio,
+    with_kv,
+    with_other_cone,
+    with_slower_contacts,
+)
+from compare.stability import cures
+from compare.stability.control import controlled
+from compare.stability.growth import growth
+from compare.stability.limits import tried
+from compare.stability.motion import motion
+from compare.stability.runs import PUSHES, grows, growth_in_run, has_grown, largest_push, observed
+
+FOOT = STANDING.format(cone="elliptic", condim=3)
+RUBBING = hinge(20.0, 30.0, 'frictionloss="0.3"')
+MOTORS = '<motor joint="turn" gear="2"/>'
+SPIN = """<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody><body><freejoint/>
+  <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.02 0.03"/></body></worldbody><keyframe><key qvel="0 0 0 0 {} 0"/></keyframe></mujoco>"""
+SWING = """<mujoco><option timestep="0.01"/><worldbody><body><joint name="a" axis="0 1 0" {}/>
+  <geom size="0.05" pos="0 0 -0.5" mass="1"/></body></worldbody><keyframe><key qvel="3"/></keyframe></mujoco>"""
+
+
+@pytest.mark.parametrize("text, integrator", [
+    (FOOT, "Euler"), (FOOT, "RK4"), (KINDS["pyramidal, condim 6"], "Euler"), (KINDS["a muscle"], "RK4"),
+    (KINDS["a DC motor"], "Euler"), (KINDS["friction loss"], "Euler"), (KINDS["fluid"], "Euler"),
+    (KINDS["a limit"], "RK4"), (KINDS["a filter"], "RK4"), (KINDS["damping of an actuator"], "RK4"),
+])  # fmt: skip
+def test_runs_show_the_limit_within_three_hundredths(text, integrator):
+    found = limit_of(text, integrator)
+    assert found.kind == "finite"
+    below, above = observed(place_of(text).model, found, integrator)
+    assert (below, above) == (pytest.approx(0.97 * found.dt), pytest.approx(1.03 * found.dt))
+
+
+def test_growth_in_a_run_is_that_of_the_step():
+    place = place_of(hinge(20.0, 5.0))
+    for dt in (0.021, 0.03):
+        factor = tried(place.model, place.rest, dt, "Euler").growth.factor
+        assert factor > 1.05 and growth_in_run(place.model, place.rest, dt, "Euler") == pytest.approx(
+            factor, rel=1e-3
+        )
+    assert growth_in_run(place.model, place.rest, 0.001, "Euler") < 1.0
+
+
+@pytest.mark.parametrize(
+    "late, steps, grown", [(2.9, 100, False), (3.1, 100, True), (np.nan, 100, True), (1.0, 101, True)]
+)
+def test_a_push_has_grown_if_its_last_quarter_is_three_times_its_second(late, steps, grown):
+    sizes = 1e-7 * np.r_[np.full(75, 1.0), np.full(25, late)]
+    assert has_grown(sizes, steps) is grown
+
+
+def test_dry_friction_holds_small_deviations_alone():
+    """Without it the limit is that of the formula; between the two only small pushes are survived."""
+    place = place_of(RUBBING)
+    smooth = (-30.0 + np.sqrt(30.0**2 + 4.0 * INERTIA * 20.0)) / 20.0
+    assert limit_of(RUBBING).dt > 4.0 * smooth
+    free = place.frictionless
+    assert not free.dof_frictionloss.any() and place_of(hinge()).frictionless is None
+    assert [tried(free, place.rest, by * smooth, "Euler").is_stable for by in (0.99, 1.01)] == [True, False]
+    pushes = [largest_push(place.model, rest_of(RUBBING, by * smooth)) for by in (0.9, 1.5)]
+    assert pushes[0].largest == PUSHES[0] and 0.0 < pushes[1].largest < 0.1 and not pushes[1].finer_too
+
+
+def test_a_servo_too_weak_for_a_push_bears_it_at_no_step():
+    """An inverted pendulum whose servo has just the force for small angles."""
+    servo = (
+        '<position joint="a" kp="8" kv="0.5" forcerange="-0.4 0.4"/>'  # after a fall it calms down, hanging
+    )
+    text = f"""<mujoco><worldbody><body><joint name="a" axis="0 1 0"/><geom size="0.05" pos="0 0 0.5" mass="1"/></body></worldbody>
+      <actuator>{servo}</actuator></mujoco>"""
+    found = largest_push(place_of(text).model, rest_of(text))
+    assert 1e-3 < found.largest < 1.0 and found.finer_too
+
+
+# controllers
+
+
+def exact_growth(steps, delay, kp, kv, dt=2e-3):
+    """Of one hinge under Euler: force kp q + kv v of a reading every `steps`, which acts `delay` < `steps` later."""
+    step, push = np.array([[1.0, dt], [0.0, 1.0]]), np.array([dt * dt, dt]) / INERTIA
+    state = np.eye(2, 3)  # and the force of the reading before
+    forces = np.eye(1, 3, 2)[0], -np.array([kp, kv]) @ state
+    for k in range(steps):
+        state = step @ state + np.outer(push, forces[k >= delay])
+    return np.abs(np.linalg.eigvals(np.vstack([state, forces[1]]))).max()
+
+
+@lru_cache
+def program(text, kp=None, kv=None, dt=2e-3, integrator="Euler"):
+    place = place_of(text)
+    return controlled(place.model, place.rest, dt, integrator, kp, kv)
+
+
+def test_a_program_grows_as_the_exact_map_of_one_hinge():
+    servo, motor = program(hinge(20.0, 1.0)), program(hinge(actuator=MOTORS), 10.0, 0.5)
+    for steps, delay in ((1, 0), (10, 4), (45, 0), (60, 0), (60, 7)):
+        exact = exact_growth(steps, delay, 20.0, 1.0)
+        for found in (servo, motor):  # the gear is 2
+            exact_here = exact if found is servo else exact_growth(steps, delay, 40.0, 2.0)
+            assert found.factor(steps, delay) == pytest.approx(max(1.0, exact_here), rel=1e-6)
+    assert program(hinge(actuator=MOTORS)) is None and len(servo.servos) == len(motor.servos) == 1
+
+
+@pytest.mark.parametrize("delay", [0, 4, 11])
+def test_runs_show_the_longest_period_and_the_longest_delay_of_two_servos(delay):
+    found = program(
+        two(HOLDING.replace('kv="3"', 'kv="0.7"').replace('kv="2"', 'kv="0.4"')),
+        dt=5e-4,
+        integrator="implicitfast",
+    )
+    longest = found.longest_period(delay)
+    assert not found.grows_in_run(longest, delay) and found.grows_in_run(longest + 2, delay)
+    latest = found.longest_delay(longest - 3)
+    assert (
+        latest >= delay
+        and not found.grows_in_run(longest - 3, latest)
+        and found.grows_in_run(longest - 3, latest + 2)
+    )
+
+
+def test_a_force_range_and_the_rest_of_a_program_are_those_of_the_file():
+    """Two rods on their servos: the program's forces hold them where MuJoCo's did."""
+    text = two()
+    found, rest = program(text, integrator="implicitfast"), rest_of(text, 2e-3, "implicitfast")
+    assert found.rest.left < 1e-4 and np.abs(found.rest.state[1:3] - rest.state[1:3]).max() < 1e-8
+    assert found.factor(1, 0) == 1.0
+    cut = hinge(actuator='<position joint="turn" kp="20" kv="1" forcerange="-0.3 0.3"/>')
+    (servo,) = program(cut).servos
+    assert [servo.force(q, 0.0) for q in (-1.0, -0.01, 1.0)] == pytest.approx([0.3, 0.2, -0.3])
+
+
+# motions
+
+
+def test_a_body_that_spins_about_its_middle_axis_leaves_by_itself():
+    """At omega sqrt((I2 - I1) (I3 - I2) / (I1 I3)), 1/s; the exact motion as well."""
+    rates = []
+    for omega in (0.0, 20.0):
+        place = place_of(SPIN.format(omega))
+        found = motion(place.model, place.start, 0.01, "RK4")
+        assert found.is_stable and found.failed_at is None
+        assert found.rate == pytest.approx(found.exact_rate, rel=0.05)
+        rates.append(found.exact_rate)
+    assert rates[1] - rates[0] == pytest.approx(20.0 / np.sqrt(3.0), rel=0.1)
+
+
+@pytest.mark.parametrize("joint, dt, integrator, stable", [
+    ("", 0.01, "Euler", True), ('stiffness="400"', 0.01, "Euler", True), ('stiffness="400"', 0.2, "Euler", False),
+    ('damping="40"', 0.05, "Euler", True), ('damping="40"', 0.05, "RK4", False),
+])  # fmt: skip
+def test_a_swing_grows_by_its_step_alone_where_the_exact_motion_does_not(joint, dt, integrator, stable):
+    place = place_of(SWING.format(joint))
+    found = motion(place.model, place.start, dt, integrator)
+    assert found.is_stable is stable and (found.failed_at is None) is stable
+
+
+# cures
+
+
+def test_the_least_changes_of_one_hinge_are_those_of_the_formula():
+    """4 I > 2 dt kv + dt^2 kp, 1 % above the step."""
+    kp, kv, dt, inertia = 20.0, 30.0, 0.02, INERTIA + 0.01
+    place, above = place_of(hinge(kp, kv, 'armature="0.01"')), 0.02 * cures.SPARE
+    assert grows(place.model, place.rest, dt, "Euler")
+    found = {cure.change: cure.factor for cure in cures.cures(place.model, place.rest, dt, "Euler")}
+    less = 2.0 * above * kv / (4.0 * inertia - above**2 * kp)
+    more = (2.0 * above * kv + above**2 * kp) / (4.0 * inertia) - 1.0
+    assert found.keys() == {"less_kv", "more_armature"}
+    assert 0.999 * less < found["less_kv"] < cures.WITHIN * less
+    assert 0.999 * more < found["more_armature"] < cures.WITHIN * more
+    for changed in (
+        with_kv(place.model, 1.0 / found["less_kv"]),
+        with_armature(place.model, found["more_armature"]),
+    ):
+        assert not grows(changed, place.rest, dt, "Euler")
+
+
+def test_what_helps_a_standing_leg_holds_in_a_run_and_half_of_it_does_not():
+    place, dt = place_of(FOOT), 1.3 * limit_of(FOOT, "implicitfast").dt
+    made = {change.name: change for change in cures.CHANGES}
+    found = cures.cures(place.model, place.rest, dt, "implicitfast")
+    assert {cure.change for cure in found} & {"less_kv", "more_armature", "slower_contacts"}
+    for cure in found:
+        change = made[cure.change]
+        assert not grows(change.made(place.model, cure.factor), place.rest, dt, "implicitfast")
+        if cure.factor > change.first * cures.WITHIN**2:
+            less = change.made(place.model, cure.factor / cures.WITHIN**2)
+            assert not tried(less, place.rest, cures.SPARE * dt, "implicitfast").is_stable
+
+
+def test_each_change_changes_what_it_says():
+    place = place_of(FOOT)
+    model = place.model
+    assert with_kv(model, 0.5).actuator_biasprm[:, 2].tolist() == [-25.0, -3.0, -3.0]
+    assert (
+        with_impratio(model, 4.0).opt.impratio == 12.0
+        and with_other_cone(model, 1.0).opt.cone != model.opt.cone
+    )
+    assert with_slower_contacts(model, 3.0).geom_solref[:, 0] == pytest.approx(0.06)
+    assert with_kv(place_of(KINDS["a box"]).model, 0.5) is None
+    assert not with_armature(place_of(KINDS["a box"]).model, 9.0).dof_armature.any()  # of a free joint
+    assert (
+        model.actuator_biasprm[0, 2] == -50.0 and model.opt.impratio == 3.0
+    )  # the model itself is as it was
+    assert growth(rest_of(FOOT)).factor == 1.0 and Step(model, 1e-3, "Euler").model is not model

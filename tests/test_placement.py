@@ -1,0 +1,133 @@
+"""A file that models a stated robot otherwise: placed elsewhere, with welded bodies or links without mass."""
+
+import numpy as np
+import pytest
+
+import tmt
+from compare.engines.mujoco import ModelError, read
+from compare.engines.mujoco.inventory import contact_pairs
+from compare.engines.mujoco.source import Source
+from compare.robots.arm import ARM
+from compare.robots.placement import placed
+from compare.run.reference import compared_with
+
+XML = ARM.mjcf.read_text(encoding="utf-8")
+ITSELF = str(ARM.mjcf)
+UPPER, FOREARM = (
+    '<body name="upper_arm" pos="0 0 0"',
+    '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>',
+)
+STATES = np.random.default_rng(0).uniform(-3.0, 3.0, (3, 8, 3))
+# the forearm's mass, centre of mass and tensor in two bodies, of which one is turned
+SPLIT = """<inertial pos="0.12 0 0" mass="1" diaginertia="0.0006 0.012 0.012"/><body name="hand" pos="0.21 0 0" euler="0 0 0.7">
+<inertial pos="0 0 0" euler="0 0 -0.7" mass="0.5" diaginertia="0.0004 0.0043 0.0043"/></body>"""
+STAND = '<body name="stand" pos="0 0 2"><inertial pos="0 0 0" mass="5" diaginertia="1 1 1"/></body>'
+YOKE = '<body name="yoke"><joint name="alpha" type="hinge" axis="0 1 0"/>'
+
+
+def edited(*edits, text=XML):
+    for old, new in edits:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    return text
+
+
+def moved(more):
+    return edited((UPPER, UPPER.replace('pos="0 0 0"', more)))
+
+
+ALONG = edited(
+    ('name="gamma"', 'name="gamma" pos="0 0.07 0"'), ('name="alpha"', 'name="alpha" pos="0 -0.02 0"')
+)
+AS_LINKS = edited(('<joint name="alpha" type="hinge" axis="0 1 0"/>', ""), (UPPER, f"{YOKE}{UPPER}"),
+                  ("</worldbody>", "</body></worldbody>"))  # fmt: skip
+OTHERWISE = {
+    "moved": (moved('pos="0.2 0.1 1.4"'), "moved by (0.2, 0.1, 1.4) m"),
+    "turned": (
+        moved('pos="0 0 0" euler="0 0 0.6"'),
+        "turned by 34.3775 deg about (0, 0, 1), gravity with it",
+    ),
+    "y up": (
+        edited(("0 0 -9.81", "0 -9.81 0"), text=moved('euler="-1.5707963267948966 0 0"')),
+        "gravity with it",
+    ),
+    "along": (ALONG, "anchor elsewhere on the axis of alpha and gamma"),
+    "welded": (edited((FOREARM, SPLIT)), "one (hand on forearm)"),
+    "stand": (edited(("</worldbody>", f"{STAND}</worldbody>")), "fixed to the world, without motion: stand"),
+    "massless": (AS_LINKS, "links without mass: yoke"),
+}
+
+
+@pytest.mark.parametrize("reference", ["arm", ITSELF])
+@pytest.mark.parametrize("name", OTHERWISE)
+def test_a_file_that_moves_as_stated_is_compared_in_its_place_and_said_to_be_otherwise(
+    name, reference, tmp_path
+):
+    text, says = OTHERWISE[name]
+    (tmp_path / "file.xml").write_text(text)
+    compared = compared_with(reference, str(tmp_path / "file.xml"))
+    if reference == "arm" or name not in (
+        "stand",
+        "massless",
+    ):  # a solution and its file have as many bodies here
+        assert (
+            says
+            in " ".join(compared.reference.lines)
+            == " ".join([compared.reference.lines[0], *compared.reference.otherwise])
+        )
+    tree, mujoco, (q, qd, tau) = compared.robot.tree, compared.mujoco.of(compared.robot.case()), STATES
+    for mine in (tmt.ARM, tree):  # which is moved, and has the same equations
+        assert np.abs(mujoco.mass_matrix(q) - tmt.mass_matrix(q, mine)).max() < 1e-14
+        assert np.abs(mujoco.acceleration(q, qd, tau) - tmt.acceleration(q, qd, tau, mine)).max() < 1e-11
+    if name != "massless":
+        assert np.abs(mujoco.com_positions(q) - tmt.com_positions(q, tree)).max() < 1e-14
+        energies = mujoco.energy(q, qd) - tmt.energy(q, qd, tree)
+        assert np.abs(energies).max() < 1e-12
+
+
+@pytest.mark.parametrize("text", [
+    edited(('name="beta" type="hinge" axis="1 0 0"', 'name="beta" type="hinge" axis="-1 0 0"')),
+    XML.replace('axis="0 1 0"', 'axis="0 -1 0"'), edited(("0 0 -9.81", "0 0 9.81")),
+    edited(('pos="0 0 -0.3"', 'pos="0 0 -0.31"')),
+    edited(('axis="1 0 0"', 'axis="0 0 1"')), edited((FOREARM, FOREARM.replace("0.15", "-0.15"))),
+])  # fmt: skip
+def test_what_moves_otherwise_is_not_moved_nor_turned(text):
+    tree = read(Source(text)).tree
+    placement = placed(tmt.ARM, tree)
+    assert placement.is_same and placement.tree is tmt.ARM and placement.remarks() == []
+
+
+def test_a_robot_that_is_turned_against_gravity_differs_in_gravity_alone():
+    placement = placed(tmt.ARM, read(Source(moved('euler="0.3 0 0"'))).tree)
+    (remark,) = placement.remarks()
+    assert not remark.values["is_with_gravity"] and remark.values["angle"] == pytest.approx(np.degrees(0.3))
+    assert np.abs(tmt.bias(*STATES[:2], placement.tree) - tmt.bias(*STATES[:2])).max() < 1e-13
+
+
+def test_bodies_stay_one_where_joints_are_locked(tmp_path):
+    (tmp_path / "file.xml").write_text(edited((FOREARM, SPLIT)))
+    compared = compared_with("arm", str(tmp_path / "file.xml"))
+    case = compared.robot.case(locked=("alpha", "gamma"))
+    q = STATES[0][:, 1:2]
+    assert np.abs(compared.mujoco.of(case).mass_matrix(q) - tmt.mass_matrix(q, case.tree)).max() < 1e-14
+
+
+def test_locked_joints_make_no_contacts_that_the_file_does_not_have():
+    """Of neighbours of which one stands still; others stay."""
+    capsule, floor = (
+        '<geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>',
+        '<geom type="plane" size="1 1 1" pos="0 0 -2"/>',
+    )
+    text = edited((FOREARM, FOREARM + capsule), ('contact="disable" constraint="disable" ', ""))
+    text = text.replace('<inertial pos="0 0 -0.15"', f'{capsule}<inertial pos="0 0 -0.15"')
+    for more, pairs in {"": 0, floor: 1}.items():
+        source = Source(text.replace("</worldbody>", f"{more}</worldbody>"))
+        model = source.without({"alpha": 0.3, "beta": 0.2})
+        assert len(contact_pairs(model)) == pairs and model.ngeom == source.model.ngeom == 2 + pairs
+    assert len(contact_pairs(source.model)) == 2  # with the upper arm too, which moves there
+
+
+def test_a_moving_link_must_carry_mass():
+    leaf = AS_LINKS.replace(FOREARM, FOREARM + '<body name="tool" pos="0.3 0 0"><joint name="turn"/></body>')
+    with pytest.raises(ModelError, match="tool moves, and neither it nor what it carries has mass"):
+        Source(leaf)

@@ -1,0 +1,146 @@
+"""How Mbar qdd + h changes with movements and speeds, in closed form: in world axes about one point, as in articulated.py.
+
+A movement along the direction S_k = (axis, shift) of a speed takes all that its joint carries along as one body, and so turns
+velocity and acceleration of what is carried, less those of the frame before (omega, u of its point at O, omegad, ud). What
+is left are two motions, with x the product of motions, (omega, u) x (axis, shift) = (omega x axis, omega x shift + u x axis):
+
+    Y_k = v x S_k        Z_k = a x S_k + v x Y_k        v, a of the frame before, a with -g.
+
+A motion X that is added to the velocity changes force and moment of a mass distribution by I X + B X alone: the mass at a point
+r feels 2 X_omega x its velocity, so that
+
+    B X = (K X_omega, 2 X_omega x p),   K = 2 (tr(G) 1 - G'),   G = integral of r rd' dm,   p its momentum.
+
+With I, B and the force F of all that the joint carries, and Y + W = v x S + v_own x S, its moment and force change by
+
+    I Z + B Y + S x* F  with the movement        I (Y + W) + B S  with the speed,
+
+along each direction inward; of the torque at joints outward by I Z + B Y and I (Y + W) + B S, with their own I and B.
+Sums of this kind, over six coordinates: Singh, Russell, Wensing, IEEE Robotics and Automation Letters 7 (2022), 1784.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from tmt.derivation.scalar import Rows, Scalar
+
+from .articulated import Direction, Frame, Rigid, gathered, outward
+from .mechanism import AnyTree
+from .vectors import ZERO, Matrix, Scalars, Vector, outer
+
+
+class Motion(NamedTuple):
+    """Angular velocity (or its rate) and velocity of the point at O, or moment and force about O."""
+
+    turn: Vector
+    shift: Vector
+
+    def times(self, other: "Motion | Direction") -> "Motion":
+        """The product of two motions: how the first changes the second, which it takes along."""
+        axis, shift = other
+        return Motion(self.turn.cross(axis), self.turn.cross(shift) + self.shift.cross(axis))
+
+    def plus(self, other: "Motion") -> "Motion":
+        return Motion(self.turn + other.turn, self.shift + other.shift)
+
+    def dot(self, other: "Motion | Direction") -> Scalar:
+        return self.turn.dot(other[0]) + self.shift.dot(other[1])
+
+
+STILL = Motion(ZERO, ZERO)
+
+
+class Momentum(NamedTuple):
+    """What B consists of."""
+
+    K: Matrix
+    p: Vector
+
+    def plus(self, other: "Momentum") -> "Momentum":
+        return Momentum(self.K + other.K, self.p + other.p)
+
+    def force(self, turn: Vector) -> Motion:
+        """B X, of the angular part of X."""
+        return Motion(self.K @ turn, turn.cross(self.p * 2.0))
+
+    def along(self, direction: Direction) -> Vector:
+        """S' B, by the angular part of X."""
+        return self.K.transposed @ direction.axis + (self.p * 2.0).cross(direction.shift)
+
+
+def momentum(body: Rigid, omega: Vector, u: Vector) -> Momentum:
+    """Of what a joint carries itself."""
+    (xx, yy, zz), (yz, xz, xy) = body.J
+    half, (x, y, z) = (xx + yy + zz) * 0.5, omega
+    second = Matrix([[half - xx, -xy, -xz], [-xy, half - yy, -yz], [-xz, -yz, half - zz]])
+    spin = Matrix([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    G, doubled = outer(u, body.s) + spin @ second, 2.0 * u.dot(body.s)
+    K = Matrix([row * -2.0 for row in G]) + Matrix(
+        [[doubled, 0.0, 0.0], [0.0, doubled, 0.0], [0.0, 0.0, doubled]]
+    )
+    return Momentum(K, u * body.m + omega.cross(body.s))
+
+
+def velocities(tree: AnyTree, frames: list[Frame], qd: Scalars) -> list[Motion]:
+    """The velocity of each joint's frame about O."""
+    result: list[Motion] = []
+    for i, joint in enumerate(tree.coordinates.joints):
+        v = result[tree.parent[i]] if tree.parent[i] >= 0 else STILL
+        shift = sum((d.shift * rate for d, rate in zip(frames[i].directions, qd[joint.qd])), v.shift)
+        result.append(Motion(frames[i].omega, shift))
+    return result
+
+
+def rates(
+    tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Callable[..., Scalar] = float
+) -> tuple[Rows, Rows]:
+    """Derivatives of Mbar qdd + h by movements of q and by qd, (nv rows of nv) each; of a ball's by turns in its own axes."""
+    n, joints = len(qd), tree.coordinates.joints
+    frames, own = outward(tree, q, qd, qdd, number)
+    rigid, v = gathered(tree, own), velocities(tree, frames, qd)
+    B = [momentum(body, *motion) for body, motion in zip(own, v)]
+    for i in reversed(range(len(joints))):
+        if tree.parent[i] >= 0:
+            B[tree.parent[i]] = B[tree.parent[i]].plus(B[i])
+    by_movement: Rows = [[0.0] * n for _ in range(n)]
+    by_speed: Rows = [[0.0] * n for _ in range(n)]
+    Y: list[Motion] = []
+    Z: list[Motion] = []
+    YW: list[Motion] = []
+    directions: list[Direction] = []
+    for i in range(len(joints)):
+        before = tree.parent[i]
+        v0 = v[before] if before >= 0 else STILL
+        a0 = Motion(ZERO, Vector(*tree.gravity) * -1.0)
+        if before >= 0:  # of a point in space, not of one that moves with the frame
+            a0 = Motion(frames[before].omegad, frames[before].a - v0.turn.cross(v0.shift))
+        for direction in frames[i].directions:
+            directions.append(direction)
+            Y.append(v0.times(direction))
+            Z.append(a0.times(direction).plus(v0.times(Y[-1])))
+            YW.append(Y[-1].plus(v[i].times(direction)))
+    for i, body in enumerate(rigid):
+        path = [k for inward in tree.path(tree.parent[i]) for k in joints[inward].speeds]
+        for k in joints[i].speeds:
+            axis, shift = directions[k]
+            by_turn = B[i].along(directions[k])
+            inertia = applied(body, directions[k])  # I S, I being symmetric
+            moved = applied(body, Z[k]).plus(B[i].force(Y[k].turn))
+            sped = applied(body, YW[k]).plus(B[i].force(axis))
+            for other in joints[i].speeds:
+                by_movement[other][k] = moved.dot(directions[other])
+                by_speed[other][k] = sped.dot(directions[other])
+            carried_along = Motion(axis.cross(body.n) + shift.cross(body.f), axis.cross(body.f))
+            moved = moved.plus(carried_along)
+            for other in path:
+                by_movement[other][k] = moved.dot(directions[other])
+                by_speed[other][k] = sped.dot(directions[other])
+                by_movement[k][other] = inertia.dot(Z[other]) + by_turn.dot(Y[other].turn)
+                by_speed[k][other] = inertia.dot(YW[other]) + by_turn.dot(directions[other].axis)
+    return by_movement, by_speed
+
+
+def applied(body: Rigid, motion: Motion | Direction) -> Motion:
+    """Moment and force about O that give a rigid body this acceleration."""
+    turn, shift = motion
+    return Motion(body.J.times(turn) + body.s.cross(shift), turn.cross(body.s) + shift * body.m)
