@@ -222,3 +222,37 @@ def test_a_mesh_of_a_package_is_found_above_the_file_or_beside_it(folder, place,
         assert read(file).model.nmesh == 1
         return
     assert read(file).source.missing == ("package://robot/meshes/a.obj",)
+
+
+BOX = """<mujoco><asset><mesh name="m" file="hull.stl"/><hfield name="h" file="hill.png" size="1 1 1 1"/></asset><worldbody>
+<geom type="hfield" hfield="h"/><body name="b"><joint name="j" axis="0 1 0"/>{}
+<geom name="hull" type="mesh" mesh="m"/><geom name="ball" size="0.1"/></body></worldbody>
+<contact><pair geom1="hull" geom2="ball"/></contact></mujoco>"""
+STATED = '<inertial pos="0 0 -0.5" mass="2" diaginertia="0.1 0.1 0.01"/>'
+
+
+def test_meshes_that_are_not_there_are_left_out_and_said():
+    source = Source(BOX.format(STATED))
+    assert source.missing == ("hull.stl", "hill.png") and said(source)["missing"] == {"files": source.missing}
+    model = Source(BOX.format(STATED).replace("hull.stl", "hull.dae")).without({})
+    for m in (source.model, model, pickle.loads(pickle.dumps(source)).without({}, bare=False)):
+        assert m.ngeom == 1 and m.npair == 0 and m.body("b").mass == 2.0
+
+
+@pytest.mark.parametrize("inertial", ["", "inertiafromgeom"])
+def test_a_mesh_that_is_not_there_cannot_give_an_inertia(inertial):
+    text = BOX.format(STATED if inertial else "")
+    text = text.replace("<asset>", f'<compiler {inertial}="true"/><asset>') if inertial else text
+    with pytest.raises(
+        ModelError, match=r"inertia of body 'b' is that of its mesh hull\.stl, which cannot be read"
+    ):
+        Source(text)
+
+
+def test_the_base_of_a_urdf_floats_where_that_is_asked():
+    fixed, floating = (Source(urdf("base", inertial=INERTIAL), flag) for flag in (False, True))
+    assert (fixed.model.nv, floating.model.nv) == (1, 7)
+    assert "fixed_base" in said(fixed) and "fixed_base" not in said(floating)
+    assert pickle.loads(pickle.dumps(floating)).without({"j": 0.0}).nv == 6
+    with pytest.raises(ModelError, match="only the base of a URDF"):
+        Source(BOX.format(STATED), True)

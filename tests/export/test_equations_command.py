@@ -4,6 +4,7 @@ import re
 import shutil
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -16,18 +17,22 @@ from compare.__main__ import main
 from compare.experiments.quantities import QUANTITIES as COMPARED
 from compare.export import checks
 from compare.export.command import FILES, identifier
+from compare.export.parameters import with_sites, with_values
 from compare.export.programs import PROGRAMS, NotRun, Program, PythonProgram, WrongProgram
 from compare.robots.arm import ARM
 from compare.run.reference import compared_with
 from tmt.derivation.quantities import QUANTITIES
+from tmt.export.parameters import Parameters
 
 HAS_C, HAS_OCTAVE = (bool(shutil.which(name)) for name in ("gcc", "octave-cli"))
 NEEDS = {"c": HAS_C, "matlab": HAS_OCTAVE, "python": True, "latex": True}
+NEEDS |= {name: find_spec(name) is not None for name in ("casadi", "jax")}
 COUNT = 20
 
 
 @pytest.mark.parametrize("language, options", [
-    ("c", []), ("c", ["--float"]), ("python", []), ("matlab", ["--quantity", "mass_matrix,bias,jacobians"]),
+    ("c", []), ("c", ["--float"]), ("python", []), ("casadi", []), ("jax", []),
+    ("matlab", ["--quantity", "mass_matrix,bias,jacobians"]),
 ])  # fmt: skip
 def test_the_arm_in_a_language(language, options, tmp_path, capsys):
     if not NEEDS[language]:
@@ -190,3 +195,41 @@ def test_values_are_compared_with_mujoco_and_with_the_exact_value(from_mujoco, t
     tree = compared.robot.tree if from_mujoco else compared_with("model", str(heavy)).robot.tree
     (row,) = outcome_of(partial(Altered, tree, "", 0.0), "mass_matrix", compared=compared).rows
     assert not row.passed and (row.of_mujoco > 1.0, row.of_exact > 1.0) == (from_mujoco, not from_mujoco)
+
+
+@pytest.mark.parametrize("language", [name for name in ("c", "python") if NEEDS[name]])
+def test_parameters_are_compared_with_the_file_that_has_other_values(language, tmp_path, capsys):
+    """And what MuJoCo has not, with the exact values alone."""
+    words = ["--parameters", "payload,rod,gravity", "--quantity", "bias,inverse_dynamics,frame_pose:rod"]
+    file = tmp_path / "swing.xml"
+    file.write_text(SWING, encoding="utf-8")
+    status = main(
+        ["equations", "--mjcf", str(file), "--to", language, *words, "--out", str(tmp_path / "out")]
+    )
+    shown = capsys.readouterr().out
+    assert (
+        status == 0 and "bias (p)" in shown and "frame_pose:rod (p)" in shown and "MuJoCo has none" in shown
+    )
+    text = next((tmp_path / "out").glob("swing.[hp]*")).read_text(encoding="utf-8")
+    assert "payload_inertia" in text and "centre of mass of payload in the frame of rod" in text
+
+
+def test_a_wrong_parameter_is_found(tmp_path, monkeypatch):
+    """Its value goes to the program, and its rounding to the bound."""
+    compared = with_sites(compared_with("model", str(PATHS["gripper"])))
+    tree = compared.robot.tree
+    chosen = Parameters(tree, ["gravity"])
+    (tmp_path / "x.py").write_text(
+        tmt.equations(tree, "python", ["inverse_dynamics"], parameters=["gravity"])
+    )
+    stated, values = ({"gravity": np.array([0.0, 0.0, -g])} for g in (9.81, 9.0))
+    make = partial(PythonProgram, tmp_path, "x", tree, ["inverse_dynamics"], False, stated, chosen)
+    for other, passes in ((values, True), ({"gravity": values["gravity"] * (1.0 + 1e-13)}, False)):
+        second = with_values(compared, chosen, values)
+        outcome, _ = checks.checked(compared, make, ["inverse_dynamics"], COUNT, False, second, other)
+        assert [row.passed for row in outcome.rows] == [True, passes]
+
+
+SWING = """<mujoco><worldbody><body name="frame" pos="0 0 1" euler="20 0 10"><joint name="a" axis="0 1 0"/>
+<geom type="capsule" size="0.05" fromto="0 0 0 0.3 0 0"/><body name="rod" pos="0.3 0 0" euler="0 30 40">
+<joint name="b" axis="1 0 0"/><geom type="capsule" size="0.04" fromto="0 0 0 0 0.1 -0.3"/></body></body></worldbody></mujoco>"""

@@ -32,7 +32,7 @@ EDITS = (
     ("tmt.exact.many", "Pairs.distance", "(_1 - _2) - self.low",  "0 * _1", "no distance from the exact values"),
     ("states", "random", "robot.coordinates.random(*_1)", "0 * _0", "every random state is zero"),
     ("states", "named", "len(q) if _1 else 0", "1", "one posture has an exact value"),
-    ("export.checks", "Row.passed", "self.of_mujoco <= 1.0", "True", "exported equations are not compared with MuJoCo"),
+    ("export.checks", "Row.passed", "(self.of_mujoco or 0.0) <= 1.0", "True", "exported equations are not compared with MuJoCo"),
     ("export.checks", "Row.passed", "self.of_exact <= 1.0", "True", "exported equations have no exact values"),
     ("export.checks", "Outcome.passed", "all(_1)", "any(_1)", "one quantity that agrees is enough"),
     ("export.checks", "Judge.largest", "self.factor * np.asarray(scale)", "2.0 * _0", "tolerance x 2"),
