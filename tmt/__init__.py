@@ -450,17 +450,19 @@ def equations(
     *,
     name: str = "robot",
     single: bool = False,
-    head: Sequence[str] = ("Not checked: compare with the model before use.",),
+    head: Sequence[str] = ("Not checked.",),
+    parameters: Sequence[str] = (),
+    limit: float = 60.0,
 ) -> str:
     """The equations of a model, with its numbers, as text in another language, for use without this package.
 
     Parameters
     ----------
     model : Tree, default ARM
-    language : {"c", "c header", "python", "matlab", "latex", "html", "sympy"}
+    language : {"c", "c header", "python", "matlab", "casadi", "jax", "latex", "html", "sympy"}
         C99 with math.h alone, no allocation; Python with NumPy alone, any batch; MATLAB and Octave, one file,
-        states as columns. The last three are simplified, with a symbol for each parameter, for some six
-        hinges and slides (needs SymPy).
+        states as columns; a casadi.Function for each quantity; JAX, any batch. The last three are simplified,
+        with a symbol for each parameter, for some six hinges and slides (needs SymPy).
     quantities : sequence of str
         Functions of this package of those names; units, signs and shapes are theirs. With symbols:
         mass_matrix, bias, gravity_balance.
@@ -470,11 +472,18 @@ def equations(
         float in C.
     head : sequence of str
         Lines that begin the comment at its head.
+    parameters : sequence of str
+        Numbers that are further arguments of each function: "gravity" (3,); a body's name, or with ".mass"
+        (1,), ".com" (3,) or ".inertia" (6,) after it; "payload" and then a body's name: what that carries
+        besides. They are in the frame that is the site of the body's name, else in that of its joint; inertias
+        are about the centre of mass: xx yy zz xy xz yz.
+    limit : float, s
+        With symbols: the most work, counted as that of one processor core; ValueError beyond.
 
     Raises
     ------
     ValueError
-        For a language, quantity or name that is not one.
+        For a language, quantity, name or parameter that is not one.
 
     Examples
     --------
@@ -483,4 +492,4 @@ def equations(
     """
     from tmt.export import text  # loads the compiler
 
-    return text(model, language, quantities, name, single, head)
+    return text(model, language, quantities, name, single, head, parameters, limit)

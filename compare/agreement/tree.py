@@ -10,7 +10,6 @@ import tmt
 
 from ..core.finding import Finding
 from ..core.text import say
-from ..engines.mujoco import read, tree_with_sites
 from .comparison import origin_of
 
 
@@ -43,6 +42,8 @@ def tree(mjcf: str | PathLike[str] | Any) -> tmt.Tree:
     >>> print(tmt.frame("tip", [np.pi / 2], model=pendulum).position.round(9) + 0.0)
     [-1.  0.  0.]
     """
+    from ..engines.mujoco import read, tree_with_sites  # here, so that `import compare` need not wait for it
+
     reading = read(origin_of(mjcf))
     if off := [item for item in reading.features if item.treatment in ("switched_off", "open_tree")]:
         values = {"model": reading.name or str(reading.source), "features": off}

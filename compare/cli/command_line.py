@@ -101,6 +101,7 @@ OPTIONS = {
     "--out": Option(metavar="DIR", default="reports/latest", of_every=True),
     "--quick": Option(None, of_every=True),
     "--mjcf": Option(metavar="FILE", of_every=True),
+    "--floating": Option(None, of_every=True),
     "--reference": Option(stated_reference, "WHAT", of_every=True),
     "--joints": Option(metavar="LIST", example=" --mjcf robot.xml --reference my_equations.py:"),
     "--scenes": Option(metavar="FILE", example=" --scenes my.toml"),

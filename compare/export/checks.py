@@ -1,12 +1,13 @@
 """Exported equations at random states, compared with MuJoCo and exact values; what an evaluation costs."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from tmt.compiled import Evaluator
+from tmt.derivation.quantities import quantity_of
 from tmt.exact.many import Pairs, exact_of_many
 
 from ..core import timing
@@ -23,6 +24,8 @@ from ..run.reference import Compared
 from .programs import Array, CProgram, NotRun, Program, States, WrongProgram
 
 ROUNDS = 20  # of timing
+STEPS = 1e-3, 1e-2  # dt, s
+OTHER = " (p)"  # after a quantity: with other values of the parameters
 
 
 class Row(NamedTuple):
@@ -31,14 +34,14 @@ class Row(NamedTuple):
     quantity: str
     unit: str
     operations: int
-    from_mujoco: float
-    of_mujoco: float  # share
+    from_mujoco: float | None  # None: MuJoCo has no such quantity
+    of_mujoco: float | None  # share
     from_exact: float
     of_exact: float
 
     @property
     def passed(self) -> bool:
-        return self.of_mujoco <= 1.0 and self.of_exact <= 1.0
+        return (self.of_mujoco or 0.0) <= 1.0 and self.of_exact <= 1.0
 
 
 class Outcome(NamedTuple):
@@ -46,6 +49,10 @@ class Outcome(NamedTuple):
     not_run: str = ""  # why it was not run
     wrong: str = ""  # why it cannot run
     file: str = ""  # that was run, where there are others with the same expressions
+
+    @property
+    def has_other_parameters(self) -> bool:
+        return any(row.quantity.endswith(OTHER) for row in self.rows)
 
     @property
     def passed(self) -> bool:
@@ -56,12 +63,13 @@ class Judge:
     """What the values of a program at states are compared with."""
 
     def __init__(self, compared: Compared, states: States, eps: float):
-        self.tree, self.states, self.factor = compared.robot.tree, states, FACTOR * eps
+        self.tree, self.states, self.factor, self.eps = compared.robot.tree, states, FACTOR * eps, eps
         self.mujoco = compared.mujoco.of(compared.robot.case())
         self.scales = Entries(self.tree, *states[:2])
 
     def rows(self, program: Program, name: str) -> list[Row]:
-        values, exact = program.values(name, self.states), exact_of_many(self.tree, name, *self.states)
+        taken = self.states[: max(3, len(quantity_of(name).takes))]
+        values, exact = program.values(name, self.states), exact_of_many(self.tree, name, *taken)
         rows = []
         for symbol, quantity in QUANTITIES.items():
             if quantity.function == name:
@@ -70,8 +78,13 @@ class Judge:
                 shown = units[0] if len(units) == 1 else unit(self.tree, *units)
                 row_name = name if quantity.part is None else symbol
                 rows.append(Row(row_name, shown, program.operations(name), *largest))
-        if not rows:
-            raise WrongProgram(f"{name} has no counterpart in compare.experiments.quantities")
+        if not rows:  # MuJoCo has none
+            row, bound = quantity_of(name), program.rounding(name, self.states)
+            labels = row.parts or (name,)
+            for k, (label, value) in enumerate(zip(labels, values, strict=True)):
+                truth, most = exact.part(k if row.parts else None), self.eps * bound[k]
+                largest = worst_of(truth.distance(value), most)
+                rows.append(Row(label, row.unit, program.operations(name), None, None, *largest))
         return rows
 
     def largest(self, quantity: Quantity, values: Array, exact: Pairs) -> tuple[float, ...]:
@@ -90,14 +103,29 @@ class Judge:
 
 
 def checked(
-    compared: Compared, make: Callable[[], Program], quantities: Sequence[str], count: int, single: bool
-) -> tuple[Outcome, Program | None]:
-    """Run a program at random states; a float32 program is asked at states that float32 has."""
+    compared: Compared, make: Callable[[], Program], quantities: Sequence[str], count: int, single: bool,
+    other: Compared | None = None, values: Mapping[str, Array] | None = None,
+) -> tuple[Outcome, Program | None]:  # fmt: skip
+    """Run a program at random states; a float32 program is asked at states that float32 has.
+
+    other: the file with other values of the parameters, which the program is given then.
+    """
     kind, states = np.float32 if single else np.float64, random_states(compared.robot, count)
-    judge = Judge(compared, [x.astype(kind).astype(float) for x in states], float(np.finfo(kind).eps))
+    states, eps, names = (
+        [x.astype(kind).astype(float) for x in states],
+        float(np.finfo(kind).eps),
+        dict.fromkeys(quantities),
+    )
+    judge = Judge(compared, states, eps)
     try:
         program = make()
-        rows = [row for name in dict.fromkeys(quantities) for row in judge.rows(program, name)]
+        rows = [row for name in names for row in judge.rows(program, name)]
+        if other and values:
+            stated, program.parameters = program.parameters, values
+            judge = Judge(other, states, eps)
+            changed = [row for name in names for row in judge.rows(program, name)]
+            rows += [row._replace(quantity=row.quantity + OTHER) for row in changed]
+            program.parameters = stated
     except NotRun as error:
         return Outcome(not_run=str(error)), None
     except WrongProgram as error:
@@ -106,10 +134,11 @@ def checked(
 
 
 def random_states(robot: Robot, count: int) -> list[Array]:
-    """q (count, nq) within the ranges of the joints, qd and tau (count, nv)."""
+    """q (count, nq) within the ranges of the joints, qd and tau (count, nv), dt (count, 1)."""
     rng, most = np.random.default_rng(SEED), samples.largest_speeds_and_torques(robot)[:, None]
     q = robot.coordinates.random(rng, count, robot.ranges)
-    return [np.ascontiguousarray(q), *rng.uniform(-most, most, (2, count, robot.coordinates.nv))]
+    rates = rng.uniform(-most, most, (2, count, robot.coordinates.nv))
+    return [np.ascontiguousarray(q), *rates, rng.uniform(*STEPS, (count, 1))]
 
 
 def worst_of(difference: Array, tolerance: Array) -> tuple[float, float]:
@@ -124,15 +153,17 @@ def worst_of(difference: Array, tolerance: Array) -> tuple[float, float]:
 def times(
     compared: Compared, program: Program | None, quantities: Sequence[str], count: int
 ) -> list[dict[str, Any]]:
-    """ns of an evaluation by C, by tmt's compiled code state after state, and by mj_forward; []: not C."""
+    """ns of an evaluation by C, also compiled for this processor, by tmt's code state after state, by mj_forward; []: not C."""
     if not isinstance(program, CProgram):
         return []
-    names, (q, qd, tau) = list(dict.fromkeys(quantities)), random_states(compared.robot, count)
+    names, (q, qd, tau, dt) = list(dict.fromkeys(quantities)), random_states(compared.robot, count)
+    libraries = {"c": program.library} | program.faster()
     calls: dict[object, Callable[..., Any]] = {}
     for name in names:
-        calls[name, "c"], _ = program.call(name, (q, qd, tau))
+        for flag, library in libraries.items():
+            calls[name, flag], _ = program.call(name, (q, qd, tau, dt), library)
         compiled = Evaluator(compared.robot.tree, name)
-        calls[name, "tmt"] = partial(compiled.fill, False, np.empty((count, compiled.size)), q, qd, tau)
+        calls[name, "tmt"] = partial(compiled.fill, False, np.empty((count, compiled.size)), q, qd, tau, dt)
     if not MinimalCalls.unavailable():
         loops = MinimalCalls(compared.mujoco.of(compared.robot.case())).loops(q[0], qd[0], tau[0])
         calls["mujoco"] = partial(loops["MuJoCo, mj_forward"][1], count)
@@ -140,4 +171,14 @@ def times(
         call()  # its code is compiled, or loaded, on the first call
     ns = {key: 1e9 * seconds / count for key, seconds in timing.fastest(calls, ROUNDS).items()}
     forward = ns.get("mujoco")
-    return [{"quantity": x, "c": ns[x, "c"], "tmt": ns[x, "tmt"], "mujoco": forward} for x in names]
+    flags = [flag for flag in libraries if flag != "c"]
+    return [
+        {
+            "quantity": x,
+            "c": ns[x, "c"],
+            "tmt": ns[x, "tmt"],
+            "mujoco": forward,
+            "faster": {flag: ns[x, flag] for flag in flags},
+        }
+        for x in names
+    ]

@@ -9,22 +9,29 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
 
 import tmt
 from tmt.export import is_word
+from tmt.export.parameters import Parameters
 
-from ..cli.command_line import EQUATIONS, Option, command_parser, expected
+from ..cli.command_line import EQUATIONS, Option, command_parser, expected, seconds
 from ..core.errors import Refused
 from ..core.text import block
 from ..core.words import in_one_line
 from ..process import interrupt
 from ..report.provenance import installed
 from ..report.terminal import Terminal
+from ..robots.arm import ARM
 
 FILES = {  # of each language: the endings of the files, and what tmt.equations calls their languages
     "c": {".c": "c", ".h": "c header"},
     "python": {".py": "python"},
     "matlab": {".m": "matlab"},
+    "casadi": {".py": "casadi"},
+    "jax": {".py": "jax"},
     "latex": {".tex": "latex", ".html": "html", ".py": "sympy"},
 }
 QUANTITIES = {"latex": "mass_matrix,bias,gravity_balance"}
@@ -33,9 +40,12 @@ STATES = 1000
 OPTIONS = {
     "--to": Option(metavar="LANGUAGE", default="c"),
     "--mjcf": Option(metavar="FILE"),
+    "--floating": Option(None),
     "--quantity": Option(metavar="LIST"),
     "--name": Option(metavar="NAME"),
+    "--parameters": Option(metavar="LIST"),
     "--float": Option(None),
+    "--limit": Option(seconds(1e6), "S", 60.0),
     "--out": Option(metavar="DIR"),
 }
 
@@ -67,20 +77,30 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
     interrupt.Now.line = "interrupted; nothing was written"
     from ..engines.mujoco import ModelError  # imports are slow
     from ..run.reference import compared_with
-    from . import checks, programs
+    from . import checks, parameters, programs
 
+    path, words = options.mjcf, (options.parameters or "").replace(", ", ",")
     try:
-        compared = compared_with("model" if options.mjcf else None, options.mjcf)
+        reference = "model" if path or words else None
+        compared = compared_with(reference, path or str(ARM.mjcf), floating=options.floating)
+        compared = parameters.with_sites(compared)
     except ModelError as error:
         raise Refused(error) from None
     robot, name = compared.robot, options.name or identifier(Path(options.mjcf or "arm").stem)
     terminal.say_lines(compared.reference.lines if options.mjcf else ())
     quantities = (options.quantity or QUANTITIES.get(options.to, OF_MOST)).replace(" ", "").split(",")
 
+    more: dict[str, Any] = {
+        "parameters": words.split(",") if words else [],
+        "limit": options.limit,
+    }
+
     def written(*head: str) -> dict[str, str]:
         try:
             text = partial(tmt.equations, robot.tree, name=name, single=options.float, head=head)
-            return {f"{name}{ending}": text(to, quantities) for ending, to in FILES[options.to].items()}
+            return {
+                f"{name}{ending}": text(to, quantities, **more) for ending, to in FILES[options.to].items()
+            }
         except ValueError as error:
             raise Refused(error) from None
 
@@ -93,11 +113,16 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
             Path(folder, file).write_text(text, encoding="utf-8")
         terminal.show(f"runs what was written, at {STATES} states")
         program_of = programs.PROGRAMS[options.to]
-        make = partial(program_of, Path(folder), name, robot.tree, quantities, options.float)
-        outcome, program = checks.checked(compared, make, quantities, STATES, options.float)
+        chosen = Parameters(robot.tree, more["parameters"])
+        stated = {x: np.array(value) for x, value in chosen.values.items()}
+        values = parameters.other_values(chosen)
+        other = parameters.with_values(compared, chosen, values) if values else None
+        arguments = Path(folder), name, robot.tree, quantities, options.float, stated, chosen
+        make = partial(program_of, *arguments)
+        outcome, program = checks.checked(compared, make, quantities, STATES, options.float, other, values)
         times = checks.times(compared, program, quantities, STATES)
     facts = {
-        "outcome": outcome, "name": in_one_line(robot.name), "states": STATES, "features": robot.features,
+        "outcome": outcome, "times": times, "name": in_one_line(robot.name), "states": STATES, "features": robot.features,
         "command": in_one_line(command),
         "sha256": hashlib.sha256(Path(robot.mjcf).read_bytes()).hexdigest()[:16],
         "mujoco": installed("mujoco"),

@@ -6,28 +6,35 @@ import runpy
 import shlex
 import shutil
 import subprocess
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 import tmt
-from tmt.compiled import Evaluator
-from tmt.derivation.quantities import QUANTITIES, shape_of
+from tmt.derivation.quantities import quantity_of, shape_of
+from tmt.export import identifier
+from tmt.export import traced as traced_of
+from tmt.export.parameters import Parameters
 
 from ..engines.own.functions import functions_of
 from ..robots import Robot
+from .rounding import running_error
 
-STATE = ("q", "qd", "tau")
+STATE = ("q", "qd", "tau", "dt")
+ROUNDINGS = 16.0  # of a number on its way through MuJoCo's compiler, in units of eps
 MOST_SECONDS = 900.0  # of a compiler, or of a run in another language
+OF_PROCESSOR = "-mfma", "-march=native"  # which a user may add; GCC then needs -std=gnu99 or the like
 FLAGS = ("-std=c99", "-O2", "-Wall", "-fPIC", "-shared")
 
 Array = NDArray[np.floating[Any]]
-States = Sequence[Array]  # q (states, nq), qd and tau (states, nv)
+Part = TypeVar("Part")
+States = Sequence[Array]  # q (states, nq), qd and tau or qdd (states, nv), dt (states, 1)
 
 
 class NotRun(RuntimeError):
@@ -47,6 +54,8 @@ class Program:
     tree: tmt.Tree
     quantities: Sequence[str]
     single: bool
+    parameters: Mapping[str, Array] = field(default_factory=dict)  # values of further arguments
+    chosen: Parameters | None = None  # which these are
     file = ""  # that is run, where there are others with the same expressions
 
     def __post_init__(self) -> None:
@@ -58,7 +67,20 @@ class Program:
 
     def operations(self, quantity: str) -> int:
         """+ - * / of an evaluation; a sine, a cosine, a root count as one each."""
-        return Evaluator(self.tree, quantity).operations
+        return traced_of(self.tree, quantity, self.chosen).operations
+
+    def rounding(self, quantity: str, states: States) -> list[Array]:
+        """In units of eps, how far rounding may take each number of the arrays of a quantity."""
+        traced = traced_of(self.tree, quantity, self.chosen)
+        count, numbers = len(states[0]), self.parameters.values()
+        arrays = [*states, *(np.tile(x, (count, 1)) for x in numbers)]
+        # those of the parameters in the compiled file have been turned to principal axes and back
+        exact = [np.zeros_like(x) for x in states]
+        errors = [*exact, *(np.full((count, len(x)), ROUNDINGS * np.abs(x).max()) for x in numbers)]
+        bounds = running_error(traced, *(np.concatenate(part, axis=1).T for part in (arrays, errors)))
+        shape = shape_of(quantity, self.tree)
+        whole = np.moveaxis(bounds, 0, -1).reshape(-1, *shape)
+        return [whole[:, k] for k in range(parts(quantity))] if parts(quantity) > 1 else [whole]
 
     def run(self, *command: str) -> str:
         try:
@@ -77,14 +99,14 @@ class Program:
         return done.stdout
 
 
-def taken(quantity: str, states: States) -> list[Array]:
-    """Those of q, qd and tau that a quantity takes."""
-    return list(states[: len(QUANTITIES[quantity].takes)])
+def taken(quantity: str, states: Sequence[Part]) -> list[Part]:
+    """Those of q, qd, tau or qdd, and dt that a quantity takes."""
+    return list(states[: len(quantity_of(quantity).takes)])
 
 
 def parts(quantity: str) -> int:
     """How many arrays a quantity has."""
-    return len(QUANTITIES[quantity].parts) or 1
+    return len(quantity_of(quantity).parts) or 1
 
 
 class CProgram(Program):
@@ -99,10 +121,23 @@ class CProgram(Program):
             self.compiled(compiler, "none", "#include <math.h>\nint none;")
         except (WrongProgram, OSError) as error:  # of the compiler or the folder, not of the equations
             raise NotRun(f"a C library cannot be made or loaded: {error}") from None
+        self.compiler = compiler
+        self.library = self.of_states("states")
+
+    def of_states(self, name: str, *flags: str) -> ctypes.CDLL:
+        """The functions in loops over states."""
         loops = "\n".join([f'#include "{self.name}.h"', *map(self.loop, self.quantities)])
         # the header before the source: the declarations must be those of the functions
-        header, source = f"{self.name}.h", f"{self.name}.c"
-        self.library = self.compiled(compiler, "states", loops, "-include", header, source)
+        texts = "-include", f"{self.name}.h", f"{self.name}.c"
+        return self.compiled(self.compiler, name, loops, *flags, *texts)
+
+    def faster(self) -> dict[str, ctypes.CDLL]:
+        """The functions compiled for a processor that multiplies and adds at once, as this one does, by the option for it."""
+        cpu = Path("/proc/cpuinfo")
+        if not cpu.is_file() or " fma " not in cpu.read_text(encoding="utf-8"):
+            return {}
+        names = {flag: f"states{flag.replace('=', '_')}" for flag in OF_PROCESSOR}
+        return {flag: self.of_states(name, "-ffp-contract=fast", flag) for flag, name in names.items()}
 
     def compiled(self, compiler: Sequence[str], name: str, text: str, *more: str) -> ctypes.CDLL:
         (self.folder / f"_{name}.c").write_text(f"{text}\n", encoding="utf-8")
@@ -111,22 +146,25 @@ class CProgram(Program):
 
     def loop(self, quantity: str) -> str:
         kind, coordinates = "float" if self.single else "double", self.tree.coordinates
-        sizes = {"q": coordinates.nq, "qd": coordinates.nv, "tau": coordinates.nv}
+        sizes = {"q": coordinates.nq, "qd": coordinates.nv, "tau": coordinates.nv, "dt": 1}
         size = prod(shape_of(quantity, self.tree))
-        given = [f"{x} + {sizes[x]} * i" for x in QUANTITIES[quantity].takes]
+        given = [f"{x} + {sizes[x]} * i" for x in taken(quantity, STATE)]
+        given += self.parameters
         given += [f"out + {size} * i + {size // parts(quantity) * k}" for k in range(parts(quantity))]
-        arguments = ", ".join(f"const {kind} *{x}" for x in STATE)
-        call = f"{self.name}_{quantity}({', '.join(given)});"
-        head = f"void states_{quantity}({arguments}, {kind} *out, long n)"
+        arguments = ", ".join(f"const {kind} *{x}" for x in (*STATE, *self.parameters))
+        call = f"{self.name}_{identifier(quantity)}({', '.join(given)});"
+        head = f"void states_{identifier(quantity)}({arguments}, {kind} *out, long n)"
         return f"{head} {{ for (long i = 0; i < n; i++) {call} }}"
 
-    def call(self, quantity: str, states: States) -> tuple[Callable[[], None], Array]:
+    def call(
+        self, quantity: str, states: States, library: ctypes.CDLL | None = None
+    ) -> tuple[Callable[[], None], Array]:
         """A call without arguments that evaluates all states, and its output (states, size)."""
         kind = np.float32 if self.single else float
         count = len(states[0])
-        arrays = [np.ascontiguousarray(x, dtype=kind) for x in states]
+        arrays = [np.ascontiguousarray(x, dtype=kind) for x in (*states, *self.parameters.values())]
         arrays.append(np.empty((count, prod(shape_of(quantity, self.tree))), dtype=kind))
-        function = self.library[f"states_{quantity}"]
+        function = (library or self.library)[f"states_{identifier(quantity)}"]
 
         def call() -> None:
             function(*(ctypes.c_void_p(x.ctypes.data) for x in arrays), ctypes.c_long(count))
@@ -137,7 +175,7 @@ class CProgram(Program):
         call, out = self.call(quantity, states)
         call()
         values = out.astype(float).reshape(len(out), *shape_of(quantity, self.tree))
-        return [values[:, k] for k in range(parts(quantity))] if QUANTITIES[quantity].parts else [values]
+        return [values[:, k] for k in range(parts(quantity))] if quantity_of(quantity).parts else [values]
 
 
 class PythonProgram(Program):
@@ -147,8 +185,49 @@ class PythonProgram(Program):
         self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
 
     def values(self, quantity: str, states: States) -> list[Array]:
-        values = self.functions[quantity](*taken(quantity, states))
-        return list(values) if QUANTITIES[quantity].parts else [values]
+        values = self.functions[identifier(quantity)](*taken(quantity, states), *self.parameters.values())
+        return list(values) if quantity_of(quantity).parts else [values]
+
+
+class CasadiProgram(Program):
+    """Functions of CasADi, called with numbers, state after state."""
+
+    def __post_init__(self) -> None:
+        with needed("casadi"):
+            self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
+
+    def values(self, quantity: str, states: States) -> list[Array]:
+        function, shape = (
+            self.functions[identifier(quantity)],
+            shape_of(quantity, self.tree)[parts(quantity) > 1 :],
+        )
+        rows = [function.call([*state, *self.parameters.values()]) for state in zip(*taken(quantity, states))]
+        return [np.array([part.full().reshape(shape) for part in results]) for results in zip(*rows)]
+
+
+class JaxProgram(Program):
+    """Functions of JAX, jitted, with 64 bits, called with all states at once."""
+
+    def __post_init__(self) -> None:
+        with needed("jax"):
+            self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
+
+    def values(self, quantity: str, states: States) -> list[Array]:
+        import jax
+
+        with jax.enable_x64(True):
+            arguments = [*taken(quantity, states), *self.parameters.values()]
+            values = jax.jit(self.functions[identifier(quantity)])(*arguments)
+        return list(map(np.asarray, values if quantity_of(quantity).parts else [values]))
+
+
+@contextmanager
+def needed(package: str) -> Iterator[None]:
+    """NotRun where a package is not installed."""
+    try:
+        yield
+    except ImportError as error:
+        raise NotRun(f"{package} cannot be imported: {error}") from None
 
 
 class SymbolicProgram(Program):
@@ -181,12 +260,13 @@ class MatlabProgram(Program):
         self.octave = found[0]
 
     def values(self, quantity: str, states: States) -> list[Array]:
-        takes, results, lines = QUANTITIES[quantity].takes, [f"r{k}" for k in range(parts(quantity))], ["1;"]
+        takes, results, lines = quantity_of(quantity).takes, [f"r{k}" for k in range(parts(quantity))], ["1;"]
         for x, values in zip(takes, states):
             np.ascontiguousarray(values).tofile(self.folder / f"{x}.bin")
             read = f"fread(f, [{values.shape[1]}, Inf], 'double')"
             lines.append(f"f = fopen('{x}.bin'); {x} = {read}; fclose(f);")
-        lines.append(f"[{', '.join(results)}] = {self.name}('{quantity}', {', '.join(takes)});")
+        given = [*takes, *(f"[{'; '.join(map(repr, x.tolist()))}]" for x in self.parameters.values())]
+        lines.append(f"[{', '.join(results)}] = {self.name}('{identifier(quantity)}', {', '.join(given)});")
         lines += [f"f = fopen('{r}.bin', 'w'); fwrite(f, {r}, 'double'); fclose(f);" for r in results]
         (self.folder / "_states.m").write_text("\n".join(lines) + "\n", encoding="utf-8")
         self.run(self.octave, "--norc", "--quiet", "_states.m")
@@ -195,4 +275,7 @@ class MatlabProgram(Program):
         return [np.moveaxis(array, -1, 0) for array in arrays]
 
 
-PROGRAMS = {"c": CProgram, "python": PythonProgram, "matlab": MatlabProgram, "latex": SymbolicProgram}
+PROGRAMS: dict[str, type[Program]] = {
+    "c": CProgram, "python": PythonProgram, "matlab": MatlabProgram, "casadi": CasadiProgram, "jax": JaxProgram,
+    "latex": SymbolicProgram,
+}  # fmt: skip

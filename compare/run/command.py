@@ -35,7 +35,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     """Compare the models and write the report; the exit status. Refused: that is not possible."""
     started, terminal, is_alone = time.perf_counter(), Terminal(), options.experiment != "all"
     try:
-        compared = compared_with(options.reference, options.mjcf, options.joints)
+        compared = compared_with(options.reference, options.mjcf, options.joints, floating=options.floating)
         if options.scenes:
             scenes = read_scenes(options.scenes, compared.robot)
             compared = compared._replace(robot=compared.robot.with_scenes(scenes))

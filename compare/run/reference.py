@@ -109,15 +109,16 @@ class Compared(NamedTuple):
 
 
 def compared_with(
-    reference: Text, path: Text, joints: Text = None, shown: Text = None, solution: Text = None
-) -> Compared:
+    reference: Text, path: Text, joints: Text = None, shown: Text = None, solution: Text = None,
+    floating: bool = False,
+) -> Compared:  # fmt: skip
     """A file (None: the arm's) and a reference (None: the arm, if the file has exactly its hinges, else the compiled model).
 
     joints: of own equations, separated by commas, see joint_map; shown: the name of the file, if not its path; solution: the
-    path of the solution, if not `reference`. ModelError, in one line, for a file that cannot be compared, JointsDiffer for
-    different joints, OwnFileError for equations that cannot be used.
+    path of the solution, if not `reference`; floating: the base of a URDF has a free joint. ModelError, in one line, for a
+    file that cannot be compared, JointsDiffer for different joints, OwnFileError for equations that cannot be used.
     """
-    source, shown = Source(Path(path or ARM.mjcf)), in_one_line(shown or path or "mjcf/arm.xml")
+    source, shown = Source(Path(path or ARM.mjcf), floating), in_one_line(shown or path or "mjcf/arm.xml")
     if reference == "arm" or (reference is None and (path is None or has_hinges(source, ARM.joints))):
         return with_arm(source, path, shown)
     reading = read(source)

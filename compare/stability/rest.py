@@ -7,6 +7,7 @@ whose time constant is below two steps (refsafe), and on the integrator.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -23,7 +24,7 @@ REACH = 0.05  # rad or m: its longest step
 UNHELD = 1e-6  # of the largest slope of a force: none
 # of the largest singular value: softer directions are moved only if the stiffer ones do not help
 DEPENDENT = 1e-4, 1e-6, 1e-9
-RELAXED_STEP = 1e-3  # s, the longest step of a relaxed run
+RELAXED_STEPS = 1e-3, 5e-4  # s, the longest step of a relaxed run, and of a file with a shorter one
 RELAXED = (4.0, 10.0), (3.0, 1.0), (2.0, 0.0)  # s, 1/s: how long its parts last, how fast its speeds decay
 RELAXED_STILL = 1e-6  # rad/s or m/s
 WILD = 100.0  # rad/s or m/s: a relaxed run that is faster has diverged
@@ -69,13 +70,17 @@ class Rest:
 
 
 def relaxed(model: mujoco.MjModel, state: np.ndarray) -> np.ndarray:
-    """Where a model sinks to from a state if its motion is damped much, and then less: the last part has the true creep."""
-    dt = min(RELAXED_STEP, model.opt.timestep)
-    for integrator in RELAXING:
+    """Where a model sinks to from a state if its motion is damped much, and then less: the last part has the true creep.
+
+    Of a file with a short step by longer ones, if they bear it.
+    """
+    longest, shortest = RELAXED_STEPS
+    own = min(longest, model.opt.timestep)
+    for integrator, dt in product(RELAXING, dict.fromkeys((max(own, shortest), own))):
         step, end = Step(model, dt, integrator), state
         for seconds, rate in RELAXED:
             end = step.relaxed(end, seconds, rate, RELAXED_STILL)
-            if not is_wild(step, end) and is_still(step, end):
+            if is_still(step, end):
                 return end
         if not is_wild(step, end):
             return end

@@ -7,8 +7,10 @@ import pytest
 
 from compare.core.finding import Finding
 from compare.core.text import say
+from compare.engines.mujoco import read
 from compare.engines.mujoco.differences import of_inverse, of_steps, of_transition
 from compare.experiments.derivatives import subjects, ways
+from compare.experiments.derivatives.contacts import contact_rows
 from compare.experiments.derivatives.tables import HardRow
 from compare.robots.arm import ARM
 
@@ -93,3 +95,24 @@ def test_where_differences_lose_digits_is_said(bent):
     assert "the same eps serves" in said[1] and "not finite" in said[2]
     stiff = subjects.stiff(bent, DT)
     assert min(stiff.tree.stiffness) > 1e3 * DT and stiff.q.shape == (1, 3)
+
+
+FEET = "".join(
+    f'<geom name="foot{k}" type="sphere" size="0.02" pos="{x} {y} 0"/>'
+    for k, (x, y) in enumerate([(0.1, 0.1), (0.1, -0.1), (-0.1, 0.1), (-0.1, -0.1)])
+)
+TABLE = f"""<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbody>
+<geom name="floor" type="plane" size="1 1 1"/><body name="table" pos="0 0 0.02"><freejoint/>
+<inertial pos="0.02 0.03 0.05" mass="1" diaginertia="0.01 0.02 0.025"/>{FEET}
+</body></worldbody></mujoco>"""
+
+
+def test_contacts_that_open_within_eps_are_named():
+    """A table whose feet sink a fraction of a millimetre into the floor."""
+    rows = contact_rows(read(TABLE))
+    fine, coarse = (next(row for row in rows if row.eps == eps) for eps in (1e-7, 1e-2))
+    assert fine.contacts == 4 and fine.changed == "" and fine.difference < 1e-3
+    assert "floor and foot0" in coarse.changed and not coarse.difference < 10 * fine.difference
+    said = say(Finding("derivatives", "contacts", {"rows": rows}))
+    assert "open or close (floor and foot" in said and "qpos0, where 4 pairs of geoms touch" in said
+    assert contact_rows(read(TABLE.replace('type="plane"', 'type="plane" contype="0" conaffinity="0"'))) == []

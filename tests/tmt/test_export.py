@@ -11,10 +11,11 @@ import pytest
 from trees import random_states, random_tree, tree_of_kinds
 
 import tmt
-from tmt.compiled import straight
+from tmt.compiled import forms, straight
 from tmt.derivation.quantities import PLAIN, QUANTITIES
 from tmt.exact.many import Pairs, exact_of_many
 from tmt.exact.values import FIELDS, exact
+from tmt.export import c
 from tmt.export.statements import Syntax, Writer
 
 HAS_C = bool(shutil.which("gcc"))
@@ -71,9 +72,10 @@ def test_brackets_keep_the_order_of_operations():
     traced, values = straight.trace("f", (4,), function), [1.3, -0.7, 2.1, 0.9]
     for number in (repr, lambda x: f"({x!r})"):
         syntax, names = Syntax("", "{name} = {value}", "", number=number), dict(zip("abcd", values))
-        writer = Writer(traced, list("abcd"), syntax)
-        exec("\n".join(writer.assignments), {}, names)
-        assert np.allclose([eval(text, {}, names) for text in writer.results], function(values), rtol=1e-14)
+        results = [f"out[{k}] = {{value}}" for k in range(len(traced.outputs))]
+        names["out"] = [None] * len(results)
+        exec("\n".join(line.text for line in Writer(traced, "abcd", results, syntax).lines), {}, names)
+        assert np.allclose(names["out"], function(values), rtol=1e-14)
 
 
 def test_the_header_has_the_sizes():
@@ -144,3 +146,84 @@ def test_the_distance_from_exact_values_has_all_their_digits():
     assert pairs.distance(np.full((2, 2), near))[0].tolist() == [2.0**-52 - 1e-20, 2.0**-52 + 2e-20]
     assert pairs.part(1).distance(pairs.high[:, 1]).tolist() == [2e-20, 4e-20] and pairs.part(None) is pairs
     assert np.isnan(pairs.distance(np.full((2, 2), np.nan))).all()
+
+
+def test_a_long_function_in_c_is_cut_into_parts_with_the_same_values(tmp_path, monkeypatch):
+    """Values that parts hand on stand in an array whose places are used again."""
+    tree, name = TREES["many"], "acceleration"
+    states = [np.ascontiguousarray(x[0]) for x in states_of(tree)]
+    results = []
+    for longest in (10_000, 30):
+        monkeypatch.setattr(c, "LONGEST", longest)
+        text = tmt.equations(tree, "c", [name])
+        (tmp_path / f"{longest}.c").write_text(text)
+        compile_in(tmp_path, f"-O1 -fPIC -shared {longest}.c -o {longest}.so -lm")
+        out = np.empty(len(tree.axis))
+        ctypes.CDLL(str(tmp_path / f"{longest}.so"))[f"robot_{name}"](
+            *(ctypes.c_void_p(x.ctypes.data) for x in (*states, out))
+        )
+        results.append(out)
+    assert "static void robot_acceleration_2(" in text and np.array_equal(*results)
+    assert int(re.search(r"double w\[(\d+)\]", text)[1]) < text.count(";") / 5
+
+
+@pytest.mark.parametrize("tree", [tmt.ARM, TREES["kinds"]], ids=["arm", "kinds"])
+def test_parameters_are_those_of_the_tree_that_has_these_numbers(tree, rng):
+    """Gravity, a body in a turned frame, and a payload, which is one more body."""
+    body, q, qd, tau = tree.body_names[-1], *states_of(tree)
+    axes, origin = np.linalg.qr(rng.normal(size=(3, 3)))[0], rng.normal(size=3)
+    axes[:, 0] *= np.linalg.det(axes)
+    sites = {
+        "site_names": (body,),
+        "site_joint": (tree.body_joint[-1],),
+        "site_offset": (origin,),
+        "site_turn": (axes,),
+    }
+    tree = replace(tree, **sites)
+    tensors = [np.trace(S) * np.eye(3) - S for S in (root @ root.T for root in rng.normal(size=(2, 3, 3)))]
+    six = [[I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]] for I in tensors]
+    masses, coms, gravity = rng.uniform(1, 2, (2, 1)), rng.normal(size=(2, 3)), rng.normal(size=3)
+    placed = [origin + axes @ com for com in coms]
+    turned = [axes @ I @ axes.T for I in tensors]
+    turned = [(I + I.T) / 2 for I in turned]
+    other = replace(
+        tree, gravity=gravity, mass=(*tree.mass[:-1], *masses[:, 0]), com=(*tree.com[:-1], *placed),
+        inertia=(*tree.inertia[:-1], *turned), body_names=(*tree.body_names, "load"),
+        body_joint=(*tree.body_joint, tree.body_joint[-1]),
+    )  # fmt: skip
+    found, names = {}, {"mass_matrix": (q,), "bias": (q, qd), "acceleration": (q, qd, tau), "energy": (q, qd)}
+    words = ["gravity", f"{body}.inertia", f"{body}.mass", f"{body}.com", "payload", body]
+    exec(tmt.equations(tree, "python", list(names), parameters=words), found)
+    values = gravity, six[0], masses[0], coms[0], masses[1], coms[1], six[1]
+    for name, states in names.items():
+        assert np.allclose(
+            found[name](*states, *values), getattr(tmt, name)(*states, model=other), rtol=1e-9, atol=1e-11
+        )
+
+
+@pytest.mark.parametrize(("words", "quantity", "why"), [
+    (["payload"], "bias", "'payload' is no parameter"), (["hand.mas"], "bias", "'hand.mas'"),
+    (["payload", "forearm"], "jacobians", "a payload has none"),
+])  # fmt: skip
+def test_what_is_no_parameter(words, quantity, why):
+    with pytest.raises(ValueError, match=why):
+        tmt.equations(tmt.ARM, "c", [quantity], parameters=words)
+
+
+def test_each_quantity_has_the_fewest_operations_of_the_forms():
+    """A tree of short branches and long paths: Mbar in the frames of the joints, or in the axes of the world."""
+    kinds = set()
+    for tree in (random_tree(np.random.default_rng(1), bodies=24), TREES["kinds"], tmt.ARM):
+        n = len(tree.axis)
+
+        def length(form, part, tree=tree, n=n):
+            def function(q, qd):
+                return forms.flat(form.terms(tree, q, qd)[part])
+
+            return straight.trace("f", (tree.coordinates.nq, n), function).operations
+
+        for part, name in enumerate(("mass_matrix", "bias")):
+            counts = [length(form, part) for form in forms.FORMS]
+            assert forms.quantity(tree, name).operations <= min(counts)
+            kinds.add((name, int(np.argmin(counts)) == 0))
+    assert ("bias", True) in kinds

@@ -1,10 +1,11 @@
-"""Which form of the dynamics is traced for a tree: of the same sums in another order, that with fewer operations.
+"""Which form of the dynamics is traced for a tree: of the same sums in another order, that with the fewest operations.
 
-Up to some ten joints in a row, and for trees of short branches, those are the sums in the frames of the joints (composite.py);
-beyond, those in the axes of the world (articulated.py), whose number grows with the number of joints.
+It is counted for each quantity. Up to some ten joints in a row, and for trees of short branches, those are the sums in the frames
+of the joints (composite.py); the bias is nearly always shorter there. Mbar of long paths, and the accelerations of large trees,
+are shorter in the axes of the world (articulated.py).
 """
 
-from functools import lru_cache
+from collections.abc import Callable, Iterable, Sequence
 
 from tmt.derivation import articulated, composite, linearized
 from tmt.derivation.dual import seeded
@@ -12,6 +13,7 @@ from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms, reduced_force
 from tmt.derivation.quantities import Form, State, Step, argument_of, quantity_of
 from tmt.derivation.scalar import Rows, Scalar, Values
+from tmt.derivation.vectors import Scalars
 from tmt.methods import Linearized, method_named, one_step
 from tmt.methods.derivatives import is_straight
 from tmt.methods.dynamics import Dynamics, Held, acts_at_single_joints, minus, plus
@@ -21,34 +23,45 @@ from tmt.model.tree import Tree
 from .straight import Traced, trace
 from .trace import Expression
 
-# speeds: up to FEW the composite form alone is traced, from MANY on the articulated one alone
-FEW, MANY = 5, 20
+MANY = 20  # speeds from which derivatives are not traced by dual numbers
 DENSE = 10  # speeds from which solving linear systems and the derivatives of the bias are loops and no longer straight lines
+
+
+def mixed(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
+    """Mbar in the axes of the world, h in the frames of the joints."""
+    M, _ = articulated.mass_matrix_and_bias(tree, q, [0.0] * len(qd))
+    return M, composite.mass_matrix_and_bias(tree, q, qd)[1]
+
+
 FORMS = (
     Form(composite.mass_matrix_and_bias, composite.generalized_force),
     Form(articulated.mass_matrix_and_bias, articulated.generalized_force, linearized.rates),
+    Form(mixed, composite.generalized_force, linearized.rates),
 )
+LONG_FORMS = (*FORMS[1:], FORMS[0]._replace(rates=linearized.rates))  # of derivatives
+
+
+def shortest(candidates: Iterable[Traced]) -> Traced:
+    return min(candidates, key=lambda traced: traced.length)
 
 
 class Traceable(Dynamics):
-    """Mbar and h of a tree for its traced functions, in the form with fewer operations.
+    """Mbar and h of a form, for traced functions.
 
     Of more than a few speeds the derivatives of h by the speeds and the solution of linear systems are functions that are called.
     by_bodies: accelerations are those of articulated bodies, where all that a method takes implicitly acts at single joints: then
     it counts as armature.
     """
 
-    def __init__(self, tree: AnyTree, by_bodies: bool = False):
-        form = articulated if is_shorter_articulated(tree) else composite
-        super().__init__(form.mass_matrix_and_bias)
-        self.n, self.by_bodies, self.has_used_bodies = len(tree.axis), by_bodies, False
+    def __init__(self, tree: AnyTree, terms: Terms, by_bodies: bool = False):
+        super().__init__(terms)
+        self.n, self.by_bodies = len(tree.axis), by_bodies
 
     def acceleration(
         self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
     ) -> Values:
         if not self.by_bodies or (implicit and not acts_at_single_joints(implicit)):
             return super().acceleration(tree, q, qd, tau, implicit)
-        self.has_used_bodies = True
         force, armature = reduced_force(tree, [0.0] * self.n, q, qd, tau), list(tree.armature)
         if implicit:
             force = minus(force, implicit.pull)
@@ -68,39 +81,45 @@ class Traceable(Dynamics):
         return tape.call("solution", [*(x for row in matrix for x in row), *right], self.n)
 
 
-@lru_cache(maxsize=64)
-def is_shorter_articulated(tree: Tree) -> bool:
-    """Whether Mbar and h have fewer operations in the articulated form."""
-    n = len(tree.axis)
-    if n <= FEW or n >= MANY:
-        return n >= MANY
-
-    def length(terms: Terms) -> int:
-        return len(trace("terms", (tree.coordinates.nq, n), lambda q, qd: flat(terms(tree, q, qd))).nodes)
-
-    return length(articulated.mass_matrix_and_bias) < length(composite.mass_matrix_and_bias)
+def all_dynamics(tree: AnyTree) -> list[Traceable]:
+    """The ways to the accelerations of a tree: by Mbar and h in each form, and by articulated bodies."""
+    by_terms = [Traceable(tree, form.terms) for form in FORMS]
+    return [*by_terms, Traceable(tree, articulated.mass_matrix_and_bias, by_bodies=True)]
 
 
-def quantity(tree: Tree, name: str) -> Traced:
-    """A quantity, by its full name, as a function of (q, qd, tau or qdd, dt), flat."""
-    if name == "acceleration":
-        return slope(tree, Method(), "quantity", with_step=False)
-    if not (quantity_of(name).is_long or name == "inverse_dynamics"):
-        return in_form(tree, name, FORMS[is_shorter_articulated(tree)])
-    forms = FORMS[len(tree.axis) >= MANY :]
-    return min((in_form(tree, name, form) for form in forms), key=lambda traced: traced.length)
+TreeOf = Callable[[Sequence[Values]], AnyTree]
 
 
-def in_form(tree: Tree, name: str, form: Form) -> Traced:
-    """A quantity whose sums are in the order of a form."""
+def quantity(tree: Tree, name: str, more: Sequence[int] = (), tree_of: TreeOf | None = None) -> Traced:
+    """A quantity, by its full name, as a function of (q, qd, tau or qdd, dt), flat.
+
+    more: the sizes of further arrays, from which tree_of makes the tree.
+    """
     row, (nq, n) = quantity_of(name), (tree.coordinates.nq, len(tree.axis))
-    step = straight_step(tree, argument_of(name), form) if row.argument == "method" else None
+    sizes = nq, n, n, 1, *more
 
-    def function(*arrays: Values) -> Values:
-        state = State(tree, dict(zip(row.takes, arrays)), form, argument_of(name), step)
-        return flat(row.of(state))
+    def model_of(arrays: Sequence[Values]) -> AnyTree:
+        return tree_of(arrays[4:]) if tree_of else tree
 
-    return trace("quantity", (nq, n, n, 1), function)
+    def in_form(form: Form) -> Traced:
+        def function(*arrays: Values) -> Values:
+            model, argument = model_of(arrays), argument_of(name)
+            step = straight_step(model, argument, form) if row.argument == "method" else None
+            return flat(row.of(State(model, dict(zip(row.takes, arrays)), form, argument, step)))
+
+        return trace("quantity", sizes, function)
+
+    def by_dynamics(dynamics: Traceable) -> Traced:
+        def function(*arrays: Values) -> Values:
+            q, qd, tau, *_ = arrays
+            return dynamics.acceleration(model_of(arrays), q, qd, tau)
+
+        return trace("quantity", sizes, function)
+
+    if name == "acceleration":
+        return shortest(map(by_dynamics, all_dynamics(tree)))
+    by_dual_numbers = FORMS[: n < MANY]
+    return shortest(map(in_form, (*by_dual_numbers, *LONG_FORMS) if row.is_long else FORMS))
 
 
 def straight_step(tree: AnyTree, name: str, form: Form) -> Step:
@@ -117,42 +136,44 @@ def flat(nested: Scalar) -> Values:
     return [x for part in nested for x in flat(part)] if isinstance(nested, (list, tuple)) else [nested]
 
 
-def slope(tree: Tree, stepping: Method, name: str = "slope", with_step: bool = True) -> Traced:
-    """The slope of a method as a function of (q, qd, tau) and, with_step, dt."""
+def slope(tree: Tree, stepping: Method) -> Traced:
+    """The slope of a method as a function of (q, qd, tau, dt)."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
     def traced(dynamics: Traceable) -> Traced:
-        def function(q: Values, qd: Values, tau: Values, dt: Values = [0.0]) -> Values:  # noqa: B006
+        def function(q: Values, qd: Values, tau: Values, dt: Values) -> Values:
             return stepping.slope(tree, q, qd, tau, dt[0], dynamics)
 
-        return trace(name, (nq, n, n, *[1] * with_step), function)
+        return trace("slope", (nq, n, n, 1), function)
 
-    by_bodies = Traceable(tree, by_bodies=n > FEW)
-    first = traced(by_bodies)
-    if n >= MANY or not by_bodies.has_used_bodies:
-        return first
-    return min(traced(Traceable(tree)), first, key=lambda function: function.length)
+    return shortest(map(traced, all_dynamics(tree)))
 
 
 def directional(tree: Tree, stepping: Method) -> Traced:
     """The slope and its derivative: (q, qd, tau, dt, dq, dqd) -> (qdd, dqdd); dq (nq) is a change of the numbers in q."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
-    def both(q: Values, qd: Values, tau: Values, dt: Values, dq: Values, dqd: Values) -> Values:
-        x = seeded([*q, *qd], [*dq, *dqd])
-        slopes = stepping.slope(tree, x[:nq], x[nq:], tau, dt[0], Traceable(tree, by_bodies=n > FEW))
-        parts = [x[0].parts(value) for value in slopes]
-        return [*(value for value, _ in parts), *(slope for _, slope in parts)]
+    def traced(dynamics: Traceable) -> Traced:
+        def both(q: Values, qd: Values, tau: Values, dt: Values, dq: Values, dqd: Values) -> Values:
+            x = seeded([*q, *qd], [*dq, *dqd])
+            slopes = stepping.slope(tree, x[:nq], x[nq:], tau, dt[0], dynamics)
+            parts = [x[0].parts(value) for value in slopes]
+            return [*(value for value, _ in parts), *(slope for _, slope in parts)]
 
-    return trace("directional", (nq, n, n, 1, nq, n), both)
+        return trace("directional", (nq, n, n, 1, nq, n), both)
+
+    return shortest(map(traced, all_dynamics(tree)))
 
 
 def bias_rate(tree: Tree) -> Traced:
     """The derivative of h along a change of the speeds: (q, qd, dqd) -> dh."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
-    def function(q: Values, qd: Values, dqd: Values) -> Values:
-        rates = seeded(qd, dqd)
-        return [rates[0].parts(x)[1] for x in articulated.bias(tree, q, rates)]
+    def traced(form: Form) -> Traced:
+        def function(q: Values, qd: Values, dqd: Values) -> Values:
+            rates = seeded(qd, dqd)
+            return [rates[0].parts(x)[1] for x in form.terms(tree, q, rates)[1]]
 
-    return trace("bias_rate", (nq, n, n), function)
+        return trace("bias_rate", (nq, n, n), function)
+
+    return shortest(map(traced, FORMS[:2]))

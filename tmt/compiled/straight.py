@@ -36,7 +36,7 @@ class Traced:
     def length(self) -> float:
         """How many operations it has, those of a linear system that it has solved among them."""
         calls = [self.tape.operands(i) for i in self.nodes if self.tape.nodes[i][0] == "call"]
-        return len(self.nodes) + sum((1 + len(arguments)) ** 1.5 / 3 for arguments in calls)
+        return self.operations + sum((1 + len(arguments)) ** 1.5 / 3 for arguments in calls)
 
     @property
     def operations(self) -> int:

@@ -15,6 +15,7 @@ subtree. These are the sums of the assignment's part e in another order.
 from collections.abc import Callable, Hashable
 from fractions import Fraction
 from functools import lru_cache
+from numbers import Rational
 from typing import NamedTuple
 
 import mpmath
@@ -79,6 +80,8 @@ class Distribution(NamedTuple):
         """The distribution in another type of number, each rounded once; zeros stay plain."""
 
         def one(x: Scalar) -> Scalar:
+            if not isinstance(x, Rational):  # a parameter
+                return x
             x = Fraction(x)
             if not x:
                 return 0.0
@@ -91,10 +94,12 @@ class Distribution(NamedTuple):
 NOTHING = Distribution(0, Vector(0, 0, 0), Matrix([[0] * 3] * 3))
 
 
-def fraction(x: Scalar) -> Fraction:
-    """A double, or a number of mpmath's, exactly."""
-    if not isinstance(x, mpmath.mpf):
+def fraction(x: Scalar) -> Scalar:
+    """A double, or a number of mpmath's, exactly; a parameter, which has no value yet, as it is."""
+    if isinstance(x, (float, Rational)):
         return Fraction(x)
+    if not isinstance(x, mpmath.mpf):
+        return x
     sign, digits, power, _ = x._mpf_
     return (-1) ** sign * int(digits) * Fraction(2) ** int(power)
 

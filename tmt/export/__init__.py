@@ -4,20 +4,26 @@ import hashlib
 import keyword
 import re
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from textwrap import wrap
 from typing import Any
 
 from tmt.compiled import forms
+from tmt.compiled.straight import Traced
+from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.quantities import QUANTITIES, is_quantity, quantity_of, shape_of, what_is_known
+from tmt.derivation.scalar import Values
 from tmt.model.arguments import checked_model
 from tmt.model.tree import Tree, stated
 from tmt.model.values import shown
 
-from . import c, matlab, python
+from . import c, casadi, jax, matlab, python
+from .parameters import OF_BODIES, Parameters
 from .statements import Function, Program
 
 LANGUAGES: dict[str, Callable[[Program], str]] = {
     "c": c.source, "c header": c.header, "python": python.source, "matlab": matlab.source,
+    "casadi": casadi.source, "jax": jax.source,
 }  # fmt: skip
 SYMBOLIC = "latex", "html", "sympy"
 OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
@@ -36,14 +42,15 @@ permute reshape assert error math numpy sympy"""
 CONVENTIONS = """\
 M(q) qdd + h(q, qd) = tau - D qd - k (q - rest) - P q - S qd, by the TMT method; Mbar is M, with armature.
 h: bias, MuJoCo's qfrc_bias: Coriolis, centrifugal and gravity terms. D: damping, k and rest: springs of the joints,
-P and S: gains of a linear controller. All numbers of the model are in the functions.
+P and S: gains of a linear controller. Numbers of the model that are no arguments are in the functions.
 T_b, B_b: Jacobians of the centre of mass of body b, inertial frame, and of its angular velocity, body axes.
 SI units, angles in rad. Shapes are those of one state; ... stands for any batch, where there is one."""
 
 
 def text(
-    model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str]
-) -> str:
+    model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str],
+    words: Sequence[str] = (), limit: float = 60.0,
+) -> str:  # fmt: skip
     checked_model(model)
     known = [*LANGUAGES, *SYMBOLIC]
     if not isinstance(language, str) or language not in known:
@@ -58,21 +65,38 @@ def text(
     if not isinstance(single, bool) or (single and language not in ("c", "c header")):
         expected = f"single precision is True or False, and in C only (not in {language})"
         raise ValueError(f"single is {shown(single)}; {expected}")
+    parameters = checked_parameters(model, language, chosen, words)
     lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
     if language in SYMBOLIC:
-        return symbolic_text(model, language, chosen, lines)
-    functions = [function_of(model, quantity) for quantity in dict.fromkeys(chosen)]
+        return symbolic_text(model, language, chosen, lines, limit)
+    if parameters.values:
+        lines += ["Parameters and their values in the model:"]
+        lines += [f"  {x}: {parameters.meanings[x]}: {list(value)}" for x, value in parameters.values.items()]
+    functions = [function_of(model, quantity, parameters) for quantity in dict.fromkeys(chosen)]
     return LANGUAGES[language](Program(name, lines, functions, single))
 
 
-def symbolic_text(model: Tree, language: str, quantities: tuple[str, ...], head: Sequence[str]) -> str:
+def checked_parameters(
+    model: Tree, language: str, quantities: Sequence[str], words: Sequence[str]
+) -> Parameters:
+    parameters = Parameters(model, words)
+    if words and language in SYMBOLIC:
+        raise ValueError(f"in {language} all numbers are symbols; parameters are of other languages")
+    if parameters.has_payload and (bodies := set(quantities).intersection(OF_BODIES)):
+        raise ValueError(f"{min(bodies)} has a row for each body; a payload has none")
+    return parameters
+
+
+def symbolic_text(
+    model: Tree, language: str, quantities: tuple[str, ...], head: Sequence[str], limit: float
+) -> str:
     try:
         from . import latex, page, symbols
     except ImportError:
         raise ValueError("symbolic equations need SymPy: pip install sympy") from None
     writers = {"latex": latex.latex, "html": page.page, "sympy": symbols.python_source}
-    return writers[language](symbols.symbolic(model, quantities), head)
+    return writers[language](symbols.symbolic(model, quantities, limit), head)
 
 
 def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ...]:
@@ -108,13 +132,32 @@ def places(part: slice) -> str:
     return f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}"
 
 
-def function_of(model: Tree, name: str) -> Function:
+def function_of(model: Tree, name: str, parameters: Parameters | None = None) -> Function:
     import tmt  # for the docstring
 
+    parameters = parameters or Parameters(model, ())
     quantity, shape, nv = quantity_of(name), shape_of(name, model), model.coordinates.nv
     third = "qdd" if "qdd" in quantity.takes else "tau"
     sizes = {"q": model.coordinates.nq, "qd": nv, third: nv, "dt": 1}
+    sizes |= {x: len(value) for x, value in parameters.values.items()}
     title = quantity.title or getattr(tmt, name.partition(":")[0]).__doc__.splitlines()[0]
     results, shape = (quantity.parts, shape[1:]) if quantity.parts else (("out",), shape)
-    identifier = re.sub(r"\W", "_", name, flags=re.ASCII)
-    return Function(identifier, title, quantity.takes, sizes, shape, results, forms.quantity(model, name))
+    takes, operations = (*quantity.takes, *parameters.values), traced(model, name, parameters)
+    return Function(identifier(name), title, takes, sizes, shape, results, operations)
+
+
+def identifier(name: str) -> str:
+    """The name of the function of a quantity."""
+    return re.sub(r"\W", "_", name, flags=re.ASCII)
+
+
+@lru_cache(maxsize=16)
+def traced(model: Tree, name: str, parameters: Parameters | None) -> Traced:
+    """A quantity as a function of its arrays and of the parameters."""
+    if parameters is None or not parameters.values:
+        return forms.quantity(model, name)
+
+    def tree_of(arrays: Sequence[Values]) -> AnyTree:
+        return parameters.applied(model, dict(zip(parameters.values, arrays)))
+
+    return forms.quantity(model, name, [len(value) for value in parameters.values.values()], tree_of)

@@ -4,14 +4,19 @@ import math
 import re
 from collections.abc import Sequence
 
-from .statements import Function, Program, Syntax, statements
+from .statements import Function, Line, Program, Syntax, statements
 
+# assignments of one function, up to some 3,000 operations: the time of a compiler grows with the square of their number
+LONGEST = 1_000
+NAME = re.compile(r"\b[xsc]\d+\b")  # of a value
+NOT_INLINED = "#ifdef __GNUC__\n__attribute__((noinline))\n#endif"
 LEAST = 1.2e-38  # of floats: what keeps a root from zero must not become zero
 
 
 def source(program: Program) -> str:
     parts = [comment(program.head), "#include <math.h>"]
-    parts += [f"{declared(program, f)}\n{{\n{body(f, program.single)}\n}}" for f in program.functions]
+    for function in program.functions:
+        parts += definitions(program, function)
     return "\n\n".join(parts) + "\n"
 
 
@@ -42,25 +47,66 @@ def comment(lines: Sequence[str]) -> str:
 
 def declared(program: Program, function: Function) -> str:
     """What a function returns, and its declaration."""
+    return f"{comment([function.title])}\nvoid {program.name}_{function.name}({arguments(program, function)})"
+
+
+def arguments(program: Program, function: Function) -> str:
     number = kind(program.single)
-    arguments = [f"const {number} {x}[{function.sizes[x]}]" for x in function.takes]
-    arguments += [f"{number} {x}[{function.size}]" for x in function.results]
-    declaration = f"void {program.name}_{function.name}({', '.join(arguments)})"
-    return f"{comment([function.title])}\n{declaration}"
+    arrays = [f"const {number} {x}[{function.sizes[x]}]" for x in function.takes]
+    return ", ".join([*arrays, *(f"{number} {x}[{function.size}]" for x in function.results)])
 
 
-def body(function: Function, single: bool) -> str:
-    used = {x for x, _ in function.used}
-    lines = [f"(void){x};" for x in function.takes if x not in used]
+def definitions(program: Program, function: Function) -> list[str]:
+    """A function; before a long one its parts, which hand values on in an array w."""
+    number = kind(program.single)
     syntax = Syntax(
         input="{x}[{k}]",
-        assignment=f"const {kind(single)} {{name}} = {{value}};",
+        assignment=f"const {number} {{name}} = {{value}};",
         result="{x}[{k}] = {value};",
-        function="{}f" if single else "{}",
-        number=float_literal if single else repr,
+        function="{}f" if program.single else "{}",
+        number=float_literal if program.single else repr,
     )
-    assignments, results = statements(function, syntax)
-    return "\n".join(f"    {line}" for line in [*lines, *assignments, *results])
+    lines, arrays = statements(function, syntax), (*function.takes, *function.results)
+    if len(lines) <= LONGEST:
+        return [f"{declared(program, function)}\n{block(arrays, [line.text for line in lines])}"]
+    sections = [lines[k : k + LONGEST] for k in range(0, len(lines), LONGEST)]
+    texts, size = handed_on(sections)
+    handed, name = f"{number} w[{size}]", f"{program.name}_{function.name}"
+    parts = [f"{name}_{k}" for k in range(1, 1 + len(sections))]
+    heads = [f"static void {part}({arguments(program, function)}, {handed})" for part in parts]
+    defined = [f"{NOT_INLINED}\n{head}\n{block((*arrays, 'w'), text)}" for head, text in zip(heads, texts)]
+    calls = [f"{part}({', '.join(arrays)}, w);" for part in parts]
+    return [*defined, f"{declared(program, function)}\n{block((), [f'{handed};', *calls])}"]
+
+
+def block(arrays: Sequence[str], lines: Sequence[str]) -> str:
+    """The body of a function of these arrays."""
+    used = {word for line in lines for word in re.findall(r"\b(\w+)\[", line)}
+    unused = [f"(void){x};" for x in arrays if x not in used]
+    return "\n".join(["{", *(f"    {line}" for line in (*unused, *lines)), "}"])
+
+
+def handed_on(sections: Sequence[Sequence[Line]]) -> tuple[list[list[str]], int]:
+    """The lines of each part of a function, with w[place] for a value of an earlier one; the size of w."""
+    last = {name: k for k, lines in enumerate(sections) for line in lines for name in NAME.findall(line.text)}
+    places: dict[str, str] = {}
+    leaving: list[list[str]] = [[] for _ in sections]
+    free: list[str] = []
+    texts, size = [], 0
+    for k, lines in enumerate(sections):
+        earlier = dict(places)  # a value of this part has its name in it
+        text = []
+        for line in lines:
+            text.append(NAME.sub(lambda name: earlier.get(name[0], name[0]), line.text))  # noqa: B023
+            if line.name and last[line.name] > k:
+                if not free:
+                    free, size = [f"w[{size}]"], size + 1
+                places[line.name] = free.pop()
+                leaving[last[line.name]].append(places[line.name])
+                text.append(f"{places[line.name]} = {line.name};")
+        free += leaving[k]
+        texts.append(text)
+    return texts, size
 
 
 def float_literal(value: float) -> str:

@@ -31,11 +31,9 @@ def source(program: Program) -> str:
 
 def text(function: Function) -> str:
     takes, results, sizes, dimensions = function.takes, function.results, function.sizes, len(function.shape)
-    assignments, values = statements(function, SYNTAX)
     lines = [f"assert(size({x}, 1) == {sizes[x]}, '{x} has {sizes[x]} rows');" for x in takes]
-    lines += assignments
     lines += [f"{result} = zeros({function.size}, size({takes[-1]}, 2));" for result in results]
-    lines += values
+    lines += [line.text for line in statements(function, SYNTAX)]
     if dimensions > 1:  # stored by rows
         shape = ", ".join(map(str, reversed(function.shape)))
         order = ", ".join(map(str, [*range(dimensions, 0, -1), dimensions + 1]))

@@ -11,7 +11,7 @@ from tmt.derivation.scalar import Scalar
 
 from .names import Names
 from .names import number as exact_number
-from .trigonometry import NOISE, Expression, Polynomial, Ring
+from .trigonometry import NOISE, OF_TERM, Expression, Polynomial, Ring
 
 FEW_TERMS, FEW_FACTORED = 40, 6  # of a polynomial of which every form is tried, of one that is factored
 
@@ -69,7 +69,7 @@ class Forms:
         for poly, angles in spaces:
             squared = [pair for pair in self.ring.places if few and has_square(poly, pair[1])]
             for turned in itertools.product([False, True], repeat=len(squared)):
-                self.ring.check_time()
+                self.ring.count(len(poly) * OF_TERM)
                 pairs = [pair[::-1] for pair, turn in zip(squared, turned) if turn]
                 yield from self.expressions(self.ring.reduced(poly, pairs), angles)
         yield self.of_harmonics(harmonics)

@@ -17,8 +17,8 @@ class Function(NamedTuple):
 
     name: str
     title: str  # what it returns, with units
-    takes: tuple[str, ...]  # of "q", "qd", "tau"
-    sizes: dict[str, int]  # of these
+    takes: tuple[str, ...]  # of the arrays in sizes
+    sizes: dict[str, int]  # of each array, in the order of the traced inputs
     shape: tuple[int, ...]  # of a result
     results: tuple[str, ...]  # names of the results
     traced: Traced
@@ -62,23 +62,31 @@ class Syntax:
     over: str = "/"
 
 
-def statements(function: Function, syntax: Syntax) -> tuple[list[str], list[str]]:
-    """The assignments of a function, and those of its results."""
+class Line(NamedTuple):
+    """An assignment; name: of the value, "" for a number of a result."""
+
+    text: str
+    name: str = ""
+
+
+def statements(function: Function, syntax: Syntax) -> list[Line]:
+    """The assignments of a function, those of its results where they are known."""
     inputs = [syntax.input.format(x=x, k=k, n=k + 1) for x, k in function.inputs]
-    writer, results = Writer(function.traced, inputs, syntax), []
-    for number, value in enumerate(writer.results):
-        result, k = divmod(number, function.size)
-        results.append(syntax.result.format(x=function.results[result], k=k, n=k + 1, value=value))
-    return writer.assignments, results
+    places = [divmod(number, function.size) for number in range(len(function.traced.outputs))]
+    results = [syntax.result.format(x=function.results[x], k=k, n=k + 1, value="{value}") for x, k in places]
+    return Writer(function.traced, inputs, results, syntax).lines
 
 
 class Writer:
-    """The assignments of a traced function, and the expressions of its results, from those of its inputs."""
+    """The assignments of a traced function and of its results, formats of their {value}, from its inputs."""
 
-    def __init__(self, traced: Traced, inputs: Sequence[str], syntax: Syntax):
+    def __init__(self, traced: Traced, inputs: Sequence[str], results: Sequence[str], syntax: Syntax):
         self.tape, self.syntax = traced.tape, syntax
-        outputs = [self.tape.lift(x) for x in traced.outputs]
-        self.uses = Counter(x.i for x in outputs)
+        outputs = [self.tape.lift(x).i for x in traced.outputs]
+        self.uses = Counter(outputs)
+        self.results: dict[int, list[str]] = defaultdict(list)  # of a node
+        for i, result in zip(outputs, results):
+            self.results[i].append(result)
         # of a sine and cosine: [(which, node)]
         self.items: dict[int, list[tuple[int, int]]] = defaultdict(list)
         for i in traced.nodes:
@@ -88,29 +96,28 @@ class Writer:
                 self.items[arguments[0]].append((arguments[1], i))
         # the text of each node, and how it is bound
         self.known = {x.i: (name, ATOM) for x, name in zip(traced.inputs, inputs)}
-        self.assignments = list(self.written(traced.nodes))
-        self.results = [self.text(x.i) for x in outputs]
+        self.lines = [line for i in traced.nodes for line in self.written(i)]
 
-    def written(self, order: Sequence[int]) -> Iterator[str]:
-        for i in order:
-            kind, arguments = self.tape.nodes[i]
-            if kind == "number":
-                number = float(arguments[0])
-                self.known[i] = self.syntax.number(number), SUM if number < 0.0 else ATOM
-            elif kind == "sincos":
-                for which, item in self.items[i]:
-                    value = self.call(("sin", "cos")[which], arguments[0])
-                    yield self.assigned(item, f"{'sc'[which]}{i}", value)
-            elif kind not in ("input", "item"):
-                self.known[i] = self.expression(kind, arguments)
-                text, _ = self.known[i]
-                if self.uses[i] > 1 or len(text) > LONGEST:
-                    yield self.assigned(i, f"x{i}", text)
+    def written(self, i: int) -> Iterator[Line]:
+        kind, arguments = self.tape.nodes[i]
+        if kind == "number":
+            number = float(arguments[0])
+            self.known[i] = self.syntax.number(number), SUM if number < 0.0 else ATOM
+        elif kind == "sincos":
+            for which, item in self.items[i]:
+                yield self.assigned(item, f"{'sc'[which]}{i}", self.call(("sin", "cos")[which], arguments[0]))
+        elif kind not in ("input", "item"):
+            self.known[i] = self.expression(kind, arguments)
+            text, _ = self.known[i]
+            if self.uses[i] > 1 or len(text) > LONGEST:
+                yield self.assigned(i, f"x{i}", text)
+        for result in self.results[i]:
+            yield Line(result.format(value=self.text(i)))
 
-    def assigned(self, i: int, name: str, value: str) -> str:
+    def assigned(self, i: int, name: str, value: str) -> Line:
         """The assignment of a node to a name, which stands for it from then on."""
         self.known[i] = name, ATOM
-        return self.syntax.assignment.format(name=name, value=value)
+        return Line(self.syntax.assignment.format(name=name, value=value), name)
 
     def text(self, i: int, least: int = SUM) -> str:
         """The expression of a node, in brackets where it is bound less than `least`."""

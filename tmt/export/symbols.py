@@ -1,7 +1,6 @@
 """Mbar, h and gravity of a Tree as SymPy expressions: the method over polynomials in named parameters."""
 
 import operator
-import time
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -47,33 +46,34 @@ class Symbolic(NamedTuple):
 
 @lru_cache(maxsize=4)  # one for all files
 def symbolic(
-    tree: Tree = ARM, quantities: tuple[str, ...] = QUANTITIES, seconds: float = 60.0, named: bool = True
+    tree: Tree = ARM, quantities: tuple[str, ...] = QUANTITIES, limit: float = 60.0, named: bool = True
 ) -> Symbolic:
     """Mbar, h and the torque that balances gravity of a Tree of hinges and slides, simplified.
 
-    seconds: the time that it may take; parameters that have no names by half of it are numbers. Raises
-    ValueError for a ball, an unknown quantity, and where it takes longer.
+    limit: the work that it may take, s of a processor core of 2026, counted and not measured; where half of it
+    does not do with named parameters, they are numbers. Raises ValueError for a ball, an unknown quantity, and
+    where it takes more.
     """
     if unknown := [name for name in quantities if name not in QUANTITIES]:
         raise ValueError(f"unknown quantity {unknown[0]!r}; known: {', '.join(QUANTITIES)}")
     for name, kind in zip(tree.joint_names, tree.kind):
         if kind == "ball":
             raise ValueError(f"symbolic equations need hinges and slides; joint {name} is a ball")
-    start, note = time.monotonic(), ""
+    note = ""
     if named:
         try:
-            return derived(Names(tree, True), quantities, start + seconds / 2, note)
+            return derived(Names(tree, True), quantities, limit / 2, note)
         except TooLong:
-            note = f"numbers in place of named parameters, which would take more than {seconds / 2:g} s"
+            note = f"numbers in place of named parameters, which would take more work than {limit / 2:g} s"
     try:
-        return derived(Names(tree, False), quantities, start + seconds, note)
+        return derived(Names(tree, False), quantities, limit / 2, note)
     except TooLong:
-        longest = f"take more than {seconds:g} s"
+        longest = f"take more work than {limit:g} s"
         raise ValueError(f"symbolic equations of these {len(tree.kind)} joints {longest}") from None
 
 
-def derived(names: Names, quantities: Sequence[str], deadline: float, note: str) -> Symbolic:
-    """The equations with the parameters that `names` has; TooLong at the deadline."""
+def derived(names: Names, quantities: Sequence[str], limit: float, note: str) -> Symbolic:
+    """The equations with the parameters that `names` has; TooLong beyond the limit."""
     tree = names.source
     places = {i: sympy.Dummy() for i, kind in enumerate(tree.kind) if kind == "slide"}
     hinges = [i for i, kind in enumerate(tree.kind) if kind == "hinge"]
@@ -81,14 +81,14 @@ def derived(names: Names, quantities: Sequence[str], deadline: float, note: str)
     parallel = {hinges.index(i): (hinges.index(j), sign) for i, (j, sign) in parallel_hinges(tree).items()}
     symbols = sorted(names.parameters, key=str)
     angles = [from_reference[i] for i in hinges]
-    ring = Ring([*symbols, *places.values(), *names.qd], len(angles), names.is_exact, deadline)
+    ring = Ring([*symbols, *places.values(), *names.qd], len(angles), names.is_exact, limit)
     forms = Forms(ring, names, angles, parallel)
     variables = [
         ring.scalar(places[i]) if i in places else ring.angle(hinges.index(i)) for i in range(len(tree.kind))
     ]
 
     def expression(scalar: Scalar) -> Expression:
-        ring.check_time()
+        ring.count(0.0)
         poly = ring.without_noise((ring.scalar(0) + scalar).poly, 0 if names.is_exact else NOISE)
         return forms.shortest(poly).xreplace({place: from_reference[i] for i, place in places.items()})
 

@@ -1,6 +1,5 @@
 """Polynomials in sines and cosines as scalars, reduced by sin^2 = 1 - cos^2: equal functions are equal."""
 
-import time
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -14,6 +13,8 @@ from tmt.derivation.vectors import Vector, cos, sin
 PRECISION = 120
 NOISE = 1e-25  # of the largest coefficient of a polynomial
 LARGEST_PRODUCT = 3_000_000  # pairs of terms in one product: some seconds
+# work, s of a processor core of 2026: of a product, of each of its pairs of terms, of a term whose form is sought
+OF_PRODUCT, OF_PAIR, OF_TERM = 4e-4, 4e-6, 1e-3
 
 
 Polynomial = Any  # of SymPy
@@ -21,23 +22,28 @@ Expression = Any  # of SymPy
 
 
 class TooLong(Exception):
-    """The time is up."""
+    """The work is more than the limit."""
 
 
 class Ring:
-    """Polynomials in symbols, sines and cosines of n angles until a deadline; exact: rational coefficients."""
+    """Polynomials in symbols, sines and cosines of n angles; exact: rational coefficients.
 
-    def __init__(self, symbols: Sequence[Expression], n: int, exact: bool, deadline: float):
+    Work is counted, so that the same is done on every machine under any load: TooLong where it is more than the limit, s.
+    """
+
+    def __init__(self, symbols: Sequence[Expression], n: int, exact: bool, limit: float):
         domain = QQ if exact else RealField(prec=PRECISION)
         functions = [Dummy() for _ in range(2 * n)]  # sines, then cosines
         self.ring = PolyRing([*symbols, *functions], domain, "lex")
         self.functions = PolyRing(functions, domain, "lex")
-        self.symbols, self.exact, self.deadline = symbols, exact, deadline
+        self.symbols, self.exact, self.limit, self.work = symbols, exact, limit, 0.0
         self.places = [(i, n + i) for i in range(n)]  # of sine and cosine in self.functions
         self.pairs = [(len(symbols) + s, len(symbols) + c) for s, c in self.places]  # and in self.ring
 
-    def check_time(self) -> None:
-        if time.monotonic() > self.deadline:
+    def count(self, work: float) -> None:
+        """Add work, s."""
+        self.work += work
+        if self.work > self.limit:
             raise TooLong
 
     def scalar(self, value: Expression) -> "Trig":
@@ -94,9 +100,10 @@ class Trig:
     def __mul__(self, other: Scalar) -> Scalar:
         if isinstance(other, Vector):
             return other * self
-        self.ring.check_time()
         other = self.other(other)
-        if len(self.poly) * len(other) > LARGEST_PRODUCT:
+        pairs = len(self.poly) * len(other)
+        self.ring.count(OF_PRODUCT + pairs * OF_PAIR)
+        if pairs > LARGEST_PRODUCT:
             raise TooLong
         return self.new(self.ring.reduced(self.poly * other, self.ring.pairs))
 

@@ -6,6 +6,8 @@ import mujoco
 import numpy as np
 
 from .dynamics import MujocoDynamics
+from .names import element_name
+from .step import Step
 
 Array = np.ndarray
 
@@ -62,3 +64,16 @@ def of_steps(
         return np.concatenate([coordinates.difference(q1, q0), v1 - v0], axis=1).T / ((1 + centred) * eps)
 
     return call
+
+
+def touching(step: Step, state: Array, by: Array) -> set[str]:
+    """The pairs of geoms whose contacts have forces at a state that is moved by a deviation, and how many contacts each has."""
+    step.put(state, by)
+    model, data = step.model, step.data
+    mujoco.mj_forward(model, data)
+    pairs: dict[str, int] = {}
+    for contact in data.contact:
+        if contact.efc_address >= 0:
+            name = " and ".join(element_name(model, "geom", geom) for geom in contact.geom)
+            pairs[name] = pairs.get(name, 0) + 1
+    return {f"{name} ({count})" for name, count in pairs.items()}

@@ -4,7 +4,6 @@ Stated numbers are converted: nested frames, angles, axes of length 1, tensors i
 compiler to change a number, the option is named. Remarks tell a user of it, and of what is fixed or switched off.
 """
 
-import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -19,7 +18,7 @@ from .engine import FROM_4
 from .inventory import LEFT_OUT, OFF, OPEN, contact_pairs
 from .names import aligns, element_name, joint_name, kind_of, matrix, moving, on, tensor
 from .reading import Reading
-from .source import FROM_GEOMS, Source
+from .source import FROM_GEOMS, Source, is_urdf
 
 # of the equations of motion
 STATED_FLAGS = {"flag gravity": "GRAVITY", "flag damper": "DAMPER", "flag eulerdamp": "EULERDAMP"}
@@ -242,9 +241,10 @@ def of_welded(source: Source) -> list[Finding]:
 def of_source(source: Source) -> list[Finding]:
     """What is fixed of a URDF; for each option by which the compiler changed stated numbers, where it did, by quantity."""
     model, findings = source.model, []
-    root = re.search(r"<(robot|mujoco)\b", source.text)
+    if source.missing:
+        findings.append(Finding("remarks", "missing", {"files": source.missing}))
     fixed = [body for body in range(1, model.nbody) if model.body_mass[body] and not moving(model)[body]]
-    if root and root[1] == "robot" and '"world"' not in source.text and fixed:
+    if is_urdf(source.text) and '"world"' not in source.text and fixed:
         values = {"link": element_name(model, "body", fixed[0]), "mass": float(model.body_mass[fixed].sum())}
         findings.append(Finding("remarks", "fixed_base", values))
     changed: dict[str, dict[str, list[str]]] = {}

@@ -8,7 +8,7 @@ printed as XML (which has seven digits). A URDF's meshes are found by their pack
 import os
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from copy import copy
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,12 @@ from .welded import compiled, join, welded_bodies
 
 FROM_GEOMS = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
 PARTS_OF_FREE = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]
+UNREAD = (
+    "Error opening file",
+    "no decoder found",
+)  # by MuJoCo, of a mesh that is not there or in another format
 ADVICE = {  # by what MuJoCo says of a file that it cannot compile
-    "Error opening file": "package://NAME/... is looked for in a folder NAME beside the file or above it, else beside the file",
-    "no decoder found": "MuJoCo reads STL, OBJ and MSH; collision meshes may be deleted: contacts are not compared",
+    "which cannot be read": "package://NAME/... is looked for in a folder NAME beside the file or above it, else beside the file",
     "must have positive eigenvalues": "the order of fullinertia is xx, yy, zz, xy, xz, yz",
     "mass and inertia of moving bodies": "boundmass and boundinertia of <compiler> give some, or both joints in one body",
 }
@@ -44,15 +47,18 @@ class ModelError(ValueError):
 class Source:
     """A file (a Path), MJCF text, or a model that was compiled elsewhere, of which a copy is taken.
 
-    origin: the Path or the text; None: compiled elsewhere. text: what it says. model: without what is only drawn. warnings: of
-    MuJoCo's compiler, one line each. bodies, joints: their numbers in the model, in the order of the spec. ModelError, in one
-    line, where MuJoCo makes no model of it.
+    origin: the Path or the text; None: compiled elsewhere. floating: whether the base of a URDF gets a free joint. text: what it
+    says. model: without what is only drawn. missing: the files of meshes and height fields that cannot be read: geoms of them
+    are left out. warnings: of MuJoCo's compiler, one line each. bodies, joints: their numbers in the model, in the order of the
+    spec. ModelError, in one line, where MuJoCo makes no model of it.
     """
 
-    def __init__(self, origin: Path | str | mujoco.MjModel) -> None:
+    def __init__(self, origin: Path | str | mujoco.MjModel, floating: bool = False) -> None:
         self.origin: Path | str | None = None
         self.text = ""
         self.warnings: tuple[str, ...] = ()
+        self.missing: tuple[str, ...] = ()
+        self.floating = floating
         self.welded: dict[int, int] = {}
         self._spec: mujoco.MjSpec | None = None
         if isinstance(origin, mujoco.MjModel):
@@ -73,9 +79,8 @@ class Source:
         try:
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
-                self._spec = parsed(origin, self.text)
-                spec = without_visuals(self._spec.copy())
-                self.model = compiled(spec)
+                self._spec = parsed(origin, self.text, self.floating)
+                spec = self.compiled_spec(self._spec)
             bytes(self.model.names).decode()
         except UnicodeDecodeError:
             raise ModelError(f"{self} has names that are not UTF-8; save it as UTF-8") from None
@@ -93,6 +98,21 @@ class Source:
         # elements have their numbers in the model only once compiled
         self.bodies, self.joints = [body.id for body in spec.bodies], [joint.id for joint in spec.joints]
 
+    def compiled_spec(self, stated: mujoco.MjSpec) -> mujoco.MjSpec:
+        """The spec of the model, without what is only drawn, and without meshes that cannot be read."""
+        spec = without_visuals(stated.copy())
+        try:
+            self.model = compiled(spec)
+        except ValueError as error:
+            if not is_unread(error):
+                raise
+            files = [asset for asset in (*stated.meshes, *stated.hfields) if not is_read(stated, asset)]
+            self.missing = tuple(asset.file for asset in files)
+            leave_out(stated, self.missing)
+            spec = without_visuals(stated.copy())
+            self.model = compiled(spec)
+        return spec
+
     def __str__(self) -> str:
         """Its name in a message."""
         if self.origin is None:
@@ -108,7 +128,8 @@ class Source:
         if self._spec is None and self.origin is not None:  # in another process
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the first reading has them
-                self._spec = parsed(self.origin, self.text)
+                self._spec = parsed(self.origin, self.text, self.floating)
+                leave_out(self._spec, self.missing)
         return self._spec
 
     def joined(self) -> "Source":
@@ -148,8 +169,23 @@ def text_of(path: Path) -> str:
         raise ModelError(f"cannot read {path}: {error.strerror}; expected an MJCF or URDF file") from None
 
 
-def parsed(origin: Path | str, text: str) -> mujoco.MjSpec:
-    """The MjSpec of a file (a Path) with this text, or of the text alone."""
+def is_urdf(text: str) -> bool:
+    root = re.search(r"<(robot|mujoco)\b", text)
+    return bool(root) and root[1] == "robot"  # type: ignore[index]
+
+
+def parsed(origin: Path | str, text: str, floating: bool = False) -> mujoco.MjSpec:
+    """The MjSpec of a file (a Path) with this text, or of the text alone; floating: the base of a URDF has a free joint."""
+    spec = parsed_as_it_is(origin, text)
+    if floating and not is_urdf(text):
+        raise ValueError("only the base of a URDF is made floating; MJCF states its free joints")
+    for body in list(spec.worldbody.bodies) if floating else ():
+        if not body.joints:
+            body.add_freejoint()
+    return spec
+
+
+def parsed_as_it_is(origin: Path | str, text: str) -> mujoco.MjSpec:
     if not isinstance(origin, Path):
         return mujoco.MjSpec.from_string(text)
     spec = mujoco.MjSpec.from_file(os.fsencode(origin))
@@ -179,6 +215,54 @@ def place_of(address: str, path: Path) -> Path | None:
     _, _, relative = address.partition("://")
     places = [*(above / relative for above in path.parents), path.parent / Path(relative).name]
     return next((place for place in places if place.is_file()), None)
+
+
+def is_unread(error: ValueError) -> bool:
+    return any(words in str(error) for words in UNREAD)
+
+
+def is_read(spec: mujoco.MjSpec, asset: mujoco.MjsMesh | mujoco.MjsHField) -> bool:
+    """Whether MuJoCo can read the file of an asset, which is tried alone."""
+    alone = mujoco.MjSpec()
+    alone.modelfiledir, alone.meshdir = spec.modelfiledir, spec.meshdir
+    if isinstance(asset, mujoco.MjsMesh):
+        alone.add_mesh(name="asset", file=asset.file)
+        alone.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="asset")
+    else:
+        alone.add_hfield(name="asset", file=asset.file, size=asset.size)
+    try:
+        alone.compile()
+    except ValueError as error:
+        return not is_unread(error)
+    return True
+
+
+def leave_out(spec: mujoco.MjSpec, missing: Collection[str]) -> None:
+    """Delete meshes and height fields by their files, and geoms of them. ValueError where one has the inertia of its body."""
+    assets = [asset for asset in (*spec.meshes, *spec.hfields) if asset.file in missing and asset.file]
+    names = {asset.name: asset.file for asset in assets}
+    geoms = [geom for geom in spec.geoms if {geom.meshname, geom.hfieldname} & names.keys()]
+    for geom in geoms:
+        body, file = geom.parent, names.get(geom.meshname or geom.hfieldname, "")
+        is_stated = body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS
+        low, high = body.compiler.inertiagrouprange
+        has_mass = geom.mass != 0.0 and geom.density != 0.0 and low <= geom.group <= high
+        if has_mass and not is_stated and moves(body):
+            raise ValueError(
+                f"the inertia of body {body.name!r} is that of its mesh {file}, which cannot be read"
+            )
+    deleted = {geom.name for geom in geoms} - {""}
+    pairs = [pair for pair in spec.pairs if {pair.geomname1, pair.geomname2} & deleted]
+    for element in (*pairs, *geoms, *assets):
+        spec.delete(element)
+
+
+def moves(body: mujoco.MjsBody) -> bool:
+    while body is not None:
+        if body.joints:
+            return True
+        body = body.parent
+    return False
 
 
 def without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:

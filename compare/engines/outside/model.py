@@ -255,13 +255,18 @@ def placed(tree: tmt.Tree, q: Array) -> tuple[Array, ...]:
 
 
 def size_of(stated: Numbers, number: str) -> float:
-    """The size of what is added where an engine reads a number: it may keep inertias about the origin of a joint."""
-    sizes = [np.abs(stated[number]).max(initial=0.0)]
-    if number.startswith(("com", "anchor")):  # each is a sum along the tree
-        sizes += [np.abs(stated[name]).max(initial=0.0) for name in ("com", "anchor")]
+    """The size of what is added where an engine reads a number: it may keep inertias about the origin of a joint.
+
+    Of places and directions: the lengths of the tree, times the number of joints, as each turn on the way may round.
+    """
+    largest = {name: float(np.abs(values).max(initial=0.0)) for name, values in stated.items()}
     if number in ("moments", "inertia"):
-        sizes.append(stated["about_origin"].max(initial=0.0))
-    return float(sum(sizes))
+        return largest[number] + largest["about_origin"]
+    if number.startswith("axis"):
+        return len(stated[number]) * 1.0
+    if number.startswith(("com", "anchor")):
+        return len(stated[number]) * (largest[number] + largest["com"] + largest["anchor"])
+    return largest[number]
 
 
 def carried(links: Iterable[Link], joints: int) -> list[list[Body]]:

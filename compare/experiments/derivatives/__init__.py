@@ -16,6 +16,7 @@ from ...judge.scale import FACTOR
 from ...robots import Robot
 from .. import Drawing, Experiment
 from ..setup import Setup
+from .contacts import contact_rows
 from .subjects import Subject, all_subjects, dynamics_of
 from .tables import CostRow, DerivativeRow, DerivativesResult, HardRow, errors_of
 from .ways import (
@@ -99,6 +100,7 @@ def rows(setup: Setup, work: Work | None = None) -> DerivativesResult:
     add_times(setup, result, main)
     if setup.alone:
         add_engines(setup, result, main[0])
+        add_contacts(setup, result)
     scenes = [row for one in every if one.subject.kind == "scene" for row in one.rows]
     result.tables["derivative_costs"] = [
         cost(result, one.quantity, scenes, way) for one in main for way in ways_of(one)
@@ -142,6 +144,16 @@ def add_engines(setup: Setup, result: DerivativesResult, forward: Measured) -> N
         result.rows.append(row)
         state = subject.q[0], subject.qd[0], subject.tau[0]
         result.times[quantity.name, LABELS[name]] = dynamics.seconds("derivatives", *state)
+
+
+def add_contacts(setup: Setup, result: DerivativesResult) -> None:
+    """What differences are worth where a robot of a file stands on its contacts."""
+    if setup.reading is None or all(feature.feature != "contact" for feature in setup.reading.features):
+        return
+    setup.progress("derivatives: contacts")
+    if rows := contact_rows(setup.reading):
+        result.tables["contact_derivatives"] = rows
+        result.find("contacts", rows=rows)
 
 
 def first(subject: Subject) -> Subject:

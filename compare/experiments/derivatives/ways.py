@@ -31,6 +31,7 @@ ONE_SIDED, CENTRED = "one-sided", "centred"
 BY_INVERSE, NUMPY, COMPILED = "mjd_inverseFD", "tmt, NumPy", "tmt, compiled"
 EXACT = NUMPY, COMPILED
 INVERSE, FORWARD = "dtau/dq and dtau/dqd", "dqdd/dq, dqdd/dqd and dqdd/dtau"
+ZERO = 1e-25  # what is no larger with 31 digits is zero
 TRUNCATED = 2.0 / 99.0  # of the difference between an eps and ten times that: twice the term in eps^2
 
 
@@ -117,14 +118,11 @@ def accelerations(subject: Subject) -> Array:
     return tmt.acceleration(subject.q, subject.qd, subject.tau, subject.tree)
 
 
-def units_of(quantity: Quantity, tree: tmt.Tree, columns: int) -> tuple[Array, Array]:
-    """Numbers of the units of rows and columns: entries with the same pair have the same unit."""
-    slides = np.array(
-        [kind == "slide" for kind, joint in zip(tree.kind, tree.coordinates.joints) for _ in joint.speeds]
-    )
-    n = len(slides)
-    each = np.repeat(np.arange(3), n) * 2 + np.tile(slides, 3)
-    return each[: 2 * n] if quantity.integrator else each[:n], each[:columns]
+def units_of_speeds(tree: tmt.Tree, blocks: int) -> Array:
+    """Numbers of the units of movements, speeds and torques, so many of these: of slides they are others than of turns."""
+    joints = zip(tree.kind, tree.coordinates.joints)
+    slides = [kind == "slide" for kind, joint in joints for _ in joint.speeds]
+    return np.repeat(np.arange(blocks), len(slides)) * 2 + np.tile(slides, blocks)
 
 
 def relative(difference: Array, exact: Array, units: tuple[Array, Array]) -> float:
@@ -137,7 +135,7 @@ def relative(difference: Array, exact: Array, units: tuple[Array, Array]) -> flo
             block = np.ix_(rows == row, columns == column)
             size = float(np.abs(exact[block]).max())
             off = float(np.abs(difference[block]).max())
-            worst = max(worst, off / size if size else 0.0)
+            worst = max(worst, off / size if size > ZERO else 0.0)
     return worst
 
 
@@ -195,7 +193,10 @@ def row_of(
 ) -> DerivativeRow:
     """The largest error of a way at all states, whose values have all columns or the first ones."""
     high, low = (part[:, :, : values.shape[2]] for part in exact)
-    units = units_of(quantity, subject.tree, values.shape[2])
+    units = (
+        units_of_speeds(subject.tree, 2 if quantity.integrator else 1),
+        units_of_speeds(subject.tree, 3)[: values.shape[2]],
+    )
     error = max(relative((v - h) - l, h, units) for v, h, l in zip(values, high, low))
     return DerivativeRow(
         subject=subject.name,

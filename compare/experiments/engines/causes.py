@@ -148,7 +148,9 @@ def no_springs(entry: Entry) -> str | None:
 def armature_without_motor(entry: Entry) -> str | None:
     """The engine has the armature of all joints that a motor or a position servo drives, and of no other."""
     is_zero = entry.number == "armature" and not entry.values("armature")[0][entry.place]
-    return entry.name if is_zero and not entry.wrong & entry.text.driven else None
+    driven = entry.wrong & entry.text.driven
+    unexplained = [name for name in driven if not entry.text.passed_over(name, "armature")]
+    return entry.name if is_zero and entry.name not in driven and not unexplained else None
 
 
 def option_gravity(entry: Entry) -> str | None:

@@ -1,0 +1,58 @@
+"""How far rounding may take the results of a row of operations: a bound of first order, that runs along with them.
+
+Each operation adds the rounding of its own result to what its operands bring (Higham, Accuracy and Stability of Numerical
+Algorithms, 2002, section 3.3). In units of eps, twice the unit of rounding, so that fused operations and functions
+that are off by one unit are within it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmt.compiled.straight import Traced
+
+Array = NDArray[np.float64]
+
+
+def running_error(traced: Traced, inputs: Array, errors: Array) -> Array:
+    """The bounds, (results, states), for inputs and their errors (numbers, states)."""
+    zero = np.zeros(inputs.shape[1])
+    value: dict[int, Array] = {x.i: numbers for x, numbers in zip(traced.inputs, inputs)}
+    error: dict[int, Array] = {x.i: numbers for x, numbers in zip(traced.inputs, errors)}
+    outputs = [traced.tape.lift(x).i for x in traced.outputs]
+    for i in traced.nodes:
+        kind, arguments = traced.tape.nodes[i]
+        if kind == "number":
+            value[i] = zero + float(arguments[0])
+            error[i] = np.abs(value[i])
+        elif kind == "item":
+            (angle,) = traced.tape.operands(arguments[0])
+            both = np.sin(value[angle]), np.cos(value[angle])
+            value[i] = both[arguments[1]]
+            error[i] = np.abs(both[1 - arguments[1]]) * error[angle] + np.abs(value[i])
+        elif kind not in ("input", "sincos"):
+            operands = [value[a] for a in arguments]
+            brought = slopes(kind, operands)
+            value[i] = RESULTS[kind](*operands)
+            error[i] = sum((np.abs(s) * error[a] for s, a in zip(brought, arguments)), np.abs(value[i]))
+    return np.array([error[i] for i in outputs])
+
+
+RESULTS = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "neg": np.negative, "sqrt": np.sqrt,
+    "arctan": np.arctan,
+}  # fmt: skip
+
+
+def slopes(kind: str, operands: list[Array]) -> list[Array]:
+    """The derivatives of an operation by its operands."""
+    x, y = operands[0], operands[-1]
+    one = np.ones_like(x)
+    return {
+        "+": lambda: [one, one],
+        "-": lambda: [one, one],
+        "*": lambda: [y, x],
+        "/": lambda: [1.0 / y, x / (y * y)],
+        "neg": lambda: [one],
+        "sqrt": lambda: [0.5 / np.sqrt(x)],
+        "arctan": lambda: [1.0 / (1.0 + x * x)],
+    }[kind]()
