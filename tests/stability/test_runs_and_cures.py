@@ -21,7 +21,7 @@ from compare.stability.growth import growth
 from compare.stability.limits import tried
 from compare.stability.motion import motion
 from compare.stability.rest import rest_near
-from compare.stability.runs import PUSHES, growth_in_run, largest_push, observed
+from compare.stability.runs import PUSHES, growth_in_run, largest_push, observed, own_limit, stays_still
 
 FOOT = STANDING.format(cone="elliptic", condim=3)
 RUBBING = hinge(20.0, 30.0, 'frictionloss="0.3"')
@@ -80,12 +80,26 @@ def test_a_servo_too_weak_for_a_push_bears_it_at_no_step():
     servo = (
         '<position joint="a" kp="8" kv="0.5" forcerange="-0.4 0.4"/>'  # after a fall it calms down, hanging
     )
-    body = '<body><joint name="a" axis="0 1 0"/><geom size="0.05" pos="0 0 0.5" mass="1"/></body>'
+    body = '<body><joint name="a" axis="0 1 0" damping="1"/><geom size="0.05" pos="0 0 0.5" mass="1"/></body>'
     text = f"<mujoco><worldbody>{body}</worldbody><actuator>{servo}</actuator></mujoco>"
     largest, finer_too = largest_push(place_of(text).model, rest_of(text))
     assert 1e-3 < largest < 1.0 and finer_too
     free = hinge(actuator=MOTORS)  # nothing brakes it
     assert largest_push(place_of(free).model, rest_of(free)) == (None, True)
+
+
+def test_the_files_own_run_stays_still_up_to_a_step():
+    """From a start beside the rest: a servo with kv, and one without, which swings for ever."""
+    place, swinging = place_of(hinge(20.0, 5.0)), place_of(hinge(20.0, 0.0))
+    start = Step(place.model, 1e-3, "Euler").moved(place.rest, np.array([1e-2, 0.0]))
+    assert [stays_still(place.model, start, dt, "Euler", 0.0) for dt in (2e-3, 0.03)] == [True, False]
+    assert [stays_still(swinging.model, start, 2e-3, "Euler", creep) for creep in (0.05, 0.11)] == [
+        False,
+        True,
+    ]
+    exact = (-5.0 + np.sqrt(25.0 + 4.0 * INERTIA * 20.0)) / 20.0
+    assert 0.93 * exact < own_limit(place.model, start, "Euler", 0.05, 0.0) < exact
+    assert own_limit(place.model, start, "Euler", 0.01, 0.0) == 0.01
 
 
 # controllers
