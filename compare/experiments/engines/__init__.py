@@ -1,10 +1,13 @@
 """Other engines that read the robot's file: what each has read, its equations, its integrators, and which to use."""
 
+import os
 from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
 import numpy as np
+
+from tmt.compiled.cores import cores
 
 from ...core.check import ENDS, About, Result
 from ...core.finding import Finding
@@ -34,6 +37,7 @@ from .readings import compare_numbers
 from .tables import EngineRow, EnginesResult, ReadRow
 
 EXPERIMENT = Experiment(order=65, serves_own=False, in_quick=False, options=("--engines",))
+BUSY = 1.5  # load of a core above which other processes take turns
 COMPARED = ("Mbar", "bias", "qdd")
 SHOWN = ["engine", "quantity", "unit", "states", "as_read_over_bar", "worst_difference", "bar", "difference_over_bar",
          "difference_eps", "mujoco_eps"]  # fmt: skip
@@ -82,8 +86,16 @@ def rows(setup: Setup) -> EnginesResult:
             servos.follow_step(result, setup, known)
             batches.time_batches(result, setup, known)
         servos.add_sentences(result)
+        add_load(result)
         answer.add_answer(result, free_scene(setup))
     return result
+
+
+def add_load(result: EnginesResult) -> None:
+    """A finding where other processes take the cores, where the system tells."""
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    if load > BUSY * cores():
+        result.find("busy", load=load, cores=cores())
 
 
 def add_not_asked(result: EnginesResult, label: str, error: EngineError) -> None:

@@ -110,8 +110,8 @@ def draw_servos(result: EnginesResult) -> tuple[str, Figure, Finding]:
     for k, (label, (t, deviation)) in enumerate(result.responses.items()):
         engine = next(row.engine for row in rows if row.label == label)
         ax.plot(
-            t,
-            np.abs(deviation).max(axis=1),
+            t[1:],
+            np.abs(deviation[1:]).max(axis=1),
             label=label,
             color=LOOKS[engine]["color"],
             linestyle=DASHES[k % len(DASHES)],
