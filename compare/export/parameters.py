@@ -1,5 +1,6 @@
 """Parameters of exported equations: their frames in a file, and the file with other values of them."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -8,13 +9,14 @@ from numpy.typing import NDArray
 from tmt.export.parameters import PAYLOAD, PLACES, Parameters
 
 from ..engines.mujoco import engine, read
+from ..engines.mujoco.changed import changed
 from ..engines.mujoco.reading import tree_with_sites
-from ..engines.mujoco.stated import Values, with_numbers
 from ..robots.case import SEED
 from ..robots.file import robot_of
 from ..run.reference import Compared
 
 Array = NDArray[np.float64]
+Values = Mapping[str, Array]  # of arguments by name
 LENGTH = 0.1  # m: how far a mass is moved
 
 
@@ -47,6 +49,6 @@ def other_values(parameters: Parameters) -> Values:
 
 def with_values(compared: Compared, parameters: Parameters, values: Values) -> Compared:
     """What is compared, from the file with these values."""
-    reading = read(with_numbers(compared.mujoco.source, compared.robot.tree, parameters, values))
+    reading = read(changed(compared.mujoco.source, compared.robot.tree, parameters, values))
     shown = compared.robot.name
     return with_sites(Compared(compared.reference, robot_of(reading, shown), engine(reading), reading))

@@ -1,4 +1,4 @@
-"""A file's model with other numbers: masses, centres of mass, inertias, gravity, a payload."""
+"""A file with other inertial numbers and another gravity, and with a payload."""
 
 from collections.abc import Mapping
 
@@ -17,8 +17,7 @@ Array = NDArray[np.float64]
 Values = Mapping[str, Array]  # of arguments by name
 
 
-def with_numbers(source: Source, tree: Tree, parameters: Parameters, values: Values) -> mujoco.MjModel:
-    """The model that MuJoCo compiles of a file with these values of its parameters."""
+def changed(source: Source, tree: Tree, parameters: Parameters, values: Values) -> mujoco.MjModel:
     assert source.spec is not None
     spec, model = without_visuals(source.spec.copy()), source.model
     for body, number in zip(spec.bodies[1:], source.bodies[1:]):  # as they were compiled
