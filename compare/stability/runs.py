@@ -49,21 +49,25 @@ def speed_after(model: mujoco.MjModel, rest: Rest, push: float, dt: float) -> fl
     return float(np.abs(speeds[-steps // 8 :] - rest.speeds).max())
 
 
-def calms(model: mujoco.MjModel, rest: Rest, push: float) -> bool:
-    """Whether the robot calms down near its rest after a push."""
-    return speed_after(model, rest, push, rest.step.dt) <= max(CALM, CALMER * push)
-
-
-def largest_push(model: mujoco.MjModel, rest: Rest) -> tuple[float | None, bool]:
+def largest_push(
+    model: mujoco.MjModel, rest: Rest, creep: float, is_stable: bool
+) -> tuple[float | None, bool]:
     """The largest push after which it calms down, rad/s or m/s, and whether it does after none larger at a finer step.
 
-    0.0: after none; None: nothing brakes it, it moves on after any push and at a finer step too.
+    creep: of the robot, rad/s or m/s; is_stable: whether the step is. 0.0: after none; None: nothing brakes it, it moves on
+    after any push and at a finer step too.
     """
+
+    def calms(model: mujoco.MjModel, rest: Rest, push: float) -> bool:
+        """Whether the robot calms down near its rest after a push."""
+        calm = max(CALM, CALMER * push, AS_FAST * creep)
+        return speed_after(model, rest, push, rest.step.dt) <= calm
+
     survived = next((push for push in PUSHES if calms(model, rest, push)), 0.0)
     if survived == PUSHES[0]:
         return survived, False
     finer = rest_near(Step(model, rest.step.dt / FINER, rest.step.integrator), rest.state)
-    if survived <= CALM and not calms(model, finer, 10.0 * CALM):
+    if is_stable and survived <= CALM and not calms(model, finer, 10.0 * CALM):
         return None, True
     next_larger = min(push for push in PUSHES if push > survived)
     return survived, not calms(model, finer, next_larger)
