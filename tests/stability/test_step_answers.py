@@ -125,6 +125,12 @@ def test_curves_have_the_growth_of_steps_and_of_runs():
     ].stable_at_file_dt is False
 
 
+def test_the_limit_without_dry_friction_stands_beside_that_with_it():
+    (row,) = compare.step_limits(hinge(20.0, 30.0, 'frictionloss="0.3"'), integrators=["Euler"])
+    assert row.smooth_dt == pytest.approx((-30.0 + np.sqrt(900.0 + 4.0 * INERTIA * 20.0)) / 20.0, rel=3e-3)
+    assert row.predicted_dt > 4.0 * row.smooth_dt and row.is_held_by_friction
+
+
 def test_every_kind_of_force_has_an_answer():
     for kind in ("a muscle", "a DC motor", "fluid", "a loaded loop", "a free caster"):
         rows = compare.step_limits(KINDS[kind], integrators=["implicitfast"])
