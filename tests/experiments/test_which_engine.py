@@ -8,11 +8,13 @@ import pytest
 
 from compare.core import timing
 from compare.core.errors import Refused
-from compare.engines import Motion
+from compare.engines import RECORDS, Motion
 from compare.engines.outside import servos_of
+from compare.engines.outside.model import FROM_FILE, numbers_of
 from compare.experiments.engines import batches, servos
 from compare.experiments.engines.answer import cheapest_of
 from compare.experiments.engines.motion import BRIEF, MANY, brief, free_scene, reference
+from compare.experiments.engines.readings import compare_numbers
 from compare.experiments.engines.tables import EnginesResult, MethodRow
 from compare.experiments.setup import Setup, engines
 from compare.robots.arm import ARM
@@ -161,3 +163,18 @@ def test_engines_are_chosen_by_their_names():
     )
     with pytest.raises(Refused, match="draek is not an engine that reads"):
         not_chosen("draek")
+
+
+def test_a_cause_is_named_where_the_engine_has_what_follows_from_it(tmp_path):
+    """A gravity that was ignored; another one is not explained by that."""
+    path = tmp_path / "robot.xml"
+    path.write_text(LEG.replace("<worldbody>", '<option gravity="1 2 -3"/><worldbody>'))
+    robot, kinds = compared_with("model", str(path)).robot, []
+    stated = numbers_of(robot.tree)
+    for gravity in ((0.0, 0.0, -9.81), (1.0, 2.0, 3.0)):
+        reading = {"read": stated | {"gravity": np.array(gravity)}, "stated": stated, "mended": {"gravity": True}, "copied": None,
+                   "way": FROM_FILE, "lacking": (), "unwritten": ()}  # fmt: skip
+        result = EnginesResult("engines", tables={"engines_read": []})
+        compare_numbers(result, robot, RECORDS["drake"], reading)
+        kinds.append({row.cause for row in result.tables["engines_read"]})
+    assert kinds == [{"option_gravity gravity"}, {None}]
