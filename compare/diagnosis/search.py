@@ -142,7 +142,10 @@ class Explanations:
     # stages
 
     def stages(self) -> Iterator[list[Cause]]:
-        """Explanations of everything: of each stage those that are natural, if there are any; then the others."""
+        """Explanations of everything: of each stage those that are natural, if there are any; then the others.
+
+        One number with many digits is simpler than two causes.
+        """
         unusual: list[Cause] = []
         stages = (
             self.everything, self.derivations, self.of_parts, self.terms, self.groups, self.beside_conventions, self.pairs,
@@ -155,6 +158,8 @@ class Explanations:
                 self.is_finished = False
             yield [cause for cause in causes if self.cost(cause) < NATURAL]
             unusual += causes
+            if stage == self.groups:
+                yield [cause for cause in unusual if cause.kind in ("number", OF_ZERO)]
             if not self.is_finished:
                 break
         yield unusual
