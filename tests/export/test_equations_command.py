@@ -122,7 +122,7 @@ def test_what_is_judged_is_what_was_written(language, tmp_path):
     assert [row.passed for row in outcome.rows] == [True, False] and outcome.rows[0].operations > 10
 
 
-@pytest.mark.parametrize("name", {quantity.function for quantity in COMPARED.values()})
+@pytest.mark.parametrize("name", sorted({quantity.function for quantity in COMPARED.values()}))
 def test_each_quantity_has_a_counterpart_in_mujoco(name):
     compared = compared_with("model", str(PATHS["mixed"]))
     outcome = outcome_of(partial(Altered, compared.robot.tree, "", 0.0), name, compared=compared)
