@@ -281,7 +281,8 @@ def add_rest(row: StepLimitRow, place: Place, at: Tried) -> None:
     """How far the rest is from the posture, how it creeps, and the growth in closed form."""
     moved, creep = np.abs(place.moved), np.abs(at.rest.speeds)
     row.moved, row.moved_joint = float(moved.max()), place.speed_names[int(np.argmax(moved))]
-    row.creep, row.creeping_joint = float(creep.max()), place.speed_names[int(np.argmax(creep))]
+    if at.rest.is_found:  # else what Newton's method has tried
+        row.creep, row.creeping_joint = float(creep.max()), place.speed_names[int(np.argmax(creep))]
     if at.rest.left <= SETTLED:
         own = radius(at.rest, place.tree)
         row.apart = None if own is None else own - at.spectral_radius

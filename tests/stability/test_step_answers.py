@@ -38,6 +38,7 @@ def test_rows_tell_of_the_robot_in_contact_and_in_the_air():
     assert {row.limit for row in rows[2:]} == {"no_rest"} and not any(
         row.stable_at_file_dt for row in rows[2:]
     )
+    assert {row.creep for row in rows[2:]} == {None} and rows[2].moved > 1.0
     euler = rows[0]
     assert euler.apart == pytest.approx(0.0, abs=1e-8) and euler.moved > 1e-3 and euler.creep < 1e-9
     (fast,) = (
