@@ -13,7 +13,7 @@ from ..engines.mujoco.step import distance
 from ..engines.mujoco.variants import has_free_base
 from ..robots.coordinates import Coordinates
 from ..robots.file import names_of_keys
-from .closed_form import radius
+from .closed_form import radius_apart
 from .cures import Cure, cures
 from .limits import COARSER, LONGEST, Limit, Tried, limit, tried
 from .naming import limiting
@@ -284,5 +284,4 @@ def add_rest(row: StepLimitRow, place: Place, at: Tried) -> None:
     if at.rest.is_found:  # else what Newton's method has tried
         row.creep, row.creeping_joint = float(creep.max()), place.speed_names[int(np.argmax(creep))]
     if at.rest.left <= SETTLED:
-        own = radius(at.rest, place.tree)
-        row.apart = None if own is None else own - at.spectral_radius
+        row.apart = radius_apart(at.rest, place.tree)

@@ -21,15 +21,32 @@ from ..engines.mujoco.forces import Forces, forces_near
 from ..engines.mujoco.names import on, reflected
 from .rest import Rest
 
+ALONE = 1e-8  # of an entry of the derivative: none
 COVERED = "Euler", "implicitfast", "implicit", "RK4"  # `discrete` solves the rows with a left side of its own
 
 
-def radius(rest: Rest, tree: tmt.Tree) -> float | None:
-    """The spectral radius of the step in closed form; None: no closed form, or the edge of an active set."""
-    forces = forces_near(rest.step, rest.state) if rest.step.integrator in COVERED else None
+def radius_apart(rest: Rest, tree: tmt.Tree) -> float | None:
+    """The spectral radius of the step in closed form, minus that of the same part of its derivative by differences.
+
+    None: no closed form, or the edge of an active set.
+    """
+    forces = forces_near(rest.step, rest.state) if is_covered(rest) else None
     if forces is None:
         return None
-    return float(np.abs(np.linalg.eigvals(matrix(rest, tree, forces))).max())
+    ours = matrix(rest, tree, forces)
+    n = len(ours)
+    return spectral_radius(ours) - spectral_radius(rest.A[:n, :n])
+
+
+def spectral_radius(A: np.ndarray) -> float:
+    return float(np.abs(np.linalg.eigvals(A)).max())
+
+
+def is_covered(rest: Rest) -> bool:
+    """RK4 only if the activations do not depend on the motion: they are left out there."""
+    moved = 2 * rest.step.model.nv
+    alone = rest.step.integrator != "RK4" or not (np.abs(rest.A[moved:, :moved]) > ALONE).any()
+    return rest.step.integrator in COVERED and alone
 
 
 def matrix(rest: Rest, tree: tmt.Tree, forces: Forces) -> np.ndarray:

@@ -34,11 +34,6 @@ class Tried:
     run_grows: bool  # where the derivative is uncertain: whether a small push grows in a run
 
     @property
-    def spectral_radius(self) -> float:
-        """Of the derivative, with neutral modes and noise."""
-        return float(np.abs(np.linalg.eigvals(self.rest.A)).max())
-
-    @property
     def is_stable(self) -> bool:
         stays = self.rest.is_found and self.moved <= GIVES_WAY
         return stays and not self.run_grows and self.growth.rate <= max(GROWS, BESIDE_DRIFT * self.drift)

@@ -9,7 +9,7 @@ from small import INERTIA, KINDS, LEG, hinge, limit_of, place_of, rest_of, spher
 
 from compare.engines.mujoco.forces import forces_near
 from compare.engines.mujoco.names import INTEGRATORS
-from compare.stability.closed_form import matrix, radius
+from compare.stability.closed_form import matrix, radius_apart
 from compare.stability.growth import growth
 from compare.stability.place import in_the_air_at
 
@@ -108,19 +108,33 @@ def test_the_closed_form_is_the_derivative_of_mujocos_own_step(kind):
 
 def test_no_closed_form_of_discrete_or_at_the_edge_of_a_limit():
     place = place_of(LEG)
-    assert radius(rest_of(LEG), place.tree) is not None
+    assert radius_apart(rest_of(LEG), place.tree) is not None
     others = [name for name in INTEGRATORS if name not in EVERY]
-    assert all(radius(rest_of(LEG, integrator=name), place.tree) is None for name in others)
+    assert all(radius_apart(rest_of(LEG, integrator=name), place.tree) is None for name in others)
     touching = hinge(joint='range="-1 0" limited="true"').replace(
         "<mujoco>", '<mujoco><compiler angle="radian"/>'
     )
-    assert radius(rest_of(touching), place_of(touching).tree) is None
+    assert radius_apart(rest_of(touching), place_of(touching).tree) is None
+
+
+def test_activations_are_left_out_of_rk4_on_both_sides_and_none_that_moves_with_the_joint():
+    turning = (
+        '<intvelocity joint="turn" kp="20" kv="5" actrange="-1 1"/>'  # its activation has the eigenvalue 1
+    )
+    for actuator in (turning, '<dcmotor joint="turn" motorconst="0.8" resistance="2"/>'):
+        text = hinge(joint='stiffness="9"', actuator=actuator)
+        assert abs(radius_apart(rest_of(text, integrator="RK4"), place_of(text).tree)) < 1e-8
+    inductive = hinge(actuator='<dcmotor joint="turn" motorconst="0.8" resistance="2" inductance="0.004"/>')
+    for integrator, known in (("Euler", True), ("RK4", False)):
+        assert (
+            radius_apart(rest_of(inductive, 1e-3, integrator), place_of(inductive).tree) is not None
+        ) is known
 
 
 def test_a_wrong_mass_is_seen_in_the_closed_form():
     place, rest = place_of(LEG), rest_of(LEG)
     heavy = replace(place.tree, mass=(5.001, 0.1))
-    assert abs(radius(rest, place.tree) / size(rest.A) - 1.0) < 1e-8
+    assert abs(radius_apart(rest, place.tree)) < 1e-8
     forces = forces_near(rest.step, rest.state)
     assert np.abs(matrix(rest, heavy, forces) - rest.A).max() > 1e-6
 

@@ -15,6 +15,7 @@ EDITS = (
     ("closed_form", "mass_and_force", "np.diag(rows.R)", "0.0", "contacts are rigid"),
     ("closed_form", "implicit", "damping * on(*_1)", "damping", "Euler always has damping implicit"),
     ("closed_form", "implicit", "np.where(_1, -_2, 0.0)", "-_2", "terms across branches are implicit"),
+    ("closed_form", "is_covered", "not (_1 > ALONE).any()", "True", "currents of a motor are left out of RK4"),
     ("closed_form", "runge_kutta", "range(1, 5)", "range(1, 4)", "RK4 is of third order"),
     ("stability.growth", "growth", "excess[_1] = 0.0", "pass", "noise of differences grows"),
     ("stability.rest", "towards_rest", "share * (creep - _1)", "share * _1", "nothing creeps"),
