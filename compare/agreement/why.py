@@ -108,16 +108,16 @@ def of_accelerations(comparison: Comparison, values: Values, tau: ndarray, qdd: 
     left_over = LeftOver(tree, right, tau, qdd, rounding)
     if left_over.causes:
         return Why(left_over.sentence())
-    if values.are_finite:
-        return Why(say(Finding("agreement", "solved")), False)
-    equations = comparison.equations
+    equations, solved = comparison.equations, Why(say(Finding("agreement", "solved")), False)
     is_asked = equations is not None and equations.has("acceleration")
     if not is_asked or equations is None or equations.seconds * len(q) * (len(q[0]) + 1) > SECONDS_OF_SLOPES:
-        return of_forces(comparison, right, tau, qdd)
+        return solved if values.are_finite else of_forces(comparison, right, tau, qdd)
     affine = Affine(tree, equations)
     inputs = affine.inputs(q)
     if inputs is not None and (np.abs(inputs - 1.0) > CONSTANT).any():
         return of_inputs(comparison, inputs, LeftOver(tree, right, inputs * tau, qdd, rounding))
+    if values.are_finite:
+        return solved
     own = affine.values(q, qd, rounding)
     if own is None:
         return of_inputless(comparison, affine, right, tau, qdd)
