@@ -55,14 +55,18 @@ class Controlled(NamedTuple):
         size = float(np.abs(np.linalg.eigvals(self.period(steps, delay))).max())
         return size if size > 1.0 + AT_ONE else 1.0
 
-    def longest_period(self, delay: int) -> int | None:
-        """The largest number of steps of a stable period; 0: not even one step is; None: all that are tried."""
-        return longest(lambda steps: self.factor(steps, delay) == 1.0, 1, round(MOST_PERIOD / self.dt))
+    def longest_period(self, delay: int, beyond: int = 0) -> int | None:
+        """The largest number of steps of a stable period, upwards from `beyond`, stable or 0; None: all that are tried."""
+        most = max(round(MOST_PERIOD / self.dt), beyond + 1)
+        return longest(lambda steps: self.factor(steps, delay) == 1.0, beyond + 1, most)
 
-    def longest_delay(self, steps: int) -> int | None:
-        """The longest stable delay in steps; -1: not even none; None: all that are tried."""
-        most = longest(lambda delay: self.factor(steps, delay - 1) == 1.0, 1, 1 + MOST_DELAYED * steps)
-        return None if most is None else most - 1
+    def longest_delay(self, steps: int, beyond: int) -> int | None:
+        """The longest stable delay in steps, upwards from `beyond`, which is stable; None: all that are tried.
+
+        A shorter one need not be stable: what acts late may act at a better time.
+        """
+        most = beyond + MOST_DELAYED * steps
+        return longest(lambda delay: self.factor(steps, delay) == 1.0, beyond + 1, most)
 
     def grows_in_run(self, steps: int, delay: int) -> bool:
         """Whether a small push grows in a run of the program, which lasts until a growth that is expected would show."""

@@ -140,12 +140,21 @@ def test_runs_show_the_longest_period_and_the_longest_delay_of_two_servos(delay)
     )
     longest = found.longest_period(delay)
     assert not found.grows_in_run(longest, delay) and found.grows_in_run(longest + 2, delay)
-    latest = found.longest_delay(longest - 3)
+    latest = found.longest_delay(longest - 3, delay)
     assert (
         latest >= delay
         and not found.grows_in_run(longest - 3, latest)
         and found.grows_in_run(longest - 3, latest + 2)
     )
+
+
+def test_a_program_that_is_late_may_be_stable_where_one_in_time_is_not():
+    """Its force acts over the end of one period and the beginning of the next: then the limits are sought beyond."""
+    found = program(hinge(20.0, 1.6))
+    steps = next(steps for steps in range(1, 99) if found.factor(steps, 0) > 1.0)
+    late = next(delay for delay in range(1, steps) if found.factor(steps, delay) == 1.0)
+    assert exact_growth(steps, 0, 20.0, 1.6) > 1.0 >= exact_growth(steps, late, 20.0, 1.6) - 1e-9
+    assert found.longest_delay(steps, late) >= late and found.longest_period(late, steps) >= steps
 
 
 def test_a_force_range_and_the_rest_of_a_program_are_those_of_the_file():

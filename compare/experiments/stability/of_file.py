@@ -53,7 +53,10 @@ class Work(NamedTuple):
 
 @dataclass(kw_only=True)
 class ControlRow(Row):
-    """A controller at its own rate: control.csv. Limits are None where all that was tried is stable."""
+    """A controller at its own rate: control.csv. Limits are None where all that was tried is stable.
+
+    longest_delay: 0 if it is not stable.
+    """
 
     posture: str
     integrator: str
@@ -147,7 +150,9 @@ def control_row(posture: Posture, reading: Reading, request: Any, asked: Asked) 
         return None
     steps = max(1, round(request.control_period / asked.dt))
     delay = round((request.delay or 0.0) / asked.dt)
-    longest, latest = found.longest_period(delay), found.longest_delay(steps)
+    is_stable = found.factor(steps, delay) == 1.0
+    longest = found.longest_period(delay, steps * is_stable)
+    latest = found.longest_delay(steps, delay) if is_stable else 0
     return ControlRow(
         posture=posture.name, integrator=asked.integrator, period=steps * asked.dt, delay=delay * asked.dt,
         growth=found.factor(steps, delay), grows_in_run=found.grows_in_run(steps, delay),
@@ -156,7 +161,7 @@ def control_row(posture: Posture, reading: Reading, request: Any, asked: Asked) 
 
 
 def in_seconds(steps: int | None, found: Controlled) -> float | None:
-    return None if steps is None else max(0, steps) * found.dt
+    return None if steps is None else steps * found.dt
 
 
 def motion_row(posture: Posture, reading: Reading, asked: Asked) -> MotionRow:
