@@ -17,7 +17,7 @@ EXPECTED = {
     "exported_c": (r"difference from tmt: \d(\.\d)?e-1\d|difference from tmt: 0$", {"arm.c", "arm.h", "arm.so"}),
     "many_files": (r"status 1.*\n.*ben.xml: differ com z of rod.*\n.*anna.xml: agree$",
                    {"class", "solution.xml", "submissions"}),
-    "own_equations": (r"equations agree; .* h\[pole\] is .*\nprobable cause: sign of gravity", set()),
+    "own_equations": (r"equations agree; .* h\[pole\] is .*\nprobable cause: gravity has the other sign in your h", set()),
     "stable_step": (r"Euler: 0\.00\d+ s, elbow; .* not stable\n.*fast: 0\.0[56]\d+ s(.*\n)+.* elbow 8\.0: 0\.002", set()),
     "time_against_error": ("6 methods", {"time_against_error.png"}),
 }  # fmt: skip

@@ -66,9 +66,9 @@ class Weaker(RungeKutta):
         return [0.5 * a for a in super().slope(tree, q, qd, tau, dt, terms)]
 
 
-@pytest.mark.parametrize("own, few", [(Longer, 5), (Weaker, 5), (Weaker, 0)])  # speeds; with more articulated
-def test_another_step_or_slope_is_taken_and_not_kept(own, few, folder, monkeypatch):
-    monkeypatch.setattr(forms, "FEW", few)
+@pytest.mark.parametrize("own, form", [(Longer, 0), (Weaker, 0), (Weaker, 1)])  # composite; articulated
+def test_another_step_or_slope_is_taken_and_not_kept(own, form, folder, monkeypatch):
+    monkeypatch.setattr(forms, "FORMS", forms.FORMS[form : form + 1])
     rk4 = METHODS["rk4"]
     stepping = own(rk4.order, rk4.A, rk4.b, rk4.c)
     monkeypatch.setitem(METHODS, "mine", stepping)

@@ -13,7 +13,7 @@ from tmt.compiled.straight import Traced
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.quantities import QUANTITIES, is_quantity, quantity_of, shape_of, what_is_known
 from tmt.derivation.scalar import Values
-from tmt.model.arguments import checked_model
+from tmt.model.arguments import checked_model, positive
 from tmt.model.tree import Tree, stated
 from tmt.model.values import shown
 
@@ -65,6 +65,9 @@ def text(
     if not isinstance(single, bool) or (single and language not in ("c", "c header")):
         expected = f"single precision is True or False, and in C only (not in {language})"
         raise ValueError(f"single is {shown(single)}; {expected}")
+    if not isinstance(words, list | tuple) or not all(isinstance(word, str) for word in words):
+        raise ValueError(f"parameters is {shown(words)}; a sequence of words is expected")
+    limit = positive("limit", limit, "a number of seconds")
     parameters = checked_parameters(model, language, chosen, words)
     lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
