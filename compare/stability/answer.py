@@ -18,7 +18,7 @@ from .cures import Cure, cures
 from .limits import COARSER, LONGEST, Limit, Tried, limit, tried
 from .naming import limiting
 from .place import Place, in_the_air_at, standing_at
-from .rest import NEAR_REST, SETTLED
+from .rest import SETTLED
 from .runs import growth_in_run, largest_push, observed, own_limit
 
 MOST_POSTURES = 6  # the first keyframes
@@ -241,7 +241,7 @@ def limit_row(
         growth=at.growth.factor,
     )
     row.has_fallen = place.has_fallen
-    if np.abs(place.creep).max(initial=0.0) > MOVING and found.kind != "saddle" and place.left <= NEAR_REST:
+    if moves_on(place, found):
         row.limit, row.predicted_dt = "moving", None
     if found.dt:
         row.gives_way = float(np.abs(distance(model, place.rest, found.rest.state)).max())
@@ -268,6 +268,13 @@ def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
     row.largest_push, row.finer_push = largest_push(
         model, found.first.rest, creep, bool(row.stable_at_file_dt)
     )
+
+
+def moves_on(place: Place, found: Limit) -> bool:
+    """Whether a robot that touches something goes on moving there, slowly, and does not fall."""
+    if found.kind == "saddle" or not place.touching:
+        return False
+    return found.kind == "no rest" or bool(np.abs(place.creep).max(initial=0.0) > MOVING)
 
 
 def holds(found: Limit, dt: float) -> bool | None:

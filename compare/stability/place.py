@@ -11,7 +11,7 @@ import tmt
 from ..engines.mujoco.linear import start_of
 from ..engines.mujoco.reading import Reading
 from ..engines.mujoco.step import Step, distance
-from ..engines.mujoco.variants import has_free_base, in_the_air, of_free_joints, without_dry_friction
+from ..engines.mujoco.variants import has_free_base, in_the_air, of_base, without_dry_friction
 from ..robots.coordinates import Coordinates
 from .limits import SADDLE, grows_by_itself, tried
 from .rest import Rest, relaxed
@@ -62,7 +62,7 @@ class Place:
     def has_fallen(self) -> bool:
         """Whether a free body is far from where it was: a walker that lies."""
         far = np.abs(self.moved) > FALLEN
-        return bool((far & of_free_joints(self.model)).any())
+        return bool((far & of_base(self.model)).any())
 
     @property
     def moved(self) -> np.ndarray:

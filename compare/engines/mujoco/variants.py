@@ -24,6 +24,14 @@ def of_free_joints(model: mujoco.MjModel) -> np.ndarray:
     return np.array(model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE)
 
 
+def of_base(model: mujoco.MjModel) -> np.ndarray:
+    """Which speeds are those of the free joint that carries most mass, (nv,): the robot's base, and not what it holds."""
+    free = [joint for joint in range(model.njnt) if kind_of(model, joint) == "free"]
+    carried = [float(model.body_subtreemass[model.jnt_bodyid[joint]]) for joint in free]
+    base = free[int(np.argmax(carried))] if free else -1
+    return np.array(model.dof_jntid == base)
+
+
 def in_the_air(model: mujoco.MjModel) -> mujoco.MjModel:
     """Without contacts; with a free joint also without gravity, as it would fall."""
     air = copied(model)
