@@ -265,9 +265,7 @@ def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
         own = own_limit(model, place.rest, row.integrator, longest, creep)
         row.own_dt = own if own < longest else None
     row.stable_at_file_dt = row.file_dt <= row.longest
-    row.largest_push, row.finer_push = largest_push(
-        model, found.first.rest, creep, bool(row.stable_at_file_dt)
-    )
+    row.largest_push, row.finer_push = largest_push(model, found.first.rest, creep)
 
 
 def moves_on(place: Place, found: Limit) -> bool:

@@ -19,6 +19,7 @@ USUAL_PUSH = 0.1  # rad/s or m/s: what a robot in use meets
 CALM, CALMER = 1e-3, 0.05  # rad/s or m/s, and of the push: a speed at the end that is rest
 FAR = 0.5  # rad or m: from a rest to what is another one
 AS_FAST, AS_FAST_ALONE, WILD = 2.0, 10.0, 1e3  # fold: of the creep, after a push and without; more has failed
+THROWN = 10.0  # fold, of the push: a speed at the end that no push leaves
 FINER = 8  # the step over the one that shows whether the robot itself bears a push
 
 
@@ -49,28 +50,26 @@ def speed_after(model: mujoco.MjModel, rest: Rest, push: float, dt: float) -> fl
     return float(np.abs(speeds[-steps // 8 :] - rest.speeds).max())
 
 
-def largest_push(
-    model: mujoco.MjModel, rest: Rest, creep: float, is_stable: bool
-) -> tuple[float | None, bool]:
-    """The largest push after which it calms down, rad/s or m/s, and whether it does after none larger at a finer step.
+def largest_push(model: mujoco.MjModel, rest: Rest, creep: float) -> tuple[float, bool]:
+    """The largest push that is survived, rad/s or m/s, 0.0: none; and whether a finer step survives no larger one either.
 
-    creep: of the robot, rad/s or m/s; is_stable: whether the step is. 0.0: after none; None: nothing brakes it, it moves on
-    after any push and at a finer step too.
+    The robot calms down near its rest, or moves on no faster than at a finer step, as what nothing brakes, or little, does.
+    creep: of the robot, rad/s or m/s.
     """
+    dt = rest.step.dt
 
-    def calms(model: mujoco.MjModel, rest: Rest, push: float) -> bool:
-        """Whether the robot calms down near its rest after a push."""
-        calm = max(CALM, CALMER * push, AS_FAST * creep)
-        return speed_after(model, rest, push, rest.step.dt) <= calm
+    def is_survived(push: float) -> bool:
+        speed = speed_after(model, rest, push, dt)
+        if speed <= max(CALM, CALMER * push, AS_FAST * creep):
+            return True
+        return np.isfinite(speed) and speed <= AS_FAST * speed_after(model, rest, push, dt / FINER)
 
-    survived = next((push for push in PUSHES if calms(model, rest, push)), 0.0)
+    survived = next((push for push in PUSHES if is_survived(push)), 0.0)
     if survived == PUSHES[0]:
         return survived, False
-    finer = rest_near(Step(model, rest.step.dt / FINER, rest.step.integrator), rest.state)
-    if is_stable and survived <= CALM and not calms(model, finer, 10.0 * CALM):
-        return None, True
+    finer = rest_near(Step(model, dt / FINER, rest.step.integrator), rest.state)
     next_larger = min(push for push in PUSHES if push > survived)
-    return survived, not calms(model, finer, next_larger)
+    return survived, speed_after(model, finer, next_larger, dt / FINER) > THROWN * next_larger
 
 
 def own_limit(

@@ -90,18 +90,18 @@ def forces_near(step: Step, state: np.ndarray) -> Forces | None:
         np.zeros((len(acting.R), size)),
         np.zeros((len(acting.R), size)),
     )
-    for column, direction in enumerate(NUDGE * np.eye(size)):
-        ends = []
-        for by in (direction, -direction):
+    for column, sides in enumerate(step.sides(state, NUDGE)):
+        ends, apart = [], float((sides[0] - sides[1]).sum())
+        for by in sides:
             step.put(state, by)
             mujoco.mj_forward(step.model, step.data)
             ends.append((smooth(), rows(step, on)))
         (force, ahead), (opposite, behind) = ends
         if ahead is None or behind is None:
             return None
-        forces.smooth[:, column] = (force - opposite) / (2.0 * NUDGE)
-        forces.dR[:, column] = (ahead.R - behind.R) / (2.0 * NUDGE)
-        forces.daref[:, column] = (ahead.aref - behind.aref) / (2.0 * NUDGE)
+        forces.smooth[:, column] = (force - opposite) / apart
+        forces.dR[:, column] = (ahead.R - behind.R) / apart
+        forces.daref[:, column] = (ahead.aref - behind.aref) / apart
         if column < nv:
-            forces.dJf[:, column] = (ahead.J - behind.J).T @ acting.f / (2.0 * NUDGE)
+            forces.dJf[:, column] = (ahead.J - behind.J).T @ acting.f / apart
     return forces

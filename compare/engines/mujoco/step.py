@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import mujoco
 import numpy as np
 
-from .names import INTEGRATORS, bit
+from .names import INTEGRATORS, bit, number_of_actuators
 from .variants import Servo
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
@@ -87,12 +87,26 @@ class Step:
         return self.state()
 
     def derivative(self, state: np.ndarray, nudge: float = NUDGE) -> np.ndarray:
-        """The derivative of a step by the deviation of the state, (n, n), by central differences."""
+        """The derivative of a step by the deviation of the state, (n, n), by differences to the two `sides`."""
         columns = [
-            self.after(state, direction) - self.after(state, -direction)
-            for direction in nudge * np.eye(self.size)
+            (self.after(state, ahead) - self.after(state, behind)) / (ahead - behind).sum()
+            for ahead, behind in self.sides(state, nudge)
         ]
-        return np.array(columns).T / (2.0 * nudge)
+        return np.array(columns).T
+
+    def sides(self, state: np.ndarray, nudge: float) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The two deviations of each difference, (n,): to both sides, of an activation at the end of its range to one.
+
+        A muscle's activation is never below 0, where its time constant is another one.
+        """
+        self.put(state)
+        act, (low, high) = self.data.act.copy(), activation_ranges(self.model)
+        ahead, behind = nudge * np.eye(self.size), -nudge * np.eye(self.size)
+        for place in range(self.model.na):
+            column = 2 * self.model.nv + place
+            ahead[column] *= act[place] + nudge <= high[place]
+            behind[column] *= act[place] - nudge >= low[place]
+        return list(zip(ahead, behind))
 
     def contacts(self) -> int:
         """The number of contacts of the data."""
@@ -163,6 +177,18 @@ class Step:
             if np.abs(data.qvel).max() < still and np.abs(data.qacc).max() < still / self.dt:
                 break
         return state if end is state else self.state()
+
+
+def activation_ranges(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest value of each activation, (na,) each: infinite where it has no range."""
+    low, high = np.full(model.na, -np.inf), np.full(model.na, np.inf)
+    for actuator in range(number_of_actuators(model)):
+        place = model.actuator_actadr[actuator] + model.actuator_actnum[actuator] - 1
+        if model.actuator_dyntype[actuator] == mujoco.mjtDyn.mjDYN_MUSCLE:
+            low[place], high[place] = 0.0, 1.0
+        elif model.actuator_actlimited[actuator]:
+            low[place], high[place] = model.actuator_actrange[actuator]
+    return low, high
 
 
 def distance(model: mujoco.MjModel, start: np.ndarray, end: np.ndarray) -> np.ndarray:
