@@ -47,13 +47,13 @@ def not_empty(text: str) -> str:
     return text
 
 
-def seconds(most: float) -> Callable[[str], float]:
+def seconds(most: float, least: float = 1e-6) -> Callable[[str], float]:
     """A type of options: a time, s."""
 
     def time(text: str) -> float:
-        if 1e-6 <= float(text) <= most:
+        if least <= float(text) <= most:
             return float(text)
-        wrong = f"{text!r} is not a time: expected seconds, from 1e-6 to {most:g}"
+        wrong = f"{text!r} is not a time: expected seconds, from {least:g} to {most:g}"
         raise argparse.ArgumentTypeError(wrong)
 
     return time
@@ -112,7 +112,7 @@ OPTIONS = {
     "--control-period": Option(
         seconds(1.0), "S", example=" --mjcf robot.xml --control-period 0.02 --delay 0.004"
     ),
-    "--delay": Option(seconds(1.0), "S"),
+    "--delay": Option(seconds(1.0, 0.0), "S"),
     "--kp": Option(gain, "KP"),
     "--kv": Option(gain, "KV"),
     "--at-speed": Option(None),

@@ -18,7 +18,7 @@ from jinja2.nodes import EvalContext
 from markupsafe import Markup
 
 from .finding import Finding
-from .words import capital, in_one_line, listed, milliseconds, some_of
+from .words import capital, in_one_line, listed, milliseconds, milliseconds_below, some_of
 
 # markup of Markdown and HTML: anywhere, at the edge of a word, at the beginning of a text
 MARKUP = re.compile(
@@ -80,6 +80,7 @@ FILTERS = {
     "listed": lambda words: listed(list(words)),
     "some": lambda words: some_of(list(words)),
     "milliseconds": milliseconds,
+    "limit": milliseconds_below,
     "capital": capital,
 }
 

@@ -1,6 +1,7 @@
 """Names and lists as parts of sentences."""
 
 from collections.abc import Sequence
+from math import floor, log10
 
 
 def capital(text: str) -> str:
@@ -33,7 +34,17 @@ def some_of(words: Sequence[str], most: int = 6) -> str:
     return f"{', '.join(words[:most])} and {more} more" if more > 0 else listed(words)
 
 
+def milliseconds_below(time: float, near: float | None = None) -> str:
+    """A limit in s as milliseconds does, rounded down: what is printed is within it."""
+    digits = digits_of_time(time, near)
+    last = 10.0 ** (floor(log10(1e3 * time)) + 1 - digits)
+    return f"{float(f'{floor(1e3 * time / last * (1.0 + 1e-12)) * last:.{digits}g}'):g} ms"
+
+
+def digits_of_time(time: float, near: float | None) -> int:
+    return 4 if near and abs(time / near - 1.0) < 0.1 and time != near else 2
+
+
 def milliseconds(time: float, near: float | None = None) -> str:
     """A time in s with two digits, 2 ms; with four where it is near another one."""
-    digits = 4 if near and abs(time / near - 1.0) < 0.1 and time != near else 2
-    return f"{float(f'{1e3 * time:.{digits}g}'):g} ms"
+    return f"{float(f'{1e3 * time:.{digits_of_time(time, near)}g}'):g} ms"

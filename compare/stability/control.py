@@ -19,6 +19,7 @@ from .rest import Rest, rest_near
 
 MOST_PERIOD = 0.5  # s
 MOST_DELAYED = 5  # periods: the longest delay that is tried
+CREPT = 30.0  # fold, of the push at the start
 AT_ONE = 2e-4  # the distance from 1 of a factor that counts as 1: of what nothing holds
 LEAST_PERIODS = 40  # of a run
 LONGER = 1.5  # fold, from one tried number of steps to the next
@@ -77,7 +78,9 @@ class Controlled(NamedTuple):
             step.run_program(start, self.servos, count, steps, delay)
             for start in (self.rest.state, pushed(self.rest, SMALL_PUSH))
         )
-        return has_grown(apart(moved, speeds_of(plain)), count)
+        sizes = apart(moved, speeds_of(plain))
+        least = 0.0 if factor > 1.0 else CREPT * SMALL_PUSH  # less may be what friction lets creep
+        return has_grown(sizes, count) and (len(sizes) < count or bool(sizes[-1] > least))
 
 
 def longest(holds: Callable[[int], bool], first: int, most: int) -> int | None:
@@ -96,7 +99,7 @@ def longest(holds: Callable[[int], bool], first: int, most: int) -> int | None:
 def controlled(
     model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, kp: float | None, kv: float | None
 ) -> Controlled | None:
-    """The servos of a model in a program, at the rest near a state; None: it has none.
+    """The servos of a model in a program, at the rest near a state; None: it has none that reads a state.
 
     kp, kv: gains of actuators that are no servos, in their control over rad or m; their targets are the state.
     """
@@ -120,6 +123,8 @@ def controlled(
         held.commands(servos, start, by) - held.commands(servos, start, -by)
         for by in NUDGE * np.eye(held.size)
     ]
+    if not np.abs(columns).max() > 0.0:  # what they read does not depend on the state
+        return None
     return Controlled(
         rest, servos, held.by_control(start, np.array(places)), np.array(columns).T / (2.0 * NUDGE)
     )

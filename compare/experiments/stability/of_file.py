@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from ...stability.answer import (
     posture_of,
     postures_of,
 )
-from ...stability.control import Controlled, controlled
+from ...stability.control import MOST_PERIOD, Controlled, controlled
 from ...stability.limits import LONGEST, SHORTEST
 from ...stability.motion import Motion, motion
 from ...stability.place import Place, standing_at
@@ -33,6 +34,7 @@ from .tables import LimitRow, StabilityResult
 
 OF = "of_file"  # the template
 RADII_WITHIN = 1e-4  # relative: of the growth in a step, MuJoCo's is by differences
+WHOLE = 1e-9  # of a step: a delay that is so near to whole steps is
 MOST_GROWTH = 10.0  # in a step: with more, differences leave the zone in which the forces are linear
 DEFAULT_STEP, DEFAULT = 0.002, "Euler"  # MuJoCo's step, s, and integrator where a file states none
 GIVES_WAY = 0.1  # rad or m: a rest at the limit so far from that of the file's step is said
@@ -149,7 +151,7 @@ def control_row(posture: Posture, reading: Reading, request: Any, asked: Asked) 
     if found is None:
         return None
     steps = max(1, round(request.control_period / asked.dt))
-    delay = round((request.delay or 0.0) / asked.dt)
+    delay = ceil((request.delay or 0.0) / asked.dt - WHOLE)  # a shorter one would be easier to bear
     is_stable = found.factor(steps, delay) == 1.0
     longest = found.longest_period(delay, steps * is_stable)
     latest = found.longest_delay(steps, delay) if is_stable else 0
@@ -295,12 +297,14 @@ def add_control(result: StabilityResult, row: ControlRow | None) -> None:
         result.not_judged(
             "",
             "stable at its control period",
-            "no actuator is a servo; state --kp and --kv",
+            "no actuator is a servo of a joint; state --kp and --kv, which act on lengths",
             about=About.STEP,
         )
         return
     result.tables.setdefault("control", []).append(row)
-    result.check(row.posture, "stable at its control period", row.growth, 1.0, "", about=About.STEP)
+    most = MOST_PERIOD if row.longest_period is None else row.longest_period
+    allowed = max(most, row.period) if row.is_stable else min(most, (1.0 - 1e-9) * row.period)
+    result.check(row.posture, "stable at its control period", row.period, allowed, "s", about=About.STEP)
     result.check(row.posture, "run of its control period, as predicted", int(row.grows_in_run != row.is_stable), 1, "runs",
                  rule="equal", about=About.PREDICTION)  # fmt: skip
     result.top.append(result.finding("control", OF, row=row))

@@ -15,7 +15,7 @@ EDITS = (
     ("fleet.table", "own_step", 'row.integrator == row.file_integrator', "True", "limits of any integrator"),
     ("command_line", "request", "option in words[:-1]", "False", "a first joint of the other sense is an option"),
     ("command_line", "process_count", "0 < int(text) <= 1024", "True", "a fleet may have no process"),
-    ("command_line", "seconds", "1e-6 <= float(text) <= most", "float(text) <= most", "a step may be negative"),
+    ("command_line", "seconds", "least <= float(text) <= most", "float(text) <= most", "a step may be negative"),
     ("command_line", "expected", "word.casefold()", "word", "a word in capitals is near to none"),
     ("command_line", "stated_reference", "text.lower().endswith(_1)", "text.endswith(_1)", "FILE.XML is no reference"),
     ("fleet.models", "lines_of", "'#@'", "'#'", "a list names further lists"),

@@ -72,7 +72,7 @@ EDITS = (
     ("provenance", "provenance", "Path(model).read_bytes()", "str(model).encode()", "a model's hash is of its name"),
     ("provenance", "commit", "_1 if changed else ''", "''", "changes since a commit are not told"),
     ("words", "scene_of", "max(*_1)", "min(*_1)", "a check is given to the scene of the shortest name"),
-    ("words", "milliseconds", "near and abs(_1) < 0.1 and _2", "False", "a step and the limit near it are the same"),
+    ("words", "digits_of_time", "near and abs(_1) < 0.1 and _2", "False", "a step and the limit near it are the same"),
     ("true_motion", "coarsest_steps", "min(_1)", "max(_1)", "errors are those of the finest steps"),
     # what is drawn, and said of it
     ("stick", "stick_figure", "joint not in tree.parent", "True", "a stick goes to every centre of mass"),

@@ -25,7 +25,10 @@ EDITS = (
     ("stability.place", "beyond_saddles", "grows_by_itself(*_1) and _2", "False", "no saddle is left"),
     ("stability.deviations", "has_grown", "len(sizes) < steps or _1", "False", "a run that is broken off has not grown"),
     ("stability.runs", "speed_after", "_1 > FAR", "False", "what falls over and lies still has survived"),
-    ("stability.runs", "largest_push", "speed_after(model, finer, next_larger, dt / FINER) > THROWN * next_larger", "False", "whatever throws a robot is its own"),
+    (
+        "stability.runs", "largest_push", "speed_after(model, finer, next_larger, dt / FINER) > THROWN * next_larger",
+        "False", "whatever throws a robot is its own",
+    ),
     ("stability.runs", "stays_still", "len(speeds) == steps and _1", "True", "the file's own run always stays still"),
     ("stability.control", "Controlled.period", "max(0, _1)", "0", "a program's delay is none"),
     ("stability.control", "longest", "low, high = (middle, high) if _1 else (low, middle)", "low, high = (low, middle)",
