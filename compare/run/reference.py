@@ -28,6 +28,7 @@ from ..robots.placement import placed
 from ..stability.answer import posture_of
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
+WHOLE = 1e-6  # of a step: a period so near to a multiple of it is one
 SOLUTION = "solution"  # the kind of reference that is another file
 Text = str | None  # None: not given
 
@@ -104,6 +105,9 @@ class Compared(NamedTuple):
                 posture_of(asked["posture"], self.reading)
         except ValueError as error:
             raise ModelError(f"{' '.join(given)}: {error}") from None
+        period, of_step = asked["control_period"], self.reading.dt if dt is None else dt
+        if period and abs(period / of_step - max(1, round(period / of_step))) > WHOLE:
+            raise ModelError(f"--control-period {period:g} is no multiple of the step, {of_step:g} s")
         step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
         return Request(step, **asked)
 

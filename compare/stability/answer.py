@@ -108,9 +108,9 @@ class StepLimitRow(Row):
     @property
     def decided_by_runs(self) -> bool:
         """Whether runs say another limit than the derivative."""
-        return self.limit in ("finite", "none", "moving") and self.longest < 0.95 * (
-            self.predicted_dt or np.inf
-        )
+        if self.limit not in ("finite", "none", "moving"):
+            return False
+        return not 0.95 <= min(self.longest, LONGEST) / (self.predicted_dt or LONGEST) <= 1.05
 
 
 class Posture(NamedTuple):
@@ -142,7 +142,7 @@ def posture_of(asked: str | Sequence[float], reading: Reading) -> Posture:
         numbers = tuple(map(float, asked.split(",") if isinstance(asked, str) else asked))
     except ValueError:
         numbers = ()
-    if len(numbers) != len(reading.qpos0):
+    if len(numbers) != len(reading.qpos0) or not np.isfinite(numbers).all():
         choices = f"{', '.join(named)}, or {len(reading.qpos0)} numbers (deg, m, quaternions)"
         raise ValueError(f"posture {asked} is not one of this file: expected {choices}")
     q = coordinates.from_degrees(numbers, positions=True)

@@ -7,6 +7,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 from ..engines.mujoco.names import integrator_by_name
 from ..engines.mujoco.reading import read
 from .answer import Asked, StepLimitRow, answer, integrators_at_rest, posture_of, postures_of
@@ -62,6 +64,8 @@ def step_limits(
     if isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<"):
         mjcf = Path(mjcf)
     reading = read(cast(Any, mjcf))  # ModelError for what is no model
+    if isinstance(integrators, str) or (dt is not None and not 0.0 < dt < np.inf):
+        raise ValueError(f"expected a sequence of names and a step above 0 s; not {integrators!r}, {dt!r}")
     names = [integrator_by_name(name) for name in integrators or integrators_at_rest()]
     asked = Asked(dt or reading.dt, reading.integrator, names, in_runs=in_runs)
     place = posture_of(posture, reading) if posture is not None else postures_of(reading)[0]

@@ -5,11 +5,13 @@ from collections.abc import Iterable
 import mujoco
 import numpy as np
 
+from ..engines.mujoco.step import Step
 from ..robots.case import SEED
 from .rest import Rest
 
 SMALL_PUSH = 1e-7  # rad/s or m/s: deviations whose growth is judged
 LASTS, LEAST_STEPS, MOST_STEPS = 4.0, 800, 20_000  # s: of a run, and between which numbers of steps
+LITTLE = 1e-6  # of an activation
 GROWN, GROWING = 1e3, 3.0  # fold: of the speed at the start; from the second to the last quarter
 
 
@@ -31,10 +33,20 @@ def steps_in(lasts: float, dt: float) -> int:
 
 
 def pushed(rest: Rest, push: float) -> np.ndarray:
-    """The state at rest with a push, rad/s or m/s, of every speed, this way or that by chance."""
-    nv, by = rest.step.model.nv, np.zeros(rest.step.size)
-    by[nv : 2 * nv] = push * np.random.default_rng(SEED).choice([-1.0, 1.0], nv)
-    return rest.step.moved(rest.state, by)
+    """The state at rest with a push, rad/s or m/s, of every speed, this way or that by chance, and a little of activations."""
+    return rest.step.moved(rest.state, push_of(rest.step, rest.state, push))
+
+
+def push_of(step: Step, state: np.ndarray, push: float) -> np.ndarray:
+    """The deviation of a push, (n,); activations, which may have any unit, stay within their ranges."""
+    nv, by = step.model.nv, np.zeros(step.size)
+    signs = np.random.default_rng(SEED).choice([-1.0, 1.0], step.size)
+    by[nv : 2 * nv] = push * signs[nv : 2 * nv]
+    little = min(push, LITTLE)
+    for place, (ahead, behind) in enumerate(step.sides(state, little)):
+        if place >= 2 * nv:
+            by += ahead if signs[place] > 0.0 or not behind.any() else behind
+    return by
 
 
 def speeds_of(run: Iterable[mujoco.MjData]) -> np.ndarray:

@@ -4,12 +4,13 @@ import mujoco
 import numpy as np
 
 from ..engines.mujoco.step import Step, distance
-from .deviations import GROWN, LASTS, SMALL_PUSH, apart, grows, pushed, speeds_of, steps_in
+from .deviations import GROWN, LASTS, SMALL_PUSH, apart, grows, push_of, pushed, speeds_of, steps_in
 from .limits import COARSER, LONGEST, SHORTEST, Limit
 from .rest import Rest, rest_near
 
 BELOW, ABOVE = 0.97, 1.03  # of a limit: the steps at which runs are to differ
 WITHIN = 1.07  # fold: how near they are then
+OWN_PUSH = 1e-6  # rad/s or m/s: at the start of a file's own run
 CURVE_STEPS, LEAST_SIZES = (
     400,
     16,
@@ -98,7 +99,8 @@ def stays_still(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator:
     """Whether the file's own run from where it sank to stays still."""
     step = Step(model, dt, integrator, exact=False)
     steps, speeds = steps_in(LASTS, dt), []
-    for data in step.run(state, steps):
+    start = step.moved(state, push_of(step, state, OWN_PUSH))
+    for data in step.run(start, steps):
         speeds.append(np.abs(data.qvel).max())
         if not speeds[-1] <= WILD * max(CALM, creep):
             return False

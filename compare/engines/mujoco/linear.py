@@ -9,8 +9,10 @@ from ...robots.actuators import Drive
 from .differences import of_steps
 from .dynamics import Array, MujocoDynamics
 from .names import INTEGRATORS, bit, control_of, element_name, output_of
+from .step import activation_ranges
 
 NUDGE = 1e-6  # of central differences, rad and rad/s
+LITTLE = 1e-6  # of an activation at the start of a run that is pushed
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
 BAD = [int(getattr(mujoco.mjtWarning, f"mjWARN_BADQ{what}")) for what in ("POS", "VEL", "ACC")]
 
@@ -71,6 +73,8 @@ def start_of(
             data.ctrl[place] = 0.0 if actuator.dynamics == "integrator" else value
         if actuator.dynamics != "none":
             data.act[model.actuator_actadr[i]] = value
+    if push.any():  # activations, too: what is pushed nowhere stays where it is
+        data.act[:] = np.clip(data.act + LITTLE, *activation_ranges(model))
     state = np.zeros(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, data, state, STATE)
     return state

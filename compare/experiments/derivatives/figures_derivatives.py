@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 from ...core.finding import Finding
 from ...report.style import BLUE, DASHES, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from .tables import CostRow, DerivativesResult, errors_of
-from .ways import EXACT, INVERSE
+from .ways import EXACT
 
 LEAST = 1e-17  # that is drawn of an error
 COLOURS = BLUE, RED, GREEN, ORANGE, PINK, SKY
@@ -53,7 +53,6 @@ def draw_times(result: DerivativesResult) -> tuple[str, Figure, Finding]:
     fig = Figure(figsize=(WIDTH, 4.0), layout="constrained")
     ax = fig.subplots()
     ways = list(dict.fromkeys(row.way for row in rows))
-    quantities = [*dict.fromkeys(row.quantity for row in rows if row.quantity != INVERSE), INVERSE]
     for k, way in enumerate(ways):
         of_way = [row for row in rows if row.way == way]
         errors = [max(row.error or 0.0, LEAST) for row in of_way]
@@ -61,9 +60,6 @@ def draw_times(result: DerivativesResult) -> tuple[str, Figure, Finding]:
         times = [row.time or 0.0 for row in of_way]
         ax.plot(errors, times, "s" if exact else "o", color=COLOURS[k % len(COLOURS)],
                 markerfacecolor="none" if k >= len(COLOURS) else None, label=way)  # fmt: skip
-        for row, error, time in zip(of_way, errors, times):
-            number = str(quantities.index(row.quantity) + 1)
-            ax.annotate(number, (error, time), (4, 3), textcoords="offset points", fontsize=7)
     ax.set(
         xscale="log",
         yscale="log",
@@ -72,5 +68,4 @@ def draw_times(result: DerivativesResult) -> tuple[str, Figure, Finding]:
     )
     ax.invert_xaxis()
     fig.legend(loc="outside right upper", fontsize=7)
-    numbered = [{"number": k + 1, "name": name} for k, name in enumerate(quantities)]
-    return "derivatives_times", fig, result.finding("times_caption", subject=result.main, quantities=numbered)
+    return "derivatives_times", fig, result.finding("times_caption", subject=result.main)

@@ -259,8 +259,10 @@ def add_answer(
     air = [row for row in here if row.integrator == asked.integrator and row.surroundings == "air" != where]
     alike = [row for row in own if row is not worst and row.stable_at_file_dt == is_stable]
     default = None if is_requested else at_default(worst, others, asked)
+    saddles = [row for row in rows if row.limit == "saddle" and row.integrator == asked.integrator]
     values = {
-        "row": worst, "also": [row.posture for row in alike], "others": others, "air": air[0] if air else None,
+        "row": worst, "saddle": saddles[0] if saddles else None,
+        "also": [row.posture for row in alike], "others": others, "air": air[0] if air else None,
         "default": default, "requested": is_requested, "dt": asked.dt, "integrator": asked.integrator,
         "uncalm": [run for run in runs if run.outcome in ("worse", "fails")], "up_to": LONGEST,
         "usual": USUAL_PUSH, "far": GIVES_WAY,
