@@ -28,7 +28,8 @@ RELAXED_STEPS = 1e-3, 5e-4  # s, the longest step of a relaxed run, and of a fil
 RELAXED = (4.0, 10.0), (3.0, 1.0), (2.0, 0.0)  # s, 1/s: how long its parts last, how fast its speeds decay
 RELAXED_STILL = 1e-6  # rad/s or m/s
 WILD = 100.0  # rad/s or m/s: a relaxed run that is faster has diverged
-LEFT_ALONE, HALVED_STEPS = 1.0, 500  # s, and steps of a run whose speeds are halved after each
+LEFT_ALONE, MOST_ALONE = 1.0, 4000  # s, and steps at most, of a run that is left alone
+HALVED_STEPS = 500  # of a run whose speeds are halved after each step
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,8 @@ def rest_near(step: Step, state: np.ndarray) -> Rest:
     The first run is left alone: it finds a creep if the step is stable. The speeds of the other are halved after each step.
     """
     best = newton(step, state)
-    for steps, share in ((round(LEFT_ALONE / step.dt), 1.0), (HALVED_STEPS, 0.5)):
+    alone = min(round(LEFT_ALONE / step.dt), MOST_ALONE)
+    for steps, share in ((alone, 1.0), (HALVED_STEPS, 0.5)):
         if best.left <= SETTLED:
             break
         for data in step.run(best.state, steps):
