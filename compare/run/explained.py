@@ -84,7 +84,7 @@ def what_follows(setup: Setup) -> dict[str, bool]:
     diagnosis, given = module("diagnosis"), setup.own.of(setup.robot.case())
     found = diagnosis.diagnosed(setup)
     equations = found.ratio <= 1.0 or bool(found.diagnosis.causes)
-    motion = equations and (found.force_ratio <= 1.0 or bool(found.of_forces))
+    motion = equations
     if motion and not found.of_forces and given.has("acceleration"):  # it has asked at a few states
         motion = diagnosis.is_solved(given, setup.robot.tree, setup.random)
     follows = dict.fromkeys(("equations", "gravity", "energy"), equations)

@@ -18,7 +18,6 @@ EDITS = (
     ("run.explained", "lifted_less_work", "np.full(_1, np.nan)", "np.zeros(_1)", "the energy of balls is explained"),
     ("run.explained", "what_follows", "diagnosis.is_solved(*_1)", "True", "accelerations at rare states are explained"),
     ("run.explained", "explained", "_1 not in still", "True", "one wrong number of a file explains all"),
-    ("run.explained", "what_follows", "found.force_ratio <= 1.0 or _1", "True", "any acceleration is explained"),
     ("run.explained", "what_follows", "off <= FACTOR * EPS * scale.weight", "True", "another gravity is explained"),
     ("run.explained", "what_follows", "np.maximum(np.abs(_1), _2)", "np.abs(_1)", "another potential is explained"),
     ("run.explained", "what_follows", "np.maximum(np.abs(_1), _2)", "_2", "another kinetic energy is explained"),
