@@ -147,7 +147,8 @@ def control_row(posture: Posture, reading: Reading, request: Any, asked: Asked) 
     """The controller of --control-period at a posture; None: no actuator is a servo, and there are no gains for them."""
     place = place_asked(posture, reading)
     model = place.frictionless or place.model  # dry friction would hold small deviations at any period
-    found = controlled(model, place.rest, asked.dt, asked.integrator, request.kp, request.kv)
+    state = place.rest if request.kp is None else place.start  # servos made of motors hold the posture itself
+    found = controlled(model, state, asked.dt, asked.integrator, request.kp, request.kv)
     if found is None:
         return None
     steps = max(1, round(request.control_period / asked.dt))
