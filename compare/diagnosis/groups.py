@@ -7,6 +7,7 @@ from numpy import ndarray
 
 from ..core.cause import Cause
 from ..core.words import listed
+from ..robots.inertia import point_inertia
 from .fit import Search
 from .model import Equations, Path
 from .places import INERTIA, SMALL
@@ -24,7 +25,7 @@ def body_columns(equations: Equations) -> ndarray:
     stated, bodies = equations.stated, len(equations.tree.mass)
     for b in range(bodies):
         m, c, I = stated["mass"][b], stated["com"][b], stated["inertia"][b]
-        about_origin = I + m * moved(c)
+        about_origin = I + point_inertia(c, m)
         for k in range(1 + OF_BODY):  # first the base: the mass is larger by 1, and the others stay
             first, tensor = m * c, about_origin.copy()
             if 1 <= k <= 3:
@@ -35,7 +36,7 @@ def body_columns(equations: Equations) -> ndarray:
                 tensor[j, i] = tensor[i, j]
             mass = m + (k < OF_BODY)
             com = first / mass if mass else 0.0 * c
-            new = {"mass": mass - m, "com": com - c, "inertia": tensor - mass * moved(com) - I}
+            new = {"mass": mass - m, "com": com - c, "inertia": tensor - point_inertia(com, mass) - I}
             for field, change in new.items():
                 for at, x in np.ndenumerate(change):
                     path = Path(field, (b, *at))
@@ -44,11 +45,6 @@ def body_columns(equations: Equations) -> ndarray:
     columns = values[:, :OF_BODY] - values[:, :1]
     columns[:, 0] = values[:, 0] - equations.right
     return columns
-
-
-def moved(c: ndarray) -> ndarray:
-    """The tensor of a unit mass at c about the origin, m2."""
-    return np.dot(c, c) * np.eye(3) - np.outer(c, c)
 
 
 def fit(search: Search, columns: ndarray) -> tuple[ndarray, ndarray] | None:
@@ -82,7 +78,7 @@ def loads(equations: Equations, search: Search) -> Iterator[Cause]:
         tensor = np.zeros((3, 3))
         for (_, i, j), x in zip(INERTIA, rest[3:]):
             tensor[i, j] = tensor[j, i] = x
-        tensor = tensor - mass * moved(com)
+        tensor = tensor - point_inertia(com, mass)
         where = ", ".join(f"{x:.5g}" for x in np.where(np.abs(com) < ZERO, 0.0, com))
         explains = f"{mass:.5g} kg, CoM ({where}) m"
         if all(determined[3:]):

@@ -15,8 +15,8 @@ import tmt
 from tmt.derivation.mechanism import origin_in_parent, turn_in_parent
 
 from ..core.words import listed
+from ..robots.inertia import point_inertia
 from .conventions import matrices
-from .groups import moved
 from .model import MOST_SPEEDS, Equations
 from .places import alike, groups
 from .variants import Variant, slip
@@ -170,7 +170,7 @@ class Recursion:
     def inertia(self, b: int, turn: ndarray) -> ndarray:
         """The tensor of a body in the world's axes, (rows, 3, 3)."""
         tree, I = self.tree, np.array(self.tree.inertia[b])
-        about_joint = tree.mass[b] * moved(np.array(tree.com[b]))
+        about_joint = point_inertia(np.array(tree.com[b]), tree.mass[b])
         I = self.step("about the joint", b, self.identity @ I, lambda: self.identity @ (I + about_joint))
         I = self.step("parallel axis", b, I, lambda: I - about_joint)
         turned = self.step("not turned", b, turn @ I @ backward(turn), lambda: I)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...robots.inertia import point_inertia
 from .. import Array
 from ..outside.model import Body, File, Numbers, OtherJoints, OtherNames
 
@@ -101,8 +102,7 @@ def in_world(context: Any, body: Any) -> Body:
     """What Drake has of a body."""
     inertia, pose = body.CalcSpatialInertiaInBodyFrame(context), body.EvalPoseInWorld(context)
     mass, com, turn = inertia.get_mass(), inertia.get_com(), pose.rotation().matrix()
-    of_com = mass * (com @ com * np.eye(3) - np.outer(com, com))
-    about_com = inertia.CalcRotationalInertia().CopyToFullMatrix3() - of_com
+    about_com = inertia.CalcRotationalInertia().CopyToFullMatrix3() - point_inertia(com, mass)
     return Body(mass, pose.translation() + turn @ com, turn @ about_com @ turn.T)
 
 

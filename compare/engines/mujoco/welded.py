@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
+from ...robots.inertia import point_inertia
 from .names import element_name, tensor
 
 # kg and kg m2: more than the least mass that MuJoCo compiles, less than the rounding of any other
@@ -52,7 +53,7 @@ def join(model: mujoco.MjModel, welded: Mapping[int, int]) -> None:
         com, total = masses @ centres / masses.sum(), np.zeros((3, 3))
         for body, mass, centre in zip(group, masses, centres - com):
             total += tensor(data.ximat[body].reshape(3, 3), model.body_inertia[body])
-            total += mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+            total += point_inertia(centre, mass)
         turn = data.xmat[base].reshape(3, 3)
         moments, axes = np.linalg.eigh(turn.T @ total @ turn)
         axes[:, 0] *= np.sign(np.linalg.det(axes))

@@ -13,6 +13,7 @@ from tmt.methods import by_speed
 
 from ...robots.case import SEED
 from ...robots.coordinates import Coordinates, free_joints
+from ...robots.inertia import point_inertia
 from .. import Array, Course
 
 Numbers = Mapping[str, Array]
@@ -288,7 +289,7 @@ def combined(bodies: Iterable[tuple[float, Array, Array]]) -> Body:
     centre = sum((body.mass * body.com for body in parts), np.zeros(3)) / (mass or 1.0)
     for m, com, inertia in parts:
         d = com - centre
-        tensor += inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
+        tensor += inertia + point_inertia(d, m)
     return Body(mass, centre, tensor)
 
 

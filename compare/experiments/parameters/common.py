@@ -9,6 +9,7 @@ import numpy as np
 from ...core.cause import Cause
 from ...core.text import block
 from ...engines.mujoco.parameters import Stated
+from ...robots.inertia import point_inertia
 from .numbers import COMPONENTS
 
 SAME = 1e-9  # relative: a factor, or a number, that is the same at several places
@@ -82,15 +83,10 @@ def load_of(numbers: Sequence[Numbers]) -> dict[str, Any] | None:
     added = mass - stated_mass
     place = (mass * com - stated_mass * stated_com) / added
     about_joint = (by_name["inertia"].compiled - by_name["inertia"].stated).reshape(3, 3)
-    about_joint = about_joint + steiner(mass, com) - steiner(stated_mass, stated_com)
-    low, middle, high = np.linalg.eigvalsh((about_joint - steiner(added, place)) * np.sign(added))
+    about_joint = about_joint + point_inertia(com, mass) - point_inertia(stated_com, stated_mass)
+    low, middle, high = np.linalg.eigvalsh((about_joint - point_inertia(place, added)) * np.sign(added))
     is_body = low >= -SAME * high and high <= (low + middle) * (1.0 + SAME)
     return {"mass": abs(added), "place": place.tolist(), "is_added": added > 0.0} if is_body else None
-
-
-def steiner(mass: float, place: np.ndarray) -> np.ndarray:
-    """The inertia of a point, (3, 3) kg m2."""
-    return mass * (place @ place * np.eye(3) - np.outer(place, place))
 
 
 def common_factor(numbers: Sequence[Numbers]) -> float | None:

@@ -18,5 +18,5 @@ EDITS = (
     ("engines.outside", "read", "model.mend(number, stated[number])", "True", "nothing is set, and it is said to be"),
     ("engines.outside", "OutsideDynamics.acceleration", "tau - passive(*_1)", "tau", "damping is forgotten"),
     ("outside", "OutsideDynamics.ask", "WorkerEnded", "KeyError", "an engine whose process ends breaks the experiment"),
-    ("engines.outside.model", "combined", "m * (_1 - np.outer(d, d))", "0.0", "Steiner's part is forgotten"),
+    ("engines.outside.model", "combined", "point_inertia(d, m)", "0.0", "Steiner's part is forgotten"),
 )  # fmt: skip
