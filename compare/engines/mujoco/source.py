@@ -258,7 +258,7 @@ def leave_out(spec: mujoco.MjSpec, missing: Collection[str]) -> None:
 
 
 def moves(body: mujoco.MjsBody) -> bool:
-    while body is not None:
+    while body.name != "world":  # whose parent is no body, and in MuJoCo 3.10 not even none
         if body.joints:
             return True
         body = body.parent
