@@ -86,14 +86,6 @@ class Search:
         part.size = float(np.linalg.norm(part.off))
         return part
 
-    def in_time(self, fits: Callable[[], list[Fitted]]) -> list[Fitted]:
-        """The fits, [] where the time is over."""
-        try:
-            return fits()
-        except OutOfTime:
-            self.is_finished = False
-            return []
-
     def weighted(self, values: ndarray) -> ndarray:
         """Given values minus others, at the first or all states, in tolerances; 0 where none is given."""
         first = slice(values.shape[-2])

@@ -12,7 +12,7 @@ from .fit import Search
 from .model import Equations, Path
 from .places import INERTIA, SMALL
 
-DIGITS = {5: 1e-9, 3: 1e-5}  # and how exact a number with so many digits is, a share
+DIGITS = {5: 1e-9, 3: 1e-5}  # and how exact a number with that count of digits is, a share
 RANK = 1e-9  # of the largest singular value
 ZERO = 1e-5  # m, or m2: what is no length of a load
 LEAST_LOAD = 1e-6  # of the heaviest body

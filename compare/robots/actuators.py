@@ -38,11 +38,6 @@ class Actuator:
         """Whether it exerts a force by a supported law."""
         return not (self.off or self.refused)
 
-    @property
-    def is_servo(self) -> bool:
-        """Whether its force depends on the length, so that it has a target."""
-        return self.acts and bool(self.bias[1] or self.gain[1])
-
     def target(self, length: float) -> float:
         """The u, within its range, for which a servo has force 0 at this length; other actuators: 0."""
         gain = self.gain[0] + self.gain[1] * length

@@ -17,7 +17,7 @@ from tmt.derivation.method import joint_frames
 from ..core.finding import Finding
 from .joint_map import places_of
 
-SAME = 1e-9  # of the length of a vector: one that is the same but for rounding
+SAME = 1e-9  # of the length of a vector: one that is the same within rounding
 MOST_AXES = 6  # of the first joints: pairs of them are tried
 
 
@@ -148,7 +148,7 @@ def turned(vectors: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def same_vectors(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Whether each of some vectors, (k, 3), is the other but for rounding."""
+    """Whether each of some vectors, (k, 3), is the other within rounding."""
     lengths = np.linalg.norm(vectors, axis=1)
     return np.abs(vectors - others).max(axis=1) <= SAME * lengths
 
@@ -181,7 +181,7 @@ def directions(kind: str, axis: np.ndarray) -> np.ndarray:
 def shifted(
     anchors: np.ndarray, others: np.ndarray, free: Sequence[np.ndarray], tolerance: float
 ) -> np.ndarray:
-    """The shift, (3,) m, with which most anchors, (n, 3), are the others but for free directions; 0 unless more are so then."""
+    """The shift, (3,) m, with which most anchors, (n, 3), are the others apart from free directions; 0 unless more are then."""
 
     def count(shift: np.ndarray) -> int:
         apart = others - anchors - shift

@@ -1,6 +1,6 @@
 """Where a model rests at a step and an integrator, with everything on that its file has on.
 
-A rest is a state that a step leaves as it is but for a creep: v+ = v with the least v, act+ = act. Dry friction and sticking
+A rest is a state that a step leaves as it is apart from a creep: v+ = v with the least v, act+ = act. Dry friction and sticking
 contacts creep in MuJoCo: their force is proportional to the speed. The rest depends on the step, as MuJoCo softens contacts
 whose time constant is below two steps (refsafe), and on the integrator.
 """

@@ -160,7 +160,7 @@ def meant(value: float) -> float:
 
 
 def without_tiny(values: Sequence[float]) -> list[float]:
-    """The components of a vector or tensor; those that are zero but for rounding are zero."""
+    """The components of a vector or tensor; those that only rounding keeps from zero are zero."""
     least = TINY * max(map(abs, values))
     return [value if abs(value) > least else 0.0 for value in values]
 

@@ -79,7 +79,7 @@ def rotation(quaternion: Array, is_forward: bool = True) -> Array:
 
 
 def near(read: Array, stated: Array, share: float = 1e-13) -> Array:
-    """Whether numbers that an engine has read are those stated, but for a share of the largest, for each joint."""
+    """Whether numbers that an engine has read are those stated, within a share of the largest, for each joint."""
     size = np.abs(stated).max(initial=0.0)
     is_near: Array = (np.abs(read - stated) <= share * size).reshape(len(stated), -1)
     return np.asarray(is_near.all(axis=1))

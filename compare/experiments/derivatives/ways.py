@@ -119,7 +119,7 @@ def accelerations(subject: Subject) -> Array:
 
 
 def units_of_speeds(tree: tmt.Tree, blocks: int) -> Array:
-    """Numbers of the units of movements, speeds and torques, so many of these: of slides they are others than of turns."""
+    """A number for the unit of each movement, speed and torque, of which there are these: slides have others than turns."""
     joints = zip(tree.kind, tree.coordinates.joints)
     slides = [kind == "slide" for kind, joint in joints for _ in joint.speeds]
     return np.repeat(np.arange(blocks), len(slides)) * 2 + np.tile(slides, blocks)
