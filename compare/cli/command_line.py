@@ -70,6 +70,13 @@ def gain(text: str) -> float:
     return value
 
 
+def allowed_error(text: str) -> float:
+    """A type of options: an error, rad or m."""
+    if gain(text) > 0.0:
+        return float(text)
+    raise argparse.ArgumentTypeError(f"{text!r} is not an error: expected rad or m, above 0")
+
+
 def process_count(text: str) -> int:
     if not text.isdecimal() or not 0 < int(text) <= 1024:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of processes: expected 1 to 1024")
@@ -116,6 +123,10 @@ OPTIONS = {
     "--kp": Option(gain, "KP"),
     "--kv": Option(gain, "KV"),
     "--at-speed": Option(None),
+    "--error": Option(allowed_error, "E", example=" --mjcf robot.xml --error 0.001 --write smaller.xml"),
+    "--points": Option(metavar="NAMES"),
+    "--controls": Option(metavar="CSV", example=" --mjcf robot.xml --controls recorded.csv"),
+    "--write": Option(metavar="FILE"),
 }
 
 

@@ -1,10 +1,12 @@
-"""Read scenes from a TOML file, one table [[scene]] each."""
+"""Read scenes from a TOML file, one table [[scene]] each, and recorded controls from a CSV file."""
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from .case import Case, Scene
 from .robot import Robot
@@ -57,6 +59,21 @@ def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
     return tuple(scenes)
 
 
+def read_controls(path: str | Path, actuators: Sequence[str]) -> dict[str, np.ndarray]:
+    """The columns of a CSV file: time, s, from 0 on, and controls by the names of actuators. SceneError, in one line."""
+    try:
+        table = pd.read_csv(path).astype(float)
+    except (OSError, ValueError) as error:
+        raise SceneError(f"cannot read the controls of {path}: {' '.join(str(error).split())}") from None
+    names = [name for name in table.columns if name != "time"]
+    if unknown := [name for name in names if name not in actuators]:
+        raise SceneError(f"{path}: there is no actuator {unknown[0]}; expected time and {', '.join(actuators)}")
+    times = table.get("time", pd.Series(dtype=float)).to_numpy()
+    if not (len(times) > 1 and names and times[0] == 0.0 and (np.diff(times) > 0.0).all() and np.isfinite(table).all(axis=None)):
+        raise SceneError(f"{path}: expected numbers, with a column time that rises from 0, and a column of an actuator")
+    return {name: table[name].to_numpy() for name in ("time", *names)}
+
+
 def scene_of(where: str, entry: dict[str, Any], robot: Robot) -> Scene:
     """One entry as a scene of the robot."""
     values = dict(entry)
@@ -85,7 +102,7 @@ def scene_of(where: str, entry: dict[str, Any], robot: Robot) -> Scene:
             raise refused("duration", "a time in s")
         values["dt"] = values["duration"] / STEPS
     try:
-        scene = Scene(**values, judged=0.0, tags=("own",))
+        scene = Scene(**values, judged=0.0, tags=("own", "user"))
         Case(robot, scene)
     except WrongField as error:
         is_q = error.field == "posture" and "q" in entry

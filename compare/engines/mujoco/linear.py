@@ -1,5 +1,6 @@
 """MuJoCo's own steps: their derivatives, runs with its automatic reset, and runs of a file's model as it is."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import mujoco
@@ -67,17 +68,24 @@ def start_of(
     data.qvel[:] += push
     mujoco.mj_fwdPosition(model, data)
     lengths = [data.actuator_length[output_of(model, i)] for i in range(len(drive.actuators))]
-    for i, (actuator, value) in enumerate(zip(drive.actuators, drive.control(key, lengths))):
-        place, inputs = control_of(model, i)
-        if inputs == 1:
-            data.ctrl[place] = 0.0 if actuator.dynamics == "integrator" else value
-        if actuator.dynamics != "none":
-            data.act[model.actuator_actadr[i]] = value
+    put_controls(model, data, drive, drive.control(key, lengths).tolist())
     if push.any():  # activations, too: what is pushed nowhere stays where it is
         data.act[:] = np.clip(data.act + LITTLE, *activation_ranges(model))
     state = np.zeros(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, data, state, STATE)
     return state
+
+
+def put_controls(
+    model: mujoco.MjModel, data: mujoco.MjData, drive: Drive, values: Sequence[float | None]
+) -> None:
+    """Set the controls and activations of the actuators, u of each, see actuators; None: as it is."""
+    for i, (actuator, value) in enumerate(zip(drive.actuators, values)):
+        place, inputs = control_of(model, i)
+        if inputs == 1 and value is not None:
+            data.ctrl[place] = 0.0 if actuator.dynamics == "integrator" else value
+        if actuator.dynamics != "none" and value is not None:
+            data.act[model.actuator_actadr[i]] = value
 
 
 def whole_run(

@@ -178,15 +178,16 @@ def apart(path: Path, other: Path, motion: Motion) -> float:
 
 @dataclass
 class Use:
-    """What a motion used: names of geoms that touched, of what acted, how far each joint moved, and seconds of each stage."""
+    """What a motion used: names of geoms that touched, of what acted, how far each joint moved."""
 
     geoms: set[str] = field(default_factory=set)
     pairs: set[tuple[str, str]] = field(default_factory=set)
     acted: dict[str, set[str]] = field(default_factory=lambda: {kind: set() for kind in (*ACTS, "actuator")})
     has_constraints: bool = False
     ranges: dict[str, float] = field(default_factory=dict)  # rad or m
-    middle: dict[str, Array] = field(default_factory=dict)  # positions (of the joint,), the mean
-    stages: dict[str, float] = field(default_factory=dict)  # s of a step
+    middle: dict[str, Array] = field(
+        default_factory=dict
+    )  # the mean positions of the joints; of one with a quaternion the start
 
 
 def used(model: mujoco.MjModel, motion: Motion, dt: float, integrator: str) -> Use:
@@ -213,8 +214,9 @@ def used(model: mujoco.MjModel, motion: Motion, dt: float, integrator: str) -> U
     q = np.array(path)
     still = Path(m, dt, np.tile(q[0], (len(q), 1)), q)
     use.ranges = movements(Path(m, dt, q, q), still)
-    use.middle = {name: q[:, columns].mean(axis=0) for name, (columns, _) in joints(m).items()}
-    use.stages = stages(d, simulation.steps)
+    for name, (columns, _) in joints(m).items():
+        is_number = columns.stop - columns.start == 1
+        use.middle[name] = q[:, columns].mean(axis=0) if is_number else q[0, columns]
     return use
 
 
@@ -222,10 +224,19 @@ def geom_name(model: mujoco.MjModel, number: int) -> str:
     return element_name(model, "geom", number)
 
 
-def stages(data: mujoco.MjData, steps: int) -> dict[str, float]:
+def stages_of(simulation: Simulation) -> dict[str, float]:
     """Seconds of each stage of a step, by MuJoCo's own timers."""
+    data, steps = simulation.data, simulation.steps
+    mujoco.mj_setState(simulation.model, data, simulation.start, STATE)
+    for inputs in simulation.inputs:
+        data.ctrl[:] = inputs[: simulation.model.nu]
+        mujoco.mj_step(simulation.model, data)
     timers = {name.removeprefix("mjTIMER_"): member for name, member in mujoco.mjtTimer.__members__.items()}
-    taken = {name: data.timer[int(member)].duration / steps for name, member in timers.items() if name != "mjNTIMER"}
+    taken = {
+        name: data.timer[int(member)].duration / steps
+        for name, member in timers.items()
+        if name != "mjNTIMER"
+    }
     seconds = {stage: sum(taken[name] for name in names) for stage, names in TIMERS.items()}
     return seconds | {"sensors and rest": taken["STEP"] - sum(seconds.values()), "whole step": taken["STEP"]}
 

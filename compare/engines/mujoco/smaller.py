@@ -13,7 +13,7 @@ from .calls import library
 from .changed import state_as_compiled
 from .motion import Motion, Use, joints
 from .names import INTEGRATORS, bit, element_name, kind_of, parts_of
-from .source import Source, compiled_without
+from .source import Positions, Source, compiled_without
 from .variants import of_base
 from .welded import compiled
 
@@ -54,10 +54,10 @@ class Smaller:
                     invented.add((elements, element.name))
         return cls(spec, frozenset(invented))
 
-    def edited(self, edit: Callable[["Smaller"], int]) -> tuple["Smaller", int]:
+    def edited(self, edit: "Edit", use: Use) -> tuple["Smaller", int]:
         """A copy from which an edit has taken something out, and how many elements."""
         copy = Smaller(self.spec.copy(), self.invented)
-        count = edit(copy)
+        count = edit(copy, use)
         return Smaller(copy.spec, self.invented), count
 
     def delete(self, elements: str, is_needless: Callable[[object], bool]) -> int:
@@ -132,13 +132,17 @@ def equalities(small: Smaller, use: Use) -> int:
 
 def actuators(small: Smaller, use: Use) -> int:
     """Actuators that never exert a force."""
-    return small.delete("actuators", lambda actuator: actuator.name not in use.acted["actuator"] and not actuator.armature)
+    return small.delete(
+        "actuators", lambda actuator: actuator.name not in use.acted["actuator"] and not actuator.armature
+    )
 
 
 def tendons(small: Smaller, use: Use) -> int:
     """Tendons to which nothing refers, and that have no force."""
     referred = {actuator.target for actuator in small.spec.actuators}
-    referred |= {name for tie in small.spec.equalities for name in (tie.name1, tie.name2)} | use.acted["tendon"]
+    referred |= {name for tie in small.spec.equalities for name in (tie.name1, tie.name2)} | use.acted[
+        "tendon"
+    ]
     return small.delete("tendons", lambda tendon: tendon.name not in referred)
 
 
@@ -165,7 +169,8 @@ def stages(small: Smaller, use: Use) -> int:
     return bin(before[0] ^ option.disableflags).count("1") + bin(before[1] ^ option.enableflags).count("1")
 
 
-FREE: dict[str, Callable[[Smaller, Use], int]] = {
+Edit = Callable[[Smaller, Use], int]
+FREE: dict[str, Edit] = {
     "drawing": drawing, "sensors": sensors, "geoms that never touch": geoms, "equalities without force": equalities,
     "actuators without force": actuators, "tendons without force": tendons, "limits that never act": limits,
     "stages without work": stages,
@@ -195,7 +200,9 @@ def joints_of(model: mujoco.MjModel, tendon: int) -> list[str]:
     """The joints of a fixed tendon."""
     first = model.tendon_adr[tendon]
     wraps = range(first, first + model.tendon_num[tendon])
-    numbers = [model.wrap_objid[wrap] for wrap in wraps if model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT]
+    numbers = [
+        model.wrap_objid[wrap] for wrap in wraps if model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT
+    ]
     return [element_name(model, "joint", number) for number in numbers]
 
 
@@ -204,7 +211,11 @@ def locked(small: Smaller, positions: Mapping[str, np.ndarray]) -> Smaller:
     if not positions:
         return small
     model, spec = small.model, small.spec.copy()
-    gone = {element_name(model, "tendon", i) for i in range(model.ntendon) if {*joints_of(model, i)} & positions.keys()}
+    gone = {
+        element_name(model, "tendon", i)
+        for i in range(model.ntendon)
+        if {*joints_of(model, i)} & positions.keys()
+    }
     for elements in (spec.equalities, spec.actuators, spec.sensors):
         for element in list(elements):
             names = {getattr(element, field, "") for field in ("name1", "name2", "target", "objname")}
@@ -212,21 +223,26 @@ def locked(small: Smaller, positions: Mapping[str, np.ndarray]) -> Smaller:
                 spec.delete(element)
     for tendon in [tendon for tendon in spec.tendons if tendon.name in gone]:
         spec.delete(tendon)
-    at: dict[str, float | tuple[float, ...]] = {}
-    for name, q in positions.items():
-        if kind_of(model, list(joints(model)).index(name)) == "free":
-            at |= dict(zip(parts_of(name), [*q[:3].tolist(), tuple(q[3:].tolist())]))
-        else:
-            at[name] = float(q[0]) if len(q) == 1 else tuple(q.tolist())
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        fixed = compiled_without(spec, at, bare=False)
+        fixed = compiled_without(spec, of_parts(model, positions), bare=False)
     for tie in list(spec.equalities):
         bodies = [mujoco.mj_name2id(fixed, mujoco.mjtObj.mjOBJ_BODY, name) for name in (tie.name1, tie.name2)]
         if min(bodies) >= 0 and len(set(fixed.body_weldid[bodies].tolist())) == 1:
             spec.delete(tie)
     spec.compiler.fusestatic = True
     return Smaller(spec, small.invented)
+
+
+def of_parts(model: mujoco.MjModel, positions: Mapping[str, np.ndarray]) -> Positions:
+    """The positions of joints by the names of those of a Tree."""
+    at: dict[str, float | tuple[float, ...]] = {}
+    for name, q in positions.items():
+        if kind_of(model, list(joints(model)).index(name)) == "free":
+            at |= dict(zip(parts_of(name), [*q[:3].tolist(), tuple(q[3:].tolist())]))
+        else:
+            at[name] = float(q[0]) if len(q) == 1 else tuple(q.tolist())
+    return at
 
 
 def finished(small: Smaller, motion: Motion, dt: float, integrator: str) -> Smaller:
