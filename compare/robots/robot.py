@@ -75,7 +75,7 @@ class Robot:
     """A robot: a file for MuJoCo, the numbers that are compared with it, and scenes.
 
     Tags of scenes: "full only": not in a quick run; "speed": every method is run; "regular": errors are regular from large steps
-    on; "falls": a free body falls and nothing else moves; "own": of a user or a file, only agreement is expected; "user": of a user.
+    on; "falls": a free body falls and nothing else moves; "own": only agreement is expected; "user": of a user.
     """
 
     name: str

@@ -84,7 +84,7 @@ class Compared(NamedTuple):
     reading: Reading | None  # None: the robot's numbers are stated
 
     def request_of(self, options: argparse.Namespace) -> Request:
-        """What the options ask of stability and reduction; ModelError, in one line, for what needs a file or is not of this one."""
+        """What the options ask; ModelError, in one line, for what needs a file or is not of this one."""
         asked = {name: getattr(options, name) for name in (*Request._fields[1:], "dt", "integrator")}
         given = [f"--{name.replace('_', '-')}" for name, value in asked.items() if value]
         if given and self.reading is None:

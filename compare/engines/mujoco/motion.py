@@ -194,7 +194,8 @@ def used(model: mujoco.MjModel, motion: Motion, dt: float, integrator: str) -> U
     """What the motion of a model uses, step by step."""
     simulation, use = Simulation(model, motion, dt, integrator), Use()
     m, d, nu = simulation.model, simulation.data, model.nu
-    path, pairs, rows, forces = [d.qpos.copy()], set(), set(), np.zeros(len(d.actuator_force))
+    path, forces = [d.qpos.copy()], np.zeros(len(d.actuator_force))
+    pairs, rows = set[tuple[int, int]](), set[tuple[int, int]]()
     for inputs in simulation.inputs:
         d.ctrl[:] = inputs[:nu]
         mujoco.mj_step(m, d)
@@ -243,7 +244,8 @@ def stages_of(simulation: Simulation) -> dict[str, float]:
 
 def near(model: mujoco.MjModel, path: Path, touched: set[tuple[str, str]]) -> dict[tuple[str, str], float]:
     """The pairs of geoms that came near and never touched, and their least distances at sampled states, m."""
-    wide, data, pairs = mujoco.MjModel.__copy__(model), mujoco.MjData(model), {}
+    wide, data = mujoco.MjModel.__copy__(model), mujoco.MjData(model)
+    pairs: dict[tuple[str, str], float] = {}
     wide.geom_margin += NEAR
     for q in path.q[:: max(1, len(path.q) // SAMPLES)]:
         data.qpos[:] = q

@@ -5,6 +5,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path as File
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -21,13 +22,14 @@ NAMED = {  # the elements that are known by their names, and their kinds in a co
     "geoms": "geom", "joints": "joint", "actuators": "actuator", "tendons": "tendon",
     "equalities": "equality", "sites": "site", "bodies": "body",
 }  # fmt: skip
+MATCHED = "joint", "actuator"  # of the smaller file with the whole one, by name
 OFF, ALL_DIGITS, USUAL_DIGITS = int(mujoco.mjtLimited.mjLIMITED_FALSE), 17, 6
 DRAWN = "skins", "lights", "cameras", "textures"
 REPORTED = int(mujoco.mjtEnableBit.mjENBL_ENERGY) | int(mujoco.mjtEnableBit.mjENBL_FWDINV)
 
 
 class Smaller:
-    """A spec and its compiled model. Elements have names, also those that have none in the file: `invented` are to be forgotten."""
+    """A spec and its compiled model. All elements have names: those that the file does not state are `invented`."""
 
     def __init__(self, spec: mujoco.MjSpec, invented: frozenset[tuple[str, str]] = frozenset()) -> None:
         self.spec, self.invented = spec, invented
@@ -51,7 +53,8 @@ class Smaller:
             for element in getattr(spec, elements):
                 if not element.name:
                     element.name = element_name(first.model, kind, element.id)
-                    invented.add((elements, element.name))
+                    if kind not in MATCHED:
+                        invented.add((elements, element.name))
         return cls(spec, frozenset(invented))
 
     def edited(self, edit: "Edit", use: Use) -> tuple["Smaller", int]:
@@ -60,14 +63,14 @@ class Smaller:
         count = edit(copy, use)
         return Smaller(copy.spec, self.invented), count
 
-    def delete(self, elements: str, is_needless: Callable[[object], bool]) -> int:
+    def delete(self, elements: str, is_needless: Callable[[Any], bool]) -> int:
         needless = [element for element in getattr(self.spec, elements) if is_needless(element)]
         for element in needless:
             self.spec.delete(element)
         return len(needless)
 
     def text(self, comment: str = "") -> str:
-        """The file with every digit, where the installed MuJoCo can print them, and its meshes at their places on this machine."""
+        """The file with every digit, if the installed MuJoCo can print them; its meshes are those of the whole file."""
         spec = self.spec.copy()
         for elements, name in self.invented:
             for element in [element for element in getattr(spec, elements) if element.name == name]:

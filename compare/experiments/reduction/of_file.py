@@ -31,6 +31,7 @@ TEXT = "reduction_of_file"  # the template
 ERROR = 1e-3  # rad or m, if none is asked for
 TENFOLD = 10.0  # errors that are asked too: a tenth, and ten times as large
 STATES = 5  # random ones, at which the locked models are compared
+OWN_STEP = "smaller file to the file as it is, by its own step"  # a check where no step is exact enough
 DEFAULT = "Euler"  # MuJoCo's integrator where a file states none
 BY_NUMBER = {int(member): name for name, member in INTEGRATORS.items()}
 
@@ -41,16 +42,16 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
     errors = allowed / TENFOLD, allowed, allowed * TENFOLD
     try:
         scene = scene_of(setup, reading)
-    except ValueError as error:
-        result.not_judged("", "a motion with fewer joints", str(error), about=About.PROGRAM)
+    except ValueError as reason:
+        result.not_judged("", "a motion with fewer joints", str(reason), about=About.PROGRAM)
         return
     kinds = take_out(scene)
     free = kinds[-1].file if kinds else scene.whole
     locks = Locks(scene, free, groups_of(scene, free))
     candidates = frontier(scene, locks, errors, setup.quiet)
     best = [best_within(candidates, error) for error in errors]
-    for error, candidate in zip(errors, best):
-        candidate.row.best_for = f"{candidate.row.best_for}, {error:g}".strip(", ")
+    for limit, candidate in zip(errors, best):
+        candidate.row.best_for = f"{candidate.row.best_for}, {limit:g}".strip(", ")
     row, names = best[1].row, locks.names(best[1].groups or ())
     small = finished(best[1].small, scene.motion, row.dt, row.integrator)
     about = {
@@ -71,10 +72,18 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
         "reduction_limits": limits,
     }
     ranges = scene.use.ranges
-    about |= {"count": len(ranges), "own": max((ranges[name] for name in names), default=0.0), "unit": movement_unit(scene.coordinates),
-              "first": candidates[0].row, "best": dict(zip(errors, (candidate.row for candidate in best))),
-              "limits": limits, "free": [kind.row for kind in kinds], "pairs": result.tables["reduction_near"],
-              "is_smooth": not scene.use.has_constraints, "write": setup.request.write}  # fmt: skip
+    about |= {
+        "count": len(ranges),
+        "own": max((ranges[name] for name in names), default=0.0),
+        "unit": movement_unit(scene.coordinates),
+        "first": candidates[0].row,
+        "best": dict(zip(errors, (candidate.row for candidate in best))),
+        "limits": limits,
+        "free": [kind.row for kind in kinds],
+        "pairs": result.tables["reduction_near"],
+        "is_smooth": not scene.use.has_constraints,
+        "write": setup.request.write,
+    }
     result.top[:0] = [
         result.finding(kind, TEXT, found=about) for kind in ("answer", "for_nothing", "gains", "limits")
     ]
@@ -121,25 +130,10 @@ def add_checks(
                  unit, rule="equal")  # fmt: skip
     written = read(Source(text))
     path = Simulation(written.model, scene.motion, written.dt, written.integrator)()
-    error = apart(path, scene.finely(scene.whole), scene.motion)
-    if row.error <= allowed:
-        result.check(
-            name,
-            "error of the smaller file",
-            error,
-            allowed,
-            unit,
-            f"{row.locked} joints locked",
-            about=About.PREDICTION,
-        )
-    else:
-        result.not_judged(
-            name,
-            "error of the smaller file",
-            "no step of any model is within it",
-            unit,
-            about=About.PREDICTION,
-        )
+    is_exact = row.error <= allowed
+    quantity, exact = ("error of the smaller file", scene.finely) if is_exact else (OWN_STEP, scene.run)
+    error = apart(path, exact(scene.whole), scene.motion)
+    result.check(name, quantity, error, allowed, unit, f"{row.locked} joints locked", about=About.PREDICTION)
     at = of_parts(scene.whole.model, locks.positions(chosen.groups or ()))
     compare_locked(result, f"{name}, {row.locked} joints locked", scene.reading.tree.lock(at), written)
 

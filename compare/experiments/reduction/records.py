@@ -97,7 +97,7 @@ class LimitRow(Row):
 
 @dataclass(kw_only=True)
 class FrontierRow(Row):
-    """A model with an integrator and a step: time over error, rad or m. best_for: the allowed errors for which it is the fastest."""
+    """A model with an integrator and a step: time over error, rad or m. best_for: the errors within which it is the fastest."""
 
     model: str
     locked: int

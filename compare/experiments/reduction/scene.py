@@ -49,7 +49,7 @@ class Scene:
 
 
 def scene_of(setup: Setup, reading: Reading) -> Scene:
-    """What is asked for: the first of --scenes; else --controls, or constant ones, from a keyframe. ValueError: it cannot be made."""
+    """The first of --scenes; else --controls, or constant ones, from a keyframe. ValueError where that cannot be."""
     request = setup.request
     points = tuple(request.points.split(",")) if request.points else ()
     whole = Smaller.whole(reading.source, points)

@@ -26,6 +26,7 @@ TRIES = 8  # joints that are tried after the first that costs too much
 FEW = 3  # models with the first 1, 2, 3 groups of joints locked are among those of the chart
 SAMPLES = 10  # states of the prediction
 ROUNDS = 6  # of timing
+AS_FAST = 1.05  # fold: the accuracy of times
 Groups = frozenset[int]  # of joints that are locked, by their numbers
 
 
@@ -143,32 +144,38 @@ class Locks:
 
 
 class Candidate(NamedTuple):
-    """A model with a step and an integrator. groups: that are locked; None: the file with everything."""
+    """A model with a step and an integrator.
+
+    groups: that are locked; None: the file with everything. apart: from the file's run, both by its own step and integrator,
+    rad or m; None: this one has another step or integrator.
+    """
 
     row: FrontierRow
     small: Smaller
     groups: Groups | None
+    apart: float | None
 
 
 def frontier(
-    scene: Scene, locks: Locks, errors: Sequence[float], quiet: Callable[[], None]
+    scene: Scene, locks: Locks, errors: Sequence[float], quiet: Callable[[], object]
 ) -> list[Candidate]:
-    """Each model by each integrator and step: its error against the reference, and its time. errors: that may be allowed.
+    """Each model by each integrator and step: its error against the reference, and its time; the file as it is first.
 
-    The first is the file as it is. Those that are worse than all of the errors are left out.
+    Left out are those that are worse than all of the errors, but for the file's own step.
     """
     sets = {frozenset(range(count)) for count in range(min(FEW, len(locks.groups)) + 1)}
     sets |= {locks.within(error) for error in errors}
-    models: dict[Groups | None, Smaller | None] = {None: scene.whole}
-    models |= {
-        groups: locks.model(groups) for groups in sorted(sets, key=len) if locks.error(groups) < np.inf
-    }
-    reference = scene.finely(scene.whole)
-    candidates, runs, first = list[Candidate](), {}, 0
-    for groups, small in models.items():
-        assert small is not None
+    models: list[tuple[Groups | None, Smaller]] = [(None, scene.whole)]
+    possible = [
+        (groups, locks.model(groups)) for groups in sorted(sets, key=len) if locks.error(groups) < np.inf
+    ]
+    models += [(groups, small) for groups, small in possible if small]
+    reference, own = scene.finely(scene.whole), (scene.reading.integrator, scene.reading.dt)
+    steps = [multiple * scene.reading.dt for multiple in STEPS]
+    candidates, runs = [], []
+    for groups, small in models:
         fine = scene.finely(small)
-        count = 0 if groups is None else len(locks.names(groups))
+        count = len(locks.names(groups or ()))
         name = (
             "whole file"
             if groups is None
@@ -176,28 +183,40 @@ def frontier(
             if count
             else "without what is not used"
         )
-        for integrator, multiple in product(INTEGRATORS, STEPS):
-            dt = multiple * scene.reading.dt
+        for integrator, dt in sorted(product(INTEGRATORS, steps), key=own.__ne__):
             run = Simulation(small.model, scene.motion, dt, integrator)
             path = run()
             row = FrontierRow(
                 model=name, locked=count, integrator=integrator, dt=dt, error=apart(path, reference, scene.motion),
                 error_of_model=apart(fine, reference, scene.motion), error_of_step=apart(path, fine, scene.motion),
             )  # fmt: skip
-            is_own = groups is None and (multiple, integrator) == (1.0, scene.reading.integrator)
+            is_own = (integrator, dt) == own
             if is_own or row.error <= max(errors):
-                runs[len(candidates)] = run
-                candidates.append(Candidate(row, small, groups))
-                first = len(candidates) - 1 if is_own else first
+                candidates.append(
+                    Candidate(row, small, groups, locks.error(groups or frozenset()) if is_own else None)
+                )
+                runs.append(run)
     quiet()
-    seconds = fastest(runs, ROUNDS)
+    seconds = fastest(dict(enumerate(runs)), ROUNDS)
     for number, candidate in enumerate(candidates):
         candidate.row.time_of_second = seconds[number] / scene.motion.duration
-        candidate.row.gain = seconds[first] / seconds[number]
-    return [candidates[first], *candidates[:first], *candidates[first + 1 :]]
+        candidate.row.gain = seconds[0] / seconds[number]
+    return candidates
 
 
 def best_within(candidates: Sequence[Candidate], allowed: float) -> Candidate:
-    """The fastest whose error is within what is allowed; else the file as it is."""
+    """The fastest within an error of the exact motion; if no step is, the fastest within it of the file's own run.
+
+    Of those that are as fast, within the accuracy of times, the one with most joints locked.
+    """
     good = [candidate for candidate in candidates if candidate.row.error <= allowed]
-    return max(good, key=lambda candidate: candidate.row.gain or 0.0, default=candidates[0])
+    if not good:
+        good = [
+            candidate
+            for candidate in candidates
+            if candidate.apart is not None and candidate.apart <= allowed
+        ]
+    fast = max(candidate.row.gain for candidate in good) / AS_FAST
+    return max(
+        good, key=lambda candidate: (candidate.row.gain >= fast, candidate.row.locked, candidate.row.gain)
+    )

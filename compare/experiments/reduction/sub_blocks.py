@@ -80,7 +80,7 @@ def check_blocks(result: Result, where: str, row: SubsetRow, apart: np.ndarray, 
     check = result.check(where, name, apart[worst], tolerance[worst], row.unit, rounding=True)
     row.states, row.largest_difference = len(apart), number_or_none(apart.max())
     row.difference_over_bar = check.over_tolerance
-    result.tables["reduction_subsets"].append(row)
+    result.tables.setdefault("reduction_subsets", []).append(row)
 
 
 def sub_block_differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Differences:
