@@ -1,12 +1,12 @@
 """Read scenes from a TOML file, one table [[scene]] each, and recorded controls from a CSV file."""
 
+import csv
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from .case import Case, Scene
 from .robot import Robot
@@ -62,16 +62,23 @@ def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
 def read_controls(path: str | Path, actuators: Sequence[str]) -> dict[str, np.ndarray]:
     """The columns of a CSV file: time, s, from 0 on, and controls by the names of actuators. SceneError, in one line."""
     try:
-        table = pd.read_csv(path).astype(float)
+        with open(path, encoding="utf-8", newline="") as file:
+            names, *lines = [line for line in csv.reader(file) if line]
+        table = np.array(lines, dtype=float).reshape(-1, len(names)).T
     except (OSError, ValueError) as error:
         raise SceneError(f"cannot read the controls of {path}: {' '.join(str(error).split())}") from None
-    names = [name for name in table.columns if name != "time"]
-    if unknown := [name for name in names if name not in actuators]:
-        raise SceneError(f"{path}: there is no actuator {unknown[0]}; expected time and {', '.join(actuators)}")
-    times = table.get("time", pd.Series(dtype=float)).to_numpy()
-    if not (len(times) > 1 and names and times[0] == 0.0 and (np.diff(times) > 0.0).all() and np.isfinite(table).all(axis=None)):
-        raise SceneError(f"{path}: expected numbers, with a column time that rises from 0, and a column of an actuator")
-    return {name: table[name].to_numpy() for name in ("time", *names)}
+    columns = dict(zip(names, table))
+    if unknown := [name for name in names if name not in ("time", *actuators)]:
+        raise SceneError(
+            f"{path}: there is no actuator {unknown[0]}; expected time and {', '.join(actuators)}"
+        )
+    times = columns.get("time", np.zeros(0))
+    rises = len(times) > 1 and times[0] == 0.0 and bool((np.diff(times) > 0.0).all())
+    if not (rises and len(columns) > 1 and np.isfinite(table).all()):
+        raise SceneError(
+            f"{path}: expected a column time that rises from 0, and numbers of at least one actuator"
+        )
+    return columns
 
 
 def scene_of(where: str, entry: dict[str, Any], robot: Robot) -> Scene:

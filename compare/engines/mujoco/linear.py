@@ -51,11 +51,16 @@ class WholeRun(NamedTuple):
 
 
 def start_of(
-    model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray, q: np.ndarray | None = None
+    model: mujoco.MjModel,
+    drive: Drive,
+    key: str,
+    push: np.ndarray,
+    q: np.ndarray | None = None,
+    controls: Sequence[float | None] = (),
 ) -> np.ndarray:
     """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) rad/s and m/s added to its speeds.
 
-    q: other positions, (nq,), at rest.
+    q: other positions, (nq,), at rest. controls: u of each actuator, None: as it is.
 
     Where no controls are stated the targets of servos are the posture.
     """
@@ -68,24 +73,19 @@ def start_of(
     data.qvel[:] += push
     mujoco.mj_fwdPosition(model, data)
     lengths = [data.actuator_length[output_of(model, i)] for i in range(len(drive.actuators))]
-    put_controls(model, data, drive, drive.control(key, lengths).tolist())
+    values = drive.control(key, lengths)
+    for i, (actuator, own) in enumerate(zip(drive.actuators, values.tolist())):
+        value = own if not controls or controls[i] is None else controls[i]
+        place, inputs = control_of(model, i)
+        if inputs == 1:
+            data.ctrl[place] = 0.0 if actuator.dynamics == "integrator" else value
+        if actuator.dynamics != "none":
+            data.act[model.actuator_actadr[i]] = value
     if push.any():  # activations, too: what is pushed nowhere stays where it is
         data.act[:] = np.clip(data.act + LITTLE, *activation_ranges(model))
     state = np.zeros(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, data, state, STATE)
     return state
-
-
-def put_controls(
-    model: mujoco.MjModel, data: mujoco.MjData, drive: Drive, values: Sequence[float | None]
-) -> None:
-    """Set the controls and activations of the actuators, u of each, see actuators; None: as it is."""
-    for i, (actuator, value) in enumerate(zip(drive.actuators, values)):
-        place, inputs = control_of(model, i)
-        if inputs == 1 and value is not None:
-            data.ctrl[place] = 0.0 if actuator.dynamics == "integrator" else value
-        if actuator.dynamics != "none" and value is not None:
-            data.act[model.actuator_actadr[i]] = value
 
 
 def whole_run(

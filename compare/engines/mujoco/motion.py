@@ -51,13 +51,21 @@ class Motion:
     def of(
         cls,
         model: mujoco.MjModel,
-        data: mujoco.MjData,
+        state: Array,
         name: str,
         duration: float,
         recorded: tuple[Array, Mapping[str, Array]] | None = None,
         points: tuple[str, ...] = (),
+        speeds: Array | None = None,
+        forces: Array | None = None,
     ) -> "Motion":
-        """From the state and the forces of the data. recorded: times, and controls (times,) of some actuators."""
+        """From a state, see linear.start_of. recorded: times, and controls (times,) of some actuators; speeds, forces: (nv,)."""
+        data = mujoco.MjData(model)
+        mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+        if speeds is not None:
+            data.qvel[:] = speeds
+        if forces is not None:
+            data.qfrc_applied[:] = forces
         times, given = recorded or (np.zeros(1), {})
         start = {name: (data.qpos[q].copy(), data.qvel[v].copy()) for name, (q, v) in joints(model).items()}
         inputs, activations = {}, {}
@@ -66,8 +74,8 @@ class Motion:
             inputs[actuator] = np.tile(data.ctrl[places], (len(times), 1))
             if actuator in given:
                 inputs[actuator][:, 0] = given[actuator]
-        forces = {name: data.qfrc_applied[v].copy() for name, (_, v) in joints(model).items()}
-        return cls(name, duration, start, activations, times, inputs, forces, points)
+        applied = {name: data.qfrc_applied[v].copy() for name, (_, v) in joints(model).items()}
+        return cls(name, duration, start, activations, times, inputs, applied, points)
 
     def placed(self, model: mujoco.MjModel) -> mujoco.MjData:
         """The data of a model at the start."""
@@ -219,6 +227,22 @@ def used(model: mujoco.MjModel, motion: Motion, dt: float, integrator: str) -> U
         is_number = columns.stop - columns.start == 1
         use.middle[name] = q[:, columns].mean(axis=0) if is_number else q[0, columns]
     return use
+
+
+def couplings(path: Path, middle: Array) -> Array:
+    """How far each speed would move each other one, were it locked at a position: (nv, nv) rad or m, moved by locked.
+
+    Its own movement times its coupling through M, the largest at sampled states of a path.
+    """
+    model, data = path.model, mujoco.MjData(path.model)
+    costs, inverse, moved = np.zeros((model.nv, model.nv)), np.zeros((model.nv, model.nv)), np.zeros(model.nv)
+    for q in path.q[:: max(1, len(path.q) // SAMPLES)]:
+        data.qpos[:] = q
+        mujoco.mj_forward(model, data)
+        mujoco.mj_solveM(model, data, inverse, np.eye(model.nv))
+        mujoco.mj_differentiatePos(model, moved, 1.0, middle, q)
+        costs = np.maximum(costs, np.abs(inverse / np.diag(inverse) * moved))
+    return costs
 
 
 def geom_name(model: mujoco.MjModel, number: int) -> str:

@@ -24,7 +24,17 @@ from ...stability.answer import Asked, answer, postures_of
 from ..setup import Setup
 from .records import JointRow, LimitRow, PairRow, ReductionResult, StageRow, SubsetRow
 from .scene import Scene, scene_of
-from .search import ROUNDS, Candidate, Kind, Locks, best_within, frontier, groups_of, take_out
+from .search import (
+    ROUNDS,
+    Candidate,
+    Kind,
+    Locks,
+    best_at_own_step,
+    best_within,
+    frontier,
+    groups_of,
+    take_out,
+)
 from .sub_blocks import check_blocks, units_of
 
 TEXT = "reduction_of_file"  # the template
@@ -77,6 +87,7 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
         "own": max((ranges[name] for name in names), default=0.0),
         "unit": movement_unit(scene.coordinates),
         "first": candidates[0].row,
+        "own_step": best_at_own_step(candidates, allowed),
         "best": dict(zip(errors, (candidate.row for candidate in best))),
         "limits": limits,
         "free": [kind.row for kind in kinds],

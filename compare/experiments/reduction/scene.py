@@ -3,15 +3,12 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import mujoco
 import numpy as np
 
-from ...engines.mujoco.linear import put_controls, start_of
+from ...engines.mujoco.linear import start_of
 from ...engines.mujoco.motion import Motion, Path, Simulation, Use, used
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.smaller import Smaller
-from ...engines.mujoco.step import STATE
-from ...robots.case import Case
 from ...robots.coordinates import Coordinates
 from ...stability.answer import posture_of, postures_of
 from ..setup import Setup
@@ -50,36 +47,23 @@ class Scene:
 
 def scene_of(setup: Setup, reading: Reading) -> Scene:
     """The first of --scenes; else --controls, or constant ones, from a keyframe. ValueError where that cannot be."""
-    request = setup.request
+    request, model = setup.request, reading.model
     points = tuple(request.points.split(",")) if request.points else ()
-    whole = Smaller.whole(reading.source, points)
-    data = mujoco.MjData(whole.model)
+    whole, still = Smaller.whole(reading.source, points), np.zeros(model.nv)
     if cases := [case for case in setup.robot.cases if "user" in case.scene.tags]:
-        scene = cases[0].scene
-        put_case(whole.model, data, reading, cases[0])
-        return Scene(reading, Motion.of(whole.model, data, scene.name, scene.duration, points=points), whole)
+        case, scene = cases[0], cases[0].scene
+        if scene.locked or np.any(scene.damping) or not scene.gravity:
+            raise ValueError(f"the scene {scene.name} changes the model: locked, damping or gravity")
+        key = scene.posture if isinstance(scene.posture, str) and scene.posture in reading.keyframes else ""
+        controls, forces = (case.controller.controls, None) if case.controller else ((), case.tau)
+        state = start_of(model, reading.drive, key, still, case.posture, controls)
+        motion = Motion.of(whole.model, state, scene.name, scene.duration, None, points, case.v, forces)
+        return Scene(reading, motion, whole)
     posture = posture_of(request.posture, reading) if request.posture else postures_of(reading)[0]
-    q = np.array(posture.q) if posture.q else None
-    state = start_of(reading.model, reading.drive, posture.key, np.zeros(reading.model.nv), q)
-    mujoco.mj_setState(whole.model, data, state, STATE)
+    state = start_of(model, reading.drive, posture.key, still, np.array(posture.q) if posture.q else None)
     recorded, duration = None, DURATION
     if request.controls:
-        controls = dict(request.controls)
-        times = controls.pop("time")
-        recorded, duration = (times, controls), float(times[-1])
-    return Scene(reading, Motion.of(whole.model, data, posture.name, duration, recorded, points), whole)
-
-
-def put_case(model: mujoco.MjModel, data: mujoco.MjData, reading: Reading, case: Case) -> None:
-    """The start, controls and forces of a user's scene, everything on; ValueError where it changes the model itself."""
-    scene = case.scene
-    if scene.locked or np.any(scene.damping) or not scene.gravity:
-        raise ValueError(f"the scene {scene.name} changes the model: locked, damping or gravity")
-    key = scene.posture if isinstance(scene.posture, str) and scene.posture in reading.keyframes else ""
-    state = start_of(reading.model, reading.drive, key, np.zeros(model.nv), case.posture)
-    mujoco.mj_setState(model, data, state, STATE)
-    data.qvel[:] = case.v
-    if case.controller:
-        put_controls(model, data, reading.drive, case.controller.controls)
-    else:
-        data.qfrc_applied[:] = case.tau
+        controls_at = dict(request.controls)
+        times = controls_at.pop("time")
+        recorded, duration = (times, controls_at), float(times[-1])
+    return Scene(reading, Motion.of(whole.model, state, posture.name, duration, recorded, points), whole)

@@ -6,11 +6,10 @@ from functools import cached_property
 from itertools import product
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
 from ...core.timing import fastest
-from ...engines.mujoco.motion import Path, Simulation, apart, joints
+from ...engines.mujoco.motion import Path, Simulation, apart, couplings, joints
 from ...engines.mujoco.names import INTEGRATORS, joint_places
 from ...engines.mujoco.smaller import FREE, Smaller, locked, tied_joints
 from .records import FreeRow, FrontierRow
@@ -24,7 +23,6 @@ DOES = {
 STEPS = 0.25, 0.5, 1.0, 2.0, 4.0, 8.0  # multiples of the file's
 TRIES = 8  # joints that are tried after the first that costs too much
 FEW = 3  # models with the first 1, 2, 3 groups of joints locked are among those of the chart
-SAMPLES = 10  # states of the prediction
 ROUNDS = 6  # of timing
 AS_FAST = 1.05  # fold: the accuracy of times
 Groups = frozenset[int]  # of joints that are locked, by their numbers
@@ -68,18 +66,9 @@ def groups_of(scene: Scene, free: Smaller) -> list[Group]:
 
     The prediction: were the joint locked, the others would be moved by its own movement times their coupling through M.
     """
-    model, path, use = free.model, scene.run(free), scene.use
+    model, use = free.model, scene.use
     places, kinds = joints(model), {place.joint: place.kind for place in joint_places(model).values()}
-    data, costs = mujoco.MjData(model), np.zeros((model.nv, model.nv))
-    middle, unit = np.hstack([use.middle[name] for name in places]), np.eye(model.nv)
-    for q in path.q[:: max(1, len(path.q) // SAMPLES)]:
-        data.qpos[:] = q
-        mujoco.mj_forward(model, data)
-        inverse, moved = np.zeros((model.nv, model.nv)), np.zeros(model.nv)
-        mujoco.mj_solveM(model, data, inverse, unit)
-        mujoco.mj_differentiatePos(model, moved, 1.0, middle, q)
-        costs = np.maximum(costs, np.abs(inverse / np.diag(inverse) * moved))
-    groups = []
+    costs, groups = couplings(scene.run(free), np.hstack([use.middle[name] for name in places])), []
     for names in tied_joints(model):
         if all(use.ranges[name] <= DOES[kinds[list(places).index(name)]] for name in names):
             speeds = np.r_[tuple(places[name][1] for name in names)]
@@ -205,18 +194,22 @@ def frontier(
 
 
 def best_within(candidates: Sequence[Candidate], allowed: float) -> Candidate:
-    """The fastest within an error of the exact motion; if no step is, the fastest within it of the file's own run.
+    """The fastest within an error of the exact motion; if no step is, see best_at_own_step.
 
     Of those that are as fast, within the accuracy of times, the one with most joints locked.
     """
     good = [candidate for candidate in candidates if candidate.row.error <= allowed]
     if not good:
-        good = [
-            candidate
-            for candidate in candidates
-            if candidate.apart is not None and candidate.apart <= allowed
-        ]
+        return best_at_own_step(candidates, allowed)
     fast = max(candidate.row.gain for candidate in good) / AS_FAST
     return max(
         good, key=lambda candidate: (candidate.row.gain >= fast, candidate.row.locked, candidate.row.gain)
     )
+
+
+def best_at_own_step(candidates: Sequence[Candidate], allowed: float) -> Candidate:
+    """The one with most joints locked within an error of the file's own run, by its step."""
+    good = [
+        candidate for candidate in candidates if candidate.apart is not None and candidate.apart <= allowed
+    ]
+    return max(good, key=lambda candidate: (candidate.row.locked, candidate.row.gain))

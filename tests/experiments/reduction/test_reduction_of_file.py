@@ -9,7 +9,7 @@ from edited import setup_of_file
 
 import tmt
 from compare.core.text import say
-from compare.engines.mujoco.motion import Simulation, apart
+from compare.engines.mujoco.motion import SAMPLES, Simulation, apart
 from compare.engines.mujoco.reading import read
 from compare.engines.mujoco.source import Source
 from compare.experiments.reduction import of_file, search
@@ -17,6 +17,7 @@ from compare.experiments.reduction.records import FrontierRow, ReductionResult
 from compare.experiments.reduction.scene import scene_of
 from compare.experiments.reduction.search import Candidate, best_within, take_out
 from compare.experiments.setup import Request
+from compare.robots.scene_file import SceneError, read_controls
 
 ARM = """<body name="{0}" pos="{1} 0 1"><joint name="{0} upper" axis="0 1 0" damping="0.1" range="-170 170"/>
 <geom size="0.05" mass="1" pos="0 0 -0.2"/><body name="{0} hand" pos="0 0 -0.4">
@@ -32,13 +33,13 @@ active="false"/></equality><tendon><fixed name="slack"><joint joint="left upper"
 <actuator>{SERVOS}<motor name="unused" joint="left lower"/></actuator><sensor><jointpos joint="left upper"/></sensor>
 <keyframe><key name="home" qpos="0 0 0 0"/></keyframe></mujoco>"""
 # a hand with a moving and a still finger, whose two joints a tendon ties
-LINK = '<body pos="{1} 0 0"><joint name="{0}" axis="0 1 0" damping="0.01"{2}/><geom size="0.01" mass="0.02" pos="{1} 0 0"/>'
+LINK = '<body pos="{1} 0 0"><joint name="{0}" axis="0 1 0" damping="0.05"{2}/><geom size="0.01" mass="0.02" pos="{1} 0 0"/>'
 HAND = f"""<mujoco><option integrator="implicitfast"/><worldbody><body><joint name="wrist" axis="0 1 0" damping="1"/>
 <geom size="0.05" mass="0.5"/>{LINK.format("index", 0.1, "")}</body>{LINK.format("thumb", -0.1, "")}
-{LINK.format("thumb tip", -0.1, ' stiffness="20"')}</body></body></body></worldbody>
+{LINK.format("thumb tip", -0.1, ' stiffness="5"')}</body></body></body></worldbody>
 <tendon><fixed name="thumb"><joint joint="thumb" coef="1"/><joint joint="thumb tip" coef="1"/></fixed></tendon>
 <actuator><position name="wrist" joint="wrist" kp="20"/><position name="index" joint="index" kp="2"/>
-<position name="thumb" tendon="thumb" kp="100"/></actuator></mujoco>"""
+<position name="thumb" tendon="thumb" kp="5"/></actuator></mujoco>"""
 TUMBLES = """<mujoco><worldbody><geom type="plane" size="3 3 0.1"/><body pos="0 0 0.3" euler="20 30 0"><freejoint/>
 <geom type="box" size="0.1 0.1 0.1"/></body></worldbody></mujoco>"""
 
@@ -187,15 +188,12 @@ def test_the_joints_that_a_tendon_ties_are_locked_together():
 
 
 def test_the_prediction_is_the_movement_times_the_coupling_through_the_mass_matrix():
-    """Of two hinges: joint 1 locked moves joint 2 by M12 / M22 times its own movement."""
-    arms = scene(
-        HAND.replace('kp="20"/><position name="index"', 'kp="200"/><position name="index"'),
-        controls=waves("index"),
-    )
+    """The others, were they free, would move by M22^-1 M21 times it."""
+    arms = scene(HAND, controls=waves("index"))
     tree = arms.reading.tree
     (group,) = [group for group in search.groups_of(arms, arms.whole) if group.names == {"wrist"}]
     path, expected = arms.run(arms.whole), 0.0
-    for q in path.q[:: len(path.q) // search.SAMPLES]:
+    for q in path.q[:: len(path.q) // SAMPLES]:
         M = np.array(tmt.mass_matrix(q, model=tree))
         moved = np.abs(q[0] - arms.use.middle["wrist"][0])
         expected = max(expected, np.abs(np.linalg.solve(M[1:, 1:], M[1:, 0])).max() * moved)
@@ -235,3 +233,19 @@ def test_recorded_controls_are_held_between_their_times():
     controls = arms.motion.controls(arms.whole.model, 0.05, 6)
     assert controls[:, 0].tolist() == [1.0, 1.0, 2.0, 2.0, 2.0, 2.0] and not controls[:, 1:].any()
     assert arms.motion.duration == 0.3
+
+
+@pytest.mark.parametrize("text, message", [
+    ("time,left upper\n0,1\n0.1,2\n", ""), ("time,elbow\n0,1\n0.1,2\n", "no actuator elbow"), ("time,left upper\n0,x\n", "cannot read"),
+    ("time,left upper\n0.1,1\n0.2,1\n", "rises from 0"), ("time\n0\n1\n", "at least one"), ("", "cannot read"),
+    ("time,left upper\n0,nan\n1,1\n", "numbers"), ("time,left upper\n0,1\n1\n", "cannot read"),
+])  # fmt: skip
+def test_a_file_of_controls_is_read_or_refused_in_one_line(tmp_path, text, message):
+    path = tmp_path / "controls.csv"
+    path.write_text(text)
+    if not message:
+        assert read_controls(path, ["left upper"])["left upper"].tolist() == [1.0, 2.0]
+    else:
+        with pytest.raises(SceneError, match=message) as refused:
+            read_controls(path, ["left upper"])
+        assert "\n" not in str(refused.value)
