@@ -107,11 +107,9 @@ class Locks:
     def error(self, groups: Groups) -> float:
         """Of the joints that stay and the points, rad or m, by the file's step; inf where they cannot be locked."""
         if groups not in self.errors:
-            small = self.model(groups)
-            is_run = small is not None and small.model.nv > 0
-            self.errors[groups] = (
-                apart(self.scene.run(small), self.path, self.scene.motion) if is_run else np.inf
-            )
+            self.errors[groups], small = np.inf, self.model(groups)
+            if small is not None and small.model.nv:
+                self.errors[groups] = apart(self.scene.run(small), self.path, self.scene.motion)
         return self.errors[groups]
 
     @cached_property

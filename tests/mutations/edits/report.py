@@ -87,6 +87,6 @@ EDITS = (
     ("reduction.search", "best_within", "candidate.row.error <= allowed", "True", "any error is within what is allowed"),
     ("reduction.search", "same_bits", "path.q.tobytes() == other.q.tobytes() and _1", "True", "every motion is the same"),
     ("mujoco.motion", "couplings", "np.diag(inverse)", "1.0", "the prediction has no coupling through M"),
-    ("mujoco.motion", "Motion.controls", "side='right'", "side='left'", "a control acts a step too late"),
+    ("mujoco.motion", "Motion.controls", "dt * np.arange(steps) + EARLY", "dt * np.arange(steps) - EARLY", "a control acts a step too late"),
     ("reduction.of_file", "add_checks", "apart(path, *_1)", "row.error", "the written file is not run"),
 )  # fmt: skip
