@@ -8,9 +8,8 @@ import numpy as np
 
 import tmt
 
-from ..engines.mujoco.linear import start_of
 from ..engines.mujoco.reading import Reading
-from ..engines.mujoco.step import Step, distance
+from ..engines.mujoco.step import Step, distance, start_of
 from ..engines.mujoco.variants import has_free_base, in_the_air, of_base, without_dry_friction
 from ..robots.coordinates import Coordinates
 from .limits import SADDLE, grows_by_itself, tried

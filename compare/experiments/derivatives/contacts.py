@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.rows import Row
-from ...engines.mujoco.differences import touching
 from ...engines.mujoco.forces import forces_near
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.step import Step
@@ -42,13 +41,12 @@ def contact_rows(reading: Reading) -> list[ContactRow]:
     forces, nv = forces_near(step, rest.state), place.model.nv
     closed = None if forces is None else matrix(rest, place.tree, forces)[: 2 * nv, : 2 * nv]
     units = units_of_speeds(place.tree, 2)
-    base = touching(step, rest.state, np.zeros(step.size))
+    base = step.touching(rest.state, np.zeros(step.size))
     rows = []
     for eps in SIZES:
         A = step.derivative(rest.state, eps)[: 2 * nv, : 2 * nv]
-        ends = [
-            touching(step, rest.state, by) for by in (*np.eye(step.size) * eps, *np.eye(step.size) * -eps)
-        ]
+        nudges = np.eye(step.size) * eps
+        ends = [step.touching(rest.state, by) for by in (*nudges, *-nudges)]
         changed = sorted(set().union(*(base ^ end for end in ends)))
         off = None if closed is None else relative(A - closed, closed, (units, units))
         rows.append(ContactRow(

@@ -8,7 +8,7 @@ from tmt.methods import METHODS
 
 from ...core.check import Result
 from ...engines import one_of_each_scheme
-from ...engines.mujoco.linear import NUDGE, transition
+from ...engines.mujoco.differences import NUDGE, transition
 from ...judge.scale import EPS, FACTOR
 from ...stability.held import held, posture_names
 from ...stability.linear_step import is_runge_kutta

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core.check import About, Result
 from ...engines import LABELS, Engine
-from ...engines.mujoco.linear import left_to_itself
+from ...engines.mujoco.differences import left_to_itself
 from ...judge.run import diverged_at, step_in_words
 from ...robots.case import Case
 from .subjects import mujoco_of
