@@ -12,7 +12,6 @@ from tmt.exact.many import Pairs, exact_of_many
 
 from ..core import timing
 from ..engines.mujoco.calls import MinimalCalls
-from ..engines.mujoco.dynamics import convective_accelerations
 from ..experiments.quantities import QUANTITIES, Quantity
 from ..judge.agree import closest
 from ..judge.entries import Entries, unit
@@ -90,10 +89,7 @@ class Judge:
     def largest(self, quantity: Quantity, values: Array, exact: Pairs) -> tuple[float, ...]:
         """The largest difference from MuJoCo and its share of the tolerance, then from the exact value."""
         arguments = self.states[: len(quantity.arguments)]
-        if quantity.function == "convective_terms" and self.tree.coordinates.balls:
-            theirs = convective_accelerations(self.mujoco, *arguments)
-        else:
-            theirs = getattr(self.mujoco, quantity.function)(*arguments)
+        theirs = getattr(self.mujoco, quantity.function)(*arguments)
         from_mujoco = values - (theirs if quantity.part is None else theirs[quantity.part])
         scale = getattr(self.scales, quantity.scale)
         if quantity.function == "acceleration":

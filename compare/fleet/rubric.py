@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from ..core.errors import Refused
 from ..core.words import in_one_line, listed, some_of
-from ..robots.validation import is_number
+from ..robots.scene import is_number
 from .cache import RESUME
 from .models import place_of_report
 from .table import FileRow

@@ -12,9 +12,10 @@ from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minut
 from tmt.model.tree import GAINS
 
 from .actuators import Drive, controller
-from .case import Scene
+from .case import Range, Robot
 from .coordinates import Coordinates, fastest_rates, free_joints
-from .robot import Feature, Range, Robot
+from .printed import Feature
+from .scene import Scene
 
 Array = np.ndarray
 DURATION = 1.0  # s; longer free motions are chaotic

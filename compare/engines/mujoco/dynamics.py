@@ -94,7 +94,12 @@ class MujocoDynamics:
         return T, B
 
     def convective_terms(self, q: Array, v: Array) -> Pair:
-        """v_conv, world, and w_conv, body axes, (..., m, 3): mj_jacDot times qvel."""
+        """v_conv, world, and w_conv, body axes, (..., m, 3): mj_jacDot times qvel; with balls accelerations.
+
+        mj_jacDot of MuJoCo 4.0 leaves out what a ball does to a slide after it in the same body.
+        """
+        if self.coordinates.has_balls:
+            return self._convective_accelerations(q, v)
 
         def terms(d: mujoco.MjData) -> np.ndarray:
             def rates(T: np.ndarray, B: np.ndarray, body: int) -> None:
@@ -103,6 +108,25 @@ class MujocoDynamics:
             return self._of_bodies(rates) @ d.qvel[self.dofs]
 
         v_conv, w_conv = np.moveaxis(self._each(terms, q, v), -3, 0)
+        return v_conv, w_conv
+
+    def _convective_accelerations(self, q: Array, v: Array) -> Pair:
+        """The accelerations of the bodies at qacc = 0 without gravity: mj_objectAcceleration."""
+        model, gravity = self.model, self.model.opt.gravity.copy()
+
+        def terms(d: mujoco.MjData) -> Pair:
+            both = np.zeros((len(self.bodies), 6))
+            d.qacc[:] = 0.0
+            mujoco.mj_rnePostConstraint(model, d)
+            for row, body in zip(both, self.bodies):
+                mujoco.mj_objectAcceleration(model, d, mujoco.mjtObj.mjOBJ_BODY, body, row, 0)
+            return both[:, 3:], self._to_body(both[:, :3])
+
+        try:
+            model.opt.gravity[:] = 0.0
+            v_conv, w_conv = np.moveaxis(self._each(terms, q, v), -3, 0)
+        finally:
+            model.opt.gravity[:] = gravity
         return v_conv, w_conv
 
     def mass_matrix(self, q: Array) -> np.ndarray:
@@ -304,26 +328,3 @@ class MujocoDynamics:
             fill(T, B, body)
         T, B = pair[..., self.dofs]
         return np.stack([T, self._to_body(B)])
-
-
-def convective_accelerations(dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray) -> Pair:
-    """v_conv, world, and w_conv, body axes, (states, m, 3): accelerations of the bodies at qacc = 0 without gravity.
-
-    By mj_objectAcceleration, not mj_jacDot as MujocoDynamics.convective_terms. q (states, nq), v (states, nv).
-    """
-    model, gravity = dynamics.model, dynamics.model.opt.gravity.copy()
-
-    def terms(d: mujoco.MjData) -> Pair:
-        both = np.zeros((len(dynamics.bodies), 6))
-        d.qacc[:] = 0.0
-        mujoco.mj_rnePostConstraint(model, d)
-        for row, body in zip(both, dynamics.bodies):
-            mujoco.mj_objectAcceleration(model, d, mujoco.mjtObj.mjOBJ_BODY, body, row, 0)
-        return both[:, 3:], dynamics._to_body(both[:, :3])
-
-    try:
-        model.opt.gravity[:] = 0.0
-        v_conv, w_conv = np.moveaxis(dynamics._each(terms, q, v), -3, 0)
-    finally:
-        model.opt.gravity[:] = gravity
-    return v_conv, w_conv

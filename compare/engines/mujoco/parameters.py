@@ -16,9 +16,9 @@ from ...judge.scale import EPS, FACTOR
 from .dynamics import MujocoDynamics
 from .engine import FROM_4
 from .inventory import LEFT_OUT, OFF, OPEN, contact_pairs
+from .locked import FROM_GEOMS
 from .names import aligns, element_name, joint_name, kind_of, matrix, moving, on, tensor
 from .reading import Reading
-from .locked import FROM_GEOMS
 from .source import Source, is_urdf
 
 # of the equations of motion
