@@ -53,9 +53,9 @@ class Placement:
         vector = Rotation.from_matrix(self.turn).as_rotvec(degrees=True)
         angle = float(np.linalg.norm(vector))
         axis = np.round(vector / (angle or 1.0), 9) + 0.0  # -0 would be shown
-        values = {"shift": self.shift.tolist(), "angle": angle, "axis": axis.tolist(), "along": self.along}
-        values |= {"is_moved": self.is_moved, "is_turned": self.is_turned}
-        values |= {"drawn": self.drawn, "is_with_gravity": self.is_with_gravity}
+        names = ("along", "is_moved", "is_turned", "drawn", "is_with_gravity")
+        values = {name: getattr(self, name) for name in names}
+        values |= {"shift": self.shift.tolist(), "angle": angle, "axis": axis.tolist()}
         return [Finding("remarks", "placed", values)]
 
 

@@ -10,7 +10,7 @@ EDITS = (
     ("mujoco.variants", "in_the_air", "has_free_base(model)", "False", "in the air a free base falls"),
     ("mujoco.variants", "add_armature", "model.dof_M0 += more", "pass", "a body that never changes stays as it is"),
     ("mujoco.variants", "Servo.force", "np.clip(_1, *_2)", "float(_1)", "a program has no range of force"),
-    ("mujoco.variants", "held_servos", "-(kv or 0.0)", "0.0", "--kv is none"),
+    ("mujoco.variants", "servo_bias", "-(kv or 0.0)", "0.0", "--kv is none"),
     ("closed_form", "mass_and_force", "forces.dJf - bias_slope(*_1)", "forces.dJf + bias_slope(*_1)", "weight pulls upwards"),
     ("closed_form", "mass_and_force", "np.diag(rows.R)", "0.0", "contacts are rigid"),
     ("closed_form", "implicit", "damping * on(*_1)", "damping", "Euler always has damping implicit"),
