@@ -7,7 +7,7 @@ from numpy import ndarray
 
 from ..core.cause import Cause
 from ..core.words import listed
-from ..robots.inertia import point_inertia
+from ..robots.coordinates import point_inertia
 from .fit import Search
 from .model import Equations, Path
 from .places import INERTIA, SMALL

@@ -15,7 +15,7 @@ import tmt
 from tmt.derivation.mechanism import origin_in_parent, turn_in_parent
 
 from ..core.words import listed
-from ..robots.inertia import point_inertia
+from ..robots.coordinates import point_inertia
 from .conventions import matrices
 from .model import MOST_SPEEDS, Equations
 from .places import alike, groups

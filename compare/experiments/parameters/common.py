@@ -9,7 +9,7 @@ import numpy as np
 from ...core.cause import Cause
 from ...core.text import block
 from ...engines.mujoco.parameters import Stated
-from ...robots.inertia import point_inertia
+from ...robots.coordinates import point_inertia
 from .numbers import COMPONENTS
 
 SAME = 1e-9  # relative: a factor, or a number, that is the same at several places
