@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from tmt.arm import ARM
 from tmt.derivation.quantities import State, argument_of, quantity_of
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.vectors import Scalar
 from tmt.methods import method_named, transition
 from tmt.model import singular
 from tmt.model.arguments import states

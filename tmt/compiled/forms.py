@@ -12,8 +12,7 @@ from tmt.derivation.dual import seeded
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms, reduced_force
 from tmt.derivation.quantities import Form, State, Step, argument_of, quantity_of
-from tmt.derivation.scalar import Rows, Scalar, Values
-from tmt.derivation.vectors import Scalars
+from tmt.derivation.vectors import Rows, Scalar, Scalars, Values
 from tmt.methods import Linearized, method_named, one_step
 from tmt.methods.derivatives import is_straight
 from tmt.methods.dynamics import Dynamics, Held, acts_at_single_joints, minus, plus

@@ -10,7 +10,7 @@ from typing import Any
 
 from tmt.derivation.coordinates import FLAT
 from tmt.derivation.dual import seeded
-from tmt.derivation.scalar import Values
+from tmt.derivation.vectors import Values
 from tmt.methods.dynamics import minus, plus
 from tmt.methods.implicit import CLOSE, ITERATIONS
 from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED, Joints

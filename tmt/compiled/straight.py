@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.vectors import Scalar
 
 from .ir import DOUBLE, POINTER, Code, Value, wide
 from .sine import sincos

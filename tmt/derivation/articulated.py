@@ -18,12 +18,10 @@ of Mbar with n times the length of the paths to the world.
 from collections.abc import Callable
 from typing import NamedTuple
 
-from tmt.derivation.scalar import Scalar, Values
-
 from .composite import Distribution, rounded, turning
 from .mechanism import AnyTree, turn_in_parent
 from .method import reduced_force, with_rotors
-from .vectors import IDENTITY, ZERO, Matrix, Scalars, Vector, outer
+from .vectors import IDENTITY, ZERO, Matrix, Scalar, Scalars, Values, Vector, outer
 
 
 class Symmetric(NamedTuple):

@@ -20,11 +20,9 @@ from typing import NamedTuple
 
 import mpmath
 
-from tmt.derivation.scalar import Scalar
-
 from .mechanism import AnyTree, origin_in_parent, turn_in_parent
 from .method import with_rotors
-from .vectors import ZERO, Matrix, Scalars, Vector, outer, total_vector
+from .vectors import ZERO, Matrix, Scalar, Scalars, Vector, outer, total_vector
 
 Placement = tuple[Vector, Matrix]  # origin (m) and turn of a frame in its parent's
 

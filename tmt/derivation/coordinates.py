@@ -14,9 +14,7 @@ IV.8), here for u that turns with the body: omega + u x omega / 2 + c u x (u x o
 from functools import lru_cache
 from typing import NamedTuple
 
-from tmt.derivation.scalar import Scalar
-
-from .vectors import Scalars, Vector, arctan, cos, sin, sqrt
+from .vectors import Scalar, Scalars, Vector, arctan, cos, sin, sqrt
 
 KINDS = {"hinge": (1, 1), "slide": (1, 1), "ball": (4, 3)}  # how many numbers of q and of qd
 TINY = 1e-300  # under a root: its own square root is far below any rounding, and no direction is undefined

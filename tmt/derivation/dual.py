@@ -8,9 +8,7 @@ level of its own, and a number of another level is a constant to it.
 from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 
-from tmt.derivation.scalar import Scalar
-
-from .vectors import Scalars, arctan, cos, sin, sqrt
+from .vectors import Scalar, Scalars, arctan, cos, sin, sqrt
 
 levels = count()
 

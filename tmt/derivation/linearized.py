@@ -22,11 +22,9 @@ Sums of this kind, over six coordinates: Singh, Russell, Wensing, IEEE Robotics 
 from collections.abc import Callable
 from typing import NamedTuple
 
-from tmt.derivation.scalar import Rows, Scalar
-
 from .articulated import Direction, Frame, Rigid, gathered, outward
 from .mechanism import AnyTree
-from .vectors import ZERO, Matrix, Scalars, Vector, outer
+from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Vector, outer
 
 
 class Motion(NamedTuple):

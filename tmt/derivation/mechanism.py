@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
-from tmt.derivation.scalar import Scalar
-
 from .coordinates import Coordinates, coordinates_of
-from .vectors import IDENTITY, Matrix, Scalars, Vector, rotation, turn_of
+from .vectors import IDENTITY, Matrix, Scalar, Scalars, Vector, rotation, turn_of
 
 Number = TypeVar("Number")
 UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -23,11 +23,9 @@ unless they are said to be in body axes.
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from tmt.derivation.scalar import Rows, Scalar, Values
-
 from .dual import jacobian
 from .mechanism import AnyTree, origin_in_parent, turn_in_parent
-from .vectors import IDENTITY, ZERO, Matrix, Scalars, Vector, solve, total, total_vector
+from .vectors import IDENTITY, ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, solve, total, total_vector
 
 Terms = Callable[[AnyTree, Scalars, Scalars], tuple[Rows, Values]]  # Mbar and h
 

@@ -8,12 +8,10 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from tmt.derivation.scalar import Rows, Scalar, Values
-
 from . import method
 from .dual import jacobian, unit_vectors
 from .mechanism import AnyTree
-from .vectors import ZERO, Factors, Scalars
+from .vectors import ZERO, Factors, Rows, Scalar, Scalars, Values
 
 Step = Callable[
     [Values, Values, Values, Scalar], tuple[Values, Values]

@@ -7,7 +7,7 @@ from functools import reduce
 
 from sympy import Add, Integer, Mul, Rational, cos, gcd, sin
 
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.vectors import Scalar
 
 from .names import Names
 from .names import number as exact_number

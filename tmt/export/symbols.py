@@ -10,7 +10,7 @@ from sympy.printing.str import StrPrinter
 
 from tmt.arm import ARM
 from tmt.derivation.quantities import State
-from tmt.derivation.scalar import Rows, Scalar, Values
+from tmt.derivation.vectors import Rows, Scalar, Values
 from tmt.model.tree import Tree
 
 from .names import EPS, Names, Parameter, Symbols, number

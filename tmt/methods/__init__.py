@@ -7,7 +7,7 @@ code, see tmt.compiled). METHODS may be given further ones, and objects of a use
 from dataclasses import dataclass
 
 from tmt.derivation.coordinates import FLAT
-from tmt.derivation.scalar import Rows, Scalar, Values
+from tmt.derivation.vectors import Rows, Scalar, Values
 from tmt.methods import dop853
 from tmt.methods.derivatives import Linearized as Linearized
 from tmt.methods.derivatives import amplification as amplification

@@ -16,8 +16,7 @@ from tmt.derivation.dual import Dual, seeded
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import reduced_force
 from tmt.derivation.quantities import Form, State, added
-from tmt.derivation.scalar import Rows, Scalar, Values
-from tmt.derivation.vectors import Factors, is_zero, solve_any, total
+from tmt.derivation.vectors import Factors, Rows, Scalar, Values, is_zero, solve_any, total
 from tmt.methods.dynamics import Dynamics, Held, Implicit, Terms, acts_at_single_joints, minus, plus
 from tmt.methods.stepping import Method, stepped
 from tmt.methods.stepping import State as Reached

@@ -9,8 +9,7 @@ from typing import NamedTuple
 from tmt.derivation import method
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms as Terms
-from tmt.derivation.scalar import Rows, Scalar, Values
-from tmt.derivation.vectors import Scalars, solve, solve_any
+from tmt.derivation.vectors import Rows, Scalar, Scalars, Values, solve, solve_any
 
 
 class Implicit(NamedTuple):

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from tmt.derivation.coordinates import FLAT
 from tmt.derivation.mechanism import AnyTree
-from tmt.derivation.scalar import Scalar, Values
+from tmt.derivation.vectors import Scalar, Values
 from tmt.methods.dynamics import LITERAL, Implicit, Terms, dynamics_of
 from tmt.methods.stepping import Joints, Method, Slope, State, advance, increments
 

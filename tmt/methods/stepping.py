@@ -9,7 +9,7 @@ from typing import Any
 
 from tmt.derivation.coordinates import FLAT, Coordinates, Flat
 from tmt.derivation.mechanism import AnyTree
-from tmt.derivation.scalar import Scalar, Values
+from tmt.derivation.vectors import Scalar, Values
 from tmt.methods.dynamics import LITERAL, Terms, dynamics_of
 from tmt.model.values import shown
 
