@@ -15,7 +15,6 @@ from compare.judge.scale import EPS, FACTOR
 from tmt.compiled.evaluator import Evaluator
 from tmt.exact.many import exact_of_many
 from tmt.exact.values import distance, exact
-from tmt.methods.derivatives import is_straight
 
 CENTRAL = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}  # weights of the difference of order 8
 STEP = 0.02
@@ -29,7 +28,7 @@ MANY = (
     "quadruped",
     "humanoid29_free",
 )  # they take long to trace with many digits
-STRAIGHT = [name for name, method in tmt.METHODS.items() if is_straight(method) and method.stages <= 4]
+STRAIGHT = [name for name, method in tmt.METHODS.items() if not method.solves_stages and method.stages <= 4]
 
 
 def model(name):

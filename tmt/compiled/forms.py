@@ -14,9 +14,7 @@ from tmt.derivation.method import Terms, reduced_force
 from tmt.derivation.quantities import Form, State, Step, argument_of, quantity_of
 from tmt.derivation.vectors import Rows, Scalar, Scalars, Values
 from tmt.methods import Linearized, method_named, one_step
-from tmt.methods.derivatives import is_straight
-from tmt.methods.dynamics import Dynamics, Held, acts_at_single_joints, minus, plus
-from tmt.methods.stepping import Method
+from tmt.methods.stepping import Dynamics, Held, Method, minus, plus
 from tmt.model.tree import Tree
 
 from .straight import Traced, trace
@@ -59,7 +57,7 @@ class Traceable(Dynamics):
     def acceleration(
         self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
     ) -> Values:
-        if not self.by_bodies or (implicit and not acts_at_single_joints(implicit)):
+        if not self.by_bodies or (implicit and not implicit.acts_at_single_joints):
             return super().acceleration(tree, q, qd, tau, implicit)
         force, armature = reduced_force(tree, [0.0] * self.n, q, qd, tau), list(tree.armature)
         if implicit:
@@ -124,7 +122,7 @@ def quantity(tree: Tree, name: str, more: Sequence[int] = (), tree_of: TreeOf | 
 def straight_step(tree: AnyTree, name: str, form: Form) -> Step:
     """A step of the method of that name without loops; ValueError of one that solves its stages."""
     stepping = method_named(name)
-    if not is_straight(stepping):
+    if stepping.solves_stages:
         raise ValueError(f"a step of {name} is no fixed row of operations: NumPy alone gives its derivatives")
     dynamics = Linearized(form)
     return lambda q, qd, tau, dt: one_step(stepping, tree, q, qd, tau, dt, dynamics)

@@ -31,9 +31,8 @@ class Runner:
     float64 and memory of their own, which is not checked.
     """
 
-    def __init__(self, tree: Tree, stepping: Method, entry: object):
+    def __init__(self, tree: Tree, stepping: Method):
         self.tree, self.stepping = tree, stepping
-        self.entry = entry  # of METHODS, which may be a user's own object
         self.functions: dict[int, Callable[..., None]] = {}
 
     def compiled(self, width: int) -> Callable[..., None]:
@@ -104,10 +103,10 @@ def runner_of(tree: Tree, name: str) -> Runner:
     """The Runner of a tree and the method of that name as it is now; ValueError if they are none."""
     runner = runners.get((id(tree), name)) if type(name) is str else None
     # whose tree is held, so that no other has its id
-    if runner is None or runner.entry is not METHODS.get(name):
+    if runner is None or runner.stepping is not METHODS.get(name):
         checked_model(tree)
         stepping = method_named(name)
         if len(runners) >= MOST:
             runners.clear()
-        runners[id(tree), name] = runner = Runner(tree, stepping, METHODS[name])
+        runners[id(tree), name] = runner = Runner(tree, stepping)
     return runner

@@ -11,9 +11,8 @@ from typing import Any
 from tmt.derivation.coordinates import FLAT
 from tmt.derivation.dual import seeded
 from tmt.derivation.vectors import Values
-from tmt.methods.dynamics import minus, plus
 from tmt.methods.implicit import CLOSE, ITERATIONS
-from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED, Joints
+from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED, Joints, minus, plus
 from tmt.model.tree import Tree
 
 from . import forms, linear
