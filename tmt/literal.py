@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tmt.arm import ARM
-from tmt.derivation.quantities import State, argument_of, quantity_of
+from tmt.derivation.quantities import PLAIN, State, argument_of, quantity_of
 from tmt.derivation.vectors import Scalar
 from tmt.methods import method_named, transition
 from tmt.model import singular
@@ -20,6 +20,12 @@ from tmt.model.tree import Tree
 
 SOLVED = ("acceleration", "inverse_mass_matrix", "derivatives")  # for which Mbar must be regular
 BEYOND = "the result is beyond the largest double; smaller numbers in the state or model are expected"
+
+
+def __getattr__(name: str) -> Callable[..., Any]:
+    if name not in PLAIN:
+        raise AttributeError(name)
+    return literal(name)
 
 
 def literal(name: str) -> Callable[..., Any]:
@@ -92,20 +98,3 @@ def gather(nested: Scalar, batch: tuple[int, ...], overflow: float | None = None
         raise ValueError(BEYOND)
     components = array.ndim - len(batch)
     return np.moveaxis(array, range(components), range(-components, 0)).copy()
-
-
-com_positions = literal("com_positions")
-angular_velocities = literal("angular_velocities")
-jacobians = literal("jacobians")
-convective_terms = literal("convective_terms")
-mass_matrix = literal("mass_matrix")
-inverse_mass_matrix = literal("inverse_mass_matrix")
-bias = literal("bias")
-gravity_balance = literal("gravity_balance")
-spring_torque = literal("spring_torque")
-acceleration = literal("acceleration")
-inverse_dynamics = literal("inverse_dynamics")
-derivatives = literal("derivatives")
-inverse_dynamics_derivatives = literal("inverse_dynamics_derivatives")
-potential_energy = literal("potential_energy")
-energy = literal("energy")

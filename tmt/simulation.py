@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from tmt.arm import ARM
 from tmt.compiled.runner import Ended, runner_of
-from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED
+from tmt.methods.stepping import DIVERGED, NEWTON, SMALL
 from tmt.model import arguments, singular
 from tmt.model.tree import Tree
 from tmt.model.values import shown
@@ -180,37 +180,24 @@ def reasons(
     if tree.never_singular and not codes.any():
         return ended
     words = {
-        OVERFLOW: "the motion diverges: within a step its numbers overflow, or its angles pass 2^49 rad",
-        TURNED: "a hinge turns by 2^49 rad or more, where doubles are too far apart for a sine",
+        DIVERGED: "the motion diverges: its numbers overflow within a step, or a hinge passes 2^49 rad",
         NEWTON: f"Newton's method does not find the stages of a step of {dt:g} s",
         SMALL: f"the tolerance of {tolerance:g} would need steps below 1e-9 dt",
     }
     for run, (code, step) in enumerate(codes.tolist()):
-        place = None if tree.never_singular else singular_step(tree, q[run], qd[run], every, between, run)
-        if place:
+        why = words.get(code)
+        if place := singular_step(tree, q[run], qd[run], every, between, run):
             step, why = place
             q[run, step // every + 1 :] = qd[run, step // every + 1 :] = np.nan
-        elif code:
-            record, last = divmod(step, every)
-            states = between(run, record) if last and between else (q[run, record:], qd[run, record:])
-            why = words[cause(tree, code, states[0][last], states[1][last], dt)]
-        if place or code:
+        if why:
             ended[run] = f"at t = {step * dt:g} s: {why}"
     return ended
 
 
-def cause(tree: Tree, code: int, q: np.ndarray, qd: np.ndarray, dt: float) -> int:
-    """The code of what ended a run after this state: a hinge far from there has no sine at the stages of the next step."""
-    hinges = [joint for joint in tree.coordinates.joints if joint.kind == "hinge"]
-    reach = max((max(abs(q[joint.q.start]), dt * abs(qd[joint.qd.start])) for joint in hinges), default=0.0)
-    if code in (OVERFLOW, NEWTON) and reach > 2.0**48:
-        return TURNED
-    # neither the state nor its speed leads there: what it turned by came from within the step
-    return OVERFLOW if code == TURNED and not reach > 2.0**48 else code
-
-
 def singular_step(tree: Tree, q: Array, qd: Array, every: int, between: Between | None, run: int) -> Place:
     """The first step after which Mbar is singular, and why; between records as well, where it would show."""
+    if tree.never_singular:
+        return None
     place = singular_in(tree, q, qd)
     places = [(place[0] * every, place[1])] if place else []
     if between and every > 1:

@@ -12,7 +12,7 @@ from tmt.derivation.coordinates import FLAT
 from tmt.derivation.dual import seeded
 from tmt.derivation.vectors import Values
 from tmt.methods.implicit import CLOSE, ITERATIONS
-from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED, Joints, minus, plus
+from tmt.methods.stepping import DIVERGED, NEWTON, SMALL, Joints, minus, plus
 from tmt.model.tree import Tree
 
 from . import forms, linear
@@ -284,12 +284,13 @@ def run(step: Step, advance: Advance) -> Code:
 
 def unsound(code: Code, tree: Tree, state: Value, width: int) -> Value:
     """Why a state cannot be gone on from; 0: it can."""
-    kind, indices = wide(DOUBLE, width), wide(INDEX, width)
+    kind = wide(DOUBLE, width)
     hinges = [joint.q.start for joint in tree.coordinates.joints if joint.kind == "hinge"]
     total, angles = Variable(code, kind, 0.0), code.number(0.0, kind)
     for k in code.each(tree.coordinates.nq + tree.coordinates.nv):
         total.set(total.get() + state.load(k * width, kind))
     for k in hinges:
         angles = angles + state.load(k * width, kind).function("fabs")
-    turned = angles.compare("lt", LIMIT).choose(code.number(0, indices), TURNED)
-    return total.get().function("fabs").compare("lt", float("inf")).choose(turned, OVERFLOW)
+    sound = total.get().function("fabs").compare("lt", float("inf"))
+    sound = sound.bits("and", angles.compare("lt", LIMIT))
+    return sound.choose(code.number(0, wide(INDEX, width)), DIVERGED)

@@ -50,6 +50,14 @@ class Mechanism(Generic[Number]):
         return coordinates_of(self.kind)
 
     @property
+    def zero(self) -> tuple[Number | float, ...]:
+        """The reference position, (nq,): every frame is parallel to the inertial frame."""
+        position: tuple[Number | float, ...] = ()
+        for kind, reference in zip(self.kind, self.reference):
+            position += (1.0, 0.0, 0.0, 0.0) if kind == "ball" else (reference,)
+        return position
+
+    @property
     def has_springs(self) -> bool:
         return any(self.stiffness)
 

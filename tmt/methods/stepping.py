@@ -17,7 +17,7 @@ from tmt.derivation.vectors import Rows, Scalar, Scalars, Values, solve, solve_a
 Slope = Callable[[Values, Values], Values]
 State = tuple[Values, Values]
 Joints = Coordinates | Flat
-OVERFLOW, TURNED, NEWTON, SMALL = 1, 2, 3, 4  # why a run ends; 0: it does not
+DIVERGED, NEWTON, SMALL = 1, 2, 3  # why a run ends; 0: it does not
 
 
 class Implicit(NamedTuple):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from functools import partial, wraps
 from textwrap import shorten
 from typing import Any
 
@@ -16,7 +18,6 @@ from tmt.derivation.mechanism import Indices, Mechanism, Names, Numbers, Rows
 
 from . import singular
 from .lock import CLOSE_TO_ONE, locked
-from .renamed import accepts_former_names
 from .values import listed, names, numbers_of, shown
 
 # fields that may be left out
@@ -25,9 +26,38 @@ ABSENT = {"site_turn": np.eye(3)}  # what stands for them, where it is not zero
 GAINS = ("position_gain", "speed_gain")  # and those of a controller, which are () where there is none
 NOT_NEGATIVE = {"mass": "kg", "damping": "N m s/rad", "armature": "kg m2", "stiffness": "N m/rad"}
 NAMES_SHOWN = 60  # characters
+FORMER = {"hinge_names": "joint_names", "body_hinge": "body_joint"}  # accepted for one release
 
 
-@accepts_former_names({"hinge_names": "joint_names", "body_hinge": "body_joint"})
+def accepts_former_names(cls: Any) -> Any:
+    """A class accepts and has the FORMER fields; ValueError for a field that it has not."""
+    initialize, known = cls.__init__, [field.name for field in fields(cls)]
+
+    def current(former: str) -> str:
+        text = f"Tree.{former} is called {FORMER[former]}; the former name will be removed in version 3"
+        warnings.warn(text, DeprecationWarning, stacklevel=3)
+        return FORMER[former]
+
+    @wraps(initialize)
+    def __init__(self: Any, *values: Any, **named: Any) -> None:
+        for former in FORMER.keys() & named.keys():  # dataclasses.replace gives the new ones too
+            named[current(former)] = named.pop(former)
+        if unknown := [name for name in named if name not in known]:
+            raise ValueError(f"a Tree has no field {unknown[0]!r}; its fields are {', '.join(known)}")
+        initialize(self, *values, **named)
+
+    def value(self: Any, former: str) -> Any:
+        return getattr(self, current(former))
+
+    cls.__init__ = __init__
+    for former in FORMER:
+        setattr(
+            cls, former, property(partial(value, former=former), doc=f"Former name of `{FORMER[former]}`.")
+        )
+    return cls
+
+
+@accepts_former_names
 @dataclass(frozen=True)
 class Tree(Mechanism[float]):
     """A tree of n joints and m rigid bodies.
@@ -102,9 +132,8 @@ class Tree(Mechanism[float]):
     """
 
     def __post_init__(self) -> None:
-        for name in ("joint_names", "body_names"):
+        for name in ("joint_names", "body_names", "site_names"):
             self._set(name, names(name, getattr(self, name)))
-        self._set("site_names", names("site_names", self.site_names))
         n, m, k = len(self.joint_names), len(self.body_names), len(self.site_names)
         self._set("kind", _kinds(self.kind, n))
         nq, nv = self.coordinates.nq, self.coordinates.nv
@@ -149,14 +178,6 @@ class Tree(Mechanism[float]):
         return f"Tree({n} joint{'s' if n > 1 else ''}: {names}; {m} {'bodies' if m > 1 else 'body'})"
 
     @property
-    def zero(self) -> Numbers[float]:
-        """The reference position, (nq,): every frame is parallel to the inertial frame."""
-        position: Numbers[float] = ()
-        for kind, reference in zip(self.kind, self.reference):
-            position += (1.0, 0.0, 0.0, 0.0) if kind == "ball" else (reference,)
-        return position
-
-    @property
     def never_singular(self) -> bool:
         """Whether Mbar is known to be regular at every q; else it may be singular at some."""
         return singular.never(self)
@@ -190,7 +211,7 @@ class Tree(Mechanism[float]):
         >>> print(forearm.joint_names, tmt.mass_matrix([0.0], forearm).round(9))
         ('gamma',) [[0.05275]]
         """
-        return locked(self, angles)
+        return replace(self, **locked(self, angles))
 
 
 def stated(value: Any) -> str:

@@ -36,7 +36,7 @@ EDITS = (
     ("compiled.sources", "own_sources", "stamps(IMPORTED) == IMPORTED", "True", "changed sources keep their name"),
     ("simulation", "simulate", "arguments.positive('dt', dt, 'a step in s')", "float(dt)", "a step may be negative"),
     ("answers", "Answers.by_machine_code", "count <= SMALL", "True", "machine code never answers unasked"),
-    ("linearized", "rates", "moved.plus(carried_along)", "moved", "a movement does not turn what it carries"),
+    ("linearized", "rates", "moved.plus(Screw(_1, _2))", "moved", "a movement does not turn what it carries"),
     ("linearized", "Momentum.force", "self.p * 2.0", "self.p", "half the Coriolis force of what a movement adds"),
     ("quantities", "State.torque_rates", "map(added, self.force_rates, passive)", "self.force_rates",
      "derivatives without damping and springs"),
