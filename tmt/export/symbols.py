@@ -1,6 +1,5 @@
 """Mbar, h and gravity of a Tree as SymPy expressions: the method over polynomials in named parameters."""
 
-import operator
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -13,7 +12,7 @@ from tmt.derivation.quantities import State
 from tmt.derivation.vectors import Rows, Scalar, Values
 from tmt.model.tree import Tree
 
-from .names import EPS, Names, Parameter, Symbols, number
+from .names import Names, Parameter, Symbols, number
 from .shortest import Forms
 from .trigonometry import Angle, Expression, Ring, TooLong, Trig
 
@@ -78,11 +77,10 @@ def derived(names: Names, quantities: Sequence[str], limit: float, note: str) ->
     places = {i: sympy.Dummy() for i, kind in enumerate(tree.kind) if kind == "slide"}
     hinges = [i for i, kind in enumerate(tree.kind) if kind == "hinge"]
     from_reference = [symbol - number(value) for symbol, value in zip(names.q, tree.reference)]
-    parallel = {hinges.index(i): (hinges.index(j), sign) for i, (j, sign) in parallel_hinges(tree).items()}
     symbols = sorted(names.parameters, key=str)
     angles = [from_reference[i] for i in hinges]
     ring = Ring([*symbols, *places.values(), *names.qd], len(angles), names.is_exact, limit)
-    forms = Forms(ring, names, angles, parallel)
+    forms = Forms(ring, names, angles)
     variables = [
         ring.scalar(places[i]) if i in places else ring.angle(hinges.index(i)) for i in range(len(tree.kind))
     ]
@@ -133,19 +131,6 @@ def coriolis(ring: Ring, mass_matrix: Rows, q: Sequence[Angle | Trig], speeds: S
         return sum(terms, zero)
 
     return [entry(i) for i in n]
-
-
-def parallel_hinges(tree: Tree) -> dict[int, tuple[int, int]]:
-    """{i: (j, sign)} of hinges i that turn on hinge j, the next one inward, about sign times its axis."""
-    found = {}
-    for i, kind in enumerate(tree.kind):
-        j = tree.parent[i]
-        while j >= 0 and tree.kind[j] == "slide":
-            j = tree.parent[j]
-        cosine = sum(map(operator.mul, tree.axis[i], tree.axis[j])) if j >= 0 else 0.0
-        if kind == "hinge" and abs(cosine) > 1.0 - 4 * EPS:
-            found[i] = j, 1 if cosine > 0.0 else -1
-    return found
 
 
 class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types
