@@ -31,10 +31,10 @@ a wrong term. `dataclasses.replace(tmt.ARM, mass=(2.0, 1.5))` is the arm with an
 tree of hinges, slides and balls (a free joint is three slides and a ball), with damping, armature, springs
 and the gains of a linear controller.
 
-Methods of `simulate`: "rk4"; "semi_implicit_euler" (MuJoCo's Euler, implicitfast and discrete), "implicit"
-(MuJoCo's), "explicit_euler"; "dopri8" (Dormand and Prince, order 8: the best for many digits) and
-"dopri8_adaptive" (with steps of its own); "implicit_midpoint" and "gauss_legendre_4", which no linear motion
-can make unstable; and "taylor", the true motion.
+Methods of `simulate`: "rk4"; "semi_implicit_euler", "implicit", "implicitfast" and "discrete" (MuJoCo's);
+"explicit_euler"; "dopri8" (Dormand and Prince, order 8: the best for many digits) and "dopri8_adaptive" (with steps
+of its own); "implicit_midpoint" and "gauss_legendre_4", which no linear motion can make unstable; and "taylor", the
+true motion.
 
 NumPy (literal.py) answers calls of up to 500 states, compiled code larger ones and, after `prepare`, all
 calls of a model, which suits loops over single states; see answers.py. Both differ in the last bits, and say
@@ -355,27 +355,16 @@ def equations(
         C99 with math.h alone, no allocation; Python with NumPy alone, any batch; MATLAB and Octave, one file,
         states as columns; a casadi.Function for each quantity; JAX, any batch. The last three are simplified,
         with a symbol for each parameter, for some six hinges and slides (needs SymPy).
-    quantities : sequence of str
-        Functions of this package of those names; units, signs and shapes are theirs. With symbols:
-        mass_matrix, bias, gravity_balance.
-    name : str
-        Of the file, which begins the names of C functions.
-    single : bool
-        float in C.
-    head : sequence of str
-        Lines that begin the comment at its head.
-    parameters : sequence of str
-        Numbers that are further arguments of each function: "gravity" (3,); a body's name, or with ".mass"
-        (1,), ".com" (3,) or ".inertia" (6,) after it; "payload" and then a body's name: what that carries
-        besides. They are in the frame that is the site of the body's name, else in that of its joint; inertias
-        are about the centre of mass: xx yy zz xy xz yz.
-    limit : float, s
+    quantities : functions of this package, by name; with symbols mass_matrix, bias, gravity_balance.
+    name : of the file, which begins the names of C functions.
+    single : float in C.
+    head : lines that begin the comment at its head.
+    parameters : numbers that are further arguments of each function
+        "gravity" (3,); a body's name, or with ".mass" (1,), ".com" (3,) or ".inertia" (6,) after it; "payload" and
+        then a body's name: what that carries besides. They are in the frame that is the site of the body's name,
+        else in that of its joint; inertias are about the centre of mass: xx yy zz xy xz yz.
+    limit : s
         With symbols: the most work, counted as that of one processor core; ValueError beyond.
-
-    Raises
-    ------
-    ValueError
-        For a language, quantity, name or parameter that is not one.
 
     Examples
     --------

@@ -63,22 +63,11 @@ class Runner:
         info = np.zeros((count, 3), np.int64)
 
         def follow_some(part: slice) -> None:
-            arrays = [array[part] for array in (q, qd, tau, info)]
-            missing = -len(arrays[0]) % width
-            if not missing:
-                self.call(width, arrays, dt, tolerance, every)()
-                return
-            # too few for a register: their last one again
-            padded = [np.concatenate([array, *[array[-1:]] * missing]) for array in arrays]
-            self.call(width, padded, dt, tolerance, every)()
-            for array, filled in zip(arrays, padded):
-                array[:] = filled[:-missing]
+            self.call(width, [array[part] for array in (q, qd, tau, info)], dt, tolerance, every)()
 
         threads = cores() if count > width and steps * count * self.stepping.stages > SPREAD else 1
-        if threads == 1:
-            follow_some(slice(count))
-        else:
-            in_threads(follow_some, count, min(count // width, PIECES * threads), width, threads)
+        parts = min(count // width, PIECES * threads) if threads > 1 else 1
+        in_threads(follow_some, count, parts, width, threads)
         return self.outcome(q, qd, info, every)
 
     def outcome(self, q: Array, qd: Array, info: Array, every: int = 1) -> Ended:

@@ -248,7 +248,7 @@ def run(step: Step, advance: Advance) -> Code:
     paths, info = (("q", nq, 0), ("qd", n, nq)), code["info"]
     state.store(code["dt"].everywhere(width), (nq + 2 * n) * width)
     with code.loop(code["runs"], width) as runs:
-        rows = [runs.index + lane for lane in range(width)]
+        rows = linear.rows_of(runs.index, code["runs"], width)
         alive, evaluations = Variable(code, flags, True), Variable(code, INDEX, 0)
         step.wanted = Variable(code, DOUBLE, code["dt"] / 8.0)
         for lane, run in enumerate(rows):

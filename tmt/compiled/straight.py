@@ -5,9 +5,10 @@ all of them together. A product that goes into one sum alone is rounded with it,
 twice as many lines in one function, so long tapes are cut; what one part hands to a later one stands in an array.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 from tmt.derivation.vectors import Scalar
 
@@ -16,6 +17,7 @@ from .sine import sincos
 from .trace import FOLD, LEAVES, Expression, Tape
 
 LONGEST = 1_000  # nodes of one function
+Key = TypeVar("Key", int, str)
 OF_ONE = ("solution", "bias_rates")  # functions of linear.py, which take one state
 
 
@@ -81,6 +83,22 @@ def entry(name: str, attributes: str, *more: str) -> Code:
     return Code(name, dict.fromkeys(("in", "out", *more), POINTER), attributes=attributes)
 
 
+def places_handed_on(made: list[list[Key]], last: Mapping[Key, int]) -> tuple[dict[Key, int], int]:
+    """The place of each value that a part hands to a later one, used again after its last part; how many places there are."""
+    leaving: list[list[int]] = [[] for _ in made]
+    free: list[int] = []
+    places: dict[Key, int] = {}
+    size = 0
+    for k, values in enumerate(made):
+        for i in values:
+            if last.get(i, k) > k:
+                places[i] = free.pop() if free else size
+                size = max(size, places[i] + 1)
+                leaving[last[i]].append(places[i])
+        free += leaving[k]
+    return places, max(size, 1)
+
+
 class Steps:
     """The operations of a traced function in order, and which values each takes and makes."""
 
@@ -114,18 +132,7 @@ class Steps:
             for i in section:
                 made[k] += self.items.get(i, [i])
                 last |= {a: k for a in self.takes(i) if a not in self.input}
-        leaving: list[list[int]] = [[] for _ in sections]
-        free: list[int] = []
-        places: dict[int, int] = {}
-        size = 0
-        for k, values in enumerate(made):
-            for i in values:
-                if last.get(i, k) > k:
-                    places[i] = free.pop() if free else size
-                    size = max(size, places[i] + 1)
-                    leaving[last[i]].append(places[i])
-            free += leaving[k]
-        return places, max(size, 1)
+        return places_handed_on(made, last)
 
     def write(self, code: Code, order: list[int], width: int, places: dict[int, int]) -> None:
         """The lines of some of the steps; places: those of the nodes that parts of a long function hand on."""

@@ -22,7 +22,7 @@ EDITS = (
     ("entries", "Entries.wrong", "_1.compare('lt', _2)", "_1.compare('ge', 0.0)", "what is infinite is answered"),
     ("entries", "Entries.wrong", "_1.compare('ge', SHORTEST)", "_1.compare('ge', 0.0)", "a quaternion may be short"),
     ("forms", "shortest", "min(_1, key=_2)", "max(_1, key=_2)", "the form with the most operations is taken"),
-    ("export.c", "handed_on", "last[line.name] > k", "last[line.name] > k + 1", "a part in C lacks values of the one before"),
+    ("straight", "places_handed_on", "last.get(i, k) > k", "last.get(i, k) > k + 1", "a part lacks values of the one before"),
     ("trigonometry", "Ring.count", "self.work > self.limit", "False", "symbolic work has no limit"),
     ("mujoco.source", "leave_out", "has_mass and not is_stated and moves(body)", "False", "a missing mesh may have the inertia"),
     ("mujoco.source", "parsed", "floating and not is_urdf(text)", "False", "--floating says nothing of MJCF"),
