@@ -21,7 +21,7 @@ from typing import NamedTuple
 from .composite import Distribution, rounded, turning
 from .mechanism import AnyTree, turn_in_parent
 from .method import with_rotors
-from .vectors import IDENTITY, ZERO, Matrix, Scalar, Scalars, Values, Vector, outer
+from .vectors import IDENTITY, ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, outer
 
 
 class Symmetric(NamedTuple):
@@ -133,7 +133,7 @@ def acceleration(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armatur
             body = Carried(body.force.plus(U.scaled(u)), J, body.H - outer(share.turn, U.shift), M)
         if tree.parent[i] >= 0:
             bodies[tree.parent[i]] = bodies[tree.parent[i]].plus(body)
-    result: list[Scalar] = []
+    result: Values = []
     motions: list[Screw] = []
     for i, joint in enumerate(joints):
         motion = motions[tree.parent[i]] if tree.parent[i] >= 0 else STILL
@@ -145,11 +145,11 @@ def acceleration(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armatur
     return result
 
 
-def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[list[Scalar]], list[Scalar]]:
+def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
     """Mbar (nv rows of nv, kg m2) and h (nv, N m), as in method.py."""
     frames, own = outward(tree, q, qd)
     rigid, joints = gathered(tree, own), tree.coordinates.joints
-    M: list[list[Scalar]] = [[0.0] * len(qd) for _ in qd]
+    M: Rows = [[0.0] * len(qd) for _ in qd]
     for i, body in enumerate(rigid):
         for k, direction in zip(joints[i].speeds, frames[i].directions):
             force = body.accelerated(direction)
@@ -162,13 +162,13 @@ def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[l
     return M, along_speeds(frames, rigid)
 
 
-def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> list[Scalar]:
+def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> Values:
     """Mbar qdd + h (nv, N m), as in method.py."""
     frames, own = outward(tree, q, qd, qdd)
     return with_rotors(tree, along_speeds(frames, gathered(tree, own)), qdd)
 
 
-def along_speeds(frames: list[Frame], rigid: list[Rigid]) -> list[Scalar]:
+def along_speeds(frames: list[Frame], rigid: list[Rigid]) -> Values:
     """The force on what each joint carries, along the direction of each speed, (nv,)."""
     return [d.dot(body.force) for frame, body in zip(frames, rigid) for d in frame.directions]
 

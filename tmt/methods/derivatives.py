@@ -161,14 +161,15 @@ def transition(
     nv = tree.coordinates.nv
     width = (2 + by_torque) * nv
     batch = np.broadcast_shapes(*(np.shape(x)[:-1] for x in (q, qd, tau)), np.shape(dt))
-    states = [
+    q, qd, tau = (
         np.broadcast_to(x, (*batch, np.shape(x)[-1])).reshape(-1, np.shape(x)[-1]) for x in (q, qd, tau)
-    ]
+    )
     steps, size = np.broadcast_to(dt, batch).reshape(-1), max(1, PART // nv)
     jacobians = [np.empty((0, 2 * nv, width))]
     for k in range(0, len(steps), size):
         part = slice(k, k + size)
-        jacobians.append(jacobian_of_part(stepping, tree, *(x[part] for x in states), steps[part], width))
+        states = q[part], qd[part], tau[part]
+        jacobians.append(jacobian_of_part(stepping, tree, *states, steps[part], width))
     return np.concatenate(jacobians).reshape(*batch, 2 * nv, width)
 
 
