@@ -17,13 +17,13 @@ from tmt.model.arguments import checked_model, positive
 from tmt.model.tree import Tree, stated
 from tmt.model.values import shown
 
-from . import c, casadi, jax, matlab, python
+from . import c, jax, scripts
 from .parameters import OF_BODIES, Parameters
 from .statements import Function, Program
 
 LANGUAGES: dict[str, Callable[[Program], str]] = {
-    "c": c.source, "c header": c.header, "python": python.source, "matlab": matlab.source,
-    "casadi": casadi.source, "jax": jax.source,
+    "c": c.source, "c header": c.header, "python": scripts.python, "matlab": scripts.matlab,
+    "casadi": scripts.casadi, "jax": jax.source,
 }  # fmt: skip
 SYMBOLIC = "latex", "html", "sympy"
 OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"

@@ -85,22 +85,20 @@ def locked(tree: Mechanism[float], angles: Mapping[str, Any]) -> dict[str, Any]:
             frames.append(before[i].onward(*_fixed(tree, i, q)))
     carried = [frames[joint] if joint >= 0 else WORLD for joint in tree.body_joint]
     of_sites = [frames[joint] if joint >= 0 else WORLD for joint in tree.site_joint]
-    return {
-        "joint_names": chosen(names, free),
+    fields = {
+        name: chosen(getattr(tree, name), free) for name in ("joint_names", "kind", "stiffness", "reference")
+    }
+    fields |= {name: chosen(getattr(tree, name), speeds) for name in ("damping", "armature")}
+    for name in ("position_gain", "speed_gain"):
+        fields[name] = tuple(chosen(row, speeds) for row in chosen(getattr(tree, name), speeds))
+    return fields | {
         "parent": tuple(before[i].joint for i in free),
         "offset": tuple(before[i].point(tree.offset[i]) for i in free),
         "axis": tuple(before[i].direction(tree.axis[k]) for i in free for k in joints[i].speeds),
-        "damping": chosen(tree.damping, speeds),
         "body_joint": tuple(carrier.joint for carrier in carried),
         "com": tuple(carrier.point(com) for carrier, com in zip(carried, tree.com)),
         "inertia": tuple(carrier.tensor(inertia) for carrier, inertia in zip(carried, tree.inertia)),
-        "kind": chosen(tree.kind, free),
-        "armature": chosen(tree.armature, speeds),
-        "stiffness": chosen(tree.stiffness, free),
         "rest": tuple(value for i in free for value in tree.rest[joints[i].q]),
-        "reference": chosen(tree.reference, free),
-        "position_gain": tuple(chosen(row, speeds) for row in chosen(tree.position_gain, speeds)),
-        "speed_gain": tuple(chosen(row, speeds) for row in chosen(tree.speed_gain, speeds)),
         "site_joint": tuple(carrier.joint for carrier in of_sites),
         "site_offset": tuple(carrier.point(offset) for carrier, offset in zip(of_sites, tree.site_offset)),
         "site_turn": tuple(carrier.turned(turn) for carrier, turn in zip(of_sites, tree.site_turn)),
