@@ -34,12 +34,9 @@ class Motion(_Path):
     Attributes
     ----------
     t : (records,), s
-    q, qd : (..., records, nq) and (..., records, nv), rad and rad/s
-        NaN from where a run ended early.
-    ended : str, None, or array of them in the shape of the batch
-        Why a run ended early, a line that says when.
-    evaluations : int
-        Of the dynamics, of all runs; those of an implicit method with their Jacobian.
+    q, qd : (..., records, nq) and (..., records, nv), rad and rad/s, NaN from where a run ended early
+    ended : str, None, or array of them in the shape of the batch: why a run ended early, a line that says when
+    evaluations : int, of the dynamics, of all runs; those of an implicit method with their Jacobian
 
     Examples
     --------
@@ -68,31 +65,22 @@ def simulate(
 
     A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad, Mbar is singular,
     Newton's method does not find the stages of an implicit method, an adaptive method would need steps below 1e-9 dt, or series
-    take too many: `ended` of the result says which. Assignment, part i.
+    take too many: `ended` of the result, a Motion, says which. Assignment, part i.
 
     Parameters
     ----------
-    q, qd : (..., nq) and (..., nv), rad and rad/s
-        State at t = 0.
-    tau : (..., nv), N m
-        Torque.
-    dt : float, s
-        Step, above 0.
-    steps : int
-        How many, at least 1.
-    method : str, default "rk4"
-        A key of METHODS, or "taylor": the true motion, rounded once, a Taylor series in pairs of doubles, whose evaluations are
-        its steps. An adaptive method takes its own steps between those.
+    q, qd : (..., nq) and (..., nv), rad and rad/s, state at t = 0
+    tau : (..., nv), N m, torque
+    dt : float, s, step, above 0
+    steps : int, how many, at least 1
+    method : str, a key of METHODS, or "taylor": the true motion, rounded once
+        That is a Taylor series in pairs of doubles, whose evaluations are its steps. An adaptive method takes its own
+        steps between those.
     model : Tree, default ARM
     tolerance : float, default 1e-9, of "taylor" 1e-33
         Of adaptive methods: the error of each step, in units of 1 + |value|.
     every : int, default 1
         Every n-th state alone is kept, n a divisor of steps: records = steps / every + 1.
-
-    Returns
-    -------
-    Motion
-        Unpacks into t, q, qd.
 
     Examples
     --------

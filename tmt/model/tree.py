@@ -67,56 +67,36 @@ class Tree(Mechanism[float]):
     moves with it, with its origin on the axis of a hinge, at the centre of a ball. Several joints in one body
     are joints in a row with no body between them. There are nv speeds, one of a hinge or slide and three of a
     ball, and nq numbers in a position: see coordinates.py. All fields are nested tuples; arrays and lists are
-    converted.
+    converted. ValueError if the numbers cannot be a tree or a rigid body.
 
     Parameters
     ----------
-    joint_names : (n,)
-        Of all joints.
-    parent : (n,)
-        Index of the joint before this one, always a smaller one; -1: fixed to the world.
-    offset : (n, 3), m
-        From the origin of the parent's frame to this joint, in the parent's frame.
-    axis : (nv, 3)
-        Direction of each speed, scaled to length 1; a ball has three at right angles, which turn with it.
-    damping : (nv,), N m s/rad or N s/m
-        Force -damping * qd.
+    joint_names : (n,) of all joints
+    parent : (n,) index of the joint before this one, always a smaller one; -1: fixed to the world
+    offset : (n, 3), m, from the origin of the parent's frame to this joint, in the parent's frame
+    axis : (nv, 3) direction of each speed, scaled to length 1; a ball has three at right angles, which turn with it
+    damping : (nv,), N m s/rad or N s/m, force -damping * qd
     body_names : (m,)
-    body_joint : (m,)
-        Index of the last joint that moves the body; -1: fixed to the world.
+    body_joint : (m,) index of the last joint that moves the body; -1: fixed to the world
     mass : (m,), kg
-    com : (m, 3), m
-        Centre of mass in the frame of its joint.
-    inertia : (m, 3, 3), kg m2
-        About the centre of mass, in the frame of its joint.
-    gravity : (3,), m/s2
-        Inertial frame.
-    kind : (n,), optional
-        "hinge", "slide" or "ball"; (): all are hinges.
-    armature : (nv,), kg m2 or kg, optional
-        Inertia of a rotor, on the diagonal of Mbar alone.
-    stiffness : (n,), N m/rad or N/m, optional
-        Of a spring at each joint.
-    rest : (nq,), rad, m and quaternions, optional
-        Where the springs are without force; (): at the reference.
-    reference : (n,), rad or m, optional
-        Where the joint leaves frames parallel; 0 for a ball.
-    position_gain, speed_gain : (nv, nv), N m/rad or N/m, and N m s/rad or N s/m, optional
+    com : (m, 3), m, centre of mass in the frame of its joint
+    inertia : (m, 3, 3), kg m2, about the centre of mass, in the frame of its joint
+    gravity : (3,), m/s2, inertial frame
+
+    The others may be left out, as ():
+
+    kind : (n,) "hinge", "slide" or "ball"; (): all are hinges
+    armature : (nv,), kg m2 or kg, inertia of a rotor, on the diagonal of Mbar alone
+    stiffness : (n,), N m/rad or N/m, of a spring at each joint
+    rest : (nq,), rad, m and quaternions, where the springs are without force; (): at the reference
+    reference : (n,), rad or m, where the joint leaves frames parallel; 0 for a ball
+    position_gain, speed_gain : (nv, nv), N m/rad or N/m, and N m s/rad or N s/m
         Of a linear controller of hinges and slides: torque = tau - position_gain @ q - speed_gain @ qd, q as
         it stands.
-    site_names : (k,), optional
-        Of further frames for `frame`, each fixed to that of a joint.
-    site_joint : (k,), optional
-        Index of that joint; -1: fixed to the world.
-    site_offset : (k, 3), m, optional
-        From the origin of the joint's frame to the site's, in the frame of the joint; (): zero.
-    site_turn : (k, 3, 3), optional
-        The axes of the site as columns, in the frame of the joint; (): parallel to it.
-
-    Raises
-    ------
-    ValueError
-        If the numbers cannot be a tree or a rigid body.
+    site_names : (k,) of further frames for `frame`, each fixed to that of a joint
+    site_joint : (k,) index of that joint; -1: fixed to the world
+    site_offset : (k, 3), m, from the origin of the joint's frame to the site's, in the frame of the joint
+    site_turn : (k, 3, 3) the axes of the site as columns, in the frame of the joint; (): parallel to it
 
     Examples
     --------
@@ -183,27 +163,16 @@ class Tree(Mechanism[float]):
         return singular.never(self)
 
     def lock(self, angles: Mapping[str, ArrayLike]) -> Tree:
-        """The tree without the joints that are named in `angles`: they stay there, at rest.
+        """The tree of the other joints, and all bodies, where those that are named in `angles` stay there, at rest.
 
         What hangs on a locked joint is carried by the joint before it, its vectors turned so that all frames
         are again parallel to the inertial frame where the free joints are at their reference. A joint locked
-        there rounds nothing.
+        there rounds nothing. ValueError for an unknown joint, a position that is none, if no joint is left, or if
+        a controller takes the position of a locked joint for the torque at a free one.
 
         Parameters
         ----------
-        angles : {name: position}
-            In rad, of a slide in m, of a ball a quaternion.
-
-        Returns
-        -------
-        Tree
-            Of the other joints, and all bodies.
-
-        Raises
-        ------
-        ValueError
-            For an unknown joint, a position that is none, if no joint is left, or if a controller takes the
-            position of a locked joint for the torque at a free one.
+        angles : {name: position}, rad, of a slide m, of a ball a quaternion
 
         Examples
         --------
