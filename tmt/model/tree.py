@@ -67,7 +67,8 @@ class Tree(Mechanism[float]):
     moves with it, with its origin on the axis of a hinge, at the centre of a ball. Several joints in one body
     are joints in a row with no body between them. There are nv speeds, one of a hinge or slide and three of a
     ball, and nq numbers in a position: see coordinates.py. All fields are nested tuples; arrays and lists are
-    converted. ValueError if the numbers cannot be a tree or a rigid body.
+    converted; those from `kind` on may be left out, as (). ValueError if the numbers cannot be a tree or a
+    rigid body.
 
     Parameters
     ----------
@@ -82,9 +83,6 @@ class Tree(Mechanism[float]):
     com : (m, 3), m, centre of mass in the frame of its joint
     inertia : (m, 3, 3), kg m2, about the centre of mass, in the frame of its joint
     gravity : (3,), m/s2, inertial frame
-
-    The others may be left out, as ():
-
     kind : (n,) "hinge", "slide" or "ball"; (): all are hinges
     armature : (nv,), kg m2 or kg, inertia of a rotor, on the diagonal of Mbar alone
     stiffness : (n,), N m/rad or N/m, of a spring at each joint
