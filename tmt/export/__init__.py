@@ -135,10 +135,9 @@ def places(part: slice) -> str:
     return f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}"
 
 
-def function_of(model: Tree, name: str, parameters: Parameters | None = None) -> Function:
+def function_of(model: Tree, name: str, parameters: Parameters) -> Function:
     import tmt  # for the docstring
 
-    parameters = parameters or Parameters(model, ())
     quantity, shape, nv = quantity_of(name), shape_of(name, model), model.coordinates.nv
     third = "qdd" if "qdd" in quantity.takes else "tau"
     sizes = {"q": model.coordinates.nq, "qd": nv, third: nv, "dt": 1}
@@ -157,7 +156,7 @@ def identifier(name: str) -> str:
 @lru_cache(maxsize=16)
 def traced(model: Tree, name: str, parameters: Parameters | None) -> Traced:
     """A quantity as a function of its arrays and of the parameters."""
-    if parameters is None or not parameters.values:
+    if parameters is None:
         return forms.quantity(model, name)
 
     def tree_of(arrays: Sequence[Values]) -> AnyTree:
