@@ -59,16 +59,12 @@ def symbolic(
         if kind == "ball":
             raise ValueError(f"symbolic equations need hinges and slides; joint {name} is a ball")
     note = ""
-    if named:
+    for has_names in (True, False) if named else (False,):
         try:
-            return derived(Names(tree, True), quantities, limit / 2, note)
+            return derived(Names(tree, has_names), quantities, limit / 2, note)
         except TooLong:
             note = f"numbers in place of named parameters, which would take more work than {limit / 2:g} s"
-    try:
-        return derived(Names(tree, False), quantities, limit / 2, note)
-    except TooLong:
-        longest = f"take more work than {limit:g} s"
-        raise ValueError(f"symbolic equations of these {len(tree.kind)} joints {longest}") from None
+    raise ValueError(f"symbolic equations of these {len(tree.kind)} joints take more work than {limit:g} s")
 
 
 def derived(names: Names, quantities: Sequence[str], limit: float, note: str) -> Symbolic:

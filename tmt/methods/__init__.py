@@ -18,8 +18,8 @@ from tmt.methods.semi_implicit import SemiImplicitEuler as SemiImplicitEuler
 from tmt.methods.semi_implicit import by_speed as by_speed
 from tmt.methods.semi_implicit import lone_speeds as lone_speeds
 from tmt.methods.stepping import Joints, Method, Slope, State, advance, increments
-from tmt.methods.tableau import Numbers, Tableau
-from tmt.model.values import shown
+from tmt.methods.tableau import Numbers, Tableau, numbers
+from tmt.model.values import listed, shown
 
 Slopes = tuple[list[Values], list[Values]]  # of all stages: rates of the movement, and accelerations
 
@@ -73,7 +73,7 @@ class AdaptiveRungeKutta(RungeKutta):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.make_plain("errors")
+        self.set_plain("errors", tuple(numbers("errors", row) for row in listed(self.errors) or (None,)))
         if len(self.errors) != 2 or any(len(row) != len(self.b) for row in self.errors):
             raise ValueError("errors must be two rows of one weight for each stage")
 

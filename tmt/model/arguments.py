@@ -70,8 +70,6 @@ def checked_model(model: Any) -> None:
 
 
 def positive(name: str, value: Any, kind: str) -> float:
-    if type(value) is float and 0.0 < value < math.inf:
-        return value
     try:
         number = float(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
     except OverflowError:
@@ -83,8 +81,6 @@ def positive(name: str, value: Any, kind: str) -> float:
 
 def whole(name: str, value: Any) -> int:
     """The value as an int of at least 1 that compiled code can count to."""
-    if type(value) is int and 1 <= value < 2**63:
-        return value
     number = int(value) if isinstance(value, numbers.Integral) and not isinstance(value, bool) else 0
     if number < 1:
         raise ValueError(f"{name} is {shown(value)}; a whole number of at least 1 is expected")
