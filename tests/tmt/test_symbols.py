@@ -20,8 +20,7 @@ from compare.judge.entries import Entries
 from compare.run.reference import compared_with
 from tmt import Tree
 from tmt.export import trigonometry
-from tmt.export.latex import latex
-from tmt.export.page import page
+from tmt.export.documents import latex, page
 from tmt.export.symbols import python_source, symbolic
 
 EPS = np.finfo(float).eps

@@ -17,8 +17,7 @@ from tmt.model.tree import Tree
 
 from . import forms, linear
 from .ir import DOUBLE, FLAG, INDEX, POINTER, Code, Value, Variable, module, wide
-from .sine import LIMIT
-from .straight import Traced, functions, trace
+from .straight import LIMIT, Traced, functions, trace
 
 # (code, state, new state, dt, evaluations): why it ends
 Advance = Callable[[Code, Value, Value, Value, Variable], Value]

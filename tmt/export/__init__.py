@@ -95,10 +95,10 @@ def symbolic_text(
     model: Tree, language: str, quantities: tuple[str, ...], head: Sequence[str], limit: float
 ) -> str:
     try:
-        from . import latex, page, symbols
+        from . import documents, symbols
     except ImportError:
         raise ValueError("symbolic equations need SymPy: pip install sympy") from None
-    writers = {"latex": latex.latex, "html": page.page, "sympy": symbols.python_source}
+    writers = {"latex": documents.latex, "html": documents.page, "sympy": symbols.python_source}
     return writers[language](symbols.symbolic(model, quantities, limit), head)
 
 

@@ -5,7 +5,7 @@ EDITS = (
     ("tree", "_check_inertia", "a + b < _1", "False", "one principal inertia may be larger than the other two"),
     ("values", "numbers_of", "not np.isfinite(array).all()", "False", "a number of a Tree may be infinite"),
     ("arguments", "_state", "not np.isfinite(array).all()", "False", "a state may be infinite"),
-    ("sine", "LIMIT", "2.0**49", "2.0**60", "hinges may turn beyond 2^49 rad"),
+    ("straight", "LIMIT", "2.0**49", "2.0**60", "hinges may turn beyond 2^49 rad"),
     ("singular", "check_tree", "turning.any(axis=-1).all()", "False", "a Tree may be singular at every q"),
     ("implicit", "CLOSE", "1e-10", "1e-2", "Newton's method stops at two digits"),
     ("implicit", "ImplicitRungeKutta.step", "raise _1", "return self.finish(q, qd, dt, a)", "no failure is seen"),
