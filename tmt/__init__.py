@@ -55,8 +55,8 @@ from tmt.answers import prepare
 from tmt.arm import ARM
 from tmt.methods import METHODS
 from tmt.methods import method_named as _method_named
-from tmt.model.arguments import checked_model as _checked_model
 from tmt.model.tree import Tree
+from tmt.model.tree import checked_model as _checked_model
 from tmt.model.values import real_numbers as _real_numbers
 from tmt.model.values import shown as _shown
 from tmt.simulation import Motion, simulate

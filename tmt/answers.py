@@ -17,8 +17,7 @@ from tmt.arm import ARM
 from tmt.compiled.evaluator import SMALL, Evaluator
 from tmt.derivation.quantities import PLAIN, QUANTITIES, is_quantity, quantity_of, what_is_known
 from tmt.model import singular
-from tmt.model.arguments import checked_model
-from tmt.model.tree import Tree
+from tmt.model.tree import Tree, checked_model
 from tmt.model.values import real_numbers, shown
 
 MOST = 64  # models that are held, besides those that are prepared

@@ -15,8 +15,8 @@ from tmt.derivation.quantities import PLAIN, State, argument_of, quantity_of
 from tmt.derivation.vectors import Scalar
 from tmt.methods import method_named, transition
 from tmt.model import singular
-from tmt.model.arguments import states
-from tmt.model.tree import Tree
+from tmt.model.tree import Tree, checked_model
+from tmt.model.values import states
 
 SOLVED = ("acceleration", "inverse_mass_matrix", "derivatives")  # for which Mbar must be regular
 BEYOND = "the result is beyond the largest double; smaller numbers in the state or model are expected"
@@ -48,11 +48,13 @@ def literal(name: str) -> Callable[..., Any]:
 
 def answer(name: str, tree: Tree, arrays: dict[str, ArrayLike]) -> Any:
     """The quantity of that full name at states in arrays by name, of which all are checked."""
-    quantity, scalars = quantity_of(name), states(tree, **arrays)
-    batch = scalars[0][0].shape
+    checked_model(tree)
+    quantity, checked = quantity_of(name), states(tree, **arrays)
+    batch = checked[0].shape[:-1]
     if quantity.argument == "method":
-        return step_derivatives(argument_of(name), tree, scalars, batch)
-    state = State(tree, dict(zip(arrays, scalars)), name=argument_of(name))
+        return step_derivatives(argument_of(name), tree, *checked)
+    scalars = {key: list(np.moveaxis(array, -1, 0)) for key, array in zip(arrays, checked)}
+    state = State(tree, scalars, name=argument_of(name))
     if name in SOLVED and not tree.never_singular:
         check_regular(tree, state, batch)
     values = quantity.of(state)
@@ -61,9 +63,10 @@ def answer(name: str, tree: Tree, arrays: dict[str, ArrayLike]) -> Any:
     return gather(values, batch, overflow=np.inf if name == "energy" else None)
 
 
-def step_derivatives(method: str, tree: Tree, scalars: list[Any], batch: tuple[int, ...]) -> np.ndarray:
+def step_derivatives(
+    method: str, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: np.ndarray
+) -> np.ndarray:
     """[A B] (..., 2 nv, 3 nv) of a step of the method of that name."""
-    q, qd, tau, dt = (np.stack(values, axis=-1) for values in scalars)
     try:
         values = transition(method_named(method), tree, q, qd, tau, dt[..., 0])
     except (ArithmeticError, np.linalg.LinAlgError) as error:

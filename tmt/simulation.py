@@ -12,11 +12,10 @@ from numpy.typing import ArrayLike
 from tmt.arm import ARM
 from tmt.compiled.runner import Ended, runner_of
 from tmt.methods.stepping import DIVERGED, NEWTON, SMALL
-from tmt.model import arguments, singular
+from tmt.model import singular, values
 from tmt.model.tree import Tree
 from tmt.model.values import shown
 
-DOUBLE = np.dtype(float)
 Array = np.ndarray
 Place = tuple[int, str] | None
 Between = Callable[[int, int], list[Array]]  # (run, record): its states q and qd up to the next record
@@ -92,18 +91,18 @@ def simulate(
     taylor = isinstance(method, str) and method == "taylor"
     runner = runner_of(model, "dopri8_adaptive" if taylor else method)
     stepping = runner.stepping
-    steps, every = arguments.whole("steps", steps), arguments.whole("every", every)
-    dt = arguments.positive("dt", dt, "a step in s")
+    steps, every = values.whole("steps", steps), values.whole("every", every)
+    dt = values.positive("dt", dt, "a step in s")
     if steps % every:
         why = f"of which steps = {shown(steps)} is no multiple"
         raise ValueError(f"every is {shown(every)}, {why}; a divisor is expected")
     if tolerance is not None and not stepping.adaptive:
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
     usual = 1e-33 if taylor else 1e-9
-    tolerance = usual if tolerance is None else arguments.positive("tolerance", tolerance, "a number")
+    tolerance = usual if tolerance is None else values.positive("tolerance", tolerance, "a number")
     batch, *start = starts(model, q, qd, tau)
     runs = len(start[0])
-    path_q, path_qd = arguments.paths(runs, steps, every, model.coordinates.nq, model.coordinates.nv)
+    path_q, path_qd = values.paths(runs, steps, every, model.coordinates.nq, model.coordinates.nv)
     if steps * dt == np.inf:
         sizes = f"dt is {dt:g} and steps is {shown(steps)}"
         raise ValueError(f"{sizes}; their product is beyond the largest double")
@@ -127,17 +126,10 @@ def simulate(
 
 
 def starts(model: Tree, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
-    """The batch shape, and q (runs, nq), qd and tau (runs, nv), contiguous, after all checks of given.states."""
-    if type(q) is type(qd) is type(tau) is np.ndarray and q.dtype is qd.dtype is tau.dtype is DOUBLE:
-        nq, nv, batch = model.coordinates.nq, model.coordinates.nv, q.shape[:-1]
-        if q.shape == (*batch, nq) and qd.shape == tau.shape == (*batch, nv) and not model.coordinates.balls:
-            rows = [np.ascontiguousarray(values).reshape(-1, values.shape[-1]) for values in (q, qd, tau)]
-            # with a number that is not finite no sum of squares is
-            if all(np.vdot(values, values) < np.inf for values in rows):
-                return batch, *rows
-    state = arguments.states(model, q=q, qd=qd, tau=tau)
-    batch = state[0][0].shape
-    return batch, *(np.stack(part, axis=-1).reshape(math.prod(batch), len(part)) for part in state)
+    """The batch shape, and q (runs, nq), qd and tau (runs, nv), contiguous, after all checks."""
+    state = values.states(model, q=q, qd=qd, tau=tau)
+    batch = state[0].shape[:-1]
+    return batch, *(np.ascontiguousarray(part).reshape(math.prod(batch), part.shape[-1]) for part in state)
 
 
 def by_series(tree: Tree, q: Array, qd: Array, tau: Array, dt: float, every: int, tolerance: float) -> Ended:

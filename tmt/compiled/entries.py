@@ -8,8 +8,8 @@ of_dt): states one after the other, of_q numbers from each q to the next (0: the
 from itertools import accumulate
 
 from tmt.derivation.quantities import quantity_of
-from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.tree import Tree
+from tmt.model.values import CLOSE_TO_ONE
 
 from . import forms, linear
 from .ir import DOUBLE, INDEX, POINTER, Code, Value, Variable, module, wide

@@ -8,8 +8,7 @@ import numpy as np
 
 from tmt.methods import METHODS, method_named
 from tmt.methods.stepping import Method
-from tmt.model.arguments import checked_model
-from tmt.model.tree import Tree
+from tmt.model.tree import Tree, checked_model
 
 from .cores import cores, in_threads
 

@@ -13,9 +13,8 @@ from tmt.compiled.straight import Traced
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.quantities import QUANTITIES, is_quantity, quantity_of, shape_of, what_is_known
 from tmt.derivation.vectors import Values
-from tmt.model.arguments import checked_model, positive
-from tmt.model.tree import Tree, stated
-from tmt.model.values import shown
+from tmt.model.tree import Tree, checked_model, stated
+from tmt.model.values import positive, shown
 
 from . import c, jax, scripts
 from .parameters import OF_BODIES, Parameters

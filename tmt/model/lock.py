@@ -11,9 +11,9 @@ import numpy as np
 from tmt.derivation.mechanism import Mechanism, origin_in_parent, turn_in_parent
 from tmt.derivation.vectors import IDENTITY, ZERO, Matrix, Vector
 
+from .values import CLOSE_TO_ONE as CLOSE_TO_ONE
 from .values import numbers_of, shown
 
-CLOSE_TO_ONE = 1e-6  # how far the length of a quaternion may be from 1
 Value = TypeVar("Value")
 
 

@@ -17,8 +17,8 @@ from tmt.derivation.coordinates import KINDS, Coordinates
 from tmt.derivation.mechanism import Indices, Mechanism, Names, Numbers, Rows
 
 from . import singular
-from .lock import CLOSE_TO_ONE, locked
-from .values import listed, names, numbers_of, shown
+from .lock import locked
+from .values import CLOSE_TO_ONE, listed, names, numbers_of, shown
 
 # fields that may be left out
 OPTIONAL = ("reference", "armature", "stiffness", "rest", "site_offset", "site_turn")
@@ -179,6 +179,11 @@ class Tree(Mechanism[float]):
         ('gamma',) [[0.05275]]
         """
         return replace(self, **locked(self, angles))
+
+
+def checked_model(model: Any) -> None:
+    if not isinstance(model, Tree):
+        raise ValueError(f"model is {shown(model)}; a tmt.Tree is expected")
 
 
 def stated(value: Any) -> str:
