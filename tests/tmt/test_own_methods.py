@@ -26,7 +26,7 @@ def test_a_method_of_ones_own(rng, monkeypatch):
     monkeypatch.setitem(METHODS, "mine", Midpoint())
     monkeypatch.setitem(METHODS, "tableau", RungeKutta(2, ((), (0.5,)), (0.0, 1.0), (0.0, 0.5)))
     mine = method_named("mine")
-    assert mine.stages == 2 and mine.lanes and not (mine.adaptive or mine.solves_stages)
+    assert mine.stages == 2 and not (mine.adaptive or mine.solves_stages)
     q, qd, tau = rng.uniform(-1, 1, (3, 9, 3))
     found, same = (tmt.simulate(q, qd, tau, 0.01, 20, name) for name in ("mine", "tableau"))
     assert found.evaluations == same.evaluations == 9 * 20 * 2

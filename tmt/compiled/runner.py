@@ -58,7 +58,9 @@ class Runner:
         from .machine import lanes
 
         count, steps = len(q), (q.shape[1] - 1) * every
-        width = lanes() if self.stepping.lanes and count >= lanes() else 1
+        # side by side where every run does the same in each step
+        is_uniform = not (self.stepping.adaptive or self.stepping.solves_stages)
+        width = lanes() if is_uniform and count >= lanes() else 1
         info = np.zeros((count, 3), np.int64)
 
         def follow_some(part: slice) -> None:

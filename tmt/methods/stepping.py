@@ -82,11 +82,6 @@ class Method:
     adaptive = False  # chooses its own steps, takes a tolerance and has an `attempt`, see AdaptiveRungeKutta
     solves_stages = False  # its stages solve an equation: it has `stage_states` and `finish`, see implicit.py
 
-    @property
-    def lanes(self) -> bool:
-        """Whether it can be followed in lanes: then every run does the same in each step."""
-        return not (self.adaptive or self.solves_stages)
-
     @cached_property
     def stages(self) -> int:
         """Evaluations of the dynamics in one step; of a method that solves its stages, in one iteration."""
