@@ -1,10 +1,7 @@
 """A robot that stands: differences of its step with all contacts on, beside the closed form, which holds where contacts stay."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ...core.rows import Row
 from ...engines.mujoco.differences import touching
 from ...engines.mujoco.forces import forces_near
 from ...engines.mujoco.reading import Reading
@@ -13,21 +10,8 @@ from ...stability.answer import postures_of
 from ...stability.closed_form import COVERED, matrix
 from ...stability.place import standing_at
 from ...stability.rest import rest_near
-from .ways import SIZES, relative, units_of_speeds
-
-
-@dataclass(kw_only=True)
-class ContactRow(Row):
-    """Centred differences of the step of a robot that stands."""
-
-    posture: str
-    integrator: str
-    contacts: int  # in which forces act
-    eps: float
-    difference: (
-        float | None
-    )  # from the closed form, relative to its largest entry of the same unit; None: there is no closed form
-    changed: str  # pairs that open or close within eps; "": contacts stay
+from .tables import ContactRow
+from .ways import SIZES, STATE, relative, units_of
 
 
 def contact_rows(reading: Reading) -> list[ContactRow]:
@@ -39,20 +23,20 @@ def contact_rows(reading: Reading) -> list[ContactRow]:
     integrator = reading.integrator if reading.integrator in COVERED else "implicitfast"
     step = Step(place.model, float(place.model.opt.timestep), integrator)
     rest = rest_near(step, place.rest)
-    forces, nv = forces_near(step, rest.state), place.model.nv
-    closed = None if forces is None else matrix(rest, place.tree, forces)[: 2 * nv, : 2 * nv]
-    units = units_of_speeds(place.tree, 2)
+    forces, states = forces_near(step, rest.state), 2 * place.model.nv
+    closed = None if forces is None else matrix(rest, place.tree, forces)[:states, :states]
+    units = units_of(place.tree, STATE)
     base = touching(step, rest.state, np.zeros(step.size))
     rows = []
     for eps in SIZES:
-        A = step.derivative(rest.state, eps)[: 2 * nv, : 2 * nv]
-        ends = [
-            touching(step, rest.state, by) for by in (*np.eye(step.size) * eps, *np.eye(step.size) * -eps)
-        ]
-        changed = sorted(set().union(*(base ^ end for end in ends)))
-        off = None if closed is None else relative(A - closed, closed, (units, units))
-        rows.append(ContactRow(
-            posture=posture.name, integrator=integrator, contacts=len(base), eps=eps,
-            difference=off if off is not None and np.isfinite(off) else None, changed="; ".join(changed),
-        ))  # fmt: skip
+        changed: set[str] = set()
+        for nudge in eps * np.eye(step.size):
+            for by in (nudge, -nudge):
+                changed |= base ^ touching(step, rest.state, by)
+        A, difference = step.derivative(rest.state, eps)[:states, :states], None
+        if closed is not None:
+            error, *_ = relative(A - closed, closed, (units, units))
+            difference = error if np.isfinite(error) else None
+        about = {"posture": posture.name, "integrator": integrator, "contacts": len(base)}
+        rows.append(ContactRow(**about, eps=eps, difference=difference, changed="; ".join(sorted(changed))))
     return rows

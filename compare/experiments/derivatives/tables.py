@@ -16,8 +16,15 @@ class DerivativeRow(Row):
     quantity: str  # of ways.QUANTITIES, and the integrator
     way: str
     eps: float | None  # of a difference, rad, m and per s; None: it is exact
-    error: float | None  # relative to the largest entry of the same unit; None: not a number
+    error: float | None  # relative to the largest exact entry of the same unit; None: not a number
     states: int
+    unit: str  # of the derivatives with that error
+    largest: float  # exact entry of that unit
+
+    @property
+    def size(self) -> float:
+        """The error; infinite where it is not a number."""
+        return inf if self.error is None else self.error
 
 
 @dataclass(kw_only=True)
@@ -33,16 +40,15 @@ class CostRow(Row):
 
 
 @dataclass(kw_only=True)
-class HardRow(Row):
-    """What differences are worth where they are hard; of steps the centred ones."""
+class ContactRow(Row):
+    """Centred differences of the step of a robot that stands, beside the closed form."""
 
-    subject: str
-    quantity: str
-    eps: float  # that serves the scenes best
-    error: float | None  # with that
-    scenes_error: float | None  # with that, along the scenes
-    best_eps: float
-    best_error: float | None
+    posture: str
+    integrator: str
+    contacts: int  # in which forces act
+    eps: float
+    difference: float | None  # relative to the largest entry of the same unit; None: there is no closed form
+    changed: str  # pairs that open or close within eps; "": contacts stay
 
 
 @dataclass
@@ -53,10 +59,12 @@ class DerivativesResult(Result):
     times: dict[tuple[str, str], float] = field(default_factory=dict)  # s, by quantity and way
 
 
-def errors_of(rows: Iterable[DerivativeRow]) -> dict[float, float]:
-    """The largest error for each eps, 0 where there is none; inf where one is not a number."""
-    errors: dict[float, float] = {}
-    for row in rows:
-        error = inf if row.error is None else row.error
-        errors[row.eps or 0.0] = max(error, errors.get(row.eps or 0.0, 0.0))
-    return errors
+def worst_of_each_eps(rows: Iterable[DerivativeRow]) -> dict[float, DerivativeRow]:
+    """The row with the largest error for each eps, 0 where there is none; from coarse to fine."""
+    ascending = sorted(rows, key=lambda row: (-(row.eps or 0.0), row.size))
+    return {row.eps or 0.0: row for row in ascending}
+
+
+def best_of(rows: Iterable[DerivativeRow]) -> DerivativeRow:
+    """The row with the largest error for the eps that serves these rows best."""
+    return min(worst_of_each_eps(rows).values(), key=lambda row: row.size)
