@@ -82,8 +82,9 @@ def test_errors_are_relative_to_entries_of_the_same_unit():
     assert ways.relative(np.full((2, 2), np.nan), exact, units)[0] == np.inf
 
 
-FREE_WITH_HINGE = """<mujoco><worldbody><body pos="0 0 1"><freejoint/><inertial pos="0 0 0" mass="2" diaginertia="0.1 0.2 0.25"/>
-<body><joint axis="0 0.6 0.8"/><inertial pos="0.1 0 0" mass="0.1" diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody></mujoco>"""
+FREE_WITH_HINGE = """<mujoco><worldbody><body pos="0 0 1"><freejoint/>
+<inertial pos="0 0 0" mass="2" diaginertia="0.1 0.2 0.25"/><body><joint axis="0 0.6 0.8"/>
+<inertial pos="0.1 0 0" mass="0.1" diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody></mujoco>"""
 
 
 def test_a_slow_turn_of_a_free_body_is_rounded_as_a_quaternion():

@@ -139,7 +139,7 @@ def figures(result: TrajectoryResult, robot: Robot) -> Iterator[partial[Any]]:
 
 
 def overview(results: Mapping[str, TrajectoryResult], robot: Robot) -> Iterator[partial[Any]]:
-    from .figures_overview import draw_scenes  # matplotlib is for the process that draws
+    from .figures_runs import draw_scenes  # matplotlib is for the process that draws
 
     if results["trajectory"].rows:
         yield partial(draw_scenes, results["trajectory"], robot)

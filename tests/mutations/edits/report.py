@@ -78,8 +78,8 @@ EDITS = (
     ("stick", "as_seen", "[RIGHTWARD, UPWARD]", "[UPWARD, RIGHTWARD]", "up is to the right"),
     ("figures", "draw_distances", "max(quantities, *_1)", "min(quantities, *_1)", "the least distance is the largest"),
     ("figures_runs", "draw_held", "path.left", "run.paths['mujoco'].left", "MuJoCo's departure is told of TMT", 1),
-    ("figures_runs", "draw_held", "result.errors[case.name]", "_0[::-1]", "the caption exchanges the engines"),
-    ("figures_runs", "run_caption", "largest_known(_1)", "min(_1)", "the least use of the band is told as the most"),
+    ("figures_runs", "draw_held", "result.errors[name]", "_0[::-1]", "the caption exchanges the engines"),
+    ("figures_runs", "draw_run", "largest_known(_1)", "min(_1)", "the least use of the band is told as the most"),
     ("figures_runs", "over_time", "first[:, i]", "mujoco[:, i]", "MuJoCo's run is drawn as TMT's"),
     ("reduction.times", "largest_gain", "max(smaller, *_1)", "min(smaller, *_1)", "the least gain is told as the best"),
 )  # fmt: skip
