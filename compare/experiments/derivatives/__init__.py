@@ -177,7 +177,7 @@ def add_advice(result: DerivativesResult, scenes: Sequence[DerivativeRow], hard:
     """Which eps to use, what it costs, and where that fails."""
     by_eps = [row for row in scenes if row.eps]
     one_sided = [row for row in by_eps if row.way.endswith(ONE_SIDED)]
-    values = {
+    values: dict[str, Any] = {
         "centred": best_of(row for row in by_eps if row.way.endswith(CENTRED)),
         "one_sided": best_of(one_sided),
         "usual": worst_of_each_eps(one_sided)[USUAL],

@@ -37,6 +37,8 @@ def contact_rows(reading: Reading) -> list[ContactRow]:
         if closed is not None:
             error, *_ = relative(A - closed, closed, (units, units))
             difference = error if np.isfinite(error) else None
-        about = {"posture": posture.name, "integrator": integrator, "contacts": len(base)}
-        rows.append(ContactRow(**about, eps=eps, difference=difference, changed="; ".join(sorted(changed))))
+        rows.append(ContactRow(
+            posture=posture.name, integrator=integrator, contacts=len(base), eps=eps, difference=difference,
+            changed="; ".join(sorted(changed)),
+        ))  # fmt: skip
     return rows

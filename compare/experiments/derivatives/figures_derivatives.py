@@ -46,7 +46,7 @@ def draw_times(result: DerivativesResult) -> tuple[str, Figure, Finding]:
         points = [(max(row.error, LEAST), row.time) for row in costs
                   if row.way == way and row.time and row.error is not None]  # fmt: skip
         fill = "none" if k >= len(COLOURS) else None
-        look = {
+        look: dict[str, Any] = {
             "color": COLOURS[k % len(COLOURS)],
             "marker": "s" if way in EXACT else "o",
             "markerfacecolor": fill,

@@ -183,9 +183,10 @@ def row_of(
     units = units_of(subject.tree, quantity.units), units_of(subject.tree, (*STATE, *FORCE))[:columns]
     high, low = (part[:, :, :columns] for part in exact)
     error, unit, largest = max(relative((v - h) - l, h, units) for v, h, l in zip(values, high, low))
-    number = error if np.isfinite(error) else None
-    about = {"subject": subject.name, "quantity": quantity.name, "way": way, "states": subject.states}
-    return DerivativeRow(**about, eps=eps, error=number, unit=unit, largest=largest)
+    return DerivativeRow(
+        subject=subject.name, quantity=quantity.name, way=way, eps=eps, states=subject.states,
+        error=error if np.isfinite(error) else None, unit=unit, largest=largest,
+    )  # fmt: skip
 
 
 def largest_share(exact: Pairs, values: Array, tolerance: Array) -> float:

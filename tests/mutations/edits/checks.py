@@ -36,8 +36,8 @@ EDITS = (
         for module, where, quantity in AGREEMENTS
     ),
     *(
-        ("quantities", "Comparison.compare", "Compared(_1, _2, values, mujoco_values, *_3)",
-         f"Compared(_1, _2, values, values if name == {quantity!r} else mujoco_values, *_3)",
+        ("quantities", "Comparison.compare", "self.agree(_1, _2, values, mujoco_values, *_3)",
+         f"self.agree(_1, _2, values, values if name == {quantity!r} else mujoco_values, *_3)",
          f"{quantity} is compared with itself")
         for quantity in ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv", "Mbar", "holding torque", "bias", "qdd", "energy")
     ),
