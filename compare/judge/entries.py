@@ -129,11 +129,15 @@ class Entries:
         """Of Mbar qdd = tau - D qd - k (q - rest) - h, N m or N, (states, nv)."""
         return self.bias + np.abs(tau) + np.array(self.tree.damping) * np.abs(self.qd) + self.springs
 
-    def residual(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
-        """Of Mbar qdd and the forces; a factorization of Mbar has terms up to sqrt(Mbar_ii Mbar_jj)."""
+    @cached_property
+    def factored(self) -> np.ndarray:
+        """The terms of Mbar and of its factorization, which are up to sqrt(Mbar_ii Mbar_jj), (states, nv, nv)."""
         root = np.sqrt(np.einsum("sii->si", self.M))
-        sizes = self.added + root[:, :, None] * root[:, None, :]
-        return np.einsum("sij,sj->si", sizes, np.abs(qdd)) + force
+        return self.added + root[:, :, None] * root[:, None, :]
+
+    def residual(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
+        """Of Mbar qdd and the forces."""
+        return np.einsum("sij,sj->si", self.factored, np.abs(qdd)) + force
 
     def acceleration(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
         """Of qdd: errors of eps in Mbar and in the forces times |Mbar^-1|, (states, nv)."""
@@ -170,9 +174,7 @@ class Entries:
 
     def solved(self, right: np.ndarray, solution: np.ndarray) -> np.ndarray:
         """Of X with Mbar X = right, (states, nv, columns): |Mbar^-1| times the sizes of both sides."""
-        root = np.sqrt(np.einsum("sii->si", self.M))
-        sizes = self.added + root[:, :, None] * root[:, None, :]
-        return self.inverse @ (right + sizes @ np.abs(solution))
+        return self.inverse @ (right + self.factored @ np.abs(solution))
 
     def derivatives(self, tau: ArrayLike, qdd: np.ndarray, by: tmt.Derivatives) -> tmt.Derivatives:
         """Of what tmt.derivatives returns at tau, where it is `by`; qdd: the accelerations."""
@@ -180,13 +182,8 @@ class Entries:
         sizes = np.abs(qdd) + self.acceleration(force, qdd)
         by_movement, by_speed = self.force_rates(sizes)
         unit_torques = np.broadcast_to(np.eye(self.qd.shape[1]), by.dqdd_dtau.shape)
-        return tmt.Derivatives(
-            self.solved(by_movement, by.dqdd_dq),
-            self.solved(by_speed, by.dqdd_dqd),
-            self.solved(unit_torques, by.dqdd_dtau),
-            by_movement,
-            by_speed,
-        )
+        sides = by_movement, by_speed, unit_torques
+        return tmt.Derivatives(*map(self.solved, sides, by[:3]), by_movement, by_speed)
 
     def step(self, dt: float, by: tmt.Derivatives, scale: tmt.Derivatives) -> np.ndarray:
         """Of [A B] of a step, (states, 2 nv, 3 nv): dt times that of the derivatives, carried through the step by their values.

@@ -24,7 +24,7 @@ def bent():
 
 
 def shares(mujoco, subject, *integrators) -> dict[str, float]:
-    every = ways.measured(subject, mujoco, integrators, DT, compiles=False)
+    every = ways.measured(ways.Task(subject, integrators, False), mujoco, DT)
     return {way: share for one in every for way, share in one.shares.items()}
 
 
@@ -93,7 +93,8 @@ def test_a_slow_turn_of_a_free_body_is_rounded_as_a_quaternion():
     case = setup.robot.cases[0]
     q, qd, tau = case.q[None], np.full((1, 7), 0.1), np.zeros((1, 7))
     subject = subjects.Subject("slow", "scene", case, case.tree, q, qd, tau)
-    every = ways.measured(subject, setup.engines["mujoco"], ("implicitfast",), 1e-3, compiles=False)
+    task = ways.Task(subject, ("implicitfast",), False)
+    every = ways.measured(task, setup.engines["mujoco"], 1e-3)
     assert max(share for one in every for share in one.shares.values()) <= 1.0
 
 

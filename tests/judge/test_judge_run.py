@@ -10,7 +10,6 @@ import tmt
 from compare.judge.run import (
     departure,
     deviation,
-    deviation_alive,
     diverged_at,
     leaves_no_digits,
     movement_unit,
@@ -60,7 +59,6 @@ def test_an_arm_has_left_at_a_tenth_of_a_radian():
         path[1, 1] = 1.0 + off
         assert departure(np.arange(3.0), path) == left
     assert deviation(np.array([1.1, 0.7]), 1.0) == pytest.approx(0.3)
-    assert deviation_alive(np.array([1.1, 0.7, np.nan]), 1.0) == pytest.approx(0.3)
 
 
 def alone(kind, **more) -> tmt.Tree:

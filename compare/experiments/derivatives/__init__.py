@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 from tmt.compiled.evaluator import Evaluator
 
@@ -19,9 +19,9 @@ from .. import Drawing, Experiment
 from ..setup import Setup
 from . import ways
 from .contacts import contact_rows
-from .subjects import Subject, all_subjects, dynamics_of
+from .subjects import all_subjects, dynamics_of
 from .tables import CostRow, DerivativeRow, DerivativesResult, best_of, worst_of_each_eps
-from .ways import CENTRED, COMPILED, EXACT, FORWARD, INVERSE, NUMPY, ONE_SIDED, USUAL, Measured
+from .ways import CENTRED, COMPILED, EXACT, FORWARD, INVERSE, NUMPY, ONE_SIDED, USUAL, Measured, Task
 
 EXPERIMENT = Experiment(order=105, serves_own=False, timed=True)
 MOST_SPEEDS = 40  # of a robot whose exact derivatives are traced in less than a minute
@@ -40,14 +40,6 @@ def skipped(robot: Robot) -> Finding | None:
     return Finding("derivatives", "large", values) if robot.coordinates.nv > MOST_SPEEDS else None
 
 
-class Task(NamedTuple):
-    """The errors at one subject."""
-
-    subject: Subject
-    integrators: Sequence[str]
-    compiles: bool
-
-
 def begin(setup: Setup) -> Work:
     """Measure the errors at all subjects, in parallel with other work: of the first one those of all integrators.
 
@@ -57,14 +49,9 @@ def begin(setup: Setup) -> Work:
     dt, states = float(mujoco.model.opt.timestep), setup.of(4, 2, 2) if is_small else 1
     tasks: list[Task] = []
     for subject in all_subjects(setup.robot, setup.random.first(200), dt, states):
-        is_main = not tasks
-        integrators = INTEGRATORS if is_small and (is_main or setup.alone) else FEW_INTEGRATORS
-        tasks.append(Task(subject, integrators, is_main))
-    return setup.map(partial(measure, mujoco=mujoco, dt=dt), tasks)
-
-
-def measure(task: Task, mujoco: Mujoco, dt: float) -> list[Measured]:
-    return ways.measured(task.subject, mujoco, task.integrators, dt, task.compiles)
+        has_all = is_small and (setup.alone or not tasks)
+        tasks.append(Task(subject, INTEGRATORS if has_all else FEW_INTEGRATORS, compiles=not tasks))
+    return setup.map(partial(ways.measured, mujoco=mujoco, dt=dt), tasks)
 
 
 def rows(setup: Setup, work: Work | None = None) -> DerivativesResult:

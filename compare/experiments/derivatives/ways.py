@@ -142,6 +142,14 @@ def relative(difference: Array, exact: Array, units: tuple[Array, Array]) -> tup
     return worst
 
 
+class Task(NamedTuple):
+    """The errors at one subject."""
+
+    subject: Subject
+    integrators: Sequence[str]
+    compiles: bool
+
+
 class Measured(NamedTuple):
     """What is known of a quantity at the states of a subject, before anything is timed."""
 
@@ -151,15 +159,14 @@ class Measured(NamedTuple):
     shares: dict[str, float]  # of the tolerance, by the way: of tmt's and of the centred differences
 
 
-def measured(
-    subject: Subject, mujoco: Mujoco, integrators: Sequence[str], dt: float, compiles: bool
-) -> list[Measured]:
+def measured(task: Task, mujoco: Mujoco, dt: float) -> list[Measured]:
     """All ways to each quantity at all states."""
-    dynamics, result = dynamics_of(mujoco, subject), []
-    for quantity in quantities(subject, integrators):
+    subject, result = task.subject, []
+    dynamics = dynamics_of(mujoco, subject)
+    for quantity in quantities(subject, task.integrators):
         exact, tolerance = quantity.exact_values(subject, dt), FACTOR * EPS * quantity.scale(subject, dt)
         by_tmt = {NUMPY: quantity.by_numpy(subject, dt)}
-        machine = quantity.by_machine_code(subject, dt) if compiles else None
+        machine = quantity.by_machine_code(subject, dt) if task.compiles else None
         if machine is not None:
             by_tmt[COMPILED] = machine
         rows = [row_of(subject, quantity, way, None, values, exact) for way, values in by_tmt.items()]
