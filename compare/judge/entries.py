@@ -182,8 +182,8 @@ class Entries:
         sizes = np.abs(qdd) + self.acceleration(force, qdd)
         by_movement, by_speed = self.force_rates(sizes)
         unit_torques = np.broadcast_to(np.eye(self.qd.shape[1]), by.dqdd_dtau.shape)
-        sides = by_movement, by_speed, unit_torques
-        return tmt.Derivatives(*map(self.solved, sides, by[:3]), by_movement, by_speed)
+        by_q, by_qd, by_tau = map(self.solved, (by_movement, by_speed, unit_torques), by[:3])
+        return tmt.Derivatives(by_q, by_qd, by_tau, by_movement, by_speed)
 
     def step(self, dt: float, by: tmt.Derivatives, scale: tmt.Derivatives) -> np.ndarray:
         """Of [A B] of a step, (states, 2 nv, 3 nv): dt times that of the derivatives, carried through the step by their values.

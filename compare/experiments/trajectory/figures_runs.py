@@ -195,8 +195,9 @@ def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Fi
             lines_to(left, [share], [place], mark, colour, markersize=4.5)
     durations = [case.duration for name in shown for case in robot.cases if case.name == name]
     judged = [min(row.judged_until for row in rows[name]) for name in shown]
-    for times, colour, label in ((durations, (GREY, 0.2), "not judged"), (judged, BLUE, "judged at all dt")):
-        right.barh(range(len(shown)), times, height=0.5, color=colour, label=label)
+    places = range(len(shown))
+    right.barh(places, durations, height=0.5, color=(GREY, 0.2), label="not judged")
+    right.barh(places, judged, height=0.5, color=BLUE, label="judged at all dt")
     beyond_tolerance(left, 1.0, "1")
     left.set_xticks([1e-4, 1e-2, 1.0])
     left.minorticks_off()

@@ -180,7 +180,7 @@ def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin
     states, stepped = ([values[single] for values in pair] for pair in (states, stepped))
     of_positions = width[:, : case.coordinates.nv].max(axis=1)
     run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, of_positions)
-    tolerance = step_rounding(stepping, tree, *states, tau, dt)
+    tolerance = step_rounding(stepping, tree, states[0], states[1], tau, dt)
     return Twin(
         run, width, rules.widest_judged(case, path.q, path.v), times[single], states, stepped, tolerance
     )
