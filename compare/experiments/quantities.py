@@ -161,7 +161,7 @@ def figures(result: AgreementResult, robot: Robot) -> Iterator[Drawing]:
 
 def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[Drawing]:
     """The picture of M, h and accelerations on the first screen, where one of them was compared."""
-    from .figures_overview import agreements, draw_agreement
+    from .figures import agreements, draw_agreement
 
     if agreements(results):
         yield partial(draw_agreement, results)

@@ -14,7 +14,8 @@ from compare.core.cause import Cause
 from compare.core.check import About, Result
 from compare.core.text import say
 from compare.engines.mujoco.reading import read
-from compare.experiments import figures_overview, module, stability
+from compare.experiments import figures as figures_of_states
+from compare.experiments import module, stability
 from compare.experiments.parameters.numbers import NumberRow
 from compare.experiments.published import PrintedRow
 from compare.experiments.speed import advice
@@ -216,13 +217,13 @@ def marks(experiment, result, robot=ARM):
 def test_the_agreement_is_the_largest_of_all_rows_of_a_quantity_and_its_picture_says_whose_distance_is_whose():
     near, other = replace(AGREED, mujoco_from_exact=None), replace(AGREED, quantity="other", difference=9.0)
     rows = [near, replace(near, difference=7.0, from_exact=None), other]
-    (found,) = figures_overview.agreements({"mass": Result("mass", rows=rows)})
+    (found,) = figures_of_states.agreements({"mass": Result("mass", rows=rows)})
     distances = {"difference": 7.0, "from_exact": 1.0, "mujoco_from_exact": None}
     assert found == {"name": "mass matrix M", "passed": True} | distances
-    _, _, caption = figures_overview.draw_agreement({"mass": Result("mass", rows=rows)})
+    _, _, caption = figures_of_states.draw_agreement({"mass": Result("mass", rows=rows)})
     assert "Maximum difference: 7 eps" in say(caption)
     rows.append(replace(AGREED, difference=float("nan"), passed=False))
-    (found,) = figures_overview.agreements({"mass": Result("mass", rows=rows)})
+    (found,) = figures_of_states.agreements({"mass": Result("mass", rows=rows)})
     assert found["difference"] == float("inf") and not found["passed"]
     drawn = marks("mass", Result("mass", rows=[AGREED]))
     assert drawn == {("D", to_hex("black"), 2.0), ("o", to_hex(BLUE), 1.0), ("s", to_hex(ORANGE), 4.0)}

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
 from ...report.style import GREY, WIDTH, file_name
-from ..figures_overview import OUTLINE, chart
+from ..figures import OUTLINE, chart
 from .advice import TARGET, best_rows, cheapest_of_fronts, front, target, within_target
 from .runs import SpeedResult, SpeedRow
 

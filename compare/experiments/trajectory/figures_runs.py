@@ -17,7 +17,7 @@ from ...judge.run import LEFT, moved_from, movement_unit, step_in_words
 from ...report.style import BLUE, GREY, LINES, ORANGE, RED, WIDTH, file_name, zero_at_the_end
 from ...robots import Robot
 from ...robots.case import Case
-from ..figures_overview import MOST_ROWS, beyond_tolerance, chart, lines_to, named_rows
+from ..figures import MOST_ROWS, beyond_tolerance, chart, lines_to, named_rows
 from .runs import Run, TrajectoryResult
 from .true_motion import difference_while_judged
 
