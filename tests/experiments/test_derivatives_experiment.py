@@ -10,9 +10,8 @@ from compare.core.finding import Finding
 from compare.core.text import say
 from compare.engines.mujoco import read
 from compare.engines.mujoco.differences import of_inverse, of_steps, of_transition
-from compare.experiments.derivatives import subjects, ways
-from compare.experiments.derivatives.contacts import contact_rows
-from compare.experiments.derivatives.tables import DerivativeRow, best_of, worst_of_each_eps
+from compare.experiments.derivatives import contact_rows, subjects, ways
+from compare.experiments.derivatives.ways import DerivativeRow, best_of, worst_of_each_eps
 from compare.robots.arm import ARM
 
 DT = 0.01

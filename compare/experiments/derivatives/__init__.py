@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any, cast
 
+import numpy as np
+
 from tmt.compiled.evaluator import Evaluator
 
 from ...core import timing
@@ -11,17 +13,23 @@ from ...core.check import About
 from ...core.finding import Finding
 from ...engines import LABELS, RECORDS
 from ...engines.mujoco import Mujoco
+from ...engines.mujoco.differences import touching
+from ...engines.mujoco.forces import forces_near
+from ...engines.mujoco.reading import Reading
+from ...engines.mujoco.step import Step
 from ...engines.outside import OutsideDynamics
 from ...engines.outside.model import EngineError
 from ...judge.scale import FACTOR
 from ...robots import Robot
+from ...stability.answer import postures_of
+from ...stability.closed_form import COVERED, matrix
+from ...stability.place import standing_at
+from ...stability.rest import rest_near
 from .. import Drawing, Experiment
 from ..setup import Setup
 from . import ways
-from .contacts import contact_rows
 from .subjects import all_subjects, dynamics_of
-from .tables import CostRow, DerivativeRow, DerivativesResult, best_of, worst_of_each_eps
-from .ways import CENTRED, COMPILED, EXACT, FORWARD, INVERSE, NUMPY, ONE_SIDED, USUAL, Measured, Task
+from .ways import EXACT, FORWARD, ContactRow, CostRow, DerivativeRow, DerivativesResult, Measured, Task
 
 EXPERIMENT = Experiment(order=105, serves_own=False, timed=True)
 MOST_SPEEDS = 40  # of a robot whose exact derivatives are traced in less than a minute
@@ -84,11 +92,11 @@ def add_times(setup: Setup, result: DerivativesResult, main: Sequence[Measured])
     for measured in main:
         quantity = measured.quantity
         for way in quantity.differences(dynamics, subject, dt, 0):
-            calls[quantity.name, way.name] = way.call(USUAL)
-        calls[quantity.name, NUMPY] = partial(quantity.by_numpy, first, dt)
-        if COMPILED in measured.shares:
+            calls[quantity.name, way.name] = way.call(ways.USUAL)
+        calls[quantity.name, ways.NUMPY] = partial(quantity.by_numpy, first, dt)
+        if ways.COMPILED in measured.shares:
             state = [values[0] for values in quantity.arguments(subject, dt)]
-            calls[quantity.name, COMPILED] = partial(
+            calls[quantity.name, ways.COMPILED] = partial(
                 Evaluator(subject.tree, quantity.function).of_one, *state
             )
     result.times = timing.fastest(calls, setup.of(50, 20, 2))
@@ -132,12 +140,45 @@ def add_contacts(setup: Setup, result: DerivativesResult) -> None:
         result.find("contacts", rows=rows)
 
 
+def contact_rows(reading: Reading) -> list[ContactRow]:
+    """Differences of the step for each eps, with all contacts on, beside the closed form, which holds where contacts stay.
+
+    Where the file's first posture sinks to; none where nothing touches it there.
+    """
+    posture = postures_of(reading)[0]
+    place = standing_at(reading, posture.name, posture.key)
+    if not place.touching:
+        return []
+    integrator = reading.integrator if reading.integrator in COVERED else "implicitfast"
+    step = Step(place.model, float(place.model.opt.timestep), integrator)
+    rest = rest_near(step, place.rest)
+    forces, states = forces_near(step, rest.state), 2 * place.model.nv
+    closed = None if forces is None else matrix(rest, place.tree, forces)[:states, :states]
+    units = ways.units_of(place.tree, ways.STATE)
+    base = touching(step, rest.state, np.zeros(step.size))
+    rows = []
+    for eps in ways.SIZES:
+        changed: set[str] = set()
+        for nudge in eps * np.eye(step.size):
+            for by in (nudge, -nudge):
+                changed |= base ^ touching(step, rest.state, by)
+        A, difference = step.derivative(rest.state, eps)[:states, :states], None
+        if closed is not None:
+            error, *_ = ways.relative(A - closed, closed, (units, units))
+            difference = error if np.isfinite(error) else None
+        rows.append(ContactRow(
+            posture=posture.name, integrator=integrator, contacts=len(base), eps=eps, difference=difference,
+            changed="; ".join(sorted(changed)),
+        ))  # fmt: skip
+    return rows
+
+
 def add_costs(result: DerivativesResult, scenes: Sequence[DerivativeRow], main: Sequence[Measured]) -> None:
     """The error of each way at all scenes, with its best eps, and its time."""
     costs: list[CostRow] = []
     for quantity, way in dict.fromkeys((row.quantity, row.way) for measured in main for row in measured.rows):
         same = [row for row in scenes if (row.quantity, row.way) == (quantity, way)]
-        best, usual = best_of(same), worst_of_each_eps(same).get(USUAL)
+        best, usual = ways.best_of(same), ways.worst_of_each_eps(same).get(ways.USUAL)
         seconds = result.times.get((quantity, way))
         costs.append(CostRow(
             quantity=quantity, way=way, best_eps=best.eps, error=best.error,
@@ -145,7 +186,7 @@ def add_costs(result: DerivativesResult, scenes: Sequence[DerivativeRow], main: 
         ))  # fmt: skip
     result.tables["derivative_costs"] = costs
     timed = [row for row in costs if row.time]
-    pairs = [(row, of_mujoco(timed, row.quantity)) for row in timed if row.way == COMPILED]
+    pairs = [(row, of_mujoco(timed, row.quantity)) for row in timed if row.way == ways.COMPILED]
     result.find(
         "costs",
         engines=[row for row in timed if row.way in LABELS.values()],
@@ -157,34 +198,38 @@ def add_costs(result: DerivativesResult, scenes: Sequence[DerivativeRow], main: 
 def of_mujoco(costs: Sequence[CostRow], quantity: str) -> CostRow | None:
     """MuJoCo's way to a quantity: its own function, centred where it can be."""
     others = [row for row in costs if row.quantity == quantity and row.way not in EXACT]
-    return max(others, key=lambda row: (row.way.endswith(CENTRED), row.way.startswith("mjd")), default=None)
+    return max(
+        others, key=lambda row: (row.way.endswith(ways.CENTRED), row.way.startswith("mjd")), default=None
+    )
 
 
 def add_advice(result: DerivativesResult, scenes: Sequence[DerivativeRow], hard: Sequence[Measured]) -> None:
     """Which eps to use, what it costs, and where that fails."""
     by_eps = [row for row in scenes if row.eps]
-    one_sided = [row for row in by_eps if row.way.endswith(ONE_SIDED)]
+    one_sided = [row for row in by_eps if row.way.endswith(ways.ONE_SIDED)]
     values: dict[str, Any] = {
-        "centred": best_of(row for row in by_eps if row.way.endswith(CENTRED)),
-        "one_sided": best_of(one_sided),
-        "usual": worst_of_each_eps(one_sided)[USUAL],
-        "inverse": best_of(row for row in by_eps if row.quantity == INVERSE),
-        "exact": best_of(row for row in scenes if row.way in EXACT),
+        "centred": ways.best_of(row for row in by_eps if row.way.endswith(ways.CENTRED)),
+        "one_sided": ways.best_of(one_sided),
+        "usual": ways.worst_of_each_eps(one_sided)[ways.USUAL],
+        "inverse": ways.best_of(row for row in by_eps if row.quantity == ways.INVERSE),
+        "exact": ways.best_of(row for row in scenes if row.way in EXACT),
     }
     result.headline = result.finding("headline", centred=values["centred"])
     result.top.append(result.finding("advice", **values))
     pairs = []
     for measured in hard:
         if measured.quantity.name != FORWARD:
-            at_scenes = best_of(row for row in by_eps if is_tried(row, measured.quantity.name))
+            at_scenes = ways.best_of(row for row in by_eps if is_tried(row, measured.quantity.name))
             rows_here = [row for row in measured.rows if row.eps and is_tried(row, measured.quantity.name)]
-            pairs.append({"row": worst_of_each_eps(rows_here)[at_scenes.eps or 0.0], "scenes": at_scenes})
+            pairs.append(
+                {"row": ways.worst_of_each_eps(rows_here)[at_scenes.eps or 0.0], "scenes": at_scenes}
+            )
     result.find("hard", pairs=pairs)
 
 
 def is_tried(row: DerivativeRow, quantity: str) -> bool:
     """Whether a row is a difference of a quantity that is tried where that is hard: of steps a centred one."""
-    return row.quantity == quantity and not row.way.endswith(ONE_SIDED)
+    return row.quantity == quantity and not row.way.endswith(ways.ONE_SIDED)
 
 
 def figures(result: DerivativesResult, robot: Robot) -> Iterator[Drawing]:

@@ -6,8 +6,7 @@ from matplotlib.figure import Figure
 
 from ...core.finding import Finding
 from ...report.style import BLUE, DASHES, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
-from .tables import CostRow, DerivativesResult, best_of, worst_of_each_eps
-from .ways import EXACT
+from .ways import EXACT, CostRow, DerivativesResult, best_of, worst_of_each_eps
 
 LEAST = 1e-17  # that is drawn of an error
 COLOURS = BLUE, RED, GREEN, ORANGE, PINK, SKY

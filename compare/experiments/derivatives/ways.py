@@ -1,7 +1,9 @@
-"""The ways to a derivative: MuJoCo's differences over their eps, tmt's exact ones; and the errors of each."""
+"""The ways to a derivative: MuJoCo's differences over their eps, tmt's exact ones; the errors of each, and rows of them."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise, product
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +12,8 @@ import tmt
 from tmt.compiled.evaluator import Evaluator
 from tmt.exact.many import Pairs, exact_of_many
 
+from ...core.check import Result
+from ...core.rows import Row, column
 from ...engines.mujoco import Mujoco
 from ...engines.mujoco.differences import Call, of_inverse, of_steps, of_transition
 from ...engines.mujoco.dynamics import MujocoDynamics
@@ -19,7 +23,6 @@ from ...judge.entries import Entries
 from ...judge.rounding import of_positions
 from ...judge.scale import EPS, FACTOR, gain_scale
 from .subjects import Subject, dynamics_of
-from .tables import DerivativeRow
 
 Array = np.ndarray
 Units = Sequence[tuple[str, str]]  # of movements, of speeds ...: of turns, of slides
@@ -33,6 +36,68 @@ STATE: Units = ("rad", "m"), ("rad/s", "m/s")
 FORCE: Units = (("N m", "N"),)
 ZERO = 1e-25  # what is no larger with 31 digits is zero
 TRUNCATED = 2.0 / 99.0  # of the difference between an eps and ten times that: twice the term in eps^2
+
+
+@dataclass(kw_only=True)
+class DerivativeRow(Row):
+    """One way to a derivative: its largest error over the states of a subject."""
+
+    subject: str  # a scene, or what is hard about its states
+    quantity: str  # of a Quantity
+    way: str
+    eps: float | None  # of a difference, rad, m and per s; None: it is exact
+    error: float | None  # relative to the largest exact entry of the same unit; None: not a number
+    states: int
+    unit: str  # of the derivatives with that error
+    largest: float  # exact entry of that unit
+
+    @property
+    def size(self) -> float:
+        """The error; infinite where it is not a number."""
+        return inf if self.error is None else self.error
+
+
+@dataclass(kw_only=True)
+class CostRow(Row):
+    """One way to a derivative: the error that it reaches, and the time of an evaluation."""
+
+    quantity: str
+    way: str
+    best_eps: float | None
+    error: float | None  # with that
+    error_at_usual: float | None  # with USUAL, 1e-6
+    time: float | None = column("us")
+
+
+@dataclass(kw_only=True)
+class ContactRow(Row):
+    """Centred differences of the step of a robot that stands, beside the closed form."""
+
+    posture: str
+    integrator: str
+    contacts: int  # in which forces act
+    eps: float
+    difference: float | None  # relative to the largest entry of the same unit; None: there is no closed form
+    changed: str  # pairs that open or close within eps; "": contacts stay
+
+
+@dataclass
+class DerivativesResult(Result):
+    """Its result: what its figure needs, too."""
+
+    main: str = ""  # the subject that is drawn
+    times: dict[tuple[str, str], float] = field(default_factory=dict)  # s, by quantity and way
+
+
+def worst_of_each_eps(rows: Iterable[DerivativeRow]) -> dict[float, DerivativeRow]:
+    """The row with the largest error for each eps, 0 where there is none; from coarse to fine."""
+    ascending = sorted(rows, key=lambda row: (-(row.eps or 0.0), row.size))
+    return {row.eps or 0.0: row for row in ascending}
+
+
+def best_of(rows: Iterable[DerivativeRow]) -> DerivativeRow:
+    """The row with the largest error for the eps that serves these rows best."""
+    return min(worst_of_each_eps(rows).values(), key=lambda row: row.size)
 
 
 class Quantity(NamedTuple):
@@ -132,13 +197,13 @@ def relative(difference: Array, exact: Array, units: tuple[Array, Array]) -> tup
 
     The first is inf where a difference is not a number.
     """
-    worst, (rows, columns) = (0.0, "", 0.0), units
-    for row, column in product(np.unique(rows), np.unique(columns)):
-        block = np.ix_(rows == row, columns == column)
+    worst, (of_rows, of_columns) = (0.0, "", 0.0), units
+    for unit, by in product(np.unique(of_rows), np.unique(of_columns)):
+        block = np.ix_(of_rows == unit, of_columns == by)
         largest, off = float(np.abs(exact[block]).max()), float(np.abs(difference[block]).max())
         if largest > ZERO or not np.isfinite(off):
             error = off / largest if np.isfinite(off) else np.inf
-            worst = max(worst, (error, f"{row} per {column}", largest))
+            worst = max(worst, (error, f"{unit} per {by}", largest))
     return worst
 
 

@@ -1,6 +1,6 @@
 """Errors of both engines against the true motion; and why a held robot leaves its posture."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,6 @@ from ...truth.reference import Reference
 from .runs import Run, TrajectoryResult
 
 SCHEMES_OF_RK4 = ("rk4", "rk4_mean_speed")
-SAYS_NOTHING = 100  # times the difference of the engines: their agreement says nothing about a larger error
 NO_TIME = 1e-6  # s: a step in which nothing moves
 
 
@@ -44,27 +43,19 @@ def find_errors(result: TrajectoryResult, robot: Robot, references: Mapping[str,
         else:
             continue
         result.errors[name] = first, second
-        difference = difference_while_judged(run)
-        about = {"scene": name, "first": first, "second": second, "difference": difference}
-        far, unit = is_far((first, second), difference), movement_unit(run.case.coordinates)
-        scenes.append(about | {"unit": unit, "far": far})
+        about = {"scene": name, "first": first, "second": second, "difference": difference_while_judged(run)}
+        scenes.append(about | {"unit": movement_unit(run.case.coordinates)})
     if result.errors:
         result.answer = result.finding("answer", errors=result.errors, steps=coarsest_steps(result))
     if any(name in references for name in result.errors):  # held scenes have their own findings
         labels = [LABELS[engine] for engine in robot.compared]
-        result.find("errors", labels=labels, scenes=scenes, times=SAYS_NOTHING)
+        result.find("errors", labels=labels, scenes=scenes)
 
 
 def coarsest_steps(result: TrajectoryResult) -> int | None:
     """The number of the coarsest steps of the scenes with errors, if they all have as many."""
     counts = {min(run.steps for run in result.runs if run.case.name == scene) for scene in result.errors}
     return counts.pop() if len(counts) == 1 else None
-
-
-def is_far(errors: Sequence[float | None], difference: float) -> bool:
-    """Whether the larger error is so large that the engines' difference says nothing about it."""
-    numbers = [error for error in errors if error is not None]
-    return len(numbers) == len(errors) and max(numbers) > SAYS_NOTHING * difference
 
 
 def difference_while_judged(run: Run) -> float:

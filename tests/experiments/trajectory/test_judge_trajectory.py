@@ -124,14 +124,11 @@ def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_
     true_motion.find_errors(result, ARM, {FREE.name: reference(FREE)})
     assert list(result.errors) == [HELD.name, FREE.name] and result.errors[HELD.name] == (0.25, None)
     assert result.answer.values["steps"] == 64
-    assert [scene["far"] for scene in result.notes[0].values["scenes"]] == [False, False]
     ours, theirs = result.errors[FREE.name]
     assert ours == pytest.approx(0.27, rel=0.03) and theirs > 90.0
 
 
-@pytest.mark.parametrize("error, far", [(0.49, False), (0.51, True), (None, False)])
-def test_an_error_of_more_than_a_hundred_times_the_difference_is_far(error, far):
-    assert true_motion.is_far((0.1, error), 0.005) is far
+def test_the_difference_while_judged_is_that_of_recorded_states():
     run = run_of(HELD, 0.25, 0.26, until=2.5)
     assert true_motion.difference_while_judged(run) == pytest.approx(0.005)
 

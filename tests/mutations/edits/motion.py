@@ -42,7 +42,6 @@ EDITS = (
      "the last state is not judged"),
     ("trajectory", "check_end", "min(_1 for q in _2)", "max(_1 for q in _2)", "it is enough that one run moves"),
     ("trajectory", "check_level", "movements.max()", "movements.min()", "the least difference is the largest"),
-    ("true_motion", "is_far", "max(numbers) > SAYS_NOTHING * difference", "False", "nothing is far from the truth"),
     ("true_motion", "departures", "push <= allowed[joint]", "True", "whatever pushes is rounding"),
     ("energy", "check_order", "finer <= _1", "True", "every drift is rounding"),
     ("energy", "largest_drift", "energy - energy[0]", "0.0 * energy", "no energy is lost"),
