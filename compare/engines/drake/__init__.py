@@ -181,7 +181,7 @@ class Model(ReadModel):
         )
         accelerations = self.dual_plant.get_generalized_acceleration_output_port().Eval(self.dual_context)
         by = np.zeros((3, n, n))
-        by[np.ix_(range(3), self.order.v, self.order.v)] = np.split(ExtractGradient(accelerations), 3, axis=1)
+        by[:, self.order.v[:, None], self.order.v] = np.split(ExtractGradient(accelerations), 3, axis=1)
         return by
 
     def prepare(self, course: Course) -> None:
