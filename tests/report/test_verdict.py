@@ -18,7 +18,7 @@ from compare.experiments import figures as figures_of_states
 from compare.experiments import module, stability
 from compare.experiments.parameters.numbers import NumberRow
 from compare.experiments.published import PrintedRow
-from compare.experiments.speed import advice
+from compare.experiments.speed import conclusions
 from compare.experiments.speed.runs import SpeedResult, SpeedRow
 from compare.experiments.stability.tables import LimitRow, StabilityResult
 from compare.experiments.trajectory.runs import TrajectoryResult
@@ -236,11 +236,11 @@ def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_n
         timed("tmt", "rk4", 1e-9, 2.0), timed("heyoka", "Taylor", None, None, why_not="absent"),
     ]  # fmt: skip
     result = SpeedResult("speed", rows=rows, regular="s")
-    assert advice.best_rows(result) == {"tmt": [rows[0], rows[2], rows[3]], "mujoco": [rows[4]]}
-    assert advice.within_target(rows[4:5]) is None  # just outside of the error asked for
+    assert conclusions.best_rows(result) == {"tmt": [rows[0], rows[2], rows[3]], "mujoco": [rows[4]]}
+    assert conclusions.within_target(rows[4:5]) is None  # just outside of the error asked for
     rows.append(timed("mujoco", "RK4", 3e-3, 1e-6, dt=0.00244140625, steps=2048))
     rows.append(timed("scipy", "DOP853", 4.5e-3, 1e-7))  # which is not the cheapest beside MuJoCo
-    assert advice.cheapest_of_fronts(advice.best_rows(result)) == [rows[-2], rows[2]]
+    assert conclusions.cheapest_of_fronts(conclusions.best_rows(result)) == [rows[-2], rows[2]]
     assert {("o", to_hex(BLUE), 1e-6), ("s", to_hex(ORANGE), 1e-6)} <= marks("speed", result)
 
 

@@ -13,7 +13,7 @@ from ...robots import Robot
 from ...truth.reference import LOST, has_no_reference
 from .. import Experiment
 from ..setup import Setup
-from . import accuracy, advice, evaluations
+from . import conclusions, evaluations
 from .runs import FIRST_STEPS, SceneRuns, SpeedResult, SpeedRow, prepared, runs_of, scene_runs, take_times
 from .settings import followed, left_out, regular_of, scenes_of
 
@@ -47,11 +47,11 @@ def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
     loops, absent = evaluations.loops(setup)
     add_times(setup, scenes)
     result = judged(setup, scenes)
-    if settings := advice.cheapest_of_fronts(advice.best_rows(result)):
-        values = {"settings": settings, **advice.target(result)}
+    if settings := conclusions.cheapest_of_fronts(conclusions.best_rows(result)):
+        values = {"settings": settings, **conclusions.target(result)}
         result.headline = result.finding("headline", **values)
         result.top.append(result.finding("answer", **values))
-    result.tables["what_should_i_use"] = advice.advice(result)
+    result.tables["what_should_i_use"] = conclusions.advice(result)
     result.find("columns")
     setup.progress("speed: one evaluation")
     result.tables["evaluations"] = evaluations.costs(loops, setup.of(12, 5, 2)) + absent
@@ -71,8 +71,8 @@ def judged(setup: Setup, scenes: Sequence[SceneRuns]) -> SpeedResult:
     falling, engines = [scene for scene in scenes if not scene.case.controller], tuple(setup.engines)
     if setup.size != "full":  # errors are regular in one scene only, and other engines have too few settings
         falling, engines = [scene for scene in scenes if scene.case.name == regular.name], IN_QUICK_RUNS
-    result.tables["speed_orders"] = accuracy.check_orders(result, falling, engines)
-    for check in (accuracy.check_same_schemes, accuracy.check_smallest_errors):
+    result.tables["speed_orders"] = conclusions.check_orders(result, falling, engines)
+    for check in (conclusions.check_same_schemes, conclusions.check_smallest_errors):
         for scene in scenes:
             check(result, scene)
     references = [
@@ -120,5 +120,5 @@ def figures(result: SpeedResult, robot: Robot) -> Iterator[partial[Any]]:
 def overview(results: Mapping[str, SpeedResult], robot: Robot) -> Iterator[partial[Any]]:
     from .figures_speed import draw_overview  # matplotlib is for the process that draws
 
-    if advice.best_rows(results["speed"]):
+    if conclusions.best_rows(results["speed"]):
         yield partial(draw_overview, results["speed"])

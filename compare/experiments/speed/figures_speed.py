@@ -11,7 +11,7 @@ from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
 from ...report.style import GREY, WIDTH, file_name
 from ..figures import OUTLINE, chart
-from .advice import TARGET, best_rows, cheapest_of_fronts, front, target, within_target
+from .conclusions import TARGET, best_rows, cheapest_of_fronts, front, target, within_target
 from .runs import SpeedResult, SpeedRow
 
 METHOD_MARKERS = "osD^v<>PX*hp"  # of the methods of an engine, whose colour they have

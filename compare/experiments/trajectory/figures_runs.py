@@ -18,8 +18,8 @@ from ...report.style import BLUE, GREY, LINES, ORANGE, RED, WIDTH, file_name, ze
 from ...robots import Robot
 from ...robots.case import Case
 from ..figures import MOST_ROWS, beyond_tolerance, chart, lines_to, named_rows
+from .errors import difference_while_judged
 from .runs import Run, TrajectoryResult
-from .true_motion import difference_while_judged
 
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
 LEVEL = 1e-6  # of a position: a smaller change is not seen in a panel

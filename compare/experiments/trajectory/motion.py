@@ -11,8 +11,8 @@ from ...judge.run import LEFT, movement_unit, step_in_words
 from ...robots import Robot
 from ...robots.case import Case
 from ...robots.stick import as_seen, stick_figure
+from .errors import SCHEMES_OF_RK4
 from .runs import Run
-from .true_motion import SCHEMES_OF_RK4
 
 FRAMES = 128  # of a scene at most, without its start
 

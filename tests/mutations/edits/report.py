@@ -25,7 +25,7 @@ EDITS = (
     ("questions", "largest", "max(rows, key=_1)", "min(rows, key=_1)", "the smallest difference is the answer"),
     ("questions", "largest", "row['largest_difference'] is None", "False", "a diverged run is an answer"),
     ("questions", "printed", "row[name]", "row['mujoco']", "the answers name MuJoCo's numbers TMT's"),
-    ("speed.advice", "within_target", "_1 <= TARGET", "True", "a setting beyond the target is cheapest"),
+    ("conclusions", "within_target", "_1 <= TARGET", "True", "a setting beyond the target is cheapest"),
     ("report.document", "Document.section", "figure.is_main", "False", "the figure of the first screen is folded"),
     ("verdict", "passed", "any(section.judged for section in sections)", "True", "a report without a check passes"),
     ("run.command", "carry_out", "not parts.broken", "True", "the exit status is 0 whatever part of the report breaks"),
@@ -72,7 +72,7 @@ EDITS = (
     ("provenance", "commit", "_1 if changed else ''", "''", "changes since a commit are not told"),
     ("words", "scene_of", "max(*_1)", "min(*_1)", "a check is given to the scene of the shortest name"),
     ("words", "digits_of_time", "near and abs(_1) < 0.1 and _2", "False", "a step and the limit near it are the same"),
-    ("true_motion", "coarsest_steps", "min(_1)", "max(_1)", "errors are those of the finest steps"),
+    ("trajectory.errors", "coarsest_steps", "min(_1)", "max(_1)", "errors are those of the finest steps"),
     # what is drawn, and said of it
     ("stick", "stick_figure", "joint not in tree.parent", "True", "a stick goes to every centre of mass"),
     ("stick", "as_seen", "[RIGHTWARD, UPWARD]", "[UPWARD, RIGHTWARD]", "up is to the right"),
