@@ -42,10 +42,9 @@ def test_differences_in_mujoco_are_those_of_its_steps(mujoco, bent):
     """mjd_transitionFD is, where the way is the same, what differences of mj_step are."""
     dynamics, state = mujoco.of(bent.case), (bent.q[0], bent.qd[0], bent.tau[0])
     for centred in (False, True):
-        own = of_transition(dynamics, *state, DT, "implicitfast", 1e-6, centred)()
-        assert (
-            np.abs(own - of_steps(dynamics, *state, DT, "implicitfast", 1e-6, centred)()[:, :6]).max() < 1e-8
-        )
+        functions = of_transition, of_steps
+        own, steps = (f(dynamics, *state, DT, "implicitfast", 1e-6, centred)() for f in functions)
+        assert np.abs(own - steps[:, :6]).max() < 1e-8
     inverse = of_inverse(dynamics, *state[:2], np.ones(3), 1e-7)()
     truth = np.hstack(ways.tmt.inverse_dynamics_derivatives(*state[:2], np.ones(3), bent.tree))
     assert np.abs(inverse - truth).max() < 1e-4 < np.abs(truth[:, :3] - truth[:, :3].T).max()
