@@ -1,4 +1,4 @@
-"""Figures of the experiments at single states, differences and corrections; and what pictures of the first screen share."""
+"""Figures of the experiments at single states, and what pictures of the first screen share."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -68,10 +68,8 @@ def agree(
 ) -> None:  # fmt: skip
     """Add a row and a check: the difference between two engines that is closest to its tolerance, 64 eps x scale.
 
-    Where exact values are known there is also a check for each engine: of its distance from them.
-
-    values, mujoco_values: (states, ...). scale: a number or (states,), or with as many dimensions as the values for a scale of
-    each entry. exact: at the first states.
+    values, mujoco_values: (states, ...). scale: a number or (states,), or with as many dimensions as the values for
+    a scale of each entry. exact: at the first states; of each engine's distance from them there is a check too.
     """
     measured = {quantity: worst_of_each(np.subtract(values, mujoco_values), scale)}
     if exact is not None and len(exact.high):

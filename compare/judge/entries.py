@@ -131,7 +131,7 @@ class Entries:
 
     @cached_property
     def factored(self) -> np.ndarray:
-        """The terms of Mbar and of its factorization, which are up to sqrt(Mbar_ii Mbar_jj), (states, nv, nv)."""
+        """The terms of Mbar and of its factorization, up to sqrt(Mbar_ii Mbar_jj), (states, nv, nv)."""
         root = np.sqrt(np.einsum("sii->si", self.M))
         return self.added + root[:, :, None] * root[:, None, :]
 
@@ -152,7 +152,7 @@ class Entries:
         return 2.0 * self.residual(force, np.broadcast_to(qdd, force.shape))
 
     def force_rates(self, qdd: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Of the derivatives of tau by movements of q and by qd, (states, nv, nv) each, at accelerations of these sizes."""
+        """Of the derivatives of tau by movements of q and by qd, (states, nv, nv) each, at these accelerations."""
         tree, sizes = self.tree, np.abs(np.broadcast_to(qdd, self.qd.shape))
         turning = sizes @ self.turns.T + self.spin**2  # (states, m)
         pushed = np.einsum("sbi,si->sb", self.t, sizes) + 2.0 * self.spin * self.speed

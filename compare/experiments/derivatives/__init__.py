@@ -49,10 +49,7 @@ def skipped(robot: Robot) -> Finding | None:
 
 
 def begin(setup: Setup) -> Work:
-    """Measure the errors at all subjects, in parallel with other work: of the first one those of all integrators.
-
-    Of a robot with many speeds one integrator alone, at fewer states.
-    """
+    """Measure the errors at all subjects, in parallel with other work."""
     mujoco, is_small = cast(Mujoco, setup.engines["mujoco"]), setup.robot.coordinates.nv <= FEW_SPEEDS
     dt, states = float(mujoco.model.opt.timestep), setup.of(4, 2, 2) if is_small else 1
     tasks: list[Task] = []
@@ -141,10 +138,7 @@ def add_contacts(setup: Setup, result: DerivativesResult) -> None:
 
 
 def contact_rows(reading: Reading) -> list[ContactRow]:
-    """Differences of the step for each eps, with all contacts on, beside the closed form, which holds where contacts stay.
-
-    Where the file's first posture sinks to; none where nothing touches it there.
-    """
+    """Differences of the step where the file's first posture sinks to, beside the closed form."""
     posture = postures_of(reading)[0]
     place = standing_at(reading, posture.name, posture.key)
     if not place.touching:
@@ -228,7 +222,7 @@ def add_advice(result: DerivativesResult, scenes: Sequence[DerivativeRow], hard:
 
 
 def is_tried(row: DerivativeRow, quantity: str) -> bool:
-    """Whether a row is a difference of a quantity that is tried where that is hard: of steps a centred one."""
+    """Whether a row is of a quantity, and of steps a centred difference."""
     return row.quantity == quantity and not row.way.endswith(ways.ONE_SIDED)
 
 

@@ -1,4 +1,4 @@
-"""The ways to a derivative: MuJoCo's differences over their eps, tmt's exact ones; the errors of each, and rows of them."""
+"""The ways to a derivative: MuJoCo's differences over their eps, tmt's exact ones; rows of the errors of each."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -165,12 +165,12 @@ class Way(NamedTuple):
 
 
 def side_by_side(values: Array) -> Array:
-    """Matrices (states, rows, columns) as they are; of parts (states, parts, nv, nv) the first three beside each other."""
+    """Matrices (states, rows, columns) as they are; of (states, parts, nv, nv) the first three beside each other."""
     return values if values.ndim == 3 else np.concatenate(values[:, :3].swapaxes(0, 1), axis=2)
 
 
 def quantities(subject: Subject, integrators: Sequence[str]) -> list[Quantity]:
-    """The derivatives of accelerations and torques, and of a step of each of these integrators that MuJoCo has."""
+    """The derivatives of accelerations and torques, and of a step of each of these integrators of MuJoCo."""
     methods = methods_for(subject.tree)
     steps = [
         Quantity(f"A and B, {name}", f"step_derivatives:{methods[name].scheme}", STATE, name)
@@ -262,7 +262,7 @@ def row_of(
 
 
 def largest_share(exact: Pairs, values: Array, tolerance: Array) -> float:
-    """The largest share of a tolerance that the distance of values from the exact ones takes, of all or of the first columns."""
+    """The largest share of a tolerance: of the distance from the exact values, of all or of the first columns."""
     exact = Pairs(*(part[:, :, : values.shape[2]] for part in exact))
     return float(share_of(exact.distance(values), tolerance).max())
 
@@ -270,8 +270,8 @@ def largest_share(exact: Pairs, values: Array, tolerance: Array) -> float:
 def share_of_differences(values: Mapping[float, Array], exact: Pairs, subject: Subject, dt: float) -> float:
     """The largest share, over eps and entries, of what rounding and truncation can make a centred difference off.
 
-    Rounding: 64 eps of what a step adds, over the eps of the difference; of a ball's turn, a quaternion, as in judge.rounding.
-    Truncation: twice the term in eps^2, from ten times eps.
+    Rounding: 64 eps of what a step adds, over the eps of the difference; a ball's turn is a quaternion, as in
+    judge.rounding. Truncation: twice the term in eps^2, from ten times eps.
     """
     entries, qdd = Entries(subject.tree, subject.q, subject.qd), accelerations(subject)
     force = entries.force(subject.tau) + gain_scale(subject.tree, subject.q, subject.qd)

@@ -1,4 +1,4 @@
-"""What follows from errors and times: checks of orders, of the same schemes and of rounding; the cheapest settings."""
+"""What follows from errors and times: checks of orders, same schemes and rounding; the cheapest settings."""
 
 import math
 from collections.abc import Mapping, Sequence

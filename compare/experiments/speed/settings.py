@@ -54,7 +54,7 @@ def followed(robot: Robot, size: str) -> list[Case]:
 
 
 def asked(engines: Mapping[str, Engine], size: str) -> list[Engine]:
-    """The engines that follow a scene. Those that read the file themselves are compared by the experiment `engines`."""
+    """The engines that follow a scene; the experiment `engines` compares those that read the file."""
     names = [name for name in engines if size != "quick" or name in IN_QUICK_RUNS]
     return [engines[name] for name in names if not RECORDS[name].reads_file]
 

@@ -1,7 +1,4 @@
-"""Errors of both engines: against the true motion, and in the energy, whose drift falls with the step at the method's order.
-
-And why a held robot leaves its posture.
-"""
+"""Errors of both engines: against the true motion, and in the energy; and why a held robot leaves its posture."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -122,7 +119,7 @@ class EnergyRow(Row):
 
 
 def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, Sequence[int]]) -> Result:
-    """The drift of the energy in free, undamped runs. steps: two counts by order, the second twice the first."""
+    """The drift of the energy in free, undamped runs. steps: by order two counts, of which one is twice the other."""
     result = Result("trajectory")
     rows = result.tables["energy"] = []
     # in a scene of a user's own the order may not show in a second

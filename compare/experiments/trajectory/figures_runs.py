@@ -1,4 +1,4 @@
-"""Figures of runs: positions and speeds against time, the engines' difference and its band; all scenes on the first screen."""
+"""Figures of runs: positions and speeds against time, the engines' difference and its band; all scenes."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -151,7 +151,7 @@ def label_axis(ax: Axes, name: str, unit: str) -> None:
 
 
 def drawable(case: Case, name: str, values: np.ndarray) -> np.ndarray:
-    """Positions "q" or speeds "v", (times, nv); of a ball's "q" its movement, NaN where it passes half a turn."""
+    """Positions "q" or speeds "v", (times, nv); of a ball its movement, NaN where it passes half a turn."""
     coordinates = case.coordinates
     if name == "v" or not coordinates.has_balls:
         return values
@@ -178,7 +178,7 @@ def differing_most(case: Case, runs: Sequence[Run]) -> list[int]:
 
 
 def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Finding]:
-    """Each scene: at the left the difference over its band; at the right how long the runs of all integrators are judged."""
+    """Each scene: at the left the difference over its band; at the right how long all its runs are judged."""
     names = [case.name for case in robot.cases if any(row.scene == case.name for row in result.rows)]
     rows = {name: [row for row in result.rows if row.scene == name] for name in names}
     wrong = [check for check in result.checks if check.failed and check.about == About.MODELS]
