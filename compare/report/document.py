@@ -19,7 +19,6 @@ from ..core.words import capital
 from ..robots import Robot
 from . import tables
 from .images import embedded
-from .motion import SCRIPT, motion_in_html
 from .questions import answers
 from .verdict import Figure, Parts, Report, Section, failures, headline, outcome, passed, standing
 
@@ -61,7 +60,7 @@ class Document:
 
     def __init__(self, report: Report, parts: Parts, folder: Path | None = None):
         self.report, self.parts, self.folder = report, parts, folder
-        self.page, self.motion = folder is not None, ""
+        self.page = folder is not None
         self.file = "index.html" if self.page else "report.md"
         data = {"page": self.page, "embedded": self.embedded, "first_notes": FIRST_NOTES}
         data |= {"outcome": outcome, "standing": standing, "headline": headline}
@@ -69,17 +68,14 @@ class Document:
         self.template: Any = environment().get_template("document.md.jinja").make_module(data)
         self.answers = parts.attempt("the questions", None, answers, report.sections, report.robot)
 
-    def embedded(self, file: str) -> tuple[Markup, int, int]:
+    def embedded(self, figure: Figure) -> tuple[Markup, int, int]:
         assert self.folder is not None
-        return embedded(self.folder / "figures" / f"{file}.png")
+        return embedded(self.folder / "figures" / figure.path)
 
     def body(self) -> list[str]:
         """All parts below the verdict; those that break are left out."""
         report = self.report
         texts = [self.made("the first screen", self.first_screen)]
-        if self.page:
-            self.motion = self.made("the motion", motion_in_html, report.sections, report.robot.noun)
-            texts.append(self.motion)
         texts.append(self.made("the introduction", self.introduction))
         if report.causes:
             texts.append(self.template.causes(tables.of_causes(report.causes)))
@@ -104,8 +100,7 @@ class Document:
         if not self.page:
             return joined([head, *body])
         html = Markup(MarkdownIt("commonmark", {"html": True}).render(joined([head, *body])))
-        script = SCRIPT if self.motion else ""
-        values = {"title": title, "good": good, "links": self.links(), "script": script, "body": html}
+        values = {"title": title, "good": good, "links": self.links(), "body": html}
         return environment().get_template("page.html.jinja").render(values)
 
     def links(self) -> list[tuple[str, bool]]:
@@ -155,7 +150,7 @@ class Document:
         checks, few = section.result.checks, MOST_ROWS if self.page else MOST_IN_MARKDOWN
         failed = [check for check in section.failed if check not in section.explained]
         not_judged = [check for check in checks if not check.judged]
-        figures = still_figures([section]) if self.page else section.own_figures
+        figures = section.own_figures
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
         first = [figure for figure in figures if figure in first or figure.is_main]
         lists = {"failing": listing(failed, few), "not_judged": listing(not_judged, few)}
@@ -181,13 +176,10 @@ def listing(checks: Sequence[Check], most: int, columns: Sequence[str] = tables.
     return Listing(len(checks), tables.of_checks(checks[:most], columns))
 
 
-def still_figures(sections: Sequence[Section]) -> list[Figure]:
-    return [figure for section in sections for figure in section.own_figures if not figure.moves]
-
-
 def linked(sections: Sequence[Section]) -> list[Figure]:
     """The figures behind a picture: first those of distances or limits."""
-    return sorted(still_figures(sections), key=lambda figure: not figure.is_main)
+    figures = [figure for section in sections for figure in section.own_figures]
+    return sorted(figures, key=lambda figure: not figure.is_main)
 
 
 def link_to(sections: Sequence[Section]) -> str:

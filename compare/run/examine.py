@@ -192,7 +192,7 @@ def section_with(name: str, result: Result, robot: Robot) -> Section:
     of_robot = {"robot": robot, "values": experiment.claim_values(robot)}
     claim, tolerance = (say(Finding(name, kind, of_robot)) for kind in ("claim", "tolerance"))
     title, record = block(name, "title", robot=robot), EXPERIMENTS[name]
-    return Section(name, title, claim, tolerance, result, record=record, scenes=result.pictures)
+    return Section(name, title, claim, tolerance, result, record=record)
 
 
 def add_problems(result: Result, problems: Sequence[Problem], told: set[int]) -> None:
