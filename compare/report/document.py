@@ -154,9 +154,6 @@ class Document:
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
         first = [figure for figure in figures if figure in first or figure.is_main]
         lists = {"failing": listing(failed, few), "not_judged": listing(not_judged, few)}
-        lists["explained"] = listing(section.explained, MOST_ROWS)
-        of_all = tables.of_checks(tables.closest(checks, MOST_ROWS), tables.CHECK[1:])
-        lists["all"] = Listing(len(checks), of_all)  # those that fail or come closest to their tolerances
         of_section = [self.table(section, name, rows) for name, rows in section.tables.items()]
         folded = [figure for figure in figures if figure not in first]
         return self.template.section(section, lists, of_section, first, folded)
