@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, TypeVar
 from ..core.cause import Cause
 from ..core.check import About, Check, Result
 from ..core.errors import described
-from ..core.experiment import Experiment
 from ..core.finding import Finding
+from ..core.records import Experiment
 from ..core.rows import Row
 from ..core.text import block, say
 from ..core.words import capital

@@ -76,9 +76,9 @@ def compute(
         from . import examine
 
         origin = provenance(command, robot.mjcf, compared.reference.file, SEED)  # of the model as it was read
-        of_workers = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
-        more = of_workers | {"chosen": options.engines, "request": request}
-        setup = examine.setup_of(compared, options.quick, alone=is_alone, **more)
+        of_run: dict[str, Any] = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
+        of_run |= {"alone": is_alone, "request": request}
+        setup = examine.setup_of(compared, options.quick, options.engines, **of_run)
         for name, reason in reasons.items():
             terminal.say(block("run", "skipped", name=name, reason=reason))
         terminal.how_far = partial(examine.progress, workers.clock, names)
