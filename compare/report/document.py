@@ -23,15 +23,12 @@ from .questions import answers
 from .verdict import Figure, Parts, Report, Section, failures, headline, outcome, passed, standing
 
 MOST_ROWS, MOST_IN_MARKDOWN = 40, 6  # of a table; its file has all
-FIRST_NOTES = 3  # of a section of the page, which folds the others
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
 MAIN_TABLES = {
     "what_should_i_use": "What should I use?",
     "engines_answer": "Which engine?",
 }  # further tables of report.md, with their titles
-# macros of a picture of the first screen: overview_title, overview_alternative
-WORDS = "title", "alternative"
 # columns of failing checks
 ON_FIRST_SCREEN = "experiment", "scene", "quantity", "value", "tolerance", "note"
 JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
@@ -62,7 +59,7 @@ class Document:
         self.report, self.parts, self.folder = report, parts, folder
         self.page = folder is not None
         self.file = "index.html" if self.page else "report.md"
-        data = {"page": self.page, "embedded": self.embedded, "first_notes": FIRST_NOTES}
+        data = {"page": self.page, "embedded": self.embedded}
         data |= {"outcome": outcome, "standing": standing, "headline": headline}
         # its attributes are the macros
         self.template: Any = environment().get_template("document.md.jinja").make_module(data)
@@ -130,7 +127,9 @@ class Document:
             fails = any(other in wrong for other in group)
             for figure in section.figures:
                 if figure.is_overview:
-                    title, alternative = (block(section.name, f"overview_{part}") for part in WORDS)
+                    title, alternative = (
+                        block(section.name, f"overview_{x}") for x in ("title", "alternative")
+                    )
                     pictures.append(Picture(figure, link_to(group), title, alternative, fails))
         if not self.page:
             return pictures

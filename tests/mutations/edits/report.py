@@ -54,7 +54,7 @@ EDITS = (
     ("verdict", "verdict", "section.record.compares and _1", "True", "what agrees is said not to"),
     ("folder", "put_back", "move(work / 'old', out)", "None", "the old report is not put back"),
     ("folder", "refuse_foreign", "name not in own", "False", "files of somebody else's are not seen"),
-    ("folder", "clear_away", "number is not None", "True", "the folder of a run that is alive is cleared"),
+    ("folder", "clear_away", "if is_left:\n _1\n _2", "if True:\n _1\n _2", "the folder of a run that is alive is cleared"),
     ("folder", "is_of_a_run", "not _1 or _2 or _3", "False", "a folder that no run has made is cleared"),
     # the first screen, and what is shown of a long table
     ("verdict", "standing", "any(failing)", "False", "the line of an experiment whose checks fail is good"),
