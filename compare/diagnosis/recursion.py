@@ -14,11 +14,10 @@ from numpy import ndarray
 import tmt
 from tmt.derivation.mechanism import origin_in_parent, turn_in_parent
 
-from ..core.words import listed
 from ..robots.inertia import point_inertia
 from .conventions import matrices
 from .model import MOST_SPEEDS, Equations
-from .places import alike, groups
+from .places import sets_of_bodies, sets_of_joints
 from .variants import Variant, slip
 
 
@@ -313,20 +312,9 @@ def slips_of_recursion(equations: Equations) -> Iterator[Variant]:
 
 
 def places_of_slips(tree: tmt.Tree) -> dict[str, dict[str, list[int]]]:
-    """Where a slip can be made, by the words of `Slip.at`: those that are alike or turn about equal axes together too."""
-    names, bodies = list(tree.joint_names), groups(tree)
-    joints = {name: [i] for i, name in enumerate(names)}
-    axes: dict[str, list[int]] = {}
-    for i in (i for i, kind in enumerate(tree.kind) if kind == "hinge"):
-        axes.setdefault(repr(tree.axis[tree.coordinates.joints[i].qd.start]), []).append(i)
-    joints |= {listed([names[i] for i in same]): same for same in axes.values()}
-    for those in alike(tree):
-        if set(those) <= set(names):
-            joints[listed(those)] = [names.index(name) for name in those]
-        else:
-            bodies[listed(those)] = [tree.body_names.index(name) for name in those]
-    joints |= {"every joint": list(range(len(names)))} if len(names) > 1 else {}
+    """Where a slip can be made, by the words of `Slip.at`."""
+    names = tree.joint_names
     turned = [i for i, kind in enumerate(tree.kind) if kind != "slide"] if len(names) <= MOST_SPEEDS else []
     moving = [(i, b) for b in range(len(tree.mass)) for i in turned if tree.moves(b)[i]]
     columns = {f"{names[i]} for {tree.body_names[b]}": [i * len(tree.mass) + b] for i, b in moving}
-    return {"joint": joints, "body": bodies, "joint and body": columns}
+    return {"joint": sets_of_joints(tree), "body": sets_of_bodies(tree), "joint and body": columns}

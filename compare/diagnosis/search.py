@@ -25,10 +25,9 @@ from .likelihood import NATURAL, cost
 from .model import ROUNDED, Equations, Values, packed
 from .places import OF_ZERO
 from .recursion import slips_of_recursion
-from .slips import lagrange, other_angles
 from .statements import Stated, Statements
 from .terms import all_places
-from .variants import Variant, program_options
+from .variants import Variant, lagrange, other_angles, program_options
 
 FEW = 2  # states at which conventions are tried first
 SHOWN = 12  # single explanations that leave least
