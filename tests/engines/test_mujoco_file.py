@@ -14,7 +14,7 @@ from runs import posix
 
 import compare
 from compare.core.text import say
-from compare.engines.mujoco import ModelError, Source, load, parse, read
+from compare.engines.mujoco import ModelError, Source, parse, read
 from compare.engines.mujoco.parameters import parameters, remarks
 from compare.robots.arm import ARM
 
@@ -69,11 +69,11 @@ def test_a_file_that_is_not_the_arm(tmp_path, content, word):
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(ModelError, match=word) as error:
-        load(path, ARM.tree)
+        parse(path, ARM.tree)
     assert "\n" not in str(error.value)
     # a comment in another encoding is no obstacle
     path.write_bytes(XML.encode().replace(b"<!--", b"<!-- \xe9 ", 1))
-    assert load(path, ARM.tree).of(ARM.case()).mass_matrix(np.zeros(3))[0, 0] == pytest.approx(0.2445)
+    assert parse(path, ARM.tree).of(ARM.case()).mass_matrix(np.zeros(3))[0, 0] == pytest.approx(0.2445)
 
 
 def test_a_body_that_no_hinge_tells_is_found_by_its_name():

@@ -205,10 +205,6 @@ def has_hinges(source: Source, names: Sequence[str]) -> bool:
     return joints == dict.fromkeys(names, "hinge")
 
 
-def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
-    return parse(Path(path), tree)
-
-
 def parse(origin: Source | Path | str, tree: tmt.Tree) -> Mujoco:
     """The engine for a file (a Path) or MJCF text; ModelError if it does not have exactly the hinges of the Tree.
 
