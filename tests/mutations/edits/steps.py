@@ -11,6 +11,7 @@ EDITS = (
     ("mujoco.variants", "add_armature", "model.dof_M0 += more", "pass", "a body that never changes stays as it is"),
     ("mujoco.variants", "Servo.force", "np.clip(_1, *_2)", "float(_1)", "a program has no range of force"),
     ("mujoco.variants", "servo_bias", "-(kv or 0.0)", "0.0", "--kv is none"),
+    ("mujoco.step", "start_of", "stated.any()", "False", "a keyframe's activations are lost"),
     ("closed_form", "mass_and_force", "forces.dJf - bias_slope(*_1)", "forces.dJf + bias_slope(*_1)", "weight pulls upwards"),
     ("closed_form", "mass_and_force", "np.diag(rows.R)", "0.0", "contacts are rigid"),
     ("closed_form", "implicit", "damping * on(*_1)", "damping", "Euler always has damping implicit"),
