@@ -43,5 +43,5 @@ EDITS = (
     ("method", "placed_frame", "carried(carrier, _1)", "carried(carrier, ZERO)", "a site is at the origin of its joint"),
     ("lock", "locked", "carrier.turned(turn)", "turn", "a site of a locked joint keeps its axes"),
     ("ways", "share_of_differences", "max(shares)", "min(shares)", "differences are judged at their worst eps alone"),
-    ("ways", "relative", "off / size", "off", "an error is not relative"),
+    ("ways", "relative", "off / largest", "off", "an error is not relative"),
 )  # fmt: skip
