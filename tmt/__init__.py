@@ -206,8 +206,7 @@ def spring_torque(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Accelerations qdd from Mbar qdd = tau - D qd - k (q - rest) - P q - S qd - h, rad/s2, shape (..., nv).
 
-    P and S: the model's position_gain and speed_gain. Assignment, parts e and f. ValueError: Mbar is
-    singular.
+    P and S: position_gain, speed_gain of the model. Assignment, parts e, f. ValueError if Mbar is singular.
     q (..., nq), qd (..., nv), tau (..., nv): positions, speeds and torques, rad, rad/s and N m.
 
     >>> q, rest = np.array([0.5, 0.3, 1.0]), np.zeros(3)
