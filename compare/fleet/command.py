@@ -69,7 +69,7 @@ def experiments_of(made: cli.Parser, only: str | None, timing: bool = False) -> 
 
 
 def fleet_status(arguments: Sequence[str]) -> int:
-    """Run the command; the exit status. SystemExit for help and wrong arguments. Refused: it cannot be carried out."""
+    """Run the command; the exit status. SystemExit: help, wrong arguments. Refused: it cannot be done."""
     made = fleet_parser()
     options, unknown = made.parse_known_intermixed_args(arguments)
     if unknown:
