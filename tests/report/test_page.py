@@ -97,9 +97,8 @@ def text_of(path):
 def test_results_have_every_check_cause_and_digit(folder):
     rows = [{"a": 0.12345678901234568, "b": k, "engine": "tmt", "ok": True} for k in range(3)]
     names = ("joint;" * 20)[:81]
-    of = section(
-        "mass", GOOD, BAD, rows=rows, figures=["mass_distances"], extra=[{"b": 1 / 3, "names": names}]
-    )
+    extra = [{"b": 1 / 3, "names": names}]
+    of = section("mass", GOOD, BAD, rows=rows, figures=["mass_distances"], extra=extra)
     of.explained = of.result.checks[1:]
     write(folder, report_of(folder, [of], [CAUSE]))
     results = json.loads(text_of(folder / "results.json"))
