@@ -90,12 +90,13 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
     terminal.say_lines(compared.reference.lines if options.mjcf else ())
     quantities = (options.quantity or QUANTITIES.get(options.to, OF_MOST)).replace(" ", "").split(",")
     named = words.split(",") if words else []
-    more: dict[str, Any] = {"parameters": named, "limit": options.limit, "single": options.float}
+    more: dict[str, Any] = {"parameters": named, "limit": options.limit}
 
     def written(*head: str) -> dict[str, str]:
-        text = partial(tmt.equations, robot.tree, quantities=quantities, name=name, head=head, **more)
+        text = partial(tmt.equations, robot.tree, name=name, single=options.float, head=head)
+        files = FILES[options.to].items()
         try:
-            return {f"{name}{ending}": text(to) for ending, to in FILES[options.to].items()}
+            return {f"{name}{ending}": text(to, quantities, **more) for ending, to in files}
         except ValueError as error:
             raise Refused(error) from None
 
