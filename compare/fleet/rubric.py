@@ -70,7 +70,7 @@ def checks_of(report: Path) -> list[Mapping[str, Any]]:
 
 
 def read_rubric(path: str, experiments: Sequence[str]) -> Rubric:
-    """The rubric of a file, for the experiments that are run. Refused, in one line, for what is wrong in it."""
+    """The rubric of a file, for the experiments that are run. Refused, in one line: what is wrong in it."""
     shown, entries = in_one_line(path), []
     try:
         content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
