@@ -141,7 +141,7 @@ class Explanations:
     def groups(self) -> Iterator[Cause]:
         """Loads, and numbers of all bodies or joints."""
         yield from loads(self.equations, self.search)
-        yield from several(self.equations, self.search)
+        yield from several(self.search)
 
     def of_parts(self) -> Iterator[Cause]:
         """Slips in some parts alone: in all that differ, or one cause for each."""
