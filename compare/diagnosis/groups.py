@@ -24,7 +24,7 @@ def body_columns(equations: Equations) -> ndarray:
     changes: dict[Path, ndarray] = {}
     stated, shape = equations.stated, (len(equations.tree.mass), 1 + OF_BODY)
     for b, k in np.ndindex(shape):  # the last is the base: the mass is larger by 1, and the others stay
-        m, c, I = stated["mass"][b], stated["com"][b], stated["inertia"][b]
+        m, c, I = float(stated["mass"][b]), stated["com"][b], stated["inertia"][b]
         first, tensor = m * c, I + point_inertia(c, m)
         if 1 <= k <= 3:
             first = first + np.eye(3)[k - 1]
@@ -70,7 +70,7 @@ def loads(equations: Equations, search: Search) -> Iterator[Cause]:
     """A further body that moves with one of the bodies: its mass, CoM and tensor."""
     for body, columns in zip(equations.tree.body_names, body_columns(equations)):
         numbers, determined = fit(search, columns)
-        mass = numbers[0]
+        mass = float(numbers[0])
         if not determined[:4].all() or mass <= LEAST_LOAD * max(equations.tree.mass):
             continue
         com, tensor = numbers[1:4] / mass, np.zeros((3, 3))
