@@ -191,6 +191,13 @@ def test_a_wrong_term_of_the_speeds_is_named():
     assert "h[knee], coefficient of hip' knee'" in cause.place and " 0.2 cos(hip)" in cause.text
 
 
+def test_a_coefficient_comes_before_the_derivative_of_M_that_does_the_same():
+    """dM[hip][knee]/d knee with the other sign: only the term of knee'^2 in h[hip] has it."""
+    causes = told({}, lambda q, qd: tmt.bias(q, qd, TREE) + np.sin(q[:, 1:]) * qd[:, 1:] ** 2 * [1, 0]).causes
+    assert causes[0].place == "h[hip], coefficient of knee'^2" and causes[0].explains == pytest.approx(-1.0)
+    assert "dM[knee][hip]/d knee in h" in [cause.place for cause in causes]
+
+
 def test_the_arguments_of_bias_exchanged():
     assert not told({}).differs
     (cause,) = told({}, lambda q, qd: tmt.bias(qd, q, TREE)).causes
