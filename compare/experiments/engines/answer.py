@@ -35,7 +35,12 @@ def add_answer(result: EnginesResult, case: Case | None) -> None:
     if case and runs:
         cheapest = {name: cheapest_engine(rows, name) for name in TARGETS}
         unit = movement_unit(case.coordinates)
-        about = {"scene": case.name, "duration": case.duration, "unit": unit, "targets": TARGETS}
+        about: dict[str, Any] = {
+            "scene": case.name,
+            "duration": case.duration,
+            "unit": unit,
+            "targets": TARGETS,
+        }
         result.top.append(result.finding("cheapest", cheapest=cheapest, **about))
         result.top += [result.finding("engine", row=row, targets=TARGETS) for row in rows]
 

@@ -1,6 +1,7 @@
 """Figures of other engines: distances from the exact values; errors, times, responses of servos, batches."""
 
 from itertools import cycle
+from typing import Any
 
 import numpy as np
 from matplotlib.axis import Axis
@@ -17,7 +18,7 @@ from .tables import EnginesResult
 
 DASHES = (*style.DASHES, (0, (1, 3)), (0, (8, 2)), (0, (6, 1, 1, 1, 1, 1)))
 OF_METHODS = "os^DvPX<>*hp"  # markers of the methods of one engine
-LOOKS = {LABELS[name]: {"marker": MARKS[name], "color": COLOURS[name]} for name in LABELS}
+LOOKS: dict[str, Any] = {LABELS[name]: {"marker": MARKS[name], "color": COLOURS[name]} for name in LABELS}
 
 
 def draw_distances(result: Result) -> tuple[str, Figure, Finding]:
