@@ -16,7 +16,7 @@ class Detail(NamedTuple):
     """A coefficient that differs: in terms, or both numbers where they are furthest apart."""
 
     name: str
-    terms: list[tuple[str, str]]  # yours and the right ones in their places, "" for none
+    terms: tuple[str, str]  # yours and the right one in its place, "" for none
     yours: float = 0.0
     right: float = 0.0
     at: tuple[str, ...] = ()  # "knee = 0.3"
@@ -31,9 +31,7 @@ class Diagnosis(NamedTuple):
     details: tuple[Detail, ...] = ()  # coefficients that differ, with both numbers or in terms
     entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[hip][knee]"
     compared: int = 0  # entries in all
-    parts: tuple[
-        str, ...
-    ] = ()  # of the equations that differ: "M", "h", or its "velocity terms" and "gravity"
+    parts: tuple[str, ...] = ()  # that differ: "M", "h", or its "velocity terms" and "gravity"
     known: tuple[str, ...] = ()  # parts that are compared
     is_symmetric: bool = True  # the given M
     # single changes that leave least: what they leave, a share, and whether it is within the tolerance

@@ -1,15 +1,14 @@
-"""Where equations differ: entries of Mbar, gravity, and coefficients of products of speeds in h, and which of
-their terms.
+"""Where equations differ: entries of Mbar, gravity, and coefficients of products of speeds in h; and which term of
+them is wrong.
 
 These are polynomials in the sines and cosines of hinges and in the positions of slides, of second degree in
-each. A common error is one term with another factor, or replaced by another. Terms have two forms: products
-such as sin(hip) cos(knee) and sums such as sin(hip + knee).
+each. A common error is one term with another factor, or replaced by another.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations, product
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +19,7 @@ from ..core.finding import Finding
 from ..core.text import apart, say
 from ..core.words import listed
 from .cause import TEMPLATE, Detail
+from .given import Given
 from .model import MOST_SPEEDS, Entry, Equations, coefficients_of
 
 MOST_JOINTS = 3  # whose terms are tried
@@ -27,13 +27,8 @@ ROUNDING = 8.0  # times the tolerance of an entry: of a sum of its values at sev
 SHOWN = 6  # positions, and coefficients, in a sentence
 STATES_PER_TERM = 2  # at which the right expressions are known
 FIT_ROUNDING = 1e-9  # of the largest coefficient
-SAME_FACTOR = 1e-7  # of the largest of several: two numbers that are one
-SHOWN_TIMES = {-2: "-2 ", -1: "-", 1: "", 2: "2 "}
 AS_NEAR = 1.0 - 1e-6  # of the largest part of a target along one term
-# numbers of terms of the right expression and of other terms, and whether these replace those
-COMBINATIONS = ((1, 0, False), (1, 1, True), (0, 1, False), (1, 1, False), (2, 0, False), (2, 1, False))
 
-Bias = Callable[[ndarray], ndarray]  # speeds (states, nv) -> h (states, nv) at the positions of the states
 Terms = dict[str, ndarray]  # values of terms at states, (states,), by their names
 
 
@@ -54,17 +49,15 @@ class Coefficient(NamedTuple):
 class Compared:
     """The coefficients of given values that differ from the right ones."""
 
-    equations: Equations
-    given: ndarray  # (states, entries), as its tolerance
-    tolerance: ndarray
-    bias: Bias | None  # your h at these positions and other speeds; None: only values are given
+    given: Given
 
     @cached_property
     def differing(self) -> list[Coefficient]:
-        equations, right = self.equations, self.equations.coefficients
-        tolerances = dict.fromkeys(right, ROUNDING * self.tolerance[:, equations.in_h].max(axis=1))
-        tolerances |= dict(zip(equations.entries, self.tolerance[:, equations.in_M].T))
-        yours = dict(zip(equations.entries, self.given[:, equations.in_M].T)) | self.of_h
+        given, equations = self.given, self.given.equations
+        right, of_M = equations.coefficients, equations.entries[equations.in_M]
+        tolerances = dict.fromkeys(right, ROUNDING * given.tolerance[:, equations.in_h].max(axis=1))
+        tolerances |= dict(zip(of_M, given.tolerance.T))
+        yours = dict(zip(of_M, given.packed.T)) | self.of_h
         finite = [entry for entry, values in yours.items() if np.isfinite(values).all()]
         compared = [Coefficient(entry, yours[entry], right[entry], tolerances[entry]) for entry in finite]
         return [entry for entry in compared if (np.abs(entry.off) > entry.tolerance).any()]
@@ -72,69 +65,62 @@ class Compared:
     @property
     def of_h(self) -> dict[Entry, ndarray]:
         """Your coefficients of h, as far as they are known."""
-        nv, bias, states = self.equations.nv, self.bias, len(self.given)
-        if not self.equations.qd.any():
-            at_rest = self.given[:, self.equations.in_h].T
-            return {Entry("gravity", (i,)): column for i, column in enumerate(at_rest)}
+        bias, nv, values = self.given.bias, self.given.equations.nv, self.given.values
+        if not values.qd.any():
+            return {Entry("gravity", (i,)): column for i, column in enumerate(values.bias.T)}
         if bias is None or nv > MOST_SPEEDS:
             return {}
-        return coefficients_of(
-            lambda speeds: np.stack([bias(np.tile(row, (states, 1))) for row in speeds]), nv
-        )
+        return coefficients_of(lambda speeds: np.stack([bias(qd + 0.0 * values.qd) for qd in speeds]), nv)
 
     @property
     def is_complete(self) -> bool:
         """Whether these make up all that differs in h: nothing is linear or cubic in the speeds."""
-        qd, in_h = self.equations.qd, self.equations.in_h
-        h = self.equations.right[:, in_h].copy()
+        values, h = self.given.values, self.given.equations.h.copy()
         for coefficient in self.differing:
             i, *pair = coefficient.entry.at
             if coefficient.entry.kind != "M":
-                h[:, i] += coefficient.off * np.prod(qd[:, pair], axis=1)
-        size = self.tolerance[:, in_h] * (1.0 + np.abs(qd).max(axis=1, keepdims=True) ** 2)
-        off = np.abs(self.given[:, in_h] - h)
+                h[:, i] += coefficient.off * np.prod(values.qd[:, pair], axis=1)
+        size = values.tolerances[1] * (1.0 + np.abs(values.qd).max(axis=1, keepdims=True) ** 2)
+        off = np.abs(values.bias - h)
         return bool(((off <= ROUNDING * size) | ~np.isfinite(off)).all())
 
     @cached_property
-    def terms(self) -> list[list[tuple[str, str]]]:
-        """See Detail, of each coefficient that differs; [] if the terms are not found."""
-        tree, names, kinds = self.equations.tree, self.equations.speeds, self.equations.tree.kind
-        if "ball" in kinds or len(kinds) > MOST_JOINTS or len(self.differing) > SHOWN:
-            return [[] for _ in self.differing]
+    def terms(self) -> list[tuple[str, str]]:
+        """Yours and the right one, of each coefficient that differs; empty if they are not found."""
+        equations, tree = self.given.equations, self.given.tree
+        names, kinds, differing = equations.speeds, tree.kind, self.differing
+        if "ball" in kinds or len(kinds) > MOST_JOINTS or len(differing) > SHOWN:
+            return [("", "")] * len(differing)
         x = np.random.default_rng(0).uniform(-3.0, 3.0, (STATES_PER_TERM * 5 ** len(kinds), len(kinds)))
         reference = np.array(tree.reference)
-        right = Equations(tree, x + reference, np.zeros_like(x)).coefficients
-        forms = [form(names, kinds, x) for form in (sums, products)]
-        angles = self.equations.q - reference
-        tried = sums(names, kinds, angles) | products(names, kinds, angles) | dict(zip(names, angles.T))
-        found = []
-        for coefficient in self.differing:
-            expression = right_terms(forms, right[coefficient.entry], np.abs(coefficient.yours).max())
-            found.append(list(pairs_of_terms(expression, few_terms(tried, expression, coefficient))))
-        return found
+        right, basis = (
+            Equations(tree, x + reference, np.zeros_like(x)).coefficients,
+            products(names, kinds, x),
+        )
+        angles = equations.q - reference
+        tried = products(names, kinds, angles) | dict(zip(names, angles.T))
+        return [wrong_term(tried, expression(basis, right[one.entry]), one) for one in differing]
 
     def details(self) -> tuple[Detail, ...]:
         """The coefficients that differ, in a sentence."""
-        details, names = [], self.equations.coordinates.positions
+        details, equations = [], self.given.equations
         for coefficient, terms in zip(self.differing[:SHOWN], self.terms):
-            k = int(np.argmax(np.abs(coefficient.off)))
-            at = tuple(f"{name} = {value:.6g}" for name, value in zip(names[:SHOWN], self.equations.q[k]))
+            k, names = int(np.argmax(np.abs(coefficient.off))), equations.coordinates.positions
+            at = tuple(f"{name} = {value:.6g}" for name, value in zip(names[:SHOWN], equations.q[k]))
             numbers = coefficient.yours[k], coefficient.right[k]
             yours, right = (x if abs(x) > coefficient.tolerance[k] else 0.0 for x in numbers)
-            details.append(Detail(coefficient.entry.named(self.equations.speeds), terms, yours, right, at))
+            details.append(Detail(coefficient.entry.named(equations.speeds), terms, yours, right, at))
         return tuple(details)
 
-    def causes(self, most: int) -> list[Cause]:
-        """The cause, if all that differs is at most this number of wrong terms, else none."""
-        if not self.differing or not self.is_complete or not all(self.terms):
+    def causes(self) -> list[Cause]:
+        """The cause, if all that differs is the same wrong term, else none."""
+        if not self.differing or not self.is_complete or len(set(self.terms)) > 1 or not any(self.terms[0]):
             return []
-        kinds = {pair for terms in self.terms for pair in terms}
-        if len(kinds) > most:
-            return []
-        findings = [Finding(TEMPLATE, "details", {"detail": Detail("", terms)}) for terms in self.terms]
-        names = listed([coefficient.entry.named(self.equations.speeds) for coefficient in self.differing])
-        explains = "; ".join(dict.fromkeys(map(say, findings)))
-        return [Cause(rank=1 + len(kinds), kind="term", place=names, stated="right", explains=explains)]
+        explains = say(Finding(TEMPLATE, "details", {"detail": Detail("", self.terms[0])}))
+        names = listed(
+            [coefficient.entry.named(self.given.equations.speeds) for coefficient in self.differing]
+        )
+        return [Cause(rank=2, kind="term", place=names, stated="right", explains=explains)]
 
 
 def products(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
@@ -156,76 +142,41 @@ def products(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
     return terms
 
 
-def sums(names: Sequence[str], kinds: Sequence[str], x: ndarray) -> Terms:
-    """Sines and cosines of sums of the angles, each up to twice, times powers of the slides."""
-    slides = [k for k, kind in enumerate(kinds) if kind == "slide"]
-    hinges = [k for k, kind in enumerate(kinds) if kind != "slide"]
-    powers = products([names[k] for k in slides], ["slide"] * len(slides), x[:, slides])
-    terms = dict(powers)
-    for times in sorted(product(range(-2, 3), repeat=len(hinges)), key=lambda times: sum(map(abs, times))):
-        if next((k for k in times if k), 0) > 0:  # the others are the same
-            parts = [f"{SHOWN_TIMES[k]}{names[hinge]}" for k, hinge in zip(times, hinges) if k]
-            called = " + ".join(parts).replace("+ -", "- ")
-            angle = x[:, hinges] @ np.array(times)
-            for power, column in powers.items():
-                before = "" if power == "1" else f"{power} "
-                terms[f"{before}cos({called})"] = column * np.cos(angle)
-                terms[f"{before}sin({called})"] = column * np.sin(angle)
-    return terms
+def expression(basis: Terms, right: ndarray) -> dict[str, float]:
+    """An expression (states,) as a sum of terms, with their factors."""
+    x = np.linalg.lstsq(np.array(list(basis.values())).T, right, rcond=None)[0]
+    least = FIT_ROUNDING * np.abs(x).max()
+    return {name: float(value) for name, value in zip(basis, x) if abs(value) > least}
 
 
-def right_terms(forms: Sequence[Terms], right: ndarray, size: float) -> dict[str, float]:
-    """An expression (states,) as a sum of terms, in the form with fewer; what rounding yours leaves is 0."""
-    fits = []
-    for form in forms:
-        x = np.linalg.lstsq(np.array(list(form.values())).T, right, rcond=None)[0]
-        least = FIT_ROUNDING * max(np.abs(x).max(), size)
-        fits.append({name: float(value) for name, value in zip(form, x) if abs(value) > least})
-    return min(fits, key=len)
-
-
-def few_terms(tried: Terms, right: Mapping[str, float], coefficient: Coefficient) -> dict[str, float]:
-    """The terms that make up a coefficient's difference, with their factors; {}: a few do not suffice."""
+def wrong_term(tried: Terms, right: Mapping[str, float], coefficient: Coefficient) -> tuple[str, str]:
+    """What yours has, and what the right expression has in its place, "" for nothing; both empty: more is wrong."""
     names, columns = list(tried), np.array(list(tried.values())) / coefficient.tolerance
     target = coefficient.off / coefficient.tolerance
-    of_right = [names.index(name) for name in right]
-    for count, others, is_replaced in COMBINATIONS:
-        for chosen in combinations(of_right, count):
-            for terms in completed(columns, target, list(chosen)) if others else [list(chosen)]:
-                x = np.linalg.lstsq(columns[terms].T, target, rcond=None)[0]
-                sizes, left = np.abs(x), np.abs(target - x @ columns[terms])
-                negligible = FIT_ROUNDING * sizes.max()
-                is_fit = sizes.min() > negligible and left.max() <= 1.0
-                if is_fit and (not is_replaced or np.ptp(sizes) <= negligible):
-                    return {names[k]: float(value) for k, value in zip(terms, x)}
-    return {}
+    for replaced in ([], *([names.index(name)] for name in right)):
+        for k in nearest_columns(columns, target, replaced):
+            x = np.linalg.lstsq(columns[[*replaced, k]].T, target, rcond=None)[0]
+            left = np.abs(target - x @ columns[[*replaced, k]]).max()
+            if left > 1.0 or np.ptp(np.abs(x)) > FIT_ROUNDING * np.abs(x).max():
+                continue
+            factor, expected = float(x[-1]), right.get(names[k], 0.0)
+            if replaced:
+                return with_factor(factor, names[k]), with_factor(-float(x[0]), names[replaced[0]])
+            yours = expected + factor
+            is_there = abs(yours) > FIT_ROUNDING * abs(factor)
+            of_yours = with_factor(yours, names[k], expected) if is_there else ""
+            return of_yours, with_factor(expected, names[k], yours) if expected else ""
+    return "", ""
 
 
-def completed(columns: ndarray, target: ndarray, chosen: list[int]) -> list[list[int]]:
-    """The chosen terms with the one that comes closest to a target with them, or all that come as close."""
+def nearest_columns(columns: ndarray, target: ndarray, chosen: list[int]) -> list[int]:
+    """The columns that come closest to a target together with the chosen ones."""
     basis = np.linalg.qr(columns[chosen].T)[0] if chosen else np.zeros((len(target), 0))
     rest = columns - columns @ basis @ basis.T
-    lengths = np.linalg.norm(columns, axis=1)
+    least = 1e-6 * np.linalg.norm(columns, axis=1)
     sizes = np.linalg.norm(rest, axis=1)
-    along = np.where(sizes > 1e-6 * lengths, np.abs(rest @ target) / np.maximum(sizes, 1e-6 * lengths), 0.0)
-    return [[*chosen, int(k)] for k in np.flatnonzero(along >= AS_NEAR * along.max())]
-
-
-def pairs_of_terms(right: Mapping[str, float], off: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-    """What yours has, and what the right expression has in its place; "" for nothing."""
-    least = SAME_FACTOR * max(map(abs, (*off.values(), *right.values())), default=1.0)
-    added = [term for term in off if term not in right]
-    for term in (term for term in off if term in right):
-        same = [other for other in added if abs(abs(off[other]) - abs(off[term])) <= least]
-        if same:
-            added.remove(same[0])
-            yield with_factor(off[same[0]], same[0]), with_factor(-off[term], term)
-        else:
-            yours, expected = right[term] + off[term], right[term]
-            is_there = abs(yours) > least
-            yield with_factor(yours, term, expected) if is_there else "", with_factor(expected, term, yours)
-    for term in added:
-        yield with_factor(off[term], term), ""
+    along = np.where(sizes > least, np.abs(rest @ target) / np.maximum(sizes, least), 0.0)
+    return np.flatnonzero(along >= AS_NEAR * along.max()).tolist()
 
 
 def with_factor(value: float, term: str, other: float = 0.0) -> str:

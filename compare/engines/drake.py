@@ -142,6 +142,8 @@ class Model(ReadModel):
         self.set_numbers(self.plant, self.context, acts=False)
         self.force = fixed_force(self.plant, self.context)
         self.forward_dynamics = self.plant.get_generalized_acceleration_output_port()
+        self.dual_plant = self.plant.ToAutoDiffXd()
+        self.dual_context = self.dual_plant.CreateDefaultContext()
 
     def set_numbers(self, plant: Any, context: Any, acts: bool) -> None:
         """The numbers of a context. acts: damping does."""
@@ -220,6 +222,25 @@ class Model(ReadModel):
         self.plant.SetPositionsAndVelocities(self.context, np.concatenate(state))
         self.force.SetFromVector(force)
         return self.order.tree(q, self.forward_dynamics.Eval(self.context))
+
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        """Quaternions do not move like numbers, nor do the angles of a ball."""
+        return ("derivatives",) if self.order.turned else ()
+
+    def derivatives(self, q: Array, v: Array, force: Array) -> Array:
+        """By AutoDiffXd, Drake's dual numbers."""
+        from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
+
+        n, values = self.order.v.size, InitializeAutoDiff(np.concatenate(self.in_drake(q, v, force)))[:, 0]
+        plant, context = self.dual_plant, self.dual_context
+        context.SetTimeStateAndParametersFrom(self.context)
+        plant.SetPositionsAndVelocities(context, values[: 2 * n])
+        plant.get_applied_generalized_force_input_port().FixValue(context, values[2 * n :])
+        accelerations = plant.get_generalized_acceleration_output_port().Eval(context)
+        by = np.zeros((3, n, n))
+        by[:, self.order.v[:, None], self.order.v] = np.split(ExtractGradient(accelerations), 3, axis=1)
+        return by
 
     def prepare(self, course: Course) -> None:
         self.simulator(course)

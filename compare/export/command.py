@@ -90,10 +90,7 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
     terminal.say_lines(compared.reference.lines if options.mjcf else ())
     quantities = (options.quantity or QUANTITIES.get(options.to, OF_MOST)).replace(" ", "").split(",")
 
-    more: dict[str, Any] = {
-        "parameters": words.split(",") if words else [],
-        "limit": options.limit,
-    }
+    more: dict[str, Any] = {"parameters": words.split(",") if words else [], "limit": options.limit}
 
     def written(*head: str) -> dict[str, str]:
         try:

@@ -204,4 +204,4 @@ def fleet_page(rows: Sequence[FileRow], **values: object) -> str:
     pages = environment()
     body = pages.get_template("fleet.html.jinja").render(rows=rows, title=title, good=good, **values)
     page = pages.get_template("page.html.jinja")
-    return page.render(title=title, links=(), good=good, script="", body=Markup(body))
+    return page.render(title=title, links=(), good=good, body=Markup(body))

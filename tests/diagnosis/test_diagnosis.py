@@ -67,7 +67,7 @@ CAUSES = {  # the given values, or the tree whose values these are: rank, place 
     "damping in h": (added(7, 0.1 * QD[:, 1]), 2, "damping of beta in h", 0.1, True),
     "a factor of both": (added(slice(None), 0.0, 1.25), 2, "all of M and h", 1.25, False),
     "a factor of a row": (added(7, 0.0, 1.25), 2, "h[beta]", 1.25, False),
-    "a row in another": (added(6, -tmt.gravity_balance(Q)[:, 1]), 2, "h[beta] at rest in h[alpha]", -1.0, False),
+    "a row in another": (added(6, -tmt.gravity_balance(Q)[:, 1]), 2, "gravity of h[beta] in h[alpha]", -1.0, False),
     "damping D qd in h": (added(slice(6, None), QD * DAMPED.damping), 1, "damping D qd", "in h", True),
     "-D qd in h": (added(slice(6, None), -QD * DAMPED.damping), 1, "damping D qd", "in h, of the other sign", True),
     "no bias": (added(slice(6, None), 0.0, 0.0), 1, "bias", "left out", False),

@@ -25,8 +25,7 @@ from .. import Experiment
 from ..setup import Setup
 from . import numbers
 from .common import Numbers, causes_in_common
-from .contacts import touches
-from .numbers import ABSENT, OF_BODIES, UNITS, FeatureRow, NumberRow
+from .numbers import ABSENT, OF_BODIES, UNITS, FeatureRow, NumberRow, touches
 
 EXPERIMENT = Experiment(order=10, serves_own=False, states_causes=True)
 SHOWN = ["of", "quantity", "component", "stated", "compiled", "unit"]
@@ -60,27 +59,27 @@ def rows(setup: Setup) -> Result:
             compared.append(Numbers(number, unit, causes))
     result.causes = causes_in_common(compared, () if is_of_file else without_inertial(setup, dynamics))
     texts = {"contact pairs": block("parameters", "touching", touching=touching[:3])} if touching else {}
-    if not robot.is_read and dynamics.may_touch and not touching:
-        result.find("nothing_touches", states=len(setup.random.q))
     if extra := dynamics.additional_bodies():
         texts["other mass"] = block("parameters", "additional", bodies=extra)
     result.causes = [replace(each, text=texts.get(each.quantity, each.text)) for each in result.causes]
     if robot.stated_in:
         result.causes += compare_features(result, robot)
     forces = numbers.check_forces(result, setup.random, dynamics)
-    if not robot.is_read:
+    if robot.is_read:
+        result.tables["inventory"] = [FeatureRow.of(feature) for feature in robot.features]
+    else:
         result.causes += forces
+        if dynamics.may_touch and not touching:
+            result.find("nothing_touches", states=len(setup.random.q))
     if is_of_file:
         for name, value, unit in (("integrator", reading.integrator, ""), ("timestep", reading.dt, "s")):
             result.rows.append(NumberRow(of="file", quantity=name, compiled=value, unit=unit))
-    if robot.is_read:
-        result.tables["inventory"] = [FeatureRow.of(feature) for feature in robot.features]
-
-    def order(cause: Cause) -> tuple[int, bool, float]:
-        return cause.rank, cause.quantity in AT_TIMES, -cause.size
-
-    result.causes = sorted(result.causes, key=order)
+    result.causes = sorted(result.causes, key=urgency)
     return result
+
+
+def urgency(cause: Cause) -> tuple[int, bool, float]:
+    return cause.rank, cause.quantity in AT_TIMES, -cause.size
 
 
 def without_inertial(setup: Setup, dynamics: MujocoDynamics) -> list[str]:

@@ -35,36 +35,35 @@ class Numbers(NamedTuple):
 
 def causes_in_common(numbers: Sequence[Numbers], from_geoms: Sequence[str]) -> list[Cause]:
     """The causes of all numbers, those of one error as one. from_geoms: bodies for which the file has no inertial."""
-    left, causes = [each for each in numbers if each.causes], []
+    left, causes = [each for each in numbers if each.causes], list[Cause]()
+
+    def explain(together: Sequence[Numbers], *cause: Cause) -> None:
+        nonlocal left
+        causes.extend(cause)
+        left = without(left, together)
+
     for quantities in ALIKE:
         together = [each for each in numbers if each.number.quantity in quantities and each.stated.any()]
         factor = common_factor(together)
         if factor and len(without(left, together)) == len(left) - len(together):
             values = {"quantities": quantities, "factor": factor}
-            causes.append(as_one(together, "factor", values, 1.0, factor))
-            left = without(left, together)
+            explain(together, as_one(together, "factor", values, 1.0, factor))
     order = [each for each in left if each.number.quantity == "order"]
     if len(order) > 1:
         every = [each for each in numbers if each.number.quantity == "order"]
         right = [each.number.place for each in every]
         file = [each.number.place for each in sorted(every, key=lambda each: each.compiled[0])]
         names = ", ".join(right), ", ".join(file)
-        causes.append(as_one(order, "order", {"file": file, "stated": right}, *names))
-        left = without(left, order)
-    for body in from_geoms:
+        explain(order, as_one(order, "order", {"file": file, "stated": right}, *names))
+    for body in dict.fromkeys(each.number.place for each in left):
         of_body = [each for each in left if each.number.place == body and each.number.quantity in OF_INERTIAL]
-        if len(of_body) > 1:
-            causes.append(as_one(of_body, "from_geoms", {"body": body, "numbers": of_body}))
-            left = without(left, of_body)
-    for body in dict.fromkeys(each.number.place for each in left if each.number.quantity == "mass"):
-        of_body = [each for each in left if each.number.place == body and each.number.quantity in OF_INERTIAL]
-        if load := load_of(of_body):
-            causes.append(as_one(of_body, "load", {"body": body, **load}))
-            left = without(left, of_body)
+        if body in from_geoms and len(of_body) > 1:
+            explain(of_body, as_one(of_body, "from_geoms", {"body": body, "numbers": of_body}))
+        elif load := load_of(of_body):
+            explain(of_body, as_one(of_body, "load", {"body": body, **load}))
     while left:
         together = alike(left)
-        left = without(left, together)
-        causes += of_group(together)
+        explain(together, *of_group(together))
     return causes
 
 

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
 from ...report.style import GREY, WIDTH, file_name
-from ..figures_overview import OUTLINE, chart
-from .advice import TARGET, best_rows, cheapest_of_fronts, front, target, within_target
+from ..figures import OUTLINE, chart
+from .conclusions import TARGET, best_rows, cheapest_of_fronts, front, target, within_target
 from .runs import SpeedResult, SpeedRow
 
 METHOD_MARKERS = "osD^v<>PX*hp"  # of the methods of an engine, whose colour they have
