@@ -114,7 +114,7 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
     compare_quantities(result, setup, engine.record, dynamics, as_read)
     if all(reading["mended"].values()):
         integrators.compare_methods(result, setup, engine)
-        servos.follow_step(result, setup, engine)
+        servos.follow_step(result, setup, engine, reads_another)
         batches.time_batches(result, setup, engine)
 
 

@@ -99,7 +99,7 @@ class ServoRow(Row):
     method: str
     servo: str  # whose law acts, and when: servos.OWN, HELD, AT_EACH_STAGE
     dt: float = column("s", digits=5)
-    deviation: float | None = column("rad")
+    deviation: float | None = column("rad", default=None)
     why: str = ""  # what explains the deviation, see servos.alike; "": nothing does
     unexplained: float | None = column("rad", default=None)  # difference from the run that explains it
     ended: str | None = None
