@@ -102,12 +102,12 @@ def trajectory(
 
 def followed(
     tree: Tree, q: Numbers, qd: Numbers, tau: Numbers, dt: float, steps: int, every: int = 1, form: str = "composite",
-    order: int = ORDER, tolerance: float = TOLERANCE,
+    order: int = ORDER, tolerance: float = TOLERANCE, most_operations: int | None = None,
 ) -> tuple[np.ndarray, int, ValueError | None]:  # fmt: skip
     """The records (k, 2, nq + nv) of a run as far as it goes, the number of its series, and why it ends early, or None."""
     traced, n = equations(tree, tau, form), tree.coordinates.nq + tree.coordinates.nv
     high, low = traced.tables(n, order + 1)
-    most = MOST_OPERATIONS // (BESIDE + len(traced.code))
+    most = (most_operations or MOST_OPERATIONS) // (BESIDE + len(traced.code))
     times = [Fraction(dt) * k for k in range(0, steps + 1, every)]
     state, t, count = first_state(tree.coordinates, q, qd), Fraction(0), 0
     path = [state]
