@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from scipy.linalg import eig
@@ -12,11 +12,14 @@ import tmt
 from tmt import METHODS, literal
 from tmt.derivation import composite, method
 from tmt.derivation.dual import Dual, seeded
+from tmt.methods import RungeKutta, SemiImplicitEuler, amplification
+from tmt.methods.implicit import ImplicitRungeKutta
+from tmt.methods.stepping import Method
+from tmt.methods.tableau import Tableau
 
 from ..robots import Robot
 from ..robots.case import SEED, Case
 from ..robots.coordinates import floats
-from .linear_step import growth_of, is_runge_kutta, linear_step
 
 AS_IT_STANDS = (
     6  # speeds up to which the method is differentiated as written; beyond, composite inertias are faster
@@ -215,6 +218,49 @@ def held(robot: Robot, posture: str, damping: float = 0.0) -> Held:
     return Held(
         robot.case(f"{posture}, held", posture=posture, torque="hold", damping=damping, gravity=gravity)
     )
+
+
+# the step of a method
+
+
+def is_runge_kutta(stepping: Method) -> TypeGuard[Tableau]:
+    """Whether a method is one of tmt's Runge-Kutta methods, explicit or implicit; a subclass may step otherwise."""
+    return type(stepping) in (RungeKutta, ImplicitRungeKutta)
+
+
+def linear_step(at: Held, stepping: Method, dt: np.ndarray) -> np.ndarray:
+    """The matrix of a step for small deviations from a held posture, (k, 2nv, 2nv) for dt (k,), s."""
+    n, each = at.nv, dt[:, None, None]
+    if is_runge_kutta(stepping):
+        return stability_function(stepping, each * at.matrix)
+    if type(stepping) is not SemiImplicitEuler:
+        return amplification(stepping, at.tree, at.q, np.zeros(n), at.tau, dt)
+    # at rest the bias has no derivative by the speeds: an implicit bias makes no difference
+    unit = np.eye(2 * n)
+    stiff, damped = map(np.array, stepping.held(at.tree))
+    matrix = at.mass_matrix + each * damped + each**2 * stiff
+    force = at.mass_matrix @ at.matrix[n:] - each * np.hstack([0.0 * stiff, stiff])
+    speeds = unit[n:] + each * np.linalg.solve(matrix, force)
+    return np.concatenate([unit[:n] + each * speeds, speeds], axis=1)
+
+
+def stability_function(stepping: Tableau, Z: np.ndarray) -> np.ndarray:
+    """The stability function of a Runge-Kutta method, 1 + b Z (1 - A Z)^-1, at matrices Z (..., m, m)."""
+    s, m = len(stepping.b), Z.shape[-1]
+    unit, stages = np.eye(m), list[np.ndarray]()
+    if type(stepping) is RungeKutta:
+        for row in stepping.A:
+            stages.append(Z @ (unit + sum(a * stage for a, stage in zip(row, stages) if a)))
+    else:
+        coupled = np.eye(s * m) - np.kron(stepping.A, Z)
+        solved = np.linalg.solve(coupled, np.tile(Z, (s, 1))).reshape(*Z.shape[:-2], s, m, m)
+        stages = list(np.moveaxis(solved, -3, 0))
+    return unit + sum(b * stage for b, stage in zip(stepping.b, stages))
+
+
+def growth_of(stepping: Tableau, z: np.ndarray) -> np.ndarray:
+    """The stability function of a Runge-Kutta method at z = lambda dt, of any shape."""
+    return stability_function(stepping, np.asarray(z)[..., None, None])[..., 0, 0]
 
 
 # forces at rest over any scalar, and their derivatives

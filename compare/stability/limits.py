@@ -1,13 +1,13 @@
 """The largest stable step of an integrator at the rest of a model, by the derivative of MuJoCo's own step."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from ..engines.mujoco.step import Step, distance
-from .deviations import grows
-from .growth import GROWS, Growth, growth
+from .growth import GROWS, Growth, grows, growth
 from .rest import Rest, rest_near
 
 LONGEST, SHORTEST = 0.4, 1e-6  # s: steps that are tried
@@ -101,3 +101,11 @@ def grows_by_itself(coarse: Tried, fine: Tried) -> bool:
     low, high = BY_ITSELF
     kept = low * coarse.growth.rate < fine.growth.rate < high * coarse.growth.rate
     return kept and fine.rest.is_found and coarse.growth.factor < SLOW
+
+
+def bisected(holds: Callable[[float], bool], low: float, high: float, within: float) -> tuple[float, float]:
+    """The largest step that holds and the smallest that fails, s, a factor `within` apart; at first low and high."""
+    while high > low * within:
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low, high

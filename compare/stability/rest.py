@@ -20,10 +20,14 @@ TRIES, SHARES = (
     15,
     (1.0, 0.5, 0.25, 0.1, 0.03),
 )  # of Newton's method, and the parts of its step that are tried
+FAST = 0.1  # of the acceleration: where less is left after a step, the slope of before is good for another
 REACH = 0.05  # rad or m: its longest step
 UNHELD = 1e-6  # of the largest slope of a force: none
-# of the largest singular value: softer directions are moved only if the stiffer ones do not help
-DEPENDENT = 1e-4, 1e-6, 1e-9
+DEPENDENT = (
+    1e-4,
+    1e-6,
+    1e-9,
+)  # of the largest singular value: softer directions move only if the stiffer do not help
 RELAXED_STEPS = 1e-3, 5e-4  # s, the longest step of a relaxed run, and of a file with a shorter one
 RELAXED = (4.0, 10.0), (3.0, 1.0), (2.0, 0.0)  # s, 1/s: how long its parts last, how fast its speeds decay
 RELAXED_STILL = 1e-6  # rad/s or m/s
@@ -81,21 +85,17 @@ def relaxed(model: mujoco.MjModel, state: np.ndarray) -> np.ndarray:
         step, end = Step(model, dt, integrator), state
         for seconds, rate in RELAXED:
             end = step.relaxed(end, seconds, rate, RELAXED_STILL)
-            if is_still(step, end):
+            if fastest(step, end) < RELAXED_STILL:
                 return end
-        if not is_wild(step, end):
+        if fastest(step, end) < WILD:
             return end
     return state
 
 
-def is_wild(step: Step, state: np.ndarray) -> bool:
+def fastest(step: Step, state: np.ndarray) -> float:
+    """The largest speed of a state, rad/s or m/s."""
     step.put(state)
-    return not np.abs(step.data.qvel).max(initial=0.0) < WILD
-
-
-def is_still(step: Step, state: np.ndarray) -> bool:
-    step.put(state)
-    return bool(np.abs(step.data.qvel).max(initial=0.0) < RELAXED_STILL)
+    return float(np.abs(step.data.qvel).max(initial=0.0))
 
 
 def rest_near(step: Step, state: np.ndarray) -> Rest:
@@ -113,22 +113,26 @@ def rest_near(step: Step, state: np.ndarray) -> Rest:
             if not np.abs(data.qvel).max() < WILD:
                 break
         end = step.state()
-        if np.isfinite(end).all() and not is_wild(step, end):
+        if np.isfinite(end).all() and fastest(step, end) < WILD:
             again = newton(step, end)
             best = min(best, again, key=lambda rest: rest.left)
     return best
 
 
 def newton(step: Step, state: np.ndarray) -> Rest:
-    rest = Rest.at(step, state)
+    """Where Newton's method leads; while it is fast it keeps the slope, which costs most."""
+    rest, is_exact = Rest.at(step, state), True
     for _ in range(TRIES):
         if rest.left <= AT_REST or not np.isfinite(rest.A).all():
             break
         better = next((move for move in moves_of(rest) if move.left < rest.left), None)
-        if better is None:
+        if better is None and is_exact:
             break
-        rest = Rest.at(step, better.state)
-    return rest
+        is_exact = better is None or better.left > FAST * rest.left
+        rest = better or rest
+        if is_exact:
+            rest = Rest.at(step, rest.state)
+    return rest if is_exact else Rest.at(step, rest.state)
 
 
 def moves_of(rest: Rest) -> Iterator[Rest]:

@@ -146,7 +146,7 @@ def test_noise_of_differences_and_what_nothing_holds_never_grow():
             for dt in (1e-4, 2e-3, 0.05):
                 assert growth(rest_of(text, dt, integrator)).factor == 1.0
         assert limit_of(text).growth.factor == 1.0  # its contacts may give way, at a long step
-    assert in_the_air_at(place_of(KINDS["a box"]), "").surroundings == "air"
+    assert in_the_air_at(place_of(KINDS["a box"])).surroundings == "air"
 
 
 @pytest.mark.parametrize("noise, factor", [(0.0, 1.0002), (1e-6, 1.0002), (4e-5, 1.0)])

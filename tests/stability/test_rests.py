@@ -8,8 +8,8 @@ from compare.engines.mujoco.forces import rows_at
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.engines.mujoco.reading import read
 from compare.engines.mujoco.step import Step
-from compare.stability.naming import limiting
-from compare.stability.place import in_the_air_at, standing_at
+from compare.stability.answer import limiting
+from compare.stability.place import Posture, in_the_air_at, standing_at
 from compare.stability.rest import NEAR_REST
 
 SPEEDING = '<general joint="turn" biastype="affine" biasprm="0 0 1"/>'  # force = speed
@@ -36,7 +36,7 @@ def test_the_rest_depends_on_the_step_where_contacts_are_softened():
     place = place_of(LEG)
     fine, coarse = (rest_of(LEG, dt).state for dt in (1e-3, 0.03))
     deeper = np.abs(fine - coarse).max()
-    assert 1e-5 < deeper < 0.1 and place.surroundings == "contact" and place.touching == 1
+    assert 1e-5 < deeper < 0.1 and place.surroundings == "contact" and place.is_touching
 
 
 def test_a_saddle_is_left_where_it_leads_to_a_rest():
@@ -60,18 +60,18 @@ def test_a_saddle_that_leads_nowhere_is_told_with_its_rate(actuator, rate):
 
 def test_what_falls_has_no_rest_and_one_in_the_air_has():
     falling, lying = place_of(STONE.format("")), place_of(STONE.format(FLOOR))
-    assert falling.left == pytest.approx(9.81) and falling.surroundings == "free" and falling.touching == 0
+    assert falling.left == pytest.approx(9.81) and falling.surroundings == "free" and not falling.is_touching
     assert limit_of(STONE.format("")).kind == "no rest"
-    assert in_the_air_at(falling, "").left < NEAR_REST
-    assert lying.touching == 1 and lying.moved[2] == pytest.approx(-0.9, abs=1e-3)
+    assert in_the_air_at(falling).left < NEAR_REST
+    assert lying.is_touching and lying.moved[2] == pytest.approx(-0.9, abs=1e-3)
     assert limit_of(STONE.format(FLOOR)).kind == "none"
-    assert in_the_air_at(place_of(hinge()), "") is None  # nothing touches it, and it rests
+    assert in_the_air_at(place_of(hinge())) is None  # nothing touches it, and it rests
 
 
 def test_in_the_air_a_free_base_has_no_weight_and_a_fixed_one_has():
     for text, weightless in ((BOX, True), (CASTER, True), (LEG, False)):
-        air = in_the_air_at(place_of(text), "")
-        assert (air.surroundings, air.touching) == ("air", 0)
+        air = in_the_air_at(place_of(text))
+        assert (air.surroundings, air.is_touching) == ("air", False)
         assert (not air.model.opt.gravity.any()) is weightless
     assert place_of(LEG).model.opt.gravity.any()
     assert rest_of(BOX).is_held.tolist() == [
@@ -117,6 +117,6 @@ def test_a_relaxed_run_loses_its_speed_whether_anything_brakes_or_not():
 
 def test_a_posture_may_be_numbers():
     reading = read(KINDS["servos"])
-    place = standing_at(reading, "mine", "", np.array([0.2, -0.1]))
+    place = standing_at(reading, Posture("mine", "", (0.2, -0.1)))
     data = place.start[1:3]
     assert data == pytest.approx([0.2, -0.1]) and np.abs(place.moved).max() < 0.2

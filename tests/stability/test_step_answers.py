@@ -7,7 +7,8 @@ from small import HOLDING, INERTIA, KINDS, LEG, STANDING, hinge, two
 
 import compare
 from compare.engines.mujoco.reading import read
-from compare.stability.answer import Asked, StepLimitRow, answer, posture_of, postures_of
+from compare.stability.answer import Asked, StepLimitRow, answer
+from compare.stability.place import posture_of, postures_of
 
 KEYS = '<keyframe><key name="low" qpos="0.3 -0.2"/><key qpos="0 0"/></keyframe>'
 FOOT = STANDING.format(cone="elliptic", condim=3)

@@ -9,9 +9,8 @@ from ...engines.mujoco.differences import touching
 from ...engines.mujoco.forces import forces_near
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.step import Step
-from ...stability.answer import postures_of
 from ...stability.closed_form import COVERED, matrix
-from ...stability.place import standing_at
+from ...stability.place import postures_of, standing_at
 from ...stability.rest import rest_near
 from .ways import SIZES, relative, units_of_speeds
 
@@ -33,8 +32,8 @@ class ContactRow(Row):
 def contact_rows(reading: Reading) -> list[ContactRow]:
     """For each eps, where the file's first posture sinks to; none where nothing touches it there."""
     posture = postures_of(reading)[0]
-    place = standing_at(reading, posture.name, posture.key)
-    if not place.touching:
+    place = standing_at(reading, posture)
+    if not place.is_touching:
         return []
     integrator = reading.integrator if reading.integrator in COVERED else "implicitfast"
     step = Step(place.model, float(place.model.opt.timestep), integrator)

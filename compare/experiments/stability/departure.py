@@ -11,9 +11,9 @@ from ...engines import Engine, Method
 from ...judge.run import LEFT, departure
 from ...stability.held import NEGLIGIBLE, Held
 from .subjects import mujoco_of, unit_of_movements
-from .tables import DepartureRow, TorqueRow
+from .tables import ClaimRow, DepartureRow
 
-Departure = DepartureRow | TorqueRow  # with a predicted and an observed time
+Departure = DepartureRow | ClaimRow  # with a predicted and an observed time
 
 LONGEST_DEPARTURE = 12.0  # s
 PERTURBATIONS = tuple(10.0**-k for k in (2, 4, 6, 8, 10, 12))  # rad, of the angles at the start

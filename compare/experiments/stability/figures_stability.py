@@ -18,7 +18,7 @@ from .claims import VARIANT, claims_of
 from .departure import departure_values
 from .limits import LINEAR_DEVIATION, summary
 from .subjects import fraction, unit_of_movements
-from .tables import FinerRow, LimitRow, StabilityResult, TorqueRow
+from .tables import ClaimRow, LimitRow, StabilityResult
 
 SCHEME_LOOKS = {  # colour, dash, name
     "rk4": (GREEN, "-", "RK4"),
@@ -163,7 +163,7 @@ def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Fin
     finer = [row for row in rows if row.claim == 2]
     fig = Figure(figsize=(WIDTH, 3.4), layout="constrained")
     axes = fig.subplots(1, 1 + bool(finer), squeeze=False)[0]
-    draw_torques(axes[0], [row for row in rows if row.claim == 1 and row.torque.startswith(VARIANT)], robot)
+    draw_torques(axes[0], [row for row in rows if row.torque.startswith(VARIANT)], robot)
     if finer:
         draw_finer_steps(axes[1], finer, robot)
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=8)
@@ -171,7 +171,7 @@ def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Fin
     return "stability_claims", fig, result.finding("figure_claims", **values, finer=bool(finer))
 
 
-def draw_torques(ax: Axes, rows: list[TorqueRow], robot: Robot) -> None:
+def draw_torques(ax: Axes, rows: list[ClaimRow], robot: Robot) -> None:
     """Claim 1: when and to which side the posture is left, over the push of the residual on the unstable mode."""
     symbol = robot.symbol(robot.joints[0])
     for engine, fill in (("tmt", "full"), ("mujoco", "none")):
@@ -198,7 +198,7 @@ def draw_torques(ax: Axes, rows: list[TorqueRow], robot: Robot) -> None:
     ax.set_ylabel(f"time until a movement of {LEFT:g} rad, s")
 
 
-def draw_finer_steps(ax: Axes, rows: list[FinerRow], robot: Robot) -> None:
+def draw_finer_steps(ax: Axes, rows: list[ClaimRow], robot: Robot) -> None:
     """Claim 2: when and to which side the posture is left against the number of steps, the torque one ulp off."""
     duration = claims_of(robot).duration
     for engine, sign in dict.fromkeys((row.engine, row.ulps) for row in rows):

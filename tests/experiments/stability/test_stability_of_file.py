@@ -12,8 +12,11 @@ from compare.engines.mujoco.reading import read
 from compare.experiments import stability
 from compare.experiments.setup import Request, Setup
 from compare.experiments.stability import figures_growth, of_file
-from compare.experiments.stability.of_file import MODES, PUSHED, ControlRow, MotionRow
-from compare.stability.answer import StepLimitRow, posture_of
+from compare.experiments.stability.of_file import MODES, PUSHED
+from compare.experiments.stability.tables import ControlRow
+from compare.stability.answer import StepLimitRow
+from compare.stability.motion import MotionRow
+from compare.stability.place import posture_of, standing_at
 
 TURNING = """<mujoco><option timestep="{dt}"/><worldbody><body><joint name="turn" axis="0 0 1"/>
   <inertial pos="0 0 0" mass="1" diaginertia="0.05 0.05 0.05"/></body></worldbody><actuator>{actuator}</actuator>
@@ -120,8 +123,7 @@ def test_a_posture_that_is_asked_for_is_the_only_one():
         assert {row.posture for row in rows} == {asked}
     reading = read(TURNING.format(dt=0.002, actuator=MOTOR))
     asked = [
-        of_file.place_asked(posture_of(text, reading), reading).start[1]
-        for text in ("home", "57.29578", "spin")
+        standing_at(reading, posture_of(text, reading)).start[1] for text in ("home", "57.29578", "spin")
     ]
     assert asked == pytest.approx([0.1, 1.0, 0.0])
 
