@@ -14,11 +14,21 @@ from ..engines.mujoco.step import Step, distance
 from ..engines.mujoco.variants import has_free_base
 from .closed_form import radius_apart
 from .cures import Cure, cures
-from .growth import Growth
+from .growth import LASTS, Growth
 from .limits import COARSER, LONGEST, Limit, limit, tried
 from .place import MOVING, Place, Posture, in_the_air_at, standing_at
 from .rest import SETTLED, Rest
-from .runs import FINER, growth_in_run, largest_push, observed, own_limit, speed_at_end
+from .runs import (
+    CALM,
+    FINER,
+    OWN_PUSH,
+    growth_in_run,
+    largest_push,
+    observed,
+    own_limit,
+    speed_at_end,
+    stays_still,
+)
 
 SHARE = 0.1  # of the energy of a mode: what a contact has more of takes part
 CURVE_STEPS = 18  # of a curve
@@ -173,6 +183,11 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> StepLimitRow:
     """The limit of an integrator at a place, and what the step in use does there."""
     model, dt = place.model, asked.dt
     found = limit(model, place.rest, integrator, dt)
+    shows = found.kind == "saddle" and found.growth.rate * LASTS > np.log(CALM / OWN_PUSH)
+    if shows and stays_still(
+        model, place.rest, dt, integrator, place.creep
+    ):  # what grows there remains small
+        found = limit(model, place.rest, integrator, dt, found.growth.rate)
     at, moved, creep = found.first, np.abs(place.moved), np.abs(found.first.rest.speeds)
     joint, contact = limiting(place, found.rest, found.growth)
     row = StepLimitRow(
@@ -185,7 +200,7 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> StepLimitRow:
     )  # fmt: skip
     if at.rest.is_found:  # else the speeds are those that Newton's method has tried
         row.creep, row.creeping_joint = float(creep.max()), place.speed_names[int(np.argmax(creep))]
-    if at.rest.left <= SETTLED:
+    if at.rest.left <= SETTLED and not place.held_objects:
         row.apart = radius_apart(at.rest, place.tree)
     if found.dt:
         row.gives_way = float(np.abs(distance(model, place.rest, found.rest.state)).max())
@@ -211,7 +226,8 @@ def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
 def add_motion(row: StepLimitRow, place: Place) -> None:
     """Of a robot that touches something and goes on moving: how fast at a finer step, and up to which step no faster."""
     finer = Step(place.model, row.file_dt / FINER, row.integrator, exact=False)
-    row.creep = speed_at_end(finer, place.rest)
+    speed = speed_at_end(finer, place.rest)
+    row.creep = speed if np.isfinite(speed) else place.creep
     row.creeping_joint = place.speed_names[int(np.argmax(np.abs(finer.data.qvel)))]
     add_own_limit(row, place, row.creep)
 

@@ -77,9 +77,9 @@ def limit(
         finer = tried(model, state, at.dt / COARSER**2, integrator, drift)
         if finer.is_stable:
             stable = finer
+        elif is_saddle(at, finer):
+            return Limit("saddle", None, finer.growth, finer.rest, began)
         elif grows_by_itself(at, finer):
-            if finer.growth.rate > SADDLE:
-                return Limit("saddle", None, finer.growth, finer.rest, began)
             return limit(model, state, integrator, first, finer.growth.rate)
         elif not (at.rest.is_found or finer.rest.is_found):
             return Limit("no rest", None, finer.growth, finer.rest, began)
@@ -94,6 +94,11 @@ def limit(
         middle = tried(model, stable.rest.state, float(np.sqrt(stable.dt * failing.dt)), integrator, drift)
         stable, failing = (middle, failing) if middle.is_stable else (stable, middle)
     return Limit("finite", stable.dt, failing.growth, stable.rest, began)
+
+
+def is_saddle(coarse: Tried, fine: Tried) -> bool:
+    """Whether something grows by itself, faster than a drift."""
+    return grows_by_itself(coarse, fine) and fine.growth.rate > SADDLE
 
 
 def grows_by_itself(coarse: Tried, fine: Tried) -> bool:

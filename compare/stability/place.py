@@ -24,7 +24,7 @@ from ..engines.mujoco.variants import (
 )
 from ..robots.coordinates import Coordinates
 from ..robots.file import names_of_keys
-from .limits import SADDLE, grows_by_itself, tried
+from .limits import is_saddle, tried
 from .rest import NEAR_REST, fastest, left_at, relaxed, rest_near
 
 MOST_POSTURES = 6  # the first keyframes
@@ -101,11 +101,7 @@ class Place:
 
     @property
     def tree(self) -> tmt.Tree:
-        tree = replace(self.reading.tree, gravity=tuple(self.model.opt.gravity))
-        if not self.still.any():
-            return tree
-        own = np.array(tree.armature or 0.0) + HELD_STILL * self.still
-        return replace(tree, armature=tuple(own.tolist()))
+        return replace(self.reading.tree, gravity=tuple(self.model.opt.gravity))
 
     @property
     def surroundings(self) -> str:
@@ -156,8 +152,13 @@ def placed(reading: Reading, posture: Posture, contacts: bool) -> Place:
         step.put(rest)
         step.data.qvel[still] = 0.0
         rest = step.state()
-    touching = any(data.ncon for data in step.run(rest, round(TOUCHES / step.dt)))
-    return Place(reading, posture, contacts, start, rest, still, touching)
+    thrown = left_at(step, rest) > FALLS and touches(step, start)
+    return Place(reading, posture, contacts, start, rest, still, thrown or touches(step, rest))
+
+
+def touches(step: Step, state: np.ndarray) -> bool:
+    """Whether a run from a state soon touches something."""
+    return any(data.ncon for data in step.run(state, round(TOUCHES / step.dt)))
 
 
 def restless_objects(step: Step, state: np.ndarray) -> np.ndarray:
@@ -187,7 +188,7 @@ def beyond_saddles(model: mujoco.MjModel, state: np.ndarray) -> np.ndarray:
     dt = min(model.opt.timestep, 1e-3)
     for _ in range(MOST_SADDLES):
         coarse, fine = (tried(model, state, step, "implicitfast") for step in (dt, dt / FINE))
-        if not (grows_by_itself(coarse, fine) and fine.growth.rate > SADDLE):
+        if not is_saddle(coarse, fine):
             return state
         along = fine.growth.shape[: model.nv].real
         by = np.zeros(fine.rest.step.size)

@@ -89,7 +89,9 @@ def own_limit(
         low, high = low / COARSER, low
         if low < SHORTEST:
             return 0.0
-    return bisected(holds, low, high, OWN_WITHIN)[0]
+    while low * OWN_WITHIN < high and holds(low * OWN_WITHIN):  # upwards: a longer one may hold beyond a gap
+        low *= OWN_WITHIN
+    return low
 
 
 def stays_still(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, creep: float) -> bool:

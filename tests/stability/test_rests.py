@@ -8,7 +8,7 @@ from compare.engines.mujoco.forces import rows_at
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.engines.mujoco.reading import read
 from compare.engines.mujoco.step import Step
-from compare.stability.answer import limiting
+from compare.stability.answer import Asked, limit_row, limiting
 from compare.stability.place import Posture, in_the_air_at, standing_at
 from compare.stability.rest import NEAR_REST
 
@@ -120,3 +120,22 @@ def test_a_posture_may_be_numbers():
     place = standing_at(reading, Posture("mine", "", (0.2, -0.1)))
     data = place.start[1:3]
     assert data == pytest.approx([0.2, -0.1]) and np.abs(place.moved).max() < 0.2
+
+
+def test_what_bounces_is_not_in_the_air():
+    """A light box on a stiff floor never rests at 2 ms: its floor stays, and the step is not stable."""
+    box = BOX.replace('mass="2"', 'mass="1e-6"').replace(
+        "<worldbody>", '<default><geom solref="-1e5 -100"/></default><worldbody>'
+    )
+    place = place_of(box)
+    assert place.surroundings == "contact"
+    row = limit_row(place, "Euler", Asked(2e-3, "Euler", ["Euler"], in_runs=True))
+    assert row.limit == "moving" and row.stable_at_file_dt is False and 1e-4 < row.own_dt < 2e-3
+
+
+def test_a_loose_object_that_moves_on_is_named_and_hides_nothing():
+    ball = '<body name="ball" pos="0 0 5"><freejoint/><geom size="0.1"/></body></worldbody>'
+    text = hinge(20.0, 5.0).replace("</worldbody>", ball)
+    place = place_of(text)
+    assert place.held_objects == "ball" and not place_of(hinge()).held_objects
+    assert limit_of(text).dt == pytest.approx(limit_of(hinge(20.0, 5.0)).dt, rel=3e-3)

@@ -99,7 +99,7 @@ def check_torques(result: Result, torques: list[ClaimRow], robot: Robot) -> None
         (own,) = (row for row in of_engine if row.torque == NEAREST)
         where, first = f"{claims.left}, {LABELS[engine]} {method}", len(result.checks)
         for row in (row for row in of_engine if row.torque in CLEAR_TORQUES):
-            along = None if row.direction is None else row.direction * np.sign(row.push)
+            along = None if row.direction is None else row.direction * np.sign(row.push or 0.0)
             at, text = (
                 f"{where}, torque {row.torque}",
                 "departure along the push of the residual (1; against it: -1)",
@@ -212,13 +212,14 @@ def check_kept(result: Result, rows: list[ClaimRow], robot: Robot, ends: Mapping
     result.tables.setdefault("stability_claims", []).extend(rows)
     for row in (row for row in rows if row.dt < limit):
         where = f"{claims.kept}, {row.who}, dt = {row.dt:.4g} s, torque {row.torque}"
-        time = row.run if row.observed is None else row.observed
+        run = row.run or 0.0
+        time = run if row.observed is None else row.observed
         what = f"time within {LEFT:g} rad, below the limit"
-        stays &= result.check(where, what, time, row.run, "s", rule="at least", about=about).passed
+        stays &= result.check(where, what, time, run, "s", rule="at least", about=about).passed
     for label, size in ends.items():
         where = f"{claims.end}, {label}"
-        what = f"acceleration that {claims.kept}'s torque gives a {claims.end} {robot.name}"
-        leaves_end |= result.check(where, what, size, PUSHED, "rad/s2", rule="at least", about=about).passed
+        quantity = f"acceleration that {claims.kept}'s torque gives a {claims.end} {robot.name}"
+        leaves_end |= result.check(where, quantity, size, PUSHED, "rad/s2", rule="at least", about=about).passed
     above = [row for row in rows if row.dt > limit]
     moves = bool(above) and all(row.observed is not None or (row.moved or 0.0) > MOVED for row in above)
     result.find(

@@ -188,7 +188,7 @@ def draw_torques(ax: Axes, rows: list[ClaimRow], robot: Robot) -> None:
                 markersize=5,
                 label=label,
             )
-    predicted = sorted((row.push * 1e14, number_or_nan(row.predicted)) for row in rows)
+    predicted = sorted((number_or_nan(row.push) * 1e14, number_or_nan(row.predicted)) for row in rows)
     ax.plot(*np.array(predicted).reshape(-1, 2).T, color="black", linewidth=0.8, label="predicted")
     ax.axvline(0.0, color="black", linewidth=0.5)
     ax.set(
@@ -201,7 +201,7 @@ def draw_torques(ax: Axes, rows: list[ClaimRow], robot: Robot) -> None:
 def draw_finer_steps(ax: Axes, rows: list[ClaimRow], robot: Robot) -> None:
     """Claim 2: when and to which side the posture is left against the number of steps, the torque one ulp off."""
     duration = claims_of(robot).duration
-    for engine, sign in dict.fromkeys((row.engine, row.ulps) for row in rows):
+    for engine, sign in dict.fromkeys((row.engine, row.ulps or 0) for row in rows):
         mine = [row for row in rows if (row.engine, row.ulps) == (engine, sign)]
         counts, times = [duration / row.dt for row in mine], [number_or_nan(row.observed) for row in mine]
         fill = "full" if engine == "tmt" else "none"

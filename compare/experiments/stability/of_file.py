@@ -71,13 +71,12 @@ def begin(setup: Setup, reading: Reading) -> Work:
         runs = own_run.begin(setup, reading, question.dt, question.integrator)
         answers = setup.map(partial(answer_of, reading=reading), tasks)
         steps.append(AtStep(question, is_requested, runs, answers))
-    in_use = {"reading": reading, "asked": asked[-1]}
+    control = partial(control_row, reading=reading, request=request, asked=asked[-1])
+    moving = partial(motion_row, reading=reading, asked=asked[-1])
     return Work(
         steps,
-        setup.map(
-            partial(control_row, request=request, **in_use), postures if request.control_period else ()
-        ),
-        setup.map(partial(motion_row, **in_use), postures if request.at_speed else ()),
+        setup.map(control, postures if request.control_period else ()),
+        setup.map(moving, postures if request.at_speed else ()),
         list(names_of_keys(reading).values())[MOST_POSTURES:],
     )
 
@@ -230,7 +229,7 @@ def headline(result: StabilityResult) -> Finding | None:
     """Whether the file's step is stable."""
     table = result.tables["step_limits"]
     own = in_use(table, table[0].file_integrator)
-    values = {"up_to": LONGEST, "dt": table[0].file_dt, "far": GIVES_WAY}
+    values = {"up_to": LONGEST, "dt": table[0].file_dt}
     return result.finding("headline", OF, row=own[0], **values) if own else None
 
 
