@@ -219,7 +219,9 @@ def check_kept(result: Result, rows: list[ClaimRow], robot: Robot, ends: Mapping
     for label, size in ends.items():
         where = f"{claims.end}, {label}"
         quantity = f"acceleration that {claims.kept}'s torque gives a {claims.end} {robot.name}"
-        leaves_end |= result.check(where, quantity, size, PUSHED, "rad/s2", rule="at least", about=about).passed
+        leaves_end |= result.check(
+            where, quantity, size, PUSHED, "rad/s2", rule="at least", about=about
+        ).passed
     above = [row for row in rows if row.dt > limit]
     moves = bool(above) and all(row.observed is not None or (row.moved or 0.0) > MOVED for row in above)
     result.find(
