@@ -149,12 +149,11 @@ def headline(result: StabilityResult) -> Finding | None:
 
 def figures(result: StabilityResult, robot: Robot) -> Iterator[Drawing]:
     # matplotlib is for the process that draws
-    from . import figures_growth
     from . import figures_stability as drawing
 
     rows = limits_shown(result)
     if result.growth:
-        yield partial(figures_growth.draw_growth, result)
+        yield partial(drawing.draw_growth, result)
     if result.centres and any(row.predicted_dt or row.observed_dt for row in rows):
         yield partial(drawing.draw_limits, result, robot, rows)
     if "departure" in result.tables:

@@ -11,7 +11,7 @@ from compare.engines.mujoco.names import INTEGRATORS
 from compare.engines.mujoco.reading import read
 from compare.experiments import stability
 from compare.experiments.setup import Request, Setup
-from compare.experiments.stability import figures_growth, of_file
+from compare.experiments.stability import figures_stability, of_file
 from compare.experiments.stability.of_file import MODES, PUSHED
 from compare.experiments.stability.tables import ControlRow
 from compare.stability.answer import StepLimitRow
@@ -99,7 +99,7 @@ def test_a_quick_run_has_the_files_integrator_and_the_default_and_a_full_one_all
     ]
     assert (
         full.growth["free"].keys() >= {"Euler", "RK4"}
-        and figures_growth.draw_growth(full)[0] == "stability_growth"
+        and figures_stability.draw_growth(full)[0] == "stability_growth"
     )
     assert stability.headline(full).values["row"].integrator == "Euler"
 
