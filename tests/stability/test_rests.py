@@ -43,19 +43,16 @@ def test_a_saddle_is_left_where_it_leads_to_a_rest():
     hanging = place_of(POLE.format(""))
     assert abs(abs(hanging.moved[0]) - np.pi) < 0.1 and limit_of(POLE.format("")).kind == "none"
     stopped = place_of(POLE.format('range="-20 30" limited="true"'))
-    assert (
-        abs(stopped.moved[0]) > 0.3
-        and limit_of(POLE.format('range="-20 30" limited="true"')).kind != "saddle"
-    )
+    assert abs(stopped.moved[0]) > 0.3
+    assert limit_of(POLE.format('range="-20 30" limited="true"')).kind != "saddle"
 
 
 @pytest.mark.parametrize("actuator, rate", [(SPEEDING, 1.0 / INERTIA), (PUSHING, np.sqrt(20.0 / INERTIA))])
 def test_a_saddle_that_leads_nowhere_is_told_with_its_rate(actuator, rate):
     for integrator in ("Euler", "implicitfast", "RK4"):
         found = limit_of(hinge(actuator=actuator), integrator)
-        assert (found.kind, found.dt) == ("saddle", None) and found.growth.rate == pytest.approx(
-            rate, rel=0.02
-        )
+        assert (found.kind, found.dt) == ("saddle", None)
+        assert found.growth.rate == pytest.approx(rate, rel=0.02)
 
 
 def test_what_falls_has_no_rest_and_one_in_the_air_has():
@@ -74,14 +71,7 @@ def test_in_the_air_a_free_base_has_no_weight_and_a_fixed_one_has():
         assert (air.surroundings, air.is_touching) == ("air", False)
         assert (not air.model.opt.gravity.any()) is weightless
     assert place_of(LEG).model.opt.gravity.any()
-    assert rest_of(BOX).is_held.tolist() == [
-        False,
-        False,
-        True,
-        True,
-        True,
-        False,
-    ]  # slides and turns on its floor
+    assert np.flatnonzero(rest_of(BOX).is_held).tolist() == [2, 3, 4]  # it slides and turns on its floor
 
 
 def test_what_limits_is_named_with_its_contact():

@@ -182,7 +182,7 @@ def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, 
             colour, dash, _ = look(method)
             if engine == "tmt":
                 ax.plot(sizes, predicted, linestyle=dash, color=colour, linewidth=1)
-                looks = {"color": colour, "mfc": "none", "markersize": 11 - k, "label": label}
+                looks: dict[str, Any] = {"color": colour, "mfc": "none", "markersize": 11 - k, "label": label}
                 ax.plot(sizes, observed, MARKS[k % 6], **looks)
             else:
                 ax.plot(sizes, observed, MUJOCO_MARKS[k % 3], color="black", markersize=5, label=label)
@@ -218,7 +218,12 @@ def draw_torques(ax: Axes, rows: list[ClaimRow], robot: Robot) -> None:
             mine = [row for row in rows if (row.engine, row.direction) == (engine, side)]
             pushes, times = [row.push for row in mine], [number_or_nan(row.observed) for row in mine]
             label = f"{LABELS[engine]}, to {word} {symbol}"
-            looks = {"color": COLOURS[engine], "fillstyle": fill, "markersize": 5, "label": label}
+            looks: dict[str, Any] = {
+                "color": COLOURS[engine],
+                "fillstyle": fill,
+                "markersize": 5,
+                "label": label,
+            }
             ax.plot(np.array(pushes) * 1e14, times, mark, **looks)
     predicted = sorted((number_or_nan(row.push) * 1e14, number_or_nan(row.predicted)) for row in rows)
     ax.plot(*np.array(predicted).reshape(-1, 2).T, color="black", linewidth=0.8, label="predicted")
