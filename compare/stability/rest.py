@@ -20,7 +20,6 @@ TRIES, SHARES = (
     15,
     (1.0, 0.5, 0.25, 0.1, 0.03),
 )  # of Newton's method, and the parts of its step that are tried
-FAST = 0.1  # of the acceleration: where less is left after a step, the slope of before is good for another
 REACH = 0.05  # rad or m: its longest step
 UNHELD = 1e-6  # of the largest slope of a force: none
 DEPENDENT = (
@@ -120,19 +119,15 @@ def rest_near(step: Step, state: np.ndarray) -> Rest:
 
 
 def newton(step: Step, state: np.ndarray) -> Rest:
-    """Where Newton's method leads; while it is fast it keeps the slope, which costs most."""
-    rest, is_exact = Rest.at(step, state), True
+    rest = Rest.at(step, state)
     for _ in range(TRIES):
         if rest.left <= AT_REST or not np.isfinite(rest.A).all():
             break
         better = next((move for move in moves_of(rest) if move.left < rest.left), None)
-        if better is None and is_exact:
+        if better is None:
             break
-        is_exact = better is None or better.left > FAST * rest.left
-        rest = better or rest
-        if is_exact:
-            rest = Rest.at(step, rest.state)
-    return rest if is_exact else Rest.at(step, rest.state)
+        rest = Rest.at(step, better.state)
+    return rest
 
 
 def moves_of(rest: Rest) -> Iterator[Rest]:
