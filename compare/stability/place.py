@@ -10,16 +10,14 @@ import numpy as np
 
 import tmt
 
-from ..engines.mujoco.linear import start_of
 from ..engines.mujoco.names import element_name
 from ..engines.mujoco.reading import Reading
-from ..engines.mujoco.step import Step, distance
+from ..engines.mujoco.step import Step, distance, start_of
 from ..engines.mujoco.variants import (
     add_armature,
     has_free_base,
     in_the_air,
     of_base,
-    of_free_joints,
     without_dry_friction,
 )
 from ..robots.coordinates import Coordinates
@@ -168,7 +166,8 @@ def restless_objects(step: Step, state: np.ndarray) -> np.ndarray:
     """
     model = step.model
     tree = np.array(model.dof_treeid)
-    loose = of_free_joints(model) & (np.bincount(tree)[tree] == 6)
+    is_free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
+    loose = is_free & (np.bincount(tree)[tree] == 6)
     if loose.all() or not loose.any():
         return np.zeros(model.nv, bool)
     rest = rest_near(step, state)

@@ -138,6 +138,9 @@ class Model(ReadModel):
         self.set_numbers(self.plant, self.context, acts=False)
         self.force = fixed_force(self.plant, self.context)
         self.forward_dynamics = self.plant.get_generalized_acceleration_output_port()
+        self.dual_plant = self.plant.ToAutoDiffXd()
+        self.dual_context = self.dual_plant.CreateDefaultContext()
+        self.dual_context.SetTimeStateAndParametersFrom(self.context)
 
     def set_numbers(self, plant: Any, context: Any, acts: bool) -> None:
         """The numbers of a context. acts: damping does."""
@@ -161,6 +164,25 @@ class Model(ReadModel):
         self.plant.SetPositionsAndVelocities(self.context, np.concatenate([q_drake, v_drake]))
         self.force.SetFromVector(force)
         return self.order.tree(q, self.forward_dynamics.Eval(self.context))
+
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        """Quaternions do not move like numbers, nor do the angles of a ball."""
+        return ("derivatives",) if self.order.turned else ()
+
+    def derivatives(self, q: Array, v: Array, force: Array) -> Array:
+        """By AutoDiffXd, Drake's dual numbers."""
+        from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
+
+        n, values = self.order.v.size, InitializeAutoDiff(np.concatenate(self.in_drake(q, v, force)))[:, 0]
+        self.dual_plant.SetPositionsAndVelocities(self.dual_context, values[: 2 * n])
+        self.dual_plant.get_applied_generalized_force_input_port().FixValue(
+            self.dual_context, values[2 * n :]
+        )
+        accelerations = self.dual_plant.get_generalized_acceleration_output_port().Eval(self.dual_context)
+        by = np.zeros((3, n, n))
+        by[:, self.order.v[:, None], self.order.v] = np.split(ExtractGradient(accelerations), 3, axis=1)
+        return by
 
     def prepare(self, course: Course) -> None:
         self.simulator(course)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...robots.inertia import point_inertia
+from ...robots.coordinates import point_inertia
 from .. import Array
 from ..outside.model import Body, File, Numbers, OtherJoints, OtherNames
 

@@ -19,7 +19,7 @@ Values = Mapping[str, Array]  # of arguments by name
 
 def changed(source: Source, tree: Tree, parameters: Parameters, values: Values) -> mujoco.MjModel:
     assert source.spec is not None
-    spec, model = without_visuals(source.spec.copy()), source.model
+    spec, model = without_visuals(source.spec), source.model
     for body, number in zip(spec.bodies[1:], source.bodies[1:]):  # as they were compiled
         state_inertial(body, model.body_mass[number], model.body_ipos[number])
         body.iquat, body.inertia = model.body_iquat[number], model.body_inertia[number]

@@ -12,8 +12,7 @@ from tmt.derivation.method import joint_frames
 from tmt.methods import by_speed
 
 from ...robots.case import SEED
-from ...robots.coordinates import Coordinates, free_joints
-from ...robots.inertia import point_inertia
+from ...robots.coordinates import Coordinates, free_joints, point_inertia
 from .. import Array, Course
 
 Numbers = Mapping[str, Array]

@@ -12,8 +12,7 @@ import numpy as np
 from ...core.check import About, Result
 from ...engines import LABELS, Engine, Method
 from ...judge.run import LEFT, departure, deviation, number_or_none
-from ...robots import Robot
-from ...robots.robot import Claims
+from ...robots import Claims, Robot
 from ...stability.held import Held, held
 from .departure import check_row, own_torque, predicted, residual, variants
 from .subjects import fraction, rk4_of_both

@@ -13,7 +13,7 @@ from ...engines import COLOURS, LABELS
 from ...judge.run import LEFT, number_or_nan
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...robots import Robot
-from ..figures_overview import MOST_ROWS, chart, named_rows
+from ..figures import MOST_ROWS, chart, named_rows
 from .claims import VARIANT, claims_of
 from .departure import departure_values
 from .limits import LINEAR_DEVIATION, summary

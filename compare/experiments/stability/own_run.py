@@ -7,8 +7,8 @@ import numpy as np
 
 from ...core.check import About, Result
 from ...engines.mujoco import Reading
-from ...engines.mujoco.linear import WholeRun, start_of, whole_run
 from ...engines.mujoco.names import on
+from ...engines.mujoco.step import WholeRun, start_of, whole_run
 from ...judge.run import number_or_none
 from ...robots.case import SEED
 from ...robots.file import names_of_keys

@@ -11,7 +11,7 @@ import tmt
 from compare.core.check import AT_OWN_STEP, AT_REQUESTED_STEP
 from compare.engines.mujoco import reading
 from compare.engines.mujoco.engine import METHODS as OF_MUJOCO
-from compare.engines.mujoco.linear import WholeRun
+from compare.engines.mujoco.step import WholeRun
 from compare.engines.tmt import Tmt
 from compare.experiments import stability
 from compare.experiments.setup import Request, Setup

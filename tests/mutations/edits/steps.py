@@ -10,7 +10,8 @@ EDITS = (
     ("mujoco.variants", "in_the_air", "has_free_base(model)", "False", "in the air a free base falls"),
     ("mujoco.variants", "add_armature", "model.dof_M0 += more", "pass", "a body that never changes stays as it is"),
     ("mujoco.variants", "Servo.force", "np.clip(_1, *_2)", "float(_1)", "a program has no range of force"),
-    ("mujoco.variants", "held_servos", "-(kv or 0.0)", "0.0", "--kv is none"),
+    ("mujoco.variants", "servo_bias", "-(kv or 0.0)", "0.0", "--kv is none"),
+    ("mujoco.step", "start_of", "stated.any()", "False", "a keyframe's activations are lost"),
     ("closed_form", "mass_and_force", "forces.dJf - bias_slope(*_1)", "forces.dJf + bias_slope(*_1)", "weight pulls upwards"),
     ("closed_form", "mass_and_force", "np.diag(rows.R)", "0.0", "contacts are rigid"),
     ("closed_form", "implicit", "damping * on(*_1)", "damping", "Euler always has damping implicit"),
@@ -23,7 +24,7 @@ EDITS = (
     ("stability.limits", "grows_by_itself", "low * _1 < _2 < _3", "False", "no saddle is told"),
     ("stability.limits", "REFINED", "2e-3", "0.5", "a limit is known to a half"),
     ("stability.place", "beyond_saddles", "is_saddle(*_1)", "False", "no saddle is left"),
-    ("stability.deviations", "has_grown", "len(sizes) < steps or _1", "False", "a run that is broken off has not grown"),
+    ("stability.growth", "has_grown", "len(sizes) < steps or _1", "False", "a run that is broken off has not grown"),
     ("stability.runs", "speed_after", "_1 > FAR", "False", "what falls over and lies still has survived"),
     (
         "stability.runs", "largest_push", "speed_after(model, finer, next_larger, dt / FINER) > THROWN * next_larger",
