@@ -25,7 +25,7 @@ from ..robots.case import SEED
 from ..robots.file import robot_of, robot_of_solution
 from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, matched_joints
 from ..robots.placement import placed
-from ..stability.answer import posture_of
+from ..stability.place import posture_of
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 WHOLE = 1e-6  # of a step: a period so near to a multiple of it is one
