@@ -197,7 +197,7 @@ def changing(q):
 
 
 @pytest.mark.parametrize("brought, cause", [
-    ({"mass_matrix": mass_matrix, "bias": wrong_bias}, SIGN), ({"gravity": lambda q: gravity(q) * [1, 2]}, "h[knee] at rest"),
+    ({"mass_matrix": mass_matrix, "bias": wrong_bias}, SIGN), ({"gravity": lambda q: gravity(q) * [1, 2]}, "gravity of h[knee]"),
     ({"acceleration": lambda q, v, t: acceleration(q, v, t, damping=0.0)}, "damping in the acceleration"),
     ({"acceleration": lambda q, v, t: acceleration(q, v, -t)}, "torque in the acceleration"),
     ({"acceleration": lambda q, v, t: acceleration(q, v, t, wrong_bias)}, SIGN),

@@ -13,6 +13,9 @@ import compare
 import tmt
 from compare.agreement import Difference
 
+SECTION = re.compile(
+    r"^ *(?:Parameters|Attributes)\n +-+\n(.*?)(?=\n *\n +\w+\n +-+\n|\Z)", re.MULTILINE | re.DOTALL
+)
 FUNCTIONS = [getattr(tmt, name) for name in tmt.__all__ if inspect.isroutine(getattr(tmt, name))]
 OTHERS = [
     tmt.Tree,
@@ -32,10 +35,13 @@ def test_examples_are_right_and_every_argument_is_described(public):
     (found,) = doctest.DocTestFinder(recurse=False).find(public, public.__qualname__, globs=names)
     assert doctest.DocTestRunner().run(found).failed == 0 and (found.examples or public is Difference)
     arguments = {*inspect.signature(public).parameters} - {"self"}
-    section = re.search(r"^ *(?:Parameters|Attributes)\n +-+\n((?:.+\n)+)", public.__doc__, re.MULTILINE)[1]
-    lines = inspect.cleandoc("\n" + section).splitlines()
-    described = [line.split(" : ")[0] for line in lines if not line.startswith(" ")]
-    assert {name.strip("* ") for names in described for name in names.split(",")} == arguments
+    if section := SECTION.search(public.__doc__):
+        lines = inspect.cleandoc("\n" + section[1]).splitlines()
+        described = [line.split(" : ")[0] for line in lines if not line.startswith(" ")]
+        assert {name.strip("* ") for names in described for name in names.split(",")} == arguments
+    else:  # of a state: shapes and units in a line; the help of tmt says what a model is
+        described = re.findall(r"(\w+)(?: \(\.\.\.|: )", public.__doc__)
+        assert arguments - {"model"} <= {*described} and "rad" in public.__doc__ and "`model`" in tmt.__doc__
 
 
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda function: function.__name__)

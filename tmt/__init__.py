@@ -1,9 +1,9 @@
 """Equations of motion of rigid bodies on hinges, slides and balls by the TMT method, and their integration.
 
 Stands alone: needs NumPy, llvmlite and mpmath, and knows nothing of any physics engine. Every function takes
-states of any leading batch shape, a further argument `model` for another Tree than the assignment's arm, and
-raises ValueError for wrong shapes, values that are not finite, unknown names, a singular Mbar and results
-beyond the largest double.
+states of any leading batch shape, one array for each, which broadcast, and a further argument `model`:
+another Tree than the assignment's arm. It raises ValueError for wrong shapes, values that are not finite,
+unknown names, a singular Mbar and results beyond the largest double.
 
 Shapes: q (..., nq), qd and tau (..., nv). Of a hinge or slide one number each, of a ball four (a quaternion
 w, x, y, z of length 1) and three (angular velocity in its own axes, and torque): nq = nv = n, the number of
@@ -31,10 +31,10 @@ a wrong term. `dataclasses.replace(tmt.ARM, mass=(2.0, 1.5))` is the arm with an
 tree of hinges, slides and balls (a free joint is three slides and a ball), with damping, armature, springs
 and the gains of a linear controller.
 
-Methods of `simulate`: "rk4"; "semi_implicit_euler" (MuJoCo's Euler, implicitfast and discrete), "implicit"
-(MuJoCo's), "explicit_euler"; "dopri8" (Dormand and Prince, order 8: the best for many digits) and
-"dopri8_adaptive" (with steps of its own); "implicit_midpoint" and "gauss_legendre_4", which no linear motion
-can make unstable; and "taylor", the true motion.
+Methods of `simulate`: "rk4"; "semi_implicit_euler", "implicit", "implicitfast" and "discrete" (MuJoCo's);
+"explicit_euler"; "dopri8" (Dormand and Prince, order 8: the best for many digits) and "dopri8_adaptive" (with
+steps of its own); "implicit_midpoint" and "gauss_legendre_4", which no linear motion can make unstable; and
+"taylor", the true motion.
 
 NumPy (literal.py) answers calls of up to 500 states, compiled code larger ones and, after `prepare`, all
 calls of a model, which suits loops over single states; see answers.py. Both differ in the last bits, and say
@@ -55,8 +55,8 @@ from tmt.answers import prepare
 from tmt.arm import ARM
 from tmt.methods import METHODS
 from tmt.methods import method_named as _method_named
-from tmt.model.arguments import checked_model as _checked_model
 from tmt.model.tree import Tree
+from tmt.model.tree import checked_model as _checked_model
 from tmt.model.values import real_numbers as _real_numbers
 from tmt.model.values import shown as _shown
 from tmt.simulation import Motion, simulate
@@ -92,14 +92,8 @@ def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Positions x_b of the centres of mass in the inertial frame, m, shape (..., m, 3).
 
     Assignment, part b, equation (1).
+    q (..., nq): positions, rad.
 
-    Parameters
-    ----------
-    q : joint positions (..., nq), rad
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> print(tmt.com_positions([0.0, 0.0, 0.0]) + 0.0)  # the upper arm hangs, the forearm points ahead
     [[ 0.    0.   -0.15]
      [ 0.15  0.   -0.3 ]]
@@ -111,14 +105,8 @@ def angular_velocities(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.nda
     """Angular velocities omega_b = B_b qd in body axes, rad/s, shape (..., m, 3).
 
     Assignment, part d.
+    q (..., nq), qd (..., nv): positions and speeds, rad and rad/s.
 
-    Parameters
-    ----------
-    q, qd : joint positions and speeds (..., nq) and (..., nv), rad and rad/s
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> print(tmt.angular_velocities([0.0, 0.0, 0.0], [1.0, 0.0, 2.0]))  # alpha and gamma both turn about y
     [[0. 1. 0.]
      [0. 3. 0.]]
@@ -130,14 +118,8 @@ def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     """T_b = dx_b/dq in the inertial frame, m/rad, and B_b with omega_b = B_b qd in body axes; both (..., m, 3, nv).
 
     B_b has unit 1. Assignment, parts d and e.
+    q (..., nq): positions, rad.
 
-    Parameters
-    ----------
-    q : joint positions (..., nq), rad
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> T, B = tmt.jacobians([0.0, 0.0, 0.0])
     >>> print(T[1, :, 2], B[1, :, 2])  # gamma lowers the forearm, 0.15 m ahead of the elbow
     [ 0.    0.   -0.15] [0. 1. 0.]
@@ -149,14 +131,8 @@ def convective_terms(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> tuple[np
     """v_conv = d(T_b qd)/dq qd, m/s2, inertial frame, and w_conv = d(B_b qd)/dq qd, rad/s2, body axes.
 
     Both (..., m, 3); h_b and g_b in the assignment, part e.
+    q (..., nq), qd (..., nv): positions and speeds, rad and rad/s.
 
-    Parameters
-    ----------
-    q, qd : joint positions and speeds (..., nq) and (..., nv), rad and rad/s
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> v_conv, w_conv = tmt.convective_terms([0.0, 0.0, 0.0], [0.0, 0.0, 2.0])
     >>> print(v_conv[1])  # towards the elbow: 0.15 m times (2 rad/s)^2
     [-0.6  0.   0. ]
@@ -168,14 +144,8 @@ def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Reduced mass matrix Mbar = sum T' m T + B' I B, kg m2, shape (..., nv, nv), symmetric positive definite.
 
     Assignment, part e.
+    q (..., nq): positions, rad.
 
-    Parameters
-    ----------
-    q : joint positions (..., nq), rad
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> print(tmt.mass_matrix([0.0, 0.0, 0.0])[2, 2].round(9))  # of the elbow: 0.019 + 1.5 kg (0.15 m)^2
     0.05275
     """
@@ -185,13 +155,8 @@ def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 def inverse_mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Inverse of `mass_matrix`, 1/(kg m2), shape (..., nv, nv): the accelerations for unit torques.
 
-    Parameters
-    ----------
-    q : joint positions (..., nq), rad
-    model : Tree, default ARM
+    q (..., nq): positions, rad.
 
-    Examples
-    --------
     >>> q = np.array([0.5, 0.3, 1.0])
     >>> print((tmt.inverse_mass_matrix(q) @ tmt.mass_matrix(q)).round(9) + 0.0)
     [[1. 0. 0.]
@@ -205,14 +170,8 @@ def bias(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Bias h = Coriolis, centrifugal and gravity terms, N m, shape (..., nv): Mbar qdd + h = tau - D qd.
 
     It is -Qbar at tau = 0 (assignment, part e) without the joint damping D, and MuJoCo's qfrc_bias.
+    q (..., nq), qd (..., nv): positions and speeds, rad and rad/s.
 
-    Parameters
-    ----------
-    q, qd : joint positions and speeds (..., nq) and (..., nv), rad and rad/s
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> print(tmt.bias([0.0, 0.0, np.pi / 2], [0.0, 0.0, 5.0]).round(9) + 0.0)  # the arm hangs, the elbow turns
     [0. 0. 0.]
     """
@@ -223,14 +182,8 @@ def gravity_balance(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Torque +dV/dq that holds the model at rest, N m, shape (..., nv).
 
     Assignment, parts c and h; MuJoCo's qfrc_bias at rest.
+    q (..., nq): positions, rad.
 
-    Parameters
-    ----------
-    q : joint positions (..., nq), rad
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> print(tmt.gravity_balance([0.0, 0.0, np.pi / 2]).round(9) + 0.0)  # the arm hangs
     [0. 0. 0.]
     """
@@ -241,14 +194,8 @@ def spring_torque(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Torque k (q - rest) that holds the springs of the joints, N m, shape (..., nv): of a ball k times the turn from its rest.
 
     With `gravity_balance` it is the torque that holds the model at rest.
+    q (..., nq): positions, rad.
 
-    Parameters
-    ----------
-    q : joint positions (..., nq), rad
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> sprung = dataclasses.replace(tmt.ARM, stiffness=(0.0, 0.0, 4.0))
     >>> print(tmt.spring_torque([0.0, 0.0, 0.5], sprung))
     [0. 0. 2.]
@@ -259,15 +206,9 @@ def spring_torque(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Accelerations qdd from Mbar qdd = tau - D qd - k (q - rest) - P q - S qd - h, rad/s2, shape (..., nv).
 
-    P and S: the model's position_gain and speed_gain. Assignment, parts e and f.
+    P and S: position_gain, speed_gain of the model. Assignment, parts e, f. ValueError if Mbar is singular.
+    q (..., nq), qd (..., nv), tau (..., nv): positions, speeds and torques, rad, rad/s and N m.
 
-    Parameters
-    ----------
-    q, qd, tau : joint positions, speeds and torques (..., nq), (..., nv) and (..., nv), rad, rad/s and N m
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> q, rest = np.array([0.5, 0.3, 1.0]), np.zeros(3)
     >>> print(tmt.acceleration(q, rest, tmt.gravity_balance(q)).round(9) + 0.0)  # it is held
     [0. 0. 0.]
@@ -278,16 +219,10 @@ def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM)
 def inverse_dynamics(q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Torque tau = Mbar qdd + h + D qd + k (q - rest) + P q + S qd that gives accelerations qdd, N m, shape (..., nv).
 
-    The inverse of `acceleration`; nothing else is added or taken off. With damping, springs and armature it is
-    MuJoCo's qfrc_inverse without contacts, limits, friction and actuators. P, S: as in `acceleration`.
+    The inverse of `acceleration`; nothing else is added or taken off. With damping, springs and armature it
+    is MuJoCo's qfrc_inverse without contacts, limits, friction and actuators. P, S: as in `acceleration`.
+    q (..., nq), qd (..., nv), qdd (..., nv): positions, speeds and accelerations, rad, rad/s and rad/s2.
 
-    Parameters
-    ----------
-    q, qd, qdd : positions, speeds and accelerations (..., nq), (..., nv) and (..., nv), rad, rad/s and rad/s2
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> q, qd, tau = np.array([0.5, 0.3, 1.0]), np.ones(3), np.array([1.0, 2.0, 3.0])
     >>> print(tmt.inverse_dynamics(q, qd, tmt.acceleration(q, qd, tau)).round(9))
     [1. 2. 3.]
@@ -298,19 +233,13 @@ def inverse_dynamics(q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, model: Tree = 
 def derivatives(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM) -> Derivatives:
     """Exact derivatives of `acceleration` by q, qd and tau, and of `inverse_dynamics` by q and qd, each (..., nv, nv).
 
-    Those of the inverse dynamics are at qdd = acceleration(q, qd, tau): dqdd/dq = -Mbar^-1 dtau/dq, and so by qd;
-    dqdd/dtau = Mbar^-1. By q means by movements: of a hinge or slide by its number in q; of a ball by turns about
-    its own three axes, for which its quaternion p changes by p o (0, u) / 2; of a free joint, three slides and a
-    ball, by the position of its origin in the inertial frame, then by turns in its own axes. MuJoCo's
-    mj_integratePos moves so, and mjd_transitionFD differentiates so.
+    Those of the inverse dynamics are at qdd = acceleration(q, qd, tau): dqdd/dq = -Mbar^-1 dtau/dq, and so by
+    qd; dqdd/dtau = Mbar^-1. By q means by movements: of a hinge or slide by its number in q; of a ball by
+    turns about its own three axes, for which its quaternion p changes by p o (0, u) / 2; of a free joint,
+    three slides and a ball, by the position of its origin in the inertial frame, then by turns in its own
+    axes. MuJoCo's mj_integratePos moves so, and mjd_transitionFD differentiates so.
+    q (..., nq), qd (..., nv), tau (..., nv): positions, speeds and torques, rad, rad/s and N m.
 
-    Parameters
-    ----------
-    q, qd, tau : joint positions, speeds and torques (..., nq), (..., nv) and (..., nv), rad, rad/s and N m
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> q, rest = np.array([0.0, 0.0, np.pi / 2]), np.zeros(3)
     >>> by = tmt.derivatives(q, rest, rest)  # the arm hangs
     >>> print(by.dtau_dq.round(9)[2, 2])  # 1.5 9.81 0.15
@@ -325,14 +254,8 @@ def inverse_dynamics_derivatives(
     """Exact derivatives of `inverse_dynamics` by q, N m/rad, and by qd, N m s/rad, each (..., nv, nv).
 
     By q means by movements, see `derivatives`; the derivative by qdd is `mass_matrix`.
+    q (..., nq), qd (..., nv), qdd (..., nv): positions, speeds and accelerations, rad, rad/s and rad/s2.
 
-    Parameters
-    ----------
-    q, qd, qdd : positions, speeds and accelerations (..., nq), (..., nv) and (..., nv), rad, rad/s and rad/s2
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> rest = np.zeros(3)
     >>> dtau_dq, dtau_dqd = tmt.inverse_dynamics_derivatives([0.0, 0.0, np.pi / 2], rest, rest)
     >>> print(dtau_dq.round(9)[2, 2], dtau_dqd[2, 2])  # gravity; the arm has no damping
@@ -346,24 +269,12 @@ def step_derivatives(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exact derivatives A = dx+/dx (..., 2 nv, 2 nv) and B = dx+/dtau (..., 2 nv, nv) of one step, x = (movement, qd).
 
-    The torque is constant during the step. Movements as in `derivatives`: before the step from q, after it from
-    the q that it reaches. Of an adaptive method the step is one of its own, of that size.
+    The torque is constant during the step. Movements as in `derivatives`: before the step from q, after it
+    from the q that it reaches. Of an adaptive method the step is one of its own, of that size.
+    q (..., nq), qd (..., nv), tau (..., nv): positions, speeds and torques, rad, rad/s and N m; dt (...): the
+    step, s, above 0; method: a key of METHODS. ValueError also where an implicit method does not find its
+    stages.
 
-    Parameters
-    ----------
-    q, qd, tau : joint positions, speeds and torques (..., nq), (..., nv) and (..., nv), rad, rad/s and N m
-    dt : step (...), s, above 0
-    method : str, default "rk4"
-        A key of METHODS.
-    model : Tree, default ARM
-
-    Raises
-    ------
-    ValueError
-        Also where an implicit method does not find its stages.
-
-    Examples
-    --------
     >>> A, B = tmt.step_derivatives([0.0, 0.0, np.pi / 2], [0.0] * 3, [0.0] * 3, 0.01, "semi_implicit_euler")
     >>> print(A.shape, B.shape, A[2, 5].round(9))  # dq+ = dt dqd+
     (6, 6) (6, 3) 0.01
@@ -380,19 +291,12 @@ def step_derivatives(
 def frame(name: str, q: ArrayLike, qd: ArrayLike | None = None, model: Tree = ARM) -> Frame:
     """Pose of a site or body, its Jacobian J (..., 6, nv) and J' qd = dJ/dt qd (..., 6), all in the inertial frame.
 
-    J qd is the velocity of the frame's origin, m/s, and then its angular velocity, rad/s: MuJoCo's mj_jac, jacp
-    above jacr. J' qd, m/s2 and rad/s2, is what both accelerations are at qdd = 0 (mj_jacDot times qd). The
-    rotation takes components in the frame to inertial ones.
+    J qd is the velocity of the frame's origin, m/s, and then its angular velocity, rad/s: MuJoCo's mj_jac,
+    jacp above jacr. J' qd, m/s2 and rad/s2, is what both accelerations are at qdd = 0 (mj_jacDot times qd).
+    The rotation takes components in the frame to inertial ones. name: a site of the model (see Tree), or a
+    body: then the frame is that of its joint, with body axes.
+    q (..., nq), qd (..., nv): positions and speeds, rad and rad/s; without qd at rest.
 
-    Parameters
-    ----------
-    name : str
-        Of a site of the model (see Tree), or of a body: then the frame is that of its joint, with body axes.
-    q, qd : joint positions and speeds (..., nq) and (..., nv), rad and rad/s; qd by default at rest
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> tool = dataclasses.replace(
     ...     tmt.ARM, site_names=["tool"], site_joint=[2], site_offset=[(0.3, 0.0, 0.0)]
     ... )
@@ -412,13 +316,8 @@ def frame(name: str, q: ArrayLike, qd: ArrayLike | None = None, model: Tree = AR
 def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Potential energy V, J, shape (...), zero with every centre of mass at the height of the origin, and springs at rest.
 
-    Parameters
-    ----------
-    q : joint positions (..., nq), rad
-    model : Tree, default ARM
+    q (..., nq): positions, rad.
 
-    Examples
-    --------
     >>> print(tmt.potential_energy([0.0, 0.0, np.pi / 2]).round(9))  # -9.81 (1.9 0.15 + 1.5 (0.3 + 0.15))
     -9.4176
     """
@@ -429,14 +328,8 @@ def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Total energy, kinetic and potential, J, shape (...); infinite where it is beyond the largest double.
 
     Its zero is that of `potential_energy`; the model's position_gain adds nothing to it.
+    q (..., nq), qd (..., nv): positions and speeds, rad and rad/s.
 
-    Parameters
-    ----------
-    q, qd : joint positions and speeds (..., nq) and (..., nv), rad and rad/s
-    model : Tree, default ARM
-
-    Examples
-    --------
     >>> print(tmt.energy([0.0, 0.0, np.pi / 2], [0.0, 0.0, 2.0]).round(9))  # -9.4176 + 0.05275 2^2 / 2
     -9.3121
     """
@@ -463,27 +356,16 @@ def equations(
         C99 with math.h alone, no allocation; Python with NumPy alone, any batch; MATLAB and Octave, one file,
         states as columns; a casadi.Function for each quantity; JAX, any batch. The last three are simplified,
         with a symbol for each parameter, for some six hinges and slides (needs SymPy).
-    quantities : sequence of str
-        Functions of this package of those names; units, signs and shapes are theirs. With symbols:
-        mass_matrix, bias, gravity_balance.
-    name : str
-        Of the file, which begins the names of C functions.
-    single : bool
-        float in C.
-    head : sequence of str
-        Lines that begin the comment at its head.
-    parameters : sequence of str
-        Numbers that are further arguments of each function: "gravity" (3,); a body's name, or with ".mass"
-        (1,), ".com" (3,) or ".inertia" (6,) after it; "payload" and then a body's name: what that carries
-        besides. They are in the frame that is the site of the body's name, else in that of its joint; inertias
-        are about the centre of mass: xx yy zz xy xz yz.
-    limit : float, s
+    quantities : functions of this package, by name; with symbols mass_matrix, bias, gravity_balance.
+    name : of the file, which begins the names of C functions.
+    single : float in C.
+    head : lines that begin the comment at its head.
+    parameters : numbers that are further arguments of each function
+        "gravity" (3,); a body's name, or with ".mass" (1,), ".com" (3,) or ".inertia" (6,) after it;
+        "payload" and then a body's name: what that carries besides. They are in the frame that is the site of
+        the body's name, else in that of its joint; inertias are about the centre of mass: xx yy zz xy xz yz.
+    limit : s
         With symbols: the most work, counted as that of one processor core; ValueError beyond.
-
-    Raises
-    ------
-    ValueError
-        For a language, quantity, name or parameter that is not one.
 
     Examples
     --------

@@ -11,15 +11,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tmt.arm import ARM
-from tmt.derivation.quantities import State, argument_of, quantity_of
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.quantities import PLAIN, State, argument_of, quantity_of
+from tmt.derivation.vectors import Scalar
 from tmt.methods import method_named, transition
 from tmt.model import singular
-from tmt.model.arguments import states
-from tmt.model.tree import Tree
+from tmt.model.tree import Tree, checked_model
+from tmt.model.values import states
 
 SOLVED = ("acceleration", "inverse_mass_matrix", "derivatives")  # for which Mbar must be regular
 BEYOND = "the result is beyond the largest double; smaller numbers in the state or model are expected"
+
+
+def __getattr__(name: str) -> Callable[..., Any]:
+    if name not in PLAIN:
+        raise AttributeError(name)
+    return literal(name)
 
 
 def literal(name: str) -> Callable[..., Any]:
@@ -42,11 +48,13 @@ def literal(name: str) -> Callable[..., Any]:
 
 def answer(name: str, tree: Tree, arrays: dict[str, ArrayLike]) -> Any:
     """The quantity of that full name at states in arrays by name, of which all are checked."""
-    quantity, scalars = quantity_of(name), states(tree, **arrays)
-    batch = scalars[0][0].shape
+    checked_model(tree)
+    quantity, checked = quantity_of(name), states(tree, **arrays)
+    batch = checked[0].shape[:-1]
     if quantity.argument == "method":
-        return step_derivatives(argument_of(name), tree, scalars, batch)
-    state = State(tree, dict(zip(arrays, scalars)), name=argument_of(name))
+        return step_derivatives(argument_of(name), tree, *checked)
+    scalars = {key: list(np.moveaxis(array, -1, 0)) for key, array in zip(arrays, checked)}
+    state = State(tree, scalars, name=argument_of(name))
     if name in SOLVED and not tree.never_singular:
         check_regular(tree, state, batch)
     values = quantity.of(state)
@@ -55,9 +63,10 @@ def answer(name: str, tree: Tree, arrays: dict[str, ArrayLike]) -> Any:
     return gather(values, batch, overflow=np.inf if name == "energy" else None)
 
 
-def step_derivatives(method: str, tree: Tree, scalars: list[Any], batch: tuple[int, ...]) -> np.ndarray:
+def step_derivatives(
+    method: str, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: np.ndarray
+) -> np.ndarray:
     """[A B] (..., 2 nv, 3 nv) of a step of the method of that name."""
-    q, qd, tau, dt = (np.stack(values, axis=-1) for values in scalars)
     try:
         values = transition(method_named(method), tree, q, qd, tau, dt[..., 0])
     except (ArithmeticError, np.linalg.LinAlgError) as error:
@@ -92,20 +101,3 @@ def gather(nested: Scalar, batch: tuple[int, ...], overflow: float | None = None
         raise ValueError(BEYOND)
     components = array.ndim - len(batch)
     return np.moveaxis(array, range(components), range(-components, 0)).copy()
-
-
-com_positions = literal("com_positions")
-angular_velocities = literal("angular_velocities")
-jacobians = literal("jacobians")
-convective_terms = literal("convective_terms")
-mass_matrix = literal("mass_matrix")
-inverse_mass_matrix = literal("inverse_mass_matrix")
-bias = literal("bias")
-gravity_balance = literal("gravity_balance")
-spring_torque = literal("spring_torque")
-acceleration = literal("acceleration")
-inverse_dynamics = literal("inverse_dynamics")
-derivatives = literal("derivatives")
-inverse_dynamics_derivatives = literal("inverse_dynamics_derivatives")
-potential_energy = literal("potential_energy")
-energy = literal("energy")

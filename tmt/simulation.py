@@ -11,12 +11,11 @@ from numpy.typing import ArrayLike
 
 from tmt.arm import ARM
 from tmt.compiled.runner import Ended, runner_of
-from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED
-from tmt.model import arguments, singular
+from tmt.methods.stepping import DIVERGED, NEWTON, SMALL
+from tmt.model import singular, values
 from tmt.model.tree import Tree
 from tmt.model.values import shown
 
-DOUBLE = np.dtype(float)
 Array = np.ndarray
 Place = tuple[int, str] | None
 Between = Callable[[int, int], list[Array]]  # (run, record): its states q and qd up to the next record
@@ -34,12 +33,9 @@ class Motion(_Path):
     Attributes
     ----------
     t : (records,), s
-    q, qd : (..., records, nq) and (..., records, nv), rad and rad/s
-        NaN from where a run ended early.
-    ended : str, None, or array of them in the shape of the batch
-        Why a run ended early, a line that says when.
-    evaluations : int
-        Of the dynamics, of all runs; those of an implicit method with their Jacobian.
+    q, qd : (..., records, nq) and (..., records, nv), rad and rad/s, NaN from where a run ended early
+    ended : str, None, or array of them in the shape of the batch: when and why a run ended early
+    evaluations : int, of the dynamics, of all runs; those of an implicit method with their Jacobian
 
     Examples
     --------
@@ -66,33 +62,25 @@ def simulate(
 ) -> Motion:  # fmt: skip
     """Motion under constant torque: t (records,) s, q (..., records, nq) and qd (..., records, nv), rad and rad/s.
 
-    A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad, Mbar is singular,
-    Newton's method does not find the stages of an implicit method, an adaptive method would need steps below 1e-9 dt, or series
-    take too many: `ended` of the result says which. Assignment, part i.
+    A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad, Mbar
+    is singular, Newton's method does not find the stages of an implicit method, an adaptive method would need
+    steps below 1e-9 dt, or series take too many: `ended` of the result, a Motion, says which. Assignment,
+    part i.
 
     Parameters
     ----------
-    q, qd : (..., nq) and (..., nv), rad and rad/s
-        State at t = 0.
-    tau : (..., nv), N m
-        Torque.
-    dt : float, s
-        Step, above 0.
-    steps : int
-        How many, at least 1.
-    method : str, default "rk4"
-        A key of METHODS, or "taylor": the true motion, rounded once, a Taylor series in pairs of doubles, whose evaluations are
-        its steps. An adaptive method takes its own steps between those.
+    q, qd : (..., nq) and (..., nv), rad and rad/s, state at t = 0
+    tau : (..., nv), N m, torque
+    dt : float, s, step, above 0
+    steps : int, how many, at least 1
+    method : str, a key of METHODS, or "taylor": the true motion, rounded once
+        That is a Taylor series in pairs of doubles, whose evaluations are its steps. An adaptive method takes
+        its own steps between those.
     model : Tree, default ARM
     tolerance : float, default 1e-9, of "taylor" 1e-33
         Of adaptive methods: the error of each step, in units of 1 + |value|.
     every : int, default 1
         Every n-th state alone is kept, n a divisor of steps: records = steps / every + 1.
-
-    Returns
-    -------
-    Motion
-        Unpacks into t, q, qd.
 
     Examples
     --------
@@ -104,18 +92,18 @@ def simulate(
     taylor = isinstance(method, str) and method == "taylor"
     runner = runner_of(model, "dopri8_adaptive" if taylor else method)
     stepping = runner.stepping
-    steps, every = arguments.whole("steps", steps), arguments.whole("every", every)
-    dt = arguments.positive("dt", dt, "a step in s")
+    steps, every = values.whole("steps", steps), values.whole("every", every)
+    dt = values.positive("dt", dt, "a step in s")
     if steps % every:
         why = f"of which steps = {shown(steps)} is no multiple"
         raise ValueError(f"every is {shown(every)}, {why}; a divisor is expected")
     if tolerance is not None and not stepping.adaptive:
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
     usual = 1e-33 if taylor else 1e-9
-    tolerance = usual if tolerance is None else arguments.positive("tolerance", tolerance, "a number")
+    tolerance = usual if tolerance is None else values.positive("tolerance", tolerance, "a number")
     batch, *start = starts(model, q, qd, tau)
     runs = len(start[0])
-    path_q, path_qd = arguments.paths(runs, steps, every, model.coordinates.nq, model.coordinates.nv)
+    path_q, path_qd = values.paths(runs, steps, every, model.coordinates.nq, model.coordinates.nv)
     if steps * dt == np.inf:
         sizes = f"dt is {dt:g} and steps is {shown(steps)}"
         raise ValueError(f"{sizes}; their product is beyond the largest double")
@@ -139,17 +127,10 @@ def simulate(
 
 
 def starts(model: Tree, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
-    """The batch shape, and q (runs, nq), qd and tau (runs, nv), contiguous, after all checks of given.states."""
-    if type(q) is type(qd) is type(tau) is np.ndarray and q.dtype is qd.dtype is tau.dtype is DOUBLE:
-        nq, nv, batch = model.coordinates.nq, model.coordinates.nv, q.shape[:-1]
-        if q.shape == (*batch, nq) and qd.shape == tau.shape == (*batch, nv) and not model.coordinates.balls:
-            rows = [np.ascontiguousarray(values).reshape(-1, values.shape[-1]) for values in (q, qd, tau)]
-            # with a number that is not finite no sum of squares is
-            if all(np.vdot(values, values) < np.inf for values in rows):
-                return batch, *rows
-    state = arguments.states(model, q=q, qd=qd, tau=tau)
-    batch = state[0][0].shape
-    return batch, *(np.stack(part, axis=-1).reshape(math.prod(batch), len(part)) for part in state)
+    """The batch shape, and q (runs, nq), qd and tau (runs, nv), contiguous, after all checks."""
+    state = values.states(model, q=q, qd=qd, tau=tau)
+    batch = state[0].shape[:-1]
+    return batch, *(np.ascontiguousarray(part).reshape(math.prod(batch), part.shape[-1]) for part in state)
 
 
 def by_series(tree: Tree, q: Array, qd: Array, tau: Array, dt: float, every: int, tolerance: float) -> Ended:
@@ -173,44 +154,32 @@ def reasons(
 ) -> Array:  # fmt: skip
     """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
 
-    q, qd: the paths (runs, records, nq and nv); codes (runs, 2): why the compiled loop ended each, 0: it did not, and after how
-    many steps. Where each so-manyth state is kept alone, between(run, record) are all from a record to the next.
+    q, qd: the paths (runs, records, nq and nv); codes (runs, 2): why the compiled loop ended each, 0: it did
+    not, and after how many steps. Where each so-manyth state is kept alone, between(run, record) are all from
+    a record to the next.
     """
     ended = np.full(len(codes), None, dtype=object)
     if tree.never_singular and not codes.any():
         return ended
     words = {
-        OVERFLOW: "the motion diverges: within a step its numbers overflow, or its angles pass 2^49 rad",
-        TURNED: "a hinge turns by 2^49 rad or more, where doubles are too far apart for a sine",
+        DIVERGED: "the motion diverges: its numbers overflow within a step, or a hinge passes 2^49 rad",
         NEWTON: f"Newton's method does not find the stages of a step of {dt:g} s",
         SMALL: f"the tolerance of {tolerance:g} would need steps below 1e-9 dt",
     }
     for run, (code, step) in enumerate(codes.tolist()):
-        place = None if tree.never_singular else singular_step(tree, q[run], qd[run], every, between, run)
-        if place:
+        why = words.get(code)
+        if place := singular_step(tree, q[run], qd[run], every, between, run):
             step, why = place
             q[run, step // every + 1 :] = qd[run, step // every + 1 :] = np.nan
-        elif code:
-            record, last = divmod(step, every)
-            states = between(run, record) if last and between else (q[run, record:], qd[run, record:])
-            why = words[cause(tree, code, states[0][last], states[1][last], dt)]
-        if place or code:
+        if why:
             ended[run] = f"at t = {step * dt:g} s: {why}"
     return ended
 
 
-def cause(tree: Tree, code: int, q: np.ndarray, qd: np.ndarray, dt: float) -> int:
-    """The code of what ended a run after this state: a hinge far from there has no sine at the stages of the next step."""
-    hinges = [joint for joint in tree.coordinates.joints if joint.kind == "hinge"]
-    reach = max((max(abs(q[joint.q.start]), dt * abs(qd[joint.qd.start])) for joint in hinges), default=0.0)
-    if code in (OVERFLOW, NEWTON) and reach > 2.0**48:
-        return TURNED
-    # neither the state nor its speed leads there: what it turned by came from within the step
-    return OVERFLOW if code == TURNED and not reach > 2.0**48 else code
-
-
 def singular_step(tree: Tree, q: Array, qd: Array, every: int, between: Between | None, run: int) -> Place:
     """The first step after which Mbar is singular, and why; between records as well, where it would show."""
+    if tree.never_singular:
+        return None
     place = singular_in(tree, q, qd)
     places = [(place[0] * every, place[1])] if place else []
     if between and every > 1:

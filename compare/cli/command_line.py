@@ -3,6 +3,7 @@
 import argparse
 import shlex
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from textwrap import fill
 from typing import Any, NamedTuple, NoReturn
@@ -14,6 +15,7 @@ from ..process.streams import PROGRAM
 
 FLEET, EQUATIONS = "fleet", "equations"  # further commands, with options of their own
 LINE_WIDTH = 80
+HIGHEST_GAIN = 1e12
 TEXT = "command_line"  # the template
 EXAMPLES = block(TEXT, "examples")
 
@@ -32,13 +34,16 @@ class Parser(argparse.ArgumentParser):
         values: dict[str, Any] = {"action": "store_true"}
         if option.type:
             values = {"type": option.type, "metavar": option.metavar, "default": option.default}
-        self.add_argument(
-            name, help=" ".join(block(template, name.strip("-").replace("-", "_")).split()), **values
-        )
+        self.add_argument(name, help=" ".join(block(template, name_of(name)).split()), **values)
 
     def refuse_option(self, word: str, options: Sequence[str]) -> NoReturn:
         names, name = {name.strip("-"): name for name in options}, word.strip("-").split("=")[0]
         self.error(f"{word!r} is not an option; {expected(name, names, ' '.join(options))}")
+
+
+def name_of(option: str) -> str:
+    """Of --control-period: control_period."""
+    return option.strip("-").replace("-", "_")
 
 
 def not_empty(text: str) -> str:
@@ -47,40 +52,25 @@ def not_empty(text: str) -> str:
     return text
 
 
-def seconds(most: float, least: float = 1e-6) -> Callable[[str], float]:
-    """A type of options: a time, s."""
+def number(noun: str, least: float, most: float, kind: type[int | float] = float) -> Callable[[str], float]:
+    """A type of options: a number from `least` to `most`."""
 
-    def time(text: str) -> float:
-        if least <= float(text) <= most:
-            return float(text)
-        wrong = f"{text!r} is not a time: expected seconds, from {least:g} to {most:g}"
+    def in_range(text: str) -> float:
+        with suppress(ValueError):
+            if least <= kind(text) <= most:
+                return kind(text)
+        wrong = f"{text!r} is not a {noun}: expected a number from {least:g} to {most:g}"
         raise argparse.ArgumentTypeError(wrong)
 
-    return time
+    return in_range
 
 
-def gain(text: str) -> float:
-    """A type of options: a gain of a controller."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a gain: expected a number that is not negative")
-    return value
+def seconds(most: float, least: float = 1e-6) -> Callable[[str], float]:
+    """A type of options: a time, s."""
+    return number("time in s", least, most)
 
 
-def allowed_error(text: str) -> float:
-    """A type of options: an error, rad or m."""
-    if gain(text) > 0.0:
-        return float(text)
-    raise argparse.ArgumentTypeError(f"{text!r} is not an error: expected rad or m, above 0")
-
-
-def process_count(text: str) -> int:
-    if not text.isdecimal() or not 0 < int(text) <= 1024:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of processes: expected 1 to 1024")
-    return int(text)
+process_count = number("number of processes", 1, 1024, int)
 
 
 def stated_reference(text: str) -> str:
@@ -120,10 +110,14 @@ OPTIONS = {
         seconds(1.0), "S", example=" --mjcf robot.xml --control-period 0.02 --delay 0.004"
     ),
     "--delay": Option(seconds(1.0, 0.0), "S"),
-    "--kp": Option(gain, "KP"),
-    "--kv": Option(gain, "KV"),
+    "--kp": Option(number("gain", 0.0, HIGHEST_GAIN), "KP"),
+    "--kv": Option(number("gain", 0.0, HIGHEST_GAIN), "KV"),
     "--at-speed": Option(None),
-    "--error": Option(allowed_error, "E", example=" --mjcf robot.xml --error 0.001 --write smaller.xml"),
+    "--error": Option(
+        number("error", 1e-12, 1.0),
+        "E",
+        example=" --mjcf robot.xml --error 0.001 --write small.xml",
+    ),
     "--points": Option(metavar="NAMES"),
     "--controls": Option(metavar="CSV", example=" --mjcf robot.xml --controls recorded.csv"),
     "--write": Option(metavar="FILE"),
@@ -186,13 +180,10 @@ def request(arguments: Sequence[str]) -> argparse.Namespace:
     if options.help:
         (of_all if name in (None, "all") else parser(name)).print_help()
         raise SystemExit(0)
-    for option in OPTIONS if name != "all" else ():
+    for option, about in OPTIONS.items():
         takers = [other for other, record in EXPERIMENTS.items() if option in record.options]
-        if (
-            vars(options)[option.strip("-").replace("-", "_")]
-            and not OPTIONS[option].of_every
-            and name not in takers
-        ):
+        is_given = vars(options)[name_of(option)]
+        if is_given and not about.of_every and name not in ("all", *takers):
             of_all.error(f"{option} is an option of {', '.join(takers)}; {name} does not take it")
     if options.joints and ":" not in (options.reference or ""):
         of_all.error("--joints needs equations of your own: --reference FILE.py:OBJECT or MODULE:OBJECT")

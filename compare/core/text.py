@@ -4,8 +4,6 @@ Templates are found by name, NAME.md.jinja, in the folders of compare. Each is a
 formatted there, with the filters below or Python's `format`.
 """
 
-import base64
-import hashlib
 import re
 from functools import cache
 from html.entities import codepoint2name
@@ -70,7 +68,6 @@ def apart(value: float, other: float, digits: int = 6) -> str:
 
 FILTERS = {
     "cell": cell,
-    "hash": lambda text: base64.b64encode(hashlib.sha256(text.encode()).digest()).decode(),
     "g": lambda value, digits=3: f"{value:.{digits}g}",
     "apart": apart,
     "percent": lambda share, digits=2: f"{100.0 * share:.{digits}g} %",

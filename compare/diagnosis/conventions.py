@@ -21,6 +21,7 @@ from ..core.cause import Cause
 from ..core.words import listed
 from ..robots.joint_map import PER_UNIT, Joint, JointMap
 from .model import Equations
+from .terms import speeds_of_joints
 
 PARALLEL = 1e-9  # of a cosine from 1
 MOST_PERMUTED = 6  # joints in all orders; of more, orders in which programs count, and two exchanged
@@ -74,21 +75,24 @@ def values_in(equations: Equations, those: Sequence[Convention]) -> Iterator[nda
     """The values in each convention, (states, entries), evaluated together."""
     if not those:
         return
-    q, qd = (np.concatenate([getattr(one, name) for one in those]) for name in ("q", "qd"))
+    q, qd = (np.concatenate([getattr(convention, name) for convention in those]) for name in ("q", "qd"))
     parts = Equations(equations.tree, q, qd, equations.layout).parts
-    count = len(those[0].q)
-    for k, convention in enumerate(those):
-        yield equations.layout.packed(
-            *convention.applied(*(part[k * count : (k + 1) * count] for part in parts))
-        )
+    for convention, *of_model in zip(those, *(np.split(part, len(those)) for part in parts)):
+        yield equations.layout.packed(*convention.applied(*of_model))
 
 
 def stated(
-    equations: Equations, kind: str, place: str, was: str, explains: str, joints: Iterable[Joint]
+    equations: Equations,
+    kind: str,
+    place: str,
+    was: str,
+    explains: str,
+    joints: Iterable[Joint],
+    rank: int = 1,
 ) -> Convention:
     """A convention that can be stated by the joints."""
     joint_map, identity = JointMap(equations.coordinates, list(joints)), np.eye(equations.nv)
-    cause = Cause(rank=1, kind=kind, place=place, stated=was, explains=explains)
+    cause = Cause(rank=rank, kind=kind, place=place, stated=was, explains=explains)
     S = np.broadcast_to(joint_map.own_forces(identity), (len(equations.q), *identity.shape))
     q, qd = joint_map.positions(equations.q), joint_map.speeds(equations.qd)
     return Convention(cause, q, qd, S, 0.0 * qd, joint_map)
@@ -110,14 +114,12 @@ def senses(equations: Equations) -> Iterator[Convention]:
 
 def chosen_senses(equations: Equations) -> list[tuple[str, ...]]:
     """Joints that may be turned together; of many joints one, and all hinges."""
-    coordinates = equations.coordinates
-    kinds = dict(zip(coordinates.names, coordinates.all_kinds))
+    kinds = dict(zip(equations.coordinates.names, equations.coordinates.all_kinds))
     straight = [name for name, kind in kinds.items() if kind != "ball"]
-    hinges = [name for name in straight if kinds[name] == "hinge"]
     most = len(straight) if len(straight) <= MOST_TURNED else 1
     chosen = [names for count in range(1, most + 1) for names in combinations(straight, count)]
     if most == 1:
-        chosen.append(tuple(hinges))
+        chosen.append(tuple(name for name in straight if kinds[name] == "hinge"))
     return sorted(chosen, key=lambda names: (len(names), sum(kinds[name] == "slide" for name in names)))
 
 
@@ -125,37 +127,24 @@ def orders(equations: Equations) -> Iterator[Convention]:
     """The order of the joints, and for a few of them their senses too."""
     right = joints_of(equations)
     names = list(right)
-    in_order = ", ".join(names)
     all_orders = permutations(names) if len(names) <= MOST_PERMUTED else named_orders(equations.tree)
     of_senses = chosen_senses(equations) if len(names) <= MOST_OF_BOTH else []
-    for order in all_orders:
-        if list(order) == names:
-            continue
-        in_other = [right[name] for name in order]
-        yield stated(equations, "order", "order of the joints", in_order, ", ".join(order), in_other)
-        for chosen in of_senses:
-            both = [right[name]._replace(sign=-1.0 if name in chosen else 1.0) for name in order]
-            named = ", ".join(map(str, both))
-            convention = stated(equations, "order", "order and senses of the joints", in_order, named, both)
-            yield replace(convention, cause=replace(convention.cause, rank=3))
+    for order in (list(order) for order in all_orders if list(order) != names):
+        for chosen in ((), *of_senses):
+            joints = [right[name]._replace(sign=-1.0 if name in chosen else 1.0) for name in order]
+            what, rank = ("order and senses of the joints", 3) if chosen else ("order of the joints", 1)
+            named = ", ".join(map(str, joints))
+            yield stated(equations, "order", what, ", ".join(names), named, joints, rank)
 
 
 def named_orders(tree: tmt.Tree) -> Iterator[list[str]]:
     """Orders in which programs count joints: breadth first, by the alphabet, sides exchanged, reversed; two exchanged."""
-    names, depth = list(tree.joint_names), [len(tree.path(i)) for i in range(len(tree.parent))]
-    breadth, alphabet = (
-        sorted(range(len(names)), key=key) for key in (lambda i: depth[i], lambda i: (depth[i], names[i]))
-    )
-    mirrored = [SIDES.sub(other_side, name) for name in names]
-    by_side = sorted(names, key=lambda name: SIDES.sub(other_side, name))
-    for order in (
-        [names[i] for i in breadth],
-        [names[i] for i in alphabet],
-        sorted(names),
-        mirrored,
-        by_side,
-        names[::-1],
-    ):
+    names = list(tree.joint_names)
+    depth = {name: len(tree.path(i)) for i, name in enumerate(names)}
+    by_depth = sorted(names, key=depth.__getitem__), sorted(names, key=lambda name: (depth[name], name))
+    sides = {name: SIDES.sub(other_side, name) for name in names}
+    by_side = list(sides.values()), sorted(names, key=sides.__getitem__)
+    for order in (*by_depth, sorted(names), *by_side, names[::-1]):
         if sorted(order) == sorted(names):
             yield order
     for i, j in combinations(range(len(names)), 2):
@@ -185,13 +174,13 @@ def from_the_world(equations: Equations) -> Iterator[Convention]:
     """Angles measured from the world instead of from the body before, of any of the hinges with parallel axes."""
     tree, joints = equations.tree, equations.tree.coordinates.joints
     before = {i: hinge_before(tree, i) for i, kind in enumerate(tree.kind) if kind == "hinge"}
-    absolute = np.eye(equations.nv)  # rows: angles from the world as sums of angles between bodies
-    for i, (parent, along) in before.items():
-        if parent >= 0:
-            absolute[joints[i].qd.start] += along * absolute[joints[parent].qd.start]
-    chained = [i for i, (parent, _) in before.items() if parent >= 0]
-    counts = range(1, len(chained) + 1) if len(chained) <= MOST_ABSOLUTE else (1, len(chained))
     at_q, at_v = ([getattr(joints[i], name).start for i in before] for name in ("q", "qd"))
+    absolute = np.eye(equations.nv)  # rows: angles from the world as sums of angles between bodies
+    chained = [i for i, (parent, _) in before.items() if parent >= 0]
+    for i in chained:
+        parent, along = before[i]
+        absolute[joints[i].qd.start] += along * absolute[joints[parent].qd.start]
+    counts = range(1, len(chained) + 1) if len(chained) <= MOST_ABSOLUTE else (1, len(chained))
     for chosen in chain.from_iterable(combinations(chained, count) for count in counts):
         own, q = np.eye(equations.nv), equations.q.copy()
         rows = [joints[i].qd.start for i in chosen]
@@ -202,21 +191,19 @@ def from_the_world(equations: Equations) -> Iterator[Convention]:
             f"angle of {listed([tree.joint_names[i] for i in chosen])}",
             "measured from the world",
         )
-        if len(chosen) == 1 and before[chosen[0]][0] in tree.body_joint:
-            body = tree.body_names[tree.body_joint.index(before[chosen[0]][0])]
-            explains = f"{explains}, not from {body}"
-        cause = Cause(
-            rank=1, kind="angles", place=place, stated="between a body and the one before", explains=explains
-        )
+        parent, _ = before[chosen[0]]
+        if len(chosen) == 1 and parent in tree.body_joint:
+            explains += f", not from {tree.body_names[tree.body_joint.index(parent)]}"
+        was = "between a body and the one before"
+        cause = Cause(rank=1, kind="angles", place=place, stated=was, explains=explains)
         S = np.broadcast_to(A, (len(q), *A.shape))
         yield Convention(cause, q, equations.qd @ A.T, S, 0.0 * equations.qd)
 
 
 def hinge_before(tree: tmt.Tree, i: int) -> tuple[int, float]:
     """The hinge that carries hinge i and is parallel to it, and the cosine of their axes; -1: there is none."""
-    parent = tree.parent[i] if tree.kind[i] == "hinge" else -1
-    while parent >= 0 and tree.kind[parent] == "slide":
-        parent = tree.parent[parent]
+    hinges = (k for k in tree.path(tree.parent[i]) if tree.kind[k] != "slide")
+    parent = next(hinges, -1)
     if parent < 0 or tree.kind[parent] != "hinge":
         return -1, 0.0
     joints = tree.coordinates.joints
@@ -226,41 +213,32 @@ def hinge_before(tree: tmt.Tree, i: int) -> tuple[int, float]:
 
 def of_balls(equations: Equations) -> Iterator[Convention]:
     """Of each ball and free joint: axes of the velocities, order and sense of the quaternion."""
-    tree, (q, qd), nv = equations.tree, (equations.q, equations.qd), equations.nv
-    zero, identity = 0.0 * qd, np.broadcast_to(np.eye(nv), (len(qd), nv, nv))
-    for i, joint in enumerate(tree.coordinates.joints):
-        if joint.kind != "ball":
-            continue
-        name = tree.joint_names[i]
-        R = matrices(turn_in_parent(tree, i, list(q.T)), len(q))
-        slides = [k for k in range(i - 3, i) if k >= 0 and tree.kind[k] == "slide"]
-        v = slice(tree.coordinates.joints[slides[0]].qd.start, joint.qd.start) if len(slides) == 3 else None
-        root = ", ".join(tree.joint_names[k] for k in slides)
-        world, linear, drift = identity.copy(), identity.copy(), zero.copy()
+    tree, q, qd, nv = equations.tree, equations.q, equations.qd, equations.nv
+    of_speeds, identity = speeds_of_joints(tree), np.broadcast_to(np.eye(nv), (len(qd), nv, nv))
+
+    def convention(
+        place: str, explains: str, q: ndarray = q, S: ndarray = identity, drift: ndarray | float = 0.0
+    ) -> Convention:
+        cause = Cause(rank=1, kind="axes", place=place, stated="", explains=explains)
+        return Convention(cause, q, np.einsum("sij,sj->si", S, qd), S, drift + 0.0 * qd)
+
+    for i, joint in ((i, joint) for i, joint in enumerate(tree.coordinates.joints) if joint.kind == "ball"):
+        name, R = tree.joint_names[i], matrices(turn_in_parent(tree, i, list(q.T)), len(q))
+        world = identity.copy()
         world[:, joint.qd, joint.qd] = np.swapaxes(R, 1, 2)
-        turned = qd.copy()
-        turned[:, joint.qd] = np.einsum("sji,sj->si", R, qd[:, joint.qd])
-        frames = [("angular velocity", name, "in world axes", turned, world, zero)]
-        if v is not None:
+        yield convention(f"angular velocity of {name}", "in world axes", S=world)
+        slides = ", ".join(tree.joint_names[max(i - 3, 0) : i])
+        if slides in of_speeds and i >= 3:
+            v = slice(of_speeds[slides][0], joint.qd.start)
+            linear, drift = identity.copy(), 0.0 * qd
             linear[:, v, v] = R
-            moved = qd.copy()
-            moved[:, v] = np.einsum("sij,sj->si", R, qd[:, v])
             drift[:, v] = np.einsum("sij,sj->si", R, np.cross(qd[:, joint.qd], qd[:, v]))
-            frames.append(("linear velocity", root, "in body axes", moved, linear, drift))
-        for what, where, explains, speeds, S, drift_of in frames:
-            cause = Cause(rank=1, kind="axes", place=f"{what} of {where}", stated="", explains=explains)
-            yield Convention(cause, q, speeds, S, drift_of)
+            yield convention(f"linear velocity of {slides}", "in body axes", S=linear, drift=drift)
         scalar_last, inverse = q.copy(), q.copy()
         scalar_last[:, joint.q] = np.roll(q[:, joint.q], 1, axis=1)
         inverse[:, joint.q] = q[:, joint.q] * [1.0, -1.0, -1.0, -1.0]
-        for explains, positions in {
-            "read as x, y, z, w": scalar_last,
-            "of the inverse rotation": inverse,
-        }.items():
-            cause = Cause(
-                rank=1, kind="axes", place=f"quaternion of {name}", stated="w, x, y, z", explains=explains
-            )
-            yield Convention(cause, positions, qd, identity, zero)
+        yield convention(f"quaternion of {name}", "read as x, y, z, w", scalar_last)
+        yield convention(f"quaternion of {name}", "of the inverse rotation", inverse)
 
 
 def matrices(turn: Matrix, count: int) -> ndarray:

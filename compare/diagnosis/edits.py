@@ -1,121 +1,88 @@
 """Numbers of a model exchanged, negated, left out or in another unit: several that one slip changes together.
 
-An edit is the place, what it explains, and the new numbers of the tree. Each kind is one function in KINDS.
+Each kind is one function in KINDS, which yields the place, what it explains, and the fields of the tree that differ.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import combinations, permutations
-from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
 
-import tmt
-
 from ..core.words import listed
-from ..robots.coordinates import Coordinates
 from .model import Changes, Equations, Path
-from .places import EVERY_BODY, XYZ, alike
+from .places import EVERY_BODY, XYZ, sets_of_bodies, sets_of_joints
 from .variants import Variant, variant
 
-UNITS = {"length": (1e3, 1e2, 1e-3, 1e-2), "mass": (1e3, 1e-3), "inertia": (1e3, 1e4, 1e6, 1e7, 1e9, 1e-3)}
-FIELDS = {"length": ("offset", "com"), "mass": ("mass",), "inertia": ("inertia",)}
-Numbers = Mapping[str, ndarray]  # fields of a tree
-
-
-class Edit(NamedTuple):
-    """Other numbers of a tree: the fields that differ."""
-
-    place: str
-    explains: str
-    fields: dict[str, ndarray]
-    kind: str = "numbers"
+UNITS = {  # factors of units that are taken for others, and the fields of a tree that have them
+    "lengths": ((1e3, 1e2, 1e-3, 1e-2), ("offset", "com")), "masses": ((1e3, 1e-3), ("mass",)),
+    "moments of inertia": ((1e3, 1e4, 1e6, 1e7, 1e9, 1e-3), ("inertia",)),
+}  # fmt: skip
+ORDERS = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == order[k] for k in range(3)))
+EXCHANGES = ORDERS[:3]  # of two axes
+DIAGONAL = np.eye(3, dtype=bool)
+Edit = tuple[str, str, dict[str, ndarray]]
+Way = Callable[[ndarray], ndarray]
+Ways = dict[tuple[str, str], Way]  # of a field, by the place and what it explains
 
 
 def edits(equations: Equations) -> list[Variant]:
     """The values with each edit that changes a number, evaluated together."""
-    stated, known = equations.stated, set()
-    chosen: list[Edit] = []
-    changes: list[dict[Path, float]] = []
-    for kind in KINDS:
-        for edit in kind(equations.tree, stated):
-            moved = {
-                Path(name, at): x
-                for name, field in edit.fields.items()
-                for at, x in np.ndenumerate(field - stated[name])
-            }
-            moved = {path: x for path, x in moved.items() if x}
-            same = tuple((path, f"{x:.12g}") for path, x in moved.items())
-            if moved and same not in known:
-                known.add(same)
-                chosen.append(edit)
-                changes.append(moved)
-    if not chosen:
-        return []
-    paths = dict.fromkeys(path for moved in changes for path in moved)
-    rows: Changes = {path: np.array([moved.get(path, 0.0) for moved in changes]) for path in paths}
-    values = equations.values(rows)
-    return [variant(2, edit.kind, edit.place, "", edit.explains, row) for edit, row in zip(chosen, values)]
+    stated = equations.stated
+    chosen: dict[tuple[tuple[Path, str], ...], tuple[Edit, dict[Path, float]]] = {}
+    for edit in (edit for kind in KINDS for edit in kind(equations)):
+        moved: dict[Path, float] = {}
+        for name, field in edit[2].items():
+            moved |= {Path(name, at): x for at, x in np.ndenumerate(field - stated[name]) if x}
+        if moved:
+            chosen.setdefault(tuple((path, f"{x:.12g}") for path, x in moved.items()), (edit, moved))
+    paths = dict.fromkeys(path for _, moved in chosen.values() for path in moved)
+    rows: Changes = {path: np.array([moved.get(path, 0.0) for _, moved in chosen.values()]) for path in paths}
+    kinds = {name: "body" for name, *_ in absent(equations)}
+    named = [(place, explains) for (place, explains, _), _ in chosen.values()]
+    return [
+        variant(2, kinds.get(place, "numbers"), place, "", explains, values)
+        for (place, explains), values in zip(named, equations.values(rows) if rows else ())
+    ]
 
 
-def sets_of_bodies(tree: tmt.Tree) -> dict[str, list[int]]:
-    """Each body, those that are alike, and all."""
-    sets = {name: [b] for b, name in enumerate(tree.body_names)}
-    for names in alike(tree):
-        if set(names) <= set(tree.body_names):
-            sets[listed(names)] = [tree.body_names.index(name) for name in names]
-    return sets | ({EVERY_BODY: list(range(len(tree.mass)))} if len(tree.mass) > 1 else {})
+def in_order(order: tuple[int, ...]) -> str:
+    moved = [XYZ[k] for k in range(3) if order[k] != k]
+    return (
+        f"{listed(moved)} exchanged"
+        if len(moved) == 2
+        else f"in the order {', '.join(XYZ[k] for k in order)}"
+    )
 
 
-def changed(field: ndarray, bodies: list[int], new: Callable[[ndarray], ndarray]) -> ndarray:
-    """A field of which the rows of some bodies are changed."""
-    after = field.copy()
-    for b in bodies:
-        after[b] = new(field[b])
-    return after
+def ways_of_tensors() -> Ways:
+    """Axes of a tensor permuted, or those of its moments or products alone; products negated or left out."""
+    ways: Ways = {}
+    for order in ORDERS:
+        axes = f"axes {in_order(order)}"
+        ways[f"inertia of {{}}, {axes}", ""] = permuted(order)
+        ways[f"moments of inertia of {{}}, {axes}", ""] = permuted(order, products=False)
+    for order in EXCHANGES:
+        fixed = next(k for k in range(3) if order[k] == k)
+        products = ["".join(sorted(XYZ[fixed] + XYZ[k])) for k in range(3) if k != fixed]
+        ways[f"products of inertia {listed(products)} of {{}}", "exchanged"] = permuted(order, moments=False)
+    return ways | {
+        ("axial and transverse inertia of {}", "exchanged"): axial_for_transverse,
+        ("products of inertia of {}", "negated"): lambda I: np.where(DIAGONAL, I, -I),
+        ("products of inertia of {}", "left out"): lambda I: np.where(DIAGONAL, I, 0.0),
+        ("inertia of {}", "left out, a point mass"): lambda I: 0.0 * I,
+    }
 
 
-def tensors(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
-    """Axes of a tensor permuted; products of inertia negated, left out or exchanged."""
-    off_diagonal = ~np.eye(3, dtype=bool)
-    ways: dict[str, tuple[str, Callable[[ndarray], ndarray]]] = {}
-    orders = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == order[k] for k in range(3)))
-    for order in orders:
-        moved = [XYZ[k] for k in range(3) if order[k] != k]
-        what = (
-            f"axes {listed(moved)} exchanged"
-            if len(moved) == 2
-            else f"axes in the order {', '.join(XYZ[k] for k in order)}"
-        )
-        ways[f"inertia of {{}}, {what}"] = "", partial(permuted, order=list(order))
-        ways[f"moments of inertia of {{}}, {what}"] = "", partial(with_moments, order=list(order))
-    ways["axial and transverse inertia of {}"] = "exchanged", axial_for_transverse
-    ways["products of inertia of {}"] = "negated", lambda I: np.where(off_diagonal, -I, I)
-    ways["products of inertia of {} "] = "left out", lambda I: np.where(off_diagonal, 0.0, I)
-    ways["inertia of {} "] = "left out, a point mass", lambda I: 0.0 * I
-    for first, second in combinations(((0, 1), (0, 2), (1, 2)), 2):
-        names = [XYZ[i] + XYZ[j] for i, j in (first, second)]
-        ways[f"products of inertia {listed(names)} of {{}}"] = (
-            "exchanged",
-            partial(exchanged, first=first, second=second),
-        )
-    for name, bodies in sets_of_bodies(tree).items():
-        for place, (explains, new) in ways.items():
-            yield Edit(
-                place.format(name).rstrip(), explains, {"inertia": changed(stated["inertia"], bodies, new)}
-            )
+def permuted(order: Sequence[int], moments: bool = True, products: bool = True) -> Way:
+    """A tensor with its moments or products those of axes in another order."""
 
+    def change(I: ndarray) -> ndarray:
+        new = I[np.ix_(order, order)]
+        return np.where(DIAGONAL, new if moments else I, new if products else I)
 
-def permuted(I: ndarray, order: list[int]) -> ndarray:
-    return I[np.ix_(order, order)]
-
-
-def with_moments(I: ndarray, order: list[int]) -> ndarray:
-    """A tensor with its moments in another order, and the same products."""
-    J = I.copy()
-    np.fill_diagonal(J, np.diag(I)[order])
-    return J
+    return change
 
 
 def axial_for_transverse(I: ndarray) -> ndarray:
@@ -124,111 +91,102 @@ def axial_for_transverse(I: ndarray) -> ndarray:
     for k in range(3):
         axial, (first, second) = moments[k], np.delete(moments, k)
         if first == second != axial:
-            J = I.copy()
-            np.fill_diagonal(J, np.where(np.arange(3) == k, first, axial))
-            return J
+            return np.where(DIAGONAL, np.diag(np.where(np.arange(3) == k, first, axial)), I)
     return I
 
 
-def exchanged(I: ndarray, first: tuple[int, int], second: tuple[int, int]) -> ndarray:
-    """A tensor with two products of inertia exchanged."""
-    J = I.copy()
-    J[first], J[second] = I[second], I[first]
-    J[first[::-1]], J[second[::-1]] = I[second], I[first]
-    return J
+def ways_of_vectors(name: str) -> Ways:
+    """At zero, of the other sign, with two coordinates exchanged."""
+    ways: Ways = {(name, "zero"): lambda r: 0.0 * r, (name, "of the other sign"): lambda r: -r}
+    for order in EXCHANGES:
+        moved = [XYZ[k] for k in range(3) if order[k] != k]
+        ways[name, f"coordinates {listed(moved)} exchanged"] = partial(np.take, indices=order)
+    return ways
 
 
-def vectors(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
-    """A CoM or an offset at zero, of the other sign, with two coordinates exchanged; the CoM at half or twice its place."""
-    ways: dict[str, Callable[[ndarray], ndarray]] = {
-        "zero": lambda r: 0.0 * r,
-        "of the other sign": lambda r: -r,
-    }
-    for i, j in combinations(range(3), 2):
-        order = [0, 1, 2]
-        order[i], order[j] = j, i
-        ways[f"coordinates {XYZ[i]} and {XYZ[j]} exchanged"] = partial(np.take, indices=order)
-    for name, bodies in sets_of_bodies(tree).items():
-        for explains, new in ways.items():
-            yield Edit(f"CoM of {name}", explains, {"com": changed(stated["com"], bodies, new)})
-    for i, name in enumerate(tree.joint_names):
-        for explains, new in ways.items():
-            yield Edit(f"offset of {name}", explains, {"offset": changed(stated["offset"], [i], new)})
+def of_rows(equations: Equations) -> Iterator[Edit]:
+    """The tensors, CoMs and offsets of bodies and joints, one, those that are alike, or all."""
+    bodies, joints = sets_of_bodies(equations.tree), sets_of_joints(equations.tree)
+    kinds = (
+        ("inertia", bodies, ways_of_tensors()), ("com", bodies, ways_of_vectors("CoM of {}")),
+        ("offset", joints, ways_of_vectors("offset of {}")),
+    )  # fmt: skip
+    for field, sets, ways in kinds:
+        for name, rows in sets.items():
+            for (place, explains), new in ways.items():
+                after = equations.stated[field].copy()
+                after[rows] = [new(row) for row in after[rows]]
+                yield place.format(name), explains, {field: after}
 
 
-def absent(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
+def absent(equations: Equations) -> Iterator[Edit]:
     """A body, or all that a joint carries, left out."""
+    tree, stated = equations.tree, equations.stated
     carried = {name: bodies for name, bodies in sets_of_bodies(tree).items() if name != EVERY_BODY}
     for i in range(len(tree.parent)):
         bodies = [b for b in range(len(tree.mass)) if tree.moves(b)[i]]
         if 1 < len(bodies) < len(tree.mass):
             carried.setdefault(listed([tree.body_names[b] for b in bodies]), bodies)
     for name, bodies in carried.items():
-        nothing = {field: changed(stated[field], bodies, lambda x: 0.0 * x) for field in ("mass", "inertia")}
-        yield Edit(name, "left out", nothing, "body")
+        fields = {field: stated[field].copy() for field in ("mass", "inertia")}
+        for field in fields.values():
+            field[bodies] = 0.0
+        yield name, "left out", fields
 
 
-def swapped(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
-    """Numbers of two bodies exchanged; the length and the CoM of a link exchanged."""
+def swapped(equations: Equations) -> Iterator[Edit]:
+    """Numbers of two bodies or joints exchanged; the length and the CoM of a link exchanged."""
+    tree, stated = equations.tree, equations.stated
+
+    def exchanged(field: str, i: int, j: int) -> dict[str, ndarray]:
+        after = stated[field].copy()
+        after[[i, j]] = after[[j, i]]
+        return {field: after}
+
     for a, b in combinations(range(len(tree.mass)), 2):
-        both, exchanged_fields = listed([tree.body_names[a], tree.body_names[b]]), {}
+        both = listed([tree.body_names[a], tree.body_names[b]])
+        together: dict[str, ndarray] = {}
         for field, name in {"mass": "masses", "com": "CoMs", "inertia": "inertias"}.items():
-            exchanged_fields[field] = stated[field].copy()
-            exchanged_fields[field][[a, b]] = stated[field][[b, a]]
-            yield Edit(f"{name} of {both}", "exchanged", {field: exchanged_fields[field]})
-        yield Edit(f"masses, CoMs and inertias of {both}", "exchanged", exchanged_fields)
-    armatures = stated["armature"] if len(stated["armature"]) else np.zeros(0)
-    names = Coordinates(tree.joint_names, tree.kind).speeds
-    for i, j in combinations(np.flatnonzero(armatures).tolist(), 2):
-        others = armatures.copy()
-        others[[i, j]] = others[[j, i]]
-        yield Edit(f"armatures of {names[i]} and {names[j]}", "exchanged", {"armature": others})
-    for b, i in enumerate(tree.body_joint):
-        for j in (j for j, parent in enumerate(tree.parent) if parent == i >= 0):
-            offset, com = stated["offset"].copy(), stated["com"].copy()
-            offset[j], com[b] = com[b], offset[j]
-            yield Edit(
-                f"CoM of {tree.body_names[b]} and offset of {tree.joint_names[j]}",
-                "exchanged",
-                {"offset": offset, "com": com},
-            )
+            together |= exchanged(field, a, b)
+            yield f"{name} of {both}", "exchanged", exchanged(field, a, b)
+        yield f"masses, CoMs and inertias of {both}", "exchanged", together
+    for i, j in combinations(np.flatnonzero(stated["armature"]).tolist(), 2):
+        names = equations.speeds[i], equations.speeds[j]
+        yield f"armatures of {listed(names)}", "exchanged", exchanged("armature", i, j)
+    for b, j in (
+        (b, j)
+        for b, i in enumerate(tree.body_joint)
+        for j, parent in enumerate(tree.parent)
+        if parent == i >= 0
+    ):
+        offset, com = stated["offset"].copy(), stated["com"].copy()
+        offset[j], com[b] = com[b], offset[j]
+        place = f"CoM of {tree.body_names[b]} and offset of {tree.joint_names[j]}"
+        yield place, "exchanged", {"offset": offset, "com": com}
 
 
-def scaled(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
+def scaled(equations: Equations) -> Iterator[Edit]:
     """All lengths, masses or tensors in another unit; gravity along another axis."""
-    for what, factors in UNITS.items():
+    for plural, (factors, names) in UNITS.items():
         for factor in factors:
-            fields = {field: factor * stated[field] for field in FIELDS[what]}
-            plural = {"length": "lengths", "mass": "masses", "inertia": "moments of inertia"}[what]
-            yield Edit(f"all {plural}", f"{factor:g} times the right ones: in another unit?", fields)
-    g = stated["gravity"]
-    for order in list(permutations(range(3)))[1:]:
-        for sign in (1.0, -1.0):
-            new = sign * g[list(order)]
+            fields = {name: factor * equations.stated[name] for name in names}
+            yield f"all {plural}", f"{factor:g} times the right ones: in another unit?", fields
+    g = equations.stated["gravity"]
+    for order in ORDERS:
+        for new in (g[list(order)], -g[list(order)]):
             along = XYZ[int(np.argmax(np.abs(new)))]
             if not np.array_equal(new, -g):  # an option
-                yield Edit("gravity", f"along {'-' if new.min() < 0.0 else ''}{along}", {"gravity": new})
+                yield "gravity", f"along {'-' if new.min() < 0.0 else ''}{along}", {"gravity": new}
 
 
-def axes(tree: tmt.Tree, stated: Numbers) -> Iterator[Edit]:
-    """A hinge or slide along another axis of its frame."""
-    for i, joint in enumerate(tree.coordinates.joints):
-        if joint.kind == "ball":
-            continue
-        for k, name in enumerate(XYZ):
-            for sign, shown in ((1.0, ""), (-1.0, "-")):
-                new = stated["axis"].copy()
-                new[joint.qd.start] = sign * np.eye(3)[k]
-                if np.allclose(new[joint.qd.start], -stated["axis"][joint.qd.start]):
-                    continue  # another sense
-                yield Edit(f"axis of {tree.joint_names[i]}", f"{shown}{name}", {"axis": new})
+def axes(equations: Equations) -> Iterator[Edit]:
+    """A hinge or slide along another axis of its frame; its other sense is a convention."""
+    for name, joint in zip(equations.tree.joint_names, equations.tree.coordinates.joints):
+        for k, sign in ((k, sign) for k in range(3) for sign in (1.0, -1.0) if joint.kind != "ball"):
+            new = equations.stated["axis"].copy()
+            before, new[joint.qd.start] = new[joint.qd.start].copy(), sign * np.eye(3)[k]
+            if not np.allclose(new[joint.qd.start], -before):
+                yield f"axis of {name}", f"{'-' if sign < 0.0 else ''}{XYZ[k]}", {"axis": new}
 
 
-KINDS: tuple[Callable[[tmt.Tree, Numbers], Iterator[Edit]], ...] = (
-    absent,
-    tensors,
-    vectors,
-    swapped,
-    scaled,
-    axes,
-)
+KINDS: tuple[Callable[[Equations], Iterator[Edit]], ...] = (absent, of_rows, swapped, scaled, axes)

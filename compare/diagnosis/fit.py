@@ -21,9 +21,8 @@ FIRST_ROUNDS, FINALISTS = 6, 24  # after these rounds only the best go on
 CONVERGED = 1e-14  # a step of a place, of its size
 SEEN = 1e-100  # of the square of a derivative, in tolerances
 LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
-PROMISING = (
-    1e-4  # of the difference: places that leave more, by their first and second derivatives, are not fitted
-)
+PROMISING = 1e-4  # of the difference: places that leave more, to second order, are not fitted
+NEARLY = 5e-13  # of the difference: what an explanation may leave as rounding
 CANDIDATES = 64  # pairs that are fitted, the most promising of all
 ROWS = 256  # of changes in one evaluation
 TURNED = np.pi * np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # more starts for the zero of a hinge
@@ -93,12 +92,17 @@ class Search:
 
     def explained(self, variants: Iterable[tuple[Cause, ndarray]]) -> list[Cause]:
         """The causes whose values, at the first or all states, leave nothing."""
-        causes = []
-        for cause, values in variants:
-            left = self.weighted(values)
-            if np.abs(left).max() <= 1.0:
-                causes.append(replace(cause, left_over=float(np.linalg.norm(left)) / self.size))
-        return causes
+        left = ((cause, self.left_over(self.weighted(values))) for cause, values in variants)
+        return [replace(cause, left_over=share) for cause, (ratio, share) in left if ratio <= 1.0]
+
+    def left_over(self, left: ndarray) -> tuple[float, float]:
+        """What is left, in tolerances: the largest, and the share of the difference.
+
+        The largest counts as 1 where the share is rounding: a length in mm rounds what is small in the right one.
+        """
+        share = float(np.linalg.norm(left)) / self.size
+        ratio = float(np.nan_to_num(np.abs(left).max(), nan=np.inf))
+        return (min(ratio, 1.0) if share <= NEARLY else ratio), share
 
     def values(self, numbers: ndarray, x: ndarray) -> ndarray:
         """Values for each row of changes x of the places `numbers`, (rows, k): (rows, states, entries)."""
@@ -156,8 +160,7 @@ class Search:
         x[near], left[near] = self.fitted(numbers[near], x[near])
         fits: dict[tuple[int, ...], Fitted] = {}
         for key, changes, rest in zip(map(tuple, numbers.tolist()), x.tolist(), left):
-            ratio = float(np.nan_to_num(np.abs(rest).max(), nan=np.inf))
-            share = float(np.linalg.norm(rest)) / self.size
+            ratio, share = self.left_over(rest)
             if key not in fits or ratio < fits[key].ratio:
                 fits[key] = Fitted(tuple(self.places[k] for k in key), tuple(changes), ratio, share)
         return sorted(fits.values(), key=lambda fit: fit.ratio)
@@ -195,6 +198,20 @@ class Search:
         numbers, size = np.arange(len(self.places))[:, None], self.sizes[:, None]
         up, down = (self.values(numbers, sign * size) for sign in (1.0, -1.0))
         return (up - down) / 2.0, (up + down) / 2.0 - self.right
+
+    def change(self, fit: Fitted) -> ndarray:
+        """What one place changes in the values to first order, (states, entries)."""
+        k = next(k for k, place in enumerate(self.places) if place is fit.places[0])
+        return self.coefficients[0][k] * fit.changes[0] / self.sizes[k]
+
+    def best_change(self, k: int, off: ndarray) -> tuple[float, float]:
+        """What the best change of a place leaves of other differences, over its tolerance, and the change."""
+        first, second = (part[k] * self.weight for part in self.coefficients)
+        _, x = nearest_change(first, second, off)
+        for _ in range(2):  # Newton's steps: the roots of a cubic have half the digits
+            slope, left = first + 2.0 * x * second, off - x * first - x * x * second
+            x += float((slope * left).sum() / max((slope * slope).sum(), 1e-300))
+        return float(np.abs(off - x * first - x * x * second).max()), x * self.places[k].size
 
     def pairs(self, kinds: Sequence[str], others: Sequence[str]) -> list[Fitted]:
         """Two places together, one of some kinds and one of some others; the most promising pairs are fitted."""

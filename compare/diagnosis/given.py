@@ -7,9 +7,10 @@ from numpy import ndarray
 
 from tmt import Tree
 
-from .coefficients import Bias
 from .conventions import Convention
 from .model import ROUNDED, Equations, Layout, Values
+
+Bias = Callable[[ndarray], ndarray]  # speeds (states, nv) -> h (states, nv) at the positions of the states
 
 
 class Given:

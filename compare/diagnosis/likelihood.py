@@ -10,17 +10,14 @@ from .places import OF_ZERO, is_common
 
 NATURAL = 1.0  # a cause that costs less is said; the others only if there is no such
 OF_KINDS = {  # what a cause of a kind costs, besides its numbers
-    "option": 0.0, "sign": 0.0, "unit": 0.1, "order": 0.25, "angles": 0.0, "axes": 0.15, "body": 0.12, "numbers": 0.2,
-    "slip": 0.3, "angle": 0.45, "load": 0.6, "several": 0.65, "term": 0.15, "part": 0.16, "coefficient": 0.3, "number": 0.0,
-    "force": 0.2,
-    OF_ZERO: 0.05,
+    "option": 0.0, "sign": 0.0, "angles": 0.0, "number": 0.0, OF_ZERO: 0.05, "unit": 0.1, "body": 0.12, "axes": 0.15,
+    "term": 0.15, "part": 0.16, "force": 0.2, "numbers": 0.2, "order": 0.25, "slip": 0.3, "coefficient": 0.3,
+    "derivative": 0.36, "angle": 0.45, "load": 0.6, "several": 0.65,
 }  # fmt: skip
-OF_NAME, ADDED, PAIR = (
-    0.1,
-    0.1,
-    0.3,
-)  # for each joint that is named; for a number that was 0; for a second cause
+OF_NAME, ADDED, PAIR = 0.1, 0.1, 0.3  # for each joint that is named; a number that was 0; a second cause
 IN_PART = 0.12  # of a slip in some parts alone
+OF_WORDS = {"every": 0.03, "damping added": 0.1, "R' I R": -0.05}  # in a place
+ALONE = " alone", "but not in gravity", "but not in the velocity terms of h"
 UNUSUAL = 1.0  # of a factor or a number that nobody writes
 
 
@@ -28,43 +25,30 @@ def cost(cause: Cause, equations: Equations) -> float:
     """A number that is smaller the likelier a cause is."""
     if len(cause.parts) > 1:
         return PAIR + sum(cost(part, equations) for part in cause.parts)
-    is_in_part = cause.place.endswith((" alone", "but not in gravity", "but not in the velocity terms of h"))
-    return of_one(cause, equations) + IN_PART * is_in_part + ADDED * ("damping added" in cause.place)
+    words = sum(more for word, more in OF_WORDS.items() if word in cause.place)
+    return of_one(cause, equations) + words + IN_PART * cause.place.endswith(ALONE)
 
 
 def of_one(cause: Cause, equations: Equations) -> float:
-    is_massless = cause.place.startswith("mass of") and cause.unit == "kg" and cause.explains == 0.0
-    base, names = OF_KINDS.get(cause.kind, 0.5), cause.place.count(",") + cause.place.count(" and ")
-    if cause.kind == "term" and cause.stated == "right":  # terms of an expression
-        return 0.5
+    base, value = OF_KINDS.get(cause.kind, 0.5), cause.explains
     if cause.kind in ("sign", "angles"):
-        slides = [
-            name
-            for name, kind in zip(equations.coordinates.names, equations.coordinates.all_kinds)
-            if kind == "slide"
-        ]
+        kinds = dict(zip(equations.coordinates.names, equations.coordinates.all_kinds))
         words = cause.place.replace(",", " ").split()
-        return base + OF_NAME * (1 + names) + 0.15 * sum(name in words for name in slides)
-    if not isinstance(cause.explains, float):
-        return base + 0.03 * ("every" in cause.place) - 0.05 * cause.place.startswith("R' I R")
-    value, stated = cause.explains, float(cause.stated) if isinstance(cause.stated, float) else 0.0
+        slides = sum(kinds.get(word) == "slide" for word in words)
+        return base + OF_NAME * (1 + cause.place.count(",") + words.count("and")) + 0.15 * slides
+    if not isinstance(value, float):
+        return base
+    stated = cause.stated if isinstance(cause.stated, float) else 0.0
     if cause.unit == "times":
-        return base + of_factor(value, equations) + 0.05 * (value != 0.0) + 0.03 * ("every" in cause.place)
-    if cause.kind == OF_ZERO:
+        return base + of_factor(value, equations) + 0.05 * (value != 0.0)
+    if cause.kind == OF_ZERO and cause.unit == "rad":
         quarters = (value - stated) / (np.pi / 2.0)
-        turns = abs(quarters - round(quarters)) < 1e-9 and cause.unit == "rad"
-        return base + (
-            0.05
-            if turns
-            else of_number(np.degrees(value) if cause.unit == "rad" else value, stated, equations)
-        )
-    base += 0.2 * is_massless
-    return (
-        base
-        + of_number(value, stated, equations)
-        + ADDED * (stated == 0.0)
-        + 0.15 * cause.place.startswith(("anchor", "armature"))
-    )
+        is_quarter = abs(quarters - round(quarters)) < 1e-9
+        return base + (0.05 if is_quarter else of_number(np.degrees(value), stated, equations))
+    is_massless = cause.place.startswith("mass of") and value == 0.0
+    is_rare = cause.place.startswith(("anchor", "armature"))
+    added = ADDED * (stated == 0.0 and cause.kind != OF_ZERO)
+    return base + of_number(value, stated, equations) + added + 0.2 * is_massless + 0.15 * is_rare
 
 
 def of_factor(factor: float, equations: Equations) -> float:
@@ -79,10 +63,8 @@ def of_factor(factor: float, equations: Equations) -> float:
 
 def of_number(value: float, stated: float, equations: Equations) -> float:
     """0, the other sign or another power of ten cost least, then numbers with few digits or of the model."""
-    if value == 0.0:
-        return 0.1
     ratio = abs(value / stated) if stated else 0.0
-    if ratio and abs(log10(ratio) - round(log10(ratio))) < 1e-10:
+    if value == 0.0 or (ratio and abs(log10(ratio) - round(log10(ratio))) < 1e-10):
         return 0.1
     digits = len(f"{abs(value):.10e}".split("e")[0].replace(".", "").rstrip("0"))
     others = np.concatenate([np.abs(field).ravel() for field in equations.stated.values()])

@@ -17,7 +17,7 @@ from numpy import ndarray
 import tmt
 from tmt.derivation import method
 from tmt.derivation.mechanism import Mechanism
-from tmt.derivation.vectors import ZERO, Matrix
+from tmt.derivation.vectors import ZERO, Vector
 
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
@@ -29,18 +29,9 @@ OF_TERM = {  # of each body: T' m T and B' I B of Mbar; T' m g, T' m v_conv, B' 
     "convective": "centripetal and Coriolis forces of {}", "Euler": "moment I w_conv of {}",
     "gyroscopic": "gyroscopic moment omega x I omega of {}",
 }  # fmt: skip
-BODY_TERMS = tuple(OF_TERM)
-VELOCITY_TERMS = BODY_TERMS[3:]
-NOTHING: dict[str, Any] = dict.fromkeys(("v_conv", "w_conv", "omega"), ZERO)
-NOTHING |= {"mass": 0.0, "inertia": Matrix([ZERO] * 3)}
-FIELDS_OF_TERMS = {  # of a body, on which a term depends
-    "translation": ("mass",), "rotation": ("inertia",), "gravity": ("mass",), "convective": ("mass", "v_conv"),
-    "Euler": ("inertia", "w_conv"), "gyroscopic": ("inertia", "omega"),
-}  # fmt: skip
 MOST_SPEEDS = 8  # with more, coefficients of products of speeds are not compared: there are nv^2 (nv + 1) / 2
 TINY = 1e-100  # an imaginary change, whose square vanishes
 ROUNDED = FACTOR * EPS  # of the scale of an entry
-Bodies = Sequence[method.Body]
 
 
 class Path(NamedTuple):
@@ -95,15 +86,9 @@ class Layout(NamedTuple):
     @property
     def parts(self) -> dict[str, slice]:
         """The entries of each part of the equations."""
-        n = len(self.places[0])
-        parts = {"M": slice(0, n), "h": slice(n, n + self.nv)}
-        if self.is_split:
-            parts = {
-                "M": parts["M"],
-                "velocity terms": parts["h"],
-                "gravity": slice(n + self.nv, n + 2 * self.nv),
-            }
-        return parts
+        n, nv = len(self.places[0]), self.nv
+        of_h = {"velocity terms": slice(n, n + nv), "gravity": slice(n + nv, n + 2 * nv)}
+        return {"M": slice(0, n)} | (of_h if self.is_split else {"h": slice(n, n + nv)})
 
     @property
     def in_M(self) -> slice:
@@ -123,10 +108,9 @@ class Layout(NamedTuple):
         of_h = [velocity_terms, rest] if self.is_split else [velocity_terms + rest]
         return np.concatenate([np.asarray(mass_matrix)[..., i, j], *of_h], axis=-1)
 
-    def of_row(self, i: int, part: str = "h") -> list[int]:
-        """The entries of a row of h, or of one part of it."""
-        chosen = [part] if part in self.parts else list(self.parts)[1:]
-        return [self.parts[name].start + i for name in chosen]
+    def of_row(self, i: int) -> list[int]:
+        """The entries of a row of h."""
+        return [self.parts[name].start + i for name in list(self.parts)[1:]]
 
 
 class Equations:
@@ -156,24 +140,35 @@ class Equations:
     @cached_property
     def terms(self) -> dict[str, ndarray]:
         """What each term of all bodies adds, (bodies, states, entries)."""
-        terms = {}
-        for term, needed in FIELDS_OF_TERMS.items():
-            absent = {name: nothing for name, nothing in NOTHING.items() if name not in needed}
-            gravity = self.tree.gravity if term == "gravity" else ZERO
-            terms[term] = np.stack([self.summed([b._replace(**absent)], gravity)[0] for b in self.bodies])
-            if self.layout.qdd is None:
-                terms[term][..., self.in_h if term in BODY_TERMS[:2] else self.in_M] = 0.0
-        return terms
+        count, I = len(self.q), self.stated["inertia"]
+        T, B = (vectors([getattr(b, name) for b in self.bodies], count) for name in "TB")
+        a, alpha, w = (
+            vectors([[getattr(b, name) for b in self.bodies]], count)[0]
+            for name in ("v_conv", "w_conv", "omega")
+        )
+        zero, mass = np.zeros((len(I), count, self.nv)), self.stated["mass"][:, None, None]
+        none = np.zeros((*zero.shape, self.nv))
+        gyroscopic = np.cross(w, np.einsum("bij,bsj->bsi", I, w))
+        euler = np.einsum("bij,bsj->bsi", I, alpha)
+
+        def along(columns: ndarray, forces: ndarray) -> ndarray:
+            return np.einsum("bnsc,bsc->bsn", columns, forces)
+
+        gravity = np.broadcast_to(-mass * self.stated["gravity"], a.shape)
+        parts = {
+            "translation": (np.einsum("bnsc,bmsc->bsnm", T * mass[..., None], T), zero, zero),
+            "rotation": (np.einsum("bnsc,bcd,bmsd->bsnm", B, I, B), zero, zero),
+            "gravity": (none, zero, along(T, gravity)),
+            "convective": (none, along(T, mass * a), zero),
+            "Euler": (none, along(B, euler), zero),
+            "gyroscopic": (none, along(B, gyroscopic), zero),
+        }
+        return {name: self.layout.packed(*part) for name, part in parts.items()}
 
     @cached_property
     def parts(self) -> tuple[ndarray, ndarray, ndarray]:
         """Mbar (states, nv, nv), velocity terms of h and h at rest (states, nv), without changes."""
-        M, velocity_terms, rest = self.sums(self.bodies, self.tree.gravity, self.tree.armature)
-        rows = [
-            np.stack([np.broadcast_to(x, len(self.q)) for x in part], axis=-1)
-            for part in (*M, velocity_terms, rest)
-        ]
-        return np.stack(rows[:-2], axis=1), rows[-2], rows[-1]
+        return self.summed(self.bodies, self.tree.gravity, self.tree.armature)
 
     @cached_property
     def right(self) -> ndarray:
@@ -210,37 +205,34 @@ class Equations:
             length = np.where(length == 0.0, 1.0, length)  # of a change that leaves no direction
             numbers["axis"][k] = [x / length, y / length, z / length]
         bodies = method.bodies(Mechanism(**numbers), list(self.q.T), list(self.qd.T))
-        return self.summed(bodies, numbers["gravity"], numbers["armature"])
+        values = self.layout.packed(*self.summed(bodies, numbers["gravity"], numbers["armature"]))
+        return values.reshape(-1, *self.right.shape)
 
     def with_bias(self, velocity_terms: ndarray | float, rest: ndarray | float) -> ndarray:
         """The right values with another h, whose parts are (states, nv)."""
         zero = 0.0 * self.qd
         return self.layout.packed(self.parts[0], velocity_terms + zero, rest + zero)
 
-    def sums(
-        self, bodies: Bodies, gravity: Iterable[Any], armature: Sequence[Any] = ()
-    ) -> tuple[list[list[Any]], list[Any], list[Any]]:
-        """Mbar, velocity terms of h and h at rest of some bodies."""
+    def summed(
+        self, bodies: Sequence[method.Body], gravity: Iterable[Any], armature: Sequence[Any]
+    ) -> tuple[ndarray, ndarray, ndarray]:
+        """Mbar, velocity terms of h and h at rest of some bodies, (changes, states, ...) or (states, ...)."""
         M, velocity_terms = method.mass_matrix(bodies), method.bias(bodies, ZERO)
         for i, rotor in enumerate(armature):
             M[i][i] = M[i][i] + rotor
         still = [b._replace(v_conv=ZERO, w_conv=ZERO, omega=ZERO) for b in bodies]
-        return M, velocity_terms, method.bias(still, gravity)
-
-    def summed(self, bodies: Bodies, gravity: Iterable[Any], armature: Sequence[Any] = ()) -> ndarray:
-        """The values of some bodies, (changes, states, entries)."""
-        M, velocity_terms, rest = self.sums(bodies, gravity, armature)
-        of_h = (
-            [velocity_terms, rest]
-            if self.layout.is_split
-            else [[v + g for v, g in zip(velocity_terms, rest)]]
+        flat = [*chain.from_iterable(M), *velocity_terms, *method.bias(still, gravity)]
+        table, nv = np.stack(np.broadcast_arrays(*flat, np.zeros(len(self.q))), axis=-1)[..., :-1], self.nv
+        return (
+            table[..., : nv * nv].reshape(*table.shape[:-1], nv, nv),
+            table[..., nv * nv : -nv],
+            table[..., -nv:],
         )
-        if self.layout.qdd is not None:
-            inertial = [sum(M_ij * qdd for M_ij, qdd in zip(row, self.layout.qdd.T)) for row in M]
-            of_h = [[force + inertia for force, inertia in zip(of_h[0], inertial)]]
-        flat = [*(M[i][j] for i, j in zip(*self.layout.places)), *chain.from_iterable(of_h)]
-        count = max([np.shape(value)[0] for value in flat if np.ndim(value) == 2], default=1)
-        return np.stack([np.broadcast_to(value, (count, len(self.q))) for value in flat], axis=-1)
+
+
+def vectors(rows: Sequence[Sequence[Vector]], count: int) -> ndarray:
+    """Vectors of scalars or (count,), as an array (rows, columns, count, 3)."""
+    return np.array([[[np.broadcast_to(x, count) for x in v] for v in row] for row in rows]).swapaxes(2, 3)
 
 
 def packed(mass_matrix: ndarray, bias: ndarray) -> ndarray:

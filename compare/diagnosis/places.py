@@ -4,7 +4,7 @@ A change x of a place adds x times a coefficient to numbers of the tree, or x ti
 entries of Mbar or h. The zero of a joint is a convention and has rank 1; the other numbers have rank 2.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import NamedTuple
 
@@ -180,7 +180,23 @@ def alike(tree: tmt.Tree) -> Iterator[list[str]]:
                 yield [tree.joint_names[i] for i in joints]
 
 
-def groups(tree: tmt.Tree) -> dict[str, list[int]]:
-    """Each body alone, and all together."""
-    alone = {body: [b] for b, body in enumerate(tree.body_names)}
-    return alone | ({EVERY_BODY: list(range(len(alone)))} if len(alone) > 1 else {})
+def sets_of_bodies(tree: tmt.Tree) -> dict[str, list[int]]:
+    """Each body, those that are alike, and all."""
+    return sets_of(list(tree.body_names), alike(tree), EVERY_BODY)
+
+
+def sets_of_joints(tree: tmt.Tree) -> dict[str, list[int]]:
+    """Each joint, hinges about equal axes, joints that are alike, and all."""
+    axes: dict[str, list[str]] = {}
+    for name, joint in zip(tree.joint_names, tree.coordinates.joints):
+        if joint.kind == "hinge":
+            axes.setdefault(repr(tree.axis[joint.qd.start]), []).append(name)
+    return sets_of(list(tree.joint_names), [*axes.values(), *alike(tree)], "every joint")
+
+
+def sets_of(names: list[str], together: Iterable[list[str]], every: str) -> dict[str, list[int]]:
+    sets = {name: [i] for i, name in enumerate(names)}
+    for those in together:
+        if set(those) <= set(names):
+            sets[listed(those)] = [names.index(name) for name in those]
+    return sets | ({every: list(range(len(names)))} if len(names) > 1 else {})

@@ -4,7 +4,7 @@ Each slip is one record in SLIPS: the step that it changes, its name, and whethe
 The step has its wrong values where `Recursion.step` is called with its name. Arrays are (rows, 3) in the world's axes.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -14,11 +14,10 @@ from numpy import ndarray
 import tmt
 from tmt.derivation.mechanism import origin_in_parent, turn_in_parent
 
-from ..core.words import listed
-from ..robots.inertia import point_inertia
+from ..robots.coordinates import point_inertia
 from .conventions import matrices
 from .model import MOST_SPEEDS, Equations
-from .places import alike, groups
+from .places import sets_of_bodies, sets_of_joints
 from .variants import Variant, slip
 
 
@@ -30,6 +29,7 @@ class Slip(NamedTuple):
     at: str = "joint"
 
 
+Wrong = Callable[[], ndarray]  # the wrong values of a step
 AXES = "to the axes of the body before"
 SLIPS = (
     Slip("order", "order of rotations at {}: its turn before those of the joints that carry it"),
@@ -117,16 +117,14 @@ class Recursion:
         for i in range(len(tree.parent)):
             self.frames.append(self.frame(i))
 
-    def step(
-        self, name: str, index: int, right: ndarray, wrong: Callable[[], ndarray] | None = None
-    ) -> ndarray:
+    def step(self, name: str, index: int, right: ndarray, wrong: Wrong | None = None) -> ndarray:
         """A step's values: wrong ones, by default zero, in the rows in which this slip is made at a joint or body."""
         if name != self.slip or self.at is None or not self.at[index].any():
             return right
         where = self.at[index].reshape(-1, *[1] * (right.ndim - 1))
         return np.where(where, wrong() if wrong else 0.0, right)
 
-    def everywhere(self, vector: object) -> ndarray:
+    def everywhere(self, vector: Sequence[float]) -> ndarray:
         return np.broadcast_to(np.array(vector), (self.rows, 3))
 
     def before(self, i: int) -> Frame:
@@ -134,44 +132,38 @@ class Recursion:
 
     def frame(self, i: int) -> Frame:
         """The frame of a joint, outward."""
-        joint, parent, columns = self.joints[i], self.before(i), list(self.q.T)
-        offset = np.stack(
-            [np.broadcast_to(x, self.rows) for x in origin_in_parent(self.tree, i, columns)], axis=-1
-        )
-        r, omega = rotated(parent.turn, offset), parent.omega
-        a = parent.a + self.step("centripetal of offset", i, centripetal(omega, r))
-        a = a + self.step("offset outward", i, np.cross(parent.alpha, r))
-        a = self.step("base", i, a, lambda: a - parent.a)
-        local, rates = list(map(self.everywhere, self.tree.axis[joint.qd])), self.qd[:, joint.qd]
+        step, joint, parent, columns = self.step, self.joints[i], self.before(i), list(self.q.T)
+        offset = [np.broadcast_to(x, self.rows) for x in origin_in_parent(self.tree, i, columns)]
+        r, omega = rotated(parent.turn, np.stack(offset, axis=-1)), parent.omega
+        a = parent.a + step("centripetal of offset", i, centripetal(omega, r))
+        a = a + step("offset outward", i, np.cross(parent.alpha, r))
+        a = step("base", i, a, lambda: a - parent.a)
+        local, rates = [self.everywhere(axis) for axis in self.tree.axis[joint.qd]], self.qd[:, joint.qd]
         if joint.kind == "slide":
-            axis = self.step("axis", i, rotated(parent.turn, local[0]), lambda: local[0])
-            a = a + self.step("coriolis", i, 2.0 * np.cross(omega, axis * rates))
+            axis = step("axis", i, rotated(parent.turn, local[0]), lambda: local[0])
+            a = a + step("coriolis", i, 2.0 * np.cross(omega, axis * rates))
             return parent._replace(origin=parent.origin + r, axes=[axis], a=a, own=self.identity, slides=True)
         own = matrices(turn_in_parent(self.tree, i, columns), self.rows)
-        turn = parent.turn @ self.step("transposed", i, own, lambda: backward(own))
-        turn = self.step("order", i, turn, lambda: own @ parent.turn)
-        turn = self.step("absolute", i, turn, lambda: own)
+        turn = parent.turn @ step("transposed", i, own, lambda: backward(own))
+        turn = step("order", i, turn, lambda: own @ parent.turn)
+        turn = step("absolute", i, turn, lambda: own)
         carrier = turn if joint.kind == "ball" else parent.turn
-        axes = [self.step("axis", i, rotated(carrier, axis), partial(np.copy, axis)) for axis in local]
+        axes = [step("axis", i, rotated(carrier, axis), axis.copy) for axis in local]
         spin = np.einsum("ksc,sk->sc", axes, rates)
-        passed = self.step(
-            "carried back",
-            i,
-            parent.passed,
-            lambda: rotated(turn @ own @ backward(parent.turn), parent.passed),
+        to_parent = backward(parent.turn)
+        passed = step(
+            "carried back", i, parent.passed, lambda: rotated(turn @ own @ to_parent, parent.passed)
         )
-        passed = self.step(
-            "carried as it is", i, passed, lambda: rotated(turn @ backward(parent.turn), passed)
-        )
-        alpha = parent.alpha + self.step("alpha", i, np.cross(passed, spin))
-        used = self.step("relative", i, passed + spin, lambda: spin)
+        passed = step("carried as it is", i, passed, lambda: rotated(turn @ to_parent, passed))
+        alpha = parent.alpha + step("alpha", i, np.cross(passed, spin))
+        used = step("relative", i, passed + spin, lambda: spin)
         return Frame(turn, parent.origin + r, axes, used, alpha, a, own, passed + spin)
 
     def inertia(self, b: int, turn: ndarray) -> ndarray:
         """The tensor of a body in the world's axes, (rows, 3, 3)."""
-        tree, I = self.tree, np.array(self.tree.inertia[b])
-        about_joint = point_inertia(np.array(tree.com[b]), tree.mass[b])
-        I = self.step("about the joint", b, self.identity @ I, lambda: self.identity @ (I + about_joint))
+        about_joint = point_inertia(np.array(self.tree.com[b]), self.tree.mass[b])
+        I = self.identity @ np.array(self.tree.inertia[b])
+        I = self.step("about the joint", b, I, lambda: I + about_joint)
         I = self.step("parallel axis", b, I, lambda: I - about_joint)
         turned = self.step("not turned", b, turn @ I @ backward(turn), lambda: I)
         return self.step("turned back", b, turned, lambda: backward(turn) @ I @ turn)
@@ -193,15 +185,9 @@ class Recursion:
     def values(self) -> tuple[ndarray, ndarray, ndarray]:
         """Mbar (rows, nv, nv), velocity terms of h and h at rest (rows, nv)."""
         tree, nv = self.tree, len(self.tree.axis)
-        M, velocity_terms, rest = (
-            np.zeros((self.rows, nv, nv)),
-            np.zeros((self.rows, nv)),
-            np.zeros((self.rows, nv)),
-        )
-        M += np.diag(tree.armature) if len(tree.armature) else 0.0
-        for b, mass in enumerate(tree.mass):
-            if tree.body_joint[b] < 0:
-                continue
+        velocity_terms, rest = np.zeros((2, self.rows, nv))
+        M = np.zeros((self.rows, nv, nv)) + np.diag(tree.armature if len(tree.armature) else [0.0] * nv)
+        for b, mass in ((b, mass) for b, mass in enumerate(tree.mass) if tree.body_joint[b] >= 0):
             frame = self.frames[tree.body_joint[b]]
             I, omega = self.inertia(b, frame.turn), frame.omega
             moment = rotated(I, frame.alpha) + np.cross(omega, rotated(I, omega))
@@ -214,44 +200,43 @@ class Recursion:
 
     def acceleration(self, b: int) -> ndarray:
         """Of the CoM of a body at qdd = 0."""
-        frame = self.frames[self.tree.body_joint[b]]
-        com, joint = self.everywhere(self.tree.com[b]), self.joints[self.tree.body_joint[b]]
-        r, spin = (
-            rotated(frame.turn, com),
-            self.everywhere(self.tree.axis[joint.qd.start]) * self.qd[:, [joint.qd.start]],
-        )
-        a = self.step("CoM outward", b, np.cross(frame.alpha, r)) + self.step(
-            "centripetal", b, centripetal(frame.omega, r)
-        )
+        frame, joint = self.frames[self.tree.body_joint[b]], self.joints[self.tree.body_joint[b]]
+        com, speed = self.everywhere(self.tree.com[b]), self.qd[:, [joint.qd.start]]
+        r, spin = rotated(frame.turn, com), self.everywhere(self.tree.axis[joint.qd.start]) * speed
+        a = self.step("CoM outward", b, np.cross(frame.alpha, r))
+        a = a + self.step("centripetal", b, centripetal(frame.omega, r))
         a = self.segment(b, a, centripetal(spin, rotated(frame.own, com)))
         return self.step("base of body", b, frame.a + a, lambda: a)
 
     def columns(self, b: int) -> tuple[ndarray, ndarray, ndarray, ndarray]:
         """T and B of a body, and the columns by which its force and moment act on the joints, (rows, nv, 3) each."""
-        tree, at, nv = self.tree, self.tree.body_joint[b], len(self.tree.axis)
-        T, B = np.zeros((2, self.rows, nv, 3))
-        levers, turns = np.zeros((2, self.rows, nv, 3))
-        frame, com = self.frames[at], self.everywhere(tree.com[b])
+        tree, joint, step = self.tree, self.tree.body_joint[b], self.step
+        T, B, levers, turns = np.zeros((4, self.rows, len(tree.axis), 3))
+        frame, com = self.frames[joint], self.everywhere(tree.com[b])
         r, alone = rotated(frame.turn, com), rotated(frame.own, com)
-        for i in (i for i in range(len(tree.parent)) if tree.moves(b)[i]):
-            mover = self.frames[i]
+        is_outward = self.slip.endswith("outward")
+        is_inward = self.slip.endswith("inward") or self.slip.startswith(("force", "moment"))
+        for i, of_force, of_moment in self.wrenches(b, r) if is_inward or is_outward else self.movers(b):
+            mover, is_own = self.frames[i], float(i == joint)
             for n, axis in enumerate(mover.axes, self.joints[i].qd.start):
-                local, is_own = self.everywhere(tree.axis[n]), float(i == at)
+                local = self.everywhere(tree.axis[n])
                 if mover.slides:
                     T[:, n] = levers[:, n] = axis
                     continue
                 arm = self.segment(b, np.cross(axis, r), is_own * np.cross(local, alone))
                 right = np.cross(axis, self.lever(i, frame.origin)) + arm
-                T[:, n] = levers[:, n] = self.step("column", i * len(tree.mass) + b, right)
-                turning = self.step("axis in B", i, axis, partial(np.copy, local))
-                B[:, n] = turns[:, n] = self.step(
-                    "relative B", b, turning, partial(np.multiply, turning, is_own)
-                )
-                if self.slip.endswith("outward"):
-                    T[:, n], _ = self.wrench(i, b, axis, r)
-                elif self.slip.endswith("inward") or self.slip.startswith(("force", "moment")):
-                    levers[:, n], turns[:, n] = self.wrench(i, b, axis, r)
+                T[:, n] = levers[:, n] = step("column", i * len(tree.mass) + b, right)
+                turning = step("axis in B", i, axis, local.copy)
+                turning = step("relative B", b, turning, partial(np.multiply, turning, is_own))
+                B[:, n] = turns[:, n] = turning
+                if is_inward or is_outward:  # by virtual power also how the joint accelerates the CoM
+                    (T if is_outward else levers)[:, n] = np.einsum("sij,si->sj", of_force, axis)
+                if is_inward:
+                    turns[:, n] = np.einsum("sij,si->sj", of_moment, axis)
         return T, B, levers, turns
+
+    def movers(self, b: int) -> Iterator[tuple[int, ndarray, ndarray]]:
+        return ((i, self.identity, self.identity) for i in self.tree.path(self.tree.body_joint[b]))
 
     def lever(self, i: int, x: ndarray) -> ndarray:
         """From the origin of joint i to a point."""
@@ -259,39 +244,33 @@ class Recursion:
         lever = self.step("lever from the first", i, lever, lambda: x - self.frames[0].origin)
         return self.step("lever from the joint before", i, lever, lambda: x - self.before(i).origin)
 
-    def wrench(self, i: int, b: int, axis: ndarray, r: ndarray) -> tuple[ndarray, ndarray]:
-        """The columns by which a force at the CoM and a moment of body b act on joint i, passed on from joint to joint.
-
-        By virtual power the first is also how the joint accelerates the CoM, which outward slips change.
-        """
-        joint, force, of_moment = self.tree.body_joint[b], self.identity, self.identity
-        arm = self.step("CoM outward", b, self.step("CoM inward", b, r))
-        of_force = crossing(self.step("sign inward", b, arm, lambda: -r))
+    def wrenches(self, b: int, r: ndarray) -> Iterator[tuple[int, ndarray, ndarray]]:
+        """The joints that move a body, inward, and how a force at its CoM and a moment are moments there, (rows, 3, 3)."""
+        step, joint, force, of_moment = self.step, self.tree.body_joint[b], self.identity, self.identity
+        arm = step("CoM outward", b, step("CoM inward", b, r))
+        of_force = crossing(step("sign inward", b, arm, lambda: -r))
         what, _, how = self.slip.partition(" ")
-        while joint != i:
-            parent, frame = self.before(joint), self.frames[joint]
-            turned = self.identity
+        while joint >= 0:
+            yield joint, of_force, of_moment
+            parent, frame, turned = self.before(joint), self.frames[joint], self.identity
             if what in ("force", "moment"):
                 own = backward(frame.own) if how == "turned back" else self.identity
                 wrong = partial(np.matmul, parent.turn @ own, backward(frame.turn))
-                turned = self.step(self.slip, joint, self.identity, wrong)
+                turned = step(self.slip, joint, self.identity, wrong)
             if what == "force":
                 force, turned = turned @ force, self.identity
-            offset = frame.origin - parent.origin
-            lever = self.step("offset outward", joint, self.step("offset inward", joint, offset))
-            lever = self.step(
-                "CoM for offset inward", joint, lever, partial(self.com_of, self.tree.parent[joint])
-            )
+            lever = step("offset inward", joint, frame.origin - parent.origin)
+            lever = step("offset outward", joint, lever)
+            joint_before = self.tree.parent[joint]
+            lever = step("CoM for offset inward", joint, lever, partial(self.com_of, joint_before))
             of_force, of_moment = turned @ of_force + crossing(lever) @ force, turned @ of_moment
-            joint = self.tree.parent[joint]
-        return np.einsum("sij,si->sj", of_force, axis), np.einsum("sij,si->sj", of_moment, axis)
+            joint = joint_before
 
     def com_of(self, joint: int) -> ndarray:
         """From a joint to the CoM of its body."""
-        com = next(
-            (com for com, at in zip(self.tree.com, self.tree.body_joint) if at == joint), (0.0, 0.0, 0.0)
-        )
-        return rotated(self.frames[joint].turn, self.everywhere(com))
+        coms = (com for com, at in zip(self.tree.com, self.tree.body_joint) if at == joint)
+        turn = self.frames[joint].turn if joint >= 0 else self.identity
+        return rotated(turn, self.everywhere(next(coms, (0.0, 0.0, 0.0))))
 
 
 def slips_of_recursion(equations: Equations) -> Iterator[Variant]:
@@ -313,20 +292,9 @@ def slips_of_recursion(equations: Equations) -> Iterator[Variant]:
 
 
 def places_of_slips(tree: tmt.Tree) -> dict[str, dict[str, list[int]]]:
-    """Where a slip can be made, by the words of `Slip.at`: those that are alike or turn about equal axes together too."""
-    names, bodies = list(tree.joint_names), groups(tree)
-    joints = {name: [i] for i, name in enumerate(names)}
-    axes: dict[str, list[int]] = {}
-    for i in (i for i, kind in enumerate(tree.kind) if kind == "hinge"):
-        axes.setdefault(repr(tree.axis[tree.coordinates.joints[i].qd.start]), []).append(i)
-    joints |= {listed([names[i] for i in same]): same for same in axes.values()}
-    for those in alike(tree):
-        if set(those) <= set(names):
-            joints[listed(those)] = [names.index(name) for name in those]
-        else:
-            bodies[listed(those)] = [tree.body_names.index(name) for name in those]
-    joints |= {"every joint": list(range(len(names)))} if len(names) > 1 else {}
+    """Where a slip can be made, by the words of `Slip.at`."""
+    names = tree.joint_names
     turned = [i for i, kind in enumerate(tree.kind) if kind != "slide"] if len(names) <= MOST_SPEEDS else []
     moving = [(i, b) for b in range(len(tree.mass)) for i in turned if tree.moves(b)[i]]
     columns = {f"{names[i]} for {tree.body_names[b]}": [i * len(tree.mass) + b] for i, b in moving}
-    return {"joint": joints, "body": bodies, "joint and body": columns}
+    return {"joint": sets_of_joints(tree), "body": sets_of_bodies(tree), "joint and body": columns}

@@ -1,21 +1,21 @@
-"""The places that are a factor: of terms, of their parts, of entries and coefficients; and all places of a search."""
+"""The places that are a factor: of terms and their parts, of entries and coefficients; and all places of a search."""
 
-from collections.abc import Iterator
-from itertools import chain, combinations_with_replacement, product
+from collections.abc import Iterator, Sequence
+from itertools import chain, combinations, combinations_with_replacement
 
 import numpy as np
 
 import tmt
 
-from .model import BODY_TERMS, MOST_SPEEDS, OF_TERM, VELOCITY_TERMS, Entry, Equations, Path
-from .places import ALL, FIT_ROUNDING, Place, factor, forces, groups, numbers, tied
+from .model import MOST_SPEEDS, OF_TERM, Entry, Equations, Path
+from .places import ALL, FIT_ROUNDING, Place, factor, forces, numbers, sets_of_bodies, tied
 
 TOGETHER = {  # terms that are often left out together
     "all moments of {} in the bias": ("Euler", "gyroscopic"),
-    "velocity terms of {} in h": VELOCITY_TERMS,
+    "velocity terms of {} in h": ("convective", "Euler", "gyroscopic"),
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
 }
-MOST_JOINTS = 4  # whose single entries of Mbar are tried
+MOST_JOINTS = 4  # of whose parts of terms single entries of Mbar are tried
 
 
 def all_places(equations: Equations) -> list[Place]:
@@ -25,60 +25,104 @@ def all_places(equations: Equations) -> list[Place]:
     return [place for place in places if place.column is None or place.column.any()]
 
 
+# entries of which a factor may be wrong
+
+
+def speeds_of_joints(tree: tmt.Tree) -> dict[str, list[int]]:
+    """The numbers of the speeds of each joint, and of the three slides of each free joint."""
+    of_joints = [list(range(joint.qd.start, joint.qd.stop)) for joint in tree.coordinates.joints]
+    joints = dict(zip(tree.joint_names, of_joints))
+    for i, kind in enumerate(tree.kind):
+        slides = [tree.joint_names[k] for k in range(i - 3, i) if k >= 0 and tree.kind[k] == "slide"]
+        if kind == "ball" and len(slides) == 3:
+            joints[", ".join(slides)] = [v for name in slides for v in joints[name]]
+    return joints
+
+
+def entries_of_M(equations: Equations) -> dict[str, list[int]]:
+    """Each entry of Mbar, and those that couple two joints of several speeds, by their names."""
+    places, tree = list(zip(*equations.layout.places)), equations.tree
+    sets = {entry.named(equations.speeds): [k] for k, entry in enumerate(equations.entries[equations.in_M])}
+    for (first, rows), (second, columns) in combinations_with_replacement(speeds_of_joints(tree).items(), 2):
+        if max(len(rows), len(columns)) > 1:
+            inside = [k for k, pair in enumerate(places) if is_between(pair, rows, columns)]
+            sets[f"M[{first}][{second}]"] = inside
+    return sets
+
+
+def rows_of_h(equations: Equations) -> dict[str, list[int]]:
+    """The speeds of each row of h, and of the rows of joints with several speeds, by their names."""
+    joints = {joint: rows for joint, rows in speeds_of_joints(equations.tree).items() if len(rows) > 1}
+    rows = {name: [i] for i, name in enumerate(equations.speeds)} | joints
+    return {f"h[{name}]": row for name, row in rows.items()}
+
+
+def is_between(pair: Sequence[int], first: list[int], second: list[int]) -> bool:
+    """Whether an entry couples a speed of one joint with one of another."""
+    i, j = pair
+    return (i in first and j in second) or (j in first and i in second)
+
+
+def in_rows(equations: Equations, rows: list[int]) -> list[int]:
+    return [entry for i in rows for entry in equations.layout.of_row(i)]
+
+
+# places
+
+
 def forces_in_bias(equations: Equations) -> Iterator[Place]:
     """Damping and springs of joints that were added to h."""
-    zero = np.zeros_like(equations.right)
+    none, zero = 0.0 * equations.parts[0], 0.0 * equations.qd
     for place in forces(equations.tree, equations.q, equations.qd):
-        if place.column is not None and place.name.startswith(("damping", "stiffness")):
-            part = "velocity terms" if place.name.startswith("damping") else "gravity"
-            column = zero.copy()
-            for i in range(equations.nv):
-                column[:, equations.layout.of_row(i, part)] = place.column[:, i : i + 1]
+        is_damping = place.name.startswith("damping")
+        if place.column is not None and (is_damping or place.name.startswith("stiffness")):
+            parts = (place.column, zero) if is_damping else (zero, place.column)
+            column = equations.layout.packed(none, *parts)
             yield place._replace(kind="force", name=f"{place.name} in h", stated=0.0, column=column)
 
 
 def masses_in_rows(equations: Equations) -> Iterator[Place]:
     """The mass of a body in the rows and columns of the hinges alone, or of the slides."""
-    tree, layout = equations.tree, equations.layout
+    tree, layout, terms = equations.tree, equations.layout, equations.terms
     of_slides = [joint.qd.start for joint in tree.coordinates.joints if joint.kind == "slide"]
     rows = {"hinges": [v for v in range(equations.nv) if v not in of_slides], "slides": of_slides}
+    added = terms["translation"] + terms["gravity"] + terms["convective"]
     for name, those in rows.items() if all(rows.values()) else ():
         entries = [k for k, (i, j) in enumerate(zip(*layout.places)) if i in those and j in those]
-        entries += [k for i in those for k in layout.of_row(i)]
-        for b, body in enumerate(tree.body_names):
-            added = np.sum(
-                [equations.terms[term][b] for term in ("translation", "gravity", "convective")], axis=0
-            )
-            if mass := tree.mass[b]:
-                column = factor("number", "", added / mass, entries).column
+        entries += in_rows(equations, those)
+        for body, mass, of_body in zip(tree.body_names, tree.mass, added):
+            if mass:
+                column = factor("number", "", of_body / mass, entries).column
                 place = f"mass of {body} in the rows of the {name}"
                 yield Place("number", place, mass, "kg", mass, column=column, least=0.0)
 
 
 def terms(equations: Equations) -> Iterator[Place]:
-    """The factor of every term of each body and of all bodies together; 1 is right."""
-    called = {name: (term,) for term, name in OF_TERM.items()} | TOGETHER
-    for name, together in called.items():
+    """The factor of every term of each body and of several together, in all, in an entry of Mbar and in a row of h."""
+    bodies, is_small = sets_of_bodies(equations.tree), equations.nv <= MOST_SPEEDS
+    of_rows = {name: in_rows(equations, rows) for name, rows in rows_of_h(equations).items()}
+    for name, together in ({name: (term,) for term, name in OF_TERM.items()} | TOGETHER).items():
         added = np.sum([equations.terms[term] for term in together], axis=0)
-        for body, those in groups(equations.tree).items():
-            yield factor("term", name.format(body), added[those].sum(axis=0))
+        for body, those in bodies.items():
+            column = added[those].sum(axis=0)
+            yield factor("term", name.format(body), column)
+            if is_small and len(together) == len(those) == 1:
+                for where, entries in (entries_of_M(equations) | of_rows).items():
+                    if len(entries) == 1 or where in of_rows:
+                        yield factor("term", f"{name.format(body)} in {where}", column, entries)
 
 
 def parts_of_terms(equations: Equations) -> Iterator[Place]:
-    """The factor of each part of a term of a body, in all and, for few joints, in an entry of M.
+    """The factor of each part of a term of a body, in all and, for few joints, in an entry of Mbar.
 
     T is a sum over the lengths that carry the body and its CoM, T' m T over pairs of these lengths.
     """
     if equations.nv > MOST_SPEEDS:
         return
-    in_M = equations.in_M
-    entries = [entry.named(equations.speeds) for entry in equations.entries[in_M]]
-    for b, body in enumerate(equations.tree.body_names):
-        for term, (k, entry) in product(BODY_TERMS[:2], enumerate(entries)):
-            yield factor("term", f"{OF_TERM[term].format(body)} in {entry}", equations.terms[term][b], [k])
+    entries = [entry.named(equations.speeds) for entry in equations.entries[equations.in_M]]
     for name, column in parts_of_bodies(equations).items():
         active = np.abs(column).max(axis=0) > FIT_ROUNDING * np.abs(column).max()
-        for k in np.flatnonzero(active[in_M]).tolist() if equations.nv <= MOST_JOINTS else ():
+        for k in np.flatnonzero(active[equations.in_M]).tolist() if equations.nv <= MOST_JOINTS else ():
             yield factor("part", f"{name} in {entries[k]}", column, [k])
         yield factor("part", name, column)
 
@@ -86,9 +130,8 @@ def parts_of_terms(equations: Equations) -> Iterator[Place]:
 def lengths_of(tree: tmt.Tree, b: int) -> dict[str, list[tuple[str, int]]]:
     """What carries the CoM of a body: numbers of the tree by names; slides that follow each other are one."""
     lengths: dict[str, list[tuple[str, int]]] = {}
-    moving = [i for i in range(len(tree.parent)) if tree.moves(b)[i]]
     slides: list[int] = []
-    for i in moving:
+    for i in (i for i in range(len(tree.parent)) if tree.moves(b)[i]):
         name = tree.joint_names[i]
         if tree.parent[i] >= 0 and np.any(tree.offset[i]):
             lengths[f"offset of {name}"] = [("offset", i)]
@@ -139,91 +182,39 @@ def alone(equations: Equations, sets: list[list[tuple[str, int]]]) -> np.ndarray
 
 
 def coefficients(equations: Equations) -> Iterator[Place]:
-    """Entries of Mbar, entries of gravity, and the coefficients of products of rates in h; 1 is right."""
-    nv, speeds, right, layout = equations.nv, equations.speeds, equations.right, equations.layout
-    zero = np.zeros_like(right)
-    for k, entry in enumerate(equations.entries[equations.in_M]):
-        yield factor("coefficient", entry.named(speeds), right, [k])
-    for block, entries in blocks(equations).items():
-        yield factor("coefficient", block, right, entries)
+    """Entries of Mbar, rows of h and their two parts, and the coefficients of products of speeds; 1 is right."""
+    layout, right, (M, velocity_terms, rest) = equations.layout, equations.right, equations.parts
+    for name, entries in entries_of_M(equations).items():
+        yield factor("coefficient", name, right, entries)
     parts = {"M": equations.in_M, "h": equations.in_h, "M and h": ALL} if layout.qdd is None else {}
     for name, part in parts.items():
         yield factor("coefficient", f"all of {name}", right, part)
-    rows = [Entry("h", (i,)).named(speeds) for i in range(nv)]
-    for i, row in enumerate(rows):
-        yield factor("coefficient", row, right, layout.of_row(i))
-
-    for joint, those in speeds_of_joints(equations.tree).items():
-        of_joint = [layout.of_row(i) for i in those]
-        if len(those) > 1:
-            yield factor("coefficient", f"h[{joint}]", right, list(chain.from_iterable(of_joint)))
-        for k, name in enumerate(list(layout.parts)[1:] if layout.is_split else ()):
-            yield factor("coefficient", f"{name} of h[{joint}]", right, [row[k] for row in of_joint])
-
-    def in_row(values: np.ndarray, i: int, part: str) -> np.ndarray:
-        column = zero.copy()
-        column[:, layout.of_row(i, part)] = values[:, None]
-        return column
-
-    for entry, values in equations.coefficients.items():
-        i, *pair = entry.at
-        if entry.kind == "gravity":
-            yield factor("coefficient", f"{rows[i]} at rest", in_row(values, i, "gravity"))
-        elif entry.kind == "velocity":
-            rates = np.prod(equations.qd[:, pair], axis=1)
-            yield factor("coefficient", entry.named(speeds), in_row(values * rates, i, "velocity terms"))
-    if nv > MOST_SPEEDS:
+    of_h = {"": (velocity_terms, rest), "velocity terms of ": (velocity_terms, 0.0 * rest)}
+    of_h |= {"gravity of ": (0.0 * rest, rest)}
+    for name, rows in rows_of_h(equations).items():
+        for before, values in of_h.items():
+            column = layout.packed(0.0 * M, *values)
+            yield factor("coefficient", f"{before}{name}", column, in_rows(equations, rows))
+    if equations.nv > MOST_SPEEDS:
         return
-    for (first, of_first), (second, of_second) in combinations_with_replacement(
-        speeds_of_joints(equations.tree).items(), 2
-    ):
-        column = zero.copy()
-        for entry, values in equations.coefficients.items():
+
+    def place(name: str, terms: list[tuple[Entry, np.ndarray]]) -> Place:
+        """The factor of some velocity terms."""
+        added = np.zeros_like(rest)
+        for entry, values in terms:
             i, *pair = entry.at
-            if entry.kind == "velocity" and is_between(pair[0], pair[1], of_first, of_second):
-                column[:, layout.of_row(i, "velocity terms")] += (
-                    values * np.prod(equations.qd[:, pair], axis=1)
-                )[:, None]
-        yield factor("coefficient", f"products of the speeds of {first} and {second} in h", column)
-    at_rest = [equations.coefficients[Entry("gravity", (i,))] for i in range(nv)]
-    for i, j in np.argwhere(~np.eye(nv, dtype=bool)).tolist():
-        yield factor(
-            "coefficient", f"{rows[j]} at rest in {rows[i]}", in_row(at_rest[j], i, "gravity"), stated=0.0
-        )
-    for term, (b, body) in product(BODY_TERMS[2:], enumerate(equations.tree.body_names)):
-        for i, row in enumerate(rows):  # the factor of a term of a body in one row of h alone
-            yield factor(
-                "term", f"{OF_TERM[term].format(body)} in {row}", equations.terms[term][b], layout.of_row(i)
-            )
+            added[:, i] += values * np.prod(equations.qd[:, pair], axis=1)
+        return factor("coefficient", name, layout.packed(0.0 * M, added, 0.0 * rest))
 
-
-def blocks(equations: Equations) -> dict[str, list[int]]:
-    """Entries of Mbar that couple two joints of several speeds, by their name; slides of a free joint are one."""
-    joints, found = speeds_of_joints(equations.tree), {}
-    for (first, of_first), (second, of_second) in combinations_with_replacement(joints.items(), 2):
-        inside = [
-            k
-            for k, (i, j) in enumerate(zip(*equations.layout.places))
-            if is_between(i, j, of_first, of_second)
-        ]
-        if max(len(of_first), len(of_second)) > 1:
-            found[f"M[{first}][{second}]"] = inside
-    return found
-
-
-def speeds_of_joints(tree: tmt.Tree) -> dict[str, list[int]]:
-    """The numbers of the speeds of each joint, and of the three slides of each free joint."""
-    joints = {
-        name: list(range(joint.qd.start, joint.qd.stop))
-        for name, joint in zip(tree.joint_names, tree.coordinates.joints)
-    }
-    for i, kind in enumerate(tree.kind):
-        slides = [tree.joint_names[k] for k in range(i - 3, i) if k >= 0 and tree.kind[k] == "slide"]
-        if kind == "ball" and len(slides) == 3:
-            joints[", ".join(slides)] = [v for name in slides for v in joints[name]]
-    return joints
-
-
-def is_between(i: int, j: int, first: list[int], second: list[int]) -> bool:
-    """Whether an entry couples a speed of one joint with one of another."""
-    return (i in first and j in second) or (j in first and i in second)
+    terms = [(entry, values) for entry, values in equations.coefficients.items() if entry.kind == "velocity"]
+    for term in terms:
+        yield place(term[0].named(equations.speeds), [term])
+    joints = speeds_of_joints(equations.tree)
+    for first, second in combinations_with_replacement(joints, 2):
+        those = [term for term in terms if is_between(term[0].at[1:], joints[first], joints[second])]
+        yield place(f"products of the speeds of {first} and {second} in h", those)
+    for i, j in chain.from_iterable(((i, j), (j, i)) for i, j in combinations(range(equations.nv), 2)):
+        moved = np.zeros_like(rest)
+        moved[:, i] = rest[:, j]
+        name = f"gravity of h[{equations.speeds[j]}] in h[{equations.speeds[i]}]"
+        yield factor("coefficient", name, layout.packed(0.0 * M, 0.0 * rest, moved), stated=0.0)

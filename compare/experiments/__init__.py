@@ -12,8 +12,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from ..core.experiment import Experiment as Experiment
 from ..core.finding import Finding
+from ..core.records import Experiment as Experiment
 from ..core.records import records_in
 
 if TYPE_CHECKING:  # for --help, the names are enough

@@ -54,7 +54,7 @@ class Answer(NamedTuple):
 
     @property
     def nearest(self) -> np.ndarray:
-        """The doubles nearest to the exact values."""
+        """The exact values as doubles."""
         return self.exact.astype(float)
 
     @property
@@ -98,56 +98,41 @@ def rows(setup: Setup) -> Result:
     result, robot, dynamics = Result("published", shown=SHOWN), setup.robot, setup.compared()
     answers = {item.item: answer(item, robot, dynamics) for item in robot.printed}
     for item in robot.printed:
-        check_answer(result, item, answers[item.item], robot.joints)
-        result.rows += rows_of(item, answers[item.item], robot.joints)
+        computed, printed = answers[item.item], np.array(item.values)
+        check_answer(result, item, computed, robot.joints)
+        tolerance = computed.rounding + (0.0 if item.is_rounding else item.half_digit)
+        for index in np.ndindex(printed.shape):
+            result.rows.append(PrintedRow(
+                item=item.item, posture=item.posture, quantity=item.quantity, unit=item.unit,
+                component=" ".join(robot.joints[i] for i in index), published=float(printed[index]),
+                exact=float(computed.nearest[index]), tmt=float(computed.tmt[index]),
+                mujoco=float(computed.mujoco[index]), tolerance=tolerance,
+            ))  # fmt: skip
     if robot.remarks:
         result.notes += robot.remarks(answers, dynamics)
     return result
 
 
-def rows_of(item: Printed, computed: Answer, joints: tuple[str, ...]) -> list[PrintedRow]:
-    printed = np.array(item.values)
-    return [
-        PrintedRow(
-            item=item.item,
-            posture=item.posture,
-            quantity=item.quantity,
-            component=" ".join(joints[i] for i in index),
-            unit=item.unit,
-            published=float(printed[index]),
-            exact=float(computed.nearest[index]),
-            tmt=float(computed.tmt[index]),
-            mujoco=float(computed.mujoco[index]),
-            tolerance=computed.rounding + (0.0 if item.is_rounding else item.half_digit),
-        )
-        for index in np.ndindex(printed.shape)
-    ]
-
-
 def check_answer(result: Result, item: Printed, computed: Answer, joints: tuple[str, ...]) -> None:
     """Checks of one item: the printed digits, or, where those are rounding, the exact value."""
-    printed, where = np.array(item.values), f"({item.item}) {item.posture}"
-    quantity, unit = item.quantity, item.unit
-    by_label = {"TMT": computed.tmt, "MuJoCo": computed.mujoco, "exact": computed.nearest}
-    from_printed = {label: np.abs(values - printed).max() for label, values in by_label.items()}
-    if item.is_rounding:
-        for label in ("TMT", "MuJoCo"):
-            from_exact = f"{label}: {quantity} - exact"
-            difference = distance(by_label[label], computed.exact).max()
-            result.check(where, from_exact, difference, computed.rounding, unit, rounding=True)
-    else:
-        for label, difference in from_printed.items():
-            printed_digits = f"{label}: {quantity} - printed"
-            result.check(where, printed_digits, difference, item.half_digit + computed.rounding, unit)
+    printed, where, rounding = np.array(item.values), f"({item.item}) {item.posture}", computed.rounding
+    quantity, unit, nearest = item.quantity, item.unit, computed.nearest
+    by_label = {"TMT": computed.tmt, "MuJoCo": computed.mujoco, "exact": nearest}
+    off = {label: np.abs(values - printed).max() for label, values in by_label.items()}
+    for label, values in by_label.items():
+        from_exact, printed_digits = f"{label}: {quantity} - exact", f"{label}: {quantity} - printed"
+        if not item.is_rounding:
+            result.check(where, printed_digits, off[label], item.half_digit + rounding, unit)
+        elif label != "exact":
+            difference = distance(values, computed.exact).max()
+            result.check(where, from_exact, difference, rounding, unit, rounding=True)
     for label in ("exact", "TMT"):
         if label.lower() in item.to_every_digit:
             every_digit = f"{label}: {quantity} - printed"
-            result.check(where, every_digit, from_printed[label], item.half_digit, unit)
+            result.check(where, every_digit, off[label], item.half_digit, unit)
     for joint in item.sizes:
-        k = joints.index(joint)
-        size = f"exact: |{quantity}_{joint}| - |printed|"
-        difference = abs(abs(computed.nearest[k]) - abs(printed[k]))
-        result.check(where, size, difference, item.half_digit, unit)
+        k, size = joints.index(joint), f"exact: |{quantity}_{joint}| - |printed|"
+        result.check(where, size, abs(abs(nearest[k]) - abs(printed[k])), item.half_digit, unit)
 
 
 def headline(result: Result) -> Finding | None:

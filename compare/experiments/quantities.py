@@ -16,9 +16,8 @@ from ..core.check import Result
 from ..core.finding import Finding
 from ..core.text import say
 from ..engines import LABELS
-from ..engines.mujoco.dynamics import convective_accelerations
 from ..engines.tmt import Compiled
-from ..judge.agree import AgreementResult, Compared, agree
+from ..judge.agree import AgreementResult, agree
 from ..judge.entries import Entries, unit
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
@@ -28,8 +27,6 @@ from .setup import Setup
 
 if TYPE_CHECKING:
     from tmt.exact.many import Pairs
-
-Array = np.ndarray
 
 
 class Quantity(NamedTuple):
@@ -79,13 +76,14 @@ class Comparison:
     """Two engines, at random states also tmt's compiled functions: each function is called once."""
 
     def __init__(self, setup: Setup, result: AgreementResult, sample: Sample):
-        self.result, self.sample, self.robot = result, sample, setup.robot
+        self.sample, self.robot = sample, setup.robot
         self.engines: list[Any] = [*setup.compared().values()]  # Dynamics that know more, MuJoCo second
         is_small = self.robot.coordinates.nv <= MOST_SPEEDS  # code for more takes minutes to compile
         if sample is setup.random and is_small and not self.robot.own:
             self.engines.append(Compiled(self.robot.tree))
         self.scale = Entries(self.robot.tree, sample.q, sample.qd)
         self.returned: dict[str, list[Any]] = {}
+        self.agree = partial(agree, result, sample)  # a row and a check of values of the two engines
 
     def values(self, name: str) -> list[np.ndarray]:
         """A quantity by each engine, (states, ...)."""
@@ -93,9 +91,6 @@ class Comparison:
         function, part, states = quantity.function, quantity.part, quantity.states(self.sample)
         if function not in self.returned:
             self.returned[function] = [getattr(engine, function)(*states) for engine in self.engines]
-            if function == "convective_terms" and self.robot.coordinates.has_balls:
-                # mj_jacDot of MuJoCo 4.0 leaves out what a ball does to a slide after it in the same body
-                self.returned[function][1] = convective_accelerations(self.engines[1], *states)
         return [values if part is None else values[part] for values in self.returned[function]]
 
     def acceleration_size(self) -> np.ndarray:
@@ -107,16 +102,12 @@ class Comparison:
     def acceleration_scale(self) -> np.ndarray:
         return QUANTITIES["qdd"].size(self.scale, self.sample.tau, self.acceleration_size())
 
-    def agree(self, name: str, unit: str, values: Array, mujoco_values: Array, scale: Array) -> None:
-        """A row and a check of values of the two engines, (states, ...)."""
-        agree(self.result, self.sample, Compared(name, unit, values, mujoco_values, scale))
-
     def compare(self, name: str) -> None:
         """Rows and checks of a quantity of two engines, and of MuJoCo and the compiled functions."""
         quantity, (values, mujoco_values, *compiled) = QUANTITIES[name], self.values(name)
         scale = self.acceleration_scale if name == "qdd" else quantity.size(self.scale)
         units, exact = quantity.unit(self.robot.tree), quantity.exact(self.sample)
-        agree(self.result, self.sample, Compared(name, units, values, mujoco_values, scale, exact))
+        self.agree(name, units, values, mujoco_values, scale, exact)
         for of_code in compiled:
             self.agree(f"{name}, compiled", units, of_code, mujoco_values, scale)
 
@@ -166,7 +157,7 @@ def figures(result: AgreementResult, robot: Robot) -> Iterator[Drawing]:
 
 def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[Drawing]:
     """The picture of M, h and accelerations on the first screen, where one of them was compared."""
-    from .figures_overview import agreements, draw_agreement
+    from .figures import agreements, draw_agreement
 
     if agreements(results):
         yield partial(draw_agreement, results)

@@ -6,8 +6,7 @@ import runpy
 import shlex
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import prod
 from pathlib import Path
@@ -132,7 +131,7 @@ class CProgram(Program):
         return self.compiled(self.compiler, name, loops, *flags, *texts)
 
     def faster(self) -> dict[str, ctypes.CDLL]:
-        """The functions compiled for a processor that multiplies and adds at once, as this one does, by the option for it."""
+        """The functions compiled for a processor that multiplies and adds at once, by each option for it."""
         cpu = Path("/proc/cpuinfo")
         if not cpu.is_file() or " fma " not in cpu.read_text(encoding="utf-8"):
             return {}
@@ -179,38 +178,31 @@ class CProgram(Program):
 
 
 class PythonProgram(Program):
-    """A module, called with all states at once."""
+    """A module whose functions are called with all states at once."""
 
     def __post_init__(self) -> None:
-        self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
+        try:
+            self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
+        except ImportError as error:
+            raise NotRun(f"{error.name} cannot be imported: {error}") from None
 
     def values(self, quantity: str, states: States) -> list[Array]:
         values = self.functions[identifier(quantity)](*taken(quantity, states), *self.parameters.values())
         return list(values) if quantity_of(quantity).parts else [values]
 
 
-class CasadiProgram(Program):
+class CasadiProgram(PythonProgram):
     """Functions of CasADi, called with numbers, state after state."""
 
-    def __post_init__(self) -> None:
-        with needed("casadi"):
-            self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
-
     def values(self, quantity: str, states: States) -> list[Array]:
-        function, shape = (
-            self.functions[identifier(quantity)],
-            shape_of(quantity, self.tree)[parts(quantity) > 1 :],
-        )
+        function = self.functions[identifier(quantity)]
+        shape = shape_of(quantity, self.tree)[parts(quantity) > 1 :]
         rows = [function.call([*state, *self.parameters.values()]) for state in zip(*taken(quantity, states))]
         return [np.array([part.full().reshape(shape) for part in results]) for results in zip(*rows)]
 
 
-class JaxProgram(Program):
+class JaxProgram(PythonProgram):
     """Functions of JAX, jitted, with 64 bits, called with all states at once."""
-
-    def __post_init__(self) -> None:
-        with needed("jax"):
-            self.functions = runpy.run_path(str(self.folder / f"{self.name}.py"))
 
     def values(self, quantity: str, states: States) -> list[Array]:
         import jax
@@ -221,21 +213,12 @@ class JaxProgram(Program):
         return list(map(np.asarray, values if quantity_of(quantity).parts else [values]))
 
 
-@contextmanager
-def needed(package: str) -> Iterator[None]:
-    """NotRun where a package is not installed."""
-    try:
-        yield
-    except ImportError as error:
-        raise NotRun(f"{package} cannot be imported: {error}") from None
-
-
-class SymbolicProgram(Program):
+class SymbolicProgram(PythonProgram):
     """The matrices of SymPy, as functions of states."""
 
     def __post_init__(self) -> None:
-        self.file = f"{self.name}.py"
-        self.matrices = runpy.run_path(str(self.folder / self.file))
+        super().__post_init__()
+        self.file, self.matrices = f"{self.name}.py", self.functions
         robot = Robot("", Path(), self.tree, {}, ())
         self.functions = functions_of(self.matrices, robot.coordinates, ())
 
@@ -276,6 +259,10 @@ class MatlabProgram(Program):
 
 
 PROGRAMS: dict[str, type[Program]] = {
-    "c": CProgram, "python": PythonProgram, "matlab": MatlabProgram, "casadi": CasadiProgram, "jax": JaxProgram,
+    "c": CProgram,
+    "python": PythonProgram,
+    "matlab": MatlabProgram,
+    "casadi": CasadiProgram,
+    "jax": JaxProgram,
     "latex": SymbolicProgram,
-}  # fmt: skip
+}

@@ -1,9 +1,11 @@
-"""How far rounding may take the results of a row of operations: a bound of first order, that runs along with them.
+"""How far rounding may take the results of a row of operations: a bound of first order, carried along.
 
-Each operation adds the rounding of its own result to what its operands bring (Higham, Accuracy and Stability of Numerical
-Algorithms, 2002, section 3.3). In units of eps, twice the unit of rounding, so that fused operations and functions
-that are off by one unit are within it.
+Each operation adds the rounding of its own result to what its operands bring (Higham, Accuracy and Stability of
+Numerical Algorithms, 2002, section 3.3). In units of eps, twice the unit of rounding, so that fused operations
+and functions that are off by one unit are within it.
 """
+
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,18 @@ from numpy.typing import NDArray
 from tmt.compiled.straight import Traced
 
 Array = NDArray[np.float64]
+
+
+# the result of an operation, and its derivatives by its operands
+OPERATIONS: dict[str, tuple[Callable[..., Array], Callable[..., Sequence[Array | float]]]] = {
+    "+": (np.add, lambda x, y: (1.0, 1.0)),
+    "-": (np.subtract, lambda x, y: (1.0, 1.0)),
+    "*": (np.multiply, lambda x, y: (y, x)),
+    "/": (np.divide, lambda x, y: (1.0 / y, x / (y * y))),
+    "neg": (np.negative, lambda x: (1.0,)),
+    "sqrt": (np.sqrt, lambda x: (0.5 / np.sqrt(x),)),
+    "arctan": (np.arctan, lambda x: (1.0 / (1.0 + x * x),)),
+}
 
 
 def running_error(traced: Traced, inputs: Array, errors: Array) -> Array:
@@ -30,29 +44,9 @@ def running_error(traced: Traced, inputs: Array, errors: Array) -> Array:
             value[i] = both[arguments[1]]
             error[i] = np.abs(both[1 - arguments[1]]) * error[angle] + np.abs(value[i])
         elif kind not in ("input", "sincos"):
+            result, slopes = OPERATIONS[kind]
             operands = [value[a] for a in arguments]
-            brought = slopes(kind, operands)
-            value[i] = RESULTS[kind](*operands)
-            error[i] = sum((np.abs(s) * error[a] for s, a in zip(brought, arguments)), np.abs(value[i]))
+            value[i] = result(*operands)
+            brought = [np.abs(slope) * error[a] for slope, a in zip(slopes(*operands), arguments)]
+            error[i] = sum(brought, np.abs(value[i]))
     return np.array([error[i] for i in outputs])
-
-
-RESULTS = {
-    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "neg": np.negative, "sqrt": np.sqrt,
-    "arctan": np.arctan,
-}  # fmt: skip
-
-
-def slopes(kind: str, operands: list[Array]) -> list[Array]:
-    """The derivatives of an operation by its operands."""
-    x, y = operands[0], operands[-1]
-    one = np.ones_like(x)
-    return {
-        "+": lambda: [one, one],
-        "-": lambda: [one, one],
-        "*": lambda: [y, x],
-        "/": lambda: [1.0 / y, x / (y * y)],
-        "neg": lambda: [one],
-        "sqrt": lambda: [0.5 / np.sqrt(x)],
-        "arctan": lambda: [1.0 / (1.0 + x * x)],
-    }[kind]()

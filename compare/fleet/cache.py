@@ -1,16 +1,16 @@
-"""The folder of a fleet: a report for each file, with its row of the table and the key of everything that both depend on."""
+"""The folder of a fleet: a report for each file, its row of the table and the key of all they depend on."""
 
 import hashlib
 import json
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
 from ..core.errors import ROOT, Refused
 from ..process import interrupt
-from ..report.folder import fcntl, lock, unlock, what_is_wrong
+from ..report import folder
 from ..report.provenance import installed
 from .models import unpacked
 
@@ -26,7 +26,7 @@ def program() -> str:
     digest = hashlib.sha256()
     for name in ("compare", "mjcf", "tmt"):
         for path in sorted((ROOT / name).rglob("*")):
-            if path.is_file() and path.suffix in (".py", ".xml", ".html", ".js", ".jinja"):
+            if path.is_file() and path.suffix in (".py", ".xml", ".jinja"):
                 digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     digest.update(repr([(name, installed(name)) for name in COMPUTED_WITH]).encode())
     return digest.hexdigest()
@@ -35,20 +35,18 @@ def program() -> str:
 @contextmanager
 def locked(out: Path) -> Iterator[None]:
     """Hold the folder of a fleet. Refused: it cannot be made, or another fleet uses it."""
-    try:
-        (out / FILES).mkdir(parents=True, exist_ok=True)
-        held = lock(out / FILES, wait=False)
-    except OSError as error:
-        why = what_is_wrong(out, error)
-        raise Refused(f"cannot write to {out}: {why}; expected a writable folder") from None
-    if held is None and fcntl is not None:
-        advice = "use another folder (--out), or wait until it has ended"
-        raise Refused(f"another fleet is writing to {out}; {advice}")
-    interrupt.Now.line = f"interrupted; {RESUME}"
-    try:
+    with ExitStack() as stack:
+        try:
+            (out / FILES).mkdir(parents=True, exist_ok=True)
+            is_held = stack.enter_context(folder.locked(out / FILES, wait=False))
+        except OSError as error:
+            why = folder.what_is_wrong(out, error)
+            raise Refused(f"cannot write to {out}: {why}; expected a writable folder") from None
+        if not is_held and folder.fcntl:
+            advice = "use another folder (--out), or wait until it has ended"
+            raise Refused(f"another fleet is writing to {out}; {advice}")
+        interrupt.Now.line = f"interrupted; {RESUME}"
         yield
-    finally:
-        unlock(held)
 
 
 def saved(place: Path, key: str) -> object:

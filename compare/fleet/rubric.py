@@ -7,13 +7,13 @@ bias = 2            # a check of an experiment, of one place or scene: "mass, fo
 
 import json
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..core.errors import Refused
 from ..core.words import in_one_line, listed, some_of
-from ..robots.validation import is_number
+from ..robots.scene import is_number
 from .cache import RESUME
 from .models import place_of_report
 from .table import FileRow
@@ -43,24 +43,20 @@ class Rubric(NamedTuple):
         return sum(entry.points for entry in self.entries)
 
     def award(self, rows: Iterable[FileRow], out: Path) -> None:
-        """Set the points of each row by its report in the folder of the fleet; without a report 0. Refused: see `require`."""
+        """Set the points of each row by its report in the folder of the fleet; without a report 0.
+
+        Refused: an entry is about no check of any report.
+        """
         known: list[Mapping[str, Any]] = []
         for row in rows:
             checks = checks_of(out / place_of_report(row.same_as or row.file)) if row.has_report else []
             row.points = float(sum(entry.points for entry in self.entries if is_earned(entry, checks)))
             known += checks
-        if known:
-            self.require(known)
-
-    def require(self, checks: Sequence[Mapping[str, Any]]) -> None:
-        """Refused, if an entry is about no check of any file."""
         for entry in self.entries:
-            if not any(map(entry.is_about, checks)):
-                names = {
-                    check["quantity"]: None for check in checks if check["experiment"] == entry.experiment
-                }
+            if known and not any(map(entry.is_about, known)):
+                names = {check["quantity"] for check in known if check["experiment"] == entry.experiment}
                 where = f"{self.path}: {entry.experiment}: no file has a check {in_one_line(entry.check)!r}"
-                raise Refused(f"{where}; known: {some_of(list(names)) or 'none'}; {RESUME}")
+                raise Refused(f"{where}; known: {some_of(sorted(names)) or 'none'}; {RESUME}")
 
 
 def is_earned(entry: Entry, checks: Sequence[Mapping[str, Any]]) -> bool:
@@ -70,39 +66,27 @@ def is_earned(entry: Entry, checks: Sequence[Mapping[str, Any]]) -> bool:
 
 def checks_of(report: Path) -> list[Mapping[str, Any]]:
     """The checks in results.json of a report."""
-    content = json.loads((report / "results.json").read_text(encoding="utf-8"))
-    return list(content["checks"])
+    return list(json.loads((report / "results.json").read_text(encoding="utf-8"))["checks"])
 
 
 def read_rubric(path: str, experiments: Sequence[str]) -> Rubric:
-    """The rubric of a file, for the experiments that are run. Refused, in one line, for what is wrong in it."""
-    shown = in_one_line(path)
+    """The rubric of a file, for the experiments that are run. Refused, in one line: what is wrong in it."""
+    shown, entries = in_one_line(path), []
     try:
-        content = tomllib.loads(Path(path).read_text(encoding="utf-8")) if Path(path).is_file() else None
+        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:  # TOML's and Unicode's errors are ValueErrors
         why = " ".join(str(error).split())
         raise Refused(f"--rubric: {shown} is not a TOML file that can be read: {why}") from None
-    if content is None:
-        raise Refused(f"--rubric: {shown} is not a file; expected a TOML file")
-    entries = tuple(entries_of(shown, content))
-    for entry in entries:
-        if entry.experiment not in experiments:
+    for experiment, value in content.items():
+        if experiment not in experiments:
             known = listed(list(experiments))
-            raise Refused(
-                f"{shown}: {in_one_line(entry.experiment)} is not an experiment of this fleet: {known}"
-            )
-        if not is_number(entry.points) or entry.points < 0.0:
-            name = ": ".join(filter(None, entry[:2]))
-            raise Refused(f"{shown}: {in_one_line(name)} is {entry.points!r}; expected points, at least 0")
+            raise Refused(f"{shown}: {in_one_line(experiment)} is not an experiment of this fleet: {known}")
+        points_of = value if isinstance(value, dict) else {"": value}
+        for check, points in points_of.items():
+            if not is_number(points) or points < 0.0:
+                name = in_one_line(f"{experiment}: {check}" if check else experiment)
+                raise Refused(f"{shown}: {name} is {points!r}; expected points, at least 0")
+            entries.append(Entry(experiment, check, points))
     if not entries:
         raise Refused(f"{shown} has no entry; {EXPECTED}")
-    return Rubric(shown, entries)
-
-
-def entries_of(shown: str, content: Mapping[str, Any]) -> Iterator[Entry]:
-    for experiment, value in content.items():
-        if not isinstance(value, dict):
-            yield Entry(experiment, "", value)
-            continue
-        for check, points in value.items():
-            yield Entry(experiment, check, points)
+    return Rubric(shown, tuple(entries))

@@ -9,15 +9,15 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
-from ..core.text import block, say
+from ..core.text import block
 from ..engines.mujoco import ModelError, read
-from ..experiments import TIMED, skipped
+from ..experiments import TIMED
 from ..process.workers import Clock
 from ..report import folder, provenance
 from ..report.terminal import Terminal
 from ..robots.case import SEED
 from ..run import examine as experiment
-from ..run.command import write_report
+from ..run.command import applying, write_report
 from ..run.reference import SOLUTION, JointsDiffer, compared_with
 from .models import unpacked
 from .table import DIFFER, REFUSED, FileRow, judge
@@ -31,9 +31,8 @@ class FleetOptions(NamedTuple):
 
     def command(self, shown: str) -> str:
         """The command that writes the same report for one file."""
-        words = ["fleet", shown]
-        words += [] if self.is_quick else ["--full"]
-        words += ["--timing"] if {*TIMED} & {*self.names} else []
+        is_timed = not {*TIMED}.isdisjoint(self.names)
+        words = ["fleet", shown] + ["--full"] * (not self.is_quick) + ["--timing"] * is_timed
         words += ["--only", ",".join(self.names)]
         words += ["--reference", self.reference] if self.reference else []
         return shlex.join(["python", "-m", "compare", *words])
@@ -61,8 +60,7 @@ def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) ->
         why = str(error).replace(str(path), shown).replace(os.path.join(path.parent, ""), "")
         row.reason = why.removeprefix(f"{shown} cannot be compared: ")
         return Compared(row, {})
-    reasons = {name: say(reason) for name in options.names if (reason := skipped(name, compared.robot))}
-    names = [name for name in options.names if name not in reasons]
+    names, reasons = applying(options.names, compared.robot)
     row.joints, row.reference = len(compared.robot.joints), compared.reference.kind
     row.file_integrator, row.file_dt = reading.integrator, reading.dt
     if not names:

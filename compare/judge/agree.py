@@ -22,22 +22,6 @@ SHOWN = (  # fields of a comparison in a report; its file has all
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Compared:
-    """A quantity by two engines at the states of a sample, (states, ...) each.
-
-    scale: a number or (states,), or with as many dimensions as the values for a scale of each entry; the
-    tolerance is 64 eps x scale. exact: at the first states.
-    """
-
-    quantity: str
-    unit: str
-    values: ArrayLike
-    mujoco_values: ArrayLike
-    scale: ArrayLike
-    exact: "Pairs | None" = None
-
-
 @dataclass(kw_only=True)
 class AgreementRow(Row):
     """One quantity over the states of a sample; the column of `from_exact` is named after the engine."""
@@ -78,40 +62,32 @@ class AgreementResult(Result):
     distances: dict[str, dict[str, dict[str, np.ndarray]]] = field(default_factory=dict)
 
 
-def agree(result: AgreementResult, sample: Sample, compared: Compared) -> None:
-    """Add a row and a check: the difference between two engines that is closest to its tolerance.
+def agree(
+    result: AgreementResult, sample: Sample, quantity: str, unit: str, values: ArrayLike, mujoco_values: ArrayLike,
+    scale: ArrayLike, exact: "Pairs | None" = None,
+) -> None:  # fmt: skip
+    """Add a row and a check: the difference between two engines that is closest to its tolerance, 64 eps x scale.
 
-    Where exact values are known there is also a check for each engine: of its distance from them.
+    values, mujoco_values: (states, ...). scale: a number or (states,), or with as many dimensions as the values for
+    a scale of each entry. exact: at the first states; of each engine's distance from them there is a check too.
     """
-    quantity, exact = compared.quantity, compared.exact
-    measured = {quantity: worst_of_each(np.subtract(compared.values, compared.mujoco_values), compared.scale)}
+    measured = {quantity: worst_of_each(np.subtract(values, mujoco_values), scale)}
     if exact is not None and len(exact.high):
-        for engine, values in ((result.label, compared.values), ("MuJoCo", compared.mujoco_values)):
-            measured[f"{quantity}, {engine} to exact"] = distance_from_exact(exact, values, compared.scale)
-    checks = [check_closest(result, sample, name, compared.unit, *pair) for name, pair in measured.items()]
-    (check, worst), (difference, scale) = checks[0], measured[quantity]
+        for engine, of_engine in ((result.label, values), ("MuJoCo", mujoco_values)):
+            measured[f"{quantity}, {engine} to exact"] = distance_from_exact(exact, of_engine, scale)
+    checks = [check_closest(result, sample, name, unit, *pair) for name, pair in measured.items()]
+    (check, worst), (difference, scales) = checks[0], measured[quantity]
     in_eps = (np.sort(over(sizes, EPS * of_sizes)) for sizes, of_sizes in measured.values())
     distances = dict(zip(DISTANCES, in_eps))
     result.distances.setdefault(sample.name, {})[quantity] = distances
     row = AgreementRow(
-        engine=result.label,
-        scene=sample.name,
-        quantity=quantity,
-        unit=compared.unit,
-        states=len(sample.q),
+        engine=result.label, scene=sample.name, quantity=quantity, unit=unit, states=len(sample.q),
         largest_difference=float(difference.max()) if np.isfinite(difference).all() else None,
-        worst_difference=check.value,
-        bar=check.tolerance,
-        difference_over_bar=check.over_tolerance,
-        scale=float(scale[worst]),
-        exact_states=None if exact is None else len(exact.high),
-        worst_state=check.note,
-        worst_q=in_full(sample.q[worst]),
-        worst_qd=in_full(sample.qd[worst]),
-        worst_tau=in_full(sample.tau[worst]),
-        passed=check.passed,
-        **{name: float(values[-1]) for name, values in distances.items()},
-    )
+        worst_difference=check.value, bar=check.tolerance, difference_over_bar=check.over_tolerance,
+        scale=float(scales[worst]), exact_states=None if exact is None else len(exact.high), worst_state=check.note,
+        worst_q=in_full(sample.q[worst]), worst_qd=in_full(sample.qd[worst]), worst_tau=in_full(sample.tau[worst]),
+        passed=check.passed, **{name: float(in_order[-1]) for name, in_order in distances.items()},
+    )  # fmt: skip
     result.rows.append(row)
     result.shown = [name for name, (field, _) in row.columns().items() if field in SHOWN]
 
@@ -154,8 +130,7 @@ def share_of(difference: np.ndarray, scale: np.ndarray) -> np.ndarray:
 def worst_of_each(differences: ArrayLike, scale: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """Of each state the difference with the largest share of its scale, and that scale, (states,) each.
 
-    differences: (states, ...). scale: a number or (states,), or with as many dimensions as the differences;
-    it may have more states.
+    differences: (states, ...). scale: as for `agree`; it may have more states.
     """
     differences, scale = np.abs(differences), np.asarray(scale, dtype=float)
     states = len(differences)

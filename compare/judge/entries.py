@@ -129,11 +129,15 @@ class Entries:
         """Of Mbar qdd = tau - D qd - k (q - rest) - h, N m or N, (states, nv)."""
         return self.bias + np.abs(tau) + np.array(self.tree.damping) * np.abs(self.qd) + self.springs
 
-    def residual(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
-        """Of Mbar qdd and the forces; a factorization of Mbar has terms up to sqrt(Mbar_ii Mbar_jj)."""
+    @cached_property
+    def factored(self) -> np.ndarray:
+        """The terms of Mbar and of its factorization, up to sqrt(Mbar_ii Mbar_jj), (states, nv, nv)."""
         root = np.sqrt(np.einsum("sii->si", self.M))
-        sizes = self.added + root[:, :, None] * root[:, None, :]
-        return np.einsum("sij,sj->si", sizes, np.abs(qdd)) + force
+        return self.added + root[:, :, None] * root[:, None, :]
+
+    def residual(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
+        """Of Mbar qdd and the forces."""
+        return np.einsum("sij,sj->si", self.factored, np.abs(qdd)) + force
 
     def acceleration(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
         """Of qdd: errors of eps in Mbar and in the forces times |Mbar^-1|, (states, nv)."""
@@ -148,7 +152,7 @@ class Entries:
         return 2.0 * self.residual(force, np.broadcast_to(qdd, force.shape))
 
     def force_rates(self, qdd: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Of the derivatives of tau by movements of q and by qd, (states, nv, nv) each, at accelerations of these sizes."""
+        """Of the derivatives of tau by movements of q and by qd, (states, nv, nv) each, at these accelerations."""
         tree, sizes = self.tree, np.abs(np.broadcast_to(qdd, self.qd.shape))
         turning = sizes @ self.turns.T + self.spin**2  # (states, m)
         pushed = np.einsum("sbi,si->sb", self.t, sizes) + 2.0 * self.spin * self.speed
@@ -170,9 +174,7 @@ class Entries:
 
     def solved(self, right: np.ndarray, solution: np.ndarray) -> np.ndarray:
         """Of X with Mbar X = right, (states, nv, columns): |Mbar^-1| times the sizes of both sides."""
-        root = np.sqrt(np.einsum("sii->si", self.M))
-        sizes = self.added + root[:, :, None] * root[:, None, :]
-        return self.inverse @ (right + sizes @ np.abs(solution))
+        return self.inverse @ (right + self.factored @ np.abs(solution))
 
     def derivatives(self, tau: ArrayLike, qdd: np.ndarray, by: tmt.Derivatives) -> tmt.Derivatives:
         """Of what tmt.derivatives returns at tau, where it is `by`; qdd: the accelerations."""
@@ -180,22 +182,20 @@ class Entries:
         sizes = np.abs(qdd) + self.acceleration(force, qdd)
         by_movement, by_speed = self.force_rates(sizes)
         unit_torques = np.broadcast_to(np.eye(self.qd.shape[1]), by.dqdd_dtau.shape)
-        return tmt.Derivatives(
-            self.solved(by_movement, by.dqdd_dq),
-            self.solved(by_speed, by.dqdd_dqd),
-            self.solved(unit_torques, by.dqdd_dtau),
-            by_movement,
-            by_speed,
-        )
+        by_q, by_qd, by_tau = map(self.solved, (by_movement, by_speed, unit_torques), by[:3])
+        return tmt.Derivatives(by_q, by_qd, by_tau, by_movement, by_speed)
 
     def step(self, dt: float, by: tmt.Derivatives, scale: tmt.Derivatives) -> np.ndarray:
-        """Of [A B] of a step, (states, 2 nv, 3 nv): dt times that of the derivatives, carried through the step by their values.
+        """Of [A B] of a step, (states, 2 nv, 3 nv): dt times that of the derivatives, carried through the step.
 
-        by: the derivatives at the start, of which a method's step makes the first terms of an exponential; scale: theirs.
+        by: the derivatives at the start, of which a step makes the first terms of an exponential; scale: theirs.
         """
         nv = self.qd.shape[1]
         rates, sizes = np.zeros((2, len(self.q), 3 * nv, 3 * nv))
-        rates[:, :nv, nv : 2 * nv] = sizes[:, :nv, nv : 2 * nv] = np.eye(nv)
+        rates[:, :nv, nv : 2 * nv] = np.eye(nv)
+        sizes[:, :nv, nv : 2 * nv] = np.equal.outer(
+            self.of_speed, self.of_speed
+        )  # turns of a ball add to each other
         rates[:, nv : 2 * nv] = np.abs(np.concatenate(by[:3], axis=2))
         sizes[:, nv : 2 * nv] = np.concatenate(scale[:3], axis=2)
         carried = term = np.broadcast_to(np.eye(3 * nv), rates.shape)

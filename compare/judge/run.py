@@ -78,11 +78,6 @@ def deviation(q: np.ndarray, start: np.ndarray, coordinates: Coordinates | None 
     return float(away) if np.isfinite(away) else np.inf
 
 
-def deviation_alive(q: np.ndarray, start: np.ndarray, coordinates: Coordinates | None = None) -> float:
-    """The same up to where the run diverged, rad or m."""
-    return float(np.nanmax(moved_from(q, start, coordinates)))
-
-
 def departure(t: np.ndarray, q: np.ndarray, coordinates: Coordinates | None = None) -> float | None:
     """The first time at which a joint is 0.1 rad, or m, from its start; None: never."""
     away = ~(moved_from(q, q[0], coordinates).max(axis=1) <= LEFT)  # a run that is NaN has left too

@@ -19,20 +19,16 @@ from ..core.words import capital
 from ..robots import Robot
 from . import tables
 from .images import embedded
-from .motion import SCRIPT, motion_in_html
 from .questions import answers
 from .verdict import Figure, Parts, Report, Section, failures, headline, outcome, passed, standing
 
 MOST_ROWS, MOST_IN_MARKDOWN = 40, 6  # of a table; its file has all
-FIRST_NOTES = 3  # of a section of the page, which folds the others
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
 MAIN_TABLES = {
     "what_should_i_use": "What should I use?",
     "engines_answer": "Which engine?",
 }  # further tables of report.md, with their titles
-# macros of a picture of the first screen: overview_title, overview_alternative
-WORDS = "title", "alternative"
 # columns of failing checks
 ON_FIRST_SCREEN = "experiment", "scene", "quantity", "value", "tolerance", "note"
 JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
@@ -61,25 +57,22 @@ class Document:
 
     def __init__(self, report: Report, parts: Parts, folder: Path | None = None):
         self.report, self.parts, self.folder = report, parts, folder
-        self.page, self.motion = folder is not None, ""
+        self.page = folder is not None
         self.file = "index.html" if self.page else "report.md"
-        data = {"page": self.page, "embedded": self.embedded, "first_notes": FIRST_NOTES}
+        data = {"page": self.page, "embedded": self.embedded}
         data |= {"outcome": outcome, "standing": standing, "headline": headline}
         # its attributes are the macros
         self.template: Any = environment().get_template("document.md.jinja").make_module(data)
         self.answers = parts.attempt("the questions", None, answers, report.sections, report.robot)
 
-    def embedded(self, file: str) -> tuple[Markup, int, int]:
+    def embedded(self, figure: Figure) -> tuple[Markup, int, int]:
         assert self.folder is not None
-        return embedded(self.folder / "figures" / f"{file}.png")
+        return embedded(self.folder / "figures" / figure.path)
 
     def body(self) -> list[str]:
         """All parts below the verdict; those that break are left out."""
         report = self.report
         texts = [self.made("the first screen", self.first_screen)]
-        if self.page:
-            self.motion = self.made("the motion", motion_in_html, report.sections, report.robot.noun)
-            texts.append(self.motion)
         texts.append(self.made("the introduction", self.introduction))
         if report.causes:
             texts.append(self.template.causes(tables.of_causes(report.causes)))
@@ -104,8 +97,7 @@ class Document:
         if not self.page:
             return joined([head, *body])
         html = Markup(MarkdownIt("commonmark", {"html": True}).render(joined([head, *body])))
-        script = SCRIPT if self.motion else ""
-        values = {"title": title, "good": good, "links": self.links(), "script": script, "body": html}
+        values = {"title": title, "good": good, "links": self.links(), "body": html}
         return environment().get_template("page.html.jinja").render(values)
 
     def links(self) -> list[tuple[str, bool]]:
@@ -135,7 +127,9 @@ class Document:
             fails = any(other in wrong for other in group)
             for figure in section.figures:
                 if figure.is_overview:
-                    title, alternative = (block(section.name, f"overview_{part}") for part in WORDS)
+                    title, alternative = (
+                        block(section.name, f"overview_{x}") for x in ("title", "alternative")
+                    )
                     pictures.append(Picture(figure, link_to(group), title, alternative, fails))
         if not self.page:
             return pictures
@@ -155,13 +149,10 @@ class Document:
         checks, few = section.result.checks, MOST_ROWS if self.page else MOST_IN_MARKDOWN
         failed = [check for check in section.failed if check not in section.explained]
         not_judged = [check for check in checks if not check.judged]
-        figures = still_figures([section]) if self.page else section.own_figures
+        figures = section.own_figures
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
-        first = [figure for figure in figures if figure in first or figure.is_main]
+        first = [figure for figure in figures if figure in first or figure.is_main or figure.moves]
         lists = {"failing": listing(failed, few), "not_judged": listing(not_judged, few)}
-        lists["explained"] = listing(section.explained, MOST_ROWS)
-        of_all = tables.of_checks(tables.closest(checks, MOST_ROWS), tables.CHECK[1:])
-        lists["all"] = Listing(len(checks), of_all)  # those that fail or come closest to their tolerances
         of_section = [self.table(section, name, rows) for name, rows in section.tables.items()]
         folded = [figure for figure in figures if figure not in first]
         return self.template.section(section, lists, of_section, first, folded)
@@ -181,13 +172,10 @@ def listing(checks: Sequence[Check], most: int, columns: Sequence[str] = tables.
     return Listing(len(checks), tables.of_checks(checks[:most], columns))
 
 
-def still_figures(sections: Sequence[Section]) -> list[Figure]:
-    return [figure for section in sections for figure in section.own_figures if not figure.moves]
-
-
 def linked(sections: Sequence[Section]) -> list[Figure]:
     """The figures behind a picture: first those of distances or limits."""
-    return sorted(still_figures(sections), key=lambda figure: not figure.is_main)
+    figures = [figure for section in sections for figure in section.own_figures]
+    return sorted(figures, key=lambda figure: not figure.is_main)
 
 
 def link_to(sections: Sequence[Section]) -> str:

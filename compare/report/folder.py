@@ -13,7 +13,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
 
@@ -58,7 +58,7 @@ def new_report(out: str | Path) -> Iterator[Path]:
 class Work:
     def __init__(self, out: Path):
         self.out, self.path = out, out / ".new-"  # the path of the folder as soon as it is made
-        self.lock: int | None = None
+        self.lock = ExitStack()
         self.made = [path for path in (out, *out.parents) if not os.path.lexists(path)]  # the innermost first
 
     @property
@@ -72,7 +72,7 @@ class Work:
             with locked(self.out):
                 with interrupt.postponed:
                     self.path = Path(tempfile.mkdtemp(prefix=".new-", dir=self.out))
-                    self.lock = lock(self.path)
+                    self.lock.enter_context(locked(self.path))
                 self.new.mkdir()
                 clear_away(self.out)
                 refuse_foreign(self.out)
@@ -103,8 +103,7 @@ class Work:
         """Delete the files of this run, except the report, and the folders that it made and left empty."""
         if is_of_a_run(self.path):
             delete(self.path)
-        unlock(self.lock)
-        self.lock = None
+        self.lock.close()
         with suppress(OSError):  # not empty
             for path in self.made:
                 path.rmdir()
@@ -130,11 +129,10 @@ def clear_away(out: Path) -> None:
     """Restore and delete what killed runs have left; the folder of a running process is locked, and stays."""
     for work in sorted(out.glob(".new-*")):
         if is_of_a_run(work):
-            number = lock(work, wait=False)
-            if number is not None:
-                put_back(work, out)
-                delete(work)
-                unlock(number)
+            with locked(work, wait=False) as is_left:
+                if is_left:
+                    put_back(work, out)
+                    delete(work)
 
 
 def is_of_a_run(path: Path) -> bool:
@@ -156,29 +154,18 @@ def delete(work: Path) -> None:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    number = lock(folder)
-    try:
-        yield
-    finally:
-        unlock(number)
-
-
-def lock(folder: Path, wait: bool = True) -> int | None:
-    """A file descriptor with the lock, which ends with the process; None: locked, or there are no locks."""
+def locked(folder: Path, wait: bool = True) -> Iterator[bool]:
+    """Hold the lock of a folder in this block, at most until the process ends; whether it is held."""
     if fcntl is None:
-        return None
+        yield wait
+        return
     number = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(number, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        return number
-    except OSError:
-        os.close(number)
-        return None
-
-
-def unlock(number: int | None) -> None:
-    if number is not None:
+        with suppress(OSError):
+            fcntl.flock(number, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            wait = True
+        yield wait
+    finally:
         os.close(number)
 
 

@@ -31,4 +31,5 @@ def embedded(path: Path) -> tuple[Markup, int, int]:
     """The address of a figure inside a page, with its data; its width and height, or OSError."""
     with Image.open(path) as image:
         width, height = image.size
-    return Markup(f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"), width, height
+    data = base64.b64encode(path.read_bytes()).decode()
+    return Markup(f"data:image/{path.suffix[1:]};base64,{data}"), width, height

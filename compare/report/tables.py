@@ -1,8 +1,8 @@
 """Tables of a report as text, and the rows of a long table that a reader needs."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 
@@ -10,7 +10,6 @@ from ..core.cause import Cause
 from ..core.check import Check
 from ..core.rows import Column, Row, columns_of
 
-Item = TypeVar("Item")
 LONGEST_LIST = 80  # characters of a list in a report; its file has all
 EVERY_DIGIT = Column(digits=7)
 CAUSE = {"rank": Column(), "place": Column(), "stated": EVERY_DIGIT, "found": EVERY_DIGIT, "text": Column()}
@@ -55,21 +54,11 @@ def of_checks(checks: Sequence[Check], columns: Sequence[str] = CHECK) -> pd.Dat
     return of_records(records, dict.fromkeys(columns, Column()))
 
 
-def closest(checks: Sequence[Check], most: int) -> list[Check]:
-    """At most `most` checks: those that do not pass, then the largest shares of a rounding tolerance."""
-    return first(checks, most, lambda check: (check.passed, -(check.over_tolerance or 0.0)))
-
-
 def shortened(rows: Sequence[Row], most: int) -> tuple[list[Row], str]:
-    """The most urgent rows, at most `most`, and how many of how many these are ('' if all of them)."""
+    """The most urgent rows, at most `most`, in their order; how many of how many ('' if all of them)."""
     which = f"{most} of {len(rows):,} rows" if len(rows) > most else ""
-    return first(rows, most, lambda row: row.urgency), which
-
-
-def first(items: Sequence[Item], most: int, key: Callable[[Item], Any]) -> list[Item]:
-    """The items with the smallest keys, at most `most`, in their order."""
-    numbers = sorted(range(len(items)), key=lambda number: key(items[number]))
-    return [items[number] for number in sorted(numbers[:most])]
+    numbers = sorted(range(len(rows)), key=lambda number: rows[number].urgency)
+    return [rows[number] for number in sorted(numbers[:most])], which
 
 
 def of_origin(origin: Mapping[str, Any]) -> pd.DataFrame:

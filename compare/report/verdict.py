@@ -7,9 +7,8 @@ from typing import Any, NamedTuple, TypeVar
 from ..core.cause import Cause
 from ..core.check import About, Check, Result
 from ..core.errors import described
-from ..core.experiment import Experiment
 from ..core.finding import Finding
-from ..core.pictures import Pictures
+from ..core.records import Experiment
 from ..core.rows import Row
 from ..core.text import block, say
 from ..core.words import capital
@@ -21,12 +20,11 @@ OVERVIEW = "overview_"  # how the files of the pictures of the first screen begi
 
 
 class Figure(NamedTuple):
-    file: str  # its name, without .png
+    file: str  # its name, without .png; of an animation with .gif
     caption: str
 
     @property
     def moves(self) -> bool:
-        """Whether it is an animation, of which the page has another form."""
         return self.file.endswith(".gif")
 
     @property
@@ -56,7 +54,6 @@ class Section:
     figures: list[Figure] = field(default_factory=list)
     explained: list[Check] = field(default_factory=list)  # failing checks that are gone without the causes
     record: Experiment = UNKNOWN  # what the program knows of it
-    scenes: Sequence[Pictures] = ()  # the motion
 
     @property
     def notes(self) -> list[str]:

@@ -3,6 +3,7 @@
 import argparse
 import os
 import time
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from ..process.streams import say_error
 from ..process.workers import WorkerEnded, load_modules, start_workers
 from ..report.folder import new_report
 from ..report.terminal import Terminal
+from ..robots import Robot
 from ..robots.case import SEED
 from ..robots.scene_file import SceneError, read_scenes
 from ..robots.states import MOST_SPEEDS
@@ -66,33 +68,33 @@ def compute(
     terminal.say_lines(compared.reference.lines)
     if robot.coordinates.nv > MOST_SPEEDS:
         terminal.say(say(Finding("shared", "large", {"speeds": robot.coordinates.nv, "most": MOST_SPEEDS})))
-    names = [options.experiment] if is_alone else list(EXPERIMENTS)
+    names, reasons = applying([options.experiment] if is_alone else [*EXPERIMENTS], robot)
     with start_workers() as workers, terminal.progress("imports"):
-        for modules in (DRAWING, COMPUTING)[: len(names)]:  # in further processes at the same time
+        for modules in (DRAWING, COMPUTING)[: 1 if is_alone else 2]:  # in further processes at the same time
             workers.submit(load_modules, *modules)
         from ..report.provenance import durations, provenance
         from . import examine
 
-        reasons = {name: say(reason) for name in names if (reason := skipped(name, robot))}
-        names = [name for name in names if name not in reasons]
         origin = provenance(command, robot.mjcf, compared.reference.file, SEED)  # of the model as it was read
-        more = {
-            "map": workers.map,
-            "quiet": workers.quiet,
-            "progress": terminal.show,
-            "chosen": options.engines,
-        }
-        setup = examine.setup_of(compared, options.quick, alone=is_alone, request=request, **more)
-        for name, said in reasons.items():
-            terminal.say(block("run", "skipped", name=name, reason=said))
+        of_run: dict[str, Any] = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
+        of_run |= {"alone": is_alone, "request": request}
+        setup = examine.setup_of(compared, options.quick, options.engines, **of_run)
+        for name, reason in reasons.items():
+            terminal.say(block("run", "skipped", name=name, reason=reason))
         terminal.how_far = partial(examine.progress, workers.clock, names)
         examined = examine.examine(names, setup, folder, terminal, workers, workers.clock)
     origin |= {"seconds": round(time.perf_counter() - started, 1)} | durations(workers.clock)
     return write_report(folder, examined, reasons, origin, compared)
 
 
+def applying(names: Sequence[str], robot: Robot) -> tuple[list[str], dict[str, str]]:
+    """The experiments that apply to a robot, and of the others why they do not."""
+    reasons = {name: say(reason) for name in names if (reason := skipped(name, robot))}
+    return [name for name in names if name not in reasons], reasons
+
+
 def write_report(
-    folder: Path, examined: "Examined", skipped: dict[str, str], origin: dict[str, Any], compared: Compared
+    folder: Path, examined: "Examined", reasons: dict[str, str], origin: dict[str, Any], compared: Compared
 ) -> Written:
     """Write a report with its verdict to a folder that has its figures; what could not be made of it."""
     from ..report import files, verdict
@@ -102,6 +104,6 @@ def write_report(
     count, subject = len(EXPERIMENTS) - len(needless), block("run", "subject", kind=reference.kind)
     about = sections, count, causes, subject, robot.name
     words = parts.attempt("the verdict", "No verdict.", verdict.verdict, *about)
-    left_out, named = list((skipped | needless).items()), {"kind": reference.kind, "name": reference.name}
+    left_out, named = list((reasons | needless).items()), {"kind": reference.kind, "name": reference.name}
     report = verdict.Report(sections, robot, origin, words, causes, left_out, named, reference.lines)
     return report, files.write(folder, report, parts)

@@ -42,18 +42,18 @@ class Examined(NamedTuple):
 def setup_of(compared: Compared, is_quick: bool, chosen: str | None = None, **more: Any) -> Setup:
     """What the experiments need. chosen: the engines of --engines; more: further fields of Setup."""
     make = Setup.quick if is_quick else Setup
+    others = not_chosen(chosen) if chosen else set()
     of_run = engines(compared.mujoco, compared.reference.own)
-    if chosen:
-        others = not_chosen(chosen)
-        of_run = {name: engine for name, engine in of_run.items() if name not in others}
+    of_run = {name: engine for name, engine in of_run.items() if name not in others}
     return make(compared.robot, of_run, reading=compared.reading, **more)
 
 
 def not_chosen(chosen: str) -> set[str]:
-    """The engines that read files and are not among names separated by commas. Refused: a name is none of these."""
+    """The engines that read files and are not chosen, by names with commas. Refused: a name is none of these."""
     known, names = [name for name, record in RECORDS.items() if record.reads_file], chosen.split(",")
-    if unknown := [name for name in names if name not in known]:
-        raise Refused(block("run", "no_engine", name=unknown[0], known=known))
+    for name in names:
+        if name not in known:
+            raise Refused(block("run", "no_engine", name=name, known=known))
     return {*known} - {*names}
 
 
@@ -83,19 +83,20 @@ class Run:
     told: set[int] = field(default_factory=set)  # problems of the user's own equations, by their numbers
     drawings: list[tuple[Section, Future[list[Figure]]]] = field(default_factory=list)
 
-    @property
-    def is_large(self) -> bool:
-        """Whether the first answers come before any long work."""
-        return self.setup.robot.coordinates.nv > MOST_SPEEDS
-
-    @property
-    def order(self) -> list[str]:
-        last = ("kinematics", *TIMED) if self.is_large else TIMED
-        return sorted(self.names, key=last.__contains__)
+    def __post_init__(self) -> None:
+        is_large = (
+            self.setup.robot.coordinates.nv > MOST_SPEEDS
+        )  # the first answers come before any long work
+        last = ("kinematics", *TIMED) if is_large else TIMED
+        self.order, self.early = sorted(self.names, key=last.__contains__), () if is_large else self.names
 
     def examined(self) -> Examined:
         (self.folder / "figures").mkdir()
-        self.begin()
+        for name in self.early:
+            if begin := functions(name).begin:
+                with self.clock.of(name):
+                    self.work[name] = self.attempt(name, begin, self.setup)
+        self.clock.ends(START)
         needless = {}
         for name in self.order:
             reason = self.needless(name)
@@ -109,17 +110,9 @@ class Run:
         sections = sorted(self.sections, key=lambda section: self.names.index(section.name))
         return Examined(sections, self.causes, needless)
 
-    def begin(self) -> None:
-        for name in self.names:
-            begin = functions(name).begin
-            if begin and not self.is_large:
-                with self.clock.of(name):
-                    self.work[name] = self.attempt(name, begin, self.setup)
-        self.clock.ends(START)
-
     def attempt(self, name: str, act: Callable[..., Value], *arguments: Any) -> Value | None:
         """act(*arguments); if it raises, None, and the experiment has crashed."""
-        value, crash = attempt(name, self.setup.robot, act, *arguments)
+        value, crash = attempt(name, self.setup, act, *arguments)
         if crash:
             self.crashed.setdefault(name, crash)
         return value
@@ -192,7 +185,7 @@ def section_with(name: str, result: Result, robot: Robot) -> Section:
     of_robot = {"robot": robot, "values": experiment.claim_values(robot)}
     claim, tolerance = (say(Finding(name, kind, of_robot)) for kind in ("claim", "tolerance"))
     title, record = block(name, "title", robot=robot), EXPERIMENTS[name]
-    return Section(name, title, claim, tolerance, result, record=record, scenes=result.pictures)
+    return Section(name, title, claim, tolerance, result, record=record)
 
 
 def add_problems(result: Result, problems: Sequence[Problem], told: set[int]) -> None:
@@ -218,7 +211,7 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[Cause]
         return []
     of_numbers: list[Cause] = []
     if len(failed) == 1 and not setup.robot.own:
-        result, _ = attempt("parameters", setup.robot, functions("parameters").rows, setup)
+        result, _ = attempt("parameters", setup, functions("parameters").rows, setup)
         of_numbers = result.causes if result else []
     if (known or of_numbers) and setup.robot.is_stated:
         return in_one(setup, of_numbers)
@@ -226,7 +219,7 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[Cause]
     if not (not known if failed[-1] == "diagnosis" else is_first):
         return of_numbers
     places = [cause.place for cause in known]
-    found, _ = attempt("diagnosis", setup.robot, module("diagnosis").diagnosed, setup)
+    found, _ = attempt("diagnosis", setup, module("diagnosis").diagnosed, setup)
     causes = [cause for cause in found.causes if cause.place not in places] if found else []
     return causes + of_numbers
 
@@ -236,18 +229,18 @@ def in_one(setup: Setup, of_numbers: list[Cause]) -> list[Cause]:
     replaced = [cause for cause in of_numbers if cause.quantity in IN_EQUATIONS]
     if len(replaced) < 2:
         return of_numbers
-    found, _ = attempt("diagnosis", setup.robot, module("diagnosis").diagnosed, setup)
+    found, _ = attempt("diagnosis", setup, module("diagnosis").diagnosed, setup)
     explaining = [cause for cause in found.diagnosis.causes if cause.rank < 3] if found else []
     others = [cause for cause in of_numbers if cause not in replaced]
     return [explaining[0], *others] if explaining else of_numbers
 
 
 def attempt(
-    name: str, robot: Robot, act: Callable[..., Value], *arguments: Any
+    name: str, setup: Setup, act: Callable[..., Value], *arguments: Any
 ) -> tuple[Value | None, Result | None]:
     """act(*arguments), and None; if it raises, None and a Result with one failed check."""
     try:
-        with quiet(robot):
+        with quiet(setup.robot):
             return act(*arguments), None
     except WorkerEnded:
         raise
@@ -264,7 +257,7 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
 def say_outcome(
     terminal: Terminal, section: Section, seconds: float, new: Sequence[Cause], known: bool = False
 ) -> None:
-    """One line for an experiment, then the new causes, and the first failing checks that no known one explains."""
+    """A line for an experiment, then new causes, and the first failing checks that no known one explains."""
     used = [check.over_tolerance or 0.0 for check in section.result.checks]
     not_judged = failures([section]).not_judged
     about = {"is_open": bool(not_judged), "share": max(used, default=0.0), "seconds": seconds}

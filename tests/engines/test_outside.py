@@ -51,6 +51,16 @@ def test_a_pendulum(engine, tmp_path):
     assert near(of.acceleration(q, v, tau), (0.25 - 0.1 * 1.5 - moment) / inertia, engine, 100.0)
 
 
+def test_derivatives_are_those_of_the_equations(engine):
+    """Of the arm's seven joints, by movements, speeds and torques, with damping and springs."""
+    of, robot = dynamics(engine, ROBOTS[1])
+    if not of.has("derivatives"):
+        pytest.skip("it has no derivatives of this robot")
+    q, v, tau = np.random.default_rng(2).uniform(-1.0, 1.0, (3, 2, 7))
+    expected = np.stack(tmt.derivatives(q, v, tau, robot.tree)[:3], axis=1)
+    assert near(of.derivatives(q, v, tau), expected, engine, 1e3 * np.abs(expected).max())
+
+
 def test_a_free_body_that_spins(engine, tmp_path):
     """Euler's equations in body axes; the linear velocity is the world's; the body is turned."""
     of, _ = dynamics_or_skip(engine, FREE_BODY, tmp_path)

@@ -4,14 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from edited import setup_of_file
 
 from compare.core.finding import Finding
 from compare.core.text import say
 from compare.engines.mujoco import read
 from compare.engines.mujoco.differences import of_inverse, of_steps, of_transition
-from compare.experiments.derivatives import subjects, ways
-from compare.experiments.derivatives.contacts import contact_rows
-from compare.experiments.derivatives.tables import HardRow
+from compare.experiments.derivatives import contact_rows, subjects, ways
+from compare.experiments.derivatives.ways import DerivativeRow, best_of, worst_of_each_eps
 from compare.robots.arm import ARM
 
 DT = 0.01
@@ -23,26 +23,28 @@ def bent():
 
 
 def shares(mujoco, subject, *integrators) -> dict[str, float]:
-    every = ways.measured(subject, mujoco, integrators, DT, compiles=False)
+    every = ways.measured(ways.Task(subject, integrators, False), mujoco, DT)
     return {way: share for one in every for way, share in one.shares.items()}
 
 
 def test_centred_differences_are_more_exact_than_one_sided_ones_and_exact_derivatives_than_both(small):
     values = small("derivatives").top[0].values
-    assert 1e-7 < values["eps"] < 1e-3 and 1e-12 < values["error"] < 1e-8
-    assert values["usual_error"] > 30 * values["error"] and values["one_sided_error"] > 10 * values["error"]
-    assert 1e-10 < values["inverse_error"] < 1e-5 and values["exact"] < 1e-12
-    assert "use eps 1e-05, centred" in say(Finding("derivatives", "advice", {**values, "eps": 1e-5}))
+    centred, usual = values["centred"], values["usual"]
+    assert 1e-7 < centred.eps < 1e-3 and 1e-12 < centred.error < 1e-8 and usual.eps == 1e-6
+    assert usual.error > 30 * centred.error and values["one_sided"].error > 10 * centred.error
+    assert 1e-10 < values["inverse"].error < 1e-5 and values["exact"].error < 1e-12
+    values = {**values, "centred": dataclasses.replace(centred, eps=1e-5, unit="m per N", largest=3.0)}
+    said = say(Finding("derivatives", "advice", values))
+    assert "use eps 1e-05, centred" in said and "m per N, at most 3)" in said
 
 
 def test_differences_in_mujoco_are_those_of_its_steps(mujoco, bent):
     """mjd_transitionFD is, where the way is the same, what differences of mj_step are."""
     dynamics, state = mujoco.of(bent.case), (bent.q[0], bent.qd[0], bent.tau[0])
     for centred in (False, True):
-        own = of_transition(dynamics, *state, DT, "implicitfast", 1e-6, centred)()
-        assert (
-            np.abs(own - of_steps(dynamics, *state, DT, "implicitfast", 1e-6, centred)()[:, :6]).max() < 1e-8
-        )
+        functions = of_transition, of_steps
+        own, steps = (f(dynamics, *state, DT, "implicitfast", 1e-6, centred)() for f in functions)
+        assert np.abs(own - steps[:, :6]).max() < 1e-8
     inverse = of_inverse(dynamics, *state[:2], np.ones(3), 1e-7)()
     truth = np.hstack(ways.tmt.inverse_dynamics_derivatives(*state[:2], np.ones(3), bent.tree))
     assert np.abs(inverse - truth).max() < 1e-4 < np.abs(truth[:, :3] - truth[:, :3].T).max()
@@ -70,29 +72,50 @@ def test_a_wrong_derivative_is_seen_entry_by_entry(mujoco, bent, monkeypatch):
 
 
 def test_errors_are_relative_to_entries_of_the_same_unit():
-    units = np.array([0, 1]), np.array([0, 1])
+    units = np.array(["rad", "m"]), np.array(["rad", "m"])
     exact, off = np.array([[1.0, 1e3], [1e-3, 1.0]]), np.array([[0.0, 0.0], [1e-6, 0.0]])
-    assert np.isclose(ways.relative(off, exact, units), 1e-3)
-    assert np.isclose(ways.relative(off, exact, (np.zeros(2), np.zeros(2))), 1e-9)
-    assert ways.relative(np.full((2, 2), np.nan), exact, units) == np.inf
+    assert ways.relative(off, exact, units) == (pytest.approx(1e-3), "m per rad", 1e-3)
+    same = np.array(["", ""])
+    assert ways.relative(off, exact, (same, same)) == (pytest.approx(1e-9), " per ", 1e3)
+    assert ways.relative(np.full((2, 2), np.nan), exact, units)[0] == np.inf
+
+
+FREE_WITH_HINGE = """<mujoco><worldbody><body pos="0 0 1"><freejoint/>
+<inertial pos="0 0 0" mass="2" diaginertia="0.1 0.2 0.25"/><body><joint axis="0 0.6 0.8"/>
+<inertial pos="0.1 0 0" mass="0.1" diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody></mujoco>"""
+
+
+def test_a_slow_turn_of_a_free_body_is_rounded_as_a_quaternion():
+    """mjd_transitionFD makes a difference of less than 1e-15 rad zero; the components of a turn add to each other."""
+    setup = setup_of_file(FREE_WITH_HINGE)
+    case = setup.robot.cases[0]
+    q, qd, tau = case.q[None], np.full((1, 7), 0.1), np.zeros((1, 7))
+    subject = subjects.Subject("slow", "scene", case, case.tree, q, qd, tau)
+    task = ways.Task(subject, ("implicitfast",), False)
+    every = ways.measured(task, setup.engines["mujoco"], 1e-3)
+    assert max(share for one in every for share in one.shares.values()) <= 1.0
 
 
 def test_where_differences_lose_digits_is_said(bent):
-    row = HardRow(
-        subject="stiff servos",
-        quantity="A and B, RK4",
-        eps=1e-5,
-        error=1e-7,
-        scenes_error=1e-9,
-        best_eps=1e-6,
-        best_error=1e-8,
-    )
+    about = {
+        "quantity": "A and B, RK4",
+        "way": "a",
+        "eps": 1e-5,
+        "states": 1,
+        "unit": "rad per rad",
+        "largest": 1.0,
+    }
+    rows = [DerivativeRow(subject="stiff servos", error=error, **about) for error in (1e-7, 9e-9, None, 1e-9)]
     said = [
-        say(Finding("derivatives", "hard", {"rows": [dataclasses.replace(row, error=error)]}))
-        for error in (1e-7, 9e-9, None)
+        say(Finding("derivatives", "hard", {"pairs": [{"row": row, "scenes": rows[3]}]})) for row in rows[:3]
     ]
-    assert "stiff servos, A and B, RK4: 1e-07 with eps 1e-05" in said[0] and "lose digits" in said[0]
+    assert (
+        "stiff servos: 1e-07 with eps 1e-05 (A and B, RK4, rad per rad" in said[0]
+        and "lose digits" in said[0]
+    )
     assert "the same eps serves" in said[1] and "not finite" in said[2]
+    finer = dataclasses.replace(rows[0], eps=1e-6)
+    assert worst_of_each_eps(rows) == {1e-5: rows[2]} and best_of([*rows, finer]) is finer
     stiff = subjects.stiff(bent, DT)
     assert min(stiff.tree.stiffness) > 1e3 * DT and stiff.q.shape == (1, 3)
 

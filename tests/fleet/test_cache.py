@@ -18,7 +18,7 @@ def test_a_folder_is_for_one_fleet_at_a_time_and_what_cannot_be_written_is_said(
         write_whole(tmp_path / "none" / "a", b"1")
 
 
-SOURCES = [f"compare/{name}" for name in ("a.py", "a.jinja", "deep/page.html", "page.js")]
+SOURCES = [f"compare/{name}" for name in ("a.py", "a.jinja", "deep/page.html.jinja")]
 SOURCES += ["mjcf/arm.xml", "tmt/b.py"]
 
 

@@ -86,7 +86,7 @@ def test_the_status_is_1_where_a_file_differs_and_what_has_changed_is_said(folde
 @pytest.mark.parametrize("arguments, word", [
     ("--onyl=mass", "did you mean --only?"), ("--reference my.py:", "FILE.xml"), ("--limit nan", "--limit: 'nan'"),
     ("--only speed", "--timing"), ("--dask x --workers 2", "--workers"), ("--timing --workers 2", "--workers"),
-    ("--since nowhere", "nowhere/fleet.csv"), ("--rubric nowhere.toml", "nowhere.toml is not a file"),
+    ("--since nowhere", "nowhere/fleet.csv"), ("--rubric nowhere.toml", "nowhere.toml is not a TOML file"),
     ("--out m/part.xml", "m/part.xml"),
 ])  # fmt: skip
 def test_what_cannot_be_carried_out_gets_status_2_and_one_line(arguments, word, folder, capsys):

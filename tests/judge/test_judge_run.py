@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
-from judged import BOTH, INSIDE, OUTSIDE
+from judged import BOTH, INSIDE, OUTSIDE, verdicts
 from servo_models import spring
 from trees import one_body
 
 import tmt
+from compare.core.check import Result
 from compare.judge.run import (
+    check_movement,
     departure,
     deviation,
-    deviation_alive,
     diverged_at,
     leaves_no_digits,
     movement_unit,
@@ -60,7 +61,13 @@ def test_an_arm_has_left_at_a_tenth_of_a_radian():
         path[1, 1] = 1.0 + off
         assert departure(np.arange(3.0), path) == left
     assert deviation(np.array([1.1, 0.7]), 1.0) == pytest.approx(0.3)
-    assert deviation_alive(np.array([1.1, 0.7, np.nan]), 1.0) == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("moved, passes", [(0.1001, True), (0.0999, False), (np.nan, False)])
+def test_a_free_run_moves_by_a_tenth_of_a_radian(moved, passes):
+    result = Result("trajectory")
+    check_movement(result, "x", moved)
+    assert verdicts(result) == {"movement": passes}
 
 
 def alone(kind, **more) -> tmt.Tree:

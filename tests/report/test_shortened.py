@@ -46,12 +46,6 @@ def test_rows_that_fail_or_differ_are_shown_then_the_largest_shares_of_a_toleran
     assert kept(rows, 3) == [3, 5, 11] and kept(rows, 1) == [3]
 
 
-def test_the_checks_that_fail_are_listed_first_then_those_closest_to_their_tolerance():
-    checks = [(f"n{k}", 2.0 if k == 2 else 0.01 * k, 1.0, "at most", True) for k in range(9)]
-    closest = tables.closest(section("mass", *checks).result.checks, 3)
-    assert [check.quantity for check in closest] == ["n2", "n7", "n8"]
-
-
 def test_a_table_has_the_digits_of_its_columns_and_lists_are_cut():
     rows = [Compared(at=2, share=1.23456789), Compared(at=3, share=math.inf, unknown=2.0)]
     table = tables.of_rows(rows)

@@ -14,10 +14,11 @@ from compare.core.cause import Cause
 from compare.core.check import About, Result
 from compare.core.text import say
 from compare.engines.mujoco.reading import read
-from compare.experiments import figures_overview, module, stability
+from compare.experiments import figures as figures_of_states
+from compare.experiments import module, stability
 from compare.experiments.parameters.numbers import NumberRow
 from compare.experiments.published import PrintedRow
-from compare.experiments.speed import advice
+from compare.experiments.speed import conclusions
 from compare.experiments.speed.runs import SpeedResult, SpeedRow
 from compare.experiments.stability.tables import LimitRow, StabilityResult
 from compare.experiments.trajectory.runs import TrajectoryResult
@@ -216,13 +217,13 @@ def marks(experiment, result, robot=ARM):
 def test_the_agreement_is_the_largest_of_all_rows_of_a_quantity_and_its_picture_says_whose_distance_is_whose():
     near, other = replace(AGREED, mujoco_from_exact=None), replace(AGREED, quantity="other", difference=9.0)
     rows = [near, replace(near, difference=7.0, from_exact=None), other]
-    (found,) = figures_overview.agreements({"mass": Result("mass", rows=rows)})
+    (found,) = figures_of_states.agreements({"mass": Result("mass", rows=rows)})
     distances = {"difference": 7.0, "from_exact": 1.0, "mujoco_from_exact": None}
     assert found == {"name": "mass matrix M", "passed": True} | distances
-    _, _, caption = figures_overview.draw_agreement({"mass": Result("mass", rows=rows)})
+    _, _, caption = figures_of_states.draw_agreement({"mass": Result("mass", rows=rows)})
     assert "Maximum difference: 7 eps" in say(caption)
     rows.append(replace(AGREED, difference=float("nan"), passed=False))
-    (found,) = figures_overview.agreements({"mass": Result("mass", rows=rows)})
+    (found,) = figures_of_states.agreements({"mass": Result("mass", rows=rows)})
     assert found["difference"] == float("inf") and not found["passed"]
     drawn = marks("mass", Result("mass", rows=[AGREED]))
     assert drawn == {("D", to_hex("black"), 2.0), ("o", to_hex(BLUE), 1.0), ("s", to_hex(ORANGE), 4.0)}
@@ -235,11 +236,11 @@ def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_n
         timed("tmt", "rk4", 1e-9, 2.0), timed("heyoka", "Taylor", None, None, why_not="absent"),
     ]  # fmt: skip
     result = SpeedResult("speed", rows=rows, regular="s")
-    assert advice.best_rows(result) == {"tmt": [rows[0], rows[2], rows[3]], "mujoco": [rows[4]]}
-    assert advice.within_target(rows[4:5]) is None  # just outside of the error asked for
+    assert conclusions.best_rows(result) == {"tmt": [rows[0], rows[2], rows[3]], "mujoco": [rows[4]]}
+    assert conclusions.within_target(rows[4:5]) is None  # just outside of the error asked for
     rows.append(timed("mujoco", "RK4", 3e-3, 1e-6, dt=0.00244140625, steps=2048))
     rows.append(timed("scipy", "DOP853", 4.5e-3, 1e-7))  # which is not the cheapest beside MuJoCo
-    assert advice.cheapest_of_fronts(advice.best_rows(result)) == [rows[-2], rows[2]]
+    assert conclusions.cheapest_of_fronts(conclusions.best_rows(result)) == [rows[-2], rows[2]]
     assert {("o", to_hex(BLUE), 1e-6), ("s", to_hex(ORANGE), 1e-6)} <= marks("speed", result)
 
 

@@ -14,8 +14,7 @@ from tmt import literal
 from tmt.compiled import Evaluator, forms
 from tmt.compiled.ir import POINTER, Code, module
 from tmt.compiled.machine import Library
-from tmt.compiled.sine import LIMIT
-from tmt.compiled.straight import functions, trace
+from tmt.compiled.straight import LIMIT, functions, trace
 from tmt.derivation.dual import jacobian
 from tmt.derivation.vectors import cos, sin
 from tmt.methods import METHODS

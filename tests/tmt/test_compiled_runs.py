@@ -71,7 +71,7 @@ def test_the_code_of_larger_trees_does_the_same(name, tree, folder, monkeypatch)
     q, qd, tau = starts(9)
     (q, qd), other = paths_from(q, qd, 3), paths_from(q[4:5], qd[4:5], 3)
     for paths, torque in (((q, qd), tau), (other, tau[4:5])):
-        Runner(tree, METHODS[name], METHODS[name]).follow(*paths, torque, 0.02, 0.0, 1)
+        Runner(tree, METHODS[name]).follow(*paths, torque, 0.02, 0.0, 1)
     assert np.array_equal(q[4], other[0][0]) and np.array_equal(qd[4], other[1][0])
     assert_is_the_step(name, q, qd, tau, 0.02, tree)
 

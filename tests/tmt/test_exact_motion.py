@@ -92,11 +92,7 @@ def test_a_symmetric_free_body_precesses_about_its_angular_momentum():
             rate = (mpmath.mpf(0.5) - 2) / 2 * 3  # of the spin about the axis of symmetry, in the body's axes
             (x, y, z), cosine, sine = spin, mpmath.cos(rate * t), mpmath.sin(rate * t)
             omega = [x * cosine - y * sine, x * sine + y * cosine, z]
-            momentum = [
-                mpmath.mpf(4),
-                mpmath.mpf(1),
-                mpmath.mpf(3) / 4,
-            ]  # over the moment about the other axes
+            momentum = [4, 1, mpmath.mpf(0.75)]  # over the moment about the other axes
             quaternion = product(product(turn, turned_about(momentum, t)), turned_about([0, 0, -rate], t))
         assert off(path, [*position, *quaternion, *speed, *omega], k) < 1e-29
 

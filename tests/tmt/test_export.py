@@ -159,9 +159,8 @@ def test_a_long_function_in_c_is_cut_into_parts_with_the_same_values(tmp_path, m
         (tmp_path / f"{longest}.c").write_text(text)
         compile_in(tmp_path, f"-O1 -fPIC -shared {longest}.c -o {longest}.so -lm")
         out = np.empty(len(tree.axis))
-        ctypes.CDLL(str(tmp_path / f"{longest}.so"))[f"robot_{name}"](
-            *(ctypes.c_void_p(x.ctypes.data) for x in (*states, out))
-        )
+        function = ctypes.CDLL(str(tmp_path / f"{longest}.so"))[f"robot_{name}"]
+        function(*(ctypes.c_void_p(x.ctypes.data) for x in (*states, out)))
         results.append(out)
     assert "static void robot_acceleration_2(" in text and np.array_equal(*results)
     assert int(re.search(r"double w\[(\d+)\]", text)[1]) < text.count(";") / 5
@@ -173,13 +172,8 @@ def test_parameters_are_those_of_the_tree_that_has_these_numbers(tree, rng):
     body, q, qd, tau = tree.body_names[-1], *states_of(tree)
     axes, origin = np.linalg.qr(rng.normal(size=(3, 3)))[0], rng.normal(size=3)
     axes[:, 0] *= np.linalg.det(axes)
-    sites = {
-        "site_names": (body,),
-        "site_joint": (tree.body_joint[-1],),
-        "site_offset": (origin,),
-        "site_turn": (axes,),
-    }
-    tree = replace(tree, **sites)
+    joint = tree.body_joint[-1:]
+    tree = replace(tree, site_names=(body,), site_joint=joint, site_offset=(origin,), site_turn=(axes,))
     tensors = [np.trace(S) * np.eye(3) - S for S in (root @ root.T for root in rng.normal(size=(2, 3, 3)))]
     six = [[I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]] for I in tensors]
     masses, coms, gravity = rng.uniform(1, 2, (2, 1)), rng.normal(size=(2, 3)), rng.normal(size=3)
@@ -196,9 +190,8 @@ def test_parameters_are_those_of_the_tree_that_has_these_numbers(tree, rng):
     exec(tmt.equations(tree, "python", list(names), parameters=words), found)
     values = gravity, six[0], masses[0], coms[0], masses[1], coms[1], six[1]
     for name, states in names.items():
-        assert np.allclose(
-            found[name](*states, *values), getattr(tmt, name)(*states, model=other), rtol=1e-9, atol=1e-11
-        )
+        expected = getattr(tmt, name)(*states, model=other)
+        assert np.allclose(found[name](*states, *values), expected, rtol=1e-9, atol=1e-11)
 
 
 @pytest.mark.parametrize(("words", "quantity", "why"), [

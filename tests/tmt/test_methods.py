@@ -34,9 +34,7 @@ def test_the_coefficients_of_dop853_are_those_of_scipy():
 @pytest.mark.parametrize("name", FIXED)
 def test_order(name):
     """One step against two halves: what they differ by falls with dt to the power of order + 1."""
-    implicit = METHODS[
-        name
-    ].solves_stages  # those take long in many digits, and doubles will do at larger steps
+    implicit = METHODS[name].solves_stages  # those take long in many digits: doubles, at larger steps
     number, large = (float, 0.04) if implicit else (mpmath.mpf, mpmath.mpf("0.01"))
     rest, start = [number(0)] * 3, [number(float(a)) for a in BENT]
 

@@ -8,8 +8,8 @@ of_dt): states one after the other, of_q numbers from each q to the next (0: the
 from itertools import accumulate
 
 from tmt.derivation.quantities import quantity_of
-from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.tree import Tree
+from tmt.model.values import CLOSE_TO_ONE
 
 from . import forms, linear
 from .ir import DOUBLE, INDEX, POINTER, Code, Value, Variable, module, wide
@@ -71,8 +71,7 @@ class Entries:
         state, out = code.reserve(self.kind, self.count), code.reserve(self.kind, self.results)
         wrong = Variable(code, INDEX, 0)
         with code.loop(count, width) as loop:
-            rows = [loop.index + lane for lane in range(width)]
-            rows = [row.compare("lt", count).choose(row, count - 1) for row in rows]
+            rows = linear.rows_of(loop.index, count, width)
             for lane, row in enumerate(rows):
                 for array, size, first in zip(ARRAYS, self.sizes, self.begins):
                     begin = row * code[f"of_{array}"]

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tmt.derivation.quantities import is_quantity, quantity_of, shape_of, what_is_known
-from tmt.model.arguments import checked_model
-from tmt.model.tree import Tree
+from tmt.model.tree import Tree, checked_model
 from tmt.model.values import shown
 
 from .cores import cores, in_threads

@@ -5,24 +5,24 @@ of the joints (composite.py); the bias is nearly always shorter there. Mbar of l
 are shorter in the axes of the world (articulated.py).
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import TypeVar
 
 from tmt.derivation import articulated, composite, linearized
 from tmt.derivation.dual import seeded
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms, reduced_force
 from tmt.derivation.quantities import Form, State, Step, argument_of, quantity_of
-from tmt.derivation.scalar import Rows, Scalar, Values
-from tmt.derivation.vectors import Scalars
+from tmt.derivation.vectors import Rows, Scalar, Scalars, Values
 from tmt.methods import Linearized, method_named, one_step
-from tmt.methods.derivatives import is_straight
-from tmt.methods.dynamics import Dynamics, Held, acts_at_single_joints, minus, plus
-from tmt.methods.stepping import Method
+from tmt.methods.stepping import Dynamics, Held, Method, minus, plus
 from tmt.model.tree import Tree
 
 from .straight import Traced, trace
 from .trace import Expression
 
+Way = TypeVar("Way")
 MANY = 20  # speeds from which derivatives are not traced by dual numbers
 DENSE = 10  # speeds from which solving linear systems and the derivatives of the bias are loops and no longer straight lines
 
@@ -41,8 +41,9 @@ FORMS = (
 LONG_FORMS = (*FORMS[1:], FORMS[0]._replace(rates=linearized.rates))  # of derivatives
 
 
-def shortest(candidates: Iterable[Traced]) -> Traced:
-    return min(candidates, key=lambda traced: traced.length)
+def shortest(name: str, sizes: Sequence[int], way: Callable[..., Values], ways: Iterable[Way]) -> Traced:
+    """Of way(w, *arrays), arrays of these sizes, for each w of the ways, what has the fewest operations."""
+    return min((trace(name, sizes, partial(way, w)) for w in ways), key=lambda traced: traced.length)
 
 
 class Traceable(Dynamics):
@@ -60,7 +61,7 @@ class Traceable(Dynamics):
     def acceleration(
         self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
     ) -> Values:
-        if not self.by_bodies or (implicit and not acts_at_single_joints(implicit)):
+        if not self.by_bodies or (implicit and not implicit.acts_at_single_joints):
             return super().acceleration(tree, q, qd, tau, implicit)
         force, armature = reduced_force(tree, [0.0] * self.n, q, qd, tau), list(tree.armature)
         if implicit:
@@ -95,37 +96,36 @@ def quantity(tree: Tree, name: str, more: Sequence[int] = (), tree_of: TreeOf | 
 
     more: the sizes of further arrays, from which tree_of makes the tree.
     """
-    row, (nq, n) = quantity_of(name), (tree.coordinates.nq, len(tree.axis))
+    row, nq, n = quantity_of(name), tree.coordinates.nq, len(tree.axis)
     sizes = nq, n, n, 1, *more
 
     def model_of(arrays: Sequence[Values]) -> AnyTree:
         return tree_of(arrays[4:]) if tree_of else tree
 
-    def in_form(form: Form) -> Traced:
-        def function(*arrays: Values) -> Values:
-            model, argument = model_of(arrays), argument_of(name)
-            step = straight_step(model, argument, form) if row.argument == "method" else None
-            return flat(row.of(State(model, dict(zip(row.takes, arrays)), form, argument, step)))
+    def in_form(form: Form, *arrays: Values) -> Values:
+        return values_in(form, model_of(arrays), name, dict(zip(row.takes, arrays)))
 
-        return trace("quantity", sizes, function)
-
-    def by_dynamics(dynamics: Traceable) -> Traced:
-        def function(*arrays: Values) -> Values:
-            q, qd, tau, *_ = arrays
-            return dynamics.acceleration(model_of(arrays), q, qd, tau)
-
-        return trace("quantity", sizes, function)
+    def by_dynamics(dynamics: Dynamics, *arrays: Values) -> Values:
+        q, qd, tau, *_ = arrays
+        return dynamics.acceleration(model_of(arrays), q, qd, tau)
 
     if name == "acceleration":
-        return shortest(map(by_dynamics, all_dynamics(tree)))
-    by_dual_numbers = FORMS[: n < MANY]
-    return shortest(map(in_form, (*by_dual_numbers, *LONG_FORMS) if row.is_long else FORMS))
+        return shortest("quantity", sizes, by_dynamics, all_dynamics(tree))
+    long_forms = (*FORMS[: n < MANY], *LONG_FORMS)  # the first by dual numbers
+    return shortest("quantity", sizes, in_form, long_forms if row.is_long else FORMS)
+
+
+def values_in(form: Form, tree: AnyTree, name: str, arrays: Mapping[str, Values]) -> Values:
+    """The numbers of a quantity, by its full name, of a state in arrays by name, flat."""
+    row, argument = quantity_of(name), argument_of(name)
+    step = straight_step(tree, argument, form) if row.argument == "method" else None
+    return flat(row.of(State(tree, arrays, form, argument, step)))
 
 
 def straight_step(tree: AnyTree, name: str, form: Form) -> Step:
     """A step of the method of that name without loops; ValueError of one that solves its stages."""
     stepping = method_named(name)
-    if not is_straight(stepping):
+    if stepping.solves_stages:
         raise ValueError(f"a step of {name} is no fixed row of operations: NumPy alone gives its derivatives")
     dynamics = Linearized(form)
     return lambda q, qd, tau, dt: one_step(stepping, tree, q, qd, tau, dt, dynamics)
@@ -138,42 +138,35 @@ def flat(nested: Scalar) -> Values:
 
 def slope(tree: Tree, stepping: Method) -> Traced:
     """The slope of a method as a function of (q, qd, tau, dt)."""
+
+    def function(dynamics: Dynamics, q: Values, qd: Values, tau: Values, dt: Values) -> Values:
+        return stepping.slope(tree, q, qd, tau, dt[0], dynamics)
+
     nq, n = tree.coordinates.nq, tree.coordinates.nv
-
-    def traced(dynamics: Traceable) -> Traced:
-        def function(q: Values, qd: Values, tau: Values, dt: Values) -> Values:
-            return stepping.slope(tree, q, qd, tau, dt[0], dynamics)
-
-        return trace("slope", (nq, n, n, 1), function)
-
-    return shortest(map(traced, all_dynamics(tree)))
+    return shortest("slope", (nq, n, n, 1), function, all_dynamics(tree))
 
 
 def directional(tree: Tree, stepping: Method) -> Traced:
     """The slope and its derivative: (q, qd, tau, dt, dq, dqd) -> (qdd, dqdd); dq (nq) is a change of the numbers in q."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
-    def traced(dynamics: Traceable) -> Traced:
-        def both(q: Values, qd: Values, tau: Values, dt: Values, dq: Values, dqd: Values) -> Values:
-            x = seeded([*q, *qd], [*dq, *dqd])
-            slopes = stepping.slope(tree, x[:nq], x[nq:], tau, dt[0], dynamics)
-            parts = [x[0].parts(value) for value in slopes]
-            return [*(value for value, _ in parts), *(slope for _, slope in parts)]
+    def both(
+        dynamics: Dynamics, q: Values, qd: Values, tau: Values, dt: Values, dq: Values, dqd: Values
+    ) -> Values:
+        x = seeded([*q, *qd], [*dq, *dqd])
+        slopes = stepping.slope(tree, x[:nq], x[nq:], tau, dt[0], dynamics)
+        parts = [x[0].parts(value) for value in slopes]
+        return [*(value for value, _ in parts), *(slope for _, slope in parts)]
 
-        return trace("directional", (nq, n, n, 1, nq, n), both)
-
-    return shortest(map(traced, all_dynamics(tree)))
+    return shortest("directional", (nq, n, n, 1, nq, n), both, all_dynamics(tree))
 
 
 def bias_rate(tree: Tree) -> Traced:
     """The derivative of h along a change of the speeds: (q, qd, dqd) -> dh."""
+
+    def function(form: Form, q: Values, qd: Values, dqd: Values) -> Values:
+        rates = seeded(qd, dqd)
+        return [rates[0].parts(x)[1] for x in form.terms(tree, q, rates)[1]]
+
     nq, n = tree.coordinates.nq, tree.coordinates.nv
-
-    def traced(form: Form) -> Traced:
-        def function(q: Values, qd: Values, dqd: Values) -> Values:
-            rates = seeded(qd, dqd)
-            return [rates[0].parts(x)[1] for x in form.terms(tree, q, rates)[1]]
-
-        return trace("bias_rate", (nq, n, n), function)
-
-    return shortest(map(traced, FORMS[:2]))
+    return shortest("bias_rate", (nq, n, n), function, FORMS[:2])

@@ -80,5 +80,11 @@ def put_directions(state: Value, at: int, n: int, first: Value, width: int) -> N
         state.store(chosen.choose(code.number(1.0, kind), code.number(0.0, kind)), (loop.index + at) * width)
 
 
+def rows_of(first: Value, count: Value, width: int) -> list[Value]:
+    """The rows from the first on, side by side; for those beyond the count the last one stands."""
+    rows = [first + lane for lane in range(width)]
+    return [row.compare("lt", count).choose(row, count - 1) for row in rows]
+
+
 def any_of(flags: Value, width: int) -> Value:
     return flags if width == 1 else flags.cast("bitcast", f"i{width}").compare("ne", 0)

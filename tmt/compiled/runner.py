@@ -8,8 +8,7 @@ import numpy as np
 
 from tmt.methods import METHODS, method_named
 from tmt.methods.stepping import Method
-from tmt.model.arguments import checked_model
-from tmt.model.tree import Tree
+from tmt.model.tree import Tree, checked_model
 
 from .cores import cores, in_threads
 
@@ -31,9 +30,8 @@ class Runner:
     float64 and memory of their own, which is not checked.
     """
 
-    def __init__(self, tree: Tree, stepping: Method, entry: object):
+    def __init__(self, tree: Tree, stepping: Method):
         self.tree, self.stepping = tree, stepping
-        self.entry = entry  # of METHODS, which may be a user's own object
         self.functions: dict[int, Callable[..., None]] = {}
 
     def compiled(self, width: int) -> Callable[..., None]:
@@ -60,26 +58,17 @@ class Runner:
         from .machine import lanes
 
         count, steps = len(q), (q.shape[1] - 1) * every
-        width = lanes() if self.stepping.lanes and count >= lanes() else 1
+        # side by side where every run does the same in each step
+        is_uniform = not (self.stepping.adaptive or self.stepping.solves_stages)
+        width = lanes() if is_uniform and count >= lanes() else 1
         info = np.zeros((count, 3), np.int64)
 
         def follow_some(part: slice) -> None:
-            arrays = [array[part] for array in (q, qd, tau, info)]
-            missing = -len(arrays[0]) % width
-            if not missing:
-                self.call(width, arrays, dt, tolerance, every)()
-                return
-            # too few for a register: their last one again
-            padded = [np.concatenate([array, *[array[-1:]] * missing]) for array in arrays]
-            self.call(width, padded, dt, tolerance, every)()
-            for array, filled in zip(arrays, padded):
-                array[:] = filled[:-missing]
+            self.call(width, [array[part] for array in (q, qd, tau, info)], dt, tolerance, every)()
 
         threads = cores() if count > width and steps * count * self.stepping.stages > SPREAD else 1
-        if threads == 1:
-            follow_some(slice(count))
-        else:
-            in_threads(follow_some, count, min(count // width, PIECES * threads), width, threads)
+        parts = min(count // width, PIECES * threads) if threads > 1 else 1
+        in_threads(follow_some, count, parts, width, threads)
         return self.outcome(q, qd, info, every)
 
     def outcome(self, q: Array, qd: Array, info: Array, every: int = 1) -> Ended:
@@ -104,10 +93,10 @@ def runner_of(tree: Tree, name: str) -> Runner:
     """The Runner of a tree and the method of that name as it is now; ValueError if they are none."""
     runner = runners.get((id(tree), name)) if type(name) is str else None
     # whose tree is held, so that no other has its id
-    if runner is None or runner.entry is not METHODS.get(name):
+    if runner is None or runner.stepping is not METHODS.get(name):
         checked_model(tree)
         stepping = method_named(name)
         if len(runners) >= MOST:
             runners.clear()
-        runners[id(tree), name] = runner = Runner(tree, stepping, METHODS[name])
+        runners[id(tree), name] = runner = Runner(tree, stepping)
     return runner

@@ -10,16 +10,14 @@ from typing import Any
 
 from tmt.derivation.coordinates import FLAT
 from tmt.derivation.dual import seeded
-from tmt.derivation.scalar import Values
-from tmt.methods.dynamics import minus, plus
+from tmt.derivation.vectors import Values
 from tmt.methods.implicit import CLOSE, ITERATIONS
-from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED, Joints
+from tmt.methods.stepping import DIVERGED, NEWTON, SMALL, Joints, minus, plus
 from tmt.model.tree import Tree
 
 from . import forms, linear
 from .ir import DOUBLE, FLAG, INDEX, POINTER, Code, Value, Variable, module, wide
-from .sine import LIMIT
-from .straight import Traced, functions, trace
+from .straight import LIMIT, Traced, functions, trace
 
 # (code, state, new state, dt, evaluations): why it ends
 Advance = Callable[[Code, Value, Value, Value, Variable], Value]
@@ -249,7 +247,7 @@ def run(step: Step, advance: Advance) -> Code:
     paths, info = (("q", nq, 0), ("qd", n, nq)), code["info"]
     state.store(code["dt"].everywhere(width), (nq + 2 * n) * width)
     with code.loop(code["runs"], width) as runs:
-        rows = [runs.index + lane for lane in range(width)]
+        rows = linear.rows_of(runs.index, code["runs"], width)
         alive, evaluations = Variable(code, flags, True), Variable(code, INDEX, 0)
         step.wanted = Variable(code, DOUBLE, code["dt"] / 8.0)
         for lane, run in enumerate(rows):
@@ -285,12 +283,13 @@ def run(step: Step, advance: Advance) -> Code:
 
 def unsound(code: Code, tree: Tree, state: Value, width: int) -> Value:
     """Why a state cannot be gone on from; 0: it can."""
-    kind, indices = wide(DOUBLE, width), wide(INDEX, width)
+    kind = wide(DOUBLE, width)
     hinges = [joint.q.start for joint in tree.coordinates.joints if joint.kind == "hinge"]
     total, angles = Variable(code, kind, 0.0), code.number(0.0, kind)
     for k in code.each(tree.coordinates.nq + tree.coordinates.nv):
         total.set(total.get() + state.load(k * width, kind))
     for k in hinges:
         angles = angles + state.load(k * width, kind).function("fabs")
-    turned = angles.compare("lt", LIMIT).choose(code.number(0, indices), TURNED)
-    return total.get().function("fabs").compare("lt", float("inf")).choose(turned, OVERFLOW)
+    sound = total.get().function("fabs").compare("lt", float("inf"))
+    sound = sound.bits("and", angles.compare("lt", LIMIT))
+    return sound.choose(code.number(0, wide(INDEX, width)), DIVERGED)

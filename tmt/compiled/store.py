@@ -11,7 +11,6 @@ import logging
 import os
 import stat
 import tempfile
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import is_dataclass
@@ -24,7 +23,6 @@ from .machine import Library, object_code, versions
 from .sources import own_sources
 
 DIGEST = 32  # bytes of a SHA-256, before the object code
-ABANDONED = 3600.0  # s: a file takes milliseconds to write, but the clocks of a shared disk differ
 complaints: list[OSError] = []  # about the folder, of this process
 
 
@@ -52,7 +50,6 @@ def library(source: Callable[[], str], *what: Tree | Method | str | int) -> Libr
     if code is None:
         code = object_code(source())
         with suppress(OSError):
-            clear(path.parent)
             write_aside(path, hashlib.sha256(code).digest() + code)
     return Library(code=code)
 
@@ -144,11 +141,3 @@ def write_aside(path: Path, content: bytes) -> None:
         except OSError:
             aside.unlink(missing_ok=True)
             raise
-
-
-def clear(folder: Path) -> None:
-    """Remove what writers that were killed have left."""
-    for file in folder.glob("*.new"):
-        with suppress(OSError):
-            if time.time() - file.lstat().st_mtime > ABANDONED:
-                file.unlink()

@@ -1,21 +1,25 @@
 """Straight-line code from a tape: one function, or a row of functions where the tape is long, for one state or several.
 
-A traced function has the signature void name(ptr in, ptr out): numbers in a row, of several states side by side each number of
-all of them together. A product that goes into one sum alone is rounded with it, once. LLVM takes more than twice as long for
-twice as many lines in one function, so long tapes are cut; what one part hands to a later one stands in an array.
+A traced function has the signature void name(ptr in, ptr out): numbers in a row, of several states side by
+side each number of all of them together. A product that goes into one sum alone is rounded with it, once.
+LLVM takes more than twice as long for twice as many lines in one function, so long tapes are cut; what one
+part hands to a later one stands in an array.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.vectors import Scalar
 
-from .ir import DOUBLE, POINTER, Code, Value, wide
-from .sine import sincos
+from .ir import DOUBLE, INDEX, POINTER, Code, Value, wide, width_of
 from .trace import FOLD, LEAVES, Expression, Tape
 
+LIMIT = 2.0**49  # rad: of larger angles there is no sine
 LONGEST = 1_000  # nodes of one function
+Key = TypeVar("Key", int, str)
 OF_ONE = ("solution", "bias_rates")  # functions of linear.py, which take one state
 
 
@@ -81,6 +85,22 @@ def entry(name: str, attributes: str, *more: str) -> Code:
     return Code(name, dict.fromkeys(("in", "out", *more), POINTER), attributes=attributes)
 
 
+def places_handed_on(made: list[list[Key]], last: Mapping[Key, int]) -> tuple[dict[Key, int], int]:
+    """The place of each value that a part hands to later ones, free after the last; how many places."""
+    leaving: list[list[int]] = [[] for _ in made]
+    free: list[int] = []
+    places: dict[Key, int] = {}
+    size = 0
+    for k, values in enumerate(made):
+        for i in values:
+            if last.get(i, k) > k:
+                places[i] = free.pop() if free else size
+                size = max(size, places[i] + 1)
+                leaving[last[i]].append(places[i])
+        free += leaving[k]
+    return places, max(size, 1)
+
+
 class Steps:
     """The operations of a traced function in order, and which values each takes and makes."""
 
@@ -114,18 +134,7 @@ class Steps:
             for i in section:
                 made[k] += self.items.get(i, [i])
                 last |= {a: k for a in self.takes(i) if a not in self.input}
-        leaving: list[list[int]] = [[] for _ in sections]
-        free: list[int] = []
-        places: dict[int, int] = {}
-        size = 0
-        for k, values in enumerate(made):
-            for i in values:
-                if last.get(i, k) > k:
-                    places[i] = free.pop() if free else size
-                    size = max(size, places[i] + 1)
-                    leaving[last[i]].append(places[i])
-            free += leaving[k]
-        return places, max(size, 1)
+        return places_handed_on(made, last)
 
     def write(self, code: Code, order: list[int], width: int, places: dict[int, int]) -> None:
         """The lines of some of the steps; places: those of the nodes that parts of a long function hand on."""
@@ -200,3 +209,35 @@ def called(code: Code, name: str, values: list[Value], count: int, width: int) -
         with code.loop(count) as loop:
             out.store(out_one.load(loop.index), loop.index * width + lane.index)
     return out
+
+
+def sincos(x: Value) -> tuple[Value, Value]:
+    """(sin x, cos x) for |x| <= LIMIT, x in rad, else NaN; without a branch, for many side by side.
+
+    x is reduced to r = x - n pi/2 in [-pi/4, pi/4] by two fused multiply-adds (pi/2 as the sum of two
+    doubles: the first difference is rounded once, however large n is), then the minimax polynomials of fdlibm
+    (Sun, 1993), then n modulo 4 swaps the two and sets their signs by bits. Off by at most 2.2e-16. Beyond,
+    neighbouring doubles are an eighth of a radian apart.
+    """
+    bits = wide(INDEX, width_of(x.kind))
+    unit = x.function("fabs").compare("le", LIMIT).choose(x.like(1.0), math.nan)
+    # the sum with 1.5 * 2^52 rounds to an integer, which is then in the last bits
+    shifted = x.fma(0.6366197723675814, 6755399441055744.0)
+    n = shifted - 6755399441055744.0
+    r = n.fma(-6.123233995736766e-17, n.fma(-1.5707963267948966, x))
+    z = r * r
+    w = z * z
+    top = z.fma(1.58969099521155010221e-10, -2.50507602534068634195e-08)
+    high = w.fma(top, z.fma(2.75573137070700676789e-06, -1.98412698298579493134e-04))
+    s = high.fma(w, z.fma(8.33333333332248946124e-03, -1.66666666666666324348e-01)).fma(z * r, r * unit)
+    top = z.fma(-1.13596475577881948265e-11, 2.08757232129817482790e-09)
+    high = w.fma(top, z.fma(-2.75573143513906633035e-07, 2.48015872894767294178e-05))
+    c = high.fma(w, z.fma(-1.38888888888741095749e-03, 4.16666666666666019037e-02)).fma(w, z.fma(-0.5, unit))
+    turns = shifted.cast("bitcast", bits)
+    swap = turns.bits("and", 1).compare("ne", 0)
+
+    def signed(value: Value, turns: Value) -> Value:
+        flip = turns.bits("and", 2).bits("shl", 62)
+        return value.cast("bitcast", bits).bits("xor", flip).cast("bitcast", x.kind)
+
+    return signed(swap.choose(c, s), turns), signed(swap.choose(s, c), turns + 1)

@@ -12,8 +12,7 @@ from collections.abc import Callable, Iterable
 from numbers import Real
 from typing import Any
 
-from tmt.derivation.scalar import Scalar
-from tmt.derivation.vectors import arctan, cos, sin, sqrt
+from tmt.derivation.vectors import Scalar, arctan, cos, sin, sqrt
 
 Function = Callable[[Scalar], Scalar]
 

@@ -18,12 +18,10 @@ of Mbar with n times the length of the paths to the world.
 from collections.abc import Callable
 from typing import NamedTuple
 
-from tmt.derivation.scalar import Scalar, Values
-
 from .composite import Distribution, rounded, turning
 from .mechanism import AnyTree, turn_in_parent
-from .method import reduced_force, with_rotors
-from .vectors import IDENTITY, ZERO, Matrix, Scalars, Vector, outer
+from .method import with_rotors
+from .vectors import IDENTITY, ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, outer
 
 
 class Symmetric(NamedTuple):
@@ -45,15 +43,28 @@ class Symmetric(NamedTuple):
         return Symmetric(self.diagonal - Vector(a.x * b.x, a.y * b.y, a.z * b.z), self.off - off)
 
 
-class Direction(NamedTuple):
-    """The motion for a unit speed."""
+class Screw(NamedTuple):
+    """Angular velocity (or its rate) and velocity of the point at O; or moment and force about O."""
 
-    axis: Vector
-    shift: Vector  # velocity of the point at O
+    turn: Vector
+    shift: Vector
 
-    def power(self, moment: Vector, force: Vector) -> Scalar:
-        """That of a moment and a force about O."""
-        return self.axis.dot(moment) + self.shift.dot(force)
+    def plus(self, other: "Screw") -> "Screw":
+        return Screw(self.turn + other.turn, self.shift + other.shift)
+
+    def scaled(self, factor: Scalar) -> "Screw":
+        return Screw(self.turn * factor, self.shift * factor)
+
+    def dot(self, other: "Screw") -> Scalar:
+        """The power of a force along a motion."""
+        return self.turn.dot(other.turn) + self.shift.dot(other.shift)
+
+    def times(self, other: "Screw") -> "Screw":
+        """The product of two motions: how the first changes the second, which it takes along."""
+        return Screw(self.turn.cross(other.turn), self.turn.cross(other.shift) + self.shift.cross(other.turn))
+
+
+STILL = Screw(ZERO, ZERO)
 
 
 class Frame(NamedTuple):
@@ -64,49 +75,43 @@ class Frame(NamedTuple):
     omega: Vector
     omegad: Vector
     a: Vector  # of its point at O
-    directions: list[Direction]  # of its speeds
+    directions: list[Screw]  # for unit speeds, of each of its speeds
 
 
 class Carried(NamedTuple):
-    """What a joint carries, rigid or giving way: moment and force about O at qdd = 0, inertia [J H; H' M]."""
+    """What a joint carries and what gives way on it: force about O at qdd = 0, inertia [J H; H' M]."""
 
-    n: Vector
-    f: Vector
+    force: Screw
     J: Symmetric
     H: Matrix
     M: Symmetric
 
     def plus(self, other: "Carried") -> "Carried":
-        n, f, J = self.n + other.n, self.f + other.f, self.J.plus(other.J)
-        return Carried(n, f, J, self.H + other.H, self.M.plus(other.M))
+        force, J = self.force.plus(other.force), self.J.plus(other.J)
+        return Carried(force, J, self.H + other.H, self.M.plus(other.M))
 
 
 class Rigid(NamedTuple):
-    """The same of rigid bodies: H = [s]x, M = m."""
+    """What a joint carries as one rigid body: H = [s]x, M = m."""
 
-    n: Vector
-    f: Vector
+    force: Screw
     J: Symmetric
     s: Vector
     m: Scalar
 
     def plus(self, other: "Rigid") -> "Rigid":
-        n, f, J = self.n + other.n, self.f + other.f, self.J.plus(other.J)
-        return Rigid(n, f, J, self.s + other.s, self.m + other.m)
+        return Rigid(self.force.plus(other.force), self.J.plus(other.J), self.s + other.s, self.m + other.m)
+
+    def accelerated(self, motion: Screw) -> Screw:
+        """The force that gives it this acceleration."""
+        moment = self.J.times(motion.turn) + self.s.cross(motion.shift)
+        return Screw(moment, motion.turn.cross(self.s) + motion.shift * self.m)
 
     @property
     def carried(self) -> Carried:
         (x, y, z), m = self.s, self.m
         H = Matrix([[0.0, z * -1.0, y], [z, 0.0, x * -1.0], [y * -1.0, x, 0.0]])
-        return Carried(self.n, self.f, self.J, H, Symmetric(Vector(m, m, m), ZERO))
-
-
-class Share(NamedTuple):
-    """How a speed gives way: U / D by moment and force, and u / D."""
-
-    moment: Vector
-    force: Vector
-    u: Scalar
+        return Carried(self.force, self.J, H, Symmetric(Vector(m, m, m), ZERO))
 
 
 def acceleration(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armature: Scalars = ()) -> Values:
@@ -114,77 +119,58 @@ def acceleration(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armatur
     frames, rigid = outward(tree, q, qd)
     armature = armature or tree.armature
     joints, bodies = tree.coordinates.joints, [body.carried for body in rigid]
-    shares: dict[int, Share] = {}
+    shares: dict[int, tuple[Screw, Scalar]] = {}  # how a speed gives way: U / D and u / D
     for i in reversed(range(len(joints))):
         body = bodies[i]
         for k, direction in reversed(list(zip(joints[i].speeds, frames[i].directions))):
-            y = body.J.times(direction.axis) + body.H @ direction.shift
-            x = body.M.times(direction.shift) + body.H.transposed @ direction.axis
-            inverse = 1.0 / (direction.power(y, x) + armature[k])
-            u = (force[k] - direction.power(body.n, body.f)) * inverse
-            shares[k] = Share(y * inverse, x * inverse, u)
-            n, f, J = body.n + y * u, body.f + x * u, body.J.less_outer(shares[k].moment, y)
-            H, M = body.H - outer(shares[k].moment, x), body.M.less_outer(shares[k].force, x)
-            body = Carried(n, f, J, H, M)
+            moment = body.J.times(direction.turn) + body.H @ direction.shift
+            U = Screw(moment, body.M.times(direction.shift) + body.H.transposed @ direction.turn)
+            inverse = 1.0 / (direction.dot(U) + armature[k])
+            u = (force[k] - direction.dot(body.force)) * inverse
+            share = U.scaled(inverse)
+            shares[k] = share, u
+            J, M = body.J.less_outer(share.turn, U.turn), body.M.less_outer(share.shift, U.shift)
+            body = Carried(body.force.plus(U.scaled(u)), J, body.H - outer(share.turn, U.shift), M)
         if tree.parent[i] >= 0:
             bodies[tree.parent[i]] = bodies[tree.parent[i]].plus(body)
-    result: list[Scalar] = []
-    motions: list[tuple[Vector, Vector]] = []  # angular acceleration, and that of the point at O
+    result: Values = []
+    motions: list[Screw] = []
     for i, joint in enumerate(joints):
-        turn, shift = motions[tree.parent[i]] if tree.parent[i] >= 0 else (ZERO, ZERO)
+        motion = motions[tree.parent[i]] if tree.parent[i] >= 0 else STILL
         for k, direction in zip(joint.speeds, frames[i].directions):
-            share = shares[k]
-            qdd = share.u - (share.moment.dot(turn) + share.force.dot(shift))
-            turn, shift = turn + direction.axis * qdd, shift + direction.shift * qdd
-            result.append(qdd)
-        motions.append((turn, shift))
+            share, u = shares[k]
+            result.append(u - share.dot(motion))
+            motion = motion.plus(direction.scaled(result[-1]))
+        motions.append(motion)
     return result
 
 
-def forward_dynamics(tree: AnyTree, q: Scalars, qd: Scalars, tau: Scalars) -> list[Scalar]:
-    """qdd (nv,) from Mbar qdd = tau - D qd - k (q - rest) - P q - S qd - h."""
-    return acceleration(tree, q, qd, reduced_force(tree, [0.0] * len(qd), q, qd, tau))
-
-
-def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[list[Scalar]], list[Scalar]]:
+def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
     """Mbar (nv rows of nv, kg m2) and h (nv, N m), as in method.py."""
-    frames, rigid = carried(tree, q, qd)
-    n, joints = len(qd), tree.coordinates.joints
-    M: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
+    frames, own = outward(tree, q, qd)
+    rigid, joints = gathered(tree, own), tree.coordinates.joints
+    M: Rows = [[0.0] * len(qd) for _ in qd]
     for i, body in enumerate(rigid):
-        for k, (axis, shift) in zip(joints[i].speeds, frames[i].directions):
-            moment = body.J.times(axis) + body.s.cross(shift)
-            push = axis.cross(body.s) + shift * body.m
-            inward = i
-            while inward >= 0:
-                for other, direction in zip(joints[inward].speeds, frames[inward].directions):
+        for k, direction in zip(joints[i].speeds, frames[i].directions):
+            force = body.accelerated(direction)
+            for inward in tree.path(i):
+                for other, along in zip(joints[inward].speeds, frames[inward].directions):
                     if other <= k:
-                        M[k][other] = M[other][k] = direction.power(moment, push)
-                inward = tree.parent[inward]
+                        M[k][other] = M[other][k] = along.dot(force)
             if tree.armature[k]:
                 M[k][k] = M[k][k] + tree.armature[k]
-    return M, along(frames, rigid)
+    return M, along_speeds(frames, rigid)
 
 
-def bias(tree: AnyTree, q: Scalars, qd: Scalars) -> list[Scalar]:
-    return along(*carried(tree, q, qd))
-
-
-def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> list[Scalar]:
+def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> Values:
     """Mbar qdd + h (nv, N m), as in method.py."""
-    return with_rotors(tree, along(*carried(tree, q, qd, qdd)), qdd)
+    frames, own = outward(tree, q, qd, qdd)
+    return with_rotors(tree, along_speeds(frames, gathered(tree, own)), qdd)
 
 
-def along(frames: list[Frame], rigid: list[Rigid]) -> list[Scalar]:
-    """h: moment and force of what is carried along each speed's direction."""
-    directions = [(direction, body) for frame, body in zip(frames, rigid) for direction in frame.directions]
-    return [direction.power(body.n, body.f) for direction, body in directions]
-
-
-def carried(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars = ()) -> tuple[list[Frame], list[Rigid]]:
-    """The frames of all joints, and all that each carries."""
-    frames, rigid = outward(tree, q, qd, qdd)
-    return frames, gathered(tree, rigid)
+def along_speeds(frames: list[Frame], rigid: list[Rigid]) -> Values:
+    """The force on what each joint carries, along the direction of each speed, (nv,)."""
+    return [d.dot(body.force) for frame, body in zip(frames, rigid) for d in frame.directions]
 
 
 def gathered(tree: AnyTree, own: list[Rigid]) -> list[Rigid]:
@@ -217,7 +203,7 @@ def outward(
             r = r if still else r + axis * (q[joint.q.start] - tree.reference[i])
             a = p.a + p.omega.cross(axis) * (2.0 * qd[joint.qd.start])  # Coriolis
             a = a + axis * qdd[joint.qd.start] if qdd else a
-            frame = Frame(p.turn, r, p.omega, p.omegad, a, [Direction(ZERO, axis)])
+            frame = Frame(p.turn, r, p.omega, p.omegad, a, [Screw(ZERO, axis)])
         else:
             turn = p.turn @ turn_in_parent(tree, i, q)
             carrier = turn if joint.kind == "ball" else p.turn
@@ -227,7 +213,7 @@ def outward(
             omegad = sum((axis * rate for axis, rate in zip(axes, qdd[joint.qd])), omegad)
             # the acceleration is handed on where the joint is
             a = p.a + turning(p.omega, p.omegad) @ r - turning(omega, omegad) @ r
-            frame = Frame(turn, r, omega, omegad, a, [Direction(axis, r.cross(axis)) for axis in axes])
+            frame = Frame(turn, r, omega, omegad, a, [Screw(axis, r.cross(axis)) for axis in axes])
         frames.append(frame)
         rigid.append(about_point(distributions[i], frame))
     return frames, rigid
@@ -242,4 +228,4 @@ def about_point(own: Distribution, frame: Frame) -> Rigid:
     (A, D, E), (_, B, F), (_, _, C) = frame.turn @ own.inertia @ frame.turn.transposed
     J = Symmetric(Vector(A + (y + z), B + (x + z), C + (x + y)), Vector(F - yz, E - xz, D - xy))
     n = J.times(omegad) + omega.cross(J.times(omega)) + s.cross(a)
-    return Rigid(n, a * m + turning(omega, omegad) @ s, J, s, m)
+    return Rigid(Screw(n, a * m + turning(omega, omegad) @ s), J, s, m)

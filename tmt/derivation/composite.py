@@ -20,11 +20,9 @@ from typing import NamedTuple
 
 import mpmath
 
-from tmt.derivation.scalar import Scalar
-
 from .mechanism import AnyTree, origin_in_parent, turn_in_parent
 from .method import with_rotors
-from .vectors import ZERO, Matrix, Scalars, Vector, outer, total_vector
+from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, outer, total_vector
 
 Placement = tuple[Vector, Matrix]  # origin (m) and turn of a frame in its parent's
 
@@ -178,13 +176,13 @@ def motions(tree: AnyTree, placements: list[Placement], qd: Scalars, qdd: Scalar
 
 def mass_matrix_and_bias(
     tree: AnyTree, q: Scalars, qd: Scalars, number: Callable[..., Scalar] = float
-) -> tuple[list[list[Scalar]], list[Scalar]]:
+) -> tuple[Rows, Values]:
     """Mbar and h, as in method.py; number: float or mpmath.mpf, to which what is exact is rounded once."""
     n, joints, placements = len(tree.axis), tree.coordinates.joints, placed(tree, q)
     axes = [Vector(*axis) for axis in tree.axis]
     own, uneven, even = map(list, rounded(tree, number))
     # inward: the mass that a joint carries; what is even about a hinge is not turned
-    M: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
+    M: Rows = [[0.0] * n for _ in range(n)]
     for i in reversed(range(len(joints))):
         kind, parent = joints[i].kind, tree.parent[i]
         carried = uneven[i].plus(even[i])
@@ -210,7 +208,7 @@ def mass_matrix_and_bias(
 
 def generalized_force(
     tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Callable[..., Scalar] = float
-) -> list[Scalar]:
+) -> Values:
     """Mbar qdd + h (nv, N m), as in method.py."""
     placements = placed(tree, q)
     own, moving = rounded(tree, number)[0], motions(tree, placements, qd, qdd)
@@ -224,9 +222,9 @@ def placed(tree: AnyTree, q: Scalars) -> list[Placement]:
 
 def inward(
     tree: AnyTree, placements: list[Placement], moving: list[Motion], own: list[Distribution]
-) -> list[Scalar]:
+) -> Values:
     """Force and moment on all that each joint carries, along and about its axes, (nv,)."""
-    result: list[Scalar] = [0.0] * len(tree.axis)
+    result: Values = [0.0] * len(tree.axis)
     forces, moments = [ZERO] * len(own), [ZERO] * len(own)
     for i, joint in reversed(list(enumerate(tree.coordinates.joints))):
         parent, a, P = tree.parent[i], moving[i].a, moving[i].P

@@ -14,9 +14,7 @@ IV.8), here for u that turns with the body: omega + u x omega / 2 + c u x (u x o
 from functools import lru_cache
 from typing import NamedTuple
 
-from tmt.derivation.scalar import Scalar
-
-from .vectors import Scalars, Vector, arctan, cos, sin, sqrt
+from .vectors import Scalars, Values, Vector, arctan, cos, sin, sqrt
 
 KINDS = {"hinge": (1, 1), "slide": (1, 1), "ball": (4, 3)}  # how many numbers of q and of qd
 TINY = 1e-300  # under a root: its own square root is far below any rounding, and no direction is undefined
@@ -27,10 +25,10 @@ class Flat:
 
     balls: tuple["Joint", ...] = ()
 
-    def move(self, q: Scalars, u: Scalars) -> list[Scalar]:
+    def move(self, q: Scalars, u: Scalars) -> Values:
         return [x + y for x, y in zip(q, u)]
 
-    def rates(self, u: Scalars, qd: Scalars) -> list[Scalar]:
+    def rates(self, u: Scalars, qd: Scalars) -> Values:
         return list(qd)
 
     tangent = component_rates = rates
@@ -39,16 +37,16 @@ class Flat:
 class Ball:
     """Coordinates of one ball: a quaternion of length 1 that moves by angular velocities in its own frame."""
 
-    def move(self, q: Scalars, u: Scalars) -> list[Scalar]:
+    def move(self, q: Scalars, u: Scalars) -> Values:
         return normalized(product(q, exponential(u)))
 
-    def tangent(self, q: Scalars, dq: Scalars) -> list[Scalar]:
+    def tangent(self, q: Scalars, dq: Scalars) -> Values:
         return [2.0 * x for x in product(conjugate(q), dq)[1:]]
 
-    def component_rates(self, q: Scalars, qd: Scalars) -> list[Scalar]:
+    def component_rates(self, q: Scalars, qd: Scalars) -> Values:
         return [0.5 * x for x in product(q, [0.0, *qd])]
 
-    def rates(self, movement: Scalars, speeds: Scalars) -> list[Scalar]:
+    def rates(self, movement: Scalars, speeds: Scalars) -> Values:
         """dexp^-1(u) omega, see above."""
         u, omega = Vector(*movement), Vector(*speeds)
         half = sqrt(u.dot(u) + TINY) * 0.5
@@ -92,13 +90,13 @@ class Coordinates(NamedTuple):
         """For each speed (nv,) the number in q of its joint's first position: the only one of a hinge."""
         return [joint.q.start for joint in self.joints for _ in joint.speeds]
 
-    def move(self, q: Scalars, u: Scalars) -> list[Scalar]:
+    def move(self, q: Scalars, u: Scalars) -> Values:
         """The position after a movement u from q, quaternions of length 1."""
         return [x for joint in self.joints for x in joint.rule.move(q[joint.q], u[joint.qd])]
 
-    def difference(self, q1: Scalars, q0: Scalars) -> list[Scalar]:
+    def difference(self, q1: Scalars, q0: Scalars) -> Values:
         """The movement from q0 to q1, (nv,): of a ball the shortest."""
-        movement: list[Scalar] = []
+        movement: Values = []
         for joint in self.joints:
             if joint.kind == "ball":
                 movement += self.logarithm(product(conjugate(q0[joint.q]), q1[joint.q]))
@@ -107,22 +105,22 @@ class Coordinates(NamedTuple):
         return movement
 
     @staticmethod
-    def logarithm(p: Scalars) -> list[Scalar]:
+    def logarithm(p: Scalars) -> Values:
         """The movement u, |u| at most pi rad, with exponential(u) = p or -p; |p| = 1."""
         w, x, y, z = p
         size, length = sqrt(w * w + TINY), sqrt(x * x + y * y + z * z + TINY)
         share = arctan(length / (1.0 + size)) * 4.0 / length * (w / size)
         return [x * share, y * share, z * share]
 
-    def tangent(self, q: Scalars, dq: Scalars) -> list[Scalar]:
+    def tangent(self, q: Scalars, dq: Scalars) -> Values:
         """The movement that changes q by small dq, linear in dq."""
         return [x for joint in self.joints for x in joint.rule.tangent(q[joint.q], dq[joint.q])]
 
-    def component_rates(self, q: Scalars, qd: Scalars) -> list[Scalar]:
+    def component_rates(self, q: Scalars, qd: Scalars) -> Values:
         """dq/dt at speeds qd, (nq,): of a ball p o (0, omega) / 2."""
         return [x for joint in self.joints for x in joint.rule.component_rates(q[joint.q], qd[joint.qd])]
 
-    def rates(self, u: Scalars, qd: Scalars) -> list[Scalar]:
+    def rates(self, u: Scalars, qd: Scalars) -> Values:
         """du/dt at speeds qd, of a motion that has moved by u."""
         return [x for joint in self.joints for x in joint.rule.rates(u[joint.qd], qd[joint.qd])]
 
@@ -137,7 +135,7 @@ def coordinates_of(kinds: tuple[str, ...]) -> Coordinates:
     return Coordinates(tuple(joints), nq, nv)
 
 
-def product(p: Scalars, r: Scalars) -> list[Scalar]:
+def product(p: Scalars, r: Scalars) -> Values:
     """The product p o r of two quaternions: the turn r, then p."""
     (a, x, y, z), (b, u, v, w) = p, r
     return [
@@ -148,17 +146,17 @@ def product(p: Scalars, r: Scalars) -> list[Scalar]:
     ]
 
 
-def conjugate(p: Scalars) -> list[Scalar]:
+def conjugate(p: Scalars) -> Values:
     """The inverse of a quaternion of length 1."""
     return [p[0], *(x * -1.0 for x in p[1:])]
 
 
-def normalized(p: Scalars) -> list[Scalar]:
+def normalized(p: Scalars) -> Values:
     length = sqrt(sum((x * x for x in p[1:]), p[0] * p[0]))
     return [x / length for x in p]
 
 
-def exponential(u: Scalars) -> list[Scalar]:
+def exponential(u: Scalars) -> Values:
     """The quaternion that turns by |u| rad about u."""
     x, y, z = u
     half = sqrt(x * x + y * y + z * z + TINY) * 0.5

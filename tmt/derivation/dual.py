@@ -8,9 +8,7 @@ level of its own, and a number of another level is a constant to it.
 from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 
-from tmt.derivation.scalar import Scalar
-
-from .vectors import Scalars, arctan, cos, sin, sqrt
+from .vectors import Rows, Scalar, Scalars, Values, arctan, cos, sin, sqrt
 
 levels = count()
 
@@ -91,8 +89,8 @@ def seeded(values: Iterable[Scalar], slopes: Iterable[Scalar]) -> list[Dual]:
 
 
 def jacobian(
-    function: Callable[[list[Scalar]], Iterable[Scalar]], x: Scalars, directions: Sequence[Scalars] = ()
-) -> list[list[Scalar]]:
+    function: Callable[[Values], Iterable[Scalar]], x: Scalars, directions: Sequence[Scalars] = ()
+) -> Rows:
     """d function_i / d x_j (rows i, columns j) of lists of scalars; directions: in place of each x_j alone."""
     columns = []
     for direction in directions or unit_vectors(len(x)):

@@ -22,32 +22,9 @@ Sums of this kind, over six coordinates: Singh, Russell, Wensing, IEEE Robotics 
 from collections.abc import Callable
 from typing import NamedTuple
 
-from tmt.derivation.scalar import Rows, Scalar
-
-from .articulated import Direction, Frame, Rigid, gathered, outward
+from .articulated import STILL, Frame, Rigid, Screw, gathered, outward
 from .mechanism import AnyTree
-from .vectors import ZERO, Matrix, Scalars, Vector, outer
-
-
-class Motion(NamedTuple):
-    """Angular velocity (or its rate) and velocity of the point at O, or moment and force about O."""
-
-    turn: Vector
-    shift: Vector
-
-    def times(self, other: "Motion | Direction") -> "Motion":
-        """The product of two motions: how the first changes the second, which it takes along."""
-        axis, shift = other
-        return Motion(self.turn.cross(axis), self.turn.cross(shift) + self.shift.cross(axis))
-
-    def plus(self, other: "Motion") -> "Motion":
-        return Motion(self.turn + other.turn, self.shift + other.shift)
-
-    def dot(self, other: "Motion | Direction") -> Scalar:
-        return self.turn.dot(other[0]) + self.shift.dot(other[1])
-
-
-STILL = Motion(ZERO, ZERO)
+from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Vector, outer
 
 
 class Momentum(NamedTuple):
@@ -59,13 +36,13 @@ class Momentum(NamedTuple):
     def plus(self, other: "Momentum") -> "Momentum":
         return Momentum(self.K + other.K, self.p + other.p)
 
-    def force(self, turn: Vector) -> Motion:
+    def force(self, turn: Vector) -> Screw:
         """B X, of the angular part of X."""
-        return Motion(self.K @ turn, turn.cross(self.p * 2.0))
+        return Screw(self.K @ turn, turn.cross(self.p * 2.0))
 
-    def along(self, direction: Direction) -> Vector:
+    def along(self, direction: Screw) -> Vector:
         """S' B, by the angular part of X."""
-        return self.K.transposed @ direction.axis + (self.p * 2.0).cross(direction.shift)
+        return self.K.transposed @ direction.turn + (self.p * 2.0).cross(direction.shift)
 
 
 def momentum(body: Rigid, omega: Vector, u: Vector) -> Momentum:
@@ -81,13 +58,13 @@ def momentum(body: Rigid, omega: Vector, u: Vector) -> Momentum:
     return Momentum(K, u * body.m + omega.cross(body.s))
 
 
-def velocities(tree: AnyTree, frames: list[Frame], qd: Scalars) -> list[Motion]:
+def velocities(tree: AnyTree, frames: list[Frame], qd: Scalars) -> list[Screw]:
     """The velocity of each joint's frame about O."""
-    result: list[Motion] = []
+    result: list[Screw] = []
     for i, joint in enumerate(tree.coordinates.joints):
         v = result[tree.parent[i]] if tree.parent[i] >= 0 else STILL
         shift = sum((d.shift * rate for d, rate in zip(frames[i].directions, qd[joint.qd])), v.shift)
-        result.append(Motion(frames[i].omega, shift))
+        result.append(Screw(frames[i].omega, shift))
     return result
 
 
@@ -102,45 +79,36 @@ def rates(
     for i in reversed(range(len(joints))):
         if tree.parent[i] >= 0:
             B[tree.parent[i]] = B[tree.parent[i]].plus(B[i])
+    S = [direction for frame in frames for direction in frame.directions]
+    Y: list[Screw] = []
+    Z: list[Screw] = []
+    YW: list[Screw] = []
+    for i, joint in enumerate(joints):
+        before, v0, a0 = tree.parent[i], STILL, Screw(ZERO, Vector(*tree.gravity) * -1.0)
+        if before >= 0:  # of a point in space, not of one that moves with the frame
+            v0 = v[before]
+            a0 = Screw(frames[before].omegad, frames[before].a - v0.turn.cross(v0.shift))
+        for k in joint.speeds:
+            Y.append(v0.times(S[k]))
+            Z.append(a0.times(S[k]).plus(v0.times(Y[k])))
+            YW.append(Y[k].plus(v[i].times(S[k])))
     by_movement: Rows = [[0.0] * n for _ in range(n)]
     by_speed: Rows = [[0.0] * n for _ in range(n)]
-    Y: list[Motion] = []
-    Z: list[Motion] = []
-    YW: list[Motion] = []
-    directions: list[Direction] = []
-    for i in range(len(joints)):
-        before = tree.parent[i]
-        v0 = v[before] if before >= 0 else STILL
-        a0 = Motion(ZERO, Vector(*tree.gravity) * -1.0)
-        if before >= 0:  # of a point in space, not of one that moves with the frame
-            a0 = Motion(frames[before].omegad, frames[before].a - v0.turn.cross(v0.shift))
-        for direction in frames[i].directions:
-            directions.append(direction)
-            Y.append(v0.times(direction))
-            Z.append(a0.times(direction).plus(v0.times(Y[-1])))
-            YW.append(Y[-1].plus(v[i].times(direction)))
     for i, body in enumerate(rigid):
         path = [k for inward in tree.path(tree.parent[i]) for k in joints[inward].speeds]
         for k in joints[i].speeds:
-            axis, shift = directions[k]
-            by_turn = B[i].along(directions[k])
-            inertia = applied(body, directions[k])  # I S, I being symmetric
-            moved = applied(body, Z[k]).plus(B[i].force(Y[k].turn))
-            sped = applied(body, YW[k]).plus(B[i].force(axis))
+            by_turn = B[i].along(S[k])
+            inertia = body.accelerated(S[k])  # I S, I being symmetric
+            moved = body.accelerated(Z[k]).plus(B[i].force(Y[k].turn))
+            sped = body.accelerated(YW[k]).plus(B[i].force(S[k].turn))
             for other in joints[i].speeds:
-                by_movement[other][k] = moved.dot(directions[other])
-                by_speed[other][k] = sped.dot(directions[other])
-            carried_along = Motion(axis.cross(body.n) + shift.cross(body.f), axis.cross(body.f))
-            moved = moved.plus(carried_along)
+                by_movement[other][k] = moved.dot(S[other])
+                by_speed[other][k] = sped.dot(S[other])
+            (axis, shift), (moment, force) = S[k], body.force
+            moved = moved.plus(Screw(axis.cross(moment) + shift.cross(force), axis.cross(force)))
             for other in path:
-                by_movement[other][k] = moved.dot(directions[other])
-                by_speed[other][k] = sped.dot(directions[other])
+                by_movement[other][k] = moved.dot(S[other])
+                by_speed[other][k] = sped.dot(S[other])
                 by_movement[k][other] = inertia.dot(Z[other]) + by_turn.dot(Y[other].turn)
-                by_speed[k][other] = inertia.dot(YW[other]) + by_turn.dot(directions[other].axis)
+                by_speed[k][other] = inertia.dot(YW[other]) + by_turn.dot(S[other].turn)
     return by_movement, by_speed
-
-
-def applied(body: Rigid, motion: Motion | Direction) -> Motion:
-    """Moment and force about O that give a rigid body this acceleration."""
-    turn, shift = motion
-    return Motion(body.J.times(turn) + body.s.cross(shift), turn.cross(body.s) + shift * body.m)

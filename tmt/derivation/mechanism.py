@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
-from tmt.derivation.scalar import Scalar
-
 from .coordinates import Coordinates, coordinates_of
-from .vectors import IDENTITY, Matrix, Scalars, Vector, rotation, turn_of
+from .vectors import IDENTITY, Matrix, Scalar, Scalars, Vector, rotation, turn_of
 
 Number = TypeVar("Number")
 UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -50,6 +48,14 @@ class Mechanism(Generic[Number]):
     def coordinates(self) -> Coordinates:
         """The places of the joints in q (nq) and qd (nv)."""
         return coordinates_of(self.kind)
+
+    @property
+    def zero(self) -> tuple[Number | float, ...]:
+        """The reference position, (nq,): every frame is parallel to the inertial frame."""
+        position: tuple[Number | float, ...] = ()
+        for kind, reference in zip(self.kind, self.reference):
+            position += (1.0, 0.0, 0.0, 0.0) if kind == "ball" else (reference,)
+        return position
 
     @property
     def has_springs(self) -> bool:

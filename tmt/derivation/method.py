@@ -23,11 +23,9 @@ unless they are said to be in body axes.
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from tmt.derivation.scalar import Rows, Scalar, Values
-
 from .dual import jacobian
 from .mechanism import AnyTree, origin_in_parent, turn_in_parent
-from .vectors import IDENTITY, ZERO, Matrix, Scalars, Vector, solve, total, total_vector
+from .vectors import IDENTITY, ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, solve, total, total_vector
 
 Terms = Callable[[AnyTree, Scalars, Scalars], tuple[Rows, Values]]  # Mbar and h
 
@@ -143,10 +141,10 @@ def placed_frame(tree: AnyTree, name: str, q: Scalars, qd: Scalars | None = None
     return Placed(pose, [list(row) for row in zip(*columns)], [*x_conv, *carrier.omega_conv])
 
 
-def mass_matrix(parts: Sequence[Body], armature: Scalars = ()) -> list[list[Scalar]]:
+def mass_matrix(parts: Sequence[Body], armature: Scalars = ()) -> Rows:
     """Mbar (nv rows of nv, kg m2) of the bodies: sum_b T' m T + B' I B, and the armature on its diagonal."""
     n = len(parts[0].T)
-    M: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
+    M: Rows = [[0.0] * n for _ in range(n)]
     for b in parts:
         moving = [k for k in range(n) if b.T[k] is not ZERO]  # the columns of all other joints are zero
         for j in moving:
@@ -159,35 +157,34 @@ def mass_matrix(parts: Sequence[Body], armature: Scalars = ()) -> list[list[Scal
     return M
 
 
-def bias(parts: Sequence[Body], gravity: Iterable[Scalar]) -> list[Scalar]:
+def bias(parts: Sequence[Body], gravity: Iterable[Scalar]) -> Values:
     """h (nv, N m) of the bodies: Mbar qdd + h = tau - D qd; at rest the torque that holds them."""
     g = Vector(*gravity)
     newton = [b.mass * (b.v_conv - g) for b in parts]
     euler = [b.inertia @ b.w_conv + b.omega.cross(b.inertia @ b.omega) for b in parts]
-
-    def component(i: int) -> Scalar:
+    h = []
+    for i in range(len(parts[0].T)):
         terms = zip(parts, newton, euler)
-        return total(b.T[i].dot(f) + b.B[i].dot(m) for b, f, m in terms if b.T[i] is not ZERO)
+        h.append(total(b.T[i].dot(f) + b.B[i].dot(m) for b, f, m in terms if b.T[i] is not ZERO))
+    return h
 
-    return [component(i) for i in range(len(parts[0].T))]
 
-
-def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[list[list[Scalar]], list[Scalar]]:
+def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
     parts = bodies(tree, q, qd)
     return mass_matrix(parts, tree.armature), bias(parts, tree.gravity)
 
 
-def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> list[Scalar]:
+def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> Values:
     """Mbar qdd + h (nv, N m)."""
     return with_rotors(tree, bias(bodies(tree, q, qd, qdd), tree.gravity), qdd)
 
 
-def with_rotors(tree: AnyTree, force: Scalars, qdd: Scalars) -> list[Scalar]:
+def with_rotors(tree: AnyTree, force: Scalars, qdd: Scalars) -> Values:
     """A force (nv,) and that which accelerates the armature."""
     return [f + rotor * a if rotor else f for f, rotor, a in zip(force, tree.armature, qdd)]
 
 
-def inverse_dynamics(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars) -> list[Scalar]:
+def inverse_dynamics(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars) -> Values:
     """tau = Mbar qdd + h + D qd + k (q - rest) + P q + S qd (nv, N m), from force = Mbar qdd + h."""
     return [x * -1.0 for x in reduced_force(tree, force, q, qd, [0.0] * len(qd))]
 
@@ -204,24 +201,24 @@ def from_rest(tree: AnyTree, q: Scalars) -> list[tuple[Scalar, Scalar]]:
     return [(stiffness, movement[k]) for stiffness, joint in joints for k in joint.speeds]
 
 
-def spring_torque(tree: AnyTree, q: Scalars) -> list[Scalar]:
+def spring_torque(tree: AnyTree, q: Scalars) -> Values:
     """k (q - rest) (nv, N m or N), which springs take off; of a ball k times the movement from its rest."""
     if not tree.has_springs:
         return [0.0] * len(tree.axis)
     return [stiffness * x for stiffness, x in from_rest(tree, q)]
 
 
-def fed_back(tree: AnyTree, q: Scalars, qd: Scalars) -> list[Scalar]:
+def fed_back(tree: AnyTree, q: Scalars, qd: Scalars) -> Values:
     """P q + S qd (nv, N m or N), which a linear controller takes off; no entry of P is that of a ball."""
     positions = [q[i] for i in tree.coordinates.first_positions]
-    terms: list[list[Scalar]] = [[] for _ in qd]
+    terms: Rows = [[] for _ in qd]
     for gain, values in ((tree.position_gain, positions), (tree.speed_gain, qd)):
         for terms_of_speed, row in zip(terms, gain):
             terms_of_speed += [g * x for g, x in zip(row, values) if g]
     return [total(terms_of_speed) for terms_of_speed in terms]
 
 
-def reduced_force(tree: AnyTree, h: Scalars, q: Scalars, qd: Scalars, tau: Scalars) -> list[Scalar]:
+def reduced_force(tree: AnyTree, h: Scalars, q: Scalars, qd: Scalars, tau: Scalars) -> Values:
     """Qbar = tau - D qd - k (q - rest) - P q - S qd - h (nv, N m)."""
     Qbar = [t - d * v - hi for t, d, v, hi in zip(tau, tree.damping, qd, h)]
     if tree.has_springs:
@@ -233,7 +230,7 @@ def reduced_force(tree: AnyTree, h: Scalars, q: Scalars, qd: Scalars, tau: Scala
 
 def acceleration(
     tree: AnyTree, q: Scalars, qd: Scalars, tau: Scalars, terms: Terms = mass_matrix_and_bias
-) -> list[Scalar]:
+) -> Values:
     """qdd (nv, rad/s2) from Mbar qdd = Qbar = tau - D qd - k (q - rest) - h."""
     M, h = terms(tree, q, qd)
     return solve(M, reduced_force(tree, h, q, qd, tau))

@@ -8,27 +8,23 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from tmt.derivation.scalar import Rows, Scalar, Values
-
 from . import method
 from .dual import jacobian, unit_vectors
 from .mechanism import AnyTree
-from .vectors import ZERO, Factors, Scalars
+from .vectors import ZERO, Factors, Rows, Scalar, Scalars, Values
 
 Step = Callable[
     [Values, Values, Values, Scalar], tuple[Values, Values]
-]  # of q, qd, tau, dt: q, qd one dt later
+]  # (q, qd, tau, dt): q, qd one dt later
 Rates = tuple[Rows, Rows]  # by movements and by speeds
 
 
 class Form(NamedTuple):
-    """Mbar and h, and Mbar qdd + h, as sums in one order."""
+    """Mbar and h, and Mbar qdd + h, as sums in one order; the rates of the latter, None: by dual numbers."""
 
     terms: Callable[..., tuple[Rows, Values]]
     generalized_force: Callable[..., Values]
-    rates: Callable[..., Rates] | None = (
-        None  # of Mbar qdd + h by movements and speeds; None: by dual numbers
-    )
+    rates: Callable[..., Rates] | None = None
 
 
 LITERAL = Form(method.mass_matrix_and_bias, method.generalized_force)

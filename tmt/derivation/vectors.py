@@ -1,4 +1,4 @@
-"""Vectors and rotations over any scalar: float, array, mpf, traced or symbolic.
+"""Vectors, rotations and linear systems over any scalar: float, array, mpf, traced or symbolic.
 
 A scalar is anything with + - * / that `sin` and `cos` know, and for ball joints `sqrt` and `arctan`. A new
 scalar type registers itself with `sin.register` and so on; nothing else has to change.
@@ -12,8 +12,9 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from tmt.derivation.scalar import Rows, Scalar, Values
-
+Scalar = Any  # of any number type over which the method is written
+Values = list[Scalar]
+Rows = list[Values]
 Scalars = Sequence[Scalar] | NDArray[Any]
 
 

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import mpmath
 import numpy as np
 
-from tmt.compiled.forms import flat, straight_step
+from tmt.compiled.forms import values_in
 from tmt.compiled.trace import Tape
 from tmt.derivation import composite, linearized
-from tmt.derivation.quantities import Form, State, argument_of, quantity_of, shape_of
+from tmt.derivation.quantities import Form, quantity_of, shape_of
 from tmt.exact import series
 from tmt.exact.motion import DIGITS, FORMS, Equations, program
 from tmt.exact.tree import exact_tree
@@ -57,14 +57,12 @@ def exact_of_many(tree: Tree, name: str, q: np.ndarray, *rates: np.ndarray) -> P
 @lru_cache(maxsize=64)
 def traced(tree: Tree, name: str) -> tuple[Equations, list[int]]:
     """The operations of a quantity, and the rows of its numbers."""
-    tape, n, row = Tape(mpmath.mpf), len(tree.axis), quantity_of(name)
+    tape, n, takes = Tape(mpmath.mpf), len(tree.axis), quantity_of(name).takes
     with mpmath.workdps(DIGITS):
         exact = exact_tree(tree, mpmath.mpf)
         sizes = {"q": tree.coordinates.nq, "qd": n, "tau": n, "qdd": n, "dt": 1}
-        takes = row.takes if len(row.takes) > 2 else ("q", "qd", "tau")
+        takes = takes if len(takes) > 2 else ("q", "qd", "tau")
         given = {array: tape.inputs(*(f"{array}{i}" for i in range(sizes[array]))) for array in takes}
-        step = straight_step(exact, argument_of(name), EXACT) if row.argument == "method" else None
-        state = State(exact, given, EXACT, argument_of(name), step)
-        results = [tape.lift(x) for x in flat(row.of(state))]
+        results = [tape.lift(x) for x in values_in(EXACT, exact, name, given)]
         equations, places = program(tape, [x for part in given.values() for x in part], results)
     return equations, [places[x.i] for x in results]

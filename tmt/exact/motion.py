@@ -106,10 +106,8 @@ def followed(
 ) -> tuple[np.ndarray, int, ValueError | None]:  # fmt: skip
     """The records (k, 2, nq + nv) of a run as far as it goes, the number of its series, and why it ends early, or None."""
     traced, n = equations(tree, tau, form), tree.coordinates.nq + tree.coordinates.nv
-    (high, low), most = (
-        traced.tables(n, order + 1),
-        (most_operations or MOST_OPERATIONS) // (BESIDE + len(traced.code)),
-    )
+    high, low = traced.tables(n, order + 1)
+    most = (most_operations or MOST_OPERATIONS) // (BESIDE + len(traced.code))
     times = [Fraction(dt) * k for k in range(0, steps + 1, every)]
     state, t, count = first_state(tree.coordinates, q, qd), Fraction(0), 0
     path = [state]

@@ -8,7 +8,7 @@ from fractions import Fraction
 import mpmath
 
 from tmt.compiled.ir import INDEX, Value
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.vectors import Scalar
 
 Both = tuple[Scalar, Scalar]  # high and low
 TERMS = 16  # of the series of sine and cosine up to pi/4: the next is below 1e-36

@@ -6,8 +6,7 @@ import mpmath
 
 from tmt.derivation.coordinates import Coordinates, normalized
 from tmt.derivation.mechanism import Mechanism
-from tmt.derivation.scalar import Scalar
-from tmt.derivation.vectors import Scalars, Vector, sqrt
+from tmt.derivation.vectors import Scalar, Scalars, Vector, sqrt
 from tmt.model.tree import Tree
 
 HALVINGS = 4  # of a turn of at most pi rad: then the sine of its half is below 0.1

@@ -12,18 +12,17 @@ from tmt.compiled import forms
 from tmt.compiled.straight import Traced
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.quantities import QUANTITIES, is_quantity, quantity_of, shape_of, what_is_known
-from tmt.derivation.scalar import Values
-from tmt.model.arguments import checked_model, positive
-from tmt.model.tree import Tree, stated
-from tmt.model.values import shown
+from tmt.derivation.vectors import Values
+from tmt.model.tree import Tree, checked_model, stated
+from tmt.model.values import positive, shown
 
-from . import c, casadi, jax, matlab, python
+from . import c, jax, scripts
 from .parameters import OF_BODIES, Parameters
 from .statements import Function, Program
 
 LANGUAGES: dict[str, Callable[[Program], str]] = {
-    "c": c.source, "c header": c.header, "python": python.source, "matlab": matlab.source,
-    "casadi": casadi.source, "jax": jax.source,
+    "c": c.source, "c header": c.header, "python": scripts.python, "matlab": scripts.matlab,
+    "casadi": scripts.casadi, "jax": jax.source,
 }  # fmt: skip
 SYMBOLIC = "latex", "html", "sympy"
 OF_SYMBOLS = "mass_matrix", "bias", "gravity_balance"
@@ -95,10 +94,10 @@ def symbolic_text(
     model: Tree, language: str, quantities: tuple[str, ...], head: Sequence[str], limit: float
 ) -> str:
     try:
-        from . import latex, page, symbols
+        from . import documents, symbols
     except ImportError:
         raise ValueError("symbolic equations need SymPy: pip install sympy") from None
-    writers = {"latex": latex.latex, "html": page.page, "sympy": symbols.python_source}
+    writers = {"latex": documents.latex, "html": documents.page, "sympy": symbols.python_source}
     return writers[language](symbols.symbolic(model, quantities, limit), head)
 
 
@@ -135,10 +134,9 @@ def places(part: slice) -> str:
     return f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}"
 
 
-def function_of(model: Tree, name: str, parameters: Parameters | None = None) -> Function:
+def function_of(model: Tree, name: str, parameters: Parameters) -> Function:
     import tmt  # for the docstring
 
-    parameters = parameters or Parameters(model, ())
     quantity, shape, nv = quantity_of(name), shape_of(name, model), model.coordinates.nv
     third = "qdd" if "qdd" in quantity.takes else "tau"
     sizes = {"q": model.coordinates.nq, "qd": nv, third: nv, "dt": 1}
@@ -157,7 +155,7 @@ def identifier(name: str) -> str:
 @lru_cache(maxsize=16)
 def traced(model: Tree, name: str, parameters: Parameters | None) -> Traced:
     """A quantity as a function of its arrays and of the parameters."""
-    if parameters is None or not parameters.values:
+    if parameters is None:
         return forms.quantity(model, name)
 
     def tree_of(arrays: Sequence[Values]) -> AnyTree:

@@ -4,6 +4,8 @@ import math
 import re
 from collections.abc import Sequence
 
+from tmt.compiled.straight import places_handed_on
+
 from .statements import Function, Line, Program, Syntax, statements
 
 # assignments of one function, up to some 3,000 operations: the time of a compiler grows with the square of their number
@@ -89,23 +91,17 @@ def block(arrays: Sequence[str], lines: Sequence[str]) -> str:
 def handed_on(sections: Sequence[Sequence[Line]]) -> tuple[list[list[str]], int]:
     """The lines of each part of a function, with w[place] for a value of an earlier one; the size of w."""
     last = {name: k for k, lines in enumerate(sections) for line in lines for name in NAME.findall(line.text)}
-    places: dict[str, str] = {}
-    leaving: list[list[str]] = [[] for _ in sections]
-    free: list[str] = []
-    texts, size = [], 0
-    for k, lines in enumerate(sections):
-        earlier = dict(places)  # a value of this part has its name in it
+    places, size = places_handed_on([[line.name for line in lines if line.name] for lines in sections], last)
+    earlier: dict[str, str] = {}
+    texts = []
+    for lines in sections:
         text = []
         for line in lines:
-            text.append(NAME.sub(lambda name: earlier.get(name[0], name[0]), line.text))  # noqa: B023
-            if line.name and last[line.name] > k:
-                if not free:
-                    free, size = [f"w[{size}]"], size + 1
-                places[line.name] = free.pop()
-                leaving[last[line.name]].append(places[line.name])
-                text.append(f"{places[line.name]} = {line.name};")
-        free += leaving[k]
+            text.append(NAME.sub(lambda name: earlier.get(name[0], name[0]), line.text))
+            if line.name in places:
+                text.append(f"w[{places[line.name]}] = {line.name};")
         texts.append(text)
+        earlier.update({line.name: f"w[{places[line.name]}]" for line in lines if line.name in places})
     return texts, size
 
 

@@ -10,18 +10,12 @@ from textwrap import fill
 
 from tmt.compiled.straight import Traced
 
-from .python import docstring
+from .scripts import docstring
 from .statements import Function, Program
 
 NAMES = {
-    "+": "add",
-    "-": "subtract",
-    "*": "multiply",
-    "/": "divide",
-    "neg": "negative",
-    "sqrt": "sqrt",
-    "arctan": "arctan",
-}
+    "+": "add", "-": "subtract", "*": "multiply", "/": "divide", "neg": "negative", "sqrt": "sqrt", "arctan": "arctan",
+}  # fmt: skip
 NOTE = "Numbers are float32 unless JAX is set to 64 bits: jax.config.update('jax_enable_x64', True)."
 HEAD = '''
 

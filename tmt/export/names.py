@@ -9,7 +9,7 @@ import numpy as np
 import sympy
 
 from tmt.derivation.mechanism import AnyTree, Mechanism
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.vectors import Scalar
 from tmt.model.tree import Tree
 
 from .trigonometry import Expression

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmt.derivation.mechanism import AnyTree, Mechanism
-from tmt.derivation.scalar import Values
-from tmt.derivation.vectors import Matrix, Vector
+from tmt.derivation.vectors import Matrix, Values, Vector
 from tmt.model.tree import Tree
 
 SIZES = {"mass": 1, "com": 3, "inertia": 6}

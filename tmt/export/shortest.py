@@ -7,7 +7,7 @@ from functools import reduce
 
 from sympy import Add, Integer, Mul, Rational, cos, gcd, sin
 
-from tmt.derivation.scalar import Scalar
+from tmt.derivation.vectors import Scalar
 
 from .names import Names
 from .names import number as exact_number
@@ -15,27 +15,20 @@ from .trigonometry import NOISE, OF_TERM, Expression, Polynomial, Ring
 
 FEW_TERMS, FEW_FACTORED = 40, 6  # of a polynomial of which every form is tried, of one that is factored
 
-Parallel = Mapping[int, tuple[int, int]]
 Term = tuple[Expression, dict[Expression, Expression]]  # of a sum: a number, {factor: power}
 Harmonics = dict[tuple[bool, tuple[int, ...]], Scalar]  # {(is_sine, k): number}, of sums of k_i times angle i
 
 
 class Forms:
-    """Expressions of polynomials of a Ring.
+    """Expressions of polynomials of a Ring, in SymPy's angles.
 
-    Masses and speeds are taken out of sums, other symbols where all terms have them. angles: SymPy
-    expressions. parallel: {i: (j, sign)} where hinge i turns on hinge j about sign times its axis.
+    Masses and speeds are taken out of sums, other symbols where all terms have them.
     """
 
-    def __init__(self, ring: Ring, names: Names, angles: Sequence[Expression], parallel: Parallel):
+    def __init__(self, ring: Ring, names: Names, angles: Sequence[Expression]):
         self.ring, self.symbols, self.masses, self.speeds = ring, ring.symbols, names.masses, set(names.qd)
-        self.angles, self.parallel, self.sums = angles, parallel, list(angles)
-        for i, (j, sign) in parallel.items():
-            self.sums[i] = angles[i] + sign * self.sums[j]
-        self.found: dict[Polynomial, Expression] = {}
-        # cosine and sine of a sum of k_i times angle i
-        none: tuple[int, ...] = ()
-        self.multiples = {none: (ring.functions.one, ring.functions.zero)}
+        self.angles = angles
+        self.known: dict[Polynomial, Expression] = {}
 
     def shortest(self, poly: Polynomial) -> Expression:
         """The shortest expression that is found for a polynomial in symbols, sines and cosines."""
@@ -56,36 +49,34 @@ class Forms:
         return min((grouped(terms, first, last) for first in (self.masses, products, ())), key=cost)
 
     def form(self, poly: Polynomial) -> Expression:
-        if poly not in self.found:
-            self.found[poly] = min(self.candidates(poly), key=cost)
-        return self.found[poly]
+        if poly not in self.known:
+            self.known[poly] = min(self.candidates(poly), key=cost)
+        return self.known[poly]
 
     def candidates(self, poly: Polynomial) -> Iterator[Expression]:
-        """Forms of a polynomial in sines and cosines: in angles, sums of parallel hinges' angles, waves."""
-        few, harmonics = len(poly) <= FEW_TERMS, self.harmonics(poly)
-        spaces = [(poly, self.angles)]
-        if self.parallel:
-            spaces.append((self.of_sums(harmonics), self.sums))
-        for poly, angles in spaces:
-            squared = [pair for pair in self.ring.places if few and has_square(poly, pair[1])]
-            for turned in itertools.product([False, True], repeat=len(squared)):
-                self.ring.count(len(poly) * OF_TERM)
-                pairs = [pair[::-1] for pair, turn in zip(squared, turned) if turn]
-                yield from self.expressions(self.ring.reduced(poly, pairs), angles)
-        yield self.of_harmonics(harmonics)
+        """A polynomial with its squares reduced in each way, as a product, and as waves."""
+        few = len(poly) <= FEW_TERMS
+        squared = [
+            pair for pair in self.ring.places if few and any(monomial[pair[1]] > 1 for monomial in poly)
+        ]
+        for turned in itertools.product([False, True], repeat=len(squared)):
+            self.ring.count(len(poly) * OF_TERM)
+            pairs = [pair[::-1] for pair, turn in zip(squared, turned) if turn]
+            yield from self.expressions(self.ring.reduced(poly, pairs))
+        yield self.of_harmonics(self.harmonics(poly))
 
-    def expressions(self, poly: Polynomial, angles: Sequence[Expression]) -> Iterator[Expression]:
+    def expressions(self, poly: Polynomial) -> Iterator[Expression]:
         """A polynomial with its common factors taken out, and as a product of polynomials."""
-        yield self.expression(poly, angles)
+        yield self.expression(poly)
         if self.ring.exact and len(poly) <= FEW_FACTORED:
             number, factors = poly.factor_list()
-            if len(factors) > 1 and angles is self.angles:  # each factor may have a shorter form of its own
+            if len(factors) > 1:  # each factor may have a shorter form of its own
                 reduced = [(self.ring.reduced(factor, self.ring.places), power) for factor, power in factors]
                 yield Mul(self.number(number), *(self.form(factor) ** power for factor, power in reduced))
 
-    def expression(self, poly: Polynomial, angles: Sequence[Expression]) -> Expression:
+    def expression(self, poly: Polynomial) -> Expression:
         functions: dict[int, Expression] = {}
-        for (sine, cosine), angle in zip(self.ring.places, angles):
+        for (sine, cosine), angle in zip(self.ring.places, self.angles):
             functions |= {sine: sin(angle), cosine: cos(angle)}
         terms = []
         for monomial, number in poly.items():
@@ -131,32 +122,6 @@ class Forms:
             angle = Add(*map(Mul, k, self.angles))
             terms.append(self.number(number) * (sin(angle) if is_sine else cos(angle)))
         return Add(*terms)
-
-    def of_sums(self, harmonics: Harmonics) -> Polynomial:
-        """Harmonics as a polynomial in sines and cosines of the sums of angles of parallel hinges."""
-        result = self.ring.functions.zero
-        for (is_sine, multiples), number in harmonics.items():
-            k = list(multiples)
-            for i, (j, sign) in self.parallel.items():
-                k[j] -= sign * k[i]
-            result += self.multiple(tuple(k))[is_sine] * number
-        return self.ring.reduced(result, self.ring.places)
-
-    def multiple(self, k: tuple[int, ...]) -> tuple[Polynomial, Polynomial]:
-        """Cosine and sine of a sum of k_i times angle i."""
-        if k not in self.multiples:
-            cosine, sine = self.multiple(k[:-1])
-            s, c = (self.ring.functions.gens[place] for place in self.ring.places[len(k) - 1])
-            s = s if k[-1] > 0 else -s
-            for _ in range(abs(k[-1])):
-                cosine, sine = cosine * c - sine * s, sine * c + cosine * s
-            reduced = [self.ring.reduced(poly, self.ring.places) for poly in (cosine, sine)]
-            self.multiples[k] = reduced[0], reduced[1]
-        return self.multiples[k]
-
-
-def has_square(poly: Polynomial, place: int) -> bool:
-    return any(monomial[place] > 1 for monomial in poly)
 
 
 def cost(form: Expression) -> int:

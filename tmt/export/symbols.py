@@ -1,6 +1,5 @@
 """Mbar, h and gravity of a Tree as SymPy expressions: the method over polynomials in named parameters."""
 
-import operator
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -10,10 +9,10 @@ from sympy.printing.str import StrPrinter
 
 from tmt.arm import ARM
 from tmt.derivation.quantities import State
-from tmt.derivation.scalar import Rows, Scalar, Values
+from tmt.derivation.vectors import Rows, Scalar, Values
 from tmt.model.tree import Tree
 
-from .names import EPS, Names, Parameter, Symbols, number
+from .names import Names, Parameter, Symbols, number
 from .shortest import Forms
 from .trigonometry import Angle, Expression, Ring, TooLong, Trig
 
@@ -60,16 +59,12 @@ def symbolic(
         if kind == "ball":
             raise ValueError(f"symbolic equations need hinges and slides; joint {name} is a ball")
     note = ""
-    if named:
+    for has_names in (True, False) if named else (False,):
         try:
-            return derived(Names(tree, True), quantities, limit / 2, note)
+            return derived(Names(tree, has_names), quantities, limit / 2, note)
         except TooLong:
             note = f"numbers in place of named parameters, which would take more work than {limit / 2:g} s"
-    try:
-        return derived(Names(tree, False), quantities, limit / 2, note)
-    except TooLong:
-        longest = f"take more work than {limit:g} s"
-        raise ValueError(f"symbolic equations of these {len(tree.kind)} joints {longest}") from None
+    raise ValueError(f"symbolic equations of these {len(tree.kind)} joints take more work than {limit:g} s")
 
 
 def derived(names: Names, quantities: Sequence[str], limit: float, note: str) -> Symbolic:
@@ -78,11 +73,10 @@ def derived(names: Names, quantities: Sequence[str], limit: float, note: str) ->
     places = {i: sympy.Dummy() for i, kind in enumerate(tree.kind) if kind == "slide"}
     hinges = [i for i, kind in enumerate(tree.kind) if kind == "hinge"]
     from_reference = [symbol - number(value) for symbol, value in zip(names.q, tree.reference)]
-    parallel = {hinges.index(i): (hinges.index(j), sign) for i, (j, sign) in parallel_hinges(tree).items()}
     symbols = sorted(names.parameters, key=str)
     angles = [from_reference[i] for i in hinges]
     ring = Ring([*symbols, *places.values(), *names.qd], len(angles), names.is_exact, limit)
-    forms = Forms(ring, names, angles, parallel)
+    forms = Forms(ring, names, angles)
     variables = [
         ring.scalar(places[i]) if i in places else ring.angle(hinges.index(i)) for i in range(len(tree.kind))
     ]
@@ -133,19 +127,6 @@ def coriolis(ring: Ring, mass_matrix: Rows, q: Sequence[Angle | Trig], speeds: S
         return sum(terms, zero)
 
     return [entry(i) for i in n]
-
-
-def parallel_hinges(tree: Tree) -> dict[int, tuple[int, int]]:
-    """{i: (j, sign)} of hinges i that turn on hinge j, the next one inward, about sign times its axis."""
-    found = {}
-    for i, kind in enumerate(tree.kind):
-        j = tree.parent[i]
-        while j >= 0 and tree.kind[j] == "slide":
-            j = tree.parent[j]
-        cosine = sum(map(operator.mul, tree.axis[i], tree.axis[j])) if j >= 0 else 0.0
-        if kind == "hinge" and abs(cosine) > 1.0 - 4 * EPS:
-            found[i] = j, 1 if cosine > 0.0 else -1
-    return found
 
 
 class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types

@@ -6,8 +6,7 @@ from typing import Any
 from sympy import QQ, Dummy, RealField
 from sympy.polys.rings import PolyRing
 
-from tmt.derivation.scalar import Scalar
-from tmt.derivation.vectors import Vector, cos, sin
+from tmt.derivation.vectors import Scalar, Vector, cos, sin
 
 # bits of coefficients that are not rational: the rounding of a sum is far below that of its doubles
 PRECISION = 120

@@ -1,13 +1,13 @@
 """The methods of integration, each a `Method` (see stepping.py) with one step that is written over any scalar.
 
 The same lines integrate floats, dual numbers (their exact Jacobian), mpmath numbers and traced expressions (machine
-code, see tmt.compiled). METHODS may be given further ones, and objects of a user's own that have a `slope` and a `step`.
+code, see tmt.compiled). METHODS may be given further ones.
 """
 
 from dataclasses import dataclass
 
 from tmt.derivation.coordinates import FLAT
-from tmt.derivation.scalar import Rows, Scalar, Values
+from tmt.derivation.vectors import Rows, Scalar, Values
 from tmt.methods import dop853
 from tmt.methods.derivatives import Linearized as Linearized
 from tmt.methods.derivatives import amplification as amplification
@@ -17,9 +17,9 @@ from tmt.methods.implicit import ImplicitRungeKutta
 from tmt.methods.semi_implicit import SemiImplicitEuler as SemiImplicitEuler
 from tmt.methods.semi_implicit import by_speed as by_speed
 from tmt.methods.semi_implicit import lone_speeds as lone_speeds
-from tmt.methods.stepping import Joints, Method, Slope, State, advance, completed, increments
-from tmt.methods.tableau import Numbers, Tableau
-from tmt.model.values import shown
+from tmt.methods.stepping import Joints, Method, Slope, State, advance, increments
+from tmt.methods.tableau import Numbers, Tableau, numbers
+from tmt.model.values import listed, shown
 
 Slopes = tuple[list[Values], list[Values]]  # of all stages: rates of the movement, and accelerations
 
@@ -73,7 +73,7 @@ class AdaptiveRungeKutta(RungeKutta):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.make_plain("errors")
+        self.set_plain("errors", tuple(numbers("errors", row) for row in listed(self.errors) or (None,)))
         if len(self.errors) != 2 or any(len(row) != len(self.b) for row in self.errors):
             raise ValueError("errors must be two rows of one weight for each stage")
 
@@ -90,7 +90,7 @@ CLASSICAL = (  # Kutta (1901): A, b, c
     (0.0, 0.5, 0.5, 1.0),
 )
 ROOT = 3**0.5 / 6
-METHODS = {
+METHODS: dict[str, Method] = {
     "rk4": RungeKutta(4, *CLASSICAL),  # the assignment's part i
     "rk4_mean_speed": RungeKutta(2, *CLASSICAL, mean_speed=True),  # of order 2 where a ball tumbles
     "dopri8": RungeKutta(order=8, A=dop853.A, b=dop853.B, c=dop853.C),  # Dormand and Prince, fixed step
@@ -111,11 +111,13 @@ METHODS = {
 
 
 def method_named(name: str) -> Method:
-    """The method of that name in METHODS, as it is there now, with all fields; ValueError if there is none, or no method."""
+    """The method of that name in METHODS, as it is there now; ValueError if there is none with a step."""
     if not isinstance(name, str) or name not in METHODS:
         names = ", ".join(METHODS)
         raise ValueError(f"unknown method {shown(name)}; known are {names}, and for simulate taylor")
-    try:
-        return completed(METHODS[name])
-    except ValueError as error:
-        raise ValueError(f"METHODS[{name!r}] is {shown(METHODS[name])}; {error}") from None
+    stepping = METHODS[name]
+    if not isinstance(stepping, Method) or type(stepping).step is Method.step:
+        raise ValueError(
+            f"METHODS[{name!r}] is {shown(stepping)}; a tmt.methods.Method with a step is expected"
+        )
+    return stepping

@@ -17,8 +17,7 @@ import numpy as np
 
 from tmt.derivation.coordinates import FLAT, Flat, Joint, normalized, product
 from tmt.derivation.dual import Dual, jacobian, seeded, unit_vectors
-from tmt.derivation.scalar import Scalar, Values
-from tmt.derivation.vectors import solve_any
+from tmt.derivation.vectors import Scalar, Values, solve_any
 from tmt.methods.stepping import Joints, Slope, State
 from tmt.methods.tableau import Numbers, Tableau
 

@@ -7,9 +7,18 @@ from typing import TypeVar
 
 from tmt.derivation.coordinates import FLAT
 from tmt.derivation.mechanism import AnyTree
-from tmt.derivation.scalar import Scalar, Values
-from tmt.methods.dynamics import LITERAL, Implicit, Terms, dynamics_of
-from tmt.methods.stepping import Joints, Method, Slope, State, advance, increments
+from tmt.derivation.vectors import Scalar, Values
+from tmt.methods.stepping import (
+    LITERAL,
+    Dynamics,
+    Implicit,
+    Joints,
+    Method,
+    Slope,
+    State,
+    advance,
+    increments,
+)
 
 T = TypeVar("T")
 Gains = Sequence[Sequence[float]]
@@ -32,8 +41,6 @@ class SemiImplicitEuler(Method):
     lone_bodies: bool = False
     implicit_springs: bool = False
     implicit_gains: bool = False
-
-    damps_implicitly = True
 
     def gains_held(self, tree: AnyTree) -> tuple[Gains, Gains]:
         """The implicit entries of a controller's gains, of position and of speed: (nv, nv) each, () where there are none."""
@@ -61,9 +68,9 @@ class SemiImplicitEuler(Method):
         return Implicit(matrix, pull, dt, frozenset(range(len(qd))) if self.implicit_bias else alone)
 
     def slope(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar, terms: Terms = LITERAL
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar, dynamics: Dynamics = LITERAL
     ) -> Values:
-        return dynamics_of(terms).acceleration(tree, q, qd, tau, self.implicit(tree, qd, dt))
+        return dynamics.acceleration(tree, q, qd, tau, self.implicit(tree, qd, dt))
 
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
         qd = advance(qd, dt, (1.0,), [slope(q, qd)])

@@ -1,65 +1,105 @@
-"""What a method of integration is, and what it says of itself: `Method`, from which all in METHODS are made.
+"""What a method of integration is, `Method`, and the `Dynamics` that its `slope` asks for accelerations.
 
-The rest of tmt asks these fields and never a type. An object that is not made from Method gets the defaults, see `completed`.
+Another way to have accelerations is a subclass of Dynamics: with calls in compiled code (forms.py), with
+derivatives by those of the linear system (derivatives.py). What a method is able to do is said by its fields;
+nothing asks for its type.
 """
 
 from collections.abc import Callable, Sequence
-from functools import cached_property, lru_cache
-from typing import Any
+from functools import cached_property
+from typing import NamedTuple
 
+from tmt.derivation import method
 from tmt.derivation.coordinates import FLAT, Coordinates, Flat
 from tmt.derivation.mechanism import AnyTree
-from tmt.derivation.scalar import Scalar, Values
-from tmt.methods.dynamics import LITERAL, Terms, dynamics_of
-from tmt.model.values import shown
+from tmt.derivation.method import Terms
+from tmt.derivation.vectors import Rows, Scalar, Scalars, Values, solve, solve_any
 
 Slope = Callable[[Values, Values], Values]
 State = tuple[Values, Values]
 Joints = Coordinates | Flat
+DIVERGED, NEWTON, SMALL = 1, 2, 3  # why a run ends; 0: it does not
+
+
+class Implicit(NamedTuple):
+    """What a method takes at the end of its step: (Mbar + matrix [+ dt dh/dqd in rows]) a = Qbar - pull."""
+
+    matrix: Rows  # (nv, nv)
+    pull: Values  # (nv,), N m
+    dt: Scalar  # s
+    bias_rows: frozenset[int]  # speeds of whose bias it takes the change
+
+    @property
+    def acts_at_single_joints(self) -> bool:
+        """Whether all of it is diagonal."""
+        across = [x for i, row in enumerate(self.matrix) for j, x in enumerate(row) if i != j]
+        return not self.bias_rows and all(isinstance(x, float) and x == 0.0 for x in across)
+
+
+Held = Implicit | None
+
+
+class Dynamics:
+    """Accelerations from Mbar and h, which `terms` gives."""
+
+    def __init__(self, terms: Terms = method.mass_matrix_and_bias):
+        self.terms = terms
+
+    def acceleration(
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
+    ) -> Values:
+        """a (nv,) from Mbar a = Qbar, or from the linear system of an implicit method."""
+        M, h = self.terms(tree, q, qd)
+        force = method.reduced_force(tree, h, q, qd, tau)
+        if implicit is None:
+            return solve(M, force)
+        matrix = [plus(*rows) for rows in zip(M, implicit.matrix)]
+        if implicit.bias_rows:
+            rates = self.bias_rates(tree, q, qd)
+            for i in implicit.bias_rows:
+                matrix[i] = plus(matrix[i], [implicit.dt * rate for rate in rates[i]])
+        return self.solve_any(matrix, minus(force, implicit.pull))
+
+    def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
+        return method.bias_rates(tree, q, qd, self.terms)
+
+    def solve_any(self, matrix: Rows, right: Values) -> Values:
+        return solve_any(matrix, right)
+
+
+LITERAL = Dynamics()
 
 
 class Method:
     """A method of integration. Another one is a subclass with a `step`; it must be hashable, as a frozen dataclass is.
 
-    `step(slope, q, qd, dt)` returns the state (q, qd) one dt later, each a list of n scalars of any type; it asks
-    `slope(q, qd)` for accelerations, a list of n. Which accelerations these are is said by the method's own `slope`. For a tree
-    with balls it is given their coordinates too (see coordinates.py), `step(slope, q, qd, dt, joints)`: q is longer than qd.
+    `step(slope, q, qd, dt)` returns the state (q, qd) one dt later, each a list of n scalars of any type; it
+    asks `slope(q, qd)` for accelerations, a list of n. Which accelerations these are is said by the method's
+    own `slope`. For a tree with balls it is given their coordinates too (coordinates.py), `step(slope, q, qd,
+    dt, joints)`: q is longer than qd.
     """
 
     order: int = 1  # the error of a run falls with dt to this power
     adaptive = False  # chooses its own steps, takes a tolerance and has an `attempt`, see AdaptiveRungeKutta
     solves_stages = False  # its stages solve an equation: it has `stage_states` and `finish`, see implicit.py
-    damps_implicitly = False  # its slope takes the joint damping at the rates one dt later
-
-    @cached_property
-    def lanes(self) -> bool:
-        """Whether it can be followed in lanes: then every run does the same in each step."""
-        return not (self.adaptive or self.solves_stages)
 
     @cached_property
     def stages(self) -> int:
         """Evaluations of the dynamics in one step; of a method that solves its stages, in one iteration."""
-        if self.solves_stages:
-            why = "it solves its stages and does not say how many they are"
-            raise ValueError(f"{why}; a field stages is expected")
         positions = []
 
         def slope(q: Values, qd: Values) -> Values:
             positions.append(q)
             return [0.0]
 
-        try:
-            self.step(slope, [0.0], [0.0], 1.0)
-        except Exception as error:  # a step of the user's own
-            why = f"its stages cannot be counted, as its step of one hinge fails: {shown(error)}"
-            raise ValueError(why) from error
+        self.step(slope, [0.0], [0.0], 1.0)
         return len(positions)
 
     def slope(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar, terms: Terms = LITERAL
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar, dynamics: Dynamics = LITERAL
     ) -> Values:
-        """qdd from Mbar qdd = tau - D qd - h; terms: Dynamics, or a function that gives Mbar and h."""
-        return dynamics_of(terms).acceleration(tree, q, qd, tau)
+        """qdd from Mbar qdd = tau - D qd - h."""
+        return dynamics.acceleration(tree, q, qd, tau)
 
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
         """The state (q, qd) one dt later, from `slope(q, qd)`."""
@@ -70,48 +110,6 @@ def stepped(stepping: Method, tree: AnyTree, slope: Slope, q: Values, qd: Values
     """The state (q, qd) of a tree one dt later by a method that asks `slope(q, qd)`."""
     joints = tree.coordinates
     return stepping.step(slope, q, qd, dt, joints) if joints.balls else stepping.step(slope, q, qd, dt)
-
-
-OVERFLOW, TURNED, NEWTON, SMALL = 1, 2, 3, 4  # why a run ends; 0: it does not
-FLAGS, COUNTS = ("adaptive", "solves_stages", "damps_implicitly", "lanes"), ("order", "stages")
-FIELDS = dict.fromkeys(FLAGS, "True or False") | dict.fromkeys(COUNTS, "a whole number of at least 1")
-ACTS = ("slope", "step")
-NEEDS = {"adaptive": ("attempt",), "solves_stages": ("stage_states", "finish")}
-EXPECTED = "a hashable method with a slope and a step is expected"
-
-
-class Completed(Method):
-    """An object that is not made from Method, with the defaults of Method for the fields that it lacks."""
-
-    def __init__(self, stepping: object):  # of a user's own class
-        for name in (*ACTS, *FIELDS, *NEEDS["adaptive"], *NEEDS["solves_stages"]):
-            if hasattr(stepping, name):
-                setattr(self, name, getattr(stepping, name))
-
-
-def completed(stepping: object) -> Method:
-    """The object as a method with all fields of Method; ValueError if it is no method, or says what cannot be."""
-    try:
-        hash(stepping)
-    except Exception:  # what a user's own object raises
-        raise ValueError(EXPECTED) from None
-    return _completed(stepping)
-
-
-@lru_cache(maxsize=64)
-def _completed(stepping: object) -> Method:
-    if not all(callable(getattr(stepping, act, None)) for act in ACTS):
-        raise ValueError(EXPECTED)
-    complete = stepping if isinstance(stepping, Method) else Completed(stepping)
-    for name, accepted in FIELDS.items():
-        value: Any = getattr(complete, name)
-        is_right = isinstance(value, bool) if name in FLAGS else type(value) is int and value >= 1
-        if not is_right:
-            raise ValueError(f"its {name} is {shown(value)}, where {accepted} is expected")
-    for name, parts in NEEDS.items():
-        if lacking := [part for part in parts if getattr(complete, name) and not hasattr(complete, part)]:
-            raise ValueError(f"its {name} is {getattr(complete, name)}, but it has no {lacking[0]}")
-    return complete
 
 
 def increments(dt: Scalar, weights: Sequence[float], slopes: Sequence[Values], n: int) -> Values:
@@ -126,3 +124,11 @@ def advance(start: Values, dt: Scalar, weights: Sequence[float], slopes: Sequenc
         terms = [slope[k] if w == 1.0 else w * slope[k] for w, slope in zip(weights, slopes) if w != 0.0]
         result.append(value + dt * sum(terms[1:], terms[0]) if terms else value)
     return result
+
+
+def plus(first: Scalars, second: Scalars) -> Values:
+    return [a + b for a, b in zip(first, second)]
+
+
+def minus(first: Scalars, second: Scalars) -> Values:
+    return [a - b for a, b in zip(first, second)]

@@ -1,12 +1,12 @@
 """Butcher tableaus: what explicit and implicit Runge-Kutta methods are given by."""
 
 from dataclasses import dataclass, field
-from typing import TypeGuard
+from typing import Any
 
 import numpy as np
 
 from tmt.methods.stepping import Method
-from tmt.model.values import real_numbers, shown
+from tmt.model.values import listed, real_numbers, shown
 
 Numbers = tuple[float, ...]
 
@@ -24,7 +24,9 @@ class Tableau(Method):
         if type(self.order) is not int or not 1 <= self.order <= 100:
             expected = "a whole number from 1 to 100 is expected"
             raise ValueError(f"order of the method is {shown(self.order)}; {expected}")
-        self.make_plain("A", "b", "c")
+        self.set_plain("A", tuple(numbers("A", row) for row in listed(self.A) or (None,)))
+        for name in ("b", "c"):
+            self.set_plain(name, numbers(name, getattr(self, name)))
         if not len(self.A) == len(self.b) == len(self.c):
             raise ValueError("A, b and c must have one entry for each stage")
         for i, (row, time) in enumerate(zip(self.A, self.c)):
@@ -38,20 +40,13 @@ class Tableau(Method):
         """Raise ValueError if row i of A has not as many entries as the kind of method wants."""
         raise NotImplementedError
 
-    def make_plain(self, *names: str) -> None:
-        """Make these rows of numbers tuples of float: a method is a value, and a key of what is compiled for it."""
-        for name in names:
-            value, is_nested = getattr(self, name), name not in ("b", "c")
-            try:
-                parts = [real_numbers(part) for part in value] if is_nested else [real_numbers(value)]
-            except TypeError:  # one number where rows are expected
-                parts = [None]
-            rows = tuple(tuple(part.tolist()) for part in parts if is_vector(part))
-            if len(rows) < len(parts):
-                wanted = "rows of numbers" if is_nested else "numbers"
-                raise ValueError(f"{name} of the method is {shown(value)}; {wanted} are expected")
-            object.__setattr__(self, name, rows if is_nested else rows[0])  # it is frozen
+    def set_plain(self, name: str, value: Any) -> None:
+        """Of floats in tuples, a method is a value, and a key of what is compiled for it."""
+        object.__setattr__(self, name, value)
 
 
-def is_vector(values: np.ndarray | None) -> TypeGuard[np.ndarray]:
-    return values is not None and values.ndim == 1 and bool(np.isfinite(values).all())
+def numbers(name: str, values: Any) -> Numbers:
+    array = real_numbers(values)
+    if array is None or array.ndim != 1 or not np.isfinite(array).all():
+        raise ValueError(f"{name} of the method has {shown(values)}, where a row of numbers is expected")
+    return tuple(array.tolist())

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from tmt.derivation.mechanism import origin_in_parent, turn_in_parent
+from tmt.derivation.mechanism import Mechanism, origin_in_parent, turn_in_parent
 from tmt.derivation.vectors import IDENTITY, ZERO, Matrix, Vector
 
+from .values import CLOSE_TO_ONE as CLOSE_TO_ONE
 from .values import numbers_of, shown
 
-if TYPE_CHECKING:
-    from .tree import Tree
-
-CLOSE_TO_ONE = 1e-6  # how far the length of a quaternion may be from 1
 Value = TypeVar("Value")
 
 
@@ -59,7 +55,8 @@ class Carrier(NamedTuple):
 WORLD = Carrier(-1, ZERO, IDENTITY)
 
 
-def locked(tree: Tree, angles: Mapping[str, Any]) -> Tree:
+def locked(tree: Mechanism[float], angles: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields that differ in the tree without the joints that are named in `angles`, see Tree.lock."""
     names, joints = tree.joint_names, tree.coordinates.joints
     if not isinstance(angles, Mapping):
         expected = "a dict of positions by the names of joints is expected"
@@ -69,7 +66,7 @@ def locked(tree: Tree, angles: Mapping[str, Any]) -> Tree:
     if len(angles) == len(names):
         raise ValueError(f"all joints ({', '.join(names)}) are locked; at least one must be free")
     if not angles:
-        return tree
+        return {}
     q = list(tree.zero)
     for name, value in angles.items():
         joint = joints[names.index(name)]
@@ -88,27 +85,24 @@ def locked(tree: Tree, angles: Mapping[str, Any]) -> Tree:
             frames.append(before[i].onward(*_fixed(tree, i, q)))
     carried = [frames[joint] if joint >= 0 else WORLD for joint in tree.body_joint]
     of_sites = [frames[joint] if joint >= 0 else WORLD for joint in tree.site_joint]
-    return replace(
-        tree,
-        joint_names=chosen(names, free),
-        parent=tuple(before[i].joint for i in free),
-        offset=tuple(before[i].point(tree.offset[i]) for i in free),
-        axis=tuple(before[i].direction(tree.axis[k]) for i in free for k in joints[i].speeds),
-        damping=chosen(tree.damping, speeds),
-        body_joint=tuple(carrier.joint for carrier in carried),
-        com=tuple(carrier.point(com) for carrier, com in zip(carried, tree.com)),
-        inertia=tuple(carrier.tensor(inertia) for carrier, inertia in zip(carried, tree.inertia)),
-        kind=chosen(tree.kind, free),
-        armature=chosen(tree.armature, speeds),
-        stiffness=chosen(tree.stiffness, free),
-        rest=tuple(value for i in free for value in tree.rest[joints[i].q]),
-        reference=chosen(tree.reference, free),
-        position_gain=tuple(chosen(row, speeds) for row in chosen(tree.position_gain, speeds)),
-        speed_gain=tuple(chosen(row, speeds) for row in chosen(tree.speed_gain, speeds)),
-        site_joint=tuple(carrier.joint for carrier in of_sites),
-        site_offset=tuple(carrier.point(offset) for carrier, offset in zip(of_sites, tree.site_offset)),
-        site_turn=tuple(carrier.turned(turn) for carrier, turn in zip(of_sites, tree.site_turn)),
-    )
+    fields = {
+        name: chosen(getattr(tree, name), free) for name in ("joint_names", "kind", "stiffness", "reference")
+    }
+    fields |= {name: chosen(getattr(tree, name), speeds) for name in ("damping", "armature")}
+    for name in ("position_gain", "speed_gain"):
+        fields[name] = tuple(chosen(row, speeds) for row in chosen(getattr(tree, name), speeds))
+    return fields | {
+        "parent": tuple(before[i].joint for i in free),
+        "offset": tuple(before[i].point(tree.offset[i]) for i in free),
+        "axis": tuple(before[i].direction(tree.axis[k]) for i in free for k in joints[i].speeds),
+        "body_joint": tuple(carrier.joint for carrier in carried),
+        "com": tuple(carrier.point(com) for carrier, com in zip(carried, tree.com)),
+        "inertia": tuple(carrier.tensor(inertia) for carrier, inertia in zip(carried, tree.inertia)),
+        "rest": tuple(value for i in free for value in tree.rest[joints[i].q]),
+        "site_joint": tuple(carrier.joint for carrier in of_sites),
+        "site_offset": tuple(carrier.point(offset) for carrier, offset in zip(of_sites, tree.site_offset)),
+        "site_turn": tuple(carrier.turned(turn) for carrier, turn in zip(of_sites, tree.site_turn)),
+    }
 
 
 def chosen(values: Sequence[Value], places: Sequence[int]) -> tuple[Value, ...]:
@@ -116,7 +110,7 @@ def chosen(values: Sequence[Value], places: Sequence[int]) -> tuple[Value, ...]:
     return tuple(values[i] for i in places) if values else ()
 
 
-def _refuse_fed_back(tree: Tree, locked_names: Any, q: Sequence[float]) -> None:
+def _refuse_fed_back(tree: Mechanism[float], locked_names: Any, q: Sequence[float]) -> None:
     """Raise ValueError if a locked joint's position makes a torque at a free one: no Tree has that."""
     joints = dict(zip(tree.joint_names, tree.coordinates.joints))
     for name in locked_names if tree.position_gain else ():
@@ -129,13 +123,12 @@ def _refuse_fed_back(tree: Tree, locked_names: Any, q: Sequence[float]) -> None:
                 raise ValueError(f"{name!r} cannot be locked at {shown(position)}: {torque}; {expected}")
 
 
-def _fixed(tree: Tree, i: int, q: Sequence[float]) -> tuple[Vector, Matrix]:
+def _fixed(tree: Mechanism[float], i: int, q: Sequence[float]) -> tuple[Vector, Matrix]:
     """Origin and turn of joint i's frame in its parent's: at the reference it rounds nothing."""
     joint = tree.coordinates.joints[i]
-    off = any(q[joint.q][1:]) if joint.kind == "ball" else q[joint.q.start] != tree.reference[i]
-    if not off:
-        return Vector(*tree.offset[i]), IDENTITY
-    return origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)
+    if any(q[joint.q][1:]) if joint.kind == "ball" else q[joint.q.start] != tree.reference[i]:
+        return origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)
+    return Vector(*tree.offset[i]), IDENTITY
 
 
 def _position(kind: str, value: Any) -> tuple[float, ...]:

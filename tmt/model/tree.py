@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from functools import partial, wraps
 from textwrap import shorten
 from typing import Any
 
@@ -15,9 +17,8 @@ from tmt.derivation.coordinates import KINDS, Coordinates
 from tmt.derivation.mechanism import Indices, Mechanism, Names, Numbers, Rows
 
 from . import singular
-from .lock import CLOSE_TO_ONE, locked
-from .renamed import accepts_former_names
-from .values import listed, names, numbers_of, shown
+from .lock import locked
+from .values import CLOSE_TO_ONE, listed, names, numbers_of, shown
 
 # fields that may be left out
 OPTIONAL = ("reference", "armature", "stiffness", "rest", "site_offset", "site_turn")
@@ -25,9 +26,38 @@ ABSENT = {"site_turn": np.eye(3)}  # what stands for them, where it is not zero
 GAINS = ("position_gain", "speed_gain")  # and those of a controller, which are () where there is none
 NOT_NEGATIVE = {"mass": "kg", "damping": "N m s/rad", "armature": "kg m2", "stiffness": "N m/rad"}
 NAMES_SHOWN = 60  # characters
+FORMER = {"hinge_names": "joint_names", "body_hinge": "body_joint"}  # accepted for one release
 
 
-@accepts_former_names({"hinge_names": "joint_names", "body_hinge": "body_joint"})
+def accepts_former_names(cls: Any) -> Any:
+    """A class accepts and has the FORMER fields; ValueError for a field that it has not."""
+    initialize, known = cls.__init__, [field.name for field in fields(cls)]
+
+    def current(former: str) -> str:
+        text = f"Tree.{former} is called {FORMER[former]}; the former name will be removed in version 3"
+        warnings.warn(text, DeprecationWarning, stacklevel=3)
+        return FORMER[former]
+
+    @wraps(initialize)
+    def __init__(self: Any, *values: Any, **named: Any) -> None:
+        for former in FORMER.keys() & named.keys():  # dataclasses.replace gives the new ones too
+            named[current(former)] = named.pop(former)
+        if unknown := [name for name in named if name not in known]:
+            raise ValueError(f"a Tree has no field {unknown[0]!r}; its fields are {', '.join(known)}")
+        initialize(self, *values, **named)
+
+    def value(self: Any, former: str) -> Any:
+        return getattr(self, current(former))
+
+    cls.__init__ = __init__
+    for former in FORMER:
+        setattr(
+            cls, former, property(partial(value, former=former), doc=f"Former name of `{FORMER[former]}`.")
+        )
+    return cls
+
+
+@accepts_former_names
 @dataclass(frozen=True)
 class Tree(Mechanism[float]):
     """A tree of n joints and m rigid bodies.
@@ -37,56 +67,34 @@ class Tree(Mechanism[float]):
     moves with it, with its origin on the axis of a hinge, at the centre of a ball. Several joints in one body
     are joints in a row with no body between them. There are nv speeds, one of a hinge or slide and three of a
     ball, and nq numbers in a position: see coordinates.py. All fields are nested tuples; arrays and lists are
-    converted.
+    converted; those from `kind` on may be left out, as (). ValueError if the numbers cannot be a tree or a
+    rigid body.
 
     Parameters
     ----------
-    joint_names : (n,)
-        Of all joints.
-    parent : (n,)
-        Index of the joint before this one, always a smaller one; -1: fixed to the world.
-    offset : (n, 3), m
-        From the origin of the parent's frame to this joint, in the parent's frame.
-    axis : (nv, 3)
-        Direction of each speed, scaled to length 1; a ball has three at right angles, which turn with it.
-    damping : (nv,), N m s/rad or N s/m
-        Force -damping * qd.
+    joint_names : (n,) of all joints
+    parent : (n,) index of the joint before this one, always a smaller one; -1: fixed to the world
+    offset : (n, 3), m, from the origin of the parent's frame to this joint, in the parent's frame
+    axis : (nv, 3) directions of the speeds, scaled to length 1; of a ball three at right angles, turning with it
+    damping : (nv,), N m s/rad or N s/m, force -damping * qd
     body_names : (m,)
-    body_joint : (m,)
-        Index of the last joint that moves the body; -1: fixed to the world.
+    body_joint : (m,) index of the last joint that moves the body; -1: fixed to the world
     mass : (m,), kg
-    com : (m, 3), m
-        Centre of mass in the frame of its joint.
-    inertia : (m, 3, 3), kg m2
-        About the centre of mass, in the frame of its joint.
-    gravity : (3,), m/s2
-        Inertial frame.
-    kind : (n,), optional
-        "hinge", "slide" or "ball"; (): all are hinges.
-    armature : (nv,), kg m2 or kg, optional
-        Inertia of a rotor, on the diagonal of Mbar alone.
-    stiffness : (n,), N m/rad or N/m, optional
-        Of a spring at each joint.
-    rest : (nq,), rad, m and quaternions, optional
-        Where the springs are without force; (): at the reference.
-    reference : (n,), rad or m, optional
-        Where the joint leaves frames parallel; 0 for a ball.
-    position_gain, speed_gain : (nv, nv), N m/rad or N/m, and N m s/rad or N s/m, optional
+    com : (m, 3), m, centre of mass in the frame of its joint
+    inertia : (m, 3, 3), kg m2, about the centre of mass, in the frame of its joint
+    gravity : (3,), m/s2, inertial frame
+    kind : (n,) "hinge", "slide" or "ball"; (): all are hinges
+    armature : (nv,), kg m2 or kg, inertia of a rotor, on the diagonal of Mbar alone
+    stiffness : (n,), N m/rad or N/m, of a spring at each joint
+    rest : (nq,), rad, m and quaternions, where the springs are without force; (): at the reference
+    reference : (n,), rad or m, where the joint leaves frames parallel; 0 for a ball
+    position_gain, speed_gain : (nv, nv), N m/rad or N/m, and N m s/rad or N s/m
         Of a linear controller of hinges and slides: torque = tau - position_gain @ q - speed_gain @ qd, q as
         it stands.
-    site_names : (k,), optional
-        Of further frames for `frame`, each fixed to that of a joint.
-    site_joint : (k,), optional
-        Index of that joint; -1: fixed to the world.
-    site_offset : (k, 3), m, optional
-        From the origin of the joint's frame to the site's, in the frame of the joint; (): zero.
-    site_turn : (k, 3, 3), optional
-        The axes of the site as columns, in the frame of the joint; (): parallel to it.
-
-    Raises
-    ------
-    ValueError
-        If the numbers cannot be a tree or a rigid body.
+    site_names : (k,) of further frames for `frame`, each fixed to that of a joint
+    site_joint : (k,) index of that joint; -1: fixed to the world
+    site_offset : (k, 3), m, from the origin of the joint's frame to the site's, in the frame of the joint
+    site_turn : (k, 3, 3) the axes of the site as columns, in the frame of the joint; (): parallel to it
 
     Examples
     --------
@@ -102,9 +110,8 @@ class Tree(Mechanism[float]):
     """
 
     def __post_init__(self) -> None:
-        for name in ("joint_names", "body_names"):
+        for name in ("joint_names", "body_names", "site_names"):
             self._set(name, names(name, getattr(self, name)))
-        self._set("site_names", names("site_names", self.site_names))
         n, m, k = len(self.joint_names), len(self.body_names), len(self.site_names)
         self._set("kind", _kinds(self.kind, n))
         nq, nv = self.coordinates.nq, self.coordinates.nv
@@ -149,40 +156,21 @@ class Tree(Mechanism[float]):
         return f"Tree({n} joint{'s' if n > 1 else ''}: {names}; {m} {'bodies' if m > 1 else 'body'})"
 
     @property
-    def zero(self) -> Numbers[float]:
-        """The reference position, (nq,): every frame is parallel to the inertial frame."""
-        position: Numbers[float] = ()
-        for kind, reference in zip(self.kind, self.reference):
-            position += (1.0, 0.0, 0.0, 0.0) if kind == "ball" else (reference,)
-        return position
-
-    @property
     def never_singular(self) -> bool:
         """Whether Mbar is known to be regular at every q; else it may be singular at some."""
         return singular.never(self)
 
     def lock(self, angles: Mapping[str, ArrayLike]) -> Tree:
-        """The tree without the joints that are named in `angles`: they stay there, at rest.
+        """The tree of the other joints and all bodies; those named in `angles` stay there, at rest.
 
         What hangs on a locked joint is carried by the joint before it, its vectors turned so that all frames
         are again parallel to the inertial frame where the free joints are at their reference. A joint locked
-        there rounds nothing.
+        there rounds nothing. ValueError for an unknown joint, a position that is none, if no joint is left,
+        or if a controller takes the position of a locked joint for the torque at a free one.
 
         Parameters
         ----------
-        angles : {name: position}
-            In rad, of a slide in m, of a ball a quaternion.
-
-        Returns
-        -------
-        Tree
-            Of the other joints, and all bodies.
-
-        Raises
-        ------
-        ValueError
-            For an unknown joint, a position that is none, if no joint is left, or if a controller takes the
-            position of a locked joint for the torque at a free one.
+        angles : {name: position}, rad, of a slide m, of a ball a quaternion
 
         Examples
         --------
@@ -190,7 +178,12 @@ class Tree(Mechanism[float]):
         >>> print(forearm.joint_names, tmt.mass_matrix([0.0], forearm).round(9))
         ('gamma',) [[0.05275]]
         """
-        return locked(self, angles)
+        return replace(self, **locked(self, angles))
+
+
+def checked_model(model: Any) -> None:
+    if not isinstance(model, Tree):
+        raise ValueError(f"model is {shown(model)}; a tmt.Tree is expected")
 
 
 def stated(value: Any) -> str:

@@ -1,10 +1,22 @@
-"""What is given, as plain values: numbers, names, and how they are said in a message."""
+"""What a user gives, checked: the value in the type that is worked with, or a ValueError of one line.
 
+The line says what was given and what is accepted.
+"""
+
+import math
+import numbers
+import os
 import reprlib
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from tmt.derivation.mechanism import Mechanism
+
+ALWAYS_FREE = 1e8  # B, that any machine has
+CLOSE_TO_ONE = 1e-6  # how far the length of a quaternion may be from 1
+Array = NDArray[np.float64]
 
 
 def shown(value: Any) -> str:
@@ -15,7 +27,7 @@ def shown(value: Any) -> str:
         return f"a {type(value).__name__}"
 
 
-def real_numbers(values: Any) -> NDArray[np.float64] | None:
+def real_numbers(values: Any) -> Array | None:
     """The values as an array of float; None for what are no real numbers: truth values, masked ones, text."""
     try:
         if _masked(values):
@@ -63,3 +75,90 @@ def numbers_of(name: str, values: Any, shape: tuple[int, ...]) -> Any:
 
 def nested(item: Any) -> Any:
     return tuple(map(nested, item)) if isinstance(item, list) else item
+
+
+def states(model: Mechanism[float], **arrays: ArrayLike) -> list[Array]:
+    """Arrays (..., nq), q, or (..., nv) of one batch shape, after a check of type, shape and values."""
+    checked = {name: _state(model, name, values) for name, values in arrays.items()}
+    if "q" in checked:
+        _check_quaternions(model, checked["q"])
+    try:
+        batch = np.broadcast_shapes(*(array.shape[:-1] for array in checked.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in checked.items())
+        raise ValueError(f"the batch shapes do not fit together: {shapes}") from None
+    return [np.broadcast_to(array, (*batch, array.shape[-1])) for array in checked.values()]
+
+
+def _state(model: Mechanism[float], name: str, values: ArrayLike) -> Array:
+    """The values as an array (..., nq) of q, (..., 1) of dt, or (..., nv)."""
+    n = {"q": model.coordinates.nq, "dt": 1}.get(name, model.coordinates.nv)
+    array = real_numbers(values)
+    if array is None:
+        raise ValueError(f"{name} is {shown(values)}; real numbers of shape (..., {n}) are expected")
+    if array.ndim == 0 or array.shape[-1] != n:
+        kinds = dict.fromkeys(model.kind)
+        flat = " or ".join(kind for kind in kinds if kind != "ball")
+        parts = [f"one number per {flat}"] if flat else []
+        if "ball" in kinds:
+            parts.append("four per ball" if name == "q" else "three per ball")
+        expected = f"(..., {n}) is expected, {', '.join(parts)} ({', '.join(model.joint_names)})"
+        raise ValueError(f"{name} has shape {array.shape}; {expected}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} has values that are not finite; finite numbers are expected")
+    return array
+
+
+def _check_quaternions(model: Mechanism[float], q: Array) -> None:
+    for name, joint in zip(model.joint_names, model.coordinates.joints):
+        if joint.kind != "ball":
+            continue
+        quaternions = q[..., joint.q].reshape(-1, 4)
+        off = np.abs(np.linalg.norm(quaternions, axis=-1) - 1.0)
+        if off.size and off.max() > CLOSE_TO_ONE:
+            expected = "a quaternion w, x, y, z of length 1 is expected"
+            raise ValueError(f"q of {name!r} is {quaternions[np.argmax(off)].tolist()}; {expected}")
+
+
+def positive(name: str, value: Any, kind: str) -> float:
+    try:
+        number = float(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
+    except OverflowError:
+        number = math.inf
+    if not 0.0 < number < math.inf:
+        raise ValueError(f"{name} is {shown(value)}; {kind} above 0 is expected")
+    return number
+
+
+def whole(name: str, value: Any) -> int:
+    """The value as an int of at least 1 that compiled code can count to."""
+    number = int(value) if isinstance(value, numbers.Integral) and not isinstance(value, bool) else 0
+    if number < 1:
+        raise ValueError(f"{name} is {shown(value)}; a whole number of at least 1 is expected")
+    if number >= 2**63:
+        raise ValueError(f"{name} is {shown(value)}; a whole number below 2^63 is expected")
+    return number
+
+
+def paths(runs: int, steps: int, every: int, nq: int, nv: int) -> tuple[Array, Array]:
+    """Arrays for q and qd of all runs, (runs, steps / every + 1, nq or nv); ValueError without memory."""
+    records = steps // every + 1
+    size = runs * records * (nq + nv) * 8
+    try:
+        if size > ALWAYS_FREE and size > memory():
+            raise MemoryError
+        return np.empty((runs, records, nq)), np.empty((runs, records, nv))
+    except MemoryError:
+        needed = f"{size / 1e9:.3g} GB" if size < 10**100 else "more than 1e+100 B"
+        raise ValueError(
+            f"steps is {shown(steps)}: with {nq} positions and {nv} speeds the states of {runs} runs would "
+            f"take {needed} of memory, more than there is; with every=k each k-th of them is kept"
+        ) from None
+
+
+def memory() -> float:
+    """The memory of this machine, B; infinite where it is not known."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, OSError, ValueError):
+        return math.inf

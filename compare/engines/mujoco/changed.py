@@ -19,7 +19,7 @@ Values = Mapping[str, Array]  # of arguments by name
 
 def changed(source: Source, tree: Tree, parameters: Parameters, values: Values) -> mujoco.MjModel:
     assert source.spec is not None
-    spec, model = without_visuals(source.spec.copy()), source.model
+    spec, model = without_visuals(source.spec), source.model
     state_as_compiled(spec, model, source.bodies)
     bodies = {element_name(model, "body", number): body for body, number in zip(spec.bodies, source.bodies)}
     if parameters.has_payload:

@@ -12,9 +12,10 @@ import numpy as np
 
 from .calls import library
 from .changed import state_as_compiled
+from .locked import Positions, compiled_without
 from .motion import Motion, Use, joints
 from .names import INTEGRATORS, bit, element_name, kind_of, parts_of
-from .source import Positions, Source, compiled_without
+from .source import Source
 from .variants import of_base
 from .welded import compiled
 

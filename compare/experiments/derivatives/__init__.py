@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from math import inf, isfinite
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
+
+import numpy as np
 
 from tmt.compiled.evaluator import Evaluator
 
@@ -12,29 +13,21 @@ from ...core.check import About
 from ...core.finding import Finding
 from ...engines import LABELS, RECORDS
 from ...engines.mujoco import Mujoco
+from ...engines.mujoco.forces import forces_near
+from ...engines.mujoco.reading import Reading
+from ...engines.mujoco.step import Step
+from ...engines.outside import OutsideDynamics
+from ...engines.outside.model import EngineError
 from ...judge.scale import FACTOR
 from ...robots import Robot
+from ...stability.closed_form import COVERED, matrix
+from ...stability.place import postures_of, standing_at
+from ...stability.rest import rest_near
 from .. import Drawing, Experiment
 from ..setup import Setup
-from .contacts import contact_rows
-from .subjects import Subject, all_subjects, dynamics_of
-from .tables import CostRow, DerivativeRow, DerivativesResult, HardRow, errors_of
-from .ways import (
-    CENTRED,
-    COMPILED,
-    EXACT,
-    FORWARD,
-    INVERSE,
-    NUMPY,
-    ONE_SIDED,
-    USUAL,
-    Measured,
-    Quantity,
-    engines_of,
-    measured,
-    over,
-    row_of,
-)  # fmt: skip
+from . import ways
+from .subjects import all_subjects, dynamics_of
+from .ways import EXACT, FORWARD, ContactRow, CostRow, DerivativeRow, DerivativesResult, Measured, Task
 
 EXPERIMENT = Experiment(order=105, serves_own=False, timed=True)
 MOST_SPEEDS = 40  # of a robot whose exact derivatives are traced in less than a minute
@@ -49,68 +42,40 @@ def claim_values(robot: Robot) -> dict[str, Any]:
 
 
 def skipped(robot: Robot) -> Finding | None:
-    speeds = robot.coordinates.nv
-    return (
-        Finding("derivatives", "large", {"speeds": speeds, "most": MOST_SPEEDS})
-        if speeds > MOST_SPEEDS
-        else None
-    )
-
-
-class Task(NamedTuple):
-    """The errors at one subject."""
-
-    subject: Subject
-    integrators: Sequence[str]
-    compiles: bool
+    values = {"speeds": robot.coordinates.nv, "most": MOST_SPEEDS}
+    return Finding("derivatives", "large", values) if robot.coordinates.nv > MOST_SPEEDS else None
 
 
 def begin(setup: Setup) -> Work:
-    """Measure the errors at all subjects, in parallel with other work: of the first one those of all integrators.
-
-    Of a robot with many speeds one integrator alone, at fewer states.
-    """
-    mujoco = cast(Mujoco, setup.engines["mujoco"])
-    dt, tasks = float(mujoco.model.opt.timestep), list[Task]()
-    is_small = setup.robot.coordinates.nv <= FEW_SPEEDS
-    states = setup.of(4, 2, 2) if is_small else 1
+    """Measure the errors at all subjects, in parallel with other work."""
+    mujoco, is_small = cast(Mujoco, setup.engines["mujoco"]), setup.robot.coordinates.nv <= FEW_SPEEDS
+    dt, states = float(mujoco.model.opt.timestep), setup.of(4, 2, 2) if is_small else 1
+    tasks: list[Task] = []
     for subject in all_subjects(setup.robot, setup.random.first(200), dt, states):
-        is_main = not tasks
-        integrators = INTEGRATORS if is_small and (is_main or setup.alone) else FEW_INTEGRATORS
-        tasks.append(Task(subject, integrators, is_main))
-    return setup.map(partial(measure, mujoco=mujoco, dt=dt), tasks)
-
-
-def measure(task: Task, mujoco: Mujoco, dt: float) -> list[Measured]:
-    return measured(task.subject, mujoco, task.integrators, dt, task.compiles)
+        has_all = is_small and (setup.alone or not tasks)
+        tasks.append(Task(subject, INTEGRATORS if has_all else FEW_INTEGRATORS, compiles=not tasks))
+    return setup.map(partial(ways.measured, mujoco=mujoco, dt=dt), tasks)
 
 
 def rows(setup: Setup, work: Work | None = None) -> DerivativesResult:
     result = DerivativesResult("derivatives", shown=[])
     groups = list(begin(setup) if work is None else work)
-    every = [one for group in groups for one in group]
-    for one in every:
-        result.rows += one.rows
-        for way, share in one.shares.items():
-            name = f"{one.quantity.name}: {way} to exact, over its tolerance"
-            result.check(one.subject.name, name, share, 1.0, "", rounding=way in EXACT)
-    main = groups[0]
+    every, main = [measured for group in groups for measured in group], groups[0]
+    for measured in every:
+        result.rows += measured.rows
+        for way, share in measured.shares.items():
+            name = f"{measured.quantity.name}: {way} to exact, over its tolerance"
+            result.check(measured.subject.name, name, share, 1.0, "", rounding=way in EXACT)
     result.main = main[0].subject.name
     setup.quiet()  # nothing else may run while times are taken
     add_times(setup, result, main)
     if setup.alone:
         add_engines(setup, result, main[0])
         add_contacts(setup, result)
-    scenes = [row for one in every if one.subject.kind == "scene" for row in one.rows]
-    result.tables["derivative_costs"] = [
-        cost(result, one.quantity, scenes, way) for one in main for way in ways_of(one)
-    ]
-    add_advice(result, scenes, every)
+    scenes = [row for measured in every if measured.subject.kind == "scene" for row in measured.rows]
+    add_costs(result, scenes, main)
+    add_advice(result, scenes, [measured for measured in every if measured.subject.kind != "scene"])
     return result
-
-
-def ways_of(one: Measured) -> list[str]:
-    return list(dict.fromkeys(row.way for row in one.rows))
 
 
 def add_times(setup: Setup, result: DerivativesResult, main: Sequence[Measured]) -> None:
@@ -118,32 +83,46 @@ def add_times(setup: Setup, result: DerivativesResult, main: Sequence[Measured])
     mujoco, subject = cast(Mujoco, setup.engines["mujoco"]), main[0].subject
     dt, dynamics = float(mujoco.model.opt.timestep), dynamics_of(mujoco, subject)
     calls: dict[tuple[str, str], Callable[[], Any]] = {}
-    for one in main:
-        quantity = one.quantity
+    first = subject._replace(q=subject.q[:1], qd=subject.qd[:1], tau=subject.tau[:1])
+    for measured in main:
+        quantity = measured.quantity
         for way in quantity.differences(dynamics, subject, dt, 0):
-            calls[quantity.name, way.name] = way.call(USUAL)
-        given = [values[0] for values in quantity.given(subject, dt)]
-        calls[quantity.name, NUMPY] = partial(quantity.by_numpy, first(subject), dt)
-        if COMPILED in one.shares:
-            calls[quantity.name, COMPILED] = partial(Evaluator(subject.tree, quantity.exact).of_one, *given)
+            calls[quantity.name, way.name] = way.call(ways.USUAL)
+        calls[quantity.name, ways.NUMPY] = partial(quantity.by_numpy, first, dt)
+        if ways.COMPILED in measured.shares:
+            state = [values[0] for values in quantity.arguments(subject, dt)]
+            calls[quantity.name, ways.COMPILED] = partial(
+                Evaluator(subject.tree, quantity.function).of_one, *state
+            )
     result.times = timing.fastest(calls, setup.of(50, 20, 2))
 
 
 def add_engines(setup: Setup, result: DerivativesResult, forward: Measured) -> None:
     """The rows, checks and times of other engines' derivatives of accelerations, of the main subject."""
     subject, quantity = forward.subject, forward.quantity
-    for name, dynamics in engines_of(subject, setup.engines).items():
+    for name, engine in setup.engines.items():
+        dynamics = None if engine.unavailable() else engine.of(subject.case)
+        if not (isinstance(dynamics, OutsideDynamics) and has_derivatives(dynamics)):
+            continue
         setup.progress(f"derivatives: {LABELS[name]}")
-        matrices = dynamics.derivatives(subject.q, subject.qd, subject.tau)
-        values, exact = quantity.side_by_side(matrices), quantity.exact_values(subject, 0.0)
-        share = over(exact.distance(values), FACTOR * RECORDS[name].eps * quantity.scale(subject, 0.0))
+        values = ways.side_by_side(dynamics.derivatives(subject.q, subject.qd, subject.tau))
+        exact, scale = quantity.exact_values(subject, 0.0), quantity.scale(subject, 0.0)
+        share = ways.largest_share(exact, values, FACTOR * RECORDS[name].eps * scale)
         what = f"{quantity.name}: {LABELS[name]} to exact, over its tolerance"
         result.check(subject.name, what, share, 1.0, "", about=About.ENGINE)
-        row = row_of(subject, quantity, LABELS[name], None, values, exact)
+        row = ways.row_of(subject, quantity, LABELS[name], None, values, exact)
         forward.rows.append(row)
         result.rows.append(row)
         state = subject.q[0], subject.qd[0], subject.tau[0]
         result.times[quantity.name, LABELS[name]] = dynamics.seconds("derivatives", *state)
+
+
+def has_derivatives(dynamics: OutsideDynamics) -> bool:
+    """Whether an engine reads the file and has derivatives; the experiment `engines` says why not."""
+    try:
+        return dynamics.has("derivatives")
+    except EngineError:
+        return False
 
 
 def add_contacts(setup: Setup, result: DerivativesResult) -> None:
@@ -156,86 +135,93 @@ def add_contacts(setup: Setup, result: DerivativesResult) -> None:
         result.find("contacts", rows=rows)
 
 
-def first(subject: Subject) -> Subject:
-    return subject._replace(q=subject.q[:1], qd=subject.qd[:1], tau=subject.tau[:1])
+def contact_rows(reading: Reading) -> list[ContactRow]:
+    """Differences of the step where the file's first posture sinks to, beside the closed form."""
+    posture = postures_of(reading)[0]
+    place = standing_at(reading, posture)
+    if not place.is_touching:
+        return []
+    integrator = reading.integrator if reading.integrator in COVERED else "implicitfast"
+    step = Step(place.model, float(place.model.opt.timestep), integrator)
+    rest = rest_near(step, place.rest)
+    forces, states = forces_near(step, rest.state), 2 * place.model.nv
+    closed = None if forces is None else matrix(rest, place.tree, forces)[:states, :states]
+    units = ways.units_of(place.tree, ways.STATE)
+    base = step.touching(rest.state, np.zeros(step.size))
+    rows = []
+    for eps in ways.SIZES:
+        changed: set[str] = set()
+        for nudge in eps * np.eye(step.size):
+            for by in (nudge, -nudge):
+                changed |= base ^ step.touching(rest.state, by)
+        A, difference = step.derivative(rest.state, eps)[:states, :states], None
+        if closed is not None:
+            error, *_ = ways.relative(A - closed, closed, (units, units))
+            difference = error if np.isfinite(error) else None
+        rows.append(ContactRow(
+            posture=posture.name, integrator=integrator, contacts=len(base), eps=eps, difference=difference,
+            changed="; ".join(sorted(changed)),
+        ))  # fmt: skip
+    return rows
 
 
-def cost(result: DerivativesResult, quantity: Quantity, scenes: Sequence[DerivativeRow], way: str) -> CostRow:
-    """The error of a way at all scenes, with its best eps, and its time."""
-    errors = errors_of(row for row in scenes if (row.quantity, row.way) == (quantity.name, way))
-    best = min(errors, key=lambda eps: errors[eps])
-    seconds = result.times.get((quantity.name, way))
-    return CostRow(
-        quantity=quantity.name,
-        way=way,
-        best_eps=best or None,
-        error=known(errors[best]),
-        error_at_usual=known(errors.get(USUAL, inf)),
-        time=None if seconds is None else 1e6 * seconds,
-    )
-
-
-def add_advice(result: DerivativesResult, scenes: Sequence[DerivativeRow], every: Sequence[Measured]) -> None:
-    """Which eps to use, what it costs, and where that fails."""
-    steps = [row for row in scenes if row.eps and row.quantity != INVERSE]
-    by_side = {
-        side: errors_of(row for row in steps if row.way.endswith(side)) for side in (CENTRED, ONE_SIDED)
-    }
-    best = {side: min(errors, key=lambda eps: errors[eps]) for side, errors in by_side.items()}
-    inverse = errors_of(row for row in scenes if row.quantity == INVERSE and row.eps)
-    at = min(inverse, key=lambda eps: inverse[eps])
-    exact = max(errors_of(row for row in scenes if row.way in EXACT).values())
-    values: dict[str, Any] = {
-        "eps": best[CENTRED], "error": by_side[CENTRED][best[CENTRED]], "usual": USUAL,
-        "usual_error": by_side[ONE_SIDED][USUAL], "one_sided_eps": best[ONE_SIDED],
-        "one_sided_error": by_side[ONE_SIDED][best[ONE_SIDED]], "inverse_eps": at, "inverse_error": inverse[at],
-        "exact": exact,
-    }  # fmt: skip
-    result.headline = result.finding("headline", **values)
-    result.top.append(result.finding("advice", **values))
-    costs: list[CostRow] = [row for row in result.tables["derivative_costs"] if row.time]
-    pairs = [(row, of_mujoco(costs, row.quantity)) for row in costs if row.way == COMPILED]
-    others = [row for row in costs if row.way in LABELS.values()]
+def add_costs(result: DerivativesResult, scenes: Sequence[DerivativeRow], main: Sequence[Measured]) -> None:
+    """The error of each way at all scenes, with its best eps, and its time."""
+    costs: list[CostRow] = []
+    for quantity, way in dict.fromkeys((row.quantity, row.way) for measured in main for row in measured.rows):
+        same = [row for row in scenes if (row.quantity, row.way) == (quantity, way)]
+        best, usual = ways.best_of(same), ways.worst_of_each_eps(same).get(ways.USUAL)
+        seconds = result.times.get((quantity, way))
+        costs.append(CostRow(
+            quantity=quantity, way=way, best_eps=best.eps, error=best.error,
+            error_at_usual=usual.error if usual else None, time=None if seconds is None else 1e6 * seconds,
+        ))  # fmt: skip
+    result.tables["derivative_costs"] = costs
+    timed = [row for row in costs if row.time]
+    pairs = [(row, of_mujoco(timed, row.quantity)) for row in timed if row.way == ways.COMPILED]
     result.find(
         "costs",
-        engines=others,
-        exact=[row for row in costs if row.quantity == FORWARD and row.way in EXACT],
+        engines=[row for row in timed if row.way in LABELS.values()],
+        exact=[row for row in timed if row.quantity == FORWARD and row.way in EXACT],
         pairs=[(row, other) for row, other in pairs if other],
     )
-    hard = [
-        hard_row(one, scenes) for one in every if one.subject.kind != "scene" and one.quantity.name != FORWARD
-    ]
-    result.tables["hard_derivatives"] = hard
-    result.find("hard", rows=hard)
 
 
 def of_mujoco(costs: Sequence[CostRow], quantity: str) -> CostRow | None:
     """MuJoCo's way to a quantity: its own function, centred where it can be."""
     others = [row for row in costs if row.quantity == quantity and row.way not in EXACT]
-    return max(others, key=lambda row: (row.way.endswith(CENTRED), row.way.startswith("mjd")), default=None)
-
-
-def hard_row(one: Measured, scenes: Sequence[DerivativeRow]) -> HardRow:
-    """What differences are worth at a hard subject with the eps that serves the scenes best; of steps centred ones."""
-    of_quantity = [row for row in (*scenes, *one.rows) if row.quantity == one.quantity.name and row.eps]
-    chosen = [row for row in of_quantity if not row.way.endswith(ONE_SIDED)]
-    here, there = (
-        errors_of(row for row in chosen if (row in one.rows) == is_here) for is_here in (True, False)
-    )
-    eps, best = min(there, key=lambda eps: there[eps]), min(here, key=lambda eps: here[eps])
-    return HardRow(
-        subject=one.subject.name,
-        quantity=one.quantity.name,
-        eps=eps,
-        error=known(here[eps]),
-        scenes_error=known(there[eps]),
-        best_eps=best,
-        best_error=known(here[best]),
+    return max(
+        others, key=lambda row: (row.way.endswith(ways.CENTRED), row.way.startswith("mjd")), default=None
     )
 
 
-def known(error: float) -> float | None:
-    return error if isfinite(error) else None
+def add_advice(result: DerivativesResult, scenes: Sequence[DerivativeRow], hard: Sequence[Measured]) -> None:
+    """Which eps to use, what it costs, and where that fails."""
+    by_eps = [row for row in scenes if row.eps]
+    one_sided = [row for row in by_eps if row.way.endswith(ways.ONE_SIDED)]
+    values: dict[str, Any] = {
+        "centred": ways.best_of(row for row in by_eps if row.way.endswith(ways.CENTRED)),
+        "one_sided": ways.best_of(one_sided),
+        "usual": ways.worst_of_each_eps(one_sided)[ways.USUAL],
+        "inverse": ways.best_of(row for row in by_eps if row.quantity == ways.INVERSE),
+        "exact": ways.best_of(row for row in scenes if row.way in EXACT),
+    }
+    result.headline = result.finding("headline", centred=values["centred"])
+    result.top.append(result.finding("advice", **values))
+    pairs = []
+    for measured in hard:
+        if measured.quantity.name != FORWARD:
+            at_scenes = ways.best_of(row for row in by_eps if is_tried(row, measured.quantity.name))
+            rows_here = [row for row in measured.rows if row.eps and is_tried(row, measured.quantity.name)]
+            pairs.append(
+                {"row": ways.worst_of_each_eps(rows_here)[at_scenes.eps or 0.0], "scenes": at_scenes}
+            )
+    result.find("hard", pairs=pairs)
+
+
+def is_tried(row: DerivativeRow, quantity: str) -> bool:
+    """Whether a row is of a quantity, and of steps a centred difference."""
+    return row.quantity == quantity and not row.way.endswith(ways.ONE_SIDED)
 
 
 def figures(result: DerivativesResult, robot: Robot) -> Iterator[Drawing]:

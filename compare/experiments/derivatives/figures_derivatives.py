@@ -1,15 +1,17 @@
 """Figures of derivatives: the error of differences against their eps, and of all ways against their time."""
 
+from typing import Any
+
 from matplotlib.figure import Figure
 
 from ...core.finding import Finding
 from ...report.style import BLUE, DASHES, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
-from .tables import CostRow, DerivativesResult, errors_of
-from .ways import EXACT
+from .ways import EXACT, CostRow, DerivativesResult, best_of, worst_of_each_eps
 
 LEAST = 1e-17  # that is drawn of an error
 COLOURS = BLUE, RED, GREEN, ORANGE, PINK, SKY
 MARKERS = "osD^vP"
+LOGARITHMIC: dict[str, Any] = {"xscale": "log", "yscale": "log"}
 
 
 def draw_errors(result: DerivativesResult) -> tuple[str, Figure, Finding]:
@@ -19,53 +21,37 @@ def draw_errors(result: DerivativesResult) -> tuple[str, Figure, Finding]:
     ax = fig.subplots()
     ways = dict.fromkeys(row.way for row in rows if row.eps)
     for way, colour, dash, marker in zip(ways, COLOURS, DASHES, MARKERS):
-        errors = errors_of(row for row in rows if row.way == way)
-        ax.plot(
-            list(errors),
-            list(errors.values()),
-            color=colour,
-            linestyle=dash,
-            marker=marker,
-            markersize=4,
-            label=way,
-        )
-    exact = max(errors_of(row for row in rows if row.eps is None).values())
+        errors = {
+            eps: row.size for eps, row in worst_of_each_eps(row for row in rows if row.way == way).items()
+        }
+        look = {"color": colour, "linestyle": dash, "marker": marker, "markersize": 4}
+        ax.plot(list(errors), list(errors.values()), label=way, **look)
+    exact = best_of(row for row in rows if row.way in EXACT).size
     ax.axhline(max(exact, LEAST), color=GREY, linestyle=":", linewidth=1.5, label="tmt's exact derivatives")
     ax.set(
-        xscale="log",
-        yscale="log",
-        xlabel="eps of the difference, rad, m, rad/s, m/s, N m or N",
-        ylabel="relative error",
+        **LOGARITHMIC, xlabel="eps of the difference, rad, m, rad/s, m/s, N m or N", ylabel="relative error"
     )
     fig.legend(loc="outside upper center", ncols=3, fontsize=8)
-    return (
-        "derivatives_errors",
-        fig,
-        result.finding("errors_caption", subject=result.main, states=rows[0].states),
-    )
+    caption = result.finding("errors_caption", subject=result.main, states=rows[0].states)
+    return "derivatives_errors", fig, caption
 
 
 def draw_times(result: DerivativesResult) -> tuple[str, Figure, Finding]:
     """The error of each way with its best eps against the time of one evaluation."""
-    rows: list[CostRow] = [
-        row for row in result.tables["derivative_costs"] if row.time and row.error is not None
-    ]
+    costs: list[CostRow] = result.tables["derivative_costs"]
     fig = Figure(figsize=(WIDTH, 4.0), layout="constrained")
     ax = fig.subplots()
-    ways = list(dict.fromkeys(row.way for row in rows))
-    for k, way in enumerate(ways):
-        of_way = [row for row in rows if row.way == way]
-        errors = [max(row.error or 0.0, LEAST) for row in of_way]
-        exact = way in EXACT
-        times = [row.time or 0.0 for row in of_way]
-        ax.plot(errors, times, "s" if exact else "o", color=COLOURS[k % len(COLOURS)],
-                markerfacecolor="none" if k >= len(COLOURS) else None, label=way)  # fmt: skip
-    ax.set(
-        xscale="log",
-        yscale="log",
-        xlabel="relative error (decreasing)",
-        ylabel="time of one evaluation, us",
-    )
+    for k, way in enumerate(dict.fromkeys(row.way for row in costs)):
+        points = [(max(row.error, LEAST), row.time) for row in costs
+                  if row.way == way and row.time and row.error is not None]  # fmt: skip
+        fill = "none" if k >= len(COLOURS) else None
+        look: dict[str, Any] = {
+            "color": COLOURS[k % len(COLOURS)],
+            "marker": "s" if way in EXACT else "o",
+            "markerfacecolor": fill,
+        }
+        ax.plot(*zip(*points), linestyle="none", label=way, **look)
+    ax.set(**LOGARITHMIC, xlabel="relative error (decreasing)", ylabel="time of one evaluation, us")
     ax.invert_xaxis()
     fig.legend(loc="outside right upper", fontsize=7)
     return "derivatives_times", fig, result.finding("times_caption", subject=result.main)

@@ -1,7 +1,9 @@
-"""The ways to a derivative: MuJoCo's differences over their eps, tmt's exact ones; and the errors of each."""
+"""The ways to a derivative: MuJoCo's differences over their eps, tmt's exact ones; rows of the errors of each."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise, product
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -10,67 +12,123 @@ import tmt
 from tmt.compiled.evaluator import Evaluator
 from tmt.exact.many import Pairs, exact_of_many
 
-from ...engines import Engine
+from ...core.check import Result
+from ...core.rows import Row, column
 from ...engines.mujoco import Mujoco
 from ...engines.mujoco.differences import Call, of_inverse, of_steps, of_transition
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.engine import methods_for
-from ...engines.outside import OutsideDynamics
-from ...engines.outside.model import EngineError
+from ...judge.agree import share_of
 from ...judge.entries import Entries
+from ...judge.rounding import of_positions
 from ...judge.scale import EPS, FACTOR, gain_scale
 from .subjects import Subject, dynamics_of
-from .tables import DerivativeRow
 
 Array = np.ndarray
-Of = Callable[[float], Call]
-Differences = Callable[[MujocoDynamics, Array, Array, Array, float, str, float, bool], Call]
+Units = Sequence[tuple[str, str]]  # of movements, of speeds ...: of turns, of slides
 SIZES = tuple(10.0**-k for k in range(2, 12))  # of differences
 USUAL = 1e-6  # of mjd_transitionFD in MuJoCo's own samples
 ONE_SIDED, CENTRED = "one-sided", "centred"
 BY_INVERSE, NUMPY, COMPILED = "mjd_inverseFD", "tmt, NumPy", "tmt, compiled"
 EXACT = NUMPY, COMPILED
 INVERSE, FORWARD = "dtau/dq and dtau/dqd", "dqdd/dq, dqdd/dqd and dqdd/dtau"
+STATE: Units = ("rad", "m"), ("rad/s", "m/s")
+FORCE: Units = (("N m", "N"),)
 ZERO = 1e-25  # what is no larger with 31 digits is zero
 TRUNCATED = 2.0 / 99.0  # of the difference between an eps and ten times that: twice the term in eps^2
 
 
+@dataclass(kw_only=True)
+class DerivativeRow(Row):
+    """One way to a derivative: its largest error over the states of a subject."""
+
+    subject: str  # a scene, or what is hard about its states
+    quantity: str  # of a Quantity
+    way: str
+    eps: float | None  # of a difference, rad, m and per s; None: it is exact
+    error: float | None  # relative to the largest exact entry of the same unit; None: not a number
+    states: int
+    unit: str  # of the derivatives with that error
+    largest: float  # exact entry of that unit
+
+    @property
+    def size(self) -> float:
+        """The error; infinite where it is not a number."""
+        return inf if self.error is None else self.error
+
+
+@dataclass(kw_only=True)
+class CostRow(Row):
+    """One way to a derivative: the error that it reaches, and the time of an evaluation."""
+
+    quantity: str
+    way: str
+    best_eps: float | None
+    error: float | None  # with that
+    error_at_usual: float | None  # with USUAL, 1e-6
+    time: float | None = column("us")
+
+
+@dataclass(kw_only=True)
+class ContactRow(Row):
+    """Centred differences of the step of a robot that stands, beside the closed form."""
+
+    posture: str
+    integrator: str
+    contacts: int  # in which forces act
+    eps: float
+    difference: float | None  # relative to the largest entry of the same unit; None: there is no closed form
+    changed: str  # pairs that open or close within eps; "": contacts stay
+
+
+@dataclass
+class DerivativesResult(Result):
+    """Its result: what its figure needs, too."""
+
+    main: str = ""  # the subject that is drawn
+    times: dict[tuple[str, str], float] = field(default_factory=dict)  # s, by quantity and way
+
+
+def worst_of_each_eps(rows: Iterable[DerivativeRow]) -> dict[float, DerivativeRow]:
+    """The row with the largest error for each eps, 0 where there is none; from coarse to fine."""
+    ascending = sorted(rows, key=lambda row: (-(row.eps or 0.0), row.size))
+    return {row.eps or 0.0: row for row in ascending}
+
+
+def best_of(rows: Iterable[DerivativeRow]) -> DerivativeRow:
+    """The row with the largest error for the eps that serves these rows best."""
+    return min(worst_of_each_eps(rows).values(), key=lambda row: row.size)
+
+
 class Quantity(NamedTuple):
-    """A derivative that has several ways."""
+    """A derivative that has several ways; the values of each are (states, rows, columns)."""
 
     name: str  # in tables
-    exact: str  # the full name of tmt's quantity
+    function: str  # the full name of tmt's quantity
+    units: Units  # of its rows; columns are movements, speeds and torques
     integrator: str = ""  # MuJoCo's, of a step
 
-    def exact_values(self, subject: Subject, dt: float) -> Pairs:
-        """(states, rows, columns)."""
-        values = exact_of_many(subject.tree, self.exact, *self.given(subject, dt))
-        return values if self.integrator else Pairs(*(self.side_by_side(part) for part in values))
-
-    def given(self, subject: Subject, dt: float) -> list[Array]:
+    def arguments(self, subject: Subject, dt: float) -> list[Array]:
         """What tmt's quantity takes at all states."""
         third = accelerations(subject) if self.name == INVERSE else subject.tau
         steps = [np.full((subject.states, 1), dt)] if self.integrator else []
         return [subject.q, subject.qd, third, *steps]
 
-    def side_by_side(self, matrices: Array) -> Array:
-        """The derivatives of this quantity, (states, nv, columns), of those of tmt's, (states, parts, nv, nv)."""
-        return np.concatenate([matrices[:, k] for k in range(2 if self.name == INVERSE else 3)], axis=2)
+    def exact_values(self, subject: Subject, dt: float) -> Pairs:
+        values = exact_of_many(subject.tree, self.function, *self.arguments(subject, dt))
+        return Pairs(*map(side_by_side, values))
 
     def by_numpy(self, subject: Subject, dt: float) -> Array:
-        values = tmt.literal.literal(self.exact)(*self.given(subject, dt), subject.tree)
-        return np.asarray(values) if self.integrator else self.side_by_side(np.stack(values, axis=1))
+        values = tmt.literal.literal(self.function)(*self.arguments(subject, dt), subject.tree)
+        return side_by_side(np.asarray(values) if self.integrator else np.stack(values, axis=1))
 
     def by_machine_code(self, subject: Subject, dt: float) -> Array | None:
-        evaluator = Evaluator(subject.tree, self.exact)
-        rows = evaluator.of_rows(*self.given(subject, dt))
-        if rows is None:
-            return None
-        values = rows.reshape(subject.states, *evaluator.shape)
-        return values if self.integrator else self.side_by_side(values)
+        evaluator = Evaluator(subject.tree, self.function)
+        rows = evaluator.of_rows(*self.arguments(subject, dt))
+        return None if rows is None else side_by_side(rows.reshape(subject.states, *evaluator.shape))
 
     def scale(self, subject: Subject, dt: float) -> Array:
-        """Of each entry, (states, rows, columns)."""
+        """Of each entry."""
         entries, qdd = Entries(subject.tree, subject.q, subject.qd), accelerations(subject)
         if self.name == INVERSE:
             return np.concatenate(entries.force_rates(qdd), axis=2)
@@ -81,20 +139,21 @@ class Quantity(NamedTuple):
     def differences(self, dynamics: MujocoDynamics, subject: Subject, dt: float, k: int) -> Iterator["Way"]:
         """MuJoCo's ways at state k."""
         q, qd, tau = subject.q[k], subject.qd[k], subject.tau[k]
-        if self.name == FORWARD:
-            return
         if self.name == INVERSE:
             a = accelerations(subject)[k]
             yield Way(BY_INVERSE, False, lambda eps: of_inverse(dynamics, q, qd, a, eps))
-            return
+        functions = {"mjd_transitionFD": of_transition, "differences of mj_step": of_steps}
+        for (side, centred), (name, function) in product(
+            ((ONE_SIDED, False), (CENTRED, True)), functions.items()
+        ):
+            if self.integrator and not (self.integrator == "RK4" and function is of_transition):
 
-        def of(ask: Differences, centred: bool) -> Of:
-            return lambda eps: ask(dynamics, q, qd, tau, dt, self.integrator, eps, centred)
+                def call(
+                    eps: float, function: Callable[..., Call] = function, centred: bool = centred
+                ) -> Call:
+                    return function(dynamics, q, qd, tau, dt, self.integrator, eps, centred)
 
-        for side, centred in ((ONE_SIDED, False), (CENTRED, True)):
-            if self.integrator != "RK4":
-                yield Way(f"mjd_transitionFD, {side}", centred, of(of_transition, centred))
-            yield Way(f"differences of mj_step, {side}", centred, of(of_steps, centred))
+                yield Way(f"{name}, {side}", centred, call)
 
 
 class Way(NamedTuple):
@@ -102,41 +161,58 @@ class Way(NamedTuple):
 
     name: str
     centred: bool
-    call: Of  # of an eps
+    call: Callable[[float], Call]  # of an eps
+
+
+def side_by_side(values: Array) -> Array:
+    """Matrices (states, rows, columns) as they are; of (states, parts, nv, nv) the first three beside each other."""
+    return values if values.ndim == 3 else np.concatenate(values[:, :3].swapaxes(0, 1), axis=2)
 
 
 def quantities(subject: Subject, integrators: Sequence[str]) -> list[Quantity]:
-    """The derivatives of accelerations and torques, and of a step of each of these integrators that MuJoCo has."""
+    """The derivatives of accelerations and torques, and of a step of each of these integrators of MuJoCo."""
     methods = methods_for(subject.tree)
-    known = [name for name in integrators if name in methods]
-    steps = [Quantity(f"A and B, {name}", f"step_derivatives:{methods[name].scheme}", name) for name in known]
-    inverse = Quantity(INVERSE, "inverse_dynamics_derivatives")
-    return [Quantity(FORWARD, "derivatives"), inverse, *steps]
+    steps = [
+        Quantity(f"A and B, {name}", f"step_derivatives:{methods[name].scheme}", STATE, name)
+        for name in integrators
+        if name in methods
+    ]
+    forward = Quantity(FORWARD, "derivatives", (("rad/s2", "m/s2"),))
+    return [forward, Quantity(INVERSE, "inverse_dynamics_derivatives", FORCE), *steps]
 
 
 def accelerations(subject: Subject) -> Array:
     return tmt.acceleration(subject.q, subject.qd, subject.tau, subject.tree)
 
 
-def units_of_speeds(tree: tmt.Tree, blocks: int) -> Array:
-    """A number for the unit of each movement, speed and torque, of which there are these: slides have others than turns."""
+def units_of(tree: tmt.Tree, units: Units) -> Array:
+    """The unit of each movement, each speed ..., of which there are these."""
     joints = zip(tree.kind, tree.coordinates.joints)
     slides = [kind == "slide" for kind, joint in joints for _ in joint.speeds]
-    return np.repeat(np.arange(blocks), len(slides)) * 2 + np.tile(slides, blocks)
+    return np.array([pair[is_slide] for pair in units for is_slide in slides])
 
 
-def relative(difference: Array, exact: Array, units: tuple[Array, Array]) -> float:
-    """The largest difference over the largest exact entry of the same unit; inf where one is not a number."""
-    worst, (rows, columns) = 0.0, units
-    if not np.isfinite(difference).all():
-        return np.inf
-    for row in np.unique(rows):
-        for column in np.unique(columns):
-            block = np.ix_(rows == row, columns == column)
-            size = float(np.abs(exact[block]).max())
-            off = float(np.abs(difference[block]).max())
-            worst = max(worst, off / size if size > ZERO else 0.0)
+def relative(difference: Array, exact: Array, units: tuple[Array, Array]) -> tuple[float, str, float]:
+    """The largest difference over the largest exact entry of the same unit, that unit, and that entry.
+
+    The first is inf where a difference is not a number.
+    """
+    worst, (of_rows, of_columns) = (0.0, "", 0.0), units
+    for unit, by in product(np.unique(of_rows), np.unique(of_columns)):
+        block = np.ix_(of_rows == unit, of_columns == by)
+        largest, off = float(np.abs(exact[block]).max()), float(np.abs(difference[block]).max())
+        if largest > ZERO or not np.isfinite(off):
+            error = off / largest if np.isfinite(off) else np.inf
+            worst = max(worst, (error, f"{unit} per {by}", largest))
     return worst
+
+
+class Task(NamedTuple):
+    """The errors at one subject."""
+
+    subject: Subject
+    integrators: Sequence[str]
+    compiles: bool
 
 
 class Measured(NamedTuple):
@@ -145,45 +221,28 @@ class Measured(NamedTuple):
     subject: Subject
     quantity: Quantity
     rows: list[DerivativeRow]
-    shares: Mapping[str, float]  # of the tolerance, by the way: of tmt's and of the centred differences
+    shares: dict[str, float]  # of the tolerance, by the way: of tmt's and of the centred differences
 
 
-def engines_of(subject: Subject, engines: Mapping[str, Engine]) -> dict[str, OutsideDynamics]:
-    """The engines that read the file and have derivatives of its accelerations, by name."""
-    every = {name: engine.of(subject.case) for name, engine in engines.items() if not engine.unavailable()}
-    outside = {name: of for name, of in every.items() if isinstance(of, OutsideDynamics)}
-    return {name: of for name, of in outside.items() if has_derivatives(of)}
-
-
-def has_derivatives(dynamics: OutsideDynamics) -> bool:
-    """Whether an engine reads the file and has derivatives; the experiment `engines` says why not."""
-    try:
-        return dynamics.has("derivatives")
-    except EngineError:
-        return False
-
-
-def measured(
-    subject: Subject, mujoco: Mujoco, integrators: Sequence[str], dt: float, compiles: bool
-) -> list[Measured]:
+def measured(task: Task, mujoco: Mujoco, dt: float) -> list[Measured]:
     """All ways to each quantity at all states."""
-    dynamics, result = dynamics_of(mujoco, subject), []
-    for quantity in quantities(subject, integrators):
-        exact, scale = quantity.exact_values(subject, dt), quantity.scale(subject, dt)
-        found: dict[tuple[str, float | None], Array] = {(NUMPY, None): quantity.by_numpy(subject, dt)}
-        machine = quantity.by_machine_code(subject, dt) if compiles else None
+    subject, result = task.subject, []
+    dynamics = dynamics_of(mujoco, subject)
+    for quantity in quantities(subject, task.integrators):
+        exact, tolerance = quantity.exact_values(subject, dt), FACTOR * EPS * quantity.scale(subject, dt)
+        by_tmt = {NUMPY: quantity.by_numpy(subject, dt)}
+        machine = quantity.by_machine_code(subject, dt) if task.compiles else None
         if machine is not None:
-            found[COMPILED, None] = machine
-        shares = {
-            way: over(exact.distance(values), FACTOR * EPS * scale) for (way, _), values in found.items()
-        }
-        ways = [list(quantity.differences(dynamics, subject, dt, k)) for k in range(subject.states)]
+            by_tmt[COMPILED] = machine
+        rows = [row_of(subject, quantity, way, None, values, exact) for way, values in by_tmt.items()]
+        shares = {way: largest_share(exact, values, tolerance) for way, values in by_tmt.items()}
+        ways = [quantity.differences(dynamics, subject, dt, k) for k in range(subject.states)]
         for same in zip(*ways):
             values = {eps: np.array([way.call(eps)() for way in same]) for eps in SIZES}
-            found |= {(same[0].name, eps): value for eps, value in values.items()}
+            name = same[0].name
+            rows += [row_of(subject, quantity, name, eps, values[eps], exact) for eps in SIZES]
             if same[0].centred:
-                shares[same[0].name] = share_of_differences(values, exact, subject, dt)
-        rows = [row_of(subject, quantity, way, eps, value, exact) for (way, eps), value in found.items()]
+                shares[name] = share_of_differences(values, exact, subject, dt)
         result.append(Measured(subject, quantity, rows, shares))
     return result
 
@@ -192,43 +251,34 @@ def row_of(
     subject: Subject, quantity: Quantity, way: str, eps: float | None, values: Array, exact: Pairs
 ) -> DerivativeRow:
     """The largest error of a way at all states, whose values have all columns or the first ones."""
-    high, low = (part[:, :, : values.shape[2]] for part in exact)
-    units = (
-        units_of_speeds(subject.tree, 2 if quantity.integrator else 1),
-        units_of_speeds(subject.tree, 3)[: values.shape[2]],
-    )
-    error = max(relative((v - h) - l, h, units) for v, h, l in zip(values, high, low))
+    columns = values.shape[2]
+    units = units_of(subject.tree, quantity.units), units_of(subject.tree, (*STATE, *FORCE))[:columns]
+    high, low = (part[:, :, :columns] for part in exact)
+    error, unit, largest = max(relative((v - h) - l, h, units) for v, h, l in zip(values, high, low))
     return DerivativeRow(
-        subject=subject.name,
-        quantity=quantity.name,
-        way=way,
-        eps=eps,
-        error=error if np.isfinite(error) else None,
-        states=subject.states,
-    )
+        subject=subject.name, quantity=quantity.name, way=way, eps=eps, states=subject.states,
+        error=error if np.isfinite(error) else None, unit=unit, largest=largest,
+    )  # fmt: skip
 
 
-def over(difference: Array, tolerance: Array) -> float:
-    """The largest share of a tolerance; that of a difference of exactly zero is 0."""
-    share = np.divide(
-        difference, tolerance, out=np.where(difference > 0.0, np.inf, 0.0), where=tolerance > 0.0
-    )
-    return float(share.max())
+def largest_share(exact: Pairs, values: Array, tolerance: Array) -> float:
+    """The largest share of a tolerance: of the distance from the exact values, of all or of the first columns."""
+    exact = Pairs(*(part[:, :, : values.shape[2]] for part in exact))
+    return float(share_of(exact.distance(values), tolerance).max())
 
 
 def share_of_differences(values: Mapping[float, Array], exact: Pairs, subject: Subject, dt: float) -> float:
     """The largest share, over eps and entries, of what rounding and truncation can make a centred difference off.
 
-    Rounding: 64 eps of what a step adds, over the eps of the difference. Truncation: twice the term in eps^2, from ten times eps.
+    Rounding: 64 eps of what a step adds, over the eps of the difference; a ball's turn is a quaternion, as in
+    judge.rounding. Truncation: twice the term in eps^2, from ten times eps.
     """
     entries, qdd = Entries(subject.tree, subject.q, subject.qd), accelerations(subject)
     force = entries.force(subject.tau) + gain_scale(subject.tree, subject.q, subject.qd)
     rates = np.abs(subject.qd) + dt * entries.acceleration(force, qdd)
-    moved = np.abs(subject.tree.coordinates.difference(list(subject.q.T), subject.tree.zero)).T
-    sizes = np.concatenate([moved + dt * rates, rates], axis=1)[:, :, None]
+    sizes = np.concatenate([of_positions(subject.tree, subject.q) + dt * rates, rates], axis=1)[:, :, None]
     shares = []
     for coarse, eps in pairwise(SIZES):
         truncated = TRUNCATED * np.abs(values[coarse] - values[eps])
-        exactly = Pairs(*(part[:, :, : values[eps].shape[2]] for part in exact))
-        shares.append(over(exactly.distance(values[eps]), FACTOR * EPS * sizes / eps + truncated))
+        shares.append(largest_share(exact, values[eps], FACTOR * EPS * sizes / eps + truncated))
     return max(shares)

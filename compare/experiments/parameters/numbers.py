@@ -1,9 +1,9 @@
-"""A number of the model, stated and compiled: its rows, check and causes; and the check that no other forces act."""
+"""A number, stated and compiled: its rows, check and causes; that no other forces act; what touches."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ...engines.mujoco.parameters import STATED_FLAGS, Stated
 from ...judge.scale import EPS, FACTOR
 from ...robots import Feature
 from ...robots.states import Sample
+from ..setup import Setup
 
 # without a counterpart in the equations
 ABSENT = ("contact pairs", *(name for name in FIELDS if name != "tendon armature"))
@@ -34,6 +35,7 @@ UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gra
     "mass": "kg", "com": "m", "inertia": "kg m2", "rest": "rad", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
     "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
+FINER = 8  # steps in one of the scene, in which contacts are looked for
 COMPONENTS = {1: [""], 3: [*"xyz"], 9: [row + of_row for row in "xyz" for of_row in "xyz"]}  # by their number
 
 
@@ -91,7 +93,7 @@ def rows_of(number: Stated, unit: str, asked_by: str | None = None) -> list[Numb
 def compare_number(result: Result, number: Stated, unit: str, words: Mapping[int, str]) -> list[Cause]:
     """Add the check of a number of a body or joint; the causes, one for each component that differs.
 
-    words: for whole numbers. Rank 1: an option, or a convention of a joint (its order, its sign, its zero); 2: one number.
+    words: for whole numbers. Rank 1: an option, or a convention of a joint (order, sign, zero); 2: one number.
     """
     quantity, tolerance = number.quantity, number.tolerance
     stated, compiled = (np.array(values, float).ravel() for values in (number.stated, number.compiled))
@@ -122,9 +124,9 @@ def cause(place: str, stated: float, compiled: float, text: str, **more: Any) ->
 
 
 def check_forces(result: Result, sample: Sample, dynamics: MujocoDynamics) -> list[Cause]:
-    """Check that no forces act that the equations do not have; these are causes unless those of the result explain them.
+    """Check that no other forces act; these are causes unless those of the result explain them.
 
-    Fluid and tendons: MuJoCo adds their forces to those of springs and damping, of whose sum the rounding is allowed.
+    MuJoCo adds forces of fluid and tendons to springs and damping, of whose sum the rounding is allowed.
     """
     unexplained, tree = [], sample.tree
     largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(sample.q, tree)).max()
@@ -139,3 +141,30 @@ def check_forces(result: Result, sample: Sample, dynamics: MujocoDynamics) -> li
             text = f"{place}: stated none, up to {most:.3g} N m at random states"
             unexplained.append(cause(place, 0.0, most, text, rank=2, quantity=place))
     return unexplained
+
+
+class Touch(NamedTuple):
+    """Two geoms that touch."""
+
+    geoms: tuple[str, str]
+    scene: str  # "": at a random state alone
+    time: float  # s, the first in that scene
+    q: list[float]  # rad
+
+
+def touches(setup: Setup, dynamics: MujocoDynamics) -> list[Touch]:
+    """The pairs of geoms that touch, each where it first does: in a scene as MuJoCo runs it, at a random state."""
+    if not dynamics.may_touch:
+        return []
+    found: dict[tuple[str, str], Touch] = {}
+    for case in setup.robot.cases_of_torque:
+        acting = cast(MujocoDynamics, setup.engines["mujoco"].of(case))
+        motion = acting.run(case.q, case.v, case.tau, case.scene.dt / FINER, case.steps * FINER, "RK4")
+        q = motion.q[np.isfinite(motion.q).all(axis=1)]
+        for time, state, pairs in zip(motion.t.tolist(), q, acting.touching(q)):
+            for pair in pairs - found.keys():
+                found[pair] = Touch(pair, case.name, time, case.positions_of_all(state).tolist())
+    for state, pairs in zip(setup.random.q, dynamics.touching(setup.random.q)):
+        for pair in pairs - found.keys():
+            found[pair] = Touch(pair, "", 0.0, state.tolist())
+    return list(found.values())

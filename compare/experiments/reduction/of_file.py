@@ -20,7 +20,8 @@ from ...judge.entries import Entries
 from ...judge.run import movement_unit
 from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
-from ...stability.answer import Asked, answer, postures_of
+from ...stability.answer import Asked, answer
+from ...stability.place import postures_of
 from ..setup import Setup
 from .records import JointRow, LimitRow, PairRow, ReductionResult, StageRow, SubsetRow
 from .scene import Scene, scene_of

@@ -5,12 +5,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ...engines.mujoco.linear import start_of
 from ...engines.mujoco.motion import Motion, Path, Simulation, Use, used
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.smaller import Smaller
+from ...engines.mujoco.step import start_of
 from ...robots.coordinates import Coordinates
-from ...stability.answer import posture_of, postures_of
+from ...stability.place import posture_of, postures_of
 from ..setup import Setup
 
 DURATION = 1.0  # s, of the motion from a keyframe

@@ -6,14 +6,14 @@ from typing import Any
 
 from ...core import timing
 from ...core.finding import Finding
-from ...engines import GRID, IN_QUICK_RUNS, LABELS, RECORDS
+from ...engines import GRID, IN_QUICK_RUNS, LABELS
 from ...judge.run import leaves_no_digits, movement_unit
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...truth.reference import LOST, has_no_reference
 from .. import Experiment
 from ..setup import Setup
-from . import accuracy, advice, evaluations
+from . import conclusions, evaluations
 from .runs import FIRST_STEPS, SceneRuns, SpeedResult, SpeedRow, prepared, runs_of, scene_runs, take_times
 from .settings import followed, left_out, regular_of, scenes_of
 
@@ -42,17 +42,21 @@ def begin(setup: Setup) -> Iterable[SceneRuns]:
 
 def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
     """Errors, times, orders, the error of rounding, and the cheapest settings."""
-    names, measured = [case.name for case in setup.robot.cases], begin(setup) if work is None else work
-    scenes = sorted(measured, key=lambda scene: names.index(scene.case.name))
+    names = [case.name for case in setup.robot.cases]
+    scenes = sorted(begin(setup) if work is None else work, key=lambda scene: names.index(scene.case.name))
     loops, absent = evaluations.loops(setup)
-    failed = add_times(setup, scenes)
+    add_times(setup, scenes)
     result = judged(setup, scenes)
-    add_advice(result)
+    if settings := conclusions.cheapest_of_fronts(conclusions.best_rows(result)):
+        values = {"settings": settings, **conclusions.target(result)}
+        result.headline = result.finding("headline", **values)
+        result.top.append(result.finding("answer", **values))
+    result.tables["what_should_i_use"] = conclusions.advice(result)
+    result.find("columns")
     setup.progress("speed: one evaluation")
     result.tables["evaluations"] = evaluations.costs(loops, setup.of(12, 5, 2)) + absent
     result.find("timing", once=timing.TIMED_ENOUGH, first_steps=FIRST_STEPS)
     add_absent(result, setup)
-    result.rows += failed
     return result
 
 
@@ -67,44 +71,29 @@ def judged(setup: Setup, scenes: Sequence[SceneRuns]) -> SpeedResult:
     falling, engines = [scene for scene in scenes if not scene.case.controller], tuple(setup.engines)
     if setup.size != "full":  # errors are regular in one scene only, and other engines have too few settings
         falling, engines = [scene for scene in scenes if scene.case.name == regular.name], IN_QUICK_RUNS
-    result.tables["speed_orders"] = accuracy.check_orders(result, falling, engines)
-    for check in (accuracy.check_same_schemes, accuracy.check_smallest_errors):
+    result.tables["speed_orders"] = conclusions.check_orders(result, falling, engines)
+    for check in (conclusions.check_same_schemes, conclusions.check_smallest_errors):
         for scene in scenes:
             check(result, scene)
-    result.find("references", runs=[about_reference(scene) for scene in scenes], unit=result.unit)
+    references = [
+        {"scene": scene.case.name, "steps": scene.reference.steps, "why": scene.reference.why,
+         "apart": scene.reference.apart, "floor": scene.floor, "expected": LOST * scene.floor / EPS}
+        for scene in scenes
+    ]  # fmt: skip
+    result.find("references", runs=references, unit=result.unit)
     return result
 
 
-def about_reference(scene: SceneRuns) -> dict[str, str | float | None]:
-    """What is said of the reference of a scene, and of the error that rounding leaves in a run."""
-    reference = scene.reference
-    errors = {"apart": reference.apart, "floor": scene.floor, "expected": LOST * scene.floor / EPS}
-    return {"scene": scene.case.name, "steps": reference.steps, "why": reference.why, **errors}
-
-
-def add_times(setup: Setup, scenes: Sequence[SceneRuns]) -> list[SpeedRow]:
-    """The rows of methods that fail. Adds the runs of engines that are called; sets the seconds of all."""
-    calls_of_scenes, failed = [prepared(scene.case, scene.runs, setup.engines) for scene in scenes], []
+def add_times(setup: Setup, scenes: Sequence[SceneRuns]) -> None:
+    """Add the runs of engines that are called; set the seconds of all."""
+    calls_of_scenes = [prepared(scene.case, scene.runs, setup.engines) for scene in scenes]
     setup.quiet()  # nothing else may run while times are taken
     for scene, calls in zip(scenes, calls_of_scenes):
         setup.progress(f"speed: timing {scene.case.name}")
-        called, rows = runs_of(scene, setup.engines, setup.size, compiled=False)
-        in_process = [run for run in called if not RECORDS[run.method.engine].reads_file]
-        again = [run for run in in_process if run.row.time < timing.TIMED_ENOUGH]
+        called = runs_of(scene, setup.engines, setup.size, compiled=False)
+        again = [run for run in called if run.row.time < timing.TIMED_ENOUGH]
         take_times(scene.runs + again, calls + prepared(scene.case, again, setup.engines))
         scene.runs += called
-        failed += rows
-    return failed
-
-
-def add_advice(result: SpeedResult) -> None:
-    """The cheapest settings, in sentences and as a table."""
-    if settings := advice.cheapest_of_fronts(advice.best_rows(result)):
-        values = {"settings": settings, **advice.target(result)}
-        result.headline = result.finding("headline", **values)
-        result.top.append(result.finding("answer", **values))
-    result.tables["what_should_i_use"] = advice.advice(result)
-    result.find("columns")
 
 
 def add_absent(result: SpeedResult, setup: Setup) -> None:
@@ -131,5 +120,5 @@ def figures(result: SpeedResult, robot: Robot) -> Iterator[partial[Any]]:
 def overview(results: Mapping[str, SpeedResult], robot: Robot) -> Iterator[partial[Any]]:
     from .figures_speed import draw_overview  # matplotlib is for the process that draws
 
-    if advice.best_rows(results["speed"]):
+    if conclusions.best_rows(results["speed"]):
         yield partial(draw_overview, results["speed"])

@@ -1,6 +1,5 @@
 """What one evaluation of the dynamics costs: MuJoCo's calls, and the ways of tmt."""
 
-import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -56,8 +55,10 @@ def loops(setup: Setup) -> tuple[list[Loop], list[EvaluationRow]]:
     many = setup.of(MANY if coordinates.nv <= MOST_OF_MANY else 10 * FEW, FEW, FEW)
     rng = np.random.default_rng([SEED, 2])
     states = [coordinates.random(rng, many), *rng.uniform(-3.0, 3.0, (2, many, coordinates.nv))]
-    first, few = [values[0] for values in states], [values[:FEW] for values in states]
-    ready, absent = at_one_state(tree, *first) + at_many_states(tree, *few), []
+    first = [values[0] for values in states]
+    tmt.prepare(tree)
+    ready, absent = [called(tree, *first), steps(tree, *first)], []
+    ready += at_many_states(tree, *(values[:FEW] for values in states))
     if missing := MinimalCalls.unavailable():
         absent.append(EvaluationRow(FORWARD, "MuJoCo, mj_forward", None, None, why_not=missing))
     else:
@@ -69,25 +70,23 @@ def loops(setup: Setup) -> tuple[list[Loop], list[EvaluationRow]]:
     return ready + (at_many_states(tree, *states) if many > FEW else []), absent
 
 
-def at_one_state(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> list[Loop]:
-    """The ways of tmt at one state, (nq,) and (nv,)."""
-    tmt.prepare(tree)
-    run, compiled = runner_of(tree, "rk4").follow, Evaluator(tree, "acceleration")
-    chain, arrays = chained(tree), (q, qd, tau, np.empty(len(qd)))
-    most = min(MOST_CALLS, MOST_NUMBERS // len(tree.axis))
+def called(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> Loop:
+    """Accelerations called from Python, at one state or at many."""
+    row = EvaluationRow(FORWARD, CALLED) if q.ndim == 1 else EvaluationRow(FORWARD, CALLED, len(q), cores())
+    return Loop(row, repeated(lambda: tmt.acceleration(q, qd, tau, tree)))
+
+
+def steps(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> Loop:
+    """Steps of RK4 from one state, each of which waits for the last."""
+    run, most = runner_of(tree, "rk4").follow, min(MOST_CALLS, MOST_NUMBERS // len(qd))
     paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
     paths[0][0, 0], paths[1][0, 0] = q, qd
 
-    def steps(count: int) -> None:
+    def loop(count: int) -> None:
         positions, speeds = (path[:, : min(count, most) + 1].copy() for path in paths)
         run(positions, speeds, tau[None], 1e-4, 0.0, 1)
 
-    waiting = EvaluationRow(FORWARD, "compiled, each waits for the last", operations=compiled.operations)
-    return [
-        Loop(EvaluationRow(FORWARD, CALLED), repeated(lambda: tmt.acceleration(q, qd, tau, tree))),
-        Loop(waiting, lambda count: chain(*(values.ctypes.data for values in arrays), count)),
-        Loop(EvaluationRow(RK4_STEP, ONE_BY_ONE), steps),
-    ]
+    return Loop(EvaluationRow(RK4_STEP, ONE_BY_ONE), loop)
 
 
 def at_many_states(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> list[Loop]:
@@ -95,16 +94,12 @@ def at_many_states(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarra
     count, run, compiled = len(qd), runner_of(tree, "rk4").follow, Evaluator(tree, "acceleration")
     out = np.empty((count, compiled.size))
     positions, speeds = (np.stack([part, part], axis=1) for part in (q, qd))
-    one_by_one = EvaluationRow(FORWARD, ONE_BY_ONE, count, operations=compiled.operations)
-    side_by_side = EvaluationRow(FORWARD, SIDE_BY_SIDE, count, operations=compiled.operations)
-    called = EvaluationRow(FORWARD, CALLED, count, cores())
     step = EvaluationRow(RK4_STEP, SIDE_BY_SIDE, count, cores())
-    return [
-        Loop(one_by_one, repeated(lambda: compiled.fill(False, out, q, qd, tau))),
-        Loop(side_by_side, repeated(lambda: compiled.fill(True, out, q, qd, tau))),
-        Loop(called, repeated(lambda: tmt.acceleration(q, qd, tau, tree))),
-        Loop(step, repeated(lambda: run(positions, speeds, tau, 1e-3, 0.0, 1))),
-    ]
+    ways = [called(tree, q, qd, tau), Loop(step, repeated(lambda: run(positions, speeds, tau, 1e-3, 0.0, 1)))]
+    for name, in_lanes in ((ONE_BY_ONE, False), (SIDE_BY_SIDE, True)):
+        row = EvaluationRow(FORWARD, name, count, operations=compiled.operations)
+        ways.append(Loop(row, repeated(partial(compiled.fill, in_lanes, out, q, qd, tau))))
+    return ways
 
 
 def repeated(call: Callable[[], object]) -> Callable[[int], None]:
@@ -130,34 +125,3 @@ def repetitions(run: Callable[[int], object]) -> int:
     run(1)
     (times,) = timing.in_turns([partial(run, 4)], 5)
     return min(max(1, int(1e-3 / (min(times) / 4))), MOST_CALLS)
-
-
-CHAIN = """
-define void @chain(ptr %q, ptr %qd, ptr %tau, ptr %out, i64 %count) {
-entry:
-  br label %body
-body:
-  %i = phi i64 [0, %entry], [%next, %body]
-  %last = phi i64 [0, %entry], [%wrong, %body]
-  %q.i = getelementptr double, ptr %q, i64 %last
-  %qd.i = getelementptr double, ptr %qd, i64 %last
-  %tau.i = getelementptr double, ptr %tau, i64 %last
-  %wrong = call i64 @one(ptr %q.i, ptr %qd.i, ptr %tau.i, ptr %tau.i, ptr %out)
-  %next = add i64 %i, 1
-  %more = icmp slt i64 %next, %count
-  br i1 %more, label %body, label %done
-done:
-  ret void
-}
-"""
-
-
-def chained(tree: tmt.Tree) -> Callable[..., None]:
-    """chain(q, qd, tau, out, count): the accelerations at one state again and again, each after the last.
-
-    A call reads the state at its address plus `wrong` of the last call, which is 0 but known only at its end.
-    """
-    from tmt.compiled import entries, machine  # loads the compiler
-
-    library = machine.Library(entries.source(tree, "acceleration", 1) + CHAIN)
-    return library.function("chain", None, *[ctypes.c_void_p] * 4, ctypes.c_int64)

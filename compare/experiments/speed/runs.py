@@ -14,8 +14,7 @@ from tmt.methods import METHODS
 from ...core import timing
 from ...core.check import Result
 from ...core.rows import MOVEMENT, MovementRow, column
-from ...engines import GRID, IN_QUICK_RUNS, RECORDS, Dynamics, Engine, Method, Setting
-from ...engines.outside.model import EngineError
+from ...engines import GRID, IN_QUICK_RUNS, Dynamics, Engine, Method, Setting
 from ...judge.rounding import growth
 from ...judge.run import diverged_at, movement_unit
 from ...judge.scale import EPS
@@ -99,40 +98,31 @@ def scene_runs(case: Case, engines: Mapping[str, Engine], size: str) -> SceneRun
     """The runs of a scene by compiled methods, which are not yet timed."""
     exact = reference(case)
     scene = SceneRuns(case, exact, max(floor(case, engines["tmt"].of(case)), exact.apart))
-    scene.runs, _ = runs_of(scene, engines, size, compiled=True)
+    scene.runs = runs_of(scene, engines, size, compiled=True)
     for run in scene.runs:
         run.row.seconds = None
     return scene
 
 
-def runs_of(
-    scene: SceneRuns, engines: Mapping[str, Engine], size: str, compiled: bool
-) -> tuple[list[Run], list[SpeedRow]]:
-    """The runs by methods whose loop is compiled, or by the others; and a row for each method that fails."""
-    runs: list[Run] = []
-    failed = []
-    for method in methods(engines, size, scene.case):
-        if (method.engine in IN_QUICK_RUNS) == compiled:
-            try:
-                runs.extend(series(scene, engines[method.engine], method, size))  # up to the one that fails
-            except EngineError as error:
-                failed.append(SpeedRow(scene.case.name, method.engine, method.name, why_not=str(error)))
-    return runs, failed
+def runs_of(scene: SceneRuns, engines: Mapping[str, Engine], size: str, compiled: bool) -> list[Run]:
+    """The runs by methods whose loop is compiled, or by the others."""
+    some = [
+        method
+        for method in methods(engines, size, scene.case)
+        if (method.engine in IN_QUICK_RUNS) == compiled
+    ]
+    return [run for method in some for run in series(scene, engines[method.engine], method, size)]
 
 
 def series(scene: SceneRuns, engine: Engine, method: Method, size: str) -> Iterator[Run]:
     """The runs of a method from coarse to fine, until one takes too long or gains nothing."""
-    record, case = RECORDS[method.engine], scene.case
-    best, last = math.inf, 0
-    for setting in settings_of(method, case, size):
+    best, last, seconds = math.inf, 0, estimated(method, scene.case.tree)
+    for setting in settings_of(method, scene.case, size):
         run = measured(scene, engine, method, setting)
         yield run
         error, work = run.row.largest_error, run.row.evaluations or run.row.steps or 2 * last + 1
-        if record.reads_file:
-            too_long = run.row.time > MOST_SECONDS[size]
-        else:
-            too_long = method.adaptive and work * estimated(method, case.tree) > MOST_SECONDS[size] / 2
-        if too_long or gained_nothing(error, work, best, last, scene.floor * record.eps / EPS):
+        too_long = method.adaptive and work * seconds > MOST_SECONDS[size] / 2
+        if too_long or gained_nothing(error, work, best, last, scene.floor):
             return
         best, last = min(best, error), work
 

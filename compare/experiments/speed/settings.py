@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from tmt import Tree
 from tmt.methods import method_named
 
-from ...engines import IN_QUICK_RUNS, Engine, Method, Setting, methods_in
+from ...engines import IN_QUICK_RUNS, RECORDS, Engine, Method, Setting, methods_in
 from ...robots import Robot
 from ...robots.case import Case
 from ...truth.reference import coarsest_steps
@@ -36,7 +36,6 @@ def scenes_of(robot: Robot) -> list[Case]:
 
 
 def is_own(case: Case) -> bool:
-    """Whether a scene is the user's own."""
     return case.scene.tags == ("own",)
 
 
@@ -54,20 +53,23 @@ def followed(robot: Robot, size: str) -> list[Case]:
     return [case for k, case in enumerate(cases) if size == "full" or k == 0 or case.name == regular]
 
 
+def asked(engines: Mapping[str, Engine], size: str) -> list[Engine]:
+    """The engines that follow a scene; the experiment `engines` compares those that read the file."""
+    names = [name for name in engines if size != "quick" or name in IN_QUICK_RUNS]
+    return [engines[name] for name in names if not RECORDS[name].reads_file]
+
+
 def methods(engines: Mapping[str, Engine], size: str, case: Case) -> list[Method]:
     """The methods by which a case is followed. Where the robot's actuators act, some have other schemes."""
     excluded = left_out(engines, size, case.robot)
-    asked = [engine for name, engine in engines.items() if size != "quick" or name in IN_QUICK_RUNS]
-    candidates = [method for engine in asked for method in methods_in(engine, case).values()]
+    candidates = [method for engine in asked(engines, size) for method in methods_in(engine, case).values()]
     return [method for method in candidates if (method.engine, method.name) not in excluded]
 
 
 def left_out(engines: Mapping[str, Engine], size: str, robot: Robot) -> dict[tuple[str, str], str]:
     """Methods that are not run, (engine, method), and why: no engine, or too slow for this robot."""
     reasons = {}
-    for engine in engines.values():
-        if size == "quick" and engine.name not in IN_QUICK_RUNS:
-            continue
+    for engine in asked(engines, size):
         too_long = getattr(engine, "too_long", lambda tree: None)
         of_engine = engine.unavailable() or too_long(robot.tree)
         for method in engine.methods.values():
@@ -107,10 +109,9 @@ def estimated(method: Method, tree: Tree) -> float:
 
 def settings_of(method: Method, case: Case, size: str = "full") -> tuple[Setting, ...]:
     """The settings of a method, from coarse to fine: steps are halved, tolerances divided by ten."""
-    if method.adaptive:
-        first, last = EXPONENTS.get(method.name, (2, 12))
-        settings = tuple(Setting(case.duration, tolerance=10.0**-k) for k in range(first, last + 1))
-    else:
+    first, last = EXPONENTS.get(method.name, (2, 12))
+    settings = tuple(Setting(case.duration, tolerance=10.0**-k) for k in range(first, last + 1))
+    if not method.adaptive:
         settings = halvings(method, case, size)
     few = FEW_SETTINGS.get(size)
     return settings[: FEW_OTHERS if few and method.engine not in IN_QUICK_RUNS else few]

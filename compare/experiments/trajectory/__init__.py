@@ -18,7 +18,7 @@ from ...robots.case import Case
 from ...truth.reference import RECORDS, Reference, reference
 from .. import Experiment
 from ..setup import Setup
-from . import energy, motion, true_motion
+from . import errors, motion
 from .runs import TrajectoryResult, follow, recorded
 
 EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=True, overview="scenes")
@@ -54,9 +54,9 @@ def begin(setup: Setup) -> Work:
     # a file's robot has scenes with steps of their own
     fast = [] if robot.is_read else [case for case in cases if "speed" in case.scene.tags]
     true = [case for case in fast if case.steps == RECORDS]
-    steps = setup.of(energy.STEPS, energy.FEW_STEPS, energy.FEW_STEPS)
+    steps = setup.of(errors.STEPS, errors.FEW_STEPS, errors.FEW_STEPS)
     runs = spread(partial(follow, engines=engines, finer=finer), cases)
-    drifts = spread(partial(energy.measure_energy, engines=engines, steps=steps), [robot])
+    drifts = spread(partial(errors.measure_energy, engines=engines, steps=steps), [robot])
     return Work(runs, drifts, [case.name for case in true], spread(reference, true), left_out)
 
 
@@ -90,8 +90,8 @@ def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
     with np.errstate(over="ignore", invalid="ignore"):  # in runs that diverge
         drawn = [motion.pictures_of(case, result.runs) for case in robot.cases]
     result.pictures = motion.in_order([pictures for pictures in drawn if pictures], robot)
-    true_motion.find_departures(result, robot, setup.engines)
-    true_motion.find_errors(result, robot, dict(zip(work.names, work.true)))
+    errors.find_departures(result, robot, setup.engines)
+    errors.find_errors(result, robot, dict(zip(work.names, work.true)))
     find_schemes(result, robot, setup.engines["mujoco"])
     result.notes += work.left_out
     return result
@@ -139,7 +139,7 @@ def figures(result: TrajectoryResult, robot: Robot) -> Iterator[partial[Any]]:
 
 
 def overview(results: Mapping[str, TrajectoryResult], robot: Robot) -> Iterator[partial[Any]]:
-    from .figures_overview import draw_scenes  # matplotlib is for the process that draws
+    from .figures_runs import draw_scenes  # matplotlib is for the process that draws
 
     if results["trajectory"].rows:
         yield partial(draw_scenes, results["trajectory"], robot)

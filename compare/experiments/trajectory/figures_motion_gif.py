@@ -65,30 +65,33 @@ def one_picture(scene: Pictures, k: int, still: Image.Image, paths: Sequence[np.
     """The k-th picture of a scene; still: the text in all of them; paths: of each engine, in pixels."""
     image = still.copy()
     pen = ImageDraw.Draw(image)
+    alive = [bool(np.isfinite(path[k]).all()) for path in paths]
     for which, path in enumerate(paths):
-        if np.isfinite(path[k]).all():
+        if alive[which]:
             draw_sticks(pen, path[k], scene.links, which, scene.few_sticks)
-    lost = [LABELS[name] for name, path in scene.points.items() if not np.isfinite(path[k]).all()]
-    about = {"lost": lost, "apart": scene.apart[k], "unit": scene.unit}
+    lost = [LABELS[name] for name, is_alive in zip(scene.points, alive) if not is_alive]
     left = {LABELS[name]: time for name, time in scene.left.items() if time and time <= scene.t[k]}
     write(pen, (PIXELS[0] - 16, PIXELS[1] - 28), f"t = {scene.t[k]:.2f} s", 17, "ra")
-    write(pen, (16, PIXELS[1] - 28), say(Finding("trajectory", "picture_apart", about)), 17)
-    write(pen, (PIXELS[0] - 16, 68), say(Finding("trajectory", "picture_left", {"left": left})), 14, "ra")
+    write(pen, (16, PIXELS[1] - 28), said("apart", lost=lost, apart=scene.apart[k], unit=scene.unit), 17)
+    write(pen, (PIXELS[0] - 16, 68), said("left", left=left), 14, "ra")
     return image.reduce(FINE)
+
+
+def said(kind: str, **values: object) -> str:
+    return say(Finding("trajectory", f"picture_{kind}", values))
 
 
 def draw_sticks(pen: Pen, points: np.ndarray, links: Links, which: int, few: bool = True) -> None:
     """The sticks of an engine: of the first (0) wide with discs, else narrow with rings. points: (n, 2)."""
     colour = (BLUE, ORANGE)[which]
     places = [tuple(FINE * point) for point in points]
-    width = FINE * ((14 if few else 8), (4 if few else 3))[which]
-    disc = FINE * ((7 if few else 4), (6 if few else 3))[which]
+    width, disc = ((14, 7), (4, 6))[which] if few else ((8, 4), (3, 3))[which]
     for start, end in links:
-        pen.line([places[start], places[end]], fill=colour, width=width)
+        pen.line([places[start], places[end]], fill=colour, width=FINE * width)
     for place in places:
-        pen.circle(place, disc, fill=colour)
+        pen.circle(place, FINE * disc, fill=colour)
         if which:
-            pen.circle(place, disc - 3 * FINE / 2, fill="white")
+            pen.circle(place, FINE * (disc - 1.5), fill="white")
 
 
 def text_of_scene(scene: Pictures, label: str, base: np.ndarray) -> Image.Image:
@@ -96,8 +99,8 @@ def text_of_scene(scene: Pictures, label: str, base: np.ndarray) -> Image.Image:
     image = Image.new("RGB", (FINE * PIXELS[0], FINE * PIXELS[1]), "white")
     pen = ImageDraw.Draw(image)
     write(pen, (16, 10), scene.scene, 20)
-    about = {"run": scene.run, "slower": scene.slower(CENTISECONDS / 100.0)}
-    write(pen, (PIXELS[0] - 16, 50), say(Finding("trajectory", "picture_run", about)), 14, "ra")
+    run = said("run", run=scene.run, slower=scene.slower(CENTISECONDS / 100.0))
+    write(pen, (PIXELS[0] - 16, 50), run, 14, "ra")
     for which, (x, name) in enumerate(zip(NAMES_AT, (label, LABELS["mujoco"]))):
         draw_sticks(pen, np.array([[x + 4, 62], [x + 36, 62]]), [(0, 1)], which)
         write(pen, (x + 48, 62), name, 16, "lm")

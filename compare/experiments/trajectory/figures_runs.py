@@ -1,4 +1,4 @@
-"""Figures of runs: positions and speeds against time, the engines' difference and its band."""
+"""Figures of runs: positions and speeds against time, the engines' difference and its band; all scenes."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,14 +9,17 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from ...core.check import largest_known
+from ...core.check import About, largest_known
 from ...core.finding import Finding
+from ...core.words import scene_of
 from ...engines import LABELS
 from ...judge.run import LEFT, moved_from, movement_unit, step_in_words
-from ...report.style import GREY, LINES, ORANGE, WIDTH, file_name, zero_at_the_end
+from ...report.style import BLUE, GREY, LINES, ORANGE, RED, WIDTH, file_name, zero_at_the_end
+from ...robots import Robot
 from ...robots.case import Case
+from ..figures import MOST_ROWS, beyond_tolerance, chart, lines_to, named_rows
+from .errors import difference_while_judged
 from .runs import Run, TrajectoryResult
-from .true_motion import difference_while_judged
 
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
 LEVEL = 1e-6  # of a position: a smaller change is not seen in a panel
@@ -25,25 +28,28 @@ LONG = 14  # letters of a joint's name
 MARKS: dict[str, Any] = {"marker": "o", "linestyle": "none", "mfc": "white", "markersize": 2.8, "mew": 0.9}
 NOT_JUDGED: dict[str, Any] = {"color": (GREY, 0.2), "linewidth": 0}
 MOST_LINES = len(LINES)  # of joints in a panel
+LEAST_SHARE, MOST_SHARE = 1e-4, 1e3  # of a band
 
 
 def draw_held(result: TrajectoryResult, run: Run, number: int) -> tuple[str, Figure, Finding]:
     """The assignment's figure of a held posture: angles against time, and when each engine leaves it."""
-    case = run.case
+    name, end = run.case.name, float(run.t[-1])
     fig = Figure(figsize=(WIDTH, 3.3), layout="constrained")
     ax = fig.subplots()
     over_time(ax, run, [np.degrees(run.until_diverged(engine, path.q)) for engine, path in run.paths.items()])
     engines = []
-    for (engine, path), error, dash in zip(run.paths.items(), result.errors[case.name], ("--", ":")):
+    for (engine, path), error, dash in zip(run.paths.items(), result.errors[name], ("--", ":")):
         engines.append({"label": LABELS[engine], "left": path.left, "error": error})
         if path.left is not None:
             label = f"{LABELS[engine]} leaves at {path.left:.2f} s"
             ax.axvline(path.left, color="black", linestyle=dash, label=label)
-    ax.set(xlabel="time, s", ylabel="hinge angle, deg", xlim=(0, run.t[-1]))
+    ax.set(xlabel="time, s", ylabel="hinge angle, deg", xlim=(0, end))
     fig.legend(loc="outside upper center", ncols=LEGEND_COLUMNS + 1)
-    values: dict[str, Any] = {"scene": case.name, "end": float(run.t[-1]), "steps": run.steps, "limit": LEFT}
-    values |= {"engines": engines, "judged": run.judged_until, "apart": difference_while_judged(run)}
-    return f"assignment_figure_{number}", fig, result.finding("figure_held", number=number, **values)
+    caption = result.finding(
+        "figure_held", number=number, scene=name, end=end, steps=run.steps, limit=LEFT, engines=engines,
+        judged=run.judged_until, apart=difference_while_judged(run),
+    )  # fmt: skip
+    return f"assignment_figure_{number}", fig, caption
 
 
 def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding]:
@@ -51,16 +57,19 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
     runs = [run for run in result.runs if run.case.name == case.name]
     steps = max(run.steps for run in runs if run.steps <= 16 * case.steps)
     runs = [run for run in runs if run.steps == steps]
-    shown, unit = differing_most(case, runs), movement_unit(case.coordinates)
+    shown, unit, step = (
+        differing_most(case, runs),
+        movement_unit(case.coordinates),
+        step_in_words(case, steps),
+    )
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
     axes = fig.subplots(3, len(runs), sharex=True, sharey="row", squeeze=False)
-    step = step_in_words(case, steps)
     for (positions, speeds, below), run in zip(axes.T, runs):
         for ax, name in ((positions, "q"), (speeds, "v")):
-            drawn = [
+            paths = [
                 (engine, drawable(case, name, getattr(path, name))) for engine, path in run.paths.items()
             ]
-            alive = [run.until_diverged(engine, values) for engine, values in drawn]
+            alive = [run.until_diverged(engine, values) for engine, values in paths]
             over_time(ax, run, alive, shown, 64 // len(runs))
         positions.set_title(f"{run.integrator}, {step}" if len(runs) < 4 else f"{run.integrator}\n{step}")
         draw_difference(below, run, result.label)
@@ -75,7 +84,16 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
     axes[2, 0].set_ylabel(f"{place}: difference, {unit}" if unit == "rad" else f"difference, {unit}")
     fig.align_ylabels(axes[:, 0])
     add_legend(fig, axes, any(len(case.coordinates.speeds[i]) > LONG for i in shown))
-    return file_name("trajectory", case.name), fig, run_caption(result, case, runs, len(shown))
+    rows = [row for row in result.rows if row.scene == case.name and row.level == "open loop"]
+    errors = result.errors.get(case.name)
+    caption = result.finding(
+        "figure_run", scene=case.robot.scene_begins(case.name), unit=unit, shown=len(shown),
+        positions=case.coordinates.nv, balls=case.coordinates.has_balls,
+        errors=errors and dict(zip((result.label, "MuJoCo"), errors)),
+        share=largest_known([row.difference_over_band for row in rows]),
+        judged=[(run.integrator, run.judged_until) for run in runs],
+    )  # fmt: skip
+    return file_name("trajectory", case.name), fig, caption
 
 
 def draw_difference(ax: Axes, run: Run, label: str) -> None:
@@ -99,26 +117,9 @@ def add_legend(fig: Figure, axes: np.ndarray, long: bool) -> None:
     if any(ax.patches for ax in axes[2]):
         handles.append(Patch(label="not judged", **NOT_JUDGED))
     columns, high = LEGEND_COLUMNS - long, axes[0, 0].get_title().count("\n")
-    lines = -(-len(handles) // columns)
     fig.legend(handles=handles, loc="upper center", ncols=columns)
-    top = (94.5 - 3 * lines - 2.4 * high) / 100
+    top = (94.5 - 3 * -(-len(handles) // columns) - 2.4 * high) / 100
     fig.subplots_adjust(left=0.105, right=0.985, bottom=0.075, top=top, hspace=0.12, wspace=0.08)
-
-
-def run_caption(result: TrajectoryResult, case: Case, runs: Sequence[Run], shown: int) -> Finding:
-    """The engines' difference in a scene and their errors. shown: the number of positions."""
-    rows = [row for row in result.rows if row.scene == case.name and row.level == "open loop"]
-    errors, coordinates = result.errors.get(case.name), case.coordinates
-    values: dict[str, Any] = {"unit": movement_unit(coordinates)}
-    values |= {
-        "scene": case.robot.scene_begins(case.name),
-        "shown": shown,
-        "positions": coordinates.nv,
-        "balls": coordinates.has_balls,
-    }
-    values["errors"] = errors and dict(zip((result.label, "MuJoCo"), errors))
-    values["share"] = largest_known([row.difference_over_band for row in rows])
-    return result.finding("figure_run", judged=[(run.integrator, run.judged_until) for run in runs], **values)
 
 
 def over_time(
@@ -150,7 +151,7 @@ def label_axis(ax: Axes, name: str, unit: str) -> None:
 
 
 def drawable(case: Case, name: str, values: np.ndarray) -> np.ndarray:
-    """Positions "q" or speeds "v", (times, nv); of a ball's "q" its movement, NaN where it passes half a turn."""
+    """Positions "q" or speeds "v", (times, nv); of a ball its movement, NaN where it passes half a turn."""
     coordinates = case.coordinates
     if name == "v" or not coordinates.has_balls:
         return values
@@ -174,3 +175,40 @@ def differing_most(case: Case, runs: Sequence[Run]) -> list[int]:
         first, mujoco = (path.q[run.t <= run.judged_until] for path in run.paths.values())
         largest = np.fmax(largest, moved_from(first, mujoco, case.coordinates).max(axis=0))
     return sorted(np.argsort(-largest, kind="stable")[:MOST_LINES].tolist())
+
+
+def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Finding]:
+    """Each scene: at the left the difference over its band; at the right how long all its runs are judged."""
+    names = [case.name for case in robot.cases if any(row.scene == case.name for row in result.rows)]
+    rows = {name: [row for row in result.rows if row.scene == name] for name in names}
+    wrong = [check for check in result.checks if check.failed and check.about == About.MODELS]
+    failing = [name for name in names if name in {scene_of(check.scene, names) for check in wrong}]
+    shares = {name: largest_known([row.difference_over_band for row in rows[name]]) for name in names}
+    wrong_first = sorted(names, key=lambda name: name not in failing)[:MOST_ROWS]
+    shown = [name for name in names if name in wrong_first]
+    fig, (left, right) = chart(2, sharey=True, width_ratios=(1.15, 1))
+    left.set(xscale="log", xlim=(LEAST_SHARE, MOST_SHARE if failing else 10.0), xlabel="difference / band")
+    for place, name in enumerate(shown):
+        colour, mark = (RED, "X") if name in failing else ("black", "D")
+        share = shares[name]
+        if share is not None:
+            lines_to(left, [share], [place], mark, colour, markersize=4.5)
+    durations = [case.duration for name in shown for case in robot.cases if case.name == name]
+    judged = [min(row.judged_until for row in rows[name]) for name in shown]
+    places = range(len(shown))
+    right.barh(places, durations, height=0.5, color=(GREY, 0.2), label="not judged")
+    right.barh(places, judged, height=0.5, color=BLUE, label="judged at all dt")
+    beyond_tolerance(left, 1.0, "1")
+    left.set_xticks([1e-4, 1e-2, 1.0])
+    left.minorticks_off()
+    right.set(xlabel="time, s", xlim=(0, 1.04 * max(durations)))
+    named_rows(left, shown, [name not in failing for name in shown])
+    left.tick_params(axis="y", labelsize=8)
+    right.grid(axis="y", visible=False)
+    fig.legend(loc="outside upper center", ncols=2, fontsize=7)
+    until = [row.judged_until for name in names for row in rows[name]]
+    caption = result.finding(
+        "overview_caption", label=result.label, share=largest_known([*shares.values()]), scenes=len(names),
+        failing=failing, shortest=min(until), longest=max(until),
+    )  # fmt: skip
+    return "overview_scenes", fig, caption

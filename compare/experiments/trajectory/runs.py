@@ -180,9 +180,10 @@ def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin
     states, stepped = ([values[single] for values in pair] for pair in (states, stepped))
     of_positions = width[:, : case.coordinates.nv].max(axis=1)
     run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, of_positions)
-    widest = rules.widest_judged(case, path.q, path.v)
     tolerance = step_rounding(stepping, tree, states[0], states[1], tau, dt)
-    return Twin(run, width, widest, times[single], states, stepped, tolerance)
+    return Twin(
+        run, width, rules.widest_judged(case, path.q, path.v), times[single], states, stepped, tolerance
+    )
 
 
 def compare_run(result: Result, twin: Twin, dynamics: Dynamics, method: Method) -> Run:
@@ -223,8 +224,7 @@ def check_level(result: Result, run: Run, level: str, deviation: Deviation) -> N
 
 def check_end(result: Result, run: Run) -> None:
     """How long a run is judged, whether both runs diverge alike, and whether it moves."""
-    case, end = run.case, ends_first(run.ends)
-    times = run.t[:: run.every]
+    case, end, times = run.case, ends_first(run.ends), run.t[:: run.every]
     alive = times[times < end][-1]
     check_time_judged(result, run, alive)
     is_known = check_divergence(result, run)
@@ -232,7 +232,7 @@ def check_end(result: Result, run: Run) -> None:
         result.not_judged(run.where, "open loop", say(result.finding("diverges_at_once")))
     if case.is_free and "own" not in case.scene.tags:
         alive_paths = [path.q[run.t < end] for path in run.paths.values()]
-        moved = min(rules.deviation_alive(q, case.q, case.coordinates) for q in alive_paths)
+        moved = min(rules.deviation(q, case.q, case.coordinates) for q in alive_paths)
         rules.check_movement(result, run.where, moved, rules.movement_unit(case.coordinates))
 
 

@@ -17,7 +17,7 @@ from compare.engines.tmt import Tmt
 from compare.experiments import trajectory
 from compare.experiments.trajectory import figures_motion_gif as gif
 from compare.experiments.trajectory import figures_runs, motion, runs
-from compare.experiments.trajectory.runs import Path, TrajectoryResult
+from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.run import diverged_at
 from compare.robots.arm import ARM, landmarks
 from compare.robots.stick import as_seen, stick_figure
@@ -192,19 +192,14 @@ def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_
     np.testing.assert_array_equal(drawn.apart, apart[::2])
 
 
-def test_between_steps_a_run_is_interpolated_until_it_has_diverged(followed):
+def test_a_run_is_drawn_until_it_has_diverged(followed):
     coarse = next(run for run in followed if (run.scheme, run.steps) == ("rk4", 64))
-    path = coarse.paths["tmt"]
-    for ended, last in ((None, 5.0), (2.5, 2.5 - 5 / 64), (5 / 64, 0.0)):
-        times, q = motion.frames(CATCH, coarse.t, path._replace(ended=ended))
-        np.testing.assert_allclose(times, np.linspace(0.0, 5.0, 129))
-        assert (np.isfinite(q).all(axis=1) == (times <= last)).all()
-        alive = times[::2] <= last
-        np.testing.assert_allclose(q[::2][alive], path.q[alive])
-    t = np.linspace(0.0, 5.0, 65)  # a cubic is itself
-    cubic = Path(t[:, None] ** [1, 2, 3], [1, 2, 3] * t[:, None] ** [0, 1, 2])
-    times, q = motion.frames(CATCH, t, cubic)
-    np.testing.assert_allclose(q, times[:, None] ** [1, 2, 3], atol=1e-12)
+    for ended, last in ((None, 64), (2.5, 31), (5 / 64, 0)):
+        paths = coarse.paths | {"tmt": coarse.paths["tmt"]._replace(ended=ended)}
+        scene = motion.pictures_of(CATCH, [replace(coarse, paths=paths)])
+        seen = np.isfinite(scene.points["tmt"]).all(axis=(1, 2))
+        assert len(scene.t) == 65 and np.flatnonzero(seen).tolist() == [*range(last + 1)]
+        assert np.array_equal(np.isfinite(scene.apart), seen) and np.isfinite(scene.points["mujoco"]).all()
 
 
 def test_a_free_body_is_a_cross_that_turns_with_it():

@@ -6,12 +6,12 @@ CHECKS = (
     ("published", "check_answer", "printed_digits"), ("published", "check_answer", "from_exact"),
     ("published", "check_answer", "every_digit"), ("published", "check_answer", "size"),
     ("mass", "check_symmetry", "what"), ("mass", "check_definiteness", "what"),
-    ("accuracy", "check_same_schemes", "quantity"), ("accuracy", "check_stopped", "quantity"),
-    ("accuracy", "check_smallest_errors", "quantity"), ("needs", "check_smaller", '"time judged"'),
+    ("conclusions", "check_same_schemes", "quantity"), ("conclusions", "check_stopped", "quantity"),
+    ("conclusions", "check_smallest_errors", "quantity"), ("needs", "check_smaller", '"time judged"'),
     ("reduction", "add_not_lockable", "quantity"), ("sub_blocks", "check_blocks", "name"),
     ("trajectory", "check_time_judged", '"time judged"'), ("trajectory", "check_divergence", "what"),
     ("judge.run", "check_movement", '"movement"'), ("followed", "check_closest", "quantity"),
-    ("energy", "check_order", "name"), ("stability.limits", "check_limits", "what"),
+    ("trajectory.errors", "check_order", "name"), ("stability.limits", "check_limits", "what"),
     ("stability.limits", "check_limits", "quantity"), ("departure", "check_row", "quantity"),
     ("claims", "check_torques", "text"), ("claims", "check_torques", "quantity"),
     ("claims", "check_finer_steps", "quantity"), ("claims", "check_kept", "what"),
@@ -36,8 +36,8 @@ EDITS = (
         for module, where, quantity in AGREEMENTS
     ),
     *(
-        ("quantities", "Comparison.compare", "Compared(_1, _2, values, mujoco_values, *_3)",
-         f"Compared(_1, _2, values, values if name == {quantity!r} else mujoco_values, *_3)",
+        ("quantities", "Comparison.compare", "self.agree(_1, _2, values, mujoco_values, *_3)",
+         f"self.agree(_1, _2, values, values if name == {quantity!r} else mujoco_values, *_3)",
          f"{quantity} is compared with itself")
         for quantity in ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv", "Mbar", "holding torque", "bias", "qdd", "energy")
     ),

@@ -40,8 +40,8 @@ EDITS = (
     # the diagnosis
     ("diagnosis.forces", "LeftOver.__init__", "SHARPER * rounding * _1", "10 * _0", "what forces may leave over x 10"),
     ("diagnosis.consistency", "power_balance", "SAFETY * error + _1", "10 * _0", "the tolerance of the power x 10"),
-    ("diagnosis.variants", "program_options", "velocity_terms + drag", "velocity_terms - drag", "both have one sign"),
-    ("diagnosis.variants", "program_options", "velocity_terms - drag", "velocity_terms + drag", "both dampings add"),
+    ("diagnosis.variants", "program_options", "moving + drag", "moving - drag", "both have one sign"),
+    ("diagnosis.variants", "program_options", "moving - drag", "moving + drag", "both dampings add"),
     ("diagnosis.conventions", "Convention.applied", "velocity_terms + _1", "velocity_terms", "axes that turn have no drift"),
     ("diagnosis.conventions", "named_orders", "len(tree.path(i))", "0", "no order is breadth first"),
     ("diagnosis.recursion", "Recursion.step", "np.where(where, _1, right)", "right", "no slip of the recursion is made"),

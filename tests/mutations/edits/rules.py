@@ -25,7 +25,7 @@ EDITS = (
     ("judge.agree", "worst_of_each", "np.abs(differences)", "np.asarray(differences)", "a negative difference passes"),
     ("judge.agree", "worst_of_each", "share_of(*_1).argmax(axis=1)", "0 * _0", "only the first component is compared"),
     ("judge.agree", "distance_from_exact", "exact.distance(_1)", "_0 / 2", "exact distances are halved"),
-    ("judge.agree", "agree", "('MuJoCo', _1)", "('MuJoCo', compared.values)", "MuJoCo's exact distance is TMT's"),
+    ("judge.agree", "agree", "('MuJoCo', _1)", "('MuJoCo', values)", "MuJoCo's exact distance is TMT's"),
     ("judge.agree", "agree", "((result.label, _1), _2)",  "(_2,)", "TMT is not compared with the exact values"),
     ("judge.agree", "DISTANCES", "('difference', _1, _2)", "('difference', _2, _1)", "exact distances are exchanged"),
     ("states", "random", "min(exact_states, states)", "1", "one state is compared with its exact value"),

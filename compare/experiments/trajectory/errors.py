@@ -1,22 +1,32 @@
-"""Errors of both engines against the true motion; and why a held robot leaves its posture."""
+"""Errors of both engines: against the true motion, and in the energy; and why a held robot leaves its posture."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from tmt import literal
 from tmt.methods import METHODS
 
-from ...engines import LABELS, Engine, compared
+from ...core.check import About, Result
+from ...core.rows import Row, column
+from ...engines import LABELS, Dynamics, Engine, compared, one_of_each_scheme, same_scheme
+from ...judge.order import ORDER_MARGIN, measured_order
 from ...judge.rounding import slope_rounding
 from ...judge.run import LEFT, deviation, moved_from, movement_unit, number_or_none
+from ...judge.scale import EPS, FACTOR, gravity_scale
 from ...robots import Robot
+from ...robots.case import Case
 from ...truth.reference import Reference
 from .runs import Run, TrajectoryResult
 
 SCHEMES_OF_RK4 = ("rk4", "rk4_mean_speed")
-SAYS_NOTHING = 100  # times the difference of the engines: their agreement says nothing about a larger error
 NO_TIME = 1e-6  # s: a step in which nothing moves
+DURATION = 1.0  # s: short enough to measure the order, long enough to move
+STEPS = {1: (4096, 8192), 4: (512, 1024)}  # by the order of the method
+FEW_STEPS = STEPS | {1: (1024, 2048)}
+ROUNDED = 10 * FACTOR * EPS  # of the terms of the energy: a smaller drift may be rounding
 
 
 def coarsest_runs(result: TrajectoryResult, robot: Robot) -> Iterator[Run]:
@@ -44,27 +54,19 @@ def find_errors(result: TrajectoryResult, robot: Robot, references: Mapping[str,
         else:
             continue
         result.errors[name] = first, second
-        difference = difference_while_judged(run)
-        about = {"scene": name, "first": first, "second": second, "difference": difference}
-        far, unit = is_far((first, second), difference), movement_unit(run.case.coordinates)
-        scenes.append(about | {"unit": unit, "far": far})
+        about = {"scene": name, "first": first, "second": second, "difference": difference_while_judged(run)}
+        scenes.append(about | {"unit": movement_unit(run.case.coordinates)})
     if result.errors:
         result.answer = result.finding("answer", errors=result.errors, steps=coarsest_steps(result))
     if any(name in references for name in result.errors):  # held scenes have their own findings
         labels = [LABELS[engine] for engine in robot.compared]
-        result.find("errors", labels=labels, scenes=scenes, times=SAYS_NOTHING)
+        result.find("errors", labels=labels, scenes=scenes)
 
 
 def coarsest_steps(result: TrajectoryResult) -> int | None:
     """The number of the coarsest steps of the scenes with errors, if they all have as many."""
     counts = {min(run.steps for run in result.runs if run.case.name == scene) for scene in result.errors}
     return counts.pop() if len(counts) == 1 else None
-
-
-def is_far(errors: Sequence[float | None], difference: float) -> bool:
-    """Whether the larger error is so large that the engines' difference says nothing about it."""
-    numbers = [error for error in errors if error is not None]
-    return len(numbers) == len(errors) and max(numbers) > SAYS_NOTHING * difference
 
 
 def difference_while_judged(run: Run) -> float:
@@ -102,3 +104,70 @@ def departures(run: Run, engines: Mapping[str, Engine]) -> dict[str, Any]:
         about = {"label": LABELS[engine], "left": run.paths[engine].left, "farthest": farthest[engine]}
         told.append(about | {"push": push, "holds": push is not None and push <= allowed[joint]})
     return {"allowed": float(allowed[joint]), "engines": told}
+
+
+@dataclass
+class EnergyRow(Row):
+    """The drift of the energy in a free run of a second."""
+
+    scene: str
+    integrator: str
+    dt: float = column("s", digits=5)
+    engine: str = ""
+    drift: float | None = column("J", default=None)
+    order: float | None = None
+
+
+def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, Sequence[int]]) -> Result:
+    """The drift of the energy in free, undamped runs. steps: by order two counts, of which one is twice the other."""
+    result = Result("trajectory")
+    rows = result.tables["energy"] = []
+    # in a scene of a user's own the order may not show in a second
+    free = [case for case in robot.cases if case.is_free and "own" not in case.scene.tags]
+    for case in [case for case in free if not any(case.tree.damping)]:
+        for method in one_of_each_scheme(engines["mujoco"]):
+            order, drifts = method.order or 0, {}
+            counts = steps[order]
+            for engine, dynamics in compared(engines, case).items():
+                name = method.name if engine == method.engine else same_scheme(engines, method, engine).name
+                drifts[engine] = [largest_drift(case, dynamics, name, count) for count in counts]
+            orders = check_order(result, case, f"{case.name}, {method.name}", order, drifts)
+            for engine, (_, drift) in drifts.items():
+                numbers = number_or_none(drift), orders.get(engine)
+                rows.append(EnergyRow(case.name, method.name, DURATION / counts[-1], engine, *numbers))
+    return result
+
+
+def largest_drift(case: Case, dynamics: Dynamics, method: str, count: int) -> float:
+    """The largest change of the energy in a second, J; NaN if the run has diverged."""
+    motion = dynamics.run(*case.start, case.tau, DURATION / count, count, method)
+    if not np.isfinite(motion.states).all():
+        return np.nan
+    energy = literal.energy(motion.q, motion.v, case.tree)
+    return float(np.abs(energy - energy[0]).max())
+
+
+def rounding(case: Case) -> float:
+    """The largest drift of the energy that may be rounding, J."""
+    speed, springs = np.abs(case.v), 0.0
+    if case.tree.has_springs:
+        stretch = case.coordinates.difference(case.q, np.array(case.tree.rest))
+        springs = literal.spring_torque(case.q, case.tree) @ stretch / 2.0
+    kinetic = speed @ np.abs(literal.mass_matrix(case.q, case.tree)) @ speed / 2.0
+    return ROUNDED * (gravity_scale(case.tree, case.q) + kinetic + springs)
+
+
+def check_order(
+    result: Result, case: Case, where: str, order: int, drifts: Mapping[str, Sequence[float]]
+) -> dict[str, float | None]:
+    """The measured order of each engine, at least the method's; {} where both drift by rounding alone."""
+    if all(finer <= rounding(case) for _, finer in drifts.values()):
+        return {}
+    orders: dict[str, float | None] = {}  # None: a run has diverged, or does not drift
+    least, name = order - ORDER_MARGIN, "order of the drift of energy"
+    for engine, of_engine in drifts.items():
+        measured = measured_order((2.0, 1.0), of_engine)
+        orders[engine] = number_or_none(measured and measured.order)
+        place = f"{where}, {LABELS[engine]}, {DURATION:g} s"
+        result.check(place, name, orders[engine], least, "", rule="at least", about=About.PREDICTION)
+    return orders
