@@ -82,13 +82,14 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
         "reduction_frontier": [candidate.row for candidate in candidates],
         "reduction_limits": limits,
     }
-    ranges = scene.use.ranges
+    ranges, own_step = scene.use.ranges, best_at_own_step(candidates, allowed)
     about |= {
         "count": len(ranges),
         "own": max((ranges[name] for name in names), default=0.0),
         "unit": movement_unit(scene.coordinates),
         "first": candidates[0].row,
-        "own_step": best_at_own_step(candidates, allowed),
+        "own_step": own_step.row,
+        "own_apart": own_step.apart,
         "best": dict(zip(errors, (candidate.row for candidate in best))),
         "limits": limits,
         "free": [kind.row for kind in kinds],

@@ -1,5 +1,6 @@
 """Reduction of a file's motion: what goes for nothing, which joints can be locked, and the file to take away."""
 
+import pickle
 from dataclasses import replace
 
 import mujoco
@@ -12,6 +13,7 @@ from compare.core.text import say
 from compare.engines.mujoco.motion import SAMPLES, Simulation, apart
 from compare.engines.mujoco.reading import read
 from compare.engines.mujoco.source import Source
+from compare.experiments import reduction
 from compare.experiments.reduction import of_file, search
 from compare.experiments.reduction.records import FrontierRow, ReductionResult
 from compare.experiments.reduction.scene import scene_of
@@ -142,6 +144,13 @@ def test_the_idle_arm_is_locked_and_the_written_file_does_the_same_motion(two_ar
     assert error == pytest.approx(check.value) and check.value == pytest.approx(best.error, abs=1e-9)
     text = path.read_text(encoding="utf-8")
     assert "home" in text and "error 0.001" in text and "right upper" in text  # the comment
+
+
+def test_the_result_goes_to_the_process_that_draws(two_arms):
+    result = pickle.loads(pickle.dumps(two_arms[0]))
+    assert [name for name, *_ in (figure() for figure in reduction.figures(result, None))] == [
+        "reduction_frontier"
+    ]
 
 
 def test_the_written_equations_are_those_of_tmts_lock(two_arms):
