@@ -88,16 +88,14 @@ def loads(equations: Equations, search: Search) -> Iterator[Cause]:
 
 
 def several(search: Search) -> Iterator[Cause]:
-    """Armatures, masses, the tensor of one body, or the moment about one axis of all, which may be left out."""
-    groups: dict[tuple[str, str], list[int]] = {}
+    """The same number of all joints or bodies: armatures, masses, moments of inertia."""
+    groups: dict[tuple[str, int], list[int]] = {}
     columns = search.coefficients[0]
     for k, place in enumerate(search.places):
         owners = {(path.field, path.at[0]) for path, _ in place.moves}
         if len(owners) == 1 and place.kind == "number" and columns[k].any():
             ((field, owner),) = owners
-            component = place.name.partition(" of ")[0]
-            for key in (str(owner), component) if field == "inertia" else ("",):
-                groups.setdefault((field, key), []).append(k)
+            groups.setdefault((field, owner if field == "inertia" else 0), []).append(k)
     for (field, _), chosen in groups.items():
         if field not in ("armature", "mass", "inertia") or len(chosen) < 2:
             continue
@@ -114,7 +112,7 @@ def several(search: Search) -> Iterator[Cause]:
             for those in ([place.stated for place, _ in pairs], [x for _, x in pairs])
         )
         names = [place.name.removeprefix(field).partition(" of ") for place, _ in pairs]
-        components = list(dict.fromkeys(before.strip() for before, *_ in names if before))
+        components = [before.strip() for before, *_ in names if before]
         called = (
             f"{field} {listed(components)}".strip()
             + f" of {listed(list(dict.fromkeys(owner for *_, owner in names)))}"

@@ -124,7 +124,7 @@ TENSOR = np.array(ARM.inertia[1])
 EDITS = {  # numbers of the arm: the cause
     "axes exchanged": ({"inertia": (ARM.inertia[0], TENSOR[::-1, ::-1])}, "inertia of forearm, axes x and z exchanged"),
     "a body left out": ({"mass": (1.9, 0.0), "inertia": (ARM.inertia[0], 0.0 * TENSOR)}, "forearm"),
-    "of rods": ({"inertia": np.array(ARM.inertia) * [[1], [1], [0]]}, "inertia zz of upper arm and forearm"),
+    "of rods": ({"inertia": np.array(ARM.inertia) * [[1], [1], [0]]}, "inertia zz of every body"),
     "in mm": ({"com": 1e3 * np.array(ARM.com), "offset": 1e3 * np.array(ARM.offset)}, "all lengths"),
     "along x": ({"gravity": (-9.81, 0.0, 0.0)}, "gravity"),
     "another axis": ({"axis": (*ARM.axis[:2], (0.0, 0.0, 1.0))}, "axis of gamma"),
