@@ -306,9 +306,7 @@ def test_what_differs_is_said_where_no_cause_is_found():
     message = message_of(
         mass_matrix=mass_matrix, bias=lambda q, v: bias(q, v) + np.sin(3.0 * q) * np.cos(7.0 * q[::-1])
     )
-    assert message.index("Cause not found. Nearest: ") < message.index(
-        "Differs: gravity alone, in h[hip], h[knee]"
-    )
+    assert "Cause not found. Differs: gravity alone, in h[hip], h[knee]" in message
     assert len(message) < 2000
 
 

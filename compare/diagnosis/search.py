@@ -27,10 +27,11 @@ from .places import OF_ZERO
 from .recursion import slips_of_recursion
 from .statements import Stated, Statements
 from .terms import all_places
-from .variants import Variant, lagrange, other_angles, other_factors, program_options
+from .variants import Variant, lagrange, other_angles, program_options
 
 FEW = 2  # states at which conventions are tried first
 SHOWN = 12  # single explanations that leave least
+NEAREST = 0.5  # of the difference: what leaves more is not near
 NEAR = 2  # conventions with which another cause is sought
 PARTIAL = 0.7  # of the difference: what such a convention leaves at most
 # pairs of a slip and a number that are tried: by what they leave to first order
@@ -94,7 +95,7 @@ class Explanations:
         if causes:
             return found
         return found._replace(
-            closest=nearest[0].cause if nearest else None,
+            closest=nearest[0].cause if nearest and nearest[0].left_over < NEAREST else None,
             details=Compared(self.given).details() if layout.qdd is None else (),
             seconds=None if self.is_finished else self.seconds,
         )
@@ -181,8 +182,8 @@ class Explanations:
             is_elsewhere = (np.abs(moved) > search.tolerance)[:, others].any()
             causes.extend(in_part(cause, said) if is_elsewhere else cause for cause in found)
 
-        factors = other_factors(self.equations, search)
-        for variant in chain(self.options, self.variants, self.recursions, self.angles, factors):
+        angles = other_angles(self.equations, search)
+        for variant in chain(self.options, self.variants, self.recursions, angles):
             add(search.explained([variant]), variant[1] - search.right)
         for fit in (fit for fit in search.singles(is_thorough=False) if fit.explains):
             add(self.statements.causes([fit]), search.change(fit))
@@ -190,7 +191,7 @@ class Explanations:
 
     def other_angles(self) -> Iterator[Cause]:
         """Sines and cosines of a hinge, in an entry or a part."""
-        yield from self.search.explained(chain(self.angles, other_factors(self.equations, self.search)))
+        yield from self.search.explained(other_angles(self.equations, self.search))
 
     def beside_conventions(self) -> Iterator[Cause]:
         """A convention and one more cause, in the model's own joints."""
@@ -238,10 +239,6 @@ class Explanations:
     @cached_property
     def variants(self) -> list[Variant]:
         return [*edits(self.equations), *lagrange(self.equations)]
-
-    @cached_property
-    def angles(self) -> list[Variant]:
-        return list(other_angles(self.equations))
 
     @cached_property
     def recursions(self) -> list[Variant]:

@@ -34,7 +34,9 @@ def unit_columns(equations: Equations) -> dict[str, np.ndarray]:
     for entry in equations.coefficients if equations.nv <= MOST_SPEEDS else ():
         parts = {"M": 0.0 * M, "velocity": 0.0 * velocity_terms, "gravity": 0.0 * rest}
         if entry.kind == "M":
-            parts["M"][:, entry.at[0], entry.at[1]] = parts["M"][:, entry.at[1], entry.at[0]] = 1.0
+            i, j = entry.at
+            parts["M"][:, i, j] = parts["M"][:, j, i] = 1.0
+            parts["M"][:, j, i] *= layout.is_symmetric or i == j
         else:
             i, *pair = entry.at
             parts[entry.kind][:, i] = np.prod(equations.qd[:, pair], axis=1)

@@ -5,7 +5,7 @@ A variant is a cause with Mbar and h as they would be, as `Equations.values` has
 
 from collections.abc import Iterable, Iterator
 from functools import partial
-from itertools import permutations, product
+from itertools import combinations, permutations, product
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from tmt import literal
 from ..core.cause import Cause
 from .fit import Search
 from .model import TINY, Equations, Path
-from .terms import entries_of_M, in_rows, rows_of_h, unit_columns
+from .terms import unit_columns
 
 Variant = tuple[Cause, np.ndarray]  # the values: (states, entries)
 Parallel = tuple[str, np.ndarray, np.ndarray]  # a name, a column (states, entries) and its factors (states,)
@@ -26,11 +26,8 @@ OF_ENERGY = {  # slips in Mdot qd - d(qd' Mbar qd / 2)/dq: place, what it is, an
     ("Mdot qd in h", "left out"): (0.0, 1.0), ("Mdot qd in h", "halved"): (0.5, 1.0),
     ("Mdot qd in h", "halved, and no gradient of the kinetic energy"): (0.5, 0.0),
 }  # fmt: skip
-PAIRS = (  # functions of an angle that are taken for each other
-    ("sin", "0"), ("cos", "0"), ("sin", "cos"), ("1", "sin"), ("1", "cos"),
-    ("sin", "sin^2"), ("cos", "cos^2"), ("sin^2", "cos^2"),
-)  # fmt: skip
 OF_FACTORS = "coefficient", "term", "part"  # kinds of places
+CLOSE = 1e-6  # of a coefficient, before the values are compared
 OF_SLOPES = {"left out": 0.0, "of the other sign": -1.0, "halved": 0.5, "twice": 2.0}
 
 
@@ -103,53 +100,50 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
             yield variant(2, "derivative", place, "once", explains, values)
 
 
-def other_angles(equations: Equations) -> Iterator[Variant]:
-    """Sine and cosine of a hinge exchanged, or its sine with the other sign, in an entry or a part of the equations."""
-    layout, right, tree = equations.layout, equations.right, equations.tree
-    places = entries_of_M(equations) | {
-        name: np.arange(right.shape[1])[part].tolist() for name, part in layout.parts.items()
-    }
-    for row, numbers in rows_of_h(equations).items():
-        places[row] = in_rows(equations, numbers)
-        for name in ("velocity terms", "gravity") if layout.is_split else ():
-            places[f"{name} of {row}"] = [layout.parts[name].start + i for i in numbers]
-    ways = {"sine and cosine of {} exchanged": np.pi / 2.0, "sine of {} of the other sign": 0.0}
-    for name, zero, joint in zip(tree.joint_names, tree.reference, tree.coordinates.joints):
-        for what, mirror in ways.items() if joint.kind == "hinge" else ():
-            q = equations.q.copy()
-            q[:, joint.q] = mirror - (q[:, joint.q] - zero) + zero
-            other = Equations(tree, q, equations.qd, layout).right
-            for place, entries in places.items():
-                values = right.copy()
-                values[:, entries] = other[:, entries]
-                yield variant(2, "angle", f"{what.format(name)} in {place}", "", "", values)
-
-
-def other_factors(equations: Equations, search: Search) -> Iterator[Variant]:
-    """Terms of an entry or a coefficient with another sine or cosine of a hinge: left out, added, one for the other."""
-    tree = equations.tree
-    angles = {
+def other_angles(equations: Equations, search: Search) -> Iterator[Variant]:
+    """Terms of an entry or a coefficient with another sine or cosine: left out, added, one for the other."""
+    tree, functions, pairs = (
+        equations.tree,
+        {"0": 0.0 * equations.q[:, 0], "1": 0.0 * equations.q[:, 0] + 1.0},
+        [],
+    )
+    hinges = {
         name: equations.q[:, joint.q.start] - zero
         for name, zero, joint in zip(tree.joint_names, tree.reference, tree.coordinates.joints)
         if joint.kind == "hinge"
     }
-    terms = [place for place in search.places if place.kind in OF_FACTORS and place.column is not None]
-    terms.sort(key=lambda place: OF_FACTORS.index(place.kind))
-    added = list(parallel(search, unit_columns(equations).items()))
-    multiplied = list(parallel(search, ((place.name, place.column) for place in terms)))
+    angles = dict(hinges)
+    for first, second in combinations(hinges, 2):
+        angles[f"{first} + {second}"] = hinges[first] + hinges[second]
+        angles[f"{first} - {second}"] = hinges[first] - hinges[second]
     for name, angle in angles.items():
-        functions = functions_of(angle)
-        for (place, column, found), (wrong, right) in product(added, PAIRS):
-            change = functions[wrong] - functions[right]
-            size = float(change @ found / (change @ change))
+        sine, cosine = f"sin({name})", f"cos({name})"
+        functions |= {sine: np.sin(angle), f"{sine}^2": np.sin(angle) ** 2}
+        functions |= {cosine: np.cos(angle), f"{cosine}^2": np.cos(angle) ** 2}
+        pairs += [(sine, "0"), (cosine, "0"), ("1", sine), ("1", cosine), (sine, cosine)]
+        pairs += [(sine, f"{sine}^2"), (cosine, f"{cosine}^2"), (f"{sine}^2", f"{cosine}^2")]
+    for first, second in combinations(angles, 2):
+        pairs += [(f"{function}({first})", f"{function}({second})") for function in ("sin", "cos")]
+    added = parallel(search, unit_columns(equations).items())
+    for (place, column, found), (wrong, right) in product(list(added), pairs):
+        change = functions[wrong] - functions[right]
+        size = float(change @ found / (change @ change))
+        if np.abs(size * change - found).max() <= CLOSE * abs(size):
             yours, other = (wrong, right) if size > 0.0 else (right, wrong)
-            said = f"{written(abs(size), yours, name)} instead of {written(abs(size), other, name)}"
+            terms = {name: f"{abs(size):.6g} {name}".removesuffix(" 1") for name in (yours, other)}
+            said = f"{terms[yours]} instead of {terms[other]}"
+            said = f"{terms[other]} left out" if yours == "0" else said
+            said = f"{terms[yours]} added" if other == "0" else said
             yield variant(2, "angle", place, "", said, search.right + (size * change)[:, None] * column)
-        for (place, column, _), (wrong, right) in product(multiplied, permutations(("1", "sin", "cos"), 2)):
+    places = [place for place in search.places if place.kind in OF_FACTORS and place.column is not None]
+    places.sort(key=lambda place: OF_FACTORS.index(place.kind))
+    multiplied = list(parallel(search, ((place.name, place.column) for place in places)))
+    for (place, column, _), name in product(multiplied, hinges):
+        for wrong, right in permutations(("1", f"sin({name})", f"cos({name})"), 2):
             change = functions[wrong] / functions[right] - 1.0
-            said = f"{wrong}({name}) for {right}({name})"
-            said = f"{right}({name}) left out" if wrong == "1" else said
-            said = f"{wrong}({name}) too many" if right == "1" else said
+            said = f"{wrong} for {right}"
+            said = f"{right} left out" if wrong == "1" else said
+            said = f"{wrong} too many" if right == "1" else said
             yield variant(2, "factor", place, "", said, search.right + change[:, None] * column)
 
 
@@ -161,23 +155,3 @@ def parallel(search: Search, columns: Iterable[tuple[str, np.ndarray]]) -> Itera
         found = (weighted * search.off).sum(axis=1) / np.where(squares > 0.0, squares, 1.0)
         if np.abs(search.off - found[:, None] * weighted).max() <= 1.0:
             yield name, column, found
-
-
-def functions_of(angle: np.ndarray) -> dict[str, np.ndarray]:
-    sine, cosine = np.sin(angle), np.cos(angle)
-    return {
-        "0": 0.0 * angle,
-        "1": 1.0 + 0.0 * angle,
-        "sin": sine,
-        "cos": cosine,
-        "sin^2": sine**2,
-        "cos^2": cosine**2,
-    }
-
-
-def written(size: float, function: str, joint: str) -> str:
-    """A term: "0.3 cos(knee)^2", "0.3", "0"."""
-    name, power = function[:3], function[3:]
-    if function in ("0", "1"):
-        return f"{size * float(function):.6g}"
-    return f"{size:.6g} {name}({joint}){power}"
