@@ -221,10 +221,10 @@ def coefficients(equations: Equations) -> Iterator[Place]:
 
     terms = [(entry, values) for entry, values in equations.coefficients.items() if entry.kind == "velocity"]
     largest, units = max(np.abs(values).max() for _, values in terms), unit_columns(equations)
-    for entry, values in terms:
-        name = entry.named(equations.speeds)
-        if np.abs(values).max() > FIT_ROUNDING * largest:
-            yield place(name, [(entry, values)])
+    for term in terms:
+        name = term[0].named(equations.speeds)
+        if np.abs(term[1]).max() > FIT_ROUNDING * largest:
+            yield place(name, [term])
         else:
             yield Place("added", name, 0.0, "", 1.0, column=units[name])
     joints = speeds_of_joints(equations.tree)

@@ -135,9 +135,10 @@ def other_angles(equations: Equations, search: Search) -> Iterator[Variant]:
             said = f"{terms[other]} left out" if yours == "0" else said
             said = f"{terms[yours]} added" if other == "0" else said
             yield variant(2, "angle", place, "", said, search.right + (size * change)[:, None] * column)
-    places = [place for place in search.places if place.kind in OF_FACTORS and place.column is not None]
+    places = [place for place in search.places if place.kind in OF_FACTORS]
     places.sort(key=lambda place: OF_FACTORS.index(place.kind))
-    multiplied = list(parallel(search, ((place.name, place.column) for place in places)))
+    columns = [(place.name, place.column) for place in places if place.column is not None]
+    multiplied = list(parallel(search, columns))
     for (place, column, _), name in product(multiplied, hinges):
         for wrong, right in permutations(("1", f"sin({name})", f"cos({name})"), 2):
             change = functions[wrong] / functions[right] - 1.0
