@@ -19,7 +19,6 @@ from .trace import FOLD, LEAVES, Expression, Tape
 LIMIT = 2.0**49  # rad: of larger angles there is no sine
 LONGEST = 1_000  # nodes of one function
 Key = TypeVar("Key", int, str)
-OF_ONE = ("solution", "bias_rates")  # functions of linear.py, which take one state
 
 
 @dataclass(frozen=True)
@@ -197,7 +196,7 @@ def called(code: Code, name: str, values: list[Value], count: int, width: int) -
     out = code.reserve(wide(DOUBLE, width), count)
     for k, x in enumerate(values):
         taken.store(x, k * width)
-    if width == 1 or name not in OF_ONE:
+    if width == 1 or name != "solution":
         code.call(name, taken, out)
         return out
     taken_one, out_one = code.reserve(DOUBLE, len(values)), code.reserve(DOUBLE, count)

@@ -218,6 +218,14 @@ def fed_back(tree: AnyTree, q: Scalars, qd: Scalars) -> Values:
     return [total(terms_of_speed) for terms_of_speed in terms]
 
 
+def with_diagonal(gains: Sequence[Scalars], diagonal: Scalars) -> Rows:
+    """A matrix of gains, if there are any, with these numbers added on its diagonal."""
+    rows = [list(row) for row in gains] or [[0.0] * len(diagonal) for _ in diagonal]
+    for i, x in enumerate(diagonal):
+        rows[i][i] += x
+    return rows
+
+
 def reduced_force(tree: AnyTree, h: Scalars, q: Scalars, qd: Scalars, tau: Scalars) -> Values:
     """Qbar = tau - D qd - k (q - rest) - P q - S qd - h (nv, N m)."""
     Qbar = [t - d * v - hi for t, d, v, hi in zip(tau, tree.damping, qd, h)]
