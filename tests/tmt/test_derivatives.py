@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from many_digits import distance, exact
 from models import PATHS
 from trees import random_states, small_tree, tree_of_kinds
 
@@ -14,7 +15,6 @@ from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 from tmt.compiled.evaluator import Evaluator
 from tmt.exact.many import exact_of_many
-from tmt.exact.values import distance, exact
 
 CENTRAL = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}  # weights of the difference of order 8
 STEP = 0.02

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from many_digits import distance, exact
 from trees import random_state, small_tree, tree_of_kinds
 
 import tmt
 from tmt.derivation import articulated, composite, method
-from tmt.exact.values import distance, exact
 
 EPS = np.finfo(float).eps
 STEP = 1e-5  # of central differences, which are right to about 1e-8 of what is differenced

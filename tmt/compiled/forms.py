@@ -49,8 +49,7 @@ def shortest(name: str, sizes: Sequence[int], way: Callable[..., Values], ways: 
 class Traceable(Dynamics):
     """Mbar and h of a form, for traced functions.
 
-    Of more than a few speeds the derivatives of h by the speeds are in closed form, and linear systems are solved by a function that
-    is called.
+    Of more than a few speeds the derivatives of h are in closed form, and linear systems are solved by a function that is called.
     by_bodies: accelerations are those of articulated bodies, where all that a method takes implicitly acts at single joints: then
     it counts as armature.
     """

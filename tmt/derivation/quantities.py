@@ -1,7 +1,7 @@
 """Every quantity of a state, in one table: what it takes, its shape and unit, how it follows from the bodies.
 
 The literal form (literal.py), the compiled one (compiled/evaluator.py) and the truth in many digits
-(exact/values.py) are all served from it.
+(exact/many.py) are all served from it.
 """
 
 from collections.abc import Callable, Mapping
