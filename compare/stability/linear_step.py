@@ -6,8 +6,7 @@ import numpy as np
 
 from tmt.methods import RungeKutta, SemiImplicitEuler, amplification
 from tmt.methods.implicit import ImplicitRungeKutta
-from tmt.methods.stepping import Method
-from tmt.methods.tableau import Tableau
+from tmt.methods.stepping import Method, Tableau
 
 if TYPE_CHECKING:
     from .held import Held

@@ -23,8 +23,6 @@ Key = TypeVar("Key", int, str)
 
 @dataclass(frozen=True)
 class Traced:
-    """A function that was traced."""
-
     name: str
     tape: Tape
     inputs: list[Expression]
@@ -125,7 +123,6 @@ class Steps:
         return [a for a in arguments if self.tape.nodes[a][0] != "number"]
 
     def handed_on(self, sections: list[list[int]]) -> tuple[dict[int, int], int]:
-        """The place of each value that a part hands to a later one, and how many places there are."""
         made: list[list[int]] = [[] for _ in sections]  # by each part
         last: dict[int, int] = {}  # the part that takes a value last
         for k, section in enumerate(sections):

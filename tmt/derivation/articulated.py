@@ -25,8 +25,6 @@ from .vectors import IDENTITY, ZERO, Matrix, Rows, Scalar, Scalars, Values, Vect
 
 
 class Symmetric(NamedTuple):
-    """A symmetric 3 x 3 matrix."""
-
     diagonal: Vector
     off: Vector  # yz, xz, xy
 
@@ -146,7 +144,6 @@ def acceleration(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armatur
 
 
 def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
-    """Mbar (nv rows of nv, kg m2) and h (nv, N m), as in method.py."""
     frames, own = outward(tree, q, qd)
     rigid, joints = gathered(tree, own), tree.coordinates.joints
     M: Rows = [[0.0] * len(qd) for _ in qd]
@@ -163,7 +160,6 @@ def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, 
 
 
 def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> Values:
-    """Mbar qdd + h (nv, N m), as in method.py."""
     frames, own = outward(tree, q, qd, qdd)
     return with_rotors(tree, along_speeds(frames, gathered(tree, own)), qdd)
 

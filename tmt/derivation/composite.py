@@ -209,14 +209,12 @@ def mass_matrix_and_bias(
 def generalized_force(
     tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Callable[..., Scalar] = float
 ) -> Values:
-    """Mbar qdd + h (nv, N m), as in method.py."""
     placements = placed(tree, q)
     own, moving = rounded(tree, number)[0], motions(tree, placements, qd, qdd)
     return with_rotors(tree, inward(tree, placements, moving, own), qdd)
 
 
 def placed(tree: AnyTree, q: Scalars) -> list[Placement]:
-    """Origin and turn of each joint's frame in its parent's."""
     return [(origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)) for i in range(len(tree.parent))]
 
 
@@ -264,7 +262,6 @@ def handed_down(offset: Vector, turn: Matrix, force: Vector, moment: Vector) -> 
 
 
 def turning(omega: Vector, omegad: Vector) -> Matrix:
-    """P = [omegad]x + [omega]x[omega]x."""
     x, y, z = omega
     u, v, w = omegad
     xx, yy, zz = x * x, y * y, z * z

@@ -28,8 +28,6 @@ from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Vector, outer
 
 
 class Momentum(NamedTuple):
-    """What B consists of."""
-
     K: Matrix
     p: Vector
 
@@ -46,7 +44,6 @@ class Momentum(NamedTuple):
 
 
 def momentum(body: Rigid, omega: Vector, u: Vector) -> Momentum:
-    """Of what a joint carries itself."""
     (xx, yy, zz), (yz, xz, xy) = body.J
     half, (x, y, z) = (xx + yy + zz) * 0.5, omega
     second = Matrix([[half - xx, -xy, -xz], [-xy, half - yy, -yz], [-xz, -yz, half - zz]])
@@ -59,7 +56,6 @@ def momentum(body: Rigid, omega: Vector, u: Vector) -> Momentum:
 
 
 def velocities(tree: AnyTree, frames: list[Frame], qd: Scalars) -> list[Screw]:
-    """The velocity of each joint's frame about O."""
     result: list[Screw] = []
     for i, joint in enumerate(tree.coordinates.joints):
         v = result[tree.parent[i]] if tree.parent[i] >= 0 else STILL

@@ -49,8 +49,6 @@ class Frame(NamedTuple):
 
 
 class Body(NamedTuple):
-    """What TMT needs of one body."""
-
     x: Vector  # CoM, m
     T: list[Vector]  # nv columns, dx/dq, m/rad
     B: list[Vector]  # nv columns, body axes

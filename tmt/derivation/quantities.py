@@ -155,8 +155,6 @@ def added(first: Rows, second: Rows) -> Rows:
 
 
 class Quantity(NamedTuple):
-    """A quantity of a state."""
-
     takes: tuple[str, ...]  # of "q", "qd", "tau" or "qdd", "dt"
     shape: tuple[int | str, ...]  # m bodies, nv speeds; 2nv and 3nv
     unit: str
@@ -215,7 +213,6 @@ PLAIN = tuple(name for name, quantity in QUANTITIES.items() if not quantity.argu
 
 
 def quantity_of(name: str) -> Quantity:
-    """The row of a quantity, by its name or its full name."""
     return QUANTITIES[name.partition(":")[0]]
 
 

@@ -150,7 +150,6 @@ class Factors:
         self.upper, self.inverse = upper, inverse
 
     def solve(self, right: Scalars) -> Values:
-        """Solution x of matrix x = right."""
         n, x = len(right), list(right)
         for i in reversed(range(n)):
             x[i] = x[i] - total(self.upper[i][k] * x[k] for k in range(i + 1, n) if not is_zero(x[k]))

@@ -16,8 +16,6 @@ with mpmath.workdps(60):  # arcsin x = x (1 + x^2 / 6 + ...), the highest first;
 
 
 class ExactTree(Mechanism[Scalar]):
-    """A Tree in another type of number."""
-
     @property
     def coordinates(self) -> Coordinates:
         return Analytic(*super().coordinates)

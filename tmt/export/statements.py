@@ -13,8 +13,6 @@ SUM, PRODUCT, ATOM = 1, 2, 3  # how strongly the parts of an expression are boun
 
 
 class Function(NamedTuple):
-    """A quantity that is written as a function."""
-
     name: str
     title: str  # what it returns, with units
     takes: tuple[str, ...]  # of the arrays in sizes
@@ -40,8 +38,6 @@ class Function(NamedTuple):
 
 
 class Program(NamedTuple):
-    """What a file is written from."""
-
     name: str
     head: Sequence[str]  # lines of the comment that it begins with
     functions: Sequence[Function]

@@ -47,11 +47,11 @@ class Linearized(Dynamics):
     def acceleration(
         self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
     ) -> Values:
-        state = plain_q, *_ = [values_of(part) for part in (q, qd, tau)]
+        plain_q, plain_qd, plain_tau = (values_of(part) for part in (q, qd, tau))
         plain = implicit._replace(pull=values_of(implicit.pull)) if implicit else None
-        key = tuple(getattr(x, "i", -1) for part in state for x in part)
+        key = tuple(getattr(x, "i", -1) for x in (*plain_q, *plain_qd, *plain_tau))
         if -1 in key or key not in self.changes:
-            self.changes[key] = self.change(tree, *state, plain)
+            self.changes[key] = self.change(tree, plain_q, plain_qd, plain_tau, plain)
         self.last = change = self.changes[key]
         dual = next((x for x in (*q, *qd, *tau) if isinstance(x, Dual)), None)
         if dual is None:
