@@ -131,18 +131,6 @@ def test_stages_that_are_solved_for_have_the_derivatives_of_50_digits(rng):
     assert distance(found, truth).max() <= FACTOR * EPS * np.abs(found).max()
 
 
-def test_a_prepared_model_answers_derivatives_with_machine_code(rng, monkeypatch):
-    tree = dataclasses.replace(tmt.ARM, mass=(1.25, 1.5))
-    q, qd, tau = random_states(rng, tree, 3)
-    before = tmt.derivatives(q, qd, tau, tree), tmt.step_derivatives(q, qd, tau, 0.01, "rk4", tree)
-    tmt.prepare(tree, "derivatives", "step_derivatives:rk4")
-    monkeypatch.setattr(tmt.literal, "literal", None)
-    after = tmt.derivatives(q, qd, tau, tree), tmt.step_derivatives(q, qd, tau, 0.01, "rk4", tree)
-    for parts, again in zip(before, after, strict=True):
-        assert all(np.allclose(a, b, rtol=1e-11, atol=1e-11) for a, b in zip(parts, again, strict=True))
-    assert not all(map(np.array_equal, before[0], after[0]))
-
-
 def with_site(tree, joint, rng):
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     offset, turn = rng.normal(size=(1, 3)), [turn * np.linalg.det(turn)]
