@@ -58,15 +58,13 @@ class Traceable(Dynamics):
         super().__init__(terms)
         self.n, self.by_bodies = len(tree.axis), by_bodies
 
-    def acceleration(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
-    ) -> Values:
-        if not self.by_bodies or (implicit and not implicit.acts_at_single_joints):
-            return super().acceleration(tree, q, qd, tau, implicit)
+    def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, held: Held = None) -> Values:
+        if not self.by_bodies or (held and not held.acts_at_single_joints):
+            return super().acceleration(tree, q, qd, tau, held)
         force, armature = reduced_force(tree, [0.0] * self.n, q, qd, tau), list(tree.armature)
-        if implicit:
-            force = minus(force, implicit.pull)
-            armature = plus(armature, [row[i] for i, row in enumerate(implicit.matrix)])
+        if held:
+            force = minus(force, held.pull)
+            armature = plus(armature, [row[i] for i, row in enumerate(held.matrix)])
         return articulated.acceleration(tree, q, qd, force, armature)
 
     def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:

@@ -7,6 +7,7 @@ part hands to a later one stands in an array.
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -32,6 +33,23 @@ class Traced:
     @cached_property
     def nodes(self) -> list[int]:
         return self.tape.needed([self.tape.lift(x) for x in self.outputs])
+
+    @cached_property
+    def places(self) -> dict[int, list[int]]:
+        """The places of a node among the results."""
+        places: dict[int, list[int]] = defaultdict(list)
+        for k, x in enumerate(self.outputs):
+            places[self.tape.lift(x).i].append(k)
+        return places
+
+    @cached_property
+    def items(self) -> dict[int, list[int]]:
+        """Of a node with several results, which of them are needed."""
+        items: dict[int, list[int]] = defaultdict(list)
+        for i in self.nodes:
+            if self.tape.nodes[i][0] == "item":
+                items[self.tape.nodes[i][1][0]].append(i)
+        return items
 
     @property
     def length(self) -> float:
@@ -105,14 +123,8 @@ class Steps:
         tape, nodes = traced.tape, traced.nodes
         outputs = [tape.lift(x) for x in traced.outputs]
         self.tape, self.fused = tape, tape.fused(nodes, outputs)
-        self.outputs: dict[int, list[int]] = {}  # the places of a node among the results
-        for k, x in enumerate(outputs):
-            self.outputs.setdefault(x.i, []).append(k)
+        self.outputs, self.items = traced.places, traced.items
         self.input = {x.i: k for k, x in enumerate(traced.inputs)}
-        self.items: dict[int, list[int]] = {}  # of a node with several results, which of them are needed
-        for i in nodes:
-            if tape.nodes[i][0] == "item":
-                self.items.setdefault(tape.nodes[i][1][0], []).append(i)
         left_out = {*self.fused.values(), *(i for i in nodes if tape.nodes[i][0] in (*LEAVES, "item"))}
         self.order = [i for i in nodes if i not in left_out]
 

@@ -44,11 +44,9 @@ class Linearized(Dynamics):
         # dual numbers of traced scalars meet the same states once for each direction
         self.changes: dict[tuple[int, ...], Change] = {}
 
-    def acceleration(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
-    ) -> Values:
+    def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, held: Held = None) -> Values:
         plain_q, plain_qd, plain_tau = (values_of(part) for part in (q, qd, tau))
-        plain = implicit._replace(pull=values_of(implicit.pull)) if implicit else None
+        plain = held._replace(pull=values_of(held.pull)) if held else None
         key = tuple(getattr(x, "i", -1) for x in (*plain_q, *plain_qd, *plain_tau))
         if -1 in key or key not in self.changes:
             self.changes[key] = self.change(tree, plain_q, plain_qd, plain_tau, plain)
@@ -59,8 +57,8 @@ class Linearized(Dynamics):
         dq, dqd, right = ([dual.parts(x)[1] for x in part] for part in (q, qd, tau))
         moved = tree.coordinates.tangent(plain_q, dq)
         right = minus(right, plus(times(change.by_movement, moved), times(change.by_speed, dqd)))
-        if implicit:
-            right = minus(right, [dual.parts(x)[1] for x in implicit.pull])
+        if held:
+            right = minus(right, [dual.parts(x)[1] for x in held.pull])
         return [Dual(value, slope, dual.level) for value, slope in zip(change.a, change.solve(right))]
 
     def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:

@@ -9,17 +9,8 @@ from tmt.derivation.coordinates import FLAT
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import with_diagonal
 from tmt.derivation.vectors import Scalar, Values
-from tmt.methods.stepping import (
-    LITERAL,
-    Dynamics,
-    Implicit,
-    Joints,
-    Method,
-    Slope,
-    State,
-    advance,
-    increments,
-)
+
+from .stepping import LITERAL, Dynamics, Implicit, Joints, Method, Slope, State, advance, increments
 
 T = TypeVar("T")
 Gains = Sequence[Sequence[float]]

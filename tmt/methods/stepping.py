@@ -49,20 +49,18 @@ class Dynamics:
     def __init__(self, terms: Terms = method.mass_matrix_and_bias):
         self.terms = terms
 
-    def acceleration(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
-    ) -> Values:
+    def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, held: Held = None) -> Values:
         """a (nv,) from Mbar a = Qbar, or from the linear system of an implicit method."""
         M, h = self.terms(tree, q, qd)
         force = method.reduced_force(tree, h, q, qd, tau)
-        if implicit is None:
+        if held is None:
             return solve(M, force)
-        matrix = [plus(*rows) for rows in zip(M, implicit.matrix)]
-        if implicit.bias_rows:
+        matrix = [plus(*rows) for rows in zip(M, held.matrix)]
+        if held.bias_rows:
             rates = self.bias_rates(tree, q, qd)
-            for i in implicit.bias_rows:
-                matrix[i] = plus(matrix[i], [implicit.dt * rate for rate in rates[i]])
-        return self.solve_any(matrix, minus(force, implicit.pull))
+            for i in held.bias_rows:
+                matrix[i] = plus(matrix[i], [held.dt * rate for rate in rates[i]])
+        return self.solve_any(matrix, minus(force, held.pull))
 
     def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
         return method.bias_rates(tree, q, qd, self.terms)
