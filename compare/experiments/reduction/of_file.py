@@ -11,6 +11,7 @@ from tmt import Tree
 from ...core.check import About
 from ...core.text import block
 from ...engines.mujoco.motion import Simulation, apart, near, stages_of
+from ...engines.mujoco.names import number_of_actuators
 from ...engines.mujoco.reading import Reading, read
 from ...engines.mujoco.smaller import Smaller, finished, of_parts
 from ...engines.mujoco.source import Source
@@ -59,7 +60,7 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
         "answers": answers,
         "chosen": chosen,
         "whole": rows[0],
-        "scene": scene.motion,
+        "scene": {"name": scene.motion.name, "duration": scene.motion.duration},
         "names": list(locked),
         "count": len(scene.use.ranges),
         "moved": max((scene.use.ranges[name] for name in locked), default=0.0),
@@ -126,7 +127,7 @@ def use_of(scene: Scene) -> list[UseRow]:
         "limits of joints": (model.jnt_limited.sum(), use.acted["joint"]),
         "limits and friction of tendons": (model.ntendon, use.acted["tendon"]),
         "equalities": (model.neq, use.acted["equality"]),
-        "actuators": (len(scene.motion.inputs), use.acted["actuator"]),
+        "actuators": (number_of_actuators(model), use.acted["actuator"]),
         "sensors": (model.nsensor, set()),  # no controller reads them
         "joints that move": (model.njnt, {name for name, moved in use.ranges.items() if moved > STILL}),
     }
