@@ -56,7 +56,7 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
     candidate = next(candidate for candidate in candidates if candidate.row is row)
     locked = locks.positions(candidate.groups)
     small = finished(candidate.small, scene.motion, row.dt, row.integrator)
-    found = {
+    facts = {
         "answers": answers,
         "chosen": chosen,
         "whole": rows[0],
@@ -73,18 +73,18 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
         "meshes": bool(small.spec.meshes or small.spec.hfields),
         "free": [row for row, _ in kinds],
     }
-    text = small.text(block(TEXT, "comment", found=found))
+    text = small.text(block(TEXT, "comment", facts=facts))
     if setup.request.write:
         Path(setup.request.write).write_text(text, encoding="utf-8")
     add_tables(result, scene, locks, list(locked), kinds, small)
-    found["digits"] = add_checks(result, scene, locks.free, locked, chosen, small, text)
+    facts["digits"] = add_checks(result, scene, locks.free, locked, chosen, small, text)
     result.tables["reduction_frontier"] = rows
     integrators = list(dict.fromkeys((reading.integrator, row.integrator, DEFAULT)))
     for model, file in (("whole", scene.whole), ("smaller", small)):
         result.tables.setdefault("reduction_limits", []).extend(limits_of(scene, file, model, integrators))
-    found |= {"limits": result.tables["reduction_limits"], "pairs": result.tables["reduction_near"]}
+    facts |= {"limits": result.tables["reduction_limits"], "pairs": result.tables["reduction_near"]}
     texts = "answer", "for_nothing", "gains", "limits"
-    result.top[:0] = [result.finding(kind, TEXT, found=found) for kind in texts]
+    result.top[:0] = [result.finding(kind, TEXT, facts=facts) for kind in texts]
 
 
 def add_tables(
