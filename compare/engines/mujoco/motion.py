@@ -51,6 +51,13 @@ def actuators(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
     return places
 
 
+def data_at(model: mujoco.MjModel, state: Array) -> mujoco.MjData:
+    """At a state of step.start_of."""
+    data = mujoco.MjData(model)
+    mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+    return data
+
+
 @dataclass(frozen=True)
 class Motion:
     """A motion, by the names of joints and actuators. Controls are constant between their times.

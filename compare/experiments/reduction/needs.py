@@ -45,9 +45,8 @@ def compare_case(result: ReductionResult, case: Case, setup: Setup) -> list[Mode
 def compare_smaller(result: ReductionResult, case: Case, smaller: Case | None, setup: Setup) -> None:
     """RK4 runs of the case and of the smaller one (None: rest), within the band of rounding."""
     scheme, coordinates, steps = rk4_of(setup.engines, "tmt").scheme, case.coordinates, FINER * case.steps
-    dt, runs, references = case.duration / steps, runs_of(case, setup), {}
-    if smaller:
-        references = runs_of(smaller, setup)
+    dt, runs = case.duration / steps, runs_of(case, setup)
+    references = runs_of(smaller, setup) if smaller else {}
     width = band(tmt.METHODS[scheme], case.tree, runs["tmt"].q, runs["tmt"].v, case.tau, dt, FINER)
     t, required = dt * FINER * np.arange(len(width)), required_time(case, scheme, dt)
     for engine, run in runs.items():
@@ -55,7 +54,8 @@ def compare_smaller(result: ReductionResult, case: Case, smaller: Case | None, s
         q, v = (np.tile(start, (steps + 1, 1)) for start in case.start)
         if smaller:
             positions, speeds = columns_of(smaller, case)
-            q[:, positions], v[:, speeds] = references[engine].q, references[engine].v
+            reference = references[engine]
+            q[:, positions], v[:, speeds] = reference.q, reference.v
             if "own" not in case.scene.tags:  # a user's own scene may hardly move
                 check_movement(result, where, deviation(run.q, run.q[0], coordinates))
         apart = differences(coordinates, (run.q, run.v), (q, v))[::FINER]

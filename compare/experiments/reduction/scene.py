@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import mujoco
 import numpy as np
 
-from ...engines.mujoco.motion import Motion, Path, Simulation, Use, used
+from ...engines.mujoco.motion import Motion, Path, Simulation, Use, data_at, used
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.smaller import Smaller
 from ...engines.mujoco.step import start_of
@@ -56,7 +55,7 @@ def scene_of(setup: Setup, reading: Reading) -> Scene:
     request, model, still = setup.request, reading.model, np.zeros(reading.model.nv)
     points = tuple(request.points.split(",")) if request.points else ()
     whole = Smaller.whole(reading.source, points)
-    data, recorded, duration = mujoco.MjData(whole.model), None, DURATION
+    recorded, duration = None, DURATION
     cases = [case for case in setup.robot.cases if "user" in case.scene.tags]
     if cases:
         case, scene = cases[0], cases[0].scene
@@ -78,7 +77,7 @@ def scene_of(setup: Setup, reading: Reading) -> Scene:
             place = standing_at(reading, posture)
             if place.left <= NEAR_REST and np.abs(place.moved).max(initial=0.0) <= STANDS:
                 state, name = place.rest, f"{name}, at rest"
-    mujoco.mj_setState(whole.model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+    data = data_at(whole.model, state)
     if cases:
         data.qvel[:] = case.v
         data.qfrc_applied[:] = 0.0 if case.controller else case.tau

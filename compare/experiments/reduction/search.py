@@ -5,12 +5,11 @@ from functools import cache
 from itertools import product
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
 from ...core.timing import fastest
 from ...engines.mujoco.motion import Path, Simulation, apart, couplings, joints
-from ...engines.mujoco.names import INTEGRATORS
+from ...engines.mujoco.names import INTEGRATORS, kind_of
 from ...engines.mujoco.smaller import FREE, Smaller, locked, tied_joints
 from .records import FreeRow, FrontierRow
 from .scene import Scene
@@ -58,11 +57,13 @@ def groups_of(scene: Scene, free: Smaller) -> list[Group]:
     The prediction: were the joint locked, the others would be moved by its own movement times their coupling through M.
     """
     model, use, places = free.model, scene.use, joints(free.model)
-    is_slide = dict(zip(places, model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE))
+    most = {
+        name: DOES_SLIDE if kind_of(model, number) == "slide" else DOES for number, name in enumerate(places)
+    }
     costs = couplings(scene.run(free), np.hstack([use.middle[name] for name in places]))
     groups = []
     for names in tied_joints(model):
-        if all(use.ranges[name] <= (DOES_SLIDE if is_slide[name] else DOES) for name in names):
+        if all(use.ranges[name] <= most[name] for name in names):
             speeds = np.r_[tuple(places[name][1] for name in names)]
             others = np.setdiff1d(np.arange(model.nv), speeds)
             groups.append(Group(names, float(costs[np.ix_(others, speeds)].max(initial=0.0))))
