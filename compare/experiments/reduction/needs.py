@@ -98,11 +98,13 @@ def time_models(result: ReductionResult, setup: Setup, rounds: int) -> None:
     """The rows: all models of all cases, timed in turn, relative to the whole model of the same case."""
     calls: dict[Any, Callable[..., Any]] = {}
     for scene, case in result.models or ():
-        for engine, dynamics in setup.compared(case).items() if case else ():
-            steps = TIMED_STEPS[engine]
-            setting = Setting(case.duration / case.steps / FINER * steps, steps)
-            method = rk4_of(setup.engines, engine).name
-            calls[scene, case.joints, engine], _ = dynamics.prepare(*case.start, case.tau, setting, method)
+        if case:
+            for engine, dynamics in setup.compared(case).items():
+                steps = TIMED_STEPS[engine]
+                setting = Setting(case.duration / case.steps / FINER * steps, steps)
+                method = rk4_of(setup.engines, engine).name
+                run, _ = dynamics.prepare(*case.start, case.tau, setting, method)
+                calls[scene, case.joints, engine] = run
     add_rows(result, setup.robot, fastest(calls, rounds))
 
 

@@ -1,6 +1,6 @@
 """No more model than a motion of a file needs: the answer, its tables, its checks, and the file to take away."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +10,7 @@ from tmt import Tree
 
 from ...core.check import About
 from ...core.text import block
-from ...core.timing import fastest
 from ...engines.mujoco.motion import Simulation, apart, near, stages_of
-from ...engines.mujoco.names import MEMBERS
 from ...engines.mujoco.reading import Reading, read
 from ...engines.mujoco.smaller import Smaller, finished, of_parts
 from ...engines.mujoco.source import Source
@@ -26,7 +24,7 @@ from ...stability.place import postures_of
 from ..setup import Setup
 from .records import FreeRow, JointRow, LimitRow, PairRow, ReductionResult, StageRow, SubsetRow, UseRow
 from .scene import Scene, scene_of
-from .search import ROUNDS, Answer, Locks, answer_within, frontier, take_out
+from .search import Answer, Locks, answer_within, frontier, seconds_of, take_out
 from .sub_blocks import check_blocks, units_of
 
 TEXT = "reduction_of_file"  # the template
@@ -80,11 +78,12 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
     add_tables(result, scene, locks, list(locked), kinds, small)
     found["digits"] = add_checks(result, scene, locks.free, locked, chosen, small, text)
     result.tables["reduction_frontier"] = rows
-    limits = [*limits_of(scene, scene.whole, "whole"), *limits_of(scene, small, "smaller")]
-    result.tables["reduction_limits"] = limits
-    found |= {"limits": limits, "pairs": result.tables["reduction_near"]}
-    kinds_of_text = "answer", "for_nothing", "gains", "limits"
-    result.top[:0] = [result.finding(kind, TEXT, found=found) for kind in kinds_of_text]
+    integrators = list(dict.fromkeys((reading.integrator, row.integrator, DEFAULT)))
+    for model, file in (("whole", scene.whole), ("smaller", small)):
+        result.tables.setdefault("reduction_limits", []).extend(limits_of(scene, file, model, integrators))
+    found |= {"limits": result.tables["reduction_limits"], "pairs": result.tables["reduction_near"]}
+    texts = "answer", "for_nothing", "gains", "limits"
+    result.top[:0] = [result.finding(kind, TEXT, found=found) for kind in texts]
 
 
 def add_tables(
@@ -96,19 +95,15 @@ def add_tables(
     small: Smaller,
 ) -> None:
     """Stages of a step, what was used, what was taken out and its time, joints, pairs that came near."""
-    use, stages = scene.use, []
-    for file in (scene.whole, locks.free, small):
-        option = file.model.opt
-        stages.append(
-            stages_of(Simulation(file.model, scene.motion, option.timestep, name_of(option.integrator)))
-        )
+    use = scene.use
+    stages = [stages_of(scene.simulation(file)) for file in (scene.whole, locks.free, small)]
     result.tables["reduction_stages"] = [
         StageRow(stage=stage, whole_file=time, free_file=stages[1][stage], smaller_file=stages[2][stage])
         for stage, time in stages[0].items()
     ]
     result.tables["reduction_use"] = use_of(scene)
     runs = [scene.simulation(file) for file in (scene.whole, *(file for _, file in kinds))]
-    times = fastest(dict(enumerate(runs)), ROUNDS)
+    times = seconds_of(runs)
     for number, (row, _) in enumerate(kinds):
         row.before, row.after = (1e6 * times[place] / runs[0].steps for place in (number, number + 1))
     result.tables["reduction_free"] = [row for row, _ in kinds]
@@ -144,10 +139,6 @@ def use_of(scene: Scene) -> list[UseRow]:
         )
         for part, (count, names) in parts.items()
     ]
-
-
-def name_of(integrator: int) -> str:
-    return next(name for name, member in MEMBERS.items() if member == integrator)
 
 
 def add_checks(
@@ -191,12 +182,11 @@ def compare_locked(result: ReductionResult, where: str, tree: Tree, smaller: Tre
         check_blocks(result, where, row, *worst_of_each(differences, entries))
 
 
-def limits_of(scene: Scene, small: Smaller, model: str) -> list[LimitRow]:
-    """The step limits of a file, where the robot rests near the start of the motion, by its integrator and the default."""
+def limits_of(scene: Scene, small: Smaller, model: str, integrators: Sequence[str]) -> list[LimitRow]:
+    """The step limits of a file, where the robot rests near the start of the motion."""
     start = finished(small, scene.motion, scene.reading.dt, scene.reading.integrator)
     reading = read(Source(start.text()))
-    integrators = [name_of(small.model.opt.integrator), scene.reading.integrator, DEFAULT]
-    asked = Asked(reading.dt, reading.integrator, list(dict.fromkeys(integrators)), in_runs=False)
+    asked = Asked(reading.dt, reading.integrator, integrators, in_runs=False)
     return [
         LimitRow(model, row.integrator, row.limit, row.predicted_dt, row.limiting_joint)
         for row in answer(postures_of(reading)[0], True, reading, asked).rows
