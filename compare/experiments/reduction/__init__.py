@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from tmt.exact.values import DIGITS
+from tmt.exact.tree import DIGITS
 
 from ...core.check import About
 from ...core.finding import Finding
