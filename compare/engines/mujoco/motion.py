@@ -1,6 +1,6 @@
 """What a robot does: a motion of a file with everything on, which smaller models of the file repeat; and what it uses."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ from mujoco import rollout
 from .names import INTEGRATORS, bit, control_of, element_name, number_of_actuators
 
 Array = np.ndarray
+Places = Callable[[mujoco.MjModel], dict[str, tuple[slice, slice]]]  # joints or actuators
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 INPUTS = int(mujoco.mjtState.mjSTATE_CTRL) | int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 NEAR, SAMPLES = 0.01, 25  # m, and states of a motion: pairs that came so near are told
@@ -51,6 +52,15 @@ def actuators(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
     return places
 
 
+def columns(model: mujoco.MjModel, whole: mujoco.MjModel, places: Places) -> tuple[Array, Array]:
+    """Where the joints or actuators of a model are in the vectors of the whole model, as in joints or actuators."""
+    among, first, second = places(whole), [], []
+    for name in places(model):
+        for numbers, place in zip((first, second), among[name]):
+            numbers += range(place.start, place.stop)
+    return np.array(first, dtype=int), np.array(second, dtype=int)
+
+
 def data_at(model: mujoco.MjModel, state: Array) -> mujoco.MjData:
     """At a state of step.start_of."""
     data = mujoco.MjData(model)
@@ -60,58 +70,32 @@ def data_at(model: mujoco.MjModel, state: Array) -> mujoco.MjData:
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion, by the names of joints and actuators. Controls are constant between their times.
+    """A motion of a whole model, which smaller ones repeat. Controls are constant between their times.
 
-    start: qpos, qvel and the applied force (N m or N) of each joint; activations, inputs: of each actuator, the inputs
-    (times, its controls). points: names of sites whose places count too.
+    start: the state, and the forces that act all the time. inputs: the controls, (times, nu). points: names of sites whose
+    places count too.
     """
 
     name: str
     duration: float  # s
-    start: Mapping[str, tuple[Array, Array, Array]]
-    activations: Mapping[str, Array]
+    start: mujoco.MjData
     times: Array  # s
-    inputs: Mapping[str, Array]
+    inputs: Array
     points: tuple[str, ...] = ()
-
-    @classmethod
-    def of(
-        cls,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        name: str,
-        duration: float,
-        recorded: tuple[Array, Mapping[str, Array]] | None = None,
-        points: tuple[str, ...] = (),
-    ) -> "Motion":
-        """From the state, the controls and the forces of data. recorded: times, and controls (times,) of some actuators."""
-        times, given = recorded or (np.zeros(1), {})
-        start, activations, inputs = {}, {}, {}
-        for joint, (q, v) in joints(model).items():
-            start[joint] = data.qpos[q].copy(), data.qvel[v].copy(), data.qfrc_applied[v].copy()
-        for actuator, (places, acts) in actuators(model).items():
-            activations[actuator] = data.act[acts].copy()
-            inputs[actuator] = np.tile(data.ctrl[places], (len(times), 1))
-            if actuator in given:
-                inputs[actuator][:, 0] = given[actuator]
-        return cls(name, duration, start, activations, times, inputs, points)
 
     def placed(self, model: mujoco.MjModel) -> mujoco.MjData:
         """The data of a model at the start."""
-        data = mujoco.MjData(model)
-        for name, (q, v) in joints(model).items():
-            data.qpos[q], data.qvel[v], data.qfrc_applied[v] = self.start[name]
-        for actuator, (places, acts) in actuators(model).items():
-            data.act[acts], data.ctrl[places] = self.activations[actuator], self.inputs[actuator][0]
+        data, start = mujoco.MjData(model), self.start
+        q, v = columns(model, start.model, joints)
+        controls, activations = columns(model, start.model, actuators)
+        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = start.qpos[q], start.qvel[v], start.qfrc_applied[v]
+        data.ctrl[:], data.act[:] = self.inputs[0, controls], start.act[activations]
         return data
 
     def controls(self, model: mujoco.MjModel, dt: float, steps: int) -> Array:
         """The controls of a model at each step, (steps, nu)."""
         at = np.searchsorted(self.times, dt * np.arange(steps) + EARLY, side="right") - 1
-        controls = np.zeros((steps, model.nu))
-        for actuator, (places, _) in actuators(model).items():
-            controls[:, places] = self.inputs[actuator][np.maximum(at, 0)]
-        return controls
+        return self.inputs[np.maximum(at, 0)][:, columns(model, self.start.model, actuators)[0]]
 
 
 class Path(NamedTuple):
@@ -175,11 +159,9 @@ def movements(path: Path, other: Path, among: Iterable[str] = ()) -> dict[str, f
     every, every_other = round(steps / path.dt), round(steps / other.dt)
     q, whole = path.q[::every], other.q[::every_other]
     count = min(len(q), len(whole))
-    places, same = joints(other.model), np.array(q[:count])
-    for name, (columns, _) in joints(path.model).items():
-        same[:, columns] = whole[:count, places[name][0]]
+    same = whole[:count, columns(path.model, other.model, joints)[0]]
     apart = np.zeros((count, path.model.nv))
-    for row, here, there in zip(apart, q, same):
+    for row, here, there in zip(apart, q[:count], same):
         mujoco.mj_differentiatePos(path.model, row, 1.0, there, here)
     largest = {name: float(np.abs(apart[:, v]).max()) for name, (_, v) in joints(path.model).items()}
     if points := tuple(among):

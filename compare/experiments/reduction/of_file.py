@@ -11,6 +11,7 @@ from tmt import Tree
 from ...core.check import About
 from ...core.text import block
 from ...engines.mujoco.motion import Simulation, apart, near, stages_of
+from ...engines.mujoco.names import number_of_actuators
 from ...engines.mujoco.reading import Reading, read
 from ...engines.mujoco.smaller import Smaller, finished, of_parts
 from ...engines.mujoco.source import Source
@@ -55,11 +56,11 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
     candidate = next(candidate for candidate in candidates if candidate.row is row)
     locked = locks.positions(candidate.groups)
     small = finished(candidate.small, scene.motion, row.dt, row.integrator)
-    found = {
+    facts = {
         "answers": answers,
         "chosen": chosen,
         "whole": rows[0],
-        "scene": scene.motion,
+        "scene": {"name": scene.motion.name, "duration": scene.motion.duration},
         "names": list(locked),
         "count": len(scene.use.ranges),
         "moved": max((scene.use.ranges[name] for name in locked), default=0.0),
@@ -72,18 +73,18 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
         "meshes": bool(small.spec.meshes or small.spec.hfields),
         "free": [row for row, _ in kinds],
     }
-    text = small.text(block(TEXT, "comment", found=found))
+    text = small.text(block(TEXT, "comment", facts=facts))
     if setup.request.write:
         Path(setup.request.write).write_text(text, encoding="utf-8")
     add_tables(result, scene, locks, list(locked), kinds, small)
-    found["digits"] = add_checks(result, scene, locks.free, locked, chosen, small, text)
+    facts["digits"] = add_checks(result, scene, locks.free, locked, chosen, small, text)
     result.tables["reduction_frontier"] = rows
     integrators = list(dict.fromkeys((reading.integrator, row.integrator, DEFAULT)))
     for model, file in (("whole", scene.whole), ("smaller", small)):
         result.tables.setdefault("reduction_limits", []).extend(limits_of(scene, file, model, integrators))
-    found |= {"limits": result.tables["reduction_limits"], "pairs": result.tables["reduction_near"]}
+    facts |= {"limits": result.tables["reduction_limits"], "pairs": result.tables["reduction_near"]}
     texts = "answer", "for_nothing", "gains", "limits"
-    result.top[:0] = [result.finding(kind, TEXT, found=found) for kind in texts]
+    result.top[:0] = [result.finding(kind, TEXT, facts=facts) for kind in texts]
 
 
 def add_tables(
@@ -126,7 +127,7 @@ def use_of(scene: Scene) -> list[UseRow]:
         "limits of joints": (model.jnt_limited.sum(), use.acted["joint"]),
         "limits and friction of tendons": (model.ntendon, use.acted["tendon"]),
         "equalities": (model.neq, use.acted["equality"]),
-        "actuators": (len(scene.motion.inputs), use.acted["actuator"]),
+        "actuators": (number_of_actuators(model), use.acted["actuator"]),
         "sensors": (model.nsensor, set()),  # no controller reads them
         "joints that move": (model.njnt, {name for name, moved in use.ranges.items() if moved > STILL}),
     }

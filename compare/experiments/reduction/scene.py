@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...engines.mujoco.motion import Motion, Path, Simulation, Use, data_at, used
+from ...engines.mujoco.motion import Motion, Path, Simulation, Use, actuators, data_at, used
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.smaller import Smaller
 from ...engines.mujoco.step import start_of
@@ -55,7 +55,7 @@ def scene_of(setup: Setup, reading: Reading) -> Scene:
     request, model, still = setup.request, reading.model, np.zeros(reading.model.nv)
     points = tuple(request.points.split(",")) if request.points else ()
     whole = Smaller.whole(reading.source, points)
-    recorded, duration = None, DURATION
+    duration, times, recorded = DURATION, np.zeros(1), dict(request.controls or {})
     cases = [case for case in setup.robot.cases if "user" in case.scene.tags]
     if cases:
         case, scene = cases[0], cases[0].scene
@@ -64,15 +64,14 @@ def scene_of(setup: Setup, reading: Reading) -> Scene:
         key = scene.posture if isinstance(scene.posture, str) and scene.posture in reading.keyframes else ""
         controls = case.controller.controls if case.controller else ()
         state = start_of(model, reading.drive, key, still, case.posture, controls)
-        name, duration = scene.name, scene.duration
+        name, duration, recorded = scene.name, scene.duration, {}
     else:
         posture = posture_of(request.posture, reading) if request.posture else postures_of(reading)[0]
         q, name = np.array(posture.q) if posture.q else None, posture.name
         state = start_of(model, reading.drive, posture.key, still, q)
-        if request.controls:
-            controls_at = dict(request.controls)
-            times = controls_at.pop("time")
-            recorded, duration = (times, controls_at), float(times[-1])
+        if recorded:
+            times = recorded.pop("time")
+            duration = float(times[-1])
         else:
             place = standing_at(reading, posture)
             if place.left <= NEAR_REST and np.abs(place.moved).max(initial=0.0) <= STANDS:
@@ -81,4 +80,7 @@ def scene_of(setup: Setup, reading: Reading) -> Scene:
     if cases:
         data.qvel[:] = case.v
         data.qfrc_applied[:] = 0.0 if case.controller else case.tau
-    return Scene(reading, Motion.of(whole.model, data, name, duration, recorded, points), whole)
+    inputs, places = np.tile(data.ctrl, (len(times), 1)), actuators(whole.model)
+    for actuator, values in recorded.items():
+        inputs[:, places[actuator][0].start] = values
+    return Scene(reading, Motion(name, duration, data, times, inputs, points), whole)

@@ -136,11 +136,12 @@ def frontier(
             models.append((f"{count} joints locked" if count else "without what is not used", small, groups))
     reference, own = scene.finely(scene.whole), (scene.reading.integrator, scene.reading.dt)
     steps = [multiple * scene.reading.dt for multiple in STEPS]
+    settings = [own, *(setting for setting in product(INTEGRATORS, steps) if setting != own)]
     candidates, runs = [], []
     for name, small, groups in models:
         fine = scene.finely(small)
         error_of_model = apart(fine, reference, scene.motion)
-        for integrator, dt in sorted(product(INTEGRATORS, steps), key=own.__ne__):
+        for integrator, dt in settings:
             run, is_own = Simulation(small.model, scene.motion, dt, integrator), (integrator, dt) == own
             path = run()
             row = FrontierRow(

@@ -87,4 +87,6 @@ EDITS = (
     ("mujoco.motion", "couplings", "np.diag(inverse)", "1.0", "the prediction has no coupling through M"),
     ("mujoco.motion", "Motion.controls", "_1 + EARLY", "_1 - EARLY", "a control acts a step too late"),
     ("reduction.of_file", "add_checks", "apart(path, exact(scene.whole), motion)", "row.error", "the written file is not run"),
+    ("reduction.scene", "scene_of", "place.left <= NEAR_REST and _1", "True", "what falls starts where it lies"),
+    ("reduction.search", "Answer.is_gain", "self.row.gain >= AS_FAST", "True", "no gain is called one"),
 )  # fmt: skip
