@@ -100,6 +100,20 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
             yield variant(2, "derivative", place, "once", explains, values)
 
 
+def exchanged_angles(equations: Equations) -> Iterator[Variant]:
+    """Sine and cosine of a hinge exchanged in a part of the equations."""
+    tree, layout = equations.tree, equations.layout
+    for name, zero, joint in zip(tree.joint_names, tree.reference, tree.coordinates.joints):
+        if joint.kind == "hinge":
+            q = equations.q.copy()
+            q[:, joint.q] = np.pi / 2.0 + 2.0 * zero - q[:, joint.q]
+            other = Equations(tree, q, equations.qd, layout).right
+            for part, entries in layout.parts.items():
+                values = equations.right.copy()
+                values[:, entries] = other[:, entries]
+                yield variant(2, "angle", f"sine and cosine of {name} exchanged in {part}", "", "", values)
+
+
 def other_angles(equations: Equations, search: Search) -> Iterator[Variant]:
     """Terms of an entry or a coefficient with another sine or cosine: left out, added, one for the other."""
     tree, functions, pairs = (
@@ -124,6 +138,7 @@ def other_angles(equations: Equations, search: Search) -> Iterator[Variant]:
         pairs += [(sine, f"{sine}^2"), (cosine, f"{cosine}^2"), (f"{sine}^2", f"{cosine}^2")]
     for first, second in combinations(angles, 2):
         pairs += [(f"{function}({first})", f"{function}({second})") for function in ("sin", "cos")]
+    yield from exchanged_angles(equations)
     added = parallel(search, unit_columns(equations).items())
     for (place, column, found), (wrong, right) in product(list(added), pairs):
         change = functions[wrong] - functions[right]

@@ -152,6 +152,7 @@ def told(changes, bias=lambda q, qd: tmt.bias(q, qd, TREE)):
     return diagnosis(all_entries(SPEEDS), TREE, bias=lambda qd: all_entries(qd)[:, H0:])
 
 
+EXCHANGED = dict.fromkeys((H0, H1), 4.905 * (np.cos(HIP - KNEE) - np.sin(HIP + KNEE)))
 LOWER = 4.905 * (np.sin(HIP - KNEE) - np.sin(HIP + KNEE))
 
 
@@ -171,6 +172,7 @@ def test_a_slip_in_one_part_of_M_comes_before_unusual_factors_of_other_terms(add
     ({M11: 0.35 * np.cos(HIP) - 0.35}, "M[knee][knee]", "0.35 cos(hip) instead of 0.35"),
     ({H1: 0.3 * np.sin(HIP)}, "h[knee], gravity", "0.3 sin(hip) added"),
     ({M10: np.cos(KNEE) * (np.cos(KNEE) - 1.0) / 2.0}, "M[hip][knee]", "0.5 cos(knee)^2 instead of 0.5 cos(knee)"),
+    (EXCHANGED, "sine and cosine of knee exchanged in gravity", ""),
     ({H0: LOWER}, "h[hip], gravity", "4.905 sin(hip - knee) instead of 4.905 sin(hip + knee)"),
 ])  # fmt: skip
 def test_another_function_of_an_angle_is_named_with_its_coefficient(added, place, explains):
