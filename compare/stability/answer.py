@@ -15,13 +15,14 @@ from ..engines.mujoco.variants import has_free_base
 from .closed_form import radius_apart
 from .cures import Cure, cures
 from .growth import LASTS, Growth
-from .limits import COARSER, LONGEST, Limit, limit, tried
+from .limits import LONGEST, Limit, limit, tried
 from .place import MOVING, Place, Posture, in_the_air_at, standing_at
 from .rest import SETTLED, Rest
 from .runs import (
     CALM,
     FINER,
     OWN_PUSH,
+    USUAL_PUSH,
     growth_in_run,
     largest_push,
     observed,
@@ -31,7 +32,6 @@ from .runs import (
 )
 
 SHARE = 0.1  # of the energy of a mode: what a contact has more of takes part
-CURVE_STEPS = 18  # of a curve
 CURVE_RUNS = 0.8, 1.05, 1.15, 1.4, 2.0  # of a limit: steps of runs beside its curve
 
 
@@ -99,6 +99,17 @@ class StepLimitRow(Row):
         """Whether the limit is lower without dry friction, which holds small deviations at any step."""
         return self.smooth_dt is not None and self.smooth_dt < 0.99 * self.longest
 
+    def needs_friction(self, dt: float) -> bool:
+        """Whether a step, s, is stable by dry friction alone, as far as small deviations go."""
+        return self.is_held_by_friction and (self.smooth_dt or 0.0) < dt <= self.longest
+
+    @property
+    def is_weak(self) -> bool:
+        """Whether a usual push is borne by a finer step than that in use alone."""
+        if self.largest_push is None or self.has_fallen or self.finer_push:
+            return False
+        return self.largest_push < USUAL_PUSH
+
     @property
     def longest(self) -> float:
         """The longest stable step, s; inf: none fails. Runs have the last word."""
@@ -153,34 +164,32 @@ def answer(posture: Posture, contacts: bool, reading: Reading, asked: Asked) -> 
         return PlaceAnswer([], {}, [])
     rows, curves = [], {}
     for integrator in asked.integrators:
-        rows.append(limit_row(place, integrator, asked))
-        if asked.drawn and rows[-1].is_known:
-            curves[integrator] = curve(place, rows[-1])
+        row, found = limit_row(place, integrator, asked)
+        rows.append(row)
+        if asked.drawn and row.is_known:
+            curves[integrator] = curve(place, row, found)
     fails = [row for row in rows if row.integrator == asked.integrator and row.stable_at_file_dt is False]
     changes = cures(place.model, place.rest, asked.dt, asked.integrator) if fails and contacts else []
     return PlaceAnswer(rows, curves, changes)
 
 
-def curve(place: Place, row: StepLimitRow) -> Curve:
-    """The growth over the step: from an eighth of the file's step to four times the limit, and about the limit in runs."""
-    limit_dt = row.predicted_dt or LONGEST / COARSER
-    low, high = min(row.file_dt, limit_dt) / 8.0, min(4.0 * max(limit_dt, row.file_dt), LONGEST)
-    beside = [share * limit_dt for share in CURVE_RUNS]
-    predicted, state = [], place.rest
-    for dt in sorted(step for step in (*np.geomspace(low, high, CURVE_STEPS), *beside) if step <= high):
-        at = tried(place.model, state, float(dt), row.integrator)
+def curve(place: Place, row: StepLimitRow, found: Limit) -> Curve:
+    """The growth over the step: at the steps of the search, and about the limit, where runs stand beside it."""
+    tries, seen, state = list(found.tries), [], found.rest.state
+    for share in CURVE_RUNS if row.predicted_dt else ():
+        at = tried(place.model, state, share * (row.predicted_dt or 0.0), row.integrator)
         if not at.rest.is_found:
             break
-        predicted.append((float(dt), at.growth.factor))
+        tries.append(at)
         state = at.rest.state
-    seen = [
-        (dt, growth_in_run(place.model, place.rest, dt, row.integrator)) for dt in beside if row.predicted_dt
-    ]
-    return Curve(predicted, [(dt, factor) for dt, factor in seen if factor is not None])
+        if (factor := growth_in_run(at.rest)) is not None:
+            seen.append((at.dt, factor))
+    predicted = [(at.dt, at.growth.factor) for at in tries if at.rest.is_found]
+    return Curve(sorted(predicted), seen)
 
 
-def limit_row(place: Place, integrator: str, asked: Asked) -> StepLimitRow:
-    """The limit of an integrator at a place, and what the step in use does there."""
+def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow, Limit]:
+    """The limit of an integrator at a place, what the step in use does there, and the search for it."""
     model, dt = place.model, asked.dt
     found = limit(model, place.rest, integrator, dt)
     shows = found.kind == "saddle" and found.growth.rate * LASTS > np.log(CALM / OWN_PUSH)
@@ -207,12 +216,14 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> StepLimitRow:
     if place.is_touching and found.kind != "saddle" and (found.kind == "no rest" or place.creep > MOVING):
         row.limit, row.predicted_dt = "moving", None
         add_motion(row, place)
-    elif row.is_known:
+    elif row.is_known and (
+        place.contacts or integrator == asked.integrator
+    ):  # in the air the others have no use
         if place.frictionless is not None:
             row.smooth_dt = limit(place.frictionless, place.rest, integrator, dt).dt
         if asked.in_runs:
             add_runs(row, place, found)
-    return row
+    return row, found
 
 
 def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:

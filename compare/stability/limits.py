@@ -46,14 +46,18 @@ class Limit:
     kind: finite; none, stable up to LONGEST; below, not stable at SHORTEST; saddle, something grows at any step, at the rate
     of `growth`; no rest, none was found.
     dt: s, of a finite one. growth: of what grows just beyond. rest: the one just below the limit, else at the last step tried.
-    first: the step with which the search began.
+    tries: all steps of the search, in its order.
     """
 
     kind: str
     dt: float | None
     growth: Growth
     rest: Rest
-    first: Tried
+    tries: list[Tried]
+
+    @property
+    def first(self) -> Tried:
+        return self.tries[0]
 
 
 def tried(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, drift: float = 0.0) -> Tried:
@@ -68,32 +72,38 @@ def limit(
     model: mujoco.MjModel, state: np.ndarray, integrator: str, first: float, drift: float = 0.0
 ) -> Limit:
     """The limit near a step `first`, s: from there upwards to what fails, or downwards to what holds, then by bisection."""
-    at = began = tried(model, state, first, integrator, drift)
+    tries = list[Tried]()
+
+    def attempt(near: np.ndarray, dt: float) -> Tried:
+        tries.append(tried(model, near, dt, integrator, drift))
+        return tries[-1]
+
+    at = attempt(state, first)
     stable, failing = (at, None) if at.is_stable else (None, at)
     while failing is None and at.dt < LONGEST:
-        at = tried(model, at.rest.state, min(at.dt * COARSER, LONGEST), integrator, drift)
+        at = attempt(at.rest.state, min(at.dt * COARSER, LONGEST))
         stable, failing = (at, None) if at.is_stable else (stable, at)
     while stable is None and at.dt > SHORTEST:
-        finer = tried(model, state, at.dt / COARSER**2, integrator, drift)
+        finer = attempt(state, at.dt / COARSER**2)
         if finer.is_stable:
             stable = finer
         elif is_saddle(at, finer):
-            return Limit("saddle", None, finer.growth, finer.rest, began)
+            return Limit("saddle", None, finer.growth, finer.rest, tries)
         elif grows_by_itself(at, finer):
             return limit(model, state, integrator, first, finer.growth.rate)
         elif not (at.rest.is_found or finer.rest.is_found):
-            return Limit("no rest", None, finer.growth, finer.rest, began)
+            return Limit("no rest", None, finer.growth, finer.rest, tries)
         else:
             failing = finer
         at = finer
     if stable is None:
-        return Limit("below", None, at.growth, at.rest, began)
+        return Limit("below", None, at.growth, at.rest, tries)
     if failing is None:
-        return Limit("none", None, stable.growth, stable.rest, began)
+        return Limit("none", None, stable.growth, stable.rest, tries)
     while failing.dt > stable.dt * (1.0 + REFINED):
-        middle = tried(model, stable.rest.state, float(np.sqrt(stable.dt * failing.dt)), integrator, drift)
+        middle = attempt(stable.rest.state, float(np.sqrt(stable.dt * failing.dt)))
         stable, failing = (middle, failing) if middle.is_stable else (stable, middle)
-    return Limit("finite", stable.dt, failing.growth, stable.rest, began)
+    return Limit("finite", stable.dt, failing.growth, stable.rest, tries)
 
 
 def is_saddle(coarse: Tried, fine: Tried) -> bool:

@@ -9,7 +9,10 @@ from .limits import COARSER, LONGEST, SHORTEST, Limit, bisected
 from .rest import Rest, rest_near
 
 BELOW, ABOVE = 0.97, 1.03  # of a limit: the steps at which runs are to differ
-WITHIN, OWN_WITHIN = 1.07, 1.03  # fold: how near they are then; and those of a file's own run
+WITHIN, OWN_FOLDS = (
+    1.07,
+    (1.125, 1.03),
+)  # fold: how near they are then; those of a file's own run, one after the other
 OWN_PUSH = 1e-6  # rad/s or m/s: at the start of a file's own run
 CURVE_STEPS, LEAST_SIZES = (
     400,
@@ -24,11 +27,8 @@ THROWN = 10.0  # fold, of the push: a speed at the end that no push leaves
 FINER = 8  # the step over the one that shows whether the robot itself bears a push
 
 
-def growth_in_run(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str) -> float | None:
-    """The factor by which a small push grows in a step of a run, after its first quarter; None: no rest, or no growth."""
-    rest = rest_near(Step(model, dt, integrator), state)
-    if not rest.is_found:
-        return None
+def growth_in_run(rest: Rest) -> float | None:
+    """The factor by which a small push grows in a step of a run, after its first quarter; None: it is small too shortly."""
     plain = speeds_of(rest.step.run(rest.state, CURVE_STEPS))
     sizes = apart(rest.step.run(pushed(rest, SMALL_PUSH), len(plain)), plain, GROWN**2 * SMALL_PUSH)
     if len(sizes) < LEAST_SIZES or not sizes.min() > 0.0:
@@ -89,8 +89,9 @@ def own_limit(
         low, high = low / COARSER, low
         if low < SHORTEST:
             return 0.0
-    while low * OWN_WITHIN < high and holds(low * OWN_WITHIN):  # upwards: a longer one may hold beyond a gap
-        low *= OWN_WITHIN
+    for fold in OWN_FOLDS:  # upwards: a longer one may hold beyond a gap
+        while low * fold < high and holds(low * fold):
+            low *= fold
     return low
 
 

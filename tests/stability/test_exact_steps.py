@@ -116,6 +116,15 @@ def test_no_closed_form_of_discrete_or_at_the_edge_of_a_limit():
     assert radius_apart(rest_of(touching), place_of(touching).tree) is None
 
 
+@pytest.mark.parametrize("kind", ["friction loss", "elliptic, condim 3"])
+def test_no_closed_form_of_what_the_noslip_solver_changes(kind):
+    """It takes R out of the rows of friction, in a few iterations: their forces are others."""
+    text = KINDS[kind].replace("<option ", '<option noslip_iterations="3" ')
+    rest, tree = rest_of(text), place_of(text).tree
+    ours = matrix(rest, tree, forces_near(rest.step, rest.state))
+    assert abs(size(ours) - size(rest.A)) > 1e-3 and radius_apart(rest, tree) is None
+
+
 def test_activations_are_left_out_of_rk4_on_both_sides_and_none_that_moves_with_the_joint():
     turning = (
         '<intvelocity joint="turn" kp="20" kv="5" actrange="-1 1"/>'  # its activation has the eigenvalue 1

@@ -89,9 +89,17 @@ class Step:
         return self.state()
 
     def derivative(self, state: np.ndarray, nudge: float = NUDGE) -> np.ndarray:
-        """The derivative of a step by the deviation of the state, (n, n), by differences to the two `sides`."""
-        columns = []
-        for ahead, behind in self.sides(state, nudge):
+        """The derivative of a step by the deviation of the state, (n, n), by differences to the two `sides`.
+
+        MuJoCo's mjd_transitionFD is the same and faster, but has neither RK4 nor the ends of a range of activations.
+        """
+        sides, columns = self.sides(state, nudge), list[np.ndarray]()
+        if self.integrator != "RK4" and all(ahead.any() and behind.any() for ahead, behind in sides):
+            A = np.zeros((self.size, self.size))
+            self.put(state)
+            mujoco.mjd_transitionFD(self.model, self.data, nudge, True, A, None, None, None)
+            return A
+        for ahead, behind in sides:
             moved = self.after(state, ahead) - self.after(state, behind)
             columns.append(moved / (ahead - behind).sum())
         return np.array(columns).T

@@ -79,15 +79,12 @@ def is_worse(own: WholeRun, finer: WholeRun) -> bool:
     return not finer.failed_at and not own.speeds[-1] <= max(CALM, FASTER * float(speed))
 
 
-def add(result: Result, rows: list[OwnRunRow], is_requested: bool) -> None:
-    """The rows, a check of each, and what is said of the worst start."""
+def add(result: Result, rows: list[OwnRunRow], is_requested: bool) -> list[OwnRunRow]:
+    """Add the rows and a check of each; those with the worst outcome."""
     rows.sort(key=lambda row: (ORDER.index(row.outcome), row.failed_at is None))
     result.tables.setdefault("own_run", []).extend(rows)
     quantity, about = AT_REQUESTED if is_requested else AT_OWN, About.STEP
     for row in rows:
         note, passed = f"{1e3 * row.dt:.4g} ms with {row.integrator}", row.outcome in ("alike", "calm")
         result.check(row.start, quantity, 1 if passed else None, 1, "runs", note, rule="equal", about=about)
-    others = sum(row.outcome == rows[0].outcome for row in rows[1:])
-    result.top.append(
-        result.finding("own_run", run=rows[0], requested=is_requested, others=others, calm=CALM)
-    )
+    return [row for row in rows if row.outcome == rows[0].outcome]
