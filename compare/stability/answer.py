@@ -1,6 +1,6 @@
 """The answer for a file: rows of limits at its postures, by the derivative of its step, in closed form and in runs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -49,7 +49,7 @@ class StepLimitRow(Row):
     hold and the shortest at which they fail. own_dt: beyond it the file's own run, from where it sinks to, fails.
     smooth_dt: the limit without dry friction. growth: per step, at the file's step; apart: in closed form minus that.
     growth_rate: just beyond the limit; of a saddle that of its fall. gives_way: from the rest to that at the limit.
-    finer_push: whether a finer step bears no larger push. moved: from the posture to the rest. has_fallen: by a free body.
+    finer_push: whether a finer step bears no larger push either; asked below a usual one. moved: from the posture to the rest. has_fallen: by a free body.
     held_objects: loose objects that move on, held where they are. Speeds are in rad/s or m/s, movements in rad or m.
     """
 
@@ -230,7 +230,7 @@ def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
     """What runs show; they have the last word."""
     if row.limit == "finite":
         row.observed_dt, row.failing_dt = observed(place.model, found, row.integrator)
-    add_own_limit(row, place, place.creep)
+    add_own_limit(row, place, lambda dt: max(place.creep, found.creep_near(dt)))
     row.largest_push, row.finer_push = largest_push(place.model, found.first.rest, place.creep)
 
 
@@ -240,12 +240,13 @@ def add_motion(row: StepLimitRow, place: Place) -> None:
     speed = speed_at_end(finer, place.rest)
     row.creep = speed if np.isfinite(speed) else place.creep
     row.creeping_joint = place.speed_names[int(np.argmax(np.abs(finer.data.qvel)))]
-    add_own_limit(row, place, row.creep)
+    creep = row.creep
+    add_own_limit(row, place, lambda dt: creep)
 
 
-def add_own_limit(row: StepLimitRow, place: Place, creep: float) -> None:
+def add_own_limit(row: StepLimitRow, place: Place, creep_at: Callable[[float], float]) -> None:
     if longest := min(row.longest, LONGEST):
-        own = own_limit(place.model, place.rest, row.integrator, longest, creep)
+        own = own_limit(place.model, place.rest, row.integrator, longest, creep_at)
         row.own_dt = own if own < longest else None
     row.stable_at_file_dt = row.file_dt <= row.longest
 

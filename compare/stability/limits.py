@@ -59,6 +59,19 @@ class Limit:
     def first(self) -> Tried:
         return self.tries[0]
 
+    def state_below(self, dt: float) -> np.ndarray:
+        """The rest of the search nearest below a step, s: from there the one at the step is followed."""
+        below = self.stable_below(dt)
+        return max(below, key=lambda at: at.dt).rest.state if below else self.rest.state
+
+    def creep_near(self, dt: float) -> float:
+        """The largest speed at the rests of the search up to a step, s, and the next coarser one."""
+        speeds = [np.abs(at.rest.speeds).max(initial=0.0) for at in self.stable_below(COARSER * dt)]
+        return float(max(speeds, default=0.0))
+
+    def stable_below(self, dt: float) -> list[Tried]:
+        return [at for at in self.tries if at.is_stable and at.dt <= dt]
+
 
 def tried(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, drift: float = 0.0) -> Tried:
     """The rest near a state at a step, and its growth. drift: the rate of what grows by itself, 1/s."""

@@ -1,5 +1,7 @@
 """What runs show: where small deviations from rest grow, the file's own run, and the largest push that is survived."""
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 
@@ -51,38 +53,44 @@ def speed_after(model: mujoco.MjModel, rest: Rest, push: float, dt: float) -> fl
     return float(np.abs(speeds[-steps // 8 :] - rest.speeds).max())
 
 
-def largest_push(model: mujoco.MjModel, rest: Rest, creep: float) -> tuple[float, bool]:
+def largest_push(model: mujoco.MjModel, rest: Rest, creep: float) -> tuple[float, bool | None]:
     """The largest push that is survived, rad/s or m/s, 0.0: none; and whether a finer step survives no larger one either.
 
-    The robot calms down near its rest, or moves on no faster than at a finer step, as what nothing brakes, or little, does.
+    The robot calms down near its rest, or moves on no faster than at a finer step, as what nothing brakes, or little, does;
+    that is not asked after a push larger than usual, nor what a finer step survives beyond a usual one.
     creep: of the robot, rad/s or m/s.
     """
     dt = rest.step.dt
 
     def is_survived(push: float) -> bool:
         speed = speed_after(model, rest, push, dt)
-        if speed <= max(CALM, CALMER * push, AS_FAST * creep):
-            return True
-        return np.isfinite(speed) and speed <= AS_FAST * speed_after(model, rest, push, dt / FINER)
+        is_calm = speed <= max(CALM, CALMER * push, AS_FAST * creep)
+        if is_calm or push > USUAL_PUSH or not np.isfinite(speed):
+            return is_calm
+        return speed <= AS_FAST * speed_after(model, rest, push, dt / FINER)
 
     survived = next((push for push in PUSHES if is_survived(push)), 0.0)
-    if survived == PUSHES[0]:
-        return survived, False
+    if survived >= USUAL_PUSH:
+        return survived, None
     finer = rest_near(Step(model, dt / FINER, rest.step.integrator), rest.state)
     next_larger = min(push for push in PUSHES if push > survived)
     return survived, speed_after(model, finer, next_larger, dt / FINER) > THROWN * next_larger
 
 
 def own_limit(
-    model: mujoco.MjModel, state: np.ndarray, integrator: str, longest: float, creep: float
+    model: mujoco.MjModel,
+    state: np.ndarray,
+    integrator: str,
+    longest: float,
+    creep_at: Callable[[float], float],
 ) -> float:
     """The longest step up to `longest`, s, at which the file's own run from a state stays still, or as slow as its creep.
 
-    By the file's own solver, without searching a rest for each step; within 3 %. 0.0: at none.
+    creep_at: at a step, s. By the file's own solver, without searching a rest for each step; within 3 %. 0.0: at none.
     """
 
     def holds(step: float) -> bool:
-        return stays_still(model, state, step, integrator, creep)
+        return stays_still(model, state, step, integrator, creep_at(step))
 
     low = high = longest
     while not holds(low):
@@ -100,7 +108,7 @@ def stays_still(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator:
     step = Step(model, dt, integrator, exact=False)
     speed = speed_at_end(step, state, WILD * max(CALM, creep))
     moved = float(np.abs(distance(model, state, step.state())).max(initial=0.0))
-    return speed <= max(CALM, AS_FAST_ALONE * creep) and moved <= FAR + creep * LASTS
+    return speed <= max(CALM, AS_FAST_ALONE * creep) and moved <= FAR + creep * dt * steps_in(LASTS, dt)
 
 
 def speed_at_end(step: Step, state: np.ndarray, most: float = np.inf) -> float:
@@ -119,10 +127,9 @@ def observed(model: mujoco.MjModel, limit: Limit, integrator: str) -> tuple[floa
     Where they do not differ there, from the limit up or down to where they do. None: none that holds, or that fails.
     """
     assert limit.dt is not None
-    state, rate = limit.rest.state, limit.growth.rate
 
     def fails(dt: float) -> bool:
-        return grows(rest_near(Step(model, dt, integrator), state), rate)
+        return grows(rest_near(Step(model, dt, integrator), limit.state_below(dt)), limit.growth.rate)
 
     low, high = BELOW * limit.dt, ABOVE * limit.dt
     while fails(low):

@@ -26,9 +26,9 @@ WHOLE = 1e-9  # of a step: a delay that is so near to whole steps is
 MOST_GROWTH = 10.0  # in a step: with more, differences leave the zone in which the forces are linear
 DEFAULT_STEP, DEFAULT = 0.002, "Euler"  # MuJoCo's step, s, and integrator where a file states none
 GIVES_WAY = 0.1  # rad or m: a rest at the limit so far from that of the file's step is said
-FAR, CREEPS = 0.05, 1e-3  # rad or m, rad/s or m/s: of a rest that is told, from its posture, and of a creep
+FAR, CREEPS = 0.05, 1e-4  # rad or m, rad/s or m/s: of a rest that is told, from its posture, and of a creep
 MODES = "growth of a step in closed form, TMT to MuJoCo"
-PUSHED = "push that its own step survives"
+PUSHED = "stable after a push"
 AT_PERIOD = "stable at its control period"
 
 
@@ -161,7 +161,10 @@ def add_checks(result: StabilityResult, rows: Sequence[StepLimitRow], quantity: 
         result.check(row.posture, quantity, row.file_dt, limit, "s", note, about=about)
         if row.stable_at_file_dt and row.largest_push is not None and not row.has_fallen:
             push = USUAL_PUSH if row.finer_push else row.largest_push
-            result.check(row.posture, PUSHED, push, USUAL_PUSH, "rad/s or m/s", rule="at least", about=about)
+            step = f"{1e3 * row.file_dt:.4g} ms with {row.file_integrator}"
+            result.check(
+                row.posture, PUSHED, push, USUAL_PUSH, "rad/s or m/s", step, rule="at least", about=about
+            )
     if not own:
         kinds = sorted({row.limit for row in rows if row.integrator == row.file_integrator})
         result.not_judged("", quantity, f"no posture has a limit: {', '.join(kinds)}", "s", about=about)
@@ -189,7 +192,7 @@ def add_answer(
     is_calm = runs[0].outcome in ("calm", "alike")
     tell(
         "answer", row=worst, saddle=next((row for row in mine if row.limit == "saddle"), None), others=others,
-        air=next((row for row in air if row is not worst), None), run=None if is_calm else runs[0],
+        air=next((row for row in air if row is not worst and row.is_known), None), run=None if is_calm else runs[0],
         requested=step.is_requested, dt=asked.dt, integrator=asked.integrator, up_to=LONGEST, calm=own_run.CALM,
     )  # fmt: skip
     if is_calm:
