@@ -22,9 +22,10 @@ from ..robots import Robot
 from ..robots.actuators import Drive
 from ..robots.arm import ARM
 from ..robots.case import SEED
-from ..robots.file import robot_of, robot_of_solution
+from ..robots.file import not_compared, robot_of, robot_of_solution
 from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, matched_joints
 from ..robots.placement import placed
+from ..robots.scene_file import read_controls
 from ..stability.place import posture_of
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
@@ -76,7 +77,7 @@ class Compared(NamedTuple):
     reading: Reading | None  # None: the robot's numbers are stated
 
     def request_of(self, options: argparse.Namespace) -> Request:
-        """What the options ask of stability. ModelError, in one line: it needs a file, or is not of this one."""
+        """What the options ask; ModelError, in one line, for what needs a file or is not of this one."""
         asked = {name: getattr(options, name) for name in (*Request._fields[1:], "dt", "integrator")}
         given = [f"--{name.replace('_', '-')}" for name, value in asked.items() if value]
         if given and self.reading is None:
@@ -99,6 +100,11 @@ class Compared(NamedTuple):
         period, of_step = asked["control_period"], self.reading.dt if dt is None else dt
         if period and abs(period / of_step - max(1, round(period / of_step))) > WHOLE:
             raise ModelError(f"--control-period {period:g} is no multiple of the step, {of_step:g} s")
+        if asked["controls"]:
+            names = [actuator.name for actuator in self.reading.drive.actuators]
+            asked["controls"] = read_controls(asked["controls"], names)
+        if asked["write"] and not Path(asked["write"]).absolute().parent.is_dir():
+            raise ModelError(f"cannot write {asked['write']}: there is no such folder")
         step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
         return Request(step, **asked)
 
@@ -128,10 +134,11 @@ def compared_with(
             source, other = source.joined(), other.joined()
             reading, stated = read(source), read(other)
         placement = placed(replace(stated.tree, joint_names=names), reading.tree)
+        unlike = not_compared(reading, stated, names)
         # its actuators do not act: those of the file may differ
         stated = replace(stated, tree=placement.tree, drive=Drive())
         robot = robot_of_solution(reading, shown, stated, of_file.source)
-        otherwise = tuple(map(say, placement.remarks() + of_welded(source)))
+        otherwise = tuple(map(say, placement.remarks() + of_welded(source) + unlike))
         of_file = of_file._replace(kind=SOLUTION, renamed=renamed, otherwise=otherwise)
         return Compared(of_file, robot, engine(reading, stated), reading)
     robot, mujoco = robot_of(reading, shown), engine(reading)

@@ -14,8 +14,7 @@ from tmt.derivation import composite, method
 from tmt.derivation.dual import Dual, seeded
 from tmt.methods import RungeKutta, amplification
 from tmt.methods.implicit import ImplicitRungeKutta
-from tmt.methods.stepping import Method
-from tmt.methods.tableau import Tableau
+from tmt.methods.stepping import Method, Tableau
 
 from ..robots import Robot
 from ..robots.case import SEED, Case
@@ -218,9 +217,14 @@ def is_runge_kutta(stepping: Method) -> TypeGuard[Tableau]:
 
 def growth_of(stepping: Tableau, z: np.ndarray) -> np.ndarray:
     """The stability function of a Runge-Kutta method, 1 + z b (1 - z A)^-1 1, at z = lambda dt, of any shape."""
-    z, A = np.asarray(z), np.array([[*row, *np.zeros(len(stepping.b) - len(row))] for row in stepping.A])
-    stages = np.linalg.solve(np.eye(len(A)) - z[..., None, None] * A, np.ones((len(A), 1)))[..., 0]
-    return 1.0 + z * (stages @ np.array(stepping.b))
+    z, stages = np.asarray(z), list[np.ndarray]()
+    if type(stepping) is RungeKutta:
+        for row in stepping.A:
+            stages.append(1.0 + z * sum((a * stage for a, stage in zip(row, stages)), 0.0 * z))
+        return 1.0 + z * sum(b * stage for b, stage in zip(stepping.b, stages))
+    size = len(stepping.b)
+    coupled = np.eye(size) - z[..., None, None] * np.array(stepping.A)
+    return 1.0 + z * (np.linalg.solve(coupled, np.ones((size, 1)))[..., 0] @ np.array(stepping.b))
 
 
 # forces at rest over any scalar, and their derivatives

@@ -44,6 +44,88 @@ class SubsetRow(Row):
     difference_over_bar: float | None = None
 
 
+@dataclass
+class StageRow(Row):
+    """A stage of a step by MuJoCo's own timers: of the whole file, without what is not used, and of the smaller file."""
+
+    stage: str
+    whole_file: float = column("us")
+    free_file: float = column("us")
+    smaller_file: float = column("us")
+
+
+@dataclass
+class UseRow(Row):
+    """What a file has of a kind, None: unknown, and what the motion used."""
+
+    part: str
+    in_file: int | None
+    used: int
+    names: str
+
+
+@dataclass
+class FreeRow(Row):
+    """What was taken out of a file; it is back if the motion was not the same to the last bit."""
+
+    kind: str
+    taken_out: int
+    same_bits: bool
+    before: float | None = column("us", default=None)  # of a step
+    after: float | None = column("us", default=None)
+
+
+@dataclass
+class JointRow(Row):
+    """How far a joint moved, rad or m, and how far it would move another one if it were locked; None: it is not to be."""
+
+    joint: str
+    moved: float
+    predicted: float | None
+    locked: bool
+
+
+@dataclass
+class PairRow(Row):
+    """Geoms that came near and never touched."""
+
+    geom: str
+    other: str
+    distance: float = column("m")
+
+
+@dataclass
+class LimitRow(Row):
+    """The largest stable step of the whole file and of the smaller one; limit: as in step_limits.csv."""
+
+    model: str
+    integrator: str
+    limit: str
+    step: float | None = column("s", digits=4)
+    joint: str = ""
+
+
+@dataclass(kw_only=True)
+class FrontierRow(Row):
+    """A model with an integrator and a step: time over error, rad or m.
+
+    error_at_own_step: from the file's own run, both by its own step and integrator: of the model alone. best_for: the errors
+    for which it is the answer.
+    """
+
+    model: str
+    locked: int
+    integrator: str
+    dt: float = column("s")
+    error: float
+    error_of_model: float
+    error_of_step: float
+    error_at_own_step: float | None = None
+    time_of_second: float = column("s", default=0.0)  # of motion
+    gain: float = 1.0  # over the file as it is
+    best_for: str = ""
+
+
 Model = tuple[str, Case | None]  # the name of a scene, and what is run; None: nothing moves
 
 
@@ -53,7 +135,6 @@ class Need(NamedTuple):
     needed: tuple[str, ...]
     locked: tuple[str, ...]  # as the scene says
     stays: tuple[str, ...]  # those that can be locked
-    undecided: tuple[str, ...]
 
 
 class Swing(NamedTuple):
@@ -64,7 +145,7 @@ class Swing(NamedTuple):
 
 @dataclass
 class ReductionResult(Result):
-    models: list[Model] | None = None  # that are timed; None: no joint can be locked
+    models: list[Model] = field(default_factory=list)  # that are timed
     needs: dict[str, Need] = field(default_factory=dict)  # by scene
     apart: dict[tuple[str, str], float] = field(default_factory=dict)  # by scene and engine, rad or m
     swings: dict[str, Swing] = field(default_factory=dict)  # by scene

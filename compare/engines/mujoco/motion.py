@@ -1,0 +1,288 @@
+"""What a robot does: a motion of a file with everything on, which smaller models of the file repeat; and what it uses."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+
+from .names import INTEGRATORS, bit, control_of, element_name, number_of_actuators
+
+Array = np.ndarray
+STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
+INPUTS = int(mujoco.mjtState.mjSTATE_CTRL) | int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+NEAR, SAMPLES = 0.01, 25  # m, and states of a motion: pairs that came so near are told
+EARLY = 1e-9  # s: a control acts from the step that begins so shortly before it
+ACTS = {  # what has a row of constraints, by the kinds of rows
+    "equality": (mujoco.mjtConstraint.mjCNSTR_EQUALITY,),
+    "joint": (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT,),
+    "tendon": (mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON, mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON),
+}
+TIMERS = {  # the stages of a step by MuJoCo's timers
+    "position": ("POS_KINEMATICS", "POS_INERTIA"),
+    "collision": ("POS_COLLISION",),
+    "constraint": ("POS_MAKE", "POS_PROJECT"),
+    "velocity": ("VELOCITY",),
+    "actuation": ("ACTUATION",),
+    "solve": ("CONSTRAINT",),
+}
+
+
+def joints(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
+    """The places in qpos and qvel of each joint."""
+    ends_q, ends_v = [*model.jnt_qposadr[1:], model.nq], [*model.jnt_dofadr[1:], model.nv]
+    places = {}
+    for number, (q, v) in enumerate(zip(model.jnt_qposadr, model.jnt_dofadr)):
+        name = element_name(model, "joint", number)
+        places[name] = slice(int(q), int(ends_q[number])), slice(int(v), int(ends_v[number]))
+    return places
+
+
+def actuators(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
+    """The places in ctrl and act of each actuator."""
+    places = {}
+    for number in range(number_of_actuators(model)):
+        control, count = control_of(model, number)
+        act, acts = max(0, model.actuator_actadr[number]), model.actuator_actnum[number]
+        name = element_name(model, "actuator", number)
+        places[name] = slice(control, control + count), slice(act, act + acts)
+    return places
+
+
+def data_at(model: mujoco.MjModel, state: Array) -> mujoco.MjData:
+    """At a state of step.start_of."""
+    data = mujoco.MjData(model)
+    mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+    return data
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion, by the names of joints and actuators. Controls are constant between their times.
+
+    start: qpos, qvel and the applied force (N m or N) of each joint; activations, inputs: of each actuator, the inputs
+    (times, its controls). points: names of sites whose places count too.
+    """
+
+    name: str
+    duration: float  # s
+    start: Mapping[str, tuple[Array, Array, Array]]
+    activations: Mapping[str, Array]
+    times: Array  # s
+    inputs: Mapping[str, Array]
+    points: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        name: str,
+        duration: float,
+        recorded: tuple[Array, Mapping[str, Array]] | None = None,
+        points: tuple[str, ...] = (),
+    ) -> "Motion":
+        """From the state, the controls and the forces of data. recorded: times, and controls (times,) of some actuators."""
+        times, given = recorded or (np.zeros(1), {})
+        start, activations, inputs = {}, {}, {}
+        for joint, (q, v) in joints(model).items():
+            start[joint] = data.qpos[q].copy(), data.qvel[v].copy(), data.qfrc_applied[v].copy()
+        for actuator, (places, acts) in actuators(model).items():
+            activations[actuator] = data.act[acts].copy()
+            inputs[actuator] = np.tile(data.ctrl[places], (len(times), 1))
+            if actuator in given:
+                inputs[actuator][:, 0] = given[actuator]
+        return cls(name, duration, start, activations, times, inputs, points)
+
+    def placed(self, model: mujoco.MjModel) -> mujoco.MjData:
+        """The data of a model at the start."""
+        data = mujoco.MjData(model)
+        for name, (q, v) in joints(model).items():
+            data.qpos[q], data.qvel[v], data.qfrc_applied[v] = self.start[name]
+        for actuator, (places, acts) in actuators(model).items():
+            data.act[acts], data.ctrl[places] = self.activations[actuator], self.inputs[actuator][0]
+        return data
+
+    def controls(self, model: mujoco.MjModel, dt: float, steps: int) -> Array:
+        """The controls of a model at each step, (steps, nu)."""
+        at = np.searchsorted(self.times, dt * np.arange(steps) + EARLY, side="right") - 1
+        controls = np.zeros((steps, model.nu))
+        for actuator, (places, _) in actuators(model).items():
+            controls[:, places] = self.inputs[actuator][np.maximum(at, 0)]
+        return controls
+
+
+class Path(NamedTuple):
+    """Where a motion of a model leads: q (n + 1, nq), v (n + 1, nv), each dt, s; NaN from where it fails."""
+
+    model: mujoco.MjModel
+    dt: float
+    q: Array
+    v: Array
+
+    @property
+    def samples(self) -> Array:
+        """Some of its positions, (states, nq)."""
+        return self.q[:: max(1, len(self.q) // SAMPLES)]
+
+    def points(self, names: Iterable[str], every: int) -> Array:
+        """Of sites each so many steps, (times, sites, 3) m."""
+        data, places = mujoco.MjData(self.model), []
+        for q in self.q[::every]:
+            data.qpos[:] = q
+            mujoco.mj_kinematics(self.model, data)
+            places.append([data.site(name).xpos.copy() for name in names])
+        return np.array(places)
+
+
+class Simulation:
+    """A motion by a model, a step, s, and an integrator; a call repeats it."""
+
+    def __init__(self, model: mujoco.MjModel, motion: Motion, dt: float, integrator: str) -> None:
+        self.model = mujoco.MjModel.__copy__(model)
+        self.model.opt.timestep, self.model.opt.integrator = dt, INTEGRATORS[integrator]
+        self.model.opt.disableflags |= bit("AUTORESET")
+        self.dt, self.steps, self.data = dt, max(1, round(motion.duration / dt)), motion.placed(self.model)
+        self.start = np.zeros(mujoco.mj_stateSize(self.model, STATE))
+        mujoco.mj_getState(self.model, self.data, self.start, STATE)
+        forces = np.tile(self.data.qfrc_applied, (self.steps, 1))
+        self.inputs = np.hstack([motion.controls(self.model, dt, self.steps), forces])
+
+    def __call__(self) -> Path:
+        nq, nv = self.model.nq, self.model.nv
+        states, _ = rollout.rollout(
+            self.model, self.data, self.start, self.inputs[None], control_spec=INPUTS, nstep=self.steps
+        )
+        path = np.vstack([self.start, states[0]])[:, : 1 + nq + nv]
+        failed = np.cumsum(~(np.diff(path[:, 0], prepend=-1.0) > 0.0)) > 0  # its clock stands still
+        path[failed] = np.nan
+        return Path(self.model, self.dt, path[:, 1 : 1 + nq], path[:, 1 + nq :])
+
+    def stepped(self) -> Iterator[mujoco.MjData]:
+        """The data after each step."""
+        mujoco.mj_setState(self.model, self.data, self.start, STATE)
+        for inputs in self.inputs:
+            self.data.ctrl[:] = inputs[: self.model.nu]
+            mujoco.mj_step(self.model, self.data)
+            yield self.data
+
+
+def movements(path: Path, other: Path, among: Iterable[str] = ()) -> dict[str, float]:
+    """How far two paths are apart at their common times: the largest of each joint that both have, rad or m, and point."""
+    steps = max(path.dt, other.dt)
+    every, every_other = round(steps / path.dt), round(steps / other.dt)
+    q, whole = path.q[::every], other.q[::every_other]
+    count = min(len(q), len(whole))
+    places, same = joints(other.model), np.array(q[:count])
+    for name, (columns, _) in joints(path.model).items():
+        same[:, columns] = whole[:count, places[name][0]]
+    apart = np.zeros((count, path.model.nv))
+    for row, here, there in zip(apart, q, same):
+        mujoco.mj_differentiatePos(path.model, row, 1.0, there, here)
+    largest = {name: float(np.abs(apart[:, v]).max()) for name, (_, v) in joints(path.model).items()}
+    if points := tuple(among):
+        distances = path.points(points, every)[:count] - other.points(points, every_other)[:count]
+        largest |= dict(zip(points, np.linalg.norm(distances, axis=2).max(axis=0).tolist()))
+    return largest
+
+
+def apart(path: Path, other: Path, motion: Motion) -> float:
+    """How far a path is from that of another model of the motion, rad or m; inf where one of them fails."""
+    largest = max(movements(path, other, motion.points).values(), default=0.0)
+    return largest if np.isfinite(largest) else np.inf
+
+
+@dataclass
+class Use:
+    """What a motion used: names of pairs of geoms that touched, of what acted by kind, how far each joint moved, rad or m.
+
+    middle: the mean positions of the joints; of a joint with a quaternion the start.
+    """
+
+    pairs: set[tuple[str, str]] = field(default_factory=set)
+    acted: dict[str, set[str]] = field(default_factory=dict)
+    has_constraints: bool = False
+    ranges: dict[str, float] = field(default_factory=dict)
+    middle: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def geoms(self) -> set[str]:
+        return {name for pair in self.pairs for name in pair}
+
+
+def used(simulation: Simulation) -> Use:
+    """What the motion of a model uses, step by step."""
+    m, use = simulation.model, Use()
+    path, forces = [simulation.data.qpos.copy()], np.zeros(len(simulation.data.actuator_force))
+    pairs, rows = set[tuple[int, int]](), set[tuple[int, int]]()
+    for d in simulation.stepped():
+        pairs.update(map(tuple, np.sort(d.contact.geom, axis=1).tolist()))
+        acts = (d.efc_force != 0.0) | (d.efc_type != ACTS["equality"][0])
+        rows.update(zip(d.efc_type[acts].tolist(), d.efc_id[acts].tolist()))
+        use.has_constraints |= d.nefc > 0
+        forces = np.maximum(forces, np.abs(d.actuator_force))
+        path.append(d.qpos.copy())
+    use.pairs = {pair_of(m, pair) for pair in pairs}
+    for kind, types in ACTS.items():
+        use.acted[kind] = {element_name(m, kind, number) for row, number in rows if row in types}
+    numbers = range(number_of_actuators(m))
+    use.acted["actuator"] = {element_name(m, "actuator", number) for number in numbers if forces[number]}
+    q = np.array(path)
+    use.ranges = movements(
+        Path(m, simulation.dt, q, q), Path(m, simulation.dt, np.tile(q[0], (len(q), 1)), q)
+    )
+    for name, (columns, _) in joints(m).items():
+        is_number = columns.stop - columns.start == 1
+        use.middle[name] = q[:, columns].mean(axis=0) if is_number else q[0, columns]
+    return use
+
+
+def pair_of(model: mujoco.MjModel, numbers: Iterable[int]) -> tuple[str, str]:
+    one, other = (element_name(model, "geom", number) for number in numbers)
+    return one, other
+
+
+def couplings(path: Path, middle: Array) -> Array:
+    """How far each speed would move each other one, were it locked at a position: (nv, nv) rad or m, moved by locked.
+
+    Its own movement times its coupling through M, the largest at sampled states of a path.
+    """
+    model, data = path.model, mujoco.MjData(path.model)
+    costs, inverse, moved = np.zeros((model.nv, model.nv)), np.zeros((model.nv, model.nv)), np.zeros(model.nv)
+    for q in path.samples:
+        data.qpos[:] = q
+        mujoco.mj_forward(model, data)
+        mujoco.mj_solveM(model, data, inverse, np.eye(model.nv))
+        mujoco.mj_differentiatePos(model, moved, 1.0, middle, q)
+        costs = np.maximum(costs, np.abs(inverse / np.diag(inverse) * moved))
+    return costs
+
+
+def stages_of(simulation: Simulation) -> dict[str, float]:
+    """The time of each stage of a step, us, by MuJoCo's own timers."""
+    for data in simulation.stepped():
+        timers = data.timer
+
+    def taken(*names: str) -> float:
+        numbers = [int(getattr(mujoco.mjtTimer, f"mjTIMER_{name}")) for name in names]
+        return 1e6 * float(sum(timers[number].duration for number in numbers)) / simulation.steps
+
+    stages, whole = {stage: taken(*names) for stage, names in TIMERS.items()}, taken("STEP")
+    return stages | {"sensors and rest": whole - sum(stages.values()), "whole step": whole}
+
+
+def near(path: Path, touched: set[tuple[str, str]]) -> dict[tuple[str, str], float]:
+    """The pairs of geoms that came near and never touched, nearest first, and their least distances at samples, m."""
+    wide, data = mujoco.MjModel.__copy__(path.model), mujoco.MjData(path.model)
+    pairs: dict[tuple[str, str], float] = {}
+    wide.geom_margin += NEAR
+    for q in path.samples:
+        data.qpos[:] = q
+        mujoco.mj_fwdPosition(wide, data)
+        for numbers, distance in zip(np.sort(data.contact.geom, axis=1), data.contact.dist.tolist()):
+            pair = pair_of(wide, numbers)
+            if pair not in touched and distance < pairs.get(pair, NEAR):
+                pairs[pair] = distance
+    return dict(sorted(pairs.items(), key=lambda item: item[1]))

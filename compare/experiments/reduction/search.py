@@ -1,0 +1,196 @@
+"""The search: what goes for nothing, which joints can be locked for an error, and how fast each model is by each step."""
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.timing import fastest
+from ...engines.mujoco.motion import Path, Simulation, apart, couplings, joints
+from ...engines.mujoco.names import INTEGRATORS, kind_of
+from ...engines.mujoco.smaller import FREE, Smaller, locked, tied_joints
+from .records import FreeRow, FrontierRow
+from .scene import Scene
+
+DOES, DOES_SLIDE = 0.1, 0.02  # rad, m: a joint that moves more is what the scene is about
+STEPS = 0.5, 1.0, 2.0, 4.0, 8.0  # multiples of the file's
+TRIES = 8  # joints that are tried after the first that costs too much
+FEW = 3  # models with the first 1, 2, 3 groups of joints locked are among those of the chart
+ROUNDS = 6  # of timing
+AS_FAST = 1.05  # fold: the accuracy of times
+Groups = frozenset[int]  # of joints that are locked, by their numbers
+
+
+def take_out(scene: Scene) -> list[tuple[FreeRow, Smaller]]:
+    """Take out one kind after the other, each only if the motion is the same to the last bit: a row, and the model then."""
+    path, small, kinds = scene.run(scene.whole), scene.whole, []
+    for kind, edit in FREE.items():
+        trial = Smaller(small.spec.copy())
+        try:
+            count = edit(trial, scene.use)
+            trial = Smaller(trial.spec)
+        except ValueError:  # something else refers to it
+            continue
+        if count:
+            is_same = same_bits(scene.run(trial), path)
+            small = trial if is_same else small
+            kinds.append((FreeRow(kind=kind, taken_out=count, same_bits=is_same), small))
+    return kinds
+
+
+def same_bits(path: Path, other: Path) -> bool:
+    return path.q.tobytes() == other.q.tobytes() and path.v.tobytes() == other.v.tobytes()
+
+
+class Group(NamedTuple):
+    """Joints that are locked together. predicted: how far they would move another joint, rad or m."""
+
+    names: list[str]
+    predicted: float
+
+
+def groups_of(scene: Scene, free: Smaller) -> list[Group]:
+    """The joints that may be locked, those that cost least by prediction first.
+
+    The prediction: were the joint locked, the others would be moved by its own movement times their coupling through M.
+    """
+    model, use, places = free.model, scene.use, joints(free.model)
+    most = {
+        name: DOES_SLIDE if kind_of(model, number) == "slide" else DOES for number, name in enumerate(places)
+    }
+    costs = couplings(scene.run(free), np.hstack([use.middle[name] for name in places]))
+    groups = []
+    for names in tied_joints(model):
+        if all(use.ranges[name] <= most[name] for name in names):
+            speeds = np.r_[tuple(places[name][1] for name in names)]
+            others = np.setdiff1d(np.arange(model.nv), speeds)
+            groups.append(Group(names, float(costs[np.ix_(others, speeds)].max(initial=0.0))))
+    groups.sort(key=lambda group: group.predicted)
+    return groups[: len(places) - 1]
+
+
+class Locks:
+    """Models with groups of joints locked, and the errors that this alone makes."""
+
+    def __init__(self, scene: Scene, free: Smaller) -> None:
+        self.scene, self.free, self.groups = scene, free, groups_of(scene, free)
+        self.path = scene.run(free)
+        self.model, self.error = cache(self.model_of), cache(self.error_of)
+
+    def positions(self, groups: Iterable[int]) -> dict[str, np.ndarray]:
+        names = {name for group in groups for name in self.groups[group].names}
+        return {name: middle for name, middle in self.scene.use.middle.items() if name in names}
+
+    def model_of(self, groups: Groups) -> Smaller | None:
+        """None: they cannot be locked, as something else refers to a joint."""
+        try:
+            return locked(self.free, self.positions(groups))
+        except ValueError:
+            return None
+
+    def error_of(self, groups: Groups) -> float:
+        """Of the joints that stay and the points, rad or m, by the file's step; inf where they cannot be locked."""
+        small = self.model(groups)
+        if small is None or not small.model.nv:
+            return np.inf
+        return apart(self.scene.run(small), self.path, self.scene.motion)
+
+    def within(self, allowed: float) -> Groups:
+        """The groups that can be locked for an error: the first by prediction, and then each that the error allows."""
+        low, high = 0, len(self.groups) + 1  # the first `low` are within the error
+        while high - low > 1:
+            middle = (low + high) // 2
+            is_within = self.error(frozenset(range(middle))) <= allowed
+            low, high = (middle, high) if is_within else (low, middle)
+        chosen = frozenset(range(low))
+        for number in range(low, min(len(self.groups), low + TRIES)):
+            if self.error(chosen | {number}) <= allowed:
+                chosen |= {number}
+        return chosen
+
+
+class Candidate(NamedTuple):
+    """A model with a step and an integrator, and the groups of joints that are locked."""
+
+    row: FrontierRow
+    small: Smaller
+    groups: Groups
+
+
+def frontier(
+    scene: Scene, locks: Locks, errors: Sequence[float], quiet: Callable[[], object]
+) -> list[Candidate]:
+    """Each model by each integrator and step: its error against the reference, and its time; the file as it is first.
+
+    Left out are those that are worse than all of the errors, but for the file's own step.
+    """
+    sets = {frozenset(range(count)) for count in range(min(FEW, len(locks.groups)) + 1)}
+    sets |= {locks.within(error) for error in errors}
+    models = [("whole file", scene.whole, Groups())]
+    for groups in sorted(sets, key=len):
+        small, count = locks.model(groups), len(locks.positions(groups))
+        if small and locks.error(groups) < np.inf:
+            models.append((f"{count} joints locked" if count else "without what is not used", small, groups))
+    reference, own = scene.finely(scene.whole), (scene.reading.integrator, scene.reading.dt)
+    steps = [multiple * scene.reading.dt for multiple in STEPS]
+    candidates, runs = [], []
+    for name, small, groups in models:
+        fine = scene.finely(small)
+        error_of_model = apart(fine, reference, scene.motion)
+        for integrator, dt in sorted(product(INTEGRATORS, steps), key=own.__ne__):
+            run, is_own = Simulation(small.model, scene.motion, dt, integrator), (integrator, dt) == own
+            path = run()
+            row = FrontierRow(
+                model=name,
+                locked=len(locks.positions(groups)),
+                integrator=integrator,
+                dt=dt,
+                error=apart(path, reference, scene.motion),
+                error_of_model=error_of_model,
+                error_of_step=apart(path, fine, scene.motion),
+                error_at_own_step=locks.error(groups) if is_own else None,
+            )
+            if is_own or row.error <= max(errors):
+                candidates.append(Candidate(row, small, groups))
+                runs.append(run)
+    quiet()
+    seconds = seconds_of(runs)
+    for number, candidate in enumerate(candidates):
+        candidate.row.time_of_second = seconds[number] / scene.motion.duration
+        candidate.row.gain = seconds[0] / seconds[number]
+    return candidates
+
+
+def seconds_of(runs: Sequence[Simulation]) -> dict[int, float]:
+    """Of processor time: other programs may wait for the processor, too."""
+    return fastest(dict(enumerate(runs)), ROUNDS, time.thread_time)
+
+
+class Answer(NamedTuple):
+    """The fastest for an error. at_own_step: within it of the file's own run, as no gain is within it of the exact motion."""
+
+    allowed: float
+    row: FrontierRow
+    at_own_step: bool
+
+    @property
+    def is_gain(self) -> bool:
+        return self.row.gain >= AS_FAST
+
+
+def answer_within(rows: Sequence[FrontierRow], allowed: float) -> Answer:
+    """For an error, rad or m, of the exact motion; where nothing is gained so, of the file's run at its own step."""
+    exact = [row for row in rows if row.error <= allowed]
+    if exact and (answer := Answer(allowed, best_of(exact), False)).is_gain:
+        return answer
+    own = [row for row in rows if row.error_at_own_step is not None and row.error_at_own_step <= allowed]
+    return Answer(allowed, best_of(own), True)
+
+
+def best_of(rows: Sequence[FrontierRow]) -> FrontierRow:
+    """Of those that are as fast as the fastest, within the accuracy of times, the one with most joints locked."""
+    fast = max(row.gain for row in rows) / AS_FAST
+    return max((row for row in rows if row.gain >= fast), key=lambda row: (row.locked, row.gain))

@@ -1,0 +1,270 @@
+"""Reduction of a file's motion: what goes for nothing, which joints can be locked, and the file to take away."""
+
+import pickle
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from edited import setup_of_file
+
+import tmt
+from compare.core.text import say
+from compare.engines.mujoco.motion import SAMPLES, Simulation, apart
+from compare.engines.mujoco.reading import read
+from compare.engines.mujoco.source import Source
+from compare.experiments import reduction
+from compare.experiments.reduction import of_file, search
+from compare.experiments.reduction.records import FrontierRow, ReductionResult
+from compare.experiments.reduction.scene import scene_of
+from compare.experiments.reduction.search import Answer, answer_within, take_out
+from compare.experiments.setup import Request
+from compare.robots.scene_file import SceneError, read_controls
+
+ARM = """<body name="{0}" pos="{1} 0 1"><joint name="{0} upper" axis="0 1 0" damping="0.1" range="-170 170"/>
+<geom size="0.05" mass="1" pos="0 0 -0.2"/><body name="{0} hand" pos="0 0 -0.4">
+<joint name="{0} lower" axis="0 1 0" damping="0.1"/>
+<geom type="box" size="0.02 0.02 0.1" mass="0.3" pos="0 0 -0.1"/><site name="{0} tip" pos="0 0 -0.2"/></body></body>"""
+SERVOS = "".join(f'<position name="{side} {part}" joint="{side} {part}" kp="50" dampratio="1"/>'
+                 for side in ("left", "right") for part in ("upper", "lower"))  # fmt: skip
+FLOOR = '<geom name="floor" type="plane" size="3 3 0.1"/><light pos="0 0 3"/><camera name="eye"/>'
+TWO_ARMS = f"""<mujoco><option integrator="implicitfast"><flag energy="enable"/></option><asset><texture name="sky" type="skybox"
+builtin="flat" width="8" height="48"/></asset><worldbody>{FLOOR}{ARM.format("left", 0)}{ARM.format("right", 1)}
+<geom name="shelf" type="box" size="0.1 0.1 0.1" pos="-2 0 1"/></worldbody><equality><joint name="never" joint1="left upper"
+active="false"/></equality><tendon><fixed name="slack"><joint joint="left upper" coef="1"/></fixed></tendon>
+<actuator>{SERVOS}<motor name="unused" joint="left lower"/></actuator><sensor><jointpos joint="left upper"/></sensor>
+<keyframe><key name="home" qpos="0 0 0 0"/></keyframe></mujoco>"""
+# a hand with a moving and a still finger, whose two joints a tendon ties
+LINK = '<body pos="{1} 0 0"><joint name="{0}" axis="0 1 0" damping="0.05"{2}/><geom size="0.01" mass="0.02" pos="{1} 0 0"/>'
+HAND = f"""<mujoco><option integrator="implicitfast"/><worldbody><body><joint name="wrist" axis="0 1 0" damping="1"/>
+<geom size="0.05" mass="0.5"/>{LINK.format("index", 0.1, "")}</body>{LINK.format("thumb", -0.1, "")}
+{LINK.format("thumb tip", -0.1, ' stiffness="5"')}</body></body></body></worldbody>
+<tendon><fixed name="thumb"><joint joint="thumb" coef="1"/><joint joint="thumb tip" coef="1"/></fixed></tendon>
+<actuator><position name="wrist" joint="wrist" kp="20"/><position name="index" joint="index" kp="2"/>
+<position name="thumb" tendon="thumb" kp="5"/></actuator></mujoco>"""
+TUMBLES = """<mujoco><worldbody><geom type="plane" size="3 3 0.1"/><body pos="0 0 0.3" euler="20 30 0"><freejoint/>
+<geom type="box" size="0.1 0.1 0.1"/></body></worldbody></mujoco>"""
+# it sinks a little to its rest: a box on a plate with a spring
+STANDS = """<mujoco><worldbody><body pos="0 0 1"><joint name="{0}" type="slide" axis="0 0 1" stiffness="{1}" damping="100"/>
+<geom type="box" size="0.1 0.1 0.1" mass="1"/></body></worldbody></mujoco>"""
+
+
+def setup_for(xml, **request):
+    return replace(setup_of_file(xml), alone=True, request=Request(**request), command="run --error 0.001")
+
+
+def scene(xml, **request):
+    setup = setup_for(xml, **request)
+    return scene_of(setup, setup.reading)
+
+
+def waves(*names):
+    """Controls that wave, of these actuators."""
+    times = np.linspace(0.0, 0.4, 21)
+    return {"time": times} | {name: 0.3 * np.sin(2.0 * np.pi * times) for name in names}
+
+
+def answered(xml, **request) -> ReductionResult:
+    setup, result = setup_for(xml, **request), ReductionResult("reduction")
+    of_file.add(result, setup, setup.reading)
+    return result
+
+
+@pytest.fixture(scope="module", autouse=True)
+def counted():
+    """Work for times: steps, and joints and geoms in each."""
+
+    def work(runs, rounds, clock):
+        return {name: run.steps * (2.0 + run.model.nv + run.model.ngeom) for name, run in runs.items()}
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search, "fastest", work)
+        yield
+
+
+@pytest.fixture(scope="module")
+def two_arms(counted, tmp_path_factory):
+    path = tmp_path_factory.mktemp("smaller") / "smaller.xml"
+    controls = waves("left upper", "left lower")
+    return answered(TWO_ARMS, controls=controls, points="left tip,right hand", write=str(path)), path
+
+
+def test_what_a_motion_does_not_use_goes_bit_for_bit():
+    arms = scene(TWO_ARMS, controls=waves("left upper"))
+    kinds = take_out(arms)
+    assert {row.kind: row.taken_out for row, _ in kinds if row.same_bits} == {
+        "drawing": 3, "sensors": 1, "geoms that never touch": 6, "equalities without force": 1, "actuators without force": 3,
+        "tendons without force": 1, "limits that never act": 2, "stages without work": 3,
+    }  # fmt: skip
+    small = kinds[-1][1]
+    counts = "ngeom", "nsensor", "neq", "ntendon", "nlight", "njnt"
+    assert [getattr(small.model, name) for name in counts] == [0, 0, 0, 0, 0, 4]
+    assert search.same_bits(arms.run(small), arms.run(arms.whole))
+
+
+def test_a_kind_without_which_the_motion_differs_stays(monkeypatch):
+    def heavier(small, use):
+        small.spec.body("left hand").geoms[0].mass *= 1.0 + 1e-9
+        return 1
+
+    monkeypatch.setattr(search, "FREE", {"mass": heavier} | search.FREE)
+    arms = scene(TWO_ARMS, controls=waves("left upper"))
+    kinds = take_out(arms)
+    assert [row.kind for row, _ in kinds if not row.same_bits] == ["mass"]
+    assert kinds[0][1] is arms.whole and kinds[-1][0].same_bits
+
+
+def test_the_idle_arm_is_locked_and_the_written_file_does_the_same_motion(two_arms):
+    """The file is read by itself, and compared with a run of the whole one that this test makes."""
+    result, path = two_arms
+    assert [str(check) for check in result.checks if not check.passed] == []
+    locked = [row.joint for row in result.tables["reduction_joints"] if row.locked]
+    assert locked == ["right upper", "right lower"]
+    best = next(row for row in result.tables["reduction_frontier"] if "0.001" in row.best_for.split(", "))
+    assert best.locked == 2 and best.error <= 1e-3
+    assert best.error <= best.error_of_model + best.error_of_step + 1e-12
+    arms = scene(TWO_ARMS, controls=waves("left upper", "left lower"))
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert [model.joint(i).name for i in range(model.njnt)] == ["left upper", "left lower"]
+    assert model.nkey == 1 and model.key("home").qpos.shape == (2,) and model.site("left tip").id >= 0
+    assert model.opt.timestep == best.dt
+    motion = Simulation(model, arms.motion, best.dt, best.integrator)()
+    error = apart(motion, arms.finely(arms.whole), arms.motion)
+    check = next(check for check in result.checks if check.quantity == "error of the smaller file")
+    assert error == pytest.approx(check.value) and check.value == pytest.approx(best.error, rel=1e-3)
+    digits = result.top[0].values["found"]["digits"]
+    assert abs(check.value - best.error) <= digits < 1e-5  # of six digits
+    text = path.read_text(encoding="utf-8")
+    assert "home" in text and "run, error 0.001" in text and "right upper" in text  # the comment
+
+
+def test_what_the_scene_used_is_a_table(two_arms):
+    use = {row.part: row for row in two_arms[0].tables["reduction_use"]}
+    assert (use["actuators"].in_file, use["actuators"].used) == (5, 2)
+    assert (use["joints that move"].in_file, use["joints that move"].used) == (4, 2)
+    assert (use["geoms that touch"].in_file, use["geoms that touch"].used, use["sensors"].in_file) == (
+        6,
+        0,
+        1,
+    )
+
+
+def test_the_result_goes_to_the_process_that_draws(two_arms):
+    result = pickle.loads(pickle.dumps(two_arms[0]))
+    names = [name for name, *_ in (figure() for figure in reduction.figures(result, None))]
+    assert names == ["reduction_frontier"]
+
+
+def test_the_equations_of_the_smaller_model_are_those_of_tmts_lock(two_arms):
+    result, path = two_arms
+    where = "home, 2 joints locked"
+    quantities = {check.quantity for check in result.checks if check.scene == where}
+    assert quantities == {f"{name}, lock of tmt to the smaller model" for name in ("Mbar", "bias")}
+    whole, written, elsewhere = read(Source(TWO_ARMS)).tree, read(path).tree, ReductionResult("reduction")
+    of_file.compare_locked(elsewhere, where, whole.lock({"right upper": 1.0, "left lower": 0.0}), written)
+    assert not all(check.passed for check in elsewhere.checks)
+
+
+def test_a_file_beyond_the_error_fails(two_arms):
+    arms = scene(TWO_ARMS, controls=waves("left upper", "left lower"))
+    _, found = two_arms[0].top[0].kind, two_arms[0].top[0].values["found"]
+    row = found["whole"]
+    for allowed, passed in ((row.error * 1.01, True), (row.error * 0.99, False)):
+        result, answer = ReductionResult("reduction"), Answer(allowed, row, at_own_step=False)
+        of_file.add_checks(result, arms, arms.whole, {}, answer, arms.whole, arms.whole.text())
+        verdicts = {check.quantity: check.passed for check in result.checks}
+        assert verdicts["error of the smaller file"] is passed
+
+
+@pytest.mark.parametrize("stiffness, name, moves", [(1000.0, "qpos0, at rest", False), (20.0, "qpos0", True)])
+def test_a_robot_that_stands_starts_at_its_rest(stiffness, name, moves):
+    """It sinks by 10 mm, or by half a meter: that is what it does."""
+    stands = scene(STANDS.format("plate", stiffness))
+    assert stands.motion.name == name
+    assert (stands.use.ranges["plate"] > of_file.STILL) is moves
+
+
+def test_the_joints_that_a_tendon_ties_are_locked_together():
+    """A hand whose thumb is still; the tendon and its servo go with it."""
+    hand = scene(HAND, controls=waves("index"))
+    groups = search.groups_of(hand, hand.whole)
+    assert {"thumb", "thumb tip"} in [set(group.names) for group in groups]
+    assert [group.predicted for group in groups] == sorted(group.predicted for group in groups)
+    small = search.locked(hand.whole, {name: hand.use.middle[name] for name in ("thumb", "thumb tip")})
+    assert (small.model.nv, small.model.ntendon, small.model.nu) == (2, 0, 2)
+    assert apart(hand.run(small), hand.run(hand.whole), hand.motion) < 0.01
+    result = answered(HAND, controls=waves("index"), error=1e-2)
+    assert {"thumb", "thumb tip"} <= {row.joint for row in result.tables["reduction_joints"] if row.locked}
+    assert "index" not in {row.joint for row in result.tables["reduction_joints"] if row.locked}
+
+
+def test_the_prediction_is_the_movement_times_the_coupling_through_the_mass_matrix():
+    """The others, were they free, would move by M22^-1 M21 times it."""
+    arms = scene(HAND, controls=waves("index"))
+    tree = arms.reading.tree
+    (group,) = [group for group in search.groups_of(arms, arms.whole) if group.names == ["wrist"]]
+    path, expected = arms.run(arms.whole), 0.0
+    for q in path.q[:: len(path.q) // SAMPLES]:
+        M = np.array(tmt.mass_matrix(q, model=tree))
+        moved = np.abs(q[0] - arms.use.middle["wrist"][0])
+        expected = max(expected, np.abs(np.linalg.solve(M[1:, 1:], M[1:, 0])).max() * moved)
+    assert group.predicted == pytest.approx(expected, rel=1e-9)
+
+
+def test_where_everything_moves_and_touches_nothing_is_left_out():
+    result = answered(TUMBLES, error=1e-9)
+    answer = result.top[0].values["found"]
+    assert not answer["names"] and not any(row.same_bits for row in answer["free"])
+    assert "nothing can be left out" in say(result.top[0])
+    assert all(check.passed for check in result.checks)
+
+
+def row(gain, error, locked=0, own=None) -> FrontierRow:
+    numbers = {"error": error, "error_of_model": 0.0, "error_of_step": error, "error_at_own_step": own}
+    return FrontierRow(model="", locked=locked, integrator="Euler", dt=0.1, gain=gain, **numbers)
+
+
+WHOLE = row(1.0, 0.5, own=0.0)
+
+
+@pytest.mark.parametrize("rows, best, at_own_step", [
+    ([WHOLE, row(3.0, 1.0), row(9.0, 1.01)], 1, False), ([WHOLE, row(3.0, 1.01)], 0, True),  # within the error; none is
+    ([WHOLE, row(3.1, 1.0), row(3.0, 0.5, 2)], 2, False), ([WHOLE, row(3.2, 1.0), row(3.0, 0.5, 2)], 1, False),
+    ([WHOLE, row(1.04, 0.5), row(2.0, 5.0, 3, own=1.0)], 2, True), ([WHOLE, row(2.0, 5.0, 3, own=1.01)], 0, True),
+])  # fmt: skip
+def test_the_fastest_within_the_error_is_the_answer(rows, best, at_own_step):
+    answer = answer_within(rows, 1.0)
+    assert answer.row is rows[best] and answer.at_own_step is at_own_step
+    assert answer.is_gain is (best > 0)
+
+
+def test_no_gain_is_not_called_one():
+    result = answered(TUMBLES, error=1e-9)
+    found = result.top[0].values["found"] | {"names": ["a"]}
+    assert "nothing is gained at" in say(replace(result.top[0], values={"found": found}))
+
+
+def test_recorded_controls_are_held_between_their_times():
+    arms = scene(
+        TWO_ARMS, controls={"time": np.array([0.0, 0.1, 0.3]), "left upper": np.array([1.0, 2.0, 3.0])}
+    )
+    controls = arms.motion.controls(arms.whole.model, 0.05, 6)
+    assert controls[:, 0].tolist() == [1.0, 1.0, 2.0, 2.0, 2.0, 2.0] and not controls[:, 1:].any()
+    assert arms.motion.duration == 0.3
+
+
+@pytest.mark.parametrize("text, message", [
+    ("time,left upper\n0,1\n0.1,2\n", ""), ("time,elbow\n0,1\n0.1,2\n", "no actuator elbow"),
+    ("time,left upper\n0,x\n", "cannot read"),
+    ("time,left upper\n0.1,1\n0.2,1\n", "rises from 0"), ("time\n0\n1\n", "at least one"), ("", "cannot read"),
+    ("time,left upper\n0,nan\n1,1\n", "numbers"), ("time,left upper\n0,1\n1\n", "cannot read"),
+])  # fmt: skip
+def test_a_file_of_controls_is_read_or_refused_in_one_line(tmp_path, text, message):
+    path = tmp_path / "controls.csv"
+    path.write_text(text)
+    if not message:
+        assert read_controls(path, ["left upper"])["left upper"].tolist() == [1.0, 2.0]
+    else:
+        with pytest.raises(SceneError, match=message) as refused:
+            read_controls(path, ["left upper"])
+        assert "\n" not in str(refused.value)
