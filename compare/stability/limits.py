@@ -16,9 +16,7 @@ REFINED = 2e-3  # of a limit
 SLOW = 1.2  # a factor below: of what grows little in a step
 BY_ITSELF = 0.7, 1.4  # of its rate at a coarser step: a slow growth whose rate stays is none of the step
 SADDLE = 0.1  # 1/s: what grows by itself and slower is a drift
-GIVES_WAY = (
-    0.3  # rad or m: a rest so far from where the search began is another one: soft constraints have given way
-)
+GIVES_WAY = 0.3  # rad or m: a rest so far from where the search began is another one
 BESIDE_DRIFT = 2.0  # fold: what grows faster than a drift
 
 

@@ -11,15 +11,10 @@ from .limits import COARSER, LONGEST, SHORTEST, Limit, bisected
 from .rest import Rest, rest_near
 
 BELOW, ABOVE = 0.97, 1.03  # of a limit: the steps at which runs are to differ
-WITHIN, OWN_FOLDS = (
-    1.07,
-    (1.125, 1.03),
-)  # fold: how near they are then; those of a file's own run, one after the other
+WITHIN = 1.07  # fold: how near they are then
+OWN_FOLDS = 1.125, 1.03  # from one step of a file's own run to the next, one after the other
 OWN_PUSH = 1e-6  # rad/s or m/s: at the start of a file's own run
-CURVE_STEPS, LEAST_SIZES = (
-    400,
-    16,
-)  # of a run that shows how fast a push grows, and of those in which it is small
+CURVE_STEPS, LEAST_SIZES = 400, 16  # of a run that shows how fast a push grows, and while it is small
 PUSHES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # rad/s or m/s, of all speeds
 USUAL_PUSH = 0.1  # rad/s or m/s: what a robot in use meets
 CALM, CALMER = 1e-3, 0.05  # rad/s or m/s, and of the push: a speed at the end that is rest

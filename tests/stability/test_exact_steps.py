@@ -92,14 +92,8 @@ def test_the_closed_form_is_the_derivative_of_mujocos_own_step(kind):
         known = len(forces.rows.R)
         if kind == "a loaded loop":
             assert np.abs(forces.rows.f).max() > 1.0
-    rows = {
-        "a loaded loop": 3,
-        "a limit": 1,
-        "friction loss": 1,
-        "a box": 12,
-        "a free caster": 9,
-        "the two-mass leg": 1,
-    }
+    rows = {"a loaded loop": 3, "a limit": 1, "friction loss": 1, "a box": 12, "a free caster": 9}
+    rows |= {"the two-mass leg": 1}
     rows |= {f"{cone}, condim {d}": count for cone, counts in (("elliptic", (1, 3, 6)), ("pyramidal", (1, 4, 10)))
              for d, count in zip((1, 3, 6), counts)}  # fmt: skip
     assert known == rows.get(kind, 0)

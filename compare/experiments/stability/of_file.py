@@ -18,14 +18,13 @@ from ...stability.place import MOST_POSTURES, Posture, posture_of, postures_of, 
 from ...stability.runs import USUAL_PUSH
 from ..setup import Request, Setup
 from . import own_run
-from .tables import ControlRow, LimitRow, OwnRunRow, StabilityResult
+from .tables import ControlRow, OwnRunRow, StabilityResult
 
 OF = "of_file"  # the template
 RADII_WITHIN = 1e-4  # relative: of the growth in a step, MuJoCo's is by differences
 WHOLE = 1e-9  # of a step: a delay that is so near to whole steps is
 MOST_GROWTH = 10.0  # in a step: with more, differences leave the zone in which the forces are linear
 DEFAULT_STEP, DEFAULT = 0.002, "Euler"  # MuJoCo's step, s, and integrator where a file states none
-GIVES_WAY = 0.1  # rad or m: a rest at the limit so far from that of the file's step is said
 FAR, CREEPS = 0.05, 1e-4  # rad or m, rad/s or m/s: of a rest that is told, from its posture, and of a creep
 MODES = "growth of a step in closed form, TMT to MuJoCo"
 PUSHED = "stable after a push"
@@ -221,8 +220,6 @@ def add_facts(tell: Callable[..., None], row: StepLimitRow | None, default: Step
         return
     if row.decided_by_runs:
         tell("by_derivative", row=row, up_to=LONGEST)
-    elif row.gives_way is not None and row.gives_way > GIVES_WAY:
-        tell("gives_way", row=row)
     if row.finer_push and row.largest_push is not None and row.largest_push < USUAL_PUSH:
         tell("push", row=row)
     if row.needs_friction(row.file_dt):
@@ -259,16 +256,3 @@ def headline(result: StabilityResult) -> Finding | None:
     own = in_use(table, table[0].file_integrator)
     values = {"up_to": LONGEST, "dt": table[0].file_dt}
     return result.finding("headline", OF, row=own[0], **values) if own else None
-
-
-def limits_in_use(rows: Sequence[StepLimitRow]) -> list[LimitRow]:
-    """The limits of a file's robot as it stands, in the form of those of the arm, for the picture of the first screen."""
-    kinds = {"finite": "finite", "none": "never_fails", "moving": "never_fails", "below": "always_fails"}
-    return [
-        LimitRow(
-            scene=row.posture, engine="mujoco", method=row.integrator, damping=0.0, mode=row.growth_rate or 0.0,
-            predicted_dt=row.predicted_dt, observed_dt=min(row.longest, LONGEST) if row.observed_dt else None,
-            limit=kinds[row.limit], passed=True,
-        )
-        for row in rows if row.limit in kinds and row.surroundings != "air"
-    ]  # fmt: skip

@@ -20,9 +20,7 @@ LASTS, LEAST_STEPS, MOST_STEPS = 2.0, 1000, 20_000  # s, and between which numbe
 LONGER = 3.0  # fold: where it has not come to rest it is run so long
 PARTS = 4  # of a run: the speeds of each are averaged
 FINER = 16  # the step over the finer one
-PUSH = (
-    1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
-)
+PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay, however unstable
 CALM = 1e-3  # rad/s or m/s, root of the mean square
 FASTER = 10.0  # fold, than at the finer step: what moves on by the step alone
 AT_OWN, AT_REQUESTED = "stable in its own run", "stable in its run"
