@@ -1,6 +1,6 @@
 """The answer for a file: rows of limits at its postures, by the derivative of its step, in closed form and in runs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -10,28 +10,17 @@ from ..core.rows import Row, column
 from ..engines.mujoco.forces import rows_at
 from ..engines.mujoco.names import INTEGRATORS, contact_name
 from ..engines.mujoco.reading import Reading
-from ..engines.mujoco.step import Step, distance
+from ..engines.mujoco.step import Step
 from ..engines.mujoco.variants import has_free_base
+from . import runs
 from .closed_form import radius_apart
 from .cures import Cure, cures
 from .growth import LASTS, Growth
-from .limits import COARSER, LONGEST, Limit, limit, tried
+from .limits import LONGEST, Limit, limit, tried
 from .place import MOVING, Place, Posture, in_the_air_at, standing_at
 from .rest import SETTLED, Rest
-from .runs import (
-    CALM,
-    FINER,
-    OWN_PUSH,
-    growth_in_run,
-    largest_push,
-    observed,
-    own_limit,
-    speed_at_end,
-    stays_still,
-)
 
 SHARE = 0.1  # of the energy of a mode: what a contact has more of takes part
-CURVE_STEPS = 18  # of a curve
 CURVE_RUNS = 0.8, 1.05, 1.15, 1.4, 2.0  # of a limit: steps of runs beside its curve
 
 
@@ -48,8 +37,8 @@ class StepLimitRow(Row):
     observed_dt, failing_dt: the longest step at which runs
     hold and the shortest at which they fail. own_dt: beyond it the file's own run, from where it sinks to, fails.
     smooth_dt: the limit without dry friction. growth: per step, at the file's step; apart: in closed form minus that.
-    growth_rate: just beyond the limit; of a saddle that of its fall. gives_way: from the rest to that at the limit.
-    finer_push: whether a finer step bears no larger push. moved: from the posture to the rest. has_fallen: by a free body.
+    growth_rate: just beyond the limit; of a saddle that of its fall. finer_push: whether a finer step bears no larger push,
+    asked below the usual push. moved: from the posture to the rest. has_fallen: by a free body.
     held_objects: loose objects that move on, held where they are. Speeds are in rad/s or m/s, movements in rad or m.
     """
 
@@ -73,7 +62,6 @@ class StepLimitRow(Row):
     apart: float | None = None
     largest_push: float | None = None
     finer_push: bool | None = None
-    gives_way: float | None = None
     has_fallen: bool = False
     moved: float | None = None
     moved_joint: str = ""
@@ -98,6 +86,17 @@ class StepLimitRow(Row):
     def is_held_by_friction(self) -> bool:
         """Whether the limit is lower without dry friction, which holds small deviations at any step."""
         return self.smooth_dt is not None and self.smooth_dt < 0.99 * self.longest
+
+    def needs_friction(self, dt: float) -> bool:
+        """Whether a step, s, is stable by dry friction alone, as far as small deviations go."""
+        return self.is_held_by_friction and (self.smooth_dt or 0.0) < dt <= self.longest
+
+    @property
+    def is_weak(self) -> bool:
+        """Whether a usual push is borne by a finer step than that in use alone."""
+        if self.largest_push is None or self.has_fallen or self.finer_push:
+            return False
+        return self.largest_push < runs.USUAL_PUSH
 
     @property
     def longest(self) -> float:
@@ -153,38 +152,36 @@ def answer(posture: Posture, contacts: bool, reading: Reading, asked: Asked) -> 
         return PlaceAnswer([], {}, [])
     rows, curves = [], {}
     for integrator in asked.integrators:
-        rows.append(limit_row(place, integrator, asked))
-        if asked.drawn and rows[-1].is_known:
-            curves[integrator] = curve(place, rows[-1])
+        row, found = limit_row(place, integrator, asked)
+        rows.append(row)
+        if asked.drawn and row.is_known:
+            curves[integrator] = curve(place, row, found)
     fails = [row for row in rows if row.integrator == asked.integrator and row.stable_at_file_dt is False]
     changes = cures(place.model, place.rest, asked.dt, asked.integrator) if fails and contacts else []
     return PlaceAnswer(rows, curves, changes)
 
 
-def curve(place: Place, row: StepLimitRow) -> Curve:
-    """The growth over the step: from an eighth of the file's step to four times the limit, and about the limit in runs."""
-    limit_dt = row.predicted_dt or LONGEST / COARSER
-    low, high = min(row.file_dt, limit_dt) / 8.0, min(4.0 * max(limit_dt, row.file_dt), LONGEST)
-    beside = [share * limit_dt for share in CURVE_RUNS]
-    predicted, state = [], place.rest
-    for dt in sorted(step for step in (*np.geomspace(low, high, CURVE_STEPS), *beside) if step <= high):
-        at = tried(place.model, state, float(dt), row.integrator)
+def curve(place: Place, row: StepLimitRow, found: Limit) -> Curve:
+    """The growth over the step: at the steps of the search, and about the limit, where runs stand beside it."""
+    tries, seen, state = list(found.tries), [], found.rest.state
+    for share in CURVE_RUNS if row.predicted_dt else ():
+        at = tried(place.model, state, share * (row.predicted_dt or 0.0), row.integrator)
         if not at.rest.is_found:
             break
-        predicted.append((float(dt), at.growth.factor))
+        tries.append(at)
         state = at.rest.state
-    seen = [
-        (dt, growth_in_run(place.model, place.rest, dt, row.integrator)) for dt in beside if row.predicted_dt
-    ]
-    return Curve(predicted, [(dt, factor) for dt, factor in seen if factor is not None])
+        if (factor := runs.growth_in_run(at.rest)) is not None:
+            seen.append((at.dt, factor))
+    predicted = [(at.dt, at.growth.factor) for at in tries if at.rest.is_found]
+    return Curve(sorted(predicted), seen)
 
 
-def limit_row(place: Place, integrator: str, asked: Asked) -> StepLimitRow:
-    """The limit of an integrator at a place, and what the step in use does there."""
+def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow, Limit]:
+    """The limit of an integrator at a place, what the step in use does there, and the search for it."""
     model, dt = place.model, asked.dt
     found = limit(model, place.rest, integrator, dt)
-    shows = found.kind == "saddle" and found.growth.rate * LASTS > np.log(CALM / OWN_PUSH)
-    if shows and stays_still(
+    shows = found.kind == "saddle" and found.growth.rate * LASTS > np.log(runs.CALM / runs.OWN_PUSH)
+    if shows and runs.stays_still(
         model, place.rest, dt, integrator, place.creep
     ):  # what grows there remains small
         found = limit(model, place.rest, integrator, dt, found.growth.rate)
@@ -202,39 +199,40 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> StepLimitRow:
         row.creep, row.creeping_joint = float(creep.max()), place.speed_names[int(np.argmax(creep))]
     if at.rest.left <= SETTLED and not place.held_objects:
         row.apart = radius_apart(at.rest, place.tree)
-    if found.dt:
-        row.gives_way = float(np.abs(distance(model, place.rest, found.rest.state)).max())
     if place.is_touching and found.kind != "saddle" and (found.kind == "no rest" or place.creep > MOVING):
         row.limit, row.predicted_dt = "moving", None
         add_motion(row, place)
-    elif row.is_known:
+    elif row.is_known and (
+        place.contacts or integrator == asked.integrator
+    ):  # in the air the others have no use
         if place.frictionless is not None:
             row.smooth_dt = limit(place.frictionless, place.rest, integrator, dt).dt
         if asked.in_runs:
             add_runs(row, place, found)
-    return row
+    return row, found
 
 
 def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
     """What runs show; they have the last word."""
     if row.limit == "finite":
-        row.observed_dt, row.failing_dt = observed(place.model, found, row.integrator)
-    add_own_limit(row, place, place.creep)
-    row.largest_push, row.finer_push = largest_push(place.model, found.first.rest, place.creep)
+        row.observed_dt, row.failing_dt = runs.observed(place.model, found, row.integrator)
+    add_own_limit(row, place, lambda dt: max(place.creep, found.creep_near(dt)))
+    row.largest_push, row.finer_push = runs.largest_push(place.model, found.first.rest, place.creep)
 
 
 def add_motion(row: StepLimitRow, place: Place) -> None:
     """Of a robot that touches something and goes on moving: how fast at a finer step, and up to which step no faster."""
-    finer = Step(place.model, row.file_dt / FINER, row.integrator, exact=False)
-    speed = speed_at_end(finer, place.rest)
+    finer = Step(place.model, row.file_dt / runs.FINER, row.integrator, exact=False)
+    speed = runs.speed_at_end(finer, place.rest)
     row.creep = speed if np.isfinite(speed) else place.creep
     row.creeping_joint = place.speed_names[int(np.argmax(np.abs(finer.data.qvel)))]
-    add_own_limit(row, place, row.creep)
+    creep = row.creep
+    add_own_limit(row, place, lambda dt: creep)
 
 
-def add_own_limit(row: StepLimitRow, place: Place, creep: float) -> None:
+def add_own_limit(row: StepLimitRow, place: Place, creep_at: Callable[[float], float]) -> None:
     if longest := min(row.longest, LONGEST):
-        own = own_limit(place.model, place.rest, row.integrator, longest, creep)
+        own = runs.own_limit(place.model, place.rest, row.integrator, longest, creep_at)
         row.own_dt = own if own < longest else None
     row.stable_at_file_dt = row.file_dt <= row.longest
 

@@ -43,10 +43,13 @@ def spectral_radius(A: np.ndarray) -> float:
 
 
 def is_covered(rest: Rest) -> bool:
-    """RK4 only if the activations do not depend on the motion: they are left out there."""
+    """RK4 only if the activations do not depend on the motion: they are left out there.
+
+    Not what MuJoCo's noslip solver changes: it takes R out of the rows of friction, in a few iterations.
+    """
     moved = 2 * rest.step.model.nv
     alone = rest.step.integrator != "RK4" or not (np.abs(rest.A[moved:, :moved]) > ALONE).any()
-    return rest.step.integrator in COVERED and alone
+    return rest.step.integrator in COVERED and alone and not rest.step.model.opt.noslip_iterations
 
 
 def matrix(rest: Rest, tree: tmt.Tree, forces: Forces) -> np.ndarray:

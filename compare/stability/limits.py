@@ -16,9 +16,7 @@ REFINED = 2e-3  # of a limit
 SLOW = 1.2  # a factor below: of what grows little in a step
 BY_ITSELF = 0.7, 1.4  # of its rate at a coarser step: a slow growth whose rate stays is none of the step
 SADDLE = 0.1  # 1/s: what grows by itself and slower is a drift
-GIVES_WAY = (
-    0.3  # rad or m: a rest so far from where the search began is another one: soft constraints have given way
-)
+GIVES_WAY = 0.3  # rad or m: a rest so far from where the search began is another one
 BESIDE_DRIFT = 2.0  # fold: what grows faster than a drift
 
 
@@ -46,14 +44,31 @@ class Limit:
     kind: finite; none, stable up to LONGEST; below, not stable at SHORTEST; saddle, something grows at any step, at the rate
     of `growth`; no rest, none was found.
     dt: s, of a finite one. growth: of what grows just beyond. rest: the one just below the limit, else at the last step tried.
-    first: the step with which the search began.
+    tries: all steps of the search, in its order.
     """
 
     kind: str
     dt: float | None
     growth: Growth
     rest: Rest
-    first: Tried
+    tries: list[Tried]
+
+    @property
+    def first(self) -> Tried:
+        return self.tries[0]
+
+    def state_below(self, dt: float) -> np.ndarray:
+        """The rest of the search nearest below a step, s: from there the one at the step is followed."""
+        below = self.stable_below(dt)
+        return max(below, key=lambda at: at.dt).rest.state if below else self.rest.state
+
+    def creep_near(self, dt: float) -> float:
+        """The largest speed at the rests of the search up to a step, s, and the next coarser one."""
+        speeds = [np.abs(at.rest.speeds).max(initial=0.0) for at in self.stable_below(COARSER * dt)]
+        return float(max(speeds, default=0.0))
+
+    def stable_below(self, dt: float) -> list[Tried]:
+        return [at for at in self.tries if at.is_stable and at.dt <= dt]
 
 
 def tried(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, drift: float = 0.0) -> Tried:
@@ -68,32 +83,38 @@ def limit(
     model: mujoco.MjModel, state: np.ndarray, integrator: str, first: float, drift: float = 0.0
 ) -> Limit:
     """The limit near a step `first`, s: from there upwards to what fails, or downwards to what holds, then by bisection."""
-    at = began = tried(model, state, first, integrator, drift)
+    tries = list[Tried]()
+
+    def attempt(near: np.ndarray, dt: float) -> Tried:
+        tries.append(tried(model, near, dt, integrator, drift))
+        return tries[-1]
+
+    at = attempt(state, first)
     stable, failing = (at, None) if at.is_stable else (None, at)
     while failing is None and at.dt < LONGEST:
-        at = tried(model, at.rest.state, min(at.dt * COARSER, LONGEST), integrator, drift)
+        at = attempt(at.rest.state, min(at.dt * COARSER, LONGEST))
         stable, failing = (at, None) if at.is_stable else (stable, at)
     while stable is None and at.dt > SHORTEST:
-        finer = tried(model, state, at.dt / COARSER**2, integrator, drift)
+        finer = attempt(state, at.dt / COARSER**2)
         if finer.is_stable:
             stable = finer
         elif is_saddle(at, finer):
-            return Limit("saddle", None, finer.growth, finer.rest, began)
+            return Limit("saddle", None, finer.growth, finer.rest, tries)
         elif grows_by_itself(at, finer):
             return limit(model, state, integrator, first, finer.growth.rate)
         elif not (at.rest.is_found or finer.rest.is_found):
-            return Limit("no rest", None, finer.growth, finer.rest, began)
+            return Limit("no rest", None, finer.growth, finer.rest, tries)
         else:
             failing = finer
         at = finer
     if stable is None:
-        return Limit("below", None, at.growth, at.rest, began)
+        return Limit("below", None, at.growth, at.rest, tries)
     if failing is None:
-        return Limit("none", None, stable.growth, stable.rest, began)
+        return Limit("none", None, stable.growth, stable.rest, tries)
     while failing.dt > stable.dt * (1.0 + REFINED):
-        middle = tried(model, stable.rest.state, float(np.sqrt(stable.dt * failing.dt)), integrator, drift)
+        middle = attempt(stable.rest.state, float(np.sqrt(stable.dt * failing.dt)))
         stable, failing = (middle, failing) if middle.is_stable else (stable, middle)
-    return Limit("finite", stable.dt, failing.growth, stable.rest, began)
+    return Limit("finite", stable.dt, failing.growth, stable.rest, tries)
 
 
 def is_saddle(coarse: Tried, fine: Tried) -> bool:

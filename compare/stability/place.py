@@ -13,13 +13,7 @@ import tmt
 from ..engines.mujoco.names import element_name
 from ..engines.mujoco.reading import Reading
 from ..engines.mujoco.step import Step, distance, start_of
-from ..engines.mujoco.variants import (
-    add_armature,
-    has_free_base,
-    in_the_air,
-    of_base,
-    without_dry_friction,
-)
+from ..engines.mujoco.variants import add_armature, has_free_base, in_the_air, of_base, without_dry_friction
 from ..robots.coordinates import Coordinates
 from ..robots.file import names_of_keys
 from .limits import is_saddle, tried

@@ -16,17 +16,12 @@ from ..engines.mujoco.step import RELAXING, Step
 
 AT_REST = 1e-5  # rad/s2 or m/s2: the acceleration that is sought
 SETTLED, NEAR_REST = 1e-3, 0.02  # rad/s2 or m/s2: the one with which the search ends, and that counts as rest
-TRIES, SHARES = (
-    15,
-    (1.0, 0.5, 0.25, 0.1, 0.03),
-)  # of Newton's method, and the parts of its step that are tried
+TRIES = 15  # of Newton's method
+SHARES = 1.0, 0.5, 0.25, 0.1, 0.03  # of its step: the parts that are tried
 REACH = 0.05  # rad or m: its longest step
 UNHELD = 1e-6  # of the largest slope of a force: none
-DEPENDENT = (
-    1e-4,
-    1e-6,
-    1e-9,
-)  # of the largest singular value: softer directions move only if the stiffer do not help
+# of the largest singular value: softer directions move only if the stiffer do not help
+DEPENDENT = 1e-4, 1e-6, 1e-9
 RELAXED_STEPS = 1e-3, 5e-4  # s, the longest step of a relaxed run, and of a file with a shorter one
 RELAXED = (4.0, 10.0), (3.0, 1.0), (2.0, 0.0)  # s, 1/s: how long its parts last, how fast its speeds decay
 RELAXED_STILL = 1e-6  # rad/s or m/s

@@ -1,5 +1,7 @@
 """What runs show: where small deviations from rest grow, the file's own run, and the largest push that is survived."""
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 
@@ -9,12 +11,10 @@ from .limits import COARSER, LONGEST, SHORTEST, Limit, bisected
 from .rest import Rest, rest_near
 
 BELOW, ABOVE = 0.97, 1.03  # of a limit: the steps at which runs are to differ
-WITHIN, OWN_WITHIN = 1.07, 1.03  # fold: how near they are then; and those of a file's own run
+WITHIN = 1.07  # fold: how near they are then
+OWN_FOLDS = 1.125, 1.03  # from one step of a file's own run to the next, one after the other
 OWN_PUSH = 1e-6  # rad/s or m/s: at the start of a file's own run
-CURVE_STEPS, LEAST_SIZES = (
-    400,
-    16,
-)  # of a run that shows how fast a push grows, and of those in which it is small
+CURVE_STEPS, LEAST_SIZES = 400, 16  # of a run that shows how fast a push grows, and while it is small
 PUSHES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # rad/s or m/s, of all speeds
 USUAL_PUSH = 0.1  # rad/s or m/s: what a robot in use meets
 CALM, CALMER = 1e-3, 0.05  # rad/s or m/s, and of the push: a speed at the end that is rest
@@ -24,11 +24,8 @@ THROWN = 10.0  # fold, of the push: a speed at the end that no push leaves
 FINER = 8  # the step over the one that shows whether the robot itself bears a push
 
 
-def growth_in_run(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str) -> float | None:
-    """The factor by which a small push grows in a step of a run, after its first quarter; None: no rest, or no growth."""
-    rest = rest_near(Step(model, dt, integrator), state)
-    if not rest.is_found:
-        return None
+def growth_in_run(rest: Rest) -> float | None:
+    """The factor by which a small push grows in a step of a run, after its first quarter; None: it is small too shortly."""
     plain = speeds_of(rest.step.run(rest.state, CURVE_STEPS))
     sizes = apart(rest.step.run(pushed(rest, SMALL_PUSH), len(plain)), plain, GROWN**2 * SMALL_PUSH)
     if len(sizes) < LEAST_SIZES or not sizes.min() > 0.0:
@@ -51,46 +48,53 @@ def speed_after(model: mujoco.MjModel, rest: Rest, push: float, dt: float) -> fl
     return float(np.abs(speeds[-steps // 8 :] - rest.speeds).max())
 
 
-def largest_push(model: mujoco.MjModel, rest: Rest, creep: float) -> tuple[float, bool]:
+def largest_push(model: mujoco.MjModel, rest: Rest, creep: float) -> tuple[float, bool | None]:
     """The largest push that is survived, rad/s or m/s, 0.0: none; and whether a finer step survives no larger one either.
 
-    The robot calms down near its rest, or moves on no faster than at a finer step, as what nothing brakes, or little, does.
+    The robot calms down near its rest, or moves on no faster than at a finer step, as what nothing brakes, or little, does;
+    that is not asked after a push larger than usual, nor what a finer step survives beyond a usual one.
     creep: of the robot, rad/s or m/s.
     """
     dt = rest.step.dt
 
     def is_survived(push: float) -> bool:
         speed = speed_after(model, rest, push, dt)
-        if speed <= max(CALM, CALMER * push, AS_FAST * creep):
-            return True
-        return np.isfinite(speed) and speed <= AS_FAST * speed_after(model, rest, push, dt / FINER)
+        is_calm = speed <= max(CALM, CALMER * push, AS_FAST * creep)
+        if is_calm or push > USUAL_PUSH or not np.isfinite(speed):
+            return is_calm
+        return speed <= AS_FAST * speed_after(model, rest, push, dt / FINER)
 
     survived = next((push for push in PUSHES if is_survived(push)), 0.0)
-    if survived == PUSHES[0]:
-        return survived, False
+    if survived >= USUAL_PUSH:
+        return survived, None
     finer = rest_near(Step(model, dt / FINER, rest.step.integrator), rest.state)
     next_larger = min(push for push in PUSHES if push > survived)
     return survived, speed_after(model, finer, next_larger, dt / FINER) > THROWN * next_larger
 
 
 def own_limit(
-    model: mujoco.MjModel, state: np.ndarray, integrator: str, longest: float, creep: float
+    model: mujoco.MjModel,
+    state: np.ndarray,
+    integrator: str,
+    longest: float,
+    creep_at: Callable[[float], float],
 ) -> float:
     """The longest step up to `longest`, s, at which the file's own run from a state stays still, or as slow as its creep.
 
-    By the file's own solver, without searching a rest for each step; within 3 %. 0.0: at none.
+    creep_at: at a step, s. By the file's own solver, without searching a rest for each step; within 3 %. 0.0: at none.
     """
 
     def holds(step: float) -> bool:
-        return stays_still(model, state, step, integrator, creep)
+        return stays_still(model, state, step, integrator, creep_at(step))
 
     low = high = longest
     while not holds(low):
         low, high = low / COARSER, low
         if low < SHORTEST:
             return 0.0
-    while low * OWN_WITHIN < high and holds(low * OWN_WITHIN):  # upwards: a longer one may hold beyond a gap
-        low *= OWN_WITHIN
+    for fold in OWN_FOLDS:  # upwards: a longer one may hold beyond a gap
+        while low * fold < high and holds(low * fold):
+            low *= fold
     return low
 
 
@@ -99,7 +103,7 @@ def stays_still(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator:
     step = Step(model, dt, integrator, exact=False)
     speed = speed_at_end(step, state, WILD * max(CALM, creep))
     moved = float(np.abs(distance(model, state, step.state())).max(initial=0.0))
-    return speed <= max(CALM, AS_FAST_ALONE * creep) and moved <= FAR + creep * LASTS
+    return speed <= max(CALM, AS_FAST_ALONE * creep) and moved <= FAR + creep * dt * steps_in(LASTS, dt)
 
 
 def speed_at_end(step: Step, state: np.ndarray, most: float = np.inf) -> float:
@@ -118,10 +122,9 @@ def observed(model: mujoco.MjModel, limit: Limit, integrator: str) -> tuple[floa
     Where they do not differ there, from the limit up or down to where they do. None: none that holds, or that fails.
     """
     assert limit.dt is not None
-    state, rate = limit.rest.state, limit.growth.rate
 
     def fails(dt: float) -> bool:
-        return grows(rest_near(Step(model, dt, integrator), state), rate)
+        return grows(rest_near(Step(model, dt, integrator), limit.state_below(dt)), limit.growth.rate)
 
     low, high = BELOW * limit.dt, ABOVE * limit.dt
     while fails(low):

@@ -6,14 +6,12 @@ from types import SimpleNamespace
 
 import pytest
 from matplotlib.colors import to_hex
-from models import PATHS
 from sections import BAD, GOOD, section
 from small_runs import Lines
 
 from compare.core.cause import Cause
 from compare.core.check import About, Result
 from compare.core.text import say
-from compare.engines.mujoco.reading import read
 from compare.experiments import figures as figures_of_states
 from compare.experiments import module, stability
 from compare.experiments.parameters.numbers import NumberRow
@@ -27,9 +25,7 @@ from compare.report.questions import answers
 from compare.report.style import BLUE, ORANGE, RED
 from compare.report.verdict import failures, headline, outcome, passed, standing, verdict
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
 from compare.run.examine import say_outcome, section_with
-from compare.stability.answer import StepLimitRow
 
 CAUSE = {"rank": 2, "experiment": "parameters", "text": "mass of forearm: stated 1"}
 OWN_STEP = ("stable at its own step", 0.002, 0.00111, "at most", False, About.STEP)
@@ -253,13 +249,3 @@ def test_limits_are_counted_and_drawn_where_they_are_predicted_and_observed():
     values = stability.headline(result).values
     assert values == {"limits": 2, "known": 2, "wrong": 1, "off": pytest.approx(0.005)}
     assert {("o", to_hex(BLUE), 0.1001), ("X", to_hex(RED), 0.0995)} <= marks("stability", result)
-
-
-def test_where_the_robot_has_servos_the_limits_with_them_are_drawn():
-    row = StepLimitRow(posture="s", base="fixed", surroundings="free", integrator="Euler", limit="finite", predicted_dt=0.1,
-                       file_dt=0.002, file_integrator="Euler", stable_at_file_dt=True)  # fmt: skip
-    other = replace(row, observed_dt=0.001, failing_dt=0.0011)  # runs have the last word
-    rows = [row, replace(row, observed_dt=0.097, failing_dt=0.103), other, replace(row, limit="saddle")]
-    result = StabilityResult("stability", rows=[STEP], centres=("s",), tables={"step_limits": rows})
-    robot = replace(ARM, drive=robot_of(read(PATHS["arm7"]), "arm7.xml").drive)
-    assert {("s", to_hex(ORANGE), 0.1), ("s", to_hex(ORANGE), 0.001)} <= marks("stability", result, robot)

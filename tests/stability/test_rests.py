@@ -119,7 +119,7 @@ def test_what_bounces_is_not_in_the_air():
     )
     place = place_of(box)
     assert place.surroundings == "contact"
-    row = limit_row(place, "Euler", Asked(2e-3, "Euler", ["Euler"], in_runs=True))
+    row, _ = limit_row(place, "Euler", Asked(2e-3, "Euler", ["Euler"], in_runs=True))
     assert row.limit == "moving" and row.stable_at_file_dt is False and 1e-4 < row.own_dt < 2e-3
 
 

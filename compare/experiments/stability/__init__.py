@@ -47,6 +47,8 @@ def claim_values(robot: Robot) -> dict[str, Any]:
         "radii": of_file.RADII_WITHIN,
         "push": USUAL_PUSH,
         "up_to": LONGEST,
+        "far": of_file.FAR,
+        "creeps": of_file.CREEPS,
         "run": {"push": own_run.PUSH, "calm": own_run.CALM, "faster": own_run.FASTER, "finer": own_run.FINER},
     }
 
@@ -165,9 +167,7 @@ def figures(result: StabilityResult, robot: Robot) -> Iterator[Drawing]:
 def overview(results: Mapping[str, StabilityResult], robot: Robot) -> Iterator[Drawing]:
     from .figures_stability import draw_overview  # matplotlib is for the process that draws
 
-    result, file_dt = results["stability"], None
+    result = results["stability"]
     rows = limits_shown(result)
-    if table := result.tables.get("step_limits"):
-        rows, file_dt = of_file.limits_in_use(table), table[0].file_dt
     if any(row.predicted_dt or row.observed_dt or row.passed is False for row in rows):
-        yield partial(draw_overview, result, robot, rows, file_dt)
+        yield partial(draw_overview, result, robot, rows)

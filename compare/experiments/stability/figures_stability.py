@@ -52,7 +52,6 @@ def limits_in(
     rows: Sequence[LimitRow],
     known: Mapping[tuple[str, str], str],
     most: int | None = None,
-    file_dt: float | None = None,
 ) -> list[Line2D]:
     """The limits of each scheme, predicted (line) and observed (mark); the handles of a legend. known: schemes of methods."""
     of_scheme: dict[str, list[LimitRow]] = {}
@@ -60,7 +59,7 @@ def limits_in(
         of_scheme.setdefault(known.get((row.engine, row.method), row.method), []).append(row)
     of_scheme = dict(list(of_scheme.items())[:most])
     steps = [dt for row in rows for dt in (row.predicted_dt, row.observed_dt)]
-    ends = list(filter(None, [*steps, file_dt])) or [1e-3, 1.0]
+    ends = list(filter(None, steps)) or [1e-3, 1.0]
     low, high = min(ends) / 2, max(ends) * 2
     for place, mine in enumerate(of_scheme.values()):
         for row in mine:
@@ -92,17 +91,15 @@ def limits_in(
 
 
 def draw_overview(
-    result: StabilityResult, robot: Robot, rows: Sequence[LimitRow], dt: float | None
+    result: StabilityResult, robot: Robot, rows: Sequence[LimitRow]
 ) -> tuple[str, Figure, Finding]:
-    """The limits of the first screen, all postures in one. dt: the file's step, s, of limits with servos."""
+    """The limits of the first screen, all postures in one."""
     fig, ax = chart()
-    handles = limits_in(ax, rows, {} if dt else result.schemes, MOST_ROWS, dt)
-    if dt:
-        ax.axvline(dt, color="black", linestyle=":")
+    handles = limits_in(ax, rows, result.schemes, MOST_ROWS)
     ax.set_xlabel("largest stable dt, s")
     looks = {"ncols": 3, "fontsize": 7.5, "handletextpad": 0.1, "columnspacing": 0.8}
-    fig.legend(handles=handles[:: 2 if dt else 1], loc="outside upper center", **looks)
-    return "overview_limits", fig, result.finding("overview_caption", file_dt=dt, **summary(rows))
+    fig.legend(handles=handles, loc="outside upper center", **looks)
+    return "overview_limits", fig, result.finding("overview_caption", **summary(rows))
 
 
 def draw_limits(
@@ -143,23 +140,16 @@ def draw_growth(result: StabilityResult) -> tuple[str, Figure, Finding]:
             steps, factors = zip(*curve.predicted) if curve.predicted else ((), ())
             ax.plot(steps, factors, color=colour, linestyle=dash, linewidth=width, label=name)
             if curve.observed:
-                looks: dict[str, Any] = {
-                    "color": colour,
-                    "markersize": 6,
-                    "markeredgecolor": "black",
-                    "zorder": 4,
-                }
-                ax.plot(*zip(*curve.observed), marker, **looks)
+                looks: dict[str, Any] = {"color": colour, "markersize": 6, "markeredgecolor": "black"}
+                ax.plot(*zip(*curve.observed), marker, zorder=4, **looks)
         ax.axhline(1.0, color="black", linewidth=0.6)
         ax.axvline(dt, color="black", linewidth=0.8, linestyle=":")
         ax.set(xscale="log", xlabel="dt, s", ylim=(0.9, MOST_GROWTH), title=TITLES[surroundings])
     panels[0].set_ylabel("growth of a deviation in a step")
     panels[0].plot([], [], "o", color="white", markeredgecolor="black", label="in runs")
     fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
-    here = [row for row in rows if (row.posture, row.surroundings) == (posture, next(iter(result.growth)))]
     values = {"posture": posture, "dt": dt, "integrator": integrator}
-    radii = {row.integrator: row.predicted_dt for row in here}
-    return "stability_growth", fig, result.finding("figure_growth", OF, radii=radii, **values)
+    return "stability_growth", fig, result.finding("figure_growth", OF, **values)
 
 
 def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Finding]:

@@ -15,9 +15,7 @@ LINEAR_DEVIATION = 1e-6  # rad, at the start
 GROWTH_STEPS = 2000  # of a run
 GROWTH_ALLOWED = 100.0  # fold, of the deviation
 FAR = 1e4  # growth beyond which a motion is not linear any more
-GROWTH_MARGIN = (
-    1e-3  # relative: a mode that grows by less from the second to the last quarter of a run does not grow
-)
+GROWTH_MARGIN = 1e-3  # relative: from the second to the last quarter of a run; less is no growth
 DECAYED = 1e-3  # of its share at the start: a mode below that has decayed, and rounding and its square are what is left
 # times the predicted limit; if there is none, the time in which the fastest mode moves: the observed one is sought among them
 TRIED_ABOUT, TRIED_OF_FASTEST = np.array([0.5, 0.997, 1.004, 2.0]), np.array([0.1, 1.0, 10.0])

@@ -1,6 +1,6 @@
 """Which step is stable for the robot of a file as it is: begins the work of compare/stability, and says what it found."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from math import ceil
 from typing import Any, NamedTuple
@@ -11,23 +11,23 @@ from ...engines.mujoco.reading import Reading
 from ...robots.file import names_of_keys
 from ...stability.answer import Asked, PlaceAnswer, StepLimitRow, answer, integrators_at_rest
 from ...stability.control import MOST_PERIOD, controlled
+from ...stability.cures import Cure
 from ...stability.limits import LONGEST, SHORTEST
 from ...stability.motion import MotionRow, motion
 from ...stability.place import MOST_POSTURES, Posture, posture_of, postures_of, standing_at
 from ...stability.runs import USUAL_PUSH
 from ..setup import Request, Setup
 from . import own_run
-from .tables import ControlRow, LimitRow, OwnRunRow, StabilityResult
+from .tables import ControlRow, OwnRunRow, StabilityResult
 
 OF = "of_file"  # the template
 RADII_WITHIN = 1e-4  # relative: of the growth in a step, MuJoCo's is by differences
 WHOLE = 1e-9  # of a step: a delay that is so near to whole steps is
 MOST_GROWTH = 10.0  # in a step: with more, differences leave the zone in which the forces are linear
 DEFAULT_STEP, DEFAULT = 0.002, "Euler"  # MuJoCo's step, s, and integrator where a file states none
-GIVES_WAY = 0.1  # rad or m: a rest at the limit so far from that of the file's step is said
-FAR, CREEPS = 1e-3, 1e-5  # rad or m, rad/s or m/s: of a rest that is said, from its posture, and of a creep
+FAR, CREEPS = 0.05, 1e-4  # rad or m, rad/s or m/s: of a rest that is told, from its posture, and of a creep
 MODES = "growth of a step in closed form, TMT to MuJoCo"
-PUSHED = "push that its own step survives"
+PUSHED = "stable after a push"
 AT_PERIOD = "stable at its control period"
 
 
@@ -114,17 +114,16 @@ def motion_row(posture: Posture, reading: Reading, asked: Asked) -> MotionRow:
 def add(result: StabilityResult, work: Work) -> None:
     """Rows, checks, the answer at the top, the curves, and what makes the step stable."""
     for step in work.steps:
-        own_run.add(result, list(step.runs), step.is_requested)
-    if work.left_out:
-        result.top.append(result.finding("left_out", OF, most=MOST_POSTURES, names=work.left_out))
-    for step in work.steps:
+        runs = own_run.add(result, list(step.runs), step.is_requested)
         places = list(step.answers)
         rows = [row for place in places for row in place.rows]
         add_checks(result, rows, AT_REQUESTED_STEP if step.is_requested else AT_OWN_STEP)
-        add_answer(result, rows, step, [cure for place in places for cure in place.cures])
+        add_answer(result, rows, step, runs, [cure for place in places for cure in place.cures])
         if not step.is_requested:
             result.tables["step_limits"] = rows
             result.growth = {place.rows[0].surroundings: place.curves for place in places if place.curves}
+    if work.left_out:
+        result.top.append(result.finding("left_out", OF, most=MOST_POSTURES, names=work.left_out))
     for row in work.control:
         add_control(result, row)
     for moving in work.motions:
@@ -161,54 +160,80 @@ def add_checks(result: StabilityResult, rows: Sequence[StepLimitRow], quantity: 
         result.check(row.posture, quantity, row.file_dt, limit, "s", note, about=about)
         if row.stable_at_file_dt and row.largest_push is not None and not row.has_fallen:
             push = USUAL_PUSH if row.finer_push else row.largest_push
-            result.check(row.posture, PUSHED, push, USUAL_PUSH, "rad/s or m/s", rule="at least", about=about)
+            step = f"{1e3 * row.file_dt:.4g} ms with {row.file_integrator}"
+            result.check(
+                row.posture, PUSHED, push, USUAL_PUSH, "rad/s or m/s", step, rule="at least", about=about
+            )
     if not own:
         kinds = sorted({row.limit for row in rows if row.integrator == row.file_integrator})
         result.not_judged("", quantity, f"no posture has a limit: {', '.join(kinds)}", "s", about=about)
 
 
 def add_answer(
-    result: StabilityResult, rows: Sequence[StepLimitRow], step: AtStep, cures: Sequence[Any]
+    result: StabilityResult,
+    rows: Sequence[StepLimitRow],
+    step: AtStep,
+    runs: Sequence[OwnRunRow],
+    cures: Sequence[Cure],
 ) -> None:
+    """The sentence about the step, the limits of all postures, and after it what matters. runs: with the worst outcome."""
+
+    def tell(kind: str, **values: Any) -> None:
+        result.top.append(result.finding(kind, OF, **values))
+
     asked, own = step.asked, in_use(rows, step.asked.integrator)
     worst = next((row for row in own if row.stable_at_file_dt is False), own[0] if own else None)
-    where, is_stable = (worst.surroundings, worst.stable_at_file_dt) if worst else ("", None)
     here = [row for row in rows if worst and row.posture == worst.posture]
-    others = [row for row in here if row.integrator != asked.integrator and row.surroundings == where]
-    air = [row for row in here if row.integrator == asked.integrator and row.surroundings == "air" != where]
+    as_it_stands = [row for row in here if worst and row.surroundings == worst.surroundings]
+    others = [row for row in as_it_stands if row is not worst]
+    air = [row for row in here if row.integrator == asked.integrator and row.surroundings == "air"]
     mine = [row for row in rows if row.integrator == asked.integrator]
-    runs = [
-        run for run in result.tables["own_run"] if (run.dt, run.integrator) == (asked.dt, asked.integrator)
-    ]
-    values = {
-        "row": worst, "saddle": next((row for row in mine if row.limit == "saddle"), None), "others": others,
-        "also": [row.posture for row in own if row is not worst and row.stable_at_file_dt == is_stable],
-        "air": air[0] if air else None, "default": None if step.is_requested else at_default(here, asked),
-        "requested": step.is_requested, "dt": asked.dt, "integrator": asked.integrator,
-        "uncalm": [run for run in runs if run.outcome in ("worse", "fails")], "up_to": LONGEST,
-        "usual": USUAL_PUSH, "far": GIVES_WAY,
-    }  # fmt: skip
-    result.top.append(result.finding("answer", OF, **values))
-    first_rows = {(row.posture, row.surroundings): row for row in reversed(rows)}
-    for row in rows:
-        is_said = (
-            not row.is_known or (row.moved or 0.0) > FAR or (row.creep or 0.0) > CREEPS or row.held_objects
-        )
-        if row is first_rows[row.posture, row.surroundings] and row.surroundings != "air" and is_said:
-            result.find("rest", OF, row=row, far=FAR, creeps=CREEPS)
-    if worst and is_stable is False:
+    is_calm = runs[0].outcome in ("calm", "alike")
+    tell(
+        "answer", row=worst, saddle=next((row for row in mine if row.limit == "saddle"), None), others=others,
+        air=next((row for row in air if row is not worst and row.is_known), None), run=None if is_calm else runs[0],
+        requested=step.is_requested, dt=asked.dt, integrator=asked.integrator, up_to=LONGEST, calm=own_run.CALM,
+    )  # fmt: skip
+    if is_calm:
+        tell("own_run", run=runs[0], others=len(runs) - 1)
+    if step.is_requested:
+        add_facts(tell, worst, None)
+    else:
+        places: dict[tuple[str, str], list[StepLimitRow]] = {}
+        for row in rows:
+            places.setdefault((row.posture, row.surroundings), []).append(row)
+        for place in places.values() if len(rows) > 1 else ():
+            tell("limits_at", rows=place, up_to=LONGEST)
+        is_default = (asked.dt, asked.integrator) == (DEFAULT_STEP, DEFAULT)
+        add_facts(tell, worst, None if is_default else next(iter(as_it_stands), None))
+        for place in places.values():
+            if place[0].surroundings != "air" and is_told(place[0]):
+                tell("rest", row=place[0], far=FAR, creeps=CREEPS)
+    if worst and worst.stable_at_file_dt is False:
         stable = [row.integrator for row in others if row.stable_at_file_dt]
-        result.find("cures", OF, row=worst, integrators=stable, cures=cures)
+        tell("cures", row=worst, integrators=stable, cures=cures)
 
 
-def at_default(rows: Sequence[StepLimitRow], asked: Asked) -> dict[str, Any] | None:
-    """Whether MuJoCo's default step is stable; None: it is the file's, or is not known."""
-    known = [row for row in rows if row.integrator == DEFAULT and row.is_known and row.surroundings != "air"]
-    if not known or (asked.dt, asked.integrator) == (DEFAULT_STEP, DEFAULT):
-        return None
-    stable = known[0].longest >= DEFAULT_STEP
-    by_friction = stable and known[0].is_held_by_friction and (known[0].smooth_dt or 0.0) < DEFAULT_STEP
-    return {"dt": DEFAULT_STEP, "integrator": DEFAULT, "stable": stable, "by_friction": by_friction}
+def add_facts(tell: Callable[..., None], row: StepLimitRow | None, default: StepLimitRow | None) -> None:
+    """What else matters of the step in use, and of MuJoCo's default step. default: that of Euler, where it is another."""
+    if row is None:
+        return
+    if row.decided_by_runs:
+        tell("by_derivative", row=row, up_to=LONGEST)
+    if row.finer_push and row.largest_push is not None and row.largest_push < USUAL_PUSH:
+        tell("push", row=row)
+    if row.needs_friction(row.file_dt):
+        tell("friction", row=row)
+    if default and default.integrator == DEFAULT and default.is_known:
+        held = default.needs_friction(DEFAULT_STEP)
+        if held or default.longest < DEFAULT_STEP:
+            tell("default", dt=DEFAULT_STEP, integrator=DEFAULT, held=held)
+
+
+def is_told(row: StepLimitRow) -> bool:
+    """Whether a rest is far from its posture, creeps, or is none."""
+    is_far = (row.moved or 0.0) > FAR or (row.creep or 0.0) > CREEPS
+    return is_far or not row.is_known or row.has_fallen or bool(row.held_objects)
 
 
 def add_control(result: StabilityResult, row: ControlRow | None) -> None:
@@ -231,16 +256,3 @@ def headline(result: StabilityResult) -> Finding | None:
     own = in_use(table, table[0].file_integrator)
     values = {"up_to": LONGEST, "dt": table[0].file_dt}
     return result.finding("headline", OF, row=own[0], **values) if own else None
-
-
-def limits_in_use(rows: Sequence[StepLimitRow]) -> list[LimitRow]:
-    """The limits of a file's robot as it stands, in the form of those of the arm, for the picture of the first screen."""
-    kinds = {"finite": "finite", "none": "never_fails", "moving": "never_fails", "below": "always_fails"}
-    return [
-        LimitRow(
-            scene=row.posture, engine="mujoco", method=row.integrator, damping=0.0, mode=row.growth_rate or 0.0,
-            predicted_dt=row.predicted_dt, observed_dt=min(row.longest, LONGEST) if row.observed_dt else None,
-            limit=kinds[row.limit], passed=True,
-        )
-        for row in rows if row.limit in kinds and row.surroundings != "air"
-    ]  # fmt: skip

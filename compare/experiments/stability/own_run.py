@@ -20,9 +20,7 @@ LASTS, LEAST_STEPS, MOST_STEPS = 2.0, 1000, 20_000  # s, and between which numbe
 LONGER = 3.0  # fold: where it has not come to rest it is run so long
 PARTS = 4  # of a run: the speeds of each are averaged
 FINER = 16  # the step over the finer one
-PUSH = (
-    1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
-)
+PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay, however unstable
 CALM = 1e-3  # rad/s or m/s, root of the mean square
 FASTER = 10.0  # fold, than at the finer step: what moves on by the step alone
 AT_OWN, AT_REQUESTED = "stable in its own run", "stable in its run"
@@ -79,15 +77,12 @@ def is_worse(own: WholeRun, finer: WholeRun) -> bool:
     return not finer.failed_at and not own.speeds[-1] <= max(CALM, FASTER * float(speed))
 
 
-def add(result: Result, rows: list[OwnRunRow], is_requested: bool) -> None:
-    """The rows, a check of each, and what is said of the worst start."""
+def add(result: Result, rows: list[OwnRunRow], is_requested: bool) -> list[OwnRunRow]:
+    """Add the rows and a check of each; those with the worst outcome."""
     rows.sort(key=lambda row: (ORDER.index(row.outcome), row.failed_at is None))
     result.tables.setdefault("own_run", []).extend(rows)
     quantity, about = AT_REQUESTED if is_requested else AT_OWN, About.STEP
     for row in rows:
         note, passed = f"{1e3 * row.dt:.4g} ms with {row.integrator}", row.outcome in ("alike", "calm")
         result.check(row.start, quantity, 1 if passed else None, 1, "runs", note, rule="equal", about=about)
-    others = sum(row.outcome == rows[0].outcome for row in rows[1:])
-    result.top.append(
-        result.finding("own_run", run=rows[0], requested=is_requested, others=others, calm=CALM)
-    )
+    return [row for row in rows if row.outcome == rows[0].outcome]

@@ -197,7 +197,7 @@ def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step():
         failed[step] = [check.quantity for check in quick(source, step=step).checks if check.failed]
     own = failed[None]
     assert own == [own_run.AT_OWN, AT_OWN_STEP] and own == failed[1e-4, "RK4"] == failed[0.005, "Euler"]
-    assert failed[0.004, "RK4"] == [own_run.AT_OWN, own_run.AT_REQUESTED, AT_OWN_STEP, AT_REQUESTED_STEP]
+    assert failed[0.004, "RK4"] == [own_run.AT_OWN, AT_OWN_STEP, own_run.AT_REQUESTED, AT_REQUESTED_STEP]
 
 
 def test_the_first_six_keyframes_are_run():

@@ -93,14 +93,34 @@ def test_a_quick_run_has_the_files_integrator_and_the_default_and_a_full_one_all
     assert stability.headline(full).values["row"].integrator == "Euler"
 
 
+def answers_of(result):
+    return [finding for finding in result.top if finding.kind == "answer"]
+
+
+@pytest.mark.parametrize("more, default, told", [
+    ({"own_dt": 0.09, "predicted_dt": 0.3}, None, ["by_derivative"]),
+    ({"largest_push": 0.01, "finer_push": True}, None, ["push"]),
+    ({"largest_push": 0.1, "finer_push": True}, None, []), ({"smooth_dt": 0.09}, None, ["friction"]),
+    ({"smooth_dt": 0.09, "file_dt": 0.08}, None, []), ({}, {"predicted_dt": 1e-3}, [False]), ({}, {"predicted_dt": 3e-3}, []),
+    ({}, {"predicted_dt": 3e-3, "smooth_dt": 1e-3}, [True]), ({}, {"predicted_dt": 1e-3, "integrator": "RK4"}, []),
+])  # fmt: skip
+def test_a_fact_is_told_where_it_matters(more, default, told):
+    """Of MuJoCo's default step: where it is not stable, or by dry friction alone."""
+    kinds = []
+    row = default and step_row(**default)
+    of_file.add_facts(lambda kind, **values: kinds.append(values.get("held", kind)), step_row(**more), row)
+    assert kinds == told
+
+
 def test_a_step_beyond_its_limit_fails_and_is_told_what_helps():
     result = found_of(dt=0.02, step=(0.01, "Euler"))
     failed = {check.quantity for check in result.checks if check.failed}
     assert AT_OWN_STEP in failed and AT_REQUESTED_STEP not in failed
-    answers = [finding.values for finding in result.top if finding.kind == "answer"]
+    answers = [answer.values for answer in answers_of(result)]
     stable = [(answer["row"].stable_at_file_dt, answer["requested"]) for answer in answers]
     assert stable == [(False, False), (True, True)]
-    (cures,) = (note.values for note in result.notes if note.kind == "cures")
+    assert result.top[0] is answers_of(result)[0]
+    (cures,) = (finding.values for finding in result.top if finding.kind == "cures")
     assert {cure.change for cure in cures["cures"]} >= {"less_kv", "more_armature"}
 
 

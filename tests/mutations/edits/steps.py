@@ -1,7 +1,7 @@
 """Edits of the step of a file at rest: its derivative, closed form, limits, runs, programs, motions, cures."""
 
 EDITS = (
-    ("mujoco.step", "Step.__init__", "TOLERANCE", "1e-4", "the force of constraints is that of a coarse solver"),
+    ("mujoco.step", "shared", "TOLERANCE", "1e-4", "the force of constraints is that of a coarse solver"),
     ("mujoco.step", "Step.run_program", "(step - delay) // period", "step // period", "a delay delays nothing"),
     ("mujoco.step", "Step.relaxed", "1.0 - rate * self.dt", "1.0", "a relaxed run is not damped"),
     ("mujoco.forces", "rows", "m.opt.cone == _1 and size > 1", "False", "pyramids have as many rows as ellipses"),
@@ -44,7 +44,7 @@ EDITS = (
     ("stability.place", "placed", "np.array(posture.q) if _1 else None", "None", "a posture in numbers is qpos0"),
     ("stability.place", "placed", "thrown or touches(*_1)", "thrown", "what bounces on its floor is in the air"),
     ("stability.place", "placed", "restless_objects(*_1) if contacts else _2", "_2", "what moves on beside it hides a robot"),
-    ("stability.runs", "OWN_WITHIN", "1.03", "1.5", "the limit of the file's own run is known to a half"),
+    ("stability.runs", "OWN_FOLDS", "1.03", "1.5", "the limit of the file's own run is known to a half"),
     ("of_file", "RADII_WITHIN", "1e-4", "1e-2", "the closed form may be off by a hundredth"),
     ("of_file", "add_checks", "USUAL_PUSH if row.finer_push else _1", "USUAL_PUSH", "every push is survived"),
     ("of_file", "in_use", "row.surroundings != 'air'", "True", "a robot in the air stands", 1),
