@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from compare.__main__ import main
+import compare
+import tmt
 
 ROD = '<inertial pos="0 0.01 0.25" mass="1.2" diaginertia="0.03 0.03 0.002"/>'
 ARM = """<mujoco><option timestep="0.005" integrator="implicitfast"/><worldbody><body pos="0 0 1">
@@ -23,13 +24,14 @@ UPRIGHT, DT = np.array([0.1, -0.2]), 0.005
 
 @pytest.mark.skipif(not shutil.which("gcc"), reason="no C compiler")
 def test_a_controller_from_exported_c_holds_an_arm_with_a_payload_upright(tmp_path):
-    file, out = tmp_path / "arm.xml", tmp_path / "c"
-    file.write_text(ARM.format(rod=ROD, load=""), encoding="utf-8")
-    words = ["--quantity", "inverse_dynamics,step_derivatives:implicitfast", "--parameters", "payload,fore"]
-    assert main(["equations", "--mjcf", str(file), *words, "--out", str(out)]) == 0
+    with pytest.warns(UserWarning, match=r"does not have its actuator \(2\)"):
+        tree = compare.tree(ARM.format(rod=ROD, load=""))
+    quantities = ["inverse_dynamics", "step_derivatives:implicitfast"]
+    text = tmt.equations(tree, "c", quantities, name="arm", parameters=["payload", "fore"])
+    (tmp_path / "arm.c").write_text(text, encoding="utf-8")
     flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC"]
-    subprocess.run(["gcc", *flags, out / "arm.c", "-o", out / "arm.so", "-lm"], check=True)
-    library, rest = ctypes.CDLL(str(out / "arm.so")), np.zeros(2)
+    subprocess.run(["gcc", *flags, tmp_path / "arm.c", "-o", tmp_path / "arm.so", "-lm"], check=True)
+    library, rest = ctypes.CDLL(str(tmp_path / "arm.so")), np.zeros(2)
 
     def called(name, shape, *arguments):
         arrays = [*(np.array(values, float) for values in arguments), np.empty(shape)]
