@@ -1,7 +1,9 @@
-"""Read scenes from a TOML file, one table [[scene]] each."""
+"""Read scenes from a TOML file, one table [[scene]] each, and recorded controls from a CSV file."""
 
+import csv
 import json
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +49,28 @@ def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
     return tuple(scenes)
 
 
+def read_controls(path: str | Path, actuators: Sequence[str]) -> dict[str, np.ndarray]:
+    """The columns of a CSV file: time, s, from 0 on, and controls by the names of actuators. SceneError, in one line."""
+    try:
+        with open(path, encoding="utf-8", newline="") as file:
+            names, *lines = [line for line in csv.reader(file) if line]
+        table = np.array(lines, dtype=float).reshape(-1, len(names)).T
+    except (OSError, ValueError) as error:
+        raise SceneError(f"cannot read the controls of {path}: {' '.join(str(error).split())}") from None
+    columns = dict(zip(names, table))
+    if unknown := [name for name in names if name not in ("time", *actuators)]:
+        raise SceneError(
+            f"{path}: there is no actuator {unknown[0]}; expected time and {', '.join(actuators)}"
+        )
+    times = columns.get("time", np.zeros(0))
+    rises = len(times) > 1 and times[0] == 0.0 and bool((np.diff(times) > 0.0).all())
+    if not (rises and len(columns) > 1 and np.isfinite(table).all()):
+        raise SceneError(
+            f"{path}: expected a column time that rises from 0, and numbers of at least one actuator"
+        )
+    return columns
+
+
 def entries_of(path: str | Path) -> list[dict[str, Any]]:
     """The tables [[scene]] of a file; SceneError if it has none, or anything else."""
     if Path(path).exists() and not Path(path).is_file():  # a pipe may be waited for without end
@@ -85,7 +109,7 @@ def scene_of(entry: dict[str, Any], robot: Robot) -> Scene:
         if not is_number(values["duration"]):
             raise WrongField(name, "duration", values["duration"], "a time in s")
         values["dt"] = values["duration"] / STEPS
-    scene = Scene(**values, judged=0.0, tags=("own",))
+    scene = Scene(**values, judged=0.0, tags=("own", "user"))
     Case(robot, scene)
     return scene
 

@@ -25,7 +25,8 @@ from ..robots.case import SEED
 from ..robots.file import robot_of, robot_of_solution
 from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, matched_joints
 from ..robots.placement import placed
-from ..stability.answer import posture_of
+from ..robots.scene_file import read_controls
+from ..stability.place import posture_of
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 WHOLE = 1e-6  # of a step: a period so near to a multiple of it is one
@@ -76,7 +77,7 @@ class Compared(NamedTuple):
     reading: Reading | None  # None: the robot's numbers are stated
 
     def request_of(self, options: argparse.Namespace) -> Request:
-        """What the options ask of stability. ModelError, in one line: it needs a file, or is not of this one."""
+        """What the options ask; ModelError, in one line, for what needs a file or is not of this one."""
         asked = {name: getattr(options, name) for name in (*Request._fields[1:], "dt", "integrator")}
         given = [f"--{name.replace('_', '-')}" for name, value in asked.items() if value]
         if given and self.reading is None:
@@ -99,6 +100,11 @@ class Compared(NamedTuple):
         period, of_step = asked["control_period"], self.reading.dt if dt is None else dt
         if period and abs(period / of_step - max(1, round(period / of_step))) > WHOLE:
             raise ModelError(f"--control-period {period:g} is no multiple of the step, {of_step:g} s")
+        if asked["controls"]:
+            names = [actuator.name for actuator in self.reading.drive.actuators]
+            asked["controls"] = read_controls(asked["controls"], names)
+        if asked["write"] and not Path(asked["write"]).absolute().parent.is_dir():
+            raise ModelError(f"cannot write {asked['write']}: there is no such folder")
         step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
         return Request(step, **asked)
 

@@ -17,7 +17,7 @@ from ..core.finding import Finding
 from ..robots import Robot
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates, rates_at
-from ..stability.linear_step import growth_of, is_runge_kutta
+from ..stability.held import growth_of, is_runge_kutta
 
 RECORDS = 64  # states of a run, without its start
 LOST = 1e-30  # error of a run in pairs relative to the growth of a small difference, about

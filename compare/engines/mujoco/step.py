@@ -213,11 +213,17 @@ def whole_run(
 
 
 def start_of(
-    model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray, q: np.ndarray | None = None
+    model: mujoco.MjModel,
+    drive: Drive,
+    key: str,
+    push: np.ndarray,
+    q: np.ndarray | None = None,
+    controls: Sequence[float | None] = (),
 ) -> np.ndarray:
     """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) rad/s and m/s added to its speeds.
 
-    q: other positions, (nq,), at rest. Where no controls are stated the targets of servos are the posture; activations
+    q: other positions, (nq,), at rest. controls: u of each actuator, None: as it is.
+    Where no controls are stated the targets of servos are the posture; activations
     are those of the keyframe, if it states any.
     """
     data, keys = mujoco.MjData(model), [element_name(model, "key", k) for k in range(model.nkey)]
@@ -230,7 +236,8 @@ def start_of(
     mujoco.mj_fwdPosition(model, data)
     lengths = [data.actuator_length[output_of(model, i)] for i in range(len(drive.actuators))]
     for i, u in enumerate(drive.control(key, lengths).tolist()):
-        set_control(model, i, u, data.ctrl, data.act)
+        asked = controls[i] if controls else None
+        set_control(model, i, u if asked is None else asked, data.ctrl, data.act)
     if stated.any():
         data.act[:] = np.clip(stated, *activation_ranges(model))
     if push.any():  # activations, too: what is pushed nowhere stays where it is

@@ -20,9 +20,8 @@ from ...engines.outside import OutsideDynamics
 from ...engines.outside.model import EngineError
 from ...judge.scale import FACTOR
 from ...robots import Robot
-from ...stability.answer import postures_of
 from ...stability.closed_form import COVERED, matrix
-from ...stability.place import standing_at
+from ...stability.place import postures_of, standing_at
 from ...stability.rest import rest_near
 from .. import Drawing, Experiment
 from ..setup import Setup
@@ -140,8 +139,8 @@ def add_contacts(setup: Setup, result: DerivativesResult) -> None:
 def contact_rows(reading: Reading) -> list[ContactRow]:
     """Differences of the step where the file's first posture sinks to, beside the closed form."""
     posture = postures_of(reading)[0]
-    place = standing_at(reading, posture.name, posture.key)
-    if not place.touching:
+    place = standing_at(reading, posture)
+    if not place.is_touching:
         return []
     integrator = reading.integrator if reading.integrator in COVERED else "implicitfast"
     step = Step(place.model, float(place.model.opt.timestep), integrator)
