@@ -224,11 +224,9 @@ def sizes(exact: Array, units: tuple[Array, Array]) -> Array:
     names, first, place = np.unique(rows, return_index=True, return_inverse=True)
     couplings = size[np.ix_(first, first)] * (1.0 - np.eye(len(names)))
     scale = matrix_balance(couplings, permute=False, separate=True)[1][0]
-    of_rows, of_columns = scale[place][:, None], np.ones(len(columns))
-    is_state = np.isin(columns, names)
-    of_columns[is_state] = scale[np.searchsorted(names, columns[is_state])]
-    balanced = size / of_rows * of_columns
-    groups = np.where(is_state, "state", columns)
+    scales = dict(zip(names, scale))
+    of_rows, of_columns = scale[place][:, None], np.array([scales.get(unit, 1.0) for unit in columns])
+    balanced, groups = size / of_rows * of_columns, np.where(np.isin(columns, names), "state", columns)
     largest = [balanced[:, groups == group].max() for group in groups]
     return of_rows * largest / of_columns
 
@@ -282,8 +280,7 @@ def row_of(
     columns = values.shape[2]
     units = units_of(subject.tree, quantity.units), units_of(subject.tree, (*STATE, *FORCE))[:columns]
     high, low, least = (part[:, :, :columns] for part in (*exact, tolerance))
-    errors = map(relative, (values - high) - low, high, repeat(units), least)
-    error, unit, largest = max(errors)
+    error, unit, largest = max(map(relative, (values - high) - low, high, repeat(units), least))
     return DerivativeRow(
         subject=subject.name, quantity=quantity.name, way=way, eps=eps, states=subject.states,
         error=error if np.isfinite(error) else None, unit=unit, largest=largest,
