@@ -72,21 +72,6 @@ def test_a_wrong_derivative_is_seen_entry_by_entry(mujoco, bent, monkeypatch):
     assert shares(mujoco, bent, "Euler")[ways.NUMPY] > 1.0
 
 
-def test_errors_are_relative_to_entries_of_the_same_unit():
-    units = np.array(["rad", "m"]), np.array(["rad", "m"])
-    exact, off = np.array([[1.0, 1e3], [1e-3, 1.0]]), np.array([[0.0, 0.0], [1e-6, 0.0]])
-    error, unit, size = ways.relative(off, exact, units)
-    assert unit == "m per rad" and error == pytest.approx(1e-6 / size) and 1e-3 <= size < 8e-3
-    same = np.array(["", ""])
-    assert ways.relative(off, exact, (same, same)) == (pytest.approx(1e-9), " per ", 1e3)
-    assert ways.relative(np.full((2, 2), np.nan), exact, units)[0] == np.inf
-
-
-FREE_WITH_HINGE = """<mujoco><worldbody><body pos="0 0 1"><freejoint/>
-<inertial pos="0 0 0" mass="2" diaginertia="0.1 0.2 0.25"/><body><joint axis="0 0.6 0.8"/>
-<inertial pos="0.1 0 0" mass="0.1" diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody></mujoco>"""
-
-
 def test_a_block_of_a_step_that_is_as_good_as_zero_is_not_what_an_error_is_relative_to():
     """Balanced, speeds in units of the robot's own time: an oscillator of 10 rad/s, its step 1 ms, a force of 1 N."""
     units = np.array(["m", "m/s"]), np.array(["m", "m/s", "N"])
@@ -96,7 +81,18 @@ def test_a_block_of_a_step_that_is_as_good_as_zero_is_not_what_an_error_is_relat
     forces = np.array(["N", "N m"]), units[1]
     assert (ways.sizes(exact, forces) == np.abs(exact)).all()  # of the inverse dynamics: of the same unit
     off = np.full((2, 3), 1e-9)
-    assert ways.relative(off, exact, forces, least=0.5)[0] == 1e-9  # what rounding may have made is zero
+    assert ways.relative(off, exact, forces)[:2] == (pytest.approx(1e-3), "N per N")
+    assert ways.relative(off, exact, forces, least=0.5) == (
+        1e-9,
+        "N per m",
+        1.0,
+    )  # rounding may have made the others
+    assert ways.relative(np.nan * off, exact, forces)[0] == np.inf
+
+
+FREE_WITH_HINGE = """<mujoco><worldbody><body pos="0 0 1"><freejoint/>
+<inertial pos="0 0 0" mass="2" diaginertia="0.1 0.2 0.25"/><body><joint axis="0 0.6 0.8"/>
+<inertial pos="0.1 0 0" mass="0.1" diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody></mujoco>"""
 
 
 def test_a_slow_turn_of_a_free_body_is_rounded_as_a_quaternion():
