@@ -6,9 +6,9 @@ import mpmath
 import numpy as np
 import pytest
 import sympy
+from many_digits import DIGITS, exact
 
 import tmt
-from tmt.exact.values import DIGITS, exact
 
 NUMBERS = (0.15, 0.15, 1.9, 1.5, 0.015, 0.014, 0.002, 0.001, 0.019, 0.019, 9.81)  # d, e, m, I, g as below
 

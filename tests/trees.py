@@ -7,7 +7,7 @@ import numpy as np
 from models.made import random_turn
 
 from tmt import Tree
-from tmt.exact.values import DIGITS
+from tmt.exact.tree import DIGITS
 
 UNIT = np.eye(3)
 

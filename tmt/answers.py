@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 from tmt import literal
 from tmt.arm import ARM
 from tmt.compiled.evaluator import SMALL, Evaluator
-from tmt.derivation.quantities import PLAIN, QUANTITIES, is_quantity, quantity_of, what_is_known
+from tmt.derivation.quantities import PLAIN, QUANTITIES, quantity_of
 from tmt.model import singular
 from tmt.model.tree import Tree, checked_model
-from tmt.model.values import real_numbers, shown
+from tmt.model.values import real_numbers
 
 MOST = 64  # models that are held, besides those that are prepared
 DOUBLE = np.dtype(float)
@@ -69,12 +69,11 @@ def prepare(model: Tree = ARM, *quantities: str) -> None:
     [-2.20725]
     """
     checked_model(model)
-    if unknown := [name for name in quantities if not is_quantity(name)]:
-        raise ValueError(f"{shown(unknown[0])} is no quantity; {what_is_known(unknown[0])}")
-    for quantity in quantities or [name for name in PLAIN if not QUANTITIES[name].is_long]:
-        evaluator = answers_of(model).evaluator(quantity)
+    chosen = quantities or [name for name in PLAIN if not QUANTITIES[name].is_long]
+    for evaluator in [Evaluator(model, quantity) for quantity in chosen]:
         evaluator.loop(wide=False)  # it is compiled, or loaded
-        answers_of(model).prepared[quantity] = evaluator.of_one
+        answers_of(model).evaluators[evaluator.quantity] = evaluator
+        answers_of(model).prepared[evaluator.quantity] = evaluator.of_one
 
 
 class Answers:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,8 +16,6 @@ from tmt.model.tree import Tree
 from tmt.model.values import shown
 
 Array = np.ndarray
-Place = tuple[int, str] | None
-Between = Callable[[int, int], list[Array]]  # (run, record): its states q and qd up to the next record
 
 
 class _Path(NamedTuple):
@@ -103,7 +100,9 @@ def simulate(
     tolerance = usual if tolerance is None else values.positive("tolerance", tolerance, "a number")
     batch, *start = starts(model, q, qd, tau)
     runs = len(start[0])
-    path_q, path_qd = values.paths(runs, steps, every, model.coordinates.nq, model.coordinates.nv)
+    # whether Mbar is singular is looked at in each step
+    within = every if taylor or model.never_singular else 1
+    path_q, path_qd = values.paths(runs, steps, within, model.coordinates.nq, model.coordinates.nv)
     if steps * dt == np.inf:
         sizes = f"dt is {dt:g} and steps is {shown(steps)}"
         raise ValueError(f"{sizes}; their product is beyond the largest double")
@@ -111,16 +110,9 @@ def simulate(
     if taylor:
         ended, evaluations = by_series(model, path_q, path_qd, torque, dt, every, tolerance)
     else:
-        codes, evaluations = runner.follow(path_q, path_qd, torque, dt, tolerance, every)
-
-        def between(run: int, record: int) -> list[np.ndarray]:
-            """The states of a run from a record to the next, (every + 1, nq and nv)."""
-            part = slice(run, run + 1), slice(record, record + 1)
-            run_q, run_qd = (np.repeat(path[part], every + 1, axis=1) for path in (path_q, path_qd))
-            runner.follow(run_q, run_qd, torque[part[0]], dt, tolerance, 1)
-            return [run_q[0], run_qd[0]]
-
-        ended = reasons(model, path_q, path_qd, codes, dt, tolerance, every, between)
+        codes, evaluations = runner.follow(path_q, path_qd, torque, dt, tolerance, within)
+        ended = reasons(model, path_q, path_qd, codes, dt, tolerance)
+        path_q, path_qd = (path[:, :: every // within] for path in (path_q, path_qd))
     t = dt * np.arange(0, steps + 1, every)
     q, qd = (path.reshape(*batch, *path.shape[1:]) for path in (path_q, path_qd))
     return Motion(t, q, qd, ended.reshape(batch)[()], evaluations)
@@ -148,15 +140,11 @@ def by_series(tree: Tree, q: Array, qd: Array, tau: Array, dt: float, every: int
     return ended, count
 
 
-def reasons(
-    tree: Tree, q: Array, qd: Array, codes: Array, dt: float, tolerance: float, every: int = 1,
-    between: Between | None = None,
-) -> Array:  # fmt: skip
+def reasons(tree: Tree, q: Array, qd: Array, codes: Array, dt: float, tolerance: float) -> Array:
     """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
 
-    q, qd: the paths (runs, records, nq and nv); codes (runs, 2): why the compiled loop ended each, 0: it did
-    not, and after how many steps. Where each so-manyth state is kept alone, between(run, record) are all from
-    a record to the next.
+    q, qd: the paths (runs, records, nq and nv), of each step where Mbar may be singular; codes (runs, 2): why the compiled loop
+    ended each, 0: it did not, and after how many steps.
     """
     ended = np.full(len(codes), None, dtype=object)
     if tree.never_singular and not codes.any():
@@ -168,37 +156,20 @@ def reasons(
     }
     for run, (code, step) in enumerate(codes.tolist()):
         why = words.get(code)
-        if place := singular_step(tree, q[run], qd[run], every, between, run):
+        if place := singular_in(tree, q[run], qd[run]):
             step, why = place
-            q[run, step // every + 1 :] = qd[run, step // every + 1 :] = np.nan
+            q[run, step + 1 :] = qd[run, step + 1 :] = np.nan
         if why:
             ended[run] = f"at t = {step * dt:g} s: {why}"
     return ended
 
 
-def singular_step(tree: Tree, q: Array, qd: Array, every: int, between: Between | None, run: int) -> Place:
-    """The first step after which Mbar is singular, and why; between records as well, where it would show."""
+def singular_in(tree: Tree, q: Array, qd: Array) -> tuple[int, str] | None:
+    """The first of start, last and that before the largest change of rates where Mbar is singular; why."""
     if tree.never_singular:
         return None
-    place = singular_in(tree, q, qd)
-    places = [(place[0] * every, place[1])] if place else []
-    if between and every > 1:
-        alive = int(np.isfinite(q[:, 0]).sum())
-        for record in {min(alive - 1, len(q) - 2), fastest_change(qd[:alive])}:
-            place = singular_in(tree, *between(run, record))
-            places += [(record * every + place[0], place[1])] if place else []
-    return min(places, default=None)
-
-
-def singular_in(tree: Tree, q: Array, qd: Array) -> Place:
-    """The first of start, last and that before the largest change of rates where Mbar is singular; why."""
     alive = int(np.isfinite(q[:, 0]).sum())
-    records = np.unique([0, alive - 1, fastest_change(qd[:alive])])
+    change = np.abs(np.diff(qd[:alive], axis=0)).max(axis=1)
+    records = np.unique([0, alive - 1, int(np.argmax(change)) if len(change) else 0])
     place = singular.first(tree, q[records])
     return (int(records[place[0]]), f"Mbar is singular: {place[1]}") if place else None
-
-
-def fastest_change(qd: np.ndarray) -> int:
-    """The record before the largest change of the rates; 0 where there is but one."""
-    change = np.abs(np.diff(qd, axis=0)).max(axis=1)
-    return int(np.argmax(change)) if len(change) else 0

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 Call = Callable[[], Any]
+Clock = Callable[[], float]  # s
 Name = TypeVar("Name")
 TIMED_ENOUGH = 0.015  # s: a function is called until as many calls as fast as its fastest take this long
 WARM = 0.004  # s: a longer call needs no call before it to warm up
@@ -16,7 +17,7 @@ LONG = 0.25  # s: a turn of another process, some 16 ms, does not change a call 
 WIDTHS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("asimd", "NEON"), ("sse2", "SSE2"))
 
 
-def in_turns(runs: Sequence[Call], rounds: int) -> list[list[float]]:
+def in_turns(runs: Sequence[Call], rounds: int, clock: Clock = time.perf_counter) -> list[list[float]]:
     """Seconds of each call of each function, at most `rounds` calls, after one to warm up short functions.
 
     A function is called again until `is_timed`: one call may have had to wait for another process.
@@ -25,9 +26,9 @@ def in_turns(runs: Sequence[Call], rounds: int) -> list[list[float]]:
     for k in range(rounds + 1):
         for run, taken in zip(runs, times):
             if not is_timed(taken):
-                begin = time.perf_counter()
+                begin = clock()
                 run()
-                taken.append(time.perf_counter() - begin)
+                taken.append(clock() - begin)
                 if k == 0 and taken[0] < WARM:
                     taken.clear()
     return times
@@ -48,8 +49,8 @@ def scatter(taken: Sequence[float]) -> float:
     return next_fast / fast
 
 
-def fastest(runs: Mapping[Name, Call], rounds: int) -> dict[Name, float]:
-    return {name: min(taken) for name, taken in zip(runs, in_turns(list(runs.values()), rounds))}
+def fastest(runs: Mapping[Name, Call], rounds: int, clock: Clock = time.perf_counter) -> dict[Name, float]:
+    return {name: min(taken) for name, taken in zip(runs, in_turns(list(runs.values()), rounds, clock))}
 
 
 def vectors() -> str:

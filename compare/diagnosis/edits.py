@@ -119,6 +119,14 @@ def of_rows(equations: Equations) -> Iterator[Edit]:
                 yield place.format(name), explains, {field: after}
 
 
+def about_one_axis(equations: Equations) -> Iterator[Edit]:
+    """The moment of inertia about one axis left out of every body, as of thin rods."""
+    for k, axis in enumerate(XYZ if len(equations.tree.mass) > 1 else ""):
+        after = equations.stated["inertia"].copy()
+        after[:, k, k] = 0.0
+        yield f"inertia {axis}{axis} of {EVERY_BODY}", "left out", {"inertia": after}
+
+
 def absent(equations: Equations) -> Iterator[Edit]:
     """A body, or all that a joint carries, left out."""
     tree, stated = equations.tree, equations.stated
@@ -189,4 +197,6 @@ def axes(equations: Equations) -> Iterator[Edit]:
                 yield f"axis of {name}", f"{'-' if sign < 0.0 else ''}{XYZ[k]}", {"axis": new}
 
 
-KINDS: tuple[Callable[[Equations], Iterator[Edit]], ...] = (absent, of_rows, swapped, scaled, axes)
+KINDS: tuple[Callable[[Equations], Iterator[Edit]], ...] = (
+    absent, of_rows, about_one_axis, swapped, scaled, axes,
+)  # fmt: skip

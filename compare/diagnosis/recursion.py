@@ -55,9 +55,11 @@ SLIPS = (
     Slip("not turned", "inertia of {} not turned to the inertial frame", "body"),
     Slip("turned back", "R' I R for R I R' of {}", "body"),
     Slip("turned back", "R for R' in the angular velocity of {}", "body"),
+    Slip("world axes", "inertia of {} in world axes, R I R', for one in its own axes", "body"),
     Slip("about the joint", "inertia of {} about its joint and mass counted again", "body"),
     Slip("parallel axis", "parallel-axis term m (c'c 1 - c c') of {} left out", "body"),
     Slip("relative B", "angular velocity of {} relative to the body before, not to the world, in its rotation", "body"),
+    Slip("column of B", "speed of {} left out of the angular velocity", "joint and body"),
     Slip("CoM inward", "moment c x F of the force at the CoM of {} left out", "body"),
     Slip("sign inward", "moment c x F of the force at the CoM of {} with the other sign", "body"),
     Slip("offset inward", "moment of the force passed on by {} left out"),
@@ -166,6 +168,7 @@ class Recursion:
         I = self.step("about the joint", b, I, lambda: I + about_joint)
         I = self.step("parallel axis", b, I, lambda: I - about_joint)
         turned = self.step("not turned", b, turn @ I @ backward(turn), lambda: I)
+        turned = self.step("world axes", b, turned, lambda: turn @ turned @ backward(turn))
         return self.step("turned back", b, turned, lambda: backward(turn) @ I @ turn)
 
     def segment(self, b: int, right: ndarray, alone: ndarray) -> ndarray:
@@ -227,6 +230,7 @@ class Recursion:
                 right = np.cross(axis, self.lever(i, frame.origin)) + arm
                 T[:, n] = levers[:, n] = step("column", i * len(tree.mass) + b, right)
                 turning = step("axis in B", i, axis, local.copy)
+                turning = step("column of B", i * len(tree.mass) + b, turning)
                 turning = step("relative B", b, turning, partial(np.multiply, turning, is_own))
                 B[:, n] = turns[:, n] = turning
                 if is_inward or is_outward:  # by virtual power also how the joint accelerates the CoM

@@ -27,7 +27,7 @@ from .places import OF_ZERO
 from .recursion import slips_of_recursion
 from .statements import Stated, Statements
 from .terms import all_places
-from .variants import Variant, lagrange, other_angles, program_options
+from .variants import Variant, lagrange, other_angles, other_factors, program_options
 
 FEW = 2  # states at which conventions are tried first
 SHOWN = 12  # single explanations that leave least
@@ -181,7 +181,8 @@ class Explanations:
             is_elsewhere = (np.abs(moved) > search.tolerance)[:, others].any()
             causes.extend(in_part(cause, said) if is_elsewhere else cause for cause in found)
 
-        for variant in chain(self.options, self.variants, self.recursions, self.angles):
+        factors = other_factors(self.equations, search)
+        for variant in chain(self.options, self.variants, self.recursions, self.angles, factors):
             add(search.explained([variant]), variant[1] - search.right)
         for fit in (fit for fit in search.singles(is_thorough=False) if fit.explains):
             add(self.statements.causes([fit]), search.change(fit))
@@ -189,7 +190,7 @@ class Explanations:
 
     def other_angles(self) -> Iterator[Cause]:
         """Sines and cosines of a hinge, in an entry or a part."""
-        yield from self.search.explained(self.angles)
+        yield from self.search.explained(chain(self.angles, other_factors(self.equations, self.search)))
 
     def beside_conventions(self) -> Iterator[Cause]:
         """A convention and one more cause, in the model's own joints."""

@@ -28,6 +28,20 @@ def all_places(equations: Equations) -> list[Place]:
 # entries of which a factor may be wrong
 
 
+def unit_columns(equations: Equations) -> dict[str, np.ndarray]:
+    """The values of 1 in an entry of Mbar, in a row of h at rest, and as a coefficient of speeds in h, by names."""
+    layout, (M, velocity_terms, rest), columns = equations.layout, equations.parts, {}
+    for entry in equations.coefficients if equations.nv <= MOST_SPEEDS else ():
+        parts = {"M": 0.0 * M, "velocity": 0.0 * velocity_terms, "gravity": 0.0 * rest}
+        if entry.kind == "M":
+            parts["M"][:, entry.at[0], entry.at[1]] = parts["M"][:, entry.at[1], entry.at[0]] = 1.0
+        else:
+            i, *pair = entry.at
+            parts[entry.kind][:, i] = np.prod(equations.qd[:, pair], axis=1)
+        columns[entry.named(equations.speeds)] = layout.packed(*parts.values())
+    return columns
+
+
 def speeds_of_joints(tree: tmt.Tree) -> dict[str, list[int]]:
     """The numbers of the speeds of each joint, and of the three slides of each free joint."""
     of_joints = [list(range(joint.qd.start, joint.qd.stop)) for joint in tree.coordinates.joints]
@@ -200,15 +214,17 @@ def coefficients(equations: Equations) -> Iterator[Place]:
 
     def place(name: str, terms: list[tuple[Entry, np.ndarray]]) -> Place:
         """The factor of some velocity terms."""
-        added = np.zeros_like(rest)
-        for entry, values in terms:
-            i, *pair = entry.at
-            added[:, i] += values * np.prod(equations.qd[:, pair], axis=1)
-        return factor("coefficient", name, layout.packed(0.0 * M, added, 0.0 * rest))
+        column = sum(values[:, None] * units[entry.named(equations.speeds)] for entry, values in terms)
+        return factor("coefficient", name, column + 0.0 * right)
 
     terms = [(entry, values) for entry, values in equations.coefficients.items() if entry.kind == "velocity"]
-    for term in terms:
-        yield place(term[0].named(equations.speeds), [term])
+    largest, units = max(np.abs(values).max() for _, values in terms), unit_columns(equations)
+    for entry, values in terms:
+        name = entry.named(equations.speeds)
+        if np.abs(values).max() > FIT_ROUNDING * largest:
+            yield place(name, [(entry, values)])
+        else:
+            yield Place("added", name, 0.0, "", 1.0, column=units[name])
     joints = speeds_of_joints(equations.tree)
     for first, second in combinations_with_replacement(joints, 2):
         those = [term for term in terms if is_between(term[0].at[1:], joints[first], joints[second])]

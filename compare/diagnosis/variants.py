@@ -3,18 +3,21 @@
 A variant is a cause with Mbar and h as they would be, as `Equations.values` has them.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
+from itertools import permutations, product
 
 import numpy as np
 
 from tmt import literal
 
 from ..core.cause import Cause
+from .fit import Search
 from .model import TINY, Equations, Path
-from .terms import entries_of_M, in_rows, rows_of_h
+from .terms import entries_of_M, in_rows, rows_of_h, unit_columns
 
 Variant = tuple[Cause, np.ndarray]  # the values: (states, entries)
+Parallel = tuple[str, np.ndarray, np.ndarray]  # a name, a column (states, entries) and its factors (states,)
 OF_ENERGY = {  # slips in Mdot qd - d(qd' Mbar qd / 2)/dq: place, what it is, and the factors of both
     ("gradient of the kinetic energy in h", "left out"): (1.0, 0.0),
     ("gradient of the kinetic energy in h", "halved"): (1.0, 0.5),
@@ -23,6 +26,11 @@ OF_ENERGY = {  # slips in Mdot qd - d(qd' Mbar qd / 2)/dq: place, what it is, an
     ("Mdot qd in h", "left out"): (0.0, 1.0), ("Mdot qd in h", "halved"): (0.5, 1.0),
     ("Mdot qd in h", "halved, and no gradient of the kinetic energy"): (0.5, 0.0),
 }  # fmt: skip
+PAIRS = (  # functions of an angle that are taken for each other
+    ("sin", "0"), ("cos", "0"), ("sin", "cos"), ("1", "sin"), ("1", "cos"),
+    ("sin", "sin^2"), ("cos", "cos^2"), ("sin^2", "cos^2"),
+)  # fmt: skip
+OF_FACTORS = "coefficient", "term", "part"  # kinds of places
 OF_SLOPES = {"left out": 0.0, "of the other sign": -1.0, "halved": 0.5, "twice": 2.0}
 
 
@@ -115,3 +123,61 @@ def other_angles(equations: Equations) -> Iterator[Variant]:
                 values = right.copy()
                 values[:, entries] = other[:, entries]
                 yield variant(2, "angle", f"{what.format(name)} in {place}", "", "", values)
+
+
+def other_factors(equations: Equations, search: Search) -> Iterator[Variant]:
+    """Terms of an entry or a coefficient with another sine or cosine of a hinge: left out, added, one for the other."""
+    tree = equations.tree
+    angles = {
+        name: equations.q[:, joint.q.start] - zero
+        for name, zero, joint in zip(tree.joint_names, tree.reference, tree.coordinates.joints)
+        if joint.kind == "hinge"
+    }
+    terms = [place for place in search.places if place.kind in OF_FACTORS and place.column is not None]
+    terms.sort(key=lambda place: OF_FACTORS.index(place.kind))
+    added = list(parallel(search, unit_columns(equations).items()))
+    multiplied = list(parallel(search, ((place.name, place.column) for place in terms)))
+    for name, angle in angles.items():
+        functions = functions_of(angle)
+        for (place, column, found), (wrong, right) in product(added, PAIRS):
+            change = functions[wrong] - functions[right]
+            size = float(change @ found / (change @ change))
+            yours, other = (wrong, right) if size > 0.0 else (right, wrong)
+            said = f"{written(abs(size), yours, name)} instead of {written(abs(size), other, name)}"
+            yield variant(2, "angle", place, "", said, search.right + (size * change)[:, None] * column)
+        for (place, column, _), (wrong, right) in product(multiplied, permutations(("1", "sin", "cos"), 2)):
+            change = functions[wrong] / functions[right] - 1.0
+            said = f"{wrong}({name}) for {right}({name})"
+            said = f"{right}({name}) left out" if wrong == "1" else said
+            said = f"{wrong}({name}) too many" if right == "1" else said
+            yield variant(2, "factor", place, "", said, search.right + change[:, None] * column)
+
+
+def parallel(search: Search, columns: Iterable[tuple[str, np.ndarray]]) -> Iterator[Parallel]:
+    """The columns that leave nothing with a factor for each state."""
+    for name, column in columns:
+        weighted = column * search.weight
+        squares = (weighted**2).sum(axis=1)
+        found = (weighted * search.off).sum(axis=1) / np.where(squares > 0.0, squares, 1.0)
+        if np.abs(search.off - found[:, None] * weighted).max() <= 1.0:
+            yield name, column, found
+
+
+def functions_of(angle: np.ndarray) -> dict[str, np.ndarray]:
+    sine, cosine = np.sin(angle), np.cos(angle)
+    return {
+        "0": 0.0 * angle,
+        "1": 1.0 + 0.0 * angle,
+        "sin": sine,
+        "cos": cosine,
+        "sin^2": sine**2,
+        "cos^2": cosine**2,
+    }
+
+
+def written(size: float, function: str, joint: str) -> str:
+    """A term: "0.3 cos(knee)^2", "0.3", "0"."""
+    name, power = function[:3], function[3:]
+    if function in ("0", "1"):
+        return f"{size * float(function):.6g}"
+    return f"{size:.6g} {name}({joint}){power}"

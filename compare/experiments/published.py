@@ -8,7 +8,7 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.exact.values import distance, exact
+from tmt.exact.many import Pairs, exact_of_many
 
 from ..core.check import Result
 from ..core.finding import Finding
@@ -47,7 +47,7 @@ class PrintedRow(Row):
 class Answer(NamedTuple):
     """The computed values of one printed answer, in its shape and unit."""
 
-    exact: np.ndarray  # of mpmath numbers
+    exact: Pairs  # of one state
     tmt: np.ndarray
     mujoco: np.ndarray
     scale: float
@@ -55,7 +55,7 @@ class Answer(NamedTuple):
     @property
     def nearest(self) -> np.ndarray:
         """The exact values as doubles."""
-        return self.exact.astype(float)
+        return self.exact.high[0]
 
     @property
     def rounding(self) -> float:
@@ -89,7 +89,7 @@ def answer(item: Printed, robot: Robot, dynamics: Mapping[str, Any]) -> Answer:
         tau = dynamics["tmt"].gravity_balance(robot.posture(held.posture))
     arguments = (q, rest, tau) if function == "acceleration" else (q,)
     of_tmt, of_mujoco = (getattr(dynamics[engine], function)(*arguments) for engine in ("tmt", "mujoco"))
-    values = getattr(exact(robot.tree, q.tolist(), rest.tolist(), tau.tolist()), function)
+    values = exact_of_many(robot.tree, function, *np.array([q, rest, tau])[:, None])
     return Answer(values, of_tmt, of_mujoco, scales(robot.tree, q)[function])
 
 
@@ -124,7 +124,7 @@ def check_answer(result: Result, item: Printed, computed: Answer, joints: tuple[
         if not item.is_rounding:
             result.check(where, printed_digits, off[label], item.half_digit + rounding, unit)
         elif label != "exact":
-            difference = distance(values, computed.exact).max()
+            difference = computed.exact.distance(values).max()
             result.check(where, from_exact, difference, rounding, unit, rounding=True)
     for label in ("exact", "TMT"):
         if label.lower() in item.to_every_digit:

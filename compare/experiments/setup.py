@@ -73,6 +73,7 @@ class Setup:
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
     alone: bool = False  # whether the experiment runs by itself, and may take longer than in `all`
     request: Request = NO_REQUEST  # of stability
+    command: str = ""  # the words of the run
     size: str = "full"
 
     @property

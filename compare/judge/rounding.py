@@ -4,8 +4,8 @@ import numpy as np
 from numpy import ndarray
 
 from tmt import Tree
-from tmt.methods import METHODS
-from tmt.methods.derivatives import Differentiated, amplification
+from tmt.literal import gather
+from tmt.methods import METHODS, Linearized, amplification
 from tmt.methods.stepping import Method, stepped
 
 from .entries import Entries
@@ -31,10 +31,10 @@ def slope_rounding(
     factorization, where A is Mbar. Of `discrete` with servos it has the force that MuJoCo leaves out, where
     the force is as small as that, or nearly so.
     """
-    dynamics = Differentiated()
+    dynamics = Linearized()
     slope = stepping.slope(tree, list(q.T), list(qd.T), list(tau), dt, dynamics)
     a = np.stack([np.broadcast_to(component, q.shape[:1]) for component in slope], axis=-1)
-    A, total = dynamics.system
+    A = gather(dynamics.last.matrix, q.shape[:1], overflow=np.nan)
     force = motion_scale(tree, q, qd) + Entries(tree, q).force(tau) + np.array(tree.damping) * np.abs(qd)
     if tree.has_gains:
         force = force + gain_scale(tree, q, qd)
@@ -42,6 +42,7 @@ def slope_rounding(
     terms = np.maximum(np.abs(A), root[:, :, None] * root[:, None, :])
     errors = FACTOR * EPS * (np.einsum("sij,sj->si", terms, np.abs(a)) + force)
     if tree.has_gains and stepping == METHODS["discrete"]:
+        total = np.einsum("sij,sj->si", A, a)
         errors = errors + LEFT_OUT * (np.linalg.norm(total, axis=1, keepdims=True) < 4.0 * LEFT_OUT)
     return a, np.abs(a), np.einsum("sij,sj->si", np.abs(np.linalg.inv(A)), errors)
 

@@ -11,6 +11,7 @@ from tmt import Tree, literal
 from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
 from tmt.model.tree import GAINS
 
+from ..core.finding import Finding
 from .actuators import Drive, controller
 from .case import Range, Robot
 from .coordinates import Coordinates, fastest_rates, free_joints
@@ -71,6 +72,32 @@ def robot_of_solution(file: RobotFile, shown: str, solution: RobotFile, whose: s
     robot = robot_of(solution, shown)
     mjcf, stated = file.path or robot.mjcf, solution.features
     return replace(robot, mjcf=mjcf, features=file.features, stated_in=whose, features_stated=stated)
+
+
+def not_compared(file: RobotFile, solution: RobotFile, names: Sequence[str]) -> list[Finding]:
+    """The limits and actuators that are not those of a solution, as they may be. names: its joints as in the file."""
+    ranges, called = (
+        dict(zip(file.tree.joint_names, file.ranges)),
+        dict(zip(solution.tree.joint_names, names)),
+    )
+    limits = [name for name, limit in zip(names, solution.ranges) if rounded(ranges[name]) != rounded(limit)]
+    laws, stated = laws_of(file.drive, {}), laws_of(solution.drive, called)
+    actuators = [name for law, name in (laws | stated).items() if law not in laws or law not in stated]
+    values = {"limits": limits, "actuators": list(dict.fromkeys(actuators))}
+    return [Finding("remarks", "not_compared", values)] if limits or actuators else []
+
+
+def laws_of(drive: Drive, joints: Mapping[str, str]) -> dict[tuple[str | tuple[str, ...], ...], str]:
+    """The names of actuators by joint, gear, law and range of control. joints: other names of joints."""
+    laws: dict[tuple[str | tuple[str, ...], ...], str] = {}
+    for actuator in drive.actuators:
+        numbers = sorted(actuator.moment or ()), actuator.gain, actuator.bias, actuator.control_range
+        laws[joints.get(actuator.joint, actuator.joint), *map(rounded, numbers)] = actuator.name
+    return laws
+
+
+def rounded(numbers: Sequence[float] | None) -> tuple[str, ...]:
+    return tuple(f"{x:.9g}" for x in numbers or ())
 
 
 def names_of_keys(file: RobotFile) -> dict[str, str]:

@@ -22,7 +22,7 @@ from ..robots import Robot
 from ..robots.actuators import Drive
 from ..robots.arm import ARM
 from ..robots.case import SEED
-from ..robots.file import robot_of, robot_of_solution
+from ..robots.file import not_compared, robot_of, robot_of_solution
 from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, matched_joints
 from ..robots.placement import placed
 from ..robots.scene_file import read_controls
@@ -134,10 +134,11 @@ def compared_with(
             source, other = source.joined(), other.joined()
             reading, stated = read(source), read(other)
         placement = placed(replace(stated.tree, joint_names=names), reading.tree)
+        unlike = not_compared(reading, stated, names)
         # its actuators do not act: those of the file may differ
         stated = replace(stated, tree=placement.tree, drive=Drive())
         robot = robot_of_solution(reading, shown, stated, of_file.source)
-        otherwise = tuple(map(say, placement.remarks() + of_welded(source)))
+        otherwise = tuple(map(say, placement.remarks() + of_welded(source) + unlike))
         of_file = of_file._replace(kind=SOLUTION, renamed=renamed, otherwise=otherwise)
         return Compared(of_file, robot, engine(reading, stated), reading)
     robot, mujoco = robot_of(reading, shown), engine(reading)

@@ -14,8 +14,7 @@ from tmt.derivation import composite, method
 from tmt.derivation.dual import Dual, seeded
 from tmt.methods import RungeKutta, amplification
 from tmt.methods.implicit import ImplicitRungeKutta
-from tmt.methods.stepping import Method
-from tmt.methods.tableau import Tableau
+from tmt.methods.stepping import Method, Tableau
 
 from ..robots import Robot
 from ..robots.case import SEED, Case

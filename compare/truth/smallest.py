@@ -16,8 +16,7 @@ import numpy as np
 import tmt
 from tmt.derivation import method
 from tmt.derivation.vectors import solve
-from tmt.exact.tree import exact_tree
-from tmt.exact.values import DIGITS
+from tmt.exact.tree import DIGITS, exact_tree
 
 from ..robots.case import SEED, Case
 

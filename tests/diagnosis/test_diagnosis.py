@@ -170,12 +170,28 @@ def test_a_slip_in_one_part_of_M_comes_before_unusual_factors_of_other_terms(add
     assert all(cause.explains == pytest.approx(factor, abs=1e-9) for cause in causes if cause.unit == "times")
 
 
+@pytest.mark.parametrize("added, place, explains", [
+    ({M10: 0.5 * np.sin(KNEE) - 0.5 * np.cos(KNEE)}, "M[hip][knee]", "0.5 sin(knee) instead of 0.5 cos(knee)"),
+    ({M11: 0.35 * np.cos(HIP) - 0.35}, "M[knee][knee]", "0.35 cos(hip) instead of 0.35"),
+    ({H1: 0.3 * np.sin(HIP)}, "h[knee], gravity", "0.3 sin(hip) instead of 0"),
+    ({M10: np.cos(KNEE) * (np.cos(KNEE) - 1.0) / 2.0}, "M[hip][knee]", "0.5 cos(knee)^2 instead of 0.5 cos(knee)"),
+])  # fmt: skip
+def test_another_function_of_an_angle_is_named_with_its_coefficient(added, place, explains):
+    assert (place, explains) in [(cause.place, cause.explains) for cause in told(added).causes]
+
+
+def test_an_added_product_of_speeds_is_named():
+    found = told({}, lambda q, qd: tmt.bias(q, qd, TREE) + 0.02 * qd[:, :1] * qd[:, 1:] * [0, 1]).causes[0]
+    assert (found.place, found.stated) == ("h[knee], coefficient of hip' knee'", 0.0)
+    assert found.explains == pytest.approx(0.02)
+
+
 def test_a_coefficient_that_nothing_explains_is_told_with_both_numbers():
-    more = lambda q, qd: 0.2 * np.cos(q[:, :1]) * qd[:, :1] * qd[:, 1:] * [0, 1]  # noqa: E731
+    more = lambda q, qd: 0.2 * np.exp(q[:, :1]) * qd[:, :1] * qd[:, 1:] * [0, 1]  # noqa: E731
     found = told({}, lambda q, qd: tmt.bias(q, qd, TREE) + more(q, qd))
     (detail,) = found.details
     assert not found.causes and detail.name == "h[knee], coefficient of hip' knee'"
-    assert (detail.right, abs(detail.yours)) == (0.0, pytest.approx(0.2 * np.abs(np.cos(HIP)).max()))
+    assert (detail.right, abs(detail.yours)) == (0.0, pytest.approx(0.2 * np.exp(HIP).max()))
     assert f"{detail.yours:g}" in found.sentence()
 
 

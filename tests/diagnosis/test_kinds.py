@@ -124,6 +124,7 @@ TENSOR = np.array(ARM.inertia[1])
 EDITS = {  # numbers of the arm: the cause
     "axes exchanged": ({"inertia": (ARM.inertia[0], TENSOR[::-1, ::-1])}, "inertia of forearm, axes x and z exchanged"),
     "a body left out": ({"mass": (1.9, 0.0), "inertia": (ARM.inertia[0], 0.0 * TENSOR)}, "forearm"),
+    "of rods": ({"inertia": np.array(ARM.inertia) * [[1], [1], [0]]}, "inertia zz of every body"),
     "in mm": ({"com": 1e3 * np.array(ARM.com), "offset": 1e3 * np.array(ARM.offset)}, "all lengths"),
     "along x": ({"gravity": (-9.81, 0.0, 0.0)}, "gravity"),
     "another axis": ({"axis": (*ARM.axis[:2], (0.0, 0.0, 1.0))}, "axis of gamma"),
@@ -173,6 +174,8 @@ def test_every_slip_of_the_recursion_changes_something_in_some_model():
     "order of rotations at gamma: its turn before those of the joints that carry it",
     "axis of gamma not turned to the inertial frame",
     "convective angular acceleration omega x axis qd of gamma left out", "column of T of beta for forearm left out",
+    "speed of beta for forearm left out of the angular velocity",
+    "inertia of forearm in world axes, R I R', for one in its own axes",
     "moment c x F of the force at the CoM of forearm left out", "force passed on by gamma turned with R' for R",
 ])  # fmt: skip
 def test_a_slip_of_the_recursion_is_named(place):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from crane import TREE, XML
+from many_digits import distance, exact
 
 import tmt
 from compare.engines import GRID, Setting
@@ -17,7 +18,6 @@ from compare.robots import Robot
 from compare.robots.arm import ARM
 from compare.robots.case import Case, Scene
 from compare.run import examine as experiment
-from tmt.exact.values import distance, exact
 
 ENGINES = (Tmt, Mujoco, Scipy, Heyoka)
 METHODS = [method for engine in (Tmt(), Mujoco, Scipy, Heyoka) for method in engine.methods.values()]

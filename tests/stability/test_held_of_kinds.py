@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from many_digits import distance
 from models import PATHS, random_tree
 from servo_models import robot
 from trees import exact_swing
@@ -14,7 +15,6 @@ from compare.robots.coordinates import floats
 from compare.stability.held import Held, held, holding, moving, posture_names, slopes
 from compare.truth.pendulum import pendulum, swing
 from tmt import METHODS
-from tmt.exact.values import distance
 from tmt.methods import amplification
 
 FIXED = [name for name, method in METHODS.items() if not method.adaptive]

@@ -8,13 +8,13 @@ from inspect import signature
 
 import numpy as np
 import pytest
+from many_digits import FIELDS, distance, exact
 from trees import one_body, random_states, small_tree, wrist
 
 import tmt
 from tmt import answers, literal
 from tmt.compiled import cores, evaluator
 from tmt.derivation.quantities import PLAIN, QUANTITIES
-from tmt.exact.values import FIELDS, distance, exact
 
 EPS = np.finfo(float).eps
 SMALL = small_tree()

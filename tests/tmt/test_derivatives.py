@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from many_digits import distance, exact
 from models import PATHS
 from trees import random_states, small_tree, tree_of_kinds
 
@@ -14,7 +15,6 @@ from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 from tmt.compiled.evaluator import Evaluator
 from tmt.exact.many import exact_of_many
-from tmt.exact.values import distance, exact
 
 CENTRAL = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}  # weights of the difference of order 8
 STEP = 0.02
@@ -129,18 +129,6 @@ def test_stages_that_are_solved_for_have_the_derivatives_of_50_digits(rng):
     truth = exact(tree, q, qd, tau, step=("implicit_midpoint", 0.02)).step_derivatives
     found = np.hstack(tmt.step_derivatives(q, qd, tau, 0.02, "implicit_midpoint", tree))
     assert distance(found, truth).max() <= FACTOR * EPS * np.abs(found).max()
-
-
-def test_a_prepared_model_answers_derivatives_with_machine_code(rng, monkeypatch):
-    tree = dataclasses.replace(tmt.ARM, mass=(1.25, 1.5))
-    q, qd, tau = random_states(rng, tree, 3)
-    before = tmt.derivatives(q, qd, tau, tree), tmt.step_derivatives(q, qd, tau, 0.01, "rk4", tree)
-    tmt.prepare(tree, "derivatives", "step_derivatives:rk4")
-    monkeypatch.setattr(tmt.literal, "literal", None)
-    after = tmt.derivatives(q, qd, tau, tree), tmt.step_derivatives(q, qd, tau, 0.01, "rk4", tree)
-    for parts, again in zip(before, after, strict=True):
-        assert all(np.allclose(a, b, rtol=1e-11, atol=1e-11) for a, b in zip(parts, again, strict=True))
-    assert not all(map(np.array_equal, before[0], after[0]))
 
 
 def with_site(tree, joint, rng):

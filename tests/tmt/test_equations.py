@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from many_digits import exact
 from trees import random_state, small_tree, tree_of_kinds
 
 import tmt
 from tmt.derivation import articulated, composite, method
-from tmt.exact.values import distance, exact
 
 EPS = np.finfo(float).eps
 STEP = 1e-5  # of central differences, which are right to about 1e-8 of what is differenced
@@ -135,12 +135,6 @@ def test_a_locked_tree_is_the_sub_block_of_the_whole(drawn, data):
         (tmt.com_positions(q[at], smaller), tmt.com_positions(q, tree)),
     ):
         assert_close(found, whole, digits=1e-12)
-
-
-def test_the_distance_from_many_digits_is_that_of_all_digits():
-    with mpmath.workdps(50):
-        off = distance(np.array([3.0]), np.array([mpmath.mpf("3.0000000000000000001")]))
-    assert abs(off[0] - 1e-19) < 1e-28
 
 
 DIGITS = 150

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from many_digits import FIELDS, exact
 from trees import random_states, random_tree, tree_of_kinds
 
 import tmt
 from tmt.compiled import forms, straight
 from tmt.derivation.quantities import PLAIN, QUANTITIES
 from tmt.exact.many import Pairs, exact_of_many
-from tmt.exact.values import FIELDS, exact
 from tmt.export import c
 from tmt.export.statements import Syntax, Writer
 

@@ -21,7 +21,6 @@ ARRAYS = ("q", "qd", "tau", "dt")
 
 
 def source(tree: Tree, quantity: str, width: int) -> str:
-    """The module of a quantity for one state at a time, or for several side by side."""
     traced = forms.quantity(tree, quantity)
     entries = Entries(tree, quantity, traced, width)
     called = [entries.rows(), entries.one()] if width == 1 else [entries.rows()]
@@ -29,8 +28,6 @@ def source(tree: Tree, quantity: str, width: int) -> str:
 
 
 class Entries:
-    """The lines around a traced quantity."""
-
     def __init__(self, tree: Tree, quantity: str, traced: Traced, width: int):
         self.tree, self.width, self.kind = tree, width, wide(DOUBLE, width)
         self.sizes = tree.coordinates.nq, tree.coordinates.nv, tree.coordinates.nv, 1

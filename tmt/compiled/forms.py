@@ -24,7 +24,7 @@ from .trace import Expression
 
 Way = TypeVar("Way")
 MANY = 20  # speeds from which derivatives are not traced by dual numbers
-DENSE = 10  # speeds from which solving linear systems and the derivatives of the bias are loops and no longer straight lines
+DENSE = 10  # speeds up to which linear systems are solved in straight lines, and the bias is differentiated by dual numbers
 
 
 def mixed(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
@@ -49,7 +49,7 @@ def shortest(name: str, sizes: Sequence[int], way: Callable[..., Values], ways: 
 class Traceable(Dynamics):
     """Mbar and h of a form, for traced functions.
 
-    Of more than a few speeds the derivatives of h by the speeds and the solution of linear systems are functions that are called.
+    Of more than a few speeds the derivatives of h are in closed form, and linear systems are solved by a function that is called.
     by_bodies: accelerations are those of articulated bodies, where all that a method takes implicitly acts at single joints: then
     it counts as armature.
     """
@@ -58,22 +58,19 @@ class Traceable(Dynamics):
         super().__init__(terms)
         self.n, self.by_bodies = len(tree.axis), by_bodies
 
-    def acceleration(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
-    ) -> Values:
-        if not self.by_bodies or (implicit and not implicit.acts_at_single_joints):
-            return super().acceleration(tree, q, qd, tau, implicit)
+    def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, held: Held = None) -> Values:
+        if not self.by_bodies or (held and not held.acts_at_single_joints):
+            return super().acceleration(tree, q, qd, tau, held)
         force, armature = reduced_force(tree, [0.0] * self.n, q, qd, tau), list(tree.armature)
-        if implicit:
-            force = minus(force, implicit.pull)
-            armature = plus(armature, [row[i] for i, row in enumerate(implicit.matrix)])
+        if held:
+            force = minus(force, held.pull)
+            armature = plus(armature, [row[i] for i, row in enumerate(held.matrix)])
         return articulated.acceleration(tree, q, qd, force, armature)
 
     def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
         if self.n <= DENSE:
             return super().bias_rates(tree, q, qd)
-        rates = q[0].tape.call("bias_rates", [*q, *qd], self.n * self.n)
-        return [rates[self.n * i : self.n * (i + 1)] for i in range(self.n)]
+        return linearized.rates(tree, q, qd, [0.0] * self.n)[1]
 
     def solve_any(self, matrix: Rows, right: Values) -> Values:
         if self.n <= DENSE:
@@ -159,14 +156,3 @@ def directional(tree: Tree, stepping: Method) -> Traced:
         return [*(value for value, _ in parts), *(slope for _, slope in parts)]
 
     return shortest("directional", (nq, n, n, 1, nq, n), both, all_dynamics(tree))
-
-
-def bias_rate(tree: Tree) -> Traced:
-    """The derivative of h along a change of the speeds: (q, qd, dqd) -> dh."""
-
-    def function(form: Form, q: Values, qd: Values, dqd: Values) -> Values:
-        rates = seeded(qd, dqd)
-        return [rates[0].parts(x)[1] for x in form.terms(tree, q, rates)[1]]
-
-    nq, n = tree.coordinates.nq, tree.coordinates.nv
-    return shortest("bias_rate", (nq, n, n), function, FORMS[:2])

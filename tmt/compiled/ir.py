@@ -38,8 +38,6 @@ def constant(kind: str, number: Number) -> str:
 
 
 class Value:
-    """A value of one kind in the code of one function."""
-
     __array_ufunc__ = None
     __slots__ = ("code", "kind", "name")
 

@@ -51,23 +51,6 @@ def solution(n: int) -> Code:
     return code
 
 
-def bias_rates(nq: int, n: int, width: int) -> Code:
-    """bias_rates(in, out): dh/dqd (n, n) from (q, qd), by `bias_rate`, several directions at a time."""
-    code = Code("bias_rates", {"in": POINTER, "out": POINTER}, attributes="noinline")
-    state = code.reserve(wide(DOUBLE, width), nq + 2 * n)
-    rates = code.reserve(wide(DOUBLE, width), n)
-    for k in range(nq + n):
-        state.store(code["in"].load(k).everywhere(width), k * width)
-    with code.loop(n, width) as loop:
-        put_directions(state, nq + n, n, loop.index, width)
-        code.call("bias_rate", state, rates)
-        for l in range(width):
-            with code.when((loop.index + l).compare("lt", n)), code.loop(n) as rows:
-                code["out"].store(rates.load(rows.index * width + l), rows.index * n + loop.index + l)
-    code.give_back()
-    return code
-
-
 def put_directions(state: Value, at: int, n: int, first: Value, width: int) -> None:
     """Put unit vectors (n,), lane l the one along `first` + l, to the numbers of a state from `at` on."""
     code = state.code

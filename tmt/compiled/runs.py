@@ -48,18 +48,13 @@ class Step:
         self.functions: list[Code] = []
         self.wanted: Variable  # of an adaptive method: the step that its tolerance wants
 
-    def add(self, traced: Traced, width: int, inline: bool = False) -> str:
-        """The functions of a traced one and of what it calls; its name."""
+    def add(self, traced: Traced, width: int, inline: bool = False) -> None:
+        """The functions of a traced one and of what it calls."""
         self.functions += functions(traced, width, inline)
         operations = [traced.tape.nodes[i] for i in traced.nodes]
-        called = {arguments[0] for kind, arguments in operations if kind == "call"}
-        missing = called - {code.name for code in self.functions}
-        if "solution" in missing:
+        is_solved = any(kind == "call" and arguments[0] == "solution" for kind, arguments in operations)
+        if is_solved and "solve" not in {code.name for code in self.functions}:
             self.functions += [linear.solve(), linear.solution(self.n)]
-        if "bias_rates" in missing:
-            self.functions += functions(forms.bias_rate(self.tree), linear.WIDTH)
-            self.functions.append(linear.bias_rates(self.nq, self.n, linear.WIDTH))
-        return traced.name
 
     def add_step(self, name: str) -> int:
         """The slope, and the step or attempt that asks it; how many results that has."""

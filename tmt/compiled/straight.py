@@ -7,6 +7,7 @@ part hands to a later one stands in an array.
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,13 +21,10 @@ from .trace import FOLD, LEAVES, Expression, Tape
 LIMIT = 2.0**49  # rad: of larger angles there is no sine
 LONGEST = 1_000  # nodes of one function
 Key = TypeVar("Key", int, str)
-OF_ONE = ("solution", "bias_rates")  # functions of linear.py, which take one state
 
 
 @dataclass(frozen=True)
 class Traced:
-    """A function that was traced."""
-
     name: str
     tape: Tape
     inputs: list[Expression]
@@ -35,6 +33,23 @@ class Traced:
     @cached_property
     def nodes(self) -> list[int]:
         return self.tape.needed([self.tape.lift(x) for x in self.outputs])
+
+    @cached_property
+    def places(self) -> dict[int, list[int]]:
+        """The places of a node among the results."""
+        places: dict[int, list[int]] = defaultdict(list)
+        for k, x in enumerate(self.outputs):
+            places[self.tape.lift(x).i].append(k)
+        return places
+
+    @cached_property
+    def items(self) -> dict[int, list[int]]:
+        """Of a node with several results, which of them are needed."""
+        items: dict[int, list[int]] = defaultdict(list)
+        for i in self.nodes:
+            if self.tape.nodes[i][0] == "item":
+                items[self.tape.nodes[i][1][0]].append(i)
+        return items
 
     @property
     def length(self) -> float:
@@ -108,14 +123,8 @@ class Steps:
         tape, nodes = traced.tape, traced.nodes
         outputs = [tape.lift(x) for x in traced.outputs]
         self.tape, self.fused = tape, tape.fused(nodes, outputs)
-        self.outputs: dict[int, list[int]] = {}  # the places of a node among the results
-        for k, x in enumerate(outputs):
-            self.outputs.setdefault(x.i, []).append(k)
+        self.outputs, self.items = traced.places, traced.items
         self.input = {x.i: k for k, x in enumerate(traced.inputs)}
-        self.items: dict[int, list[int]] = {}  # of a node with several results, which of them are needed
-        for i in nodes:
-            if tape.nodes[i][0] == "item":
-                self.items.setdefault(tape.nodes[i][1][0], []).append(i)
         left_out = {*self.fused.values(), *(i for i in nodes if tape.nodes[i][0] in (*LEAVES, "item"))}
         self.order = [i for i in nodes if i not in left_out]
 
@@ -127,7 +136,6 @@ class Steps:
         return [a for a in arguments if self.tape.nodes[a][0] != "number"]
 
     def handed_on(self, sections: list[list[int]]) -> tuple[dict[int, int], int]:
-        """The place of each value that a part hands to a later one, and how many places there are."""
         made: list[list[int]] = [[] for _ in sections]  # by each part
         last: dict[int, int] = {}  # the part that takes a value last
         for k, section in enumerate(sections):
@@ -198,7 +206,7 @@ def called(code: Code, name: str, values: list[Value], count: int, width: int) -
     out = code.reserve(wide(DOUBLE, width), count)
     for k, x in enumerate(values):
         taken.store(x, k * width)
-    if width == 1 or name not in OF_ONE:
+    if width == 1 or name != "solution":
         code.call(name, taken, out)
         return out
     taken_one, out_one = code.reserve(DOUBLE, len(values)), code.reserve(DOUBLE, count)

@@ -171,8 +171,6 @@ class Tape:
 
 
 class Expression:
-    """A traced scalar."""
-
     __slots__ = ("i", "tape")
     __array_ufunc__ = None
 

@@ -21,21 +21,16 @@ from typing import NamedTuple
 from .composite import Distribution, rounded, turning
 from .mechanism import AnyTree, turn_in_parent
 from .method import with_rotors
-from .vectors import IDENTITY, ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, outer
+from .vectors import IDENTITY, ZERO, Matrix, Record, Rows, Scalar, Scalars, Values, Vector, combined, outer
 
 
 class Symmetric(NamedTuple):
-    """A symmetric 3 x 3 matrix."""
-
     diagonal: Vector
     off: Vector  # yz, xz, xy
 
     def times(self, v: Vector) -> Vector:
         (xx, yy, zz), (yz, xz, xy) = self
         return Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ v
-
-    def plus(self, other: "Symmetric") -> "Symmetric":
-        return Symmetric(self.diagonal + other.diagonal, self.off + other.off)
 
     def less_outer(self, a: Vector, b: Vector) -> "Symmetric":
         """The matrix less a b', a along b."""
@@ -48,9 +43,6 @@ class Screw(NamedTuple):
 
     turn: Vector
     shift: Vector
-
-    def plus(self, other: "Screw") -> "Screw":
-        return Screw(self.turn + other.turn, self.shift + other.shift)
 
     def scaled(self, factor: Scalar) -> "Screw":
         return Screw(self.turn * factor, self.shift * factor)
@@ -86,10 +78,6 @@ class Carried(NamedTuple):
     H: Matrix
     M: Symmetric
 
-    def plus(self, other: "Carried") -> "Carried":
-        force, J = self.force.plus(other.force), self.J.plus(other.J)
-        return Carried(force, J, self.H + other.H, self.M.plus(other.M))
-
 
 class Rigid(NamedTuple):
     """What a joint carries as one rigid body: H = [s]x, M = m."""
@@ -98,9 +86,6 @@ class Rigid(NamedTuple):
     J: Symmetric
     s: Vector
     m: Scalar
-
-    def plus(self, other: "Rigid") -> "Rigid":
-        return Rigid(self.force.plus(other.force), self.J.plus(other.J), self.s + other.s, self.m + other.m)
 
     def accelerated(self, motion: Screw) -> Screw:
         """The force that gives it this acceleration."""
@@ -130,9 +115,9 @@ def acceleration(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armatur
             share = U.scaled(inverse)
             shares[k] = share, u
             J, M = body.J.less_outer(share.turn, U.turn), body.M.less_outer(share.shift, U.shift)
-            body = Carried(body.force.plus(U.scaled(u)), J, body.H - outer(share.turn, U.shift), M)
+            body = Carried(combined(body.force, U.scaled(u)), J, body.H - outer(share.turn, U.shift), M)
         if tree.parent[i] >= 0:
-            bodies[tree.parent[i]] = bodies[tree.parent[i]].plus(body)
+            bodies[tree.parent[i]] = combined(bodies[tree.parent[i]], body)
     result: Values = []
     motions: list[Screw] = []
     for i, joint in enumerate(joints):
@@ -140,13 +125,12 @@ def acceleration(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armatur
         for k, direction in zip(joint.speeds, frames[i].directions):
             share, u = shares[k]
             result.append(u - share.dot(motion))
-            motion = motion.plus(direction.scaled(result[-1]))
+            motion = combined(motion, direction.scaled(result[-1]))
         motions.append(motion)
     return result
 
 
 def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
-    """Mbar (nv rows of nv, kg m2) and h (nv, N m), as in method.py."""
     frames, own = outward(tree, q, qd)
     rigid, joints = gathered(tree, own), tree.coordinates.joints
     M: Rows = [[0.0] * len(qd) for _ in qd]
@@ -163,7 +147,6 @@ def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, 
 
 
 def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> Values:
-    """Mbar qdd + h (nv, N m), as in method.py."""
     frames, own = outward(tree, q, qd, qdd)
     return with_rotors(tree, along_speeds(frames, gathered(tree, own)), qdd)
 
@@ -173,13 +156,13 @@ def along_speeds(frames: list[Frame], rigid: list[Rigid]) -> Values:
     return [d.dot(body.force) for frame, body in zip(frames, rigid) for d in frame.directions]
 
 
-def gathered(tree: AnyTree, own: list[Rigid]) -> list[Rigid]:
-    """All that each joint carries, from what it carries itself."""
-    rigid = list(own)
-    for i in reversed(range(len(rigid))):
+def gathered(tree: AnyTree, own: list[Record]) -> list[Record]:
+    """The sum of all that each joint carries, from what it carries itself."""
+    result = list(own)
+    for i in reversed(range(len(result))):
         if tree.parent[i] >= 0:
-            rigid[tree.parent[i]] = rigid[tree.parent[i]].plus(rigid[i])
-    return rigid
+            result[tree.parent[i]] = combined(result[tree.parent[i]], result[i])
+    return result
 
 
 def outward(

@@ -22,7 +22,7 @@ import mpmath
 
 from .mechanism import AnyTree, origin_in_parent, turn_in_parent
 from .method import with_rotors
-from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, outer, total_vector
+from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, combined, outer, total_vector
 
 Placement = tuple[Vector, Matrix]  # origin (m) and turn of a frame in its parent's
 
@@ -33,9 +33,6 @@ class Distribution(NamedTuple):
     mass: Scalar  # kg
     moment: Vector  # kg m
     second: Matrix  # kg m2, symmetric
-
-    def plus(self, other: "Distribution") -> "Distribution":
-        return Distribution(self.mass + other.mass, self.moment + other.moment, self.second + other.second)
 
     def less(self, other: "Distribution") -> "Distribution":
         return Distribution(self.mass - other.mass, self.moment - other.moment, self.second - other.second)
@@ -128,7 +125,7 @@ def carried_by_joint(tree: AnyTree) -> list[Distribution]:
     own = [NOTHING] * len(joints)
     for body, i in enumerate(tree.body_joint):
         if i >= 0:
-            own[i] = own[i].plus(distribution_of(tree, body))
+            own[i] = combined(own[i], distribution_of(tree, body))
     for i in reversed(range(len(joints))):
         if joints[i].kind == "hinge":
             handed = own[i].on_line(exact_vector(tree.axis[joints[i].qd.start]))
@@ -138,7 +135,8 @@ def carried_by_joint(tree: AnyTree) -> list[Distribution]:
             handed = NOTHING._replace(second=own[i].second)
         own[i] = own[i].less(handed)
         if tree.parent[i] >= 0:
-            own[tree.parent[i]] = own[tree.parent[i]].plus(handed.moved(exact_vector(tree.offset[i])))
+            handed = handed.moved(exact_vector(tree.offset[i]))
+            own[tree.parent[i]] = combined(own[tree.parent[i]], handed)
     return own
 
 
@@ -185,7 +183,7 @@ def mass_matrix_and_bias(
     M: Rows = [[0.0] * n for _ in range(n)]
     for i in reversed(range(len(joints))):
         kind, parent = joints[i].kind, tree.parent[i]
-        carried = uneven[i].plus(even[i])
+        carried = combined(uneven[i], even[i])
         for k in joints[i].speeds:
             force, moment = carried.at_unit_acceleration(kind, axes[k])
             M[k][k] = axes[k].dot(force if kind == "slide" else moment)
@@ -202,21 +200,20 @@ def mass_matrix_and_bias(
                     M[k][other] = M[other][k] = axes[other].dot(acts)
         if parent >= 0:
             offset, turn = placements[i]
-            uneven[parent] = uneven[parent].plus(uneven[i].turned(turn).plus(even[i]).moved(offset))
+            carried = combined(uneven[i].turned(turn), even[i]).moved(offset)
+            uneven[parent] = combined(uneven[parent], carried)
     return M, inward(tree, placements, motions(tree, placements, qd), own)
 
 
 def generalized_force(
     tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Callable[..., Scalar] = float
 ) -> Values:
-    """Mbar qdd + h (nv, N m), as in method.py."""
     placements = placed(tree, q)
     own, moving = rounded(tree, number)[0], motions(tree, placements, qd, qdd)
     return with_rotors(tree, inward(tree, placements, moving, own), qdd)
 
 
 def placed(tree: AnyTree, q: Scalars) -> list[Placement]:
-    """Origin and turn of each joint's frame in its parent's."""
     return [(origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)) for i in range(len(tree.parent))]
 
 
@@ -264,7 +261,6 @@ def handed_down(offset: Vector, turn: Matrix, force: Vector, moment: Vector) -> 
 
 
 def turning(omega: Vector, omegad: Vector) -> Matrix:
-    """P = [omegad]x + [omega]x[omega]x."""
     x, y, z = omega
     u, v, w = omegad
     xx, yy, zz = x * x, y * y, z * z

@@ -47,7 +47,6 @@ class Ball:
         return [0.5 * x for x in product(q, [0.0, *qd])]
 
     def rates(self, movement: Scalars, speeds: Scalars) -> Values:
-        """dexp^-1(u) omega, see above."""
         u, omega = Vector(*movement), Vector(*speeds)
         half = sqrt(u.dot(u) + TINY) * 0.5
         share = (1.0 - half * cos(half) / sin(half)) / (half * half) * 0.25
@@ -59,8 +58,6 @@ FLAT, BALL = Flat(), Ball()
 
 
 class Joint(NamedTuple):
-    """One joint's place in q and qd."""
-
     kind: str
     q: slice
     qd: slice
@@ -75,8 +72,6 @@ class Joint(NamedTuple):
 
 
 class Coordinates(NamedTuple):
-    """The places of all joints."""
-
     joints: tuple[Joint, ...]
     nq: int
     nv: int

@@ -24,17 +24,12 @@ from typing import NamedTuple
 
 from .articulated import STILL, Frame, Rigid, Screw, gathered, outward
 from .mechanism import AnyTree
-from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Vector, outer
+from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Vector, combined, outer
 
 
 class Momentum(NamedTuple):
-    """What B consists of."""
-
     K: Matrix
     p: Vector
-
-    def plus(self, other: "Momentum") -> "Momentum":
-        return Momentum(self.K + other.K, self.p + other.p)
 
     def force(self, turn: Vector) -> Screw:
         """B X, of the angular part of X."""
@@ -46,7 +41,6 @@ class Momentum(NamedTuple):
 
 
 def momentum(body: Rigid, omega: Vector, u: Vector) -> Momentum:
-    """Of what a joint carries itself."""
     (xx, yy, zz), (yz, xz, xy) = body.J
     half, (x, y, z) = (xx + yy + zz) * 0.5, omega
     second = Matrix([[half - xx, -xy, -xz], [-xy, half - yy, -yz], [-xz, -yz, half - zz]])
@@ -59,7 +53,6 @@ def momentum(body: Rigid, omega: Vector, u: Vector) -> Momentum:
 
 
 def velocities(tree: AnyTree, frames: list[Frame], qd: Scalars) -> list[Screw]:
-    """The velocity of each joint's frame about O."""
     result: list[Screw] = []
     for i, joint in enumerate(tree.coordinates.joints):
         v = result[tree.parent[i]] if tree.parent[i] >= 0 else STILL
@@ -75,10 +68,7 @@ def rates(
     n, joints = len(qd), tree.coordinates.joints
     frames, own = outward(tree, q, qd, qdd, number)
     rigid, v = gathered(tree, own), velocities(tree, frames, qd)
-    B = [momentum(body, *motion) for body, motion in zip(own, v)]
-    for i in reversed(range(len(joints))):
-        if tree.parent[i] >= 0:
-            B[tree.parent[i]] = B[tree.parent[i]].plus(B[i])
+    B = gathered(tree, [momentum(body, *motion) for body, motion in zip(own, v)])
     S = [direction for frame in frames for direction in frame.directions]
     Y: list[Screw] = []
     Z: list[Screw] = []
@@ -90,8 +80,8 @@ def rates(
             a0 = Screw(frames[before].omegad, frames[before].a - v0.turn.cross(v0.shift))
         for k in joint.speeds:
             Y.append(v0.times(S[k]))
-            Z.append(a0.times(S[k]).plus(v0.times(Y[k])))
-            YW.append(Y[k].plus(v[i].times(S[k])))
+            Z.append(combined(a0.times(S[k]), v0.times(Y[k])))
+            YW.append(combined(Y[k], v[i].times(S[k])))
     by_movement: Rows = [[0.0] * n for _ in range(n)]
     by_speed: Rows = [[0.0] * n for _ in range(n)]
     for i, body in enumerate(rigid):
@@ -99,13 +89,14 @@ def rates(
         for k in joints[i].speeds:
             by_turn = B[i].along(S[k])
             inertia = body.accelerated(S[k])  # I S, I being symmetric
-            moved = body.accelerated(Z[k]).plus(B[i].force(Y[k].turn))
-            sped = body.accelerated(YW[k]).plus(B[i].force(S[k].turn))
+            moved = combined(body.accelerated(Z[k]), B[i].force(Y[k].turn))
+            sped = combined(body.accelerated(YW[k]), B[i].force(S[k].turn))
             for other in joints[i].speeds:
                 by_movement[other][k] = moved.dot(S[other])
                 by_speed[other][k] = sped.dot(S[other])
             (axis, shift), (moment, force) = S[k], body.force
-            moved = moved.plus(Screw(axis.cross(moment) + shift.cross(force), axis.cross(force)))
+            turned = Screw(axis.cross(moment) + shift.cross(force), axis.cross(force))
+            moved = combined(moved, turned)
             for other in path:
                 by_movement[other][k] = moved.dot(S[other])
                 by_speed[other][k] = sped.dot(S[other])

@@ -46,7 +46,6 @@ class Mechanism(Generic[Number]):
 
     @property
     def coordinates(self) -> Coordinates:
-        """The places of the joints in q (nq) and qd (nv)."""
         return coordinates_of(self.kind)
 
     @property

@@ -49,8 +49,6 @@ class Frame(NamedTuple):
 
 
 class Body(NamedTuple):
-    """What TMT needs of one body."""
-
     x: Vector  # CoM, m
     T: list[Vector]  # nv columns, dx/dq, m/rad
     B: list[Vector]  # nv columns, body axes
@@ -216,6 +214,14 @@ def fed_back(tree: AnyTree, q: Scalars, qd: Scalars) -> Values:
         for terms_of_speed, row in zip(terms, gain):
             terms_of_speed += [g * x for g, x in zip(row, values) if g]
     return [total(terms_of_speed) for terms_of_speed in terms]
+
+
+def with_diagonal(gains: Sequence[Scalars], diagonal: Scalars) -> Rows:
+    """A matrix of gains, if there are any, with these numbers added on its diagonal."""
+    rows = [list(row) for row in gains] or [[0.0] * len(diagonal) for _ in diagonal]
+    for i, x in enumerate(diagonal):
+        rows[i][i] += x
+    return rows
 
 
 def reduced_force(tree: AnyTree, h: Scalars, q: Scalars, qd: Scalars, tau: Scalars) -> Values:

@@ -1,7 +1,7 @@
 """Every quantity of a state, in one table: what it takes, its shape and unit, how it follows from the bodies.
 
 The literal form (literal.py), the compiled one (compiled/evaluator.py) and the truth in many digits
-(exact/values.py) are all served from it.
+(exact/many.py) are all served from it.
 """
 
 from collections.abc import Callable, Mapping
@@ -93,23 +93,25 @@ class State:
     def force_rates(self) -> Rates:
         """Derivatives of Mbar qdd + h by movements of q and by qd, (nv, nv) each."""
         if self.form.rates is None:
-            return self.by_movement_and_speed(self.force)
+            by_movement = self.by_movement(lambda q: self.force(q, self.qd))
+            return by_movement, jacobian(lambda qd: self.force(self.q, qd), list(self.qd))
         return self.form.rates(self.tree, self.q, self.qd, self.qdd)
 
     @cached_property
     def torque_rates(self) -> Rates:
         """The same of the inverse dynamics."""
-        nothing = [0.0] * len(self.qd)
-        passive = self.by_movement_and_speed(lambda q, qd: method.inverse_dynamics(self.tree, q, qd, nothing))
-        by_movement, by_speed = map(added, self.force_rates, passive)
-        return by_movement, by_speed
+        by_movement, by_speed = self.force_rates
+        nothing, qd = [0.0] * len(self.qd), list(self.qd)
+        if self.tree.has_springs or self.tree.position_gain:
+            pulled = self.by_movement(lambda q: method.inverse_dynamics(self.tree, q, qd, nothing))
+            by_movement = added(by_movement, pulled)
+        damped = method.with_diagonal(self.tree.speed_gain, self.tree.damping)
+        return by_movement, added(by_speed, damped)
 
-    def by_movement_and_speed(self, function: Callable[[Values, Values], Values]) -> Rates:
-        """Derivatives of a function of q and qd by dual numbers, (nv rows of nv) each."""
-        coordinates, n = self.tree.coordinates, len(self.qd)
-        moved = [coordinates.component_rates(self.q, u) for u in unit_vectors(n)]
-        q, qd = list(self.q), list(self.qd)
-        return jacobian(lambda x: function(x, qd), q, moved), jacobian(lambda x: function(q, x), qd)
+    def by_movement(self, function: Callable[[Values], Values]) -> Rows:
+        """Derivatives of a function of q by dual numbers, nv rows of nv."""
+        moved = [self.tree.coordinates.component_rates(self.q, u) for u in unit_vectors(len(self.qd))]
+        return jacobian(function, list(self.q), moved)
 
     @property
     def derivatives(self) -> list[Rows]:
@@ -153,8 +155,6 @@ def added(first: Rows, second: Rows) -> Rows:
 
 
 class Quantity(NamedTuple):
-    """A quantity of a state."""
-
     takes: tuple[str, ...]  # of "q", "qd", "tau" or "qdd", "dt"
     shape: tuple[int | str, ...]  # m bodies, nv speeds; 2nv and 3nv
     unit: str
@@ -214,7 +214,6 @@ PLAIN = tuple(name for name, quantity in QUANTITIES.items() if not quantity.argu
 
 
 def quantity_of(name: str) -> Quantity:
-    """The row of a quantity, by its name or its full name."""
     return QUANTITIES[name.partition(":")[0]]
 
 

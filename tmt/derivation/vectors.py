@@ -6,13 +6,14 @@ scalar type registers itself with `sin.register` and so on; nothing else has to 
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import singledispatch
-from typing import Any, overload
+from typing import Any, NamedTuple, TypeVar, overload
 
 import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
 Scalar = Any  # of any number type over which the method is written
+Record = TypeVar("Record", bound=NamedTuple)
 Values = list[Scalar]
 Rows = list[Values]
 Scalars = Sequence[Scalar] | NDArray[Any]
@@ -150,7 +151,6 @@ class Factors:
         self.upper, self.inverse = upper, inverse
 
     def solve(self, right: Scalars) -> Values:
-        """Solution x of matrix x = right."""
         n, x = len(right), list(right)
         for i in reversed(range(n)):
             x[i] = x[i] - total(self.upper[i][k] * x[k] for k in range(i + 1, n) if not is_zero(x[k]))
@@ -187,6 +187,12 @@ def solve_any(matrix: Sequence[Scalars], right: Scalars) -> Values:
     for i in reversed(range(n)):
         x[i] = (x[i] - total(upper[i][k] * x[k] for k in range(i + 1, n))) / upper[i][i]
     return x
+
+
+def combined(a: Record, b: Record) -> Record:
+    """The sum of two records, field by field."""
+    parts = zip(a, b)
+    return a._make([combined(x, y) if isinstance(x, tuple) else x + y for x, y in parts])
 
 
 def is_zero(x: Scalar) -> bool:

@@ -134,7 +134,6 @@ def followed(
 
 
 def equations(tree: Tree, tau: Numbers, form: str) -> Equations:
-    """The equations of a tree under constant torque (nv,), N m, in one of FORMS."""
     tape, coordinates = Tape(mpmath.mpf), tree.coordinates
     with mpmath.workdps(DIGITS):
         sizes = {"q": coordinates.nq, "qd": coordinates.nv}
@@ -169,7 +168,6 @@ def program(tape: Tape, inputs: Nodes, results: Nodes) -> tuple[Equations, dict[
 
 
 def first_state(coordinates: Coordinates, q: Numbers, qd: Numbers) -> np.ndarray:
-    """The state in pairs, (2, nq + nv), quaternions at length 1."""
     with mpmath.workdps(DIGITS):
         q, qd = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd))
         return np.array([pair(x) for x in (*of_length_1(coordinates, q), *qd)]).T.copy()

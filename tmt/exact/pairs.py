@@ -1,9 +1,7 @@
 """Numbers of about 32 digits for compiled code: the sum of a pair of doubles (high, low), low at most half an ulp of high.
 
-Sums and products after Knuth and Dekker, exact where they must be by `fma`; over floats, and over the values of compiled code.
+Sums and products after Knuth and Dekker, exact where they must be by `fma`; over the values of compiled code.
 """
-
-from fractions import Fraction
 
 import mpmath
 
@@ -48,7 +46,7 @@ def add(ah: Scalar, al: Scalar, bh: Scalar, bl: Scalar) -> Both:
 
 def multiply(ah: Scalar, al: Scalar, bh: Scalar, bl: Scalar) -> Both:
     p = ah * bh
-    return joined(p, fused(ah, bh, -p) + fused(ah, bl, al * bh))
+    return joined(p, ah.fma(bh, -p) + ah.fma(bl, al * bh))
 
 
 def divide(ah: Scalar, al: Scalar, bh: Scalar, bl: Scalar) -> Both:
@@ -64,11 +62,6 @@ def less(ah: Scalar, al: Scalar, bh: Scalar, bl: Scalar, times: Scalar) -> Both:
     """The pair a - times b."""
     ph, pl = multiply(bh, bl, times, 0.0)
     return add(ah, al, -ph, -pl)
-
-
-def fused(a: Scalar, b: Scalar, c: Scalar) -> Scalar:
-    """a b + c, rounded once."""
-    return float(Fraction(a) * Fraction(b) + Fraction(c)) if isinstance(a, float) else a.fma(b, c)
 
 
 def root(ah: Value, al: Value) -> tuple[Value, Value]:

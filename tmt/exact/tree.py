@@ -9,14 +9,13 @@ from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.vectors import Scalar, Scalars, Vector, sqrt
 from tmt.model.tree import Tree
 
+DIGITS = 50  # of computations that show that numbers are zero or that others are right
 HALVINGS = 4  # of a turn of at most pi rad: then the sine of its half is below 0.1
 with mpmath.workdps(60):  # arcsin x = x (1 + x^2 / 6 + ...), the highest first; the next is below 1e-37
     ARC_SINE = [mpmath.binomial(2 * k, k) / (4**k * (2 * k + 1)) for k in reversed(range(18))]
 
 
 class ExactTree(Mechanism[Scalar]):
-    """A Tree in another type of number."""
-
     @property
     def coordinates(self) -> Coordinates:
         return Analytic(*super().coordinates)

@@ -148,13 +148,11 @@ def function_of(model: Tree, name: str, parameters: Parameters) -> Function:
 
 
 def identifier(name: str) -> str:
-    """The name of the function of a quantity."""
     return re.sub(r"\W", "_", name, flags=re.ASCII)
 
 
 @lru_cache(maxsize=16)
 def traced(model: Tree, name: str, parameters: Parameters | None) -> Traced:
-    """A quantity as a function of its arrays and of the parameters."""
     if parameters is None:
         return forms.quantity(model, name)
 

@@ -48,7 +48,6 @@ def comment(lines: Sequence[str]) -> str:
 
 
 def declared(program: Program, function: Function) -> str:
-    """What a function returns, and its declaration."""
     return f"{comment([function.title])}\nvoid {program.name}_{function.name}({arguments(program, function)})"
 
 
@@ -82,7 +81,6 @@ def definitions(program: Program, function: Function) -> list[str]:
 
 
 def block(arrays: Sequence[str], lines: Sequence[str]) -> str:
-    """The body of a function of these arrays."""
     used = {word for line in lines for word in re.findall(r"\b(\w+)\[", line)}
     unused = [f"(void){x};" for x in arrays if x not in used]
     return "\n".join(["{", *(f"    {line}" for line in (*unused, *lines)), "}"])

@@ -130,8 +130,6 @@ class Names:
         return self.named and all(x in (-1, 0, 1) for axis in self.axes for x in axis)
 
     def mechanism(self, scalar: Callable[[Expression], Scalar]) -> AnyTree:
-        """The Tree with its numbers and symbols as scalars; q is from the reference position."""
-
         def lifted(values: Any) -> Any:
             return tuple(map(lifted, values)) if isinstance(values, list) else scalar(values)
 

@@ -24,8 +24,6 @@ OF_BODIES = "com_positions", "angular_velocities", "jacobians", "convective_term
 
 
 class Frame(NamedTuple):
-    """A frame of a body in that of its joint: its origin, m, and its axes as columns."""
-
     origin: NDArray[np.float64]
     axes: NDArray[np.float64]
 
@@ -116,7 +114,6 @@ class Parameters:
 
 
 def placed(part: str, values: Values, frame: Frame) -> Any:
-    """A mass, a centre of mass or an inertia in the frame of the joint."""
     turn = Matrix(np.where(np.abs(frame.axes) < 1e-15, 0.0, frame.axes).tolist())
     if part == "mass":
         return values[0]

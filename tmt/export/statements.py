@@ -1,6 +1,6 @@
 """A traced function as assignments in a language: one for each value that is used twice or is long."""
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import prod
@@ -13,8 +13,6 @@ SUM, PRODUCT, ATOM = 1, 2, 3  # how strongly the parts of an expression are boun
 
 
 class Function(NamedTuple):
-    """A quantity that is written as a function."""
-
     name: str
     title: str  # what it returns, with units
     takes: tuple[str, ...]  # of the arrays in sizes
@@ -40,8 +38,6 @@ class Function(NamedTuple):
 
 
 class Program(NamedTuple):
-    """What a file is written from."""
-
     name: str
     head: Sequence[str]  # lines of the comment that it begins with
     functions: Sequence[Function]
@@ -82,18 +78,10 @@ class Writer:
 
     def __init__(self, traced: Traced, inputs: Sequence[str], results: Sequence[str], syntax: Syntax):
         self.tape, self.syntax = traced.tape, syntax
-        outputs = [self.tape.lift(x).i for x in traced.outputs]
-        self.uses = Counter(outputs)
-        self.results: dict[int, list[str]] = defaultdict(list)  # of a node
-        for i, result in zip(outputs, results):
-            self.results[i].append(result)
-        # of a sine and cosine: [(which, node)]
-        self.items: dict[int, list[tuple[int, int]]] = defaultdict(list)
+        self.traced, self.results = traced, results
+        self.uses = Counter({i: len(places) for i, places in traced.places.items()})
         for i in traced.nodes:
             self.uses.update(self.tape.operands(i))
-            kind, arguments = self.tape.nodes[i]
-            if kind == "item":
-                self.items[arguments[0]].append((arguments[1], i))
         # the text of each node, and how it is bound
         self.known = {x.i: (name, ATOM) for x, name in zip(traced.inputs, inputs)}
         self.lines = [line for i in traced.nodes for line in self.written(i)]
@@ -104,15 +92,16 @@ class Writer:
             number = float(arguments[0])
             self.known[i] = self.syntax.number(number), SUM if number < 0.0 else ATOM
         elif kind == "sincos":
-            for which, item in self.items[i]:
-                yield self.assigned(item, f"{'sc'[which]}{i}", self.call(("sin", "cos")[which], arguments[0]))
+            for item in self.traced.items[i]:
+                function = ("sin", "cos")[self.tape.nodes[item][1][1]]
+                yield self.assigned(item, f"{function[0]}{i}", self.call(function, arguments[0]))
         elif kind not in ("input", "item"):
             self.known[i] = self.expression(kind, arguments)
             text, _ = self.known[i]
             if self.uses[i] > 1 or len(text) > LONGEST:
                 yield self.assigned(i, f"x{i}", text)
-        for result in self.results[i]:
-            yield Line(result.format(value=self.text(i)))
+        for place in self.traced.places.get(i, ()):
+            yield Line(self.results[place].format(value=self.text(i)))
 
     def assigned(self, i: int, name: str, value: str) -> Line:
         """The assignment of a node to a name, which stands for it from then on."""

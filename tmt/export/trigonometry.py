@@ -40,7 +40,6 @@ class Ring:
         self.pairs = [(len(symbols) + s, len(symbols) + c) for s, c in self.places]  # and in self.ring
 
     def count(self, work: float) -> None:
-        """Add work, s."""
         self.work += work
         if self.work > self.limit:
             raise TooLong

@@ -17,9 +17,8 @@ from tmt.methods.implicit import ImplicitRungeKutta
 from tmt.methods.semi_implicit import SemiImplicitEuler as SemiImplicitEuler
 from tmt.methods.semi_implicit import by_speed as by_speed
 from tmt.methods.semi_implicit import lone_speeds as lone_speeds
-from tmt.methods.stepping import Joints, Method, Slope, State, advance, increments
-from tmt.methods.tableau import Numbers, Tableau, numbers
-from tmt.model.values import listed, shown
+from tmt.methods.stepping import Joints, Method, Numbers, Slope, State, Tableau, advance, increments
+from tmt.model.values import shown
 
 Slopes = tuple[list[Values], list[Values]]  # of all stages: rates of the movement, and accelerations
 
@@ -73,7 +72,7 @@ class AdaptiveRungeKutta(RungeKutta):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.set_plain("errors", tuple(numbers("errors", row) for row in listed(self.errors) or (None,)))
+        self.set_rows("errors")
         if len(self.errors) != 2 or any(len(row) != len(self.b) for row in self.errors):
             raise ValueError("errors must be two rows of one weight for each stage")
 

@@ -10,64 +10,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tmt.derivation import composite
+from tmt.derivation import composite, linearized
 from tmt.derivation.dual import Dual, seeded
 from tmt.derivation.mechanism import AnyTree
-from tmt.derivation.method import reduced_force
 from tmt.derivation.quantities import Form, State, added
 from tmt.derivation.vectors import Factors, Rows, Scalar, Values, is_zero, solve_any, total
 from tmt.methods.stepping import LITERAL, Dynamics, Held, Implicit, Method, minus, plus, stepped
 from tmt.methods.stepping import State as Reached
 
 Array = np.ndarray
+COMPOSITE = Form(composite.mass_matrix_and_bias, composite.generalized_force, linearized.rates)
 FEW_SPEEDS = 4  # up to which dual numbers go through the solution of the linear system too
 PART = 4096  # states times speeds that are taken at once: more do not stay in the processor's cache
-
-
-class Differentiated(Dynamics):
-    """Accelerations at many states, of dual numbers by the derivatives of the linear system."""
-
-    def __init__(self) -> None:
-        super().__init__(composite.mass_matrix_and_bias)
-        # of the last states: A (states, nv, nv) and the force (states, nv) of A a = force
-        self.system: tuple[Array, Array]
-
-    def residual(
-        self, tree: AnyTree, a: Values, q: Values, qd: Values, tau: Values, implicit: Held
-    ) -> Values:
-        """What a leaves of the linear system, (nv,): zero where it is the slope, and linear in a.
-
-        dh/dqd a is (h(qd + a) - h(qd - a)) / 2, as h is quadratic in the speeds.
-        """
-        M, h = self.terms(tree, q, qd)
-        force = reduced_force(tree, h, q, qd, tau)
-        if implicit is None:
-            return minus(times(M, a), force)
-        left = minus(plus(times(M, a), times(implicit.matrix, a)), minus(force, implicit.pull))
-        if implicit.bias_rows:
-            ahead, behind = (self.terms(tree, q, speeds)[1] for speeds in (plus(qd, a), minus(qd, a)))
-            for i in implicit.bias_rows:
-                left[i] = left[i] + 0.5 * implicit.dt * (ahead[i] - behind[i])
-        return left
-
-    def acceleration(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
-    ) -> Values:
-        plain_q, plain_qd, plain_tau, plain = plain_parts(q, qd, tau, implicit)
-        n, states = len(qd), plain_qd[0].shape
-        unknown = seeded(np.zeros((n, *states)), np.eye(n)[..., None])
-        left = self.residual(tree, unknown, plain_q, plain_qd, plain_tau, plain)
-        A = np.array([np.broadcast_to(row.slope, (n, *states)) for row in left]).transpose(2, 0, 1)
-        self.system = A, -np.array([np.broadcast_to(row.value, states) for row in left]).T
-        a = np.linalg.solve(A, self.system[1][..., None])[..., 0].T.copy()
-        dual = next((x for x in (*q, *qd, *tau) if isinstance(x, Dual)), None)
-        if dual is None:
-            return list(a)
-        left = self.residual(tree, list(a), q, qd, tau, implicit)
-        # what no state changes is no dual number: a sphere that floats free
-        rows = np.array([np.broadcast_to(dual.parts(x)[1], (len(dual.slope), a.shape[1])) for x in left])
-        slopes = -np.linalg.solve(A, rows.transpose(2, 0, 1)).transpose(1, 2, 0)
-        return [Dual(value, slope, dual.level) for value, slope in zip(a, slopes.copy())]
 
 
 class Change(NamedTuple):
@@ -76,35 +30,41 @@ class Change(NamedTuple):
     a: Values
     by_movement: Rows
     by_speed: Rows
+    matrix: Rows
     solve: Callable[[Values], Values]  # the linear system
 
 
 class Linearized(Dynamics):
     """Accelerations of dual numbers over any scalar, with the derivatives of the linear system by those of Mbar qdd + h."""
 
-    def __init__(self, form: Form):
+    def __init__(self, form: Form = COMPOSITE):
         super().__init__(form.terms)
         self.form = form
-        # all directions of dual numbers meet the same states
-        self.changes: dict[tuple[Scalar, ...], Change] = {}
+        self.last: Change  # of the state that was met last
+        # dual numbers of traced scalars meet the same states once for each direction
+        self.changes: dict[tuple[int, ...], Change] = {}
 
-    def acceleration(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
-    ) -> Values:
-        plain_q, plain_qd, plain_tau, plain = plain_parts(q, qd, tau, implicit)
-        key = tuple(x.i if hasattr(x, "i") else x for x in (*plain_q, *plain_qd, *plain_tau))
-        if key not in self.changes:
+    def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, held: Held = None) -> Values:
+        plain_q, plain_qd, plain_tau = (values_of(part) for part in (q, qd, tau))
+        plain = held._replace(pull=values_of(held.pull)) if held else None
+        key = tuple(getattr(x, "i", -1) for x in (*plain_q, *plain_qd, *plain_tau))
+        if -1 in key or key not in self.changes:
             self.changes[key] = self.change(tree, plain_q, plain_qd, plain_tau, plain)
-        change = self.changes[key]
+        self.last = change = self.changes[key]
         dual = next((x for x in (*q, *qd, *tau) if isinstance(x, Dual)), None)
         if dual is None:
             return change.a
         dq, dqd, right = ([dual.parts(x)[1] for x in part] for part in (q, qd, tau))
         moved = tree.coordinates.tangent(plain_q, dq)
         right = minus(right, plus(times(change.by_movement, moved), times(change.by_speed, dqd)))
-        if implicit:
-            right = minus(right, [dual.parts(x)[1] for x in implicit.pull])
+        if held:
+            right = minus(right, [dual.parts(x)[1] for x in held.pull])
         return [Dual(value, slope, dual.level) for value, slope in zip(change.a, change.solve(right))]
+
+    def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
+        if self.form.rates is None:
+            return super().bias_rates(tree, q, qd)
+        return self.form.rates(tree, q, qd, [0.0] * len(qd))[1]
 
     def change(self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held) -> Change:
         a = super().acceleration(tree, q, qd, tau, implicit)
@@ -113,24 +73,24 @@ class Linearized(Dynamics):
         if implicit:
             matrix = added(matrix, implicit.matrix)
         if implicit is None or implicit.acts_at_single_joints:
-            return Change(a, by_movement, by_speed, Factors(matrix).solve)
+            return Change(a, by_movement, by_speed, matrix, Factors(matrix).solve)
         if implicit.bias_rows:
             changes = self.changes_of_bias(tree, q, qd, a, implicit)
             matrix, by_movement, by_speed = map(added, (matrix, by_movement, by_speed), changes)
-        return Change(a, by_movement, by_speed, partial(solve_any, matrix))
+        return Change(a, by_movement, by_speed, matrix, partial(solve_any, matrix))
 
     def changes_of_bias(
         self, tree: AnyTree, q: Values, qd: Values, a: Values, implicit: Implicit
     ) -> list[Rows]:
         """dt dh/dqd in the rows that are implicit, and the derivatives of dt dh/dqd a by movements and by speeds."""
         rest, half = [0.0] * len(qd), [0.5] * len(qd)
-        now, ahead, behind = (
+        ahead, behind = (
             State(tree, {"q": q, "qd": speeds, "qdd": rest}, self.form).force_rates
-            for speeds in (qd, plus(qd, a), minus(qd, a))
+            for speeds in (plus(qd, a), minus(qd, a))
         )
         dts = [implicit.dt if i in implicit.bias_rows else 0.0 for i in range(len(qd))]
         changes = [scaled(half, [minus(*rows) for rows in zip(*pair)]) for pair in zip(ahead, behind)]
-        return [scaled(dts, rows) for rows in (now[1], *changes)]
+        return [scaled(dts, rows) for rows in (self.bias_rates(tree, q, qd), *changes)]
 
 
 def one_step(
@@ -184,18 +144,12 @@ def jacobian_of_part(
     state = [*seeded(start[: len(moved)], moved), *start[len(moved) :]]
     # the Jacobian of stages that are solved for is by dual numbers of dual numbers
     through_solution = nv <= FEW_SPEEDS or stepping.solves_stages
-    dynamics = Dynamics(composite.mass_matrix_and_bias) if through_solution else Differentiated()
+    dynamics = Dynamics(COMPOSITE.terms) if through_solution else Linearized()
     torque = state[nq + nv :]
     new_q, new_qd = one_step(stepping, tree, state[:nq], state[nq : nq + nv], torque, dt, dynamics)
     moved = joints.tangent([x.value for x in new_q], [x.slope for x in new_q])
     slopes = [np.broadcast_to(slope, (width, len(dt))) for slope in (*moved, *(x.slope for x in new_qd))]
     return np.array(slopes).transpose(2, 0, 1)
-
-
-def plain_parts(q: Values, qd: Values, tau: Values, implicit: Held) -> tuple[Values, Values, Values, Held]:
-    """A state, a torque and what is implicit, without derivatives."""
-    plain = implicit._replace(pull=values_of(implicit.pull)) if implicit else None
-    return values_of(q), values_of(qd), values_of(tau), plain
 
 
 def values_of(numbers: Values) -> Values:

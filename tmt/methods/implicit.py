@@ -18,8 +18,7 @@ import numpy as np
 from tmt.derivation.coordinates import FLAT, Flat, Joint, normalized, product
 from tmt.derivation.dual import Dual, jacobian, seeded, unit_vectors
 from tmt.derivation.vectors import Scalar, Values, solve_any
-from tmt.methods.stepping import Joints, Slope, State
-from tmt.methods.tableau import Numbers, Tableau
+from tmt.methods.stepping import Joints, Numbers, Slope, State, Tableau
 
 ITERATIONS = 50  # Newton's method doubles the correct digits each time: a stage that needs more is not found
 CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size: the next change would be its square
@@ -86,7 +85,6 @@ class ImplicitRungeKutta(Tableau):
         return [components[4 * i : 4 * i + 4] for i in s]
 
     def finish(self, q: Values, qd: Values, dt: Scalar, a: Values, joints: Joints) -> State:
-        """The state (q, qd) one dt later, from the accelerations of the stages."""
         n, s = len(qd), range(self.stages)
         twice = [sum(self.b[k] * self.A[k][j] for k in s) for j in s]
         moved, balls = [dt * (qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)], []

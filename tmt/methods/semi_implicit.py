@@ -7,18 +7,10 @@ from typing import TypeVar
 
 from tmt.derivation.coordinates import FLAT
 from tmt.derivation.mechanism import AnyTree
+from tmt.derivation.method import with_diagonal
 from tmt.derivation.vectors import Scalar, Values
-from tmt.methods.stepping import (
-    LITERAL,
-    Dynamics,
-    Implicit,
-    Joints,
-    Method,
-    Slope,
-    State,
-    advance,
-    increments,
-)
+
+from .stepping import LITERAL, Dynamics, Implicit, Joints, Method, Slope, State, advance, increments
 
 T = TypeVar("T")
 Gains = Sequence[Sequence[float]]
@@ -75,14 +67,6 @@ class SemiImplicitEuler(Method):
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
         qd = advance(qd, dt, (1.0,), [slope(q, qd)])
         return joints.move(q, increments(dt, (1.0,), [qd], len(qd))), qd
-
-
-def with_diagonal(gains: Gains, diagonal: Sequence[float]) -> Gains:
-    """A matrix of gains, if there are any, with these numbers added on its diagonal."""
-    rows = [list(row) for row in gains] or [[0.0] * len(diagonal) for _ in diagonal]
-    for i, x in enumerate(diagonal):
-        rows[i][i] += x
-    return rows
 
 
 def by_speed(tree: AnyTree, of_joints: Iterable[T]) -> list[T]:

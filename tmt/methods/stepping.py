@@ -6,17 +6,22 @@ nothing asks for its type.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from tmt.derivation import method
 from tmt.derivation.coordinates import FLAT, Coordinates, Flat
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms
 from tmt.derivation.vectors import Rows, Scalar, Scalars, Values, solve, solve_any
+from tmt.model.values import listed, real_numbers, shown
 
 Slope = Callable[[Values, Values], Values]
 State = tuple[Values, Values]
+Numbers = tuple[float, ...]
 Joints = Coordinates | Flat
 DIVERGED, NEWTON, SMALL = 1, 2, 3  # why a run ends; 0: it does not
 
@@ -31,7 +36,6 @@ class Implicit(NamedTuple):
 
     @property
     def acts_at_single_joints(self) -> bool:
-        """Whether all of it is diagonal."""
         across = [x for i, row in enumerate(self.matrix) for j, x in enumerate(row) if i != j]
         return not self.bias_rows and all(isinstance(x, float) and x == 0.0 for x in across)
 
@@ -45,20 +49,18 @@ class Dynamics:
     def __init__(self, terms: Terms = method.mass_matrix_and_bias):
         self.terms = terms
 
-    def acceleration(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
-    ) -> Values:
+    def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, held: Held = None) -> Values:
         """a (nv,) from Mbar a = Qbar, or from the linear system of an implicit method."""
         M, h = self.terms(tree, q, qd)
         force = method.reduced_force(tree, h, q, qd, tau)
-        if implicit is None:
+        if held is None:
             return solve(M, force)
-        matrix = [plus(*rows) for rows in zip(M, implicit.matrix)]
-        if implicit.bias_rows:
+        matrix = [plus(*rows) for rows in zip(M, held.matrix)]
+        if held.bias_rows:
             rates = self.bias_rates(tree, q, qd)
-            for i in implicit.bias_rows:
-                matrix[i] = plus(matrix[i], [implicit.dt * rate for rate in rates[i]])
-        return self.solve_any(matrix, minus(force, implicit.pull))
+            for i in held.bias_rows:
+                matrix[i] = plus(matrix[i], [held.dt * rate for rate in rates[i]])
+        return self.solve_any(matrix, minus(force, held.pull))
 
     def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
         return method.bias_rates(tree, q, qd, self.terms)
@@ -107,7 +109,6 @@ class Method:
 
 
 def stepped(stepping: Method, tree: AnyTree, slope: Slope, q: Values, qd: Values, dt: Scalar) -> State:
-    """The state (q, qd) of a tree one dt later by a method that asks `slope(q, qd)`."""
     joints = tree.coordinates
     return stepping.step(slope, q, qd, dt, joints) if joints.balls else stepping.step(slope, q, qd, dt)
 
@@ -132,3 +133,47 @@ def plus(first: Scalars, second: Scalars) -> Values:
 
 def minus(first: Scalars, second: Scalars) -> Values:
     return [a - b for a, b in zip(first, second)]
+
+
+@dataclass(frozen=True)
+class Tableau(Method):
+    """A method given by its Butcher tableau; ValueError unless rows of A sum to c, and b to 1."""
+
+    order: int = field()  # it must be given, though Method has a default
+    A: tuple[Numbers, ...]  # row i: the weights in stage i, of the stages before it or of all
+    b: Numbers  # the weights of the stages in the step
+    c: Numbers  # the time of each stage in units of dt
+
+    def __post_init__(self) -> None:
+        if type(self.order) is not int or not 1 <= self.order <= 100:
+            expected = "a whole number from 1 to 100 is expected"
+            raise ValueError(f"order of the method is {shown(self.order)}; {expected}")
+        self.set_rows("A")
+        for name in ("b", "c"):
+            self.set_plain(name, numbers(name, getattr(self, name)))
+        if not len(self.A) == len(self.b) == len(self.c):
+            raise ValueError("A, b and c must have one entry for each stage")
+        for i, (row, time) in enumerate(zip(self.A, self.c)):
+            self.check_row(i, row)
+            if abs(sum(row) - time) > 1e-14:
+                raise ValueError(f"row {i} of A sums to {sum(row)}, not to c = {time}")
+        if abs(sum(self.b) - 1.0) > 1e-14:
+            raise ValueError(f"b sums to {sum(self.b)}, not to 1")
+
+    def check_row(self, i: int, row: Numbers) -> None:
+        """Raise ValueError if row i of A has not as many entries as the kind of method wants."""
+        raise NotImplementedError
+
+    def set_rows(self, name: str) -> None:
+        self.set_plain(name, tuple(numbers(name, row) for row in listed(getattr(self, name)) or (None,)))
+
+    def set_plain(self, name: str, value: Any) -> None:
+        """Of floats in tuples, a method is a value, and a key of what is compiled for it."""
+        object.__setattr__(self, name, value)
+
+
+def numbers(name: str, values: Any) -> Numbers:
+    array = real_numbers(values)
+    if array is None or array.ndim != 1 or not np.isfinite(array).all():
+        raise ValueError(f"{name} of the method has {shown(values)}, where a row of numbers is expected")
+    return tuple(array.tolist())

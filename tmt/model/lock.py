@@ -36,14 +36,12 @@ class Carrier(NamedTuple):
         return self._replace(origin=ZERO).point(direction)
 
     def tensor(self, tensor: Sequence[Sequence[float]]) -> Any:
-        """A symmetric tensor in the axes of the free joint's frame."""
         if self.turn is IDENTITY:
             return tensor
         turned = np.array([list(row) for row in self.turn @ Matrix(tensor) @ self.turn.transposed])
         return (turned + turned.T) / 2.0
 
     def turned(self, axes: Sequence[Sequence[float]]) -> Any:
-        """Axes, as columns, in those of the free joint's frame."""
         return tuple(tuple(row) for row in self.turn @ Matrix(axes))
 
     def onward(self, origin: Vector, turn: Matrix) -> Carrier:

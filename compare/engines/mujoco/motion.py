@@ -1,6 +1,6 @@
 """What a robot does: a motion of a file with everything on, which smaller models of the file repeat; and what it uses."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -20,7 +20,7 @@ ACTS = {  # what has a row of constraints, by the kinds of rows
     "joint": (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT,),
     "tendon": (mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON, mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON),
 }
-TIMERS = {  # the stages of a step by MuJoCo's timers; of `sensors and rest` those that are taken from the whole
+TIMERS = {  # the stages of a step by MuJoCo's timers
     "position": ("POS_KINEMATICS", "POS_INERTIA"),
     "collision": ("POS_COLLISION",),
     "constraint": ("POS_MAKE", "POS_PROJECT"),
@@ -30,79 +30,13 @@ TIMERS = {  # the stages of a step by MuJoCo's timers; of `sensors and rest` tho
 }
 
 
-@dataclass(frozen=True)
-class Motion:
-    """A motion, by the names of joints and actuators. Controls are constant between their times.
-
-    start: qpos and qvel of each joint; activations, inputs: of each actuator, the inputs (times, its controls); forces: applied
-    all the time, at the speeds of each joint, N m or N. points: names of sites whose places count too.
-    """
-
-    name: str
-    duration: float  # s
-    start: Mapping[str, tuple[Array, Array]]
-    activations: Mapping[str, Array]
-    times: Array  # s
-    inputs: Mapping[str, Array]
-    forces: Mapping[str, Array] = field(default_factory=dict)
-    points: tuple[str, ...] = ()
-
-    @classmethod
-    def of(
-        cls,
-        model: mujoco.MjModel,
-        state: Array,
-        name: str,
-        duration: float,
-        recorded: tuple[Array, Mapping[str, Array]] | None = None,
-        points: tuple[str, ...] = (),
-        speeds: Array | None = None,
-        forces: Array | None = None,
-    ) -> "Motion":
-        """From a state, see linear.start_of. recorded: times, and controls (times,) of some actuators; speeds, forces: (nv,)."""
-        data = mujoco.MjData(model)
-        mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
-        if speeds is not None:
-            data.qvel[:] = speeds
-        if forces is not None:
-            data.qfrc_applied[:] = forces
-        times, given = recorded or (np.zeros(1), {})
-        start = {name: (data.qpos[q].copy(), data.qvel[v].copy()) for name, (q, v) in joints(model).items()}
-        inputs, activations = {}, {}
-        for actuator, (places, acts) in actuators(model).items():
-            activations[actuator] = data.act[acts].copy()
-            inputs[actuator] = np.tile(data.ctrl[places], (len(times), 1))
-            if actuator in given:
-                inputs[actuator][:, 0] = given[actuator]
-        applied = {name: data.qfrc_applied[v].copy() for name, (_, v) in joints(model).items()}
-        return cls(name, duration, start, activations, times, inputs, applied, points)
-
-    def placed(self, model: mujoco.MjModel) -> mujoco.MjData:
-        """The data of a model at the start."""
-        data = mujoco.MjData(model)
-        for name, (q, v) in joints(model).items():
-            data.qpos[q], data.qvel[v] = self.start[name]
-            data.qfrc_applied[v] = self.forces.get(name, 0.0)
-        for actuator, (places, acts) in actuators(model).items():
-            data.act[acts], data.ctrl[places] = self.activations[actuator], self.inputs[actuator][0]
-        return data
-
-    def controls(self, model: mujoco.MjModel, dt: float, steps: int) -> Array:
-        """The controls of a model at each step, (steps, nu)."""
-        at = np.searchsorted(self.times, dt * np.arange(steps) + EARLY, side="right") - 1
-        controls = np.zeros((steps, model.nu))
-        for actuator, (places, _) in actuators(model).items():
-            controls[:, places] = self.inputs[actuator][np.maximum(at, 0)]
-        return controls
-
-
 def joints(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
     """The places in qpos and qvel of each joint."""
+    ends_q, ends_v = [*model.jnt_qposadr[1:], model.nq], [*model.jnt_dofadr[1:], model.nv]
     places = {}
-    ends = zip([*model.jnt_qposadr[1:], model.nq], [*model.jnt_dofadr[1:], model.nv])
-    for number, (q, v) in enumerate(ends):
-        start = model.jnt_qposadr[number], model.jnt_dofadr[number]
-        places[element_name(model, "joint", number)] = slice(start[0], q), slice(start[1], v)
+    for number, (q, v) in enumerate(zip(model.jnt_qposadr, model.jnt_dofadr)):
+        name = element_name(model, "joint", number)
+        places[name] = slice(int(q), int(ends_q[number])), slice(int(v), int(ends_v[number]))
     return places
 
 
@@ -117,6 +51,69 @@ def actuators(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
     return places
 
 
+def data_at(model: mujoco.MjModel, state: Array) -> mujoco.MjData:
+    """At a state of step.start_of."""
+    data = mujoco.MjData(model)
+    mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+    return data
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion, by the names of joints and actuators. Controls are constant between their times.
+
+    start: qpos, qvel and the applied force (N m or N) of each joint; activations, inputs: of each actuator, the inputs
+    (times, its controls). points: names of sites whose places count too.
+    """
+
+    name: str
+    duration: float  # s
+    start: Mapping[str, tuple[Array, Array, Array]]
+    activations: Mapping[str, Array]
+    times: Array  # s
+    inputs: Mapping[str, Array]
+    points: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        name: str,
+        duration: float,
+        recorded: tuple[Array, Mapping[str, Array]] | None = None,
+        points: tuple[str, ...] = (),
+    ) -> "Motion":
+        """From the state, the controls and the forces of data. recorded: times, and controls (times,) of some actuators."""
+        times, given = recorded or (np.zeros(1), {})
+        start, activations, inputs = {}, {}, {}
+        for joint, (q, v) in joints(model).items():
+            start[joint] = data.qpos[q].copy(), data.qvel[v].copy(), data.qfrc_applied[v].copy()
+        for actuator, (places, acts) in actuators(model).items():
+            activations[actuator] = data.act[acts].copy()
+            inputs[actuator] = np.tile(data.ctrl[places], (len(times), 1))
+            if actuator in given:
+                inputs[actuator][:, 0] = given[actuator]
+        return cls(name, duration, start, activations, times, inputs, points)
+
+    def placed(self, model: mujoco.MjModel) -> mujoco.MjData:
+        """The data of a model at the start."""
+        data = mujoco.MjData(model)
+        for name, (q, v) in joints(model).items():
+            data.qpos[q], data.qvel[v], data.qfrc_applied[v] = self.start[name]
+        for actuator, (places, acts) in actuators(model).items():
+            data.act[acts], data.ctrl[places] = self.activations[actuator], self.inputs[actuator][0]
+        return data
+
+    def controls(self, model: mujoco.MjModel, dt: float, steps: int) -> Array:
+        """The controls of a model at each step, (steps, nu)."""
+        at = np.searchsorted(self.times, dt * np.arange(steps) + EARLY, side="right") - 1
+        controls = np.zeros((steps, model.nu))
+        for actuator, (places, _) in actuators(model).items():
+            controls[:, places] = self.inputs[actuator][np.maximum(at, 0)]
+        return controls
+
+
 class Path(NamedTuple):
     """Where a motion of a model leads: q (n + 1, nq), v (n + 1, nv), each dt, s; NaN from where it fails."""
 
@@ -124,6 +121,11 @@ class Path(NamedTuple):
     dt: float
     q: Array
     v: Array
+
+    @property
+    def samples(self) -> Array:
+        """Some of its positions, (states, nq)."""
+        return self.q[:: max(1, len(self.q) // SAMPLES)]
 
     def points(self, names: Iterable[str], every: int) -> Array:
         """Of sites each so many steps, (times, sites, 3) m."""
@@ -158,6 +160,14 @@ class Simulation:
         path[failed] = np.nan
         return Path(self.model, self.dt, path[:, 1 : 1 + nq], path[:, 1 + nq :])
 
+    def stepped(self) -> Iterator[mujoco.MjData]:
+        """The data after each step."""
+        mujoco.mj_setState(self.model, self.data, self.start, STATE)
+        for inputs in self.inputs:
+            self.data.ctrl[:] = inputs[: self.model.nu]
+            mujoco.mj_step(self.model, self.data)
+            yield self.data
+
 
 def movements(path: Path, other: Path, among: Iterable[str] = ()) -> dict[str, float]:
     """How far two paths are apart at their common times: the largest of each joint that both have, rad or m, and point."""
@@ -186,47 +196,52 @@ def apart(path: Path, other: Path, motion: Motion) -> float:
 
 @dataclass
 class Use:
-    """What a motion used: names of geoms that touched, of what acted, how far each joint moved."""
+    """What a motion used: names of pairs of geoms that touched, of what acted by kind, how far each joint moved, rad or m.
 
-    geoms: set[str] = field(default_factory=set)
+    middle: the mean positions of the joints; of a joint with a quaternion the start.
+    """
+
     pairs: set[tuple[str, str]] = field(default_factory=set)
-    acted: dict[str, set[str]] = field(default_factory=lambda: {kind: set() for kind in (*ACTS, "actuator")})
+    acted: dict[str, set[str]] = field(default_factory=dict)
     has_constraints: bool = False
-    ranges: dict[str, float] = field(default_factory=dict)  # rad or m
-    middle: dict[str, Array] = field(
-        default_factory=dict
-    )  # the mean positions of the joints; of one with a quaternion the start
+    ranges: dict[str, float] = field(default_factory=dict)
+    middle: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def geoms(self) -> set[str]:
+        return {name for pair in self.pairs for name in pair}
 
 
-def used(model: mujoco.MjModel, motion: Motion, dt: float, integrator: str) -> Use:
+def used(simulation: Simulation) -> Use:
     """What the motion of a model uses, step by step."""
-    simulation, use = Simulation(model, motion, dt, integrator), Use()
-    m, d, nu = simulation.model, simulation.data, model.nu
-    path, forces = [d.qpos.copy()], np.zeros(len(d.actuator_force))
+    m, use = simulation.model, Use()
+    path, forces = [simulation.data.qpos.copy()], np.zeros(len(simulation.data.actuator_force))
     pairs, rows = set[tuple[int, int]](), set[tuple[int, int]]()
-    for inputs in simulation.inputs:
-        d.ctrl[:] = inputs[:nu]
-        mujoco.mj_step(m, d)
+    for d in simulation.stepped():
         pairs.update(map(tuple, np.sort(d.contact.geom, axis=1).tolist()))
         acts = (d.efc_force != 0.0) | (d.efc_type != ACTS["equality"][0])
         rows.update(zip(d.efc_type[acts].tolist(), d.efc_id[acts].tolist()))
         use.has_constraints |= d.nefc > 0
         forces = np.maximum(forces, np.abs(d.actuator_force))
         path.append(d.qpos.copy())
-    use.pairs = {(geom_name(m, one), geom_name(m, other)) for one, other in pairs}
-    use.geoms = {name for pair in use.pairs for name in pair}
+    use.pairs = {pair_of(m, pair) for pair in pairs}
     for kind, types in ACTS.items():
         use.acted[kind] = {element_name(m, kind, number) for row, number in rows if row in types}
-    for number in range(number_of_actuators(m)):
-        if forces[number]:
-            use.acted["actuator"].add(element_name(m, "actuator", number))
+    numbers = range(number_of_actuators(m))
+    use.acted["actuator"] = {element_name(m, "actuator", number) for number in numbers if forces[number]}
     q = np.array(path)
-    still = Path(m, dt, np.tile(q[0], (len(q), 1)), q)
-    use.ranges = movements(Path(m, dt, q, q), still)
+    use.ranges = movements(
+        Path(m, simulation.dt, q, q), Path(m, simulation.dt, np.tile(q[0], (len(q), 1)), q)
+    )
     for name, (columns, _) in joints(m).items():
         is_number = columns.stop - columns.start == 1
         use.middle[name] = q[:, columns].mean(axis=0) if is_number else q[0, columns]
     return use
+
+
+def pair_of(model: mujoco.MjModel, numbers: Iterable[int]) -> tuple[str, str]:
+    one, other = (element_name(model, "geom", number) for number in numbers)
+    return one, other
 
 
 def couplings(path: Path, middle: Array) -> Array:
@@ -236,7 +251,7 @@ def couplings(path: Path, middle: Array) -> Array:
     """
     model, data = path.model, mujoco.MjData(path.model)
     costs, inverse, moved = np.zeros((model.nv, model.nv)), np.zeros((model.nv, model.nv)), np.zeros(model.nv)
-    for q in path.q[:: max(1, len(path.q) // SAMPLES)]:
+    for q in path.samples:
         data.qpos[:] = q
         mujoco.mj_forward(model, data)
         mujoco.mj_solveM(model, data, inverse, np.eye(model.nv))
@@ -245,37 +260,29 @@ def couplings(path: Path, middle: Array) -> Array:
     return costs
 
 
-def geom_name(model: mujoco.MjModel, number: int) -> str:
-    return element_name(model, "geom", number)
-
-
 def stages_of(simulation: Simulation) -> dict[str, float]:
-    """Seconds of each stage of a step, by MuJoCo's own timers."""
-    data, steps = simulation.data, simulation.steps
-    mujoco.mj_setState(simulation.model, data, simulation.start, STATE)
-    for inputs in simulation.inputs:
-        data.ctrl[:] = inputs[: simulation.model.nu]
-        mujoco.mj_step(simulation.model, data)
-    timers = {name.removeprefix("mjTIMER_"): member for name, member in mujoco.mjtTimer.__members__.items()}
-    taken = {
-        name: data.timer[int(member)].duration / steps
-        for name, member in timers.items()
-        if name != "mjNTIMER"
-    }
-    seconds = {stage: sum(taken[name] for name in names) for stage, names in TIMERS.items()}
-    return seconds | {"sensors and rest": taken["STEP"] - sum(seconds.values()), "whole step": taken["STEP"]}
+    """The time of each stage of a step, us, by MuJoCo's own timers."""
+    for data in simulation.stepped():
+        timers = data.timer
+
+    def taken(*names: str) -> float:
+        numbers = [int(getattr(mujoco.mjtTimer, f"mjTIMER_{name}")) for name in names]
+        return 1e6 * float(sum(timers[number].duration for number in numbers)) / simulation.steps
+
+    stages, whole = {stage: taken(*names) for stage, names in TIMERS.items()}, taken("STEP")
+    return stages | {"sensors and rest": whole - sum(stages.values()), "whole step": whole}
 
 
-def near(model: mujoco.MjModel, path: Path, touched: set[tuple[str, str]]) -> dict[tuple[str, str], float]:
-    """The pairs of geoms that came near and never touched, and their least distances at sampled states, m."""
-    wide, data = mujoco.MjModel.__copy__(model), mujoco.MjData(model)
+def near(path: Path, touched: set[tuple[str, str]]) -> dict[tuple[str, str], float]:
+    """The pairs of geoms that came near and never touched, nearest first, and their least distances at samples, m."""
+    wide, data = mujoco.MjModel.__copy__(path.model), mujoco.MjData(path.model)
     pairs: dict[tuple[str, str], float] = {}
     wide.geom_margin += NEAR
-    for q in path.q[:: max(1, len(path.q) // SAMPLES)]:
+    for q in path.samples:
         data.qpos[:] = q
         mujoco.mj_fwdPosition(wide, data)
-        for one, distance in zip(np.sort(data.contact.geom, axis=1).tolist(), data.contact.dist.tolist()):
-            pair = geom_name(model, one[0]), geom_name(model, one[1])
+        for numbers, distance in zip(np.sort(data.contact.geom, axis=1), data.contact.dist.tolist()):
+            pair = pair_of(wide, numbers)
             if pair not in touched and distance < pairs.get(pair, NEAR):
                 pairs[pair] = distance
     return dict(sorted(pairs.items(), key=lambda item: item[1]))

@@ -1,16 +1,14 @@
 """A smaller file: what a motion does not use is taken out of an MjSpec, joints are locked, and it is written as MJCF."""
 
-import ctypes
 import warnings
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path as File
 from typing import Any
 
 import mujoco
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
-from .calls import library
 from .changed import state_as_compiled
 from .locked import Positions, compiled_without
 from .motion import Motion, Use, joints
@@ -23,17 +21,16 @@ NAMED = {  # the elements that are known by their names, and their kinds in a co
     "geoms": "geom", "joints": "joint", "actuators": "actuator", "tendons": "tendon",
     "equalities": "equality", "sites": "site", "bodies": "body",
 }  # fmt: skip
-MATCHED = "joint", "actuator"  # of the smaller file with the whole one, by name
-OFF, ALL_DIGITS, USUAL_DIGITS = int(mujoco.mjtLimited.mjLIMITED_FALSE), 17, 6
+OFF = int(mujoco.mjtLimited.mjLIMITED_FALSE)
 DRAWN = "skins", "lights", "cameras", "textures"
 REPORTED = int(mujoco.mjtEnableBit.mjENBL_ENERGY) | int(mujoco.mjtEnableBit.mjENBL_FWDINV)
 
 
 class Smaller:
-    """A spec and its compiled model. All elements have names: those that the file does not state are `invented`."""
+    """A spec, all of whose elements have names, and its compiled model."""
 
-    def __init__(self, spec: mujoco.MjSpec, invented: frozenset[tuple[str, str]] = frozenset()) -> None:
-        self.spec, self.invented = spec, invented
+    def __init__(self, spec: mujoco.MjSpec) -> None:
+        self.spec = spec
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the first reading has them
             self.model = compiled(spec)
@@ -42,7 +39,7 @@ class Smaller:
     def whole(cls, source: Source, points: tuple[str, ...] = ()) -> "Smaller":
         """The whole file. points: of bodies with such a name, sites are added. ValueError for a name that is neither."""
         assert source.spec is not None
-        spec, invented = source.spec.copy(), set()
+        spec = source.spec.copy()
         sites, bodies = ({element.name for element in elements} for elements in (spec.sites, spec.bodies))
         for name in points:
             if name not in sites | bodies:
@@ -52,17 +49,8 @@ class Smaller:
         first = cls(spec)
         for elements, kind in NAMED.items():
             for element in getattr(spec, elements):
-                if not element.name:
-                    element.name = element_name(first.model, kind, element.id)
-                    if kind not in MATCHED:
-                        invented.add((elements, element.name))
-        return cls(spec, frozenset(invented))
-
-    def edited(self, edit: "Edit", use: Use) -> tuple["Smaller", int]:
-        """A copy from which an edit has taken something out, and how many elements."""
-        copy = Smaller(self.spec.copy(), self.invented)
-        count = edit(copy, use)
-        return Smaller(copy.spec, self.invented), count
+                element.name = element.name or element_name(first.model, kind, element.id)
+        return cls(spec)
 
     def delete(self, elements: str, is_needless: Callable[[Any], bool]) -> int:
         needless = [element for element in getattr(self.spec, elements) if is_needless(element)]
@@ -71,29 +59,14 @@ class Smaller:
         return len(needless)
 
     def text(self, comment: str = "") -> str:
-        """The file with every digit, if the installed MuJoCo can print them; its meshes are those of the whole file."""
-        spec = self.spec.copy()
-        for elements, name in self.invented:
-            for element in [element for element in getattr(spec, elements) if element.name == name]:
-                element.name = ""
-        spec.comment = comment.replace("--", "- -")
-        folder = File(spec.modelfiledir or ".").absolute()
+        """The file, by MuJoCo with six digits. Its meshes are read from the folders of the whole file."""
+        spec, folder = self.spec.copy(), File(self.spec.modelfiledir or ".").absolute()
+        spec.comment = comment.replace("--", "- -")  # which XML does not allow
         spec.meshdir, spec.texturedir = str(folder / spec.meshdir), str(folder / spec.texturedir)
-        with warnings.catch_warnings(), every_digit():
+        with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             compiled(spec)
             return str(spec.to_xml())
-
-
-@contextmanager
-def every_digit() -> Iterator[None]:
-    """MuJoCo prints MJCF with all digits, if it has the function that its own tests use for it; else with six."""
-    choose = getattr(ctypes.CDLL(library() or None), "_mjPRIVATE__set_xml_precision", lambda digits: None)
-    choose(ALL_DIGITS)
-    try:
-        yield
-    finally:
-        choose(USUAL_DIGITS)
 
 
 def drawing(small: Smaller, use: Use) -> int:
@@ -126,28 +99,12 @@ def geoms(small: Smaller, use: Use) -> int:
     return pairs + touchless(small, lambda geom: geom.name not in use.geoms)
 
 
-def sensors(small: Smaller, use: Use) -> int:
-    return small.delete("sensors", lambda _: True)
-
-
-def equalities(small: Smaller, use: Use) -> int:
-    return small.delete("equalities", lambda tie: tie.name not in use.acted["equality"])
-
-
-def actuators(small: Smaller, use: Use) -> int:
-    """Actuators that never exert a force."""
-    return small.delete(
-        "actuators", lambda actuator: actuator.name not in use.acted["actuator"] and not actuator.armature
-    )
-
-
 def tendons(small: Smaller, use: Use) -> int:
     """Tendons to which nothing refers, and that have no force."""
-    referred = {actuator.target for actuator in small.spec.actuators}
-    referred |= {name for tie in small.spec.equalities for name in (tie.name1, tie.name2)} | use.acted[
-        "tendon"
-    ]
-    return small.delete("tendons", lambda tendon: tendon.name not in referred)
+    needed = {actuator.target for actuator in small.spec.actuators} | use.acted["tendon"]
+    for tie in small.spec.equalities:
+        needed |= {tie.name1, tie.name2}
+    return small.delete("tendons", lambda tendon: tendon.name not in needed)
 
 
 def limits(small: Smaller, use: Use) -> int:
@@ -173,41 +130,48 @@ def stages(small: Smaller, use: Use) -> int:
     return bin(before[0] ^ option.disableflags).count("1") + bin(before[1] ^ option.enableflags).count("1")
 
 
-Edit = Callable[[Smaller, Use], int]
+def without(elements: str, is_needless: Callable[[Any, Use], bool]) -> "Edit":
+    return lambda small, use: small.delete(elements, lambda element: is_needless(element, use))
+
+
+def is_forceless(actuator: mujoco.MjsActuator, use: Use) -> bool:
+    return actuator.name not in use.acted["actuator"] and not actuator.armature
+
+
+Edit = Callable[[Smaller, Use], int]  # takes out what a motion does not use: how many elements
 FREE: dict[str, Edit] = {
-    "drawing": drawing, "sensors": sensors, "geoms that never touch": geoms, "equalities without force": equalities,
-    "actuators without force": actuators, "tendons without force": tendons, "limits that never act": limits,
+    "drawing": drawing,
+    "sensors": without("sensors", lambda sensor, use: True),
+    "geoms that never touch": geoms,
+    "equalities without force": without("equalities", lambda tie, use: tie.name not in use.acted["equality"]),
+    "actuators without force": without("actuators", is_forceless),
+    "tendons without force": tendons,
+    "limits that never act": limits,
     "stages without work": stages,
-}  # fmt: skip
+}
 
 
-def tied_joints(model: mujoco.MjModel) -> list[frozenset[str]]:
+def tied_joints(model: mujoco.MjModel) -> list[list[str]]:
     """The joints that can be locked, those together that a tendon or an equality of joints ties; not the base of a free robot."""
     names, base = list(joints(model)), set(model.dof_jntid[of_base(model)].tolist())
-    groups = [frozenset([name]) for number, name in enumerate(names) if number not in base]
-    for tie in range(model.neq):
-        if model.eq_type[tie] == mujoco.mjtEq.mjEQ_JOINT:
-            ends = (model.eq_obj1id[tie], model.eq_obj2id[tie])
-            groups = merged(groups, frozenset(names[end] for end in ends if end >= 0))
-    for tendon in range(model.ntendon):
-        groups = merged(groups, frozenset(joints_of(model, tendon)))
-    return groups
+    together = [joints_of(model, tendon) for tendon in range(model.ntendon)]
+    for tie in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):
+        ends = (model.eq_obj1id[tie], model.eq_obj2id[tie])
+        together.append([int(end) for end in ends if end >= 0])
+    ties = np.eye(model.njnt)
+    for numbers in together:
+        ties[np.ix_(numbers, numbers)] = 1.0
+    count, labels = connected_components(ties, directed=False)
+    groups = [np.flatnonzero(labels == label).tolist() for label in range(count)]
+    return [[names[number] for number in group] for group in groups if not base.intersection(group)]
 
 
-def merged(groups: list[frozenset[str]], tied: frozenset[str]) -> list[frozenset[str]]:
-    together = [group for group in groups if group & tied]
-    others = [group for group in groups if not group & tied]
-    return [*others, frozenset().union(*together)] if together else groups
-
-
-def joints_of(model: mujoco.MjModel, tendon: int) -> list[str]:
-    """The joints of a fixed tendon."""
+def joints_of(model: mujoco.MjModel, tendon: int) -> list[int]:
+    """The numbers of the joints of a fixed tendon."""
     first = model.tendon_adr[tendon]
-    wraps = range(first, first + model.tendon_num[tendon])
-    numbers = [
-        model.wrap_objid[wrap] for wrap in wraps if model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT
-    ]
-    return [element_name(model, "joint", number) for number in numbers]
+    wraps = slice(first, first + model.tendon_num[tendon])
+    is_joint = model.wrap_type[wraps] == mujoco.mjtWrap.mjWRAP_JOINT
+    return [int(number) for number in model.wrap_objid[wraps][is_joint]]
 
 
 def locked(small: Smaller, positions: Mapping[str, np.ndarray]) -> Smaller:
@@ -215,11 +179,9 @@ def locked(small: Smaller, positions: Mapping[str, np.ndarray]) -> Smaller:
     if not positions:
         return small
     model, spec = small.model, small.spec.copy()
-    gone = {
-        element_name(model, "tendon", i)
-        for i in range(model.ntendon)
-        if {*joints_of(model, i)} & positions.keys()
-    }
+    numbers = {number for number, name in enumerate(joints(model)) if name in positions}
+    tied = [tendon for tendon in range(model.ntendon) if numbers.intersection(joints_of(model, tendon))]
+    gone = {element_name(model, "tendon", tendon) for tendon in tied}
     for elements in (spec.equalities, spec.actuators, spec.sensors):
         for element in list(elements):
             names = {getattr(element, field, "") for field in ("name1", "name2", "target", "objname")}
@@ -235,7 +197,7 @@ def locked(small: Smaller, positions: Mapping[str, np.ndarray]) -> Smaller:
         if min(bodies) >= 0 and len(set(fixed.body_weldid[bodies].tolist())) == 1:
             spec.delete(tie)
     spec.compiler.fusestatic = True
-    return Smaller(spec, small.invented)
+    return Smaller(spec)
 
 
 def of_parts(model: mujoco.MjModel, positions: Mapping[str, np.ndarray]) -> Positions:
@@ -256,4 +218,4 @@ def finished(small: Smaller, motion: Motion, dt: float, integrator: str) -> Smal
     for key in list(spec.keys):
         spec.delete(key)
     spec.add_key(name=motion.name, qpos=data.qpos, qvel=data.qvel, act=data.act, ctrl=data.ctrl)
-    return Smaller(spec, small.invented)
+    return Smaller(spec)

@@ -11,8 +11,8 @@ from ...judge.run import MOVES
 from ...robots.case import Case
 from ...truth.pendulum import pendulum, swing
 from ..setup import Setup
+from .needs import rk4_of
 from .records import ReductionResult, Swing
-from .times import rk4_of
 
 SWING_STEPS = (4, 8, 16, 32, 64, 128)  # multiples of the case's own steps
 IN_TABLE = 16  # the one of these whose error is in the table

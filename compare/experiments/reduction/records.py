@@ -44,7 +44,7 @@ class SubsetRow(Row):
     difference_over_bar: float | None = None
 
 
-@dataclass(kw_only=True)
+@dataclass
 class StageRow(Row):
     """A stage of a step by MuJoCo's own timers: of the whole file, without what is not used, and of the smaller file."""
 
@@ -54,7 +54,17 @@ class StageRow(Row):
     smaller_file: float = column("us")
 
 
-@dataclass(kw_only=True)
+@dataclass
+class UseRow(Row):
+    """What a file has of a kind, None: unknown, and what the motion used."""
+
+    part: str
+    in_file: int | None
+    used: int
+    names: str
+
+
+@dataclass
 class FreeRow(Row):
     """What was taken out of a file; it is back if the motion was not the same to the last bit."""
 
@@ -65,7 +75,7 @@ class FreeRow(Row):
     after: float | None = column("us", default=None)
 
 
-@dataclass(kw_only=True)
+@dataclass
 class JointRow(Row):
     """How far a joint moved, rad or m, and how far it would move another one if it were locked; None: it is not to be."""
 
@@ -75,7 +85,7 @@ class JointRow(Row):
     locked: bool
 
 
-@dataclass(kw_only=True)
+@dataclass
 class PairRow(Row):
     """Geoms that came near and never touched."""
 
@@ -84,7 +94,7 @@ class PairRow(Row):
     distance: float = column("m")
 
 
-@dataclass(kw_only=True)
+@dataclass
 class LimitRow(Row):
     """The largest stable step of the whole file and of the smaller one; limit: as in step_limits.csv."""
 
@@ -92,12 +102,16 @@ class LimitRow(Row):
     integrator: str
     limit: str
     step: float | None = column("s", digits=4)
-    joint: str
+    joint: str = ""
 
 
 @dataclass(kw_only=True)
 class FrontierRow(Row):
-    """A model with an integrator and a step: time over error, rad or m. best_for: the errors within which it is the fastest."""
+    """A model with an integrator and a step: time over error, rad or m.
+
+    error_at_own_step: from the file's own run, both by its own step and integrator: of the model alone. best_for: the errors
+    for which it is the answer.
+    """
 
     model: str
     locked: int
@@ -106,6 +120,7 @@ class FrontierRow(Row):
     error: float
     error_of_model: float
     error_of_step: float
+    error_at_own_step: float | None = None
     time_of_second: float = column("s", default=0.0)  # of motion
     gain: float = 1.0  # over the file as it is
     best_for: str = ""
@@ -120,7 +135,6 @@ class Need(NamedTuple):
     needed: tuple[str, ...]
     locked: tuple[str, ...]  # as the scene says
     stays: tuple[str, ...]  # those that can be locked
-    undecided: tuple[str, ...]
 
 
 class Swing(NamedTuple):
@@ -131,7 +145,7 @@ class Swing(NamedTuple):
 
 @dataclass
 class ReductionResult(Result):
-    models: list[Model] | None = None  # that are timed; None: no joint can be locked
+    models: list[Model] = field(default_factory=list)  # that are timed
     needs: dict[str, Need] = field(default_factory=dict)  # by scene
     apart: dict[tuple[str, str], float] = field(default_factory=dict)  # by scene and engine, rad or m
     swings: dict[str, Swing] = field(default_factory=dict)  # by scene

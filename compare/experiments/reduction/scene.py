@@ -5,16 +5,18 @@ from functools import cached_property
 
 import numpy as np
 
-from ...engines.mujoco.motion import Motion, Path, Simulation, Use, used
+from ...engines.mujoco.motion import Motion, Path, Simulation, Use, data_at, used
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.smaller import Smaller
 from ...engines.mujoco.step import start_of
 from ...robots.coordinates import Coordinates
-from ...stability.place import posture_of, postures_of
+from ...stability.place import posture_of, postures_of, standing_at
+from ...stability.rest import NEAR_REST
 from ..setup import Setup
 
 DURATION = 1.0  # s, of the motion from a keyframe
 FINER = 8  # fold, the step of the reference
+STANDS = 0.1  # rad or m: what sinks less to its rest stands there
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Scene:
 
     @cached_property
     def use(self) -> Use:
-        return used(self.whole.model, self.motion, self.reading.dt, self.reading.integrator)
+        return used(self.simulation(self.whole))
 
     @property
     def coordinates(self) -> Coordinates:
@@ -46,24 +48,37 @@ class Scene:
 
 
 def scene_of(setup: Setup, reading: Reading) -> Scene:
-    """The first of --scenes; else --controls, or constant ones, from a keyframe. ValueError where that cannot be."""
-    request, model = setup.request, reading.model
+    """The first of --scenes; else --controls from a posture; else a posture, of a robot that stands its rest.
+
+    ValueError where that cannot be.
+    """
+    request, model, still = setup.request, reading.model, np.zeros(reading.model.nv)
     points = tuple(request.points.split(",")) if request.points else ()
-    whole, still = Smaller.whole(reading.source, points), np.zeros(model.nv)
-    if cases := [case for case in setup.robot.cases if "user" in case.scene.tags]:
+    whole = Smaller.whole(reading.source, points)
+    recorded, duration = None, DURATION
+    cases = [case for case in setup.robot.cases if "user" in case.scene.tags]
+    if cases:
         case, scene = cases[0], cases[0].scene
         if scene.locked or np.any(scene.damping) or not scene.gravity:
             raise ValueError(f"the scene {scene.name} changes the model: locked, damping or gravity")
         key = scene.posture if isinstance(scene.posture, str) and scene.posture in reading.keyframes else ""
-        controls, forces = (case.controller.controls, None) if case.controller else ((), case.tau)
+        controls = case.controller.controls if case.controller else ()
         state = start_of(model, reading.drive, key, still, case.posture, controls)
-        motion = Motion.of(whole.model, state, scene.name, scene.duration, None, points, case.v, forces)
-        return Scene(reading, motion, whole)
-    posture = posture_of(request.posture, reading) if request.posture else postures_of(reading)[0]
-    state = start_of(model, reading.drive, posture.key, still, np.array(posture.q) if posture.q else None)
-    recorded, duration = None, DURATION
-    if request.controls:
-        controls_at = dict(request.controls)
-        times = controls_at.pop("time")
-        recorded, duration = (times, controls_at), float(times[-1])
-    return Scene(reading, Motion.of(whole.model, state, posture.name, duration, recorded, points), whole)
+        name, duration = scene.name, scene.duration
+    else:
+        posture = posture_of(request.posture, reading) if request.posture else postures_of(reading)[0]
+        q, name = np.array(posture.q) if posture.q else None, posture.name
+        state = start_of(model, reading.drive, posture.key, still, q)
+        if request.controls:
+            controls_at = dict(request.controls)
+            times = controls_at.pop("time")
+            recorded, duration = (times, controls_at), float(times[-1])
+        else:
+            place = standing_at(reading, posture)
+            if place.left <= NEAR_REST and np.abs(place.moved).max(initial=0.0) <= STANDS:
+                state, name = place.rest, f"{name}, at rest"
+    data = data_at(whole.model, state)
+    if cases:
+        data.qvel[:] = case.v
+        data.qfrc_applied[:] = 0.0 if case.controller else case.tau
+    return Scene(reading, Motion.of(whole.model, data, name, duration, recorded, points), whole)

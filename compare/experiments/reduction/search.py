@@ -1,8 +1,8 @@
 """The search: what goes for nothing, which joints can be locked for an error, and how fast each model is by each step."""
 
+import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache
 from itertools import product
 from typing import NamedTuple
 
@@ -10,17 +10,13 @@ import numpy as np
 
 from ...core.timing import fastest
 from ...engines.mujoco.motion import Path, Simulation, apart, couplings, joints
-from ...engines.mujoco.names import INTEGRATORS, joint_places
+from ...engines.mujoco.names import INTEGRATORS, kind_of
 from ...engines.mujoco.smaller import FREE, Smaller, locked, tied_joints
 from .records import FreeRow, FrontierRow
 from .scene import Scene
 
-DOES = {
-    "hinge": 0.1,
-    "slide": 0.02,
-    "ball": 0.1,
-}  # rad or m: a joint that moves more is what the scene is about
-STEPS = 0.25, 0.5, 1.0, 2.0, 4.0, 8.0  # multiples of the file's
+DOES, DOES_SLIDE = 0.1, 0.02  # rad, m: a joint that moves more is what the scene is about
+STEPS = 0.5, 1.0, 2.0, 4.0, 8.0  # multiples of the file's
 TRIES = 8  # joints that are tried after the first that costs too much
 FEW = 3  # models with the first 1, 2, 3 groups of joints locked are among those of the chart
 ROUNDS = 6  # of timing
@@ -28,25 +24,20 @@ AS_FAST = 1.05  # fold: the accuracy of times
 Groups = frozenset[int]  # of joints that are locked, by their numbers
 
 
-class Kind(NamedTuple):
-    """What was taken out, or stayed as it changed the motion; and the file then."""
-
-    row: FreeRow
-    file: Smaller
-
-
-def take_out(scene: Scene) -> list[Kind]:
-    """Take out one kind after the other, each only if the motion is the same to the last bit."""
+def take_out(scene: Scene) -> list[tuple[FreeRow, Smaller]]:
+    """Take out one kind after the other, each only if the motion is the same to the last bit: a row, and the model then."""
     path, small, kinds = scene.run(scene.whole), scene.whole, []
     for kind, edit in FREE.items():
+        trial = Smaller(small.spec.copy())
         try:
-            trial, count = small.edited(edit, scene.use)
+            count = edit(trial, scene.use)
+            trial = Smaller(trial.spec)
         except ValueError:  # something else refers to it
             continue
         if count:
             is_same = same_bits(scene.run(trial), path)
             small = trial if is_same else small
-            kinds.append(Kind(FreeRow(kind=kind, taken_out=count, same_bits=is_same), small))
+            kinds.append((FreeRow(kind=kind, taken_out=count, same_bits=is_same), small))
     return kinds
 
 
@@ -57,7 +48,7 @@ def same_bits(path: Path, other: Path) -> bool:
 class Group(NamedTuple):
     """Joints that are locked together. predicted: how far they would move another joint, rad or m."""
 
-    names: frozenset[str]
+    names: list[str]
     predicted: float
 
 
@@ -66,11 +57,14 @@ def groups_of(scene: Scene, free: Smaller) -> list[Group]:
 
     The prediction: were the joint locked, the others would be moved by its own movement times their coupling through M.
     """
-    model, use = free.model, scene.use
-    places, kinds = joints(model), {place.joint: place.kind for place in joint_places(model).values()}
-    costs, groups = couplings(scene.run(free), np.hstack([use.middle[name] for name in places])), []
+    model, use, places = free.model, scene.use, joints(free.model)
+    most = {
+        name: DOES_SLIDE if kind_of(model, number) == "slide" else DOES for number, name in enumerate(places)
+    }
+    costs = couplings(scene.run(free), np.hstack([use.middle[name] for name in places]))
+    groups = []
     for names in tied_joints(model):
-        if all(use.ranges[name] <= DOES[kinds[list(places).index(name)]] for name in names):
+        if all(use.ranges[name] <= most[name] for name in names):
             speeds = np.r_[tuple(places[name][1] for name in names)]
             others = np.setdiff1d(np.arange(model.nv), speeds)
             groups.append(Group(names, float(costs[np.ix_(others, speeds)].max(initial=0.0))))
@@ -78,43 +72,31 @@ def groups_of(scene: Scene, free: Smaller) -> list[Group]:
     return groups[: len(places) - 1]
 
 
-@dataclass
 class Locks:
     """Models with groups of joints locked, and the errors that this alone makes."""
 
-    scene: Scene
-    free: Smaller
-    groups: Sequence[Group]
-    models: dict[Groups, Smaller | None] = field(default_factory=dict)
-    errors: dict[Groups, float] = field(default_factory=dict)
-
-    def names(self, groups: Iterable[int]) -> list[str]:
-        names = {name for group in groups for name in self.groups[group].names}
-        return [name for name in self.scene.use.middle if name in names]
+    def __init__(self, scene: Scene, free: Smaller) -> None:
+        self.scene, self.free, self.groups = scene, free, groups_of(scene, free)
+        self.path = scene.run(free)
+        self.model, self.error = cache(self.model_of), cache(self.error_of)
 
     def positions(self, groups: Iterable[int]) -> dict[str, np.ndarray]:
-        return {name: self.scene.use.middle[name] for name in self.names(groups)}
+        names = {name for group in groups for name in self.groups[group].names}
+        return {name: middle for name, middle in self.scene.use.middle.items() if name in names}
 
-    def model(self, groups: Groups) -> Smaller | None:
+    def model_of(self, groups: Groups) -> Smaller | None:
         """None: they cannot be locked, as something else refers to a joint."""
-        if groups not in self.models:
-            try:
-                self.models[groups] = locked(self.free, self.positions(groups))
-            except ValueError:
-                self.models[groups] = None
-        return self.models[groups]
+        try:
+            return locked(self.free, self.positions(groups))
+        except ValueError:
+            return None
 
-    def error(self, groups: Groups) -> float:
+    def error_of(self, groups: Groups) -> float:
         """Of the joints that stay and the points, rad or m, by the file's step; inf where they cannot be locked."""
-        if groups not in self.errors:
-            self.errors[groups], small = np.inf, self.model(groups)
-            if small is not None and small.model.nv:
-                self.errors[groups] = apart(self.scene.run(small), self.path, self.scene.motion)
-        return self.errors[groups]
-
-    @cached_property
-    def path(self) -> Path:
-        return self.scene.run(self.free)
+        small = self.model(groups)
+        if small is None or not small.model.nv:
+            return np.inf
+        return apart(self.scene.run(small), self.path, self.scene.motion)
 
     def within(self, allowed: float) -> Groups:
         """The groups that can be locked for an error: the first by prediction, and then each that the error allows."""
@@ -131,16 +113,11 @@ class Locks:
 
 
 class Candidate(NamedTuple):
-    """A model with a step and an integrator.
-
-    groups: that are locked; None: the file with everything. apart: from the file's run, both by its own step and integrator,
-    rad or m; None: this one has another step or integrator.
-    """
+    """A model with a step and an integrator, and the groups of joints that are locked."""
 
     row: FrontierRow
     small: Smaller
-    groups: Groups | None
-    apart: float | None
+    groups: Groups
 
 
 def frontier(
@@ -152,62 +129,68 @@ def frontier(
     """
     sets = {frozenset(range(count)) for count in range(min(FEW, len(locks.groups)) + 1)}
     sets |= {locks.within(error) for error in errors}
-    models: list[tuple[Groups | None, Smaller]] = [(None, scene.whole)]
-    possible = [
-        (groups, locks.model(groups)) for groups in sorted(sets, key=len) if locks.error(groups) < np.inf
-    ]
-    models += [(groups, small) for groups, small in possible if small]
+    models = [("whole file", scene.whole, Groups())]
+    for groups in sorted(sets, key=len):
+        small, count = locks.model(groups), len(locks.positions(groups))
+        if small and locks.error(groups) < np.inf:
+            models.append((f"{count} joints locked" if count else "without what is not used", small, groups))
     reference, own = scene.finely(scene.whole), (scene.reading.integrator, scene.reading.dt)
     steps = [multiple * scene.reading.dt for multiple in STEPS]
     candidates, runs = [], []
-    for groups, small in models:
+    for name, small, groups in models:
         fine = scene.finely(small)
-        count = len(locks.names(groups or ()))
-        name = (
-            "whole file"
-            if groups is None
-            else f"{count} joints locked"
-            if count
-            else "without what is not used"
-        )
+        error_of_model = apart(fine, reference, scene.motion)
         for integrator, dt in sorted(product(INTEGRATORS, steps), key=own.__ne__):
-            run = Simulation(small.model, scene.motion, dt, integrator)
+            run, is_own = Simulation(small.model, scene.motion, dt, integrator), (integrator, dt) == own
             path = run()
             row = FrontierRow(
-                model=name, locked=count, integrator=integrator, dt=dt, error=apart(path, reference, scene.motion),
-                error_of_model=apart(fine, reference, scene.motion), error_of_step=apart(path, fine, scene.motion),
-            )  # fmt: skip
-            is_own = (integrator, dt) == own
+                model=name,
+                locked=len(locks.positions(groups)),
+                integrator=integrator,
+                dt=dt,
+                error=apart(path, reference, scene.motion),
+                error_of_model=error_of_model,
+                error_of_step=apart(path, fine, scene.motion),
+                error_at_own_step=locks.error(groups) if is_own else None,
+            )
             if is_own or row.error <= max(errors):
-                candidates.append(
-                    Candidate(row, small, groups, locks.error(groups or frozenset()) if is_own else None)
-                )
+                candidates.append(Candidate(row, small, groups))
                 runs.append(run)
     quiet()
-    seconds = fastest(dict(enumerate(runs)), ROUNDS)
+    seconds = seconds_of(runs)
     for number, candidate in enumerate(candidates):
         candidate.row.time_of_second = seconds[number] / scene.motion.duration
         candidate.row.gain = seconds[0] / seconds[number]
     return candidates
 
 
-def best_within(candidates: Sequence[Candidate], allowed: float) -> Candidate:
-    """The fastest within an error of the exact motion; if no step is, see best_at_own_step.
-
-    Of those that are as fast, within the accuracy of times, the one with most joints locked.
-    """
-    good = [candidate for candidate in candidates if candidate.row.error <= allowed]
-    if not good:
-        return best_at_own_step(candidates, allowed)
-    fast = max(candidate.row.gain for candidate in good) / AS_FAST
-    return max(
-        good, key=lambda candidate: (candidate.row.gain >= fast, candidate.row.locked, candidate.row.gain)
-    )
+def seconds_of(runs: Sequence[Simulation]) -> dict[int, float]:
+    """Of processor time: other programs may wait for the processor, too."""
+    return fastest(dict(enumerate(runs)), ROUNDS, time.thread_time)
 
 
-def best_at_own_step(candidates: Sequence[Candidate], allowed: float) -> Candidate:
-    """The one with most joints locked within an error of the file's own run, by its step."""
-    good = [
-        candidate for candidate in candidates if candidate.apart is not None and candidate.apart <= allowed
-    ]
-    return max(good, key=lambda candidate: (candidate.row.locked, candidate.row.gain))
+class Answer(NamedTuple):
+    """The fastest for an error. at_own_step: within it of the file's own run, as no gain is within it of the exact motion."""
+
+    allowed: float
+    row: FrontierRow
+    at_own_step: bool
+
+    @property
+    def is_gain(self) -> bool:
+        return self.row.gain >= AS_FAST
+
+
+def answer_within(rows: Sequence[FrontierRow], allowed: float) -> Answer:
+    """For an error, rad or m, of the exact motion; where nothing is gained so, of the file's run at its own step."""
+    exact = [row for row in rows if row.error <= allowed]
+    if exact and (answer := Answer(allowed, best_of(exact), False)).is_gain:
+        return answer
+    own = [row for row in rows if row.error_at_own_step is not None and row.error_at_own_step <= allowed]
+    return Answer(allowed, best_of(own), True)
+
+
+def best_of(rows: Sequence[FrontierRow]) -> FrontierRow:
+    """Of those that are as fast as the fastest, within the accuracy of times, the one with most joints locked."""
+    fast = max(row.gain for row in rows) / AS_FAST
+    return max((row for row in rows if row.gain >= fast), key=lambda row: (row.locked, row.gain))

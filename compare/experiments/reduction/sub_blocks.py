@@ -18,33 +18,33 @@ from .needs import columns_of
 from .records import SubsetRow
 
 ALL_SUBSETS = 6  # joints up to which all subsets are locked; above, some joints, each alone
-# by quantity and pair of models: of the states, and the scale of each, (states,)
-Differences = dict[tuple[str, str], tuple[np.ndarray, np.ndarray]]
 MOST_TO_LOCK = 2.0  # s that an exact state may take
+Differences = dict[
+    tuple[str, str], tuple[np.ndarray, np.ndarray]
+]  # by quantity and pair: of states, and their scales
 
 
 def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
     """A check and a row for each subset, quantity and pair of models, over random angles and states."""
-    result.tables["reduction_subsets"] = []
     robot, rng, states = setup.robot, np.random.default_rng(SEED), 20
     coordinates = robot.coordinates
+    result.tables["reduction_subsets"] = []
     if robot.is_read and seconds(robot) > MOST_TO_LOCK:
         result.find("no_subsets", bodies=len(robot.tree.mass))
         return
     if len(robot.joints) > ALL_SUBSETS:
         angles, states = 1, setup.of(4, 2, 2)
-    units = units_of(coordinates)
+    units, degree = units_of(coordinates), coordinates.from_degrees(np.ones(coordinates.nq), positions=True)
     for locked in subsets(robot.joints, setup.of(12, 6, 4)):
-        choices = []  # of the angles at which they are locked
-        for _ in range(angles):
-            q = coordinates.random(rng, states)
-            v = rng.uniform(-10.0, 10.0, (states, coordinates.nv))
-            case = robot.case(scene_name(locked), posture=posture_of(coordinates, q[0]), locked=locked)
+        choices, scene = [], f"{' and '.join(locked)} locked"
+        for _ in range(angles):  # at which they are locked
+            q, v = coordinates.random(rng, states), rng.uniform(-10.0, 10.0, (states, coordinates.nv))
+            case = robot.case(scene, posture=tuple(q[0] / degree), locked=locked)
             choices.append(sub_block_differences(setup, case, q, v))
         for quantity, pair in choices[0]:
             apart, scale = np.concatenate([choice[quantity, pair] for choice in choices], axis=1)
             row = SubsetRow(locked=" ".join(locked), quantity=quantity, parties=pair, unit=units[quantity])
-            check_blocks(result, scene_name(locked), row, apart, scale)
+            check_blocks(result, scene, row, apart, scale)
 
 
 def units_of(coordinates: Coordinates) -> dict[str, str]:
@@ -58,18 +58,6 @@ def subsets(joints: Sequence[str], most: int) -> list[tuple[str, ...]]:
     if len(joints) <= ALL_SUBSETS:
         return [names for count in range(1, len(joints)) for names in combinations(joints, count)]
     return [(name,) for name in joints[:: -(-len(joints) // most)]]
-
-
-def posture_of(coordinates: Coordinates, q: np.ndarray) -> tuple[float, ...]:
-    """A position (nq,) with hinges in deg, as in a scene."""
-    posture = np.array(q, dtype=float)
-    hinges = [joint.q.start for joint in coordinates.places.joints if joint.kind == "hinge"]
-    posture[hinges] = np.degrees(posture[hinges])
-    return tuple(posture)
-
-
-def scene_name(locked: Sequence[str]) -> str:
-    return f"{' and '.join(locked)} locked"
 
 
 def check_blocks(result: Result, where: str, row: SubsetRow, apart: np.ndarray, scale: np.ndarray) -> None:
@@ -96,20 +84,24 @@ def sub_block_differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray
     free_q, free_v, scale = q[:, positions], v[:, speeds], Entries(setup.robot.tree, q, v)
     reduced, unlocked = setup.compared(case).values(), setup.compared().values()
     block, rows = np.ix_(np.arange(len(q)), speeds, speeds), np.ix_(np.arange(len(q)), speeds)
-    masses = [engine.mass_matrix(free_q) for engine in reduced]
-    pairs = pairs_of("Mbar", masses, [engine.mass_matrix(q)[block] for engine in unlocked])
-    of_masses = {pair: worst_of_each(apart, scale.mass_matrix[block]) for pair, apart in pairs.items()}
-    biases = [engine.bias(free_q, free_v) for engine in reduced]
-    pairs = pairs_of("bias", biases, [engine.bias(q, v)[rows] for engine in unlocked])
-    return of_masses | {pair: worst_of_each(apart, scale.bias[rows]) for pair, apart in pairs.items()}
-
-
-def pairs_of(
-    quantity: str, reduced: Sequence[np.ndarray], whole: Sequence[np.ndarray]
-) -> dict[tuple[str, str], np.ndarray]:
-    """The differences of a quantity of the reduced and of the whole model, each by TMT and MuJoCo."""
-    return {
-        (quantity, "TMT, reduced to whole"): reduced[0] - whole[0],
-        (quantity, "MuJoCo, reduced to whole"): reduced[1] - whole[1],
-        (quantity, "reduced, TMT to MuJoCo"): reduced[0] - reduced[1],
+    compared = {
+        "Mbar": (
+            [engine.mass_matrix(free_q) for engine in reduced],
+            [engine.mass_matrix(q)[block] for engine in unlocked],
+            scale.mass_matrix[block],
+        ),
+        "bias": (
+            [engine.bias(free_q, free_v) for engine in reduced],
+            [engine.bias(q, v)[rows] for engine in unlocked],
+            scale.bias[rows],
+        ),
     }
+    differences = {}
+    for quantity, (smaller, whole, entries) in compared.items():
+        for pair, apart in (
+            ("TMT, reduced to whole", smaller[0] - whole[0]),
+            ("MuJoCo, reduced to whole", smaller[1] - whole[1]),
+            ("reduced, TMT to MuJoCo", smaller[0] - smaller[1]),
+        ):
+            differences[quantity, pair] = worst_of_each(apart, entries)
+    return differences
