@@ -13,7 +13,7 @@ from ..core.text import say
 from .comparison import origin_of
 
 
-def tree(mjcf: str | PathLike[str] | Any) -> tmt.Tree:
+def tree(mjcf: str | PathLike[str] | Any, *, floating: bool = False) -> tmt.Tree:
     """The Tree of a robot's file: its joints and bodies with the numbers that MuJoCo compiles.
 
     Joints and bodies have the names and the order of the file; a free joint b is three slides b x, b y, b z and a
@@ -22,6 +22,7 @@ def tree(mjcf: str | PathLike[str] | Any) -> tmt.Tree:
     Parameters
     ----------
     mjcf : path of MJCF or URDF, MJCF text or MjModel
+    floating : give the base of a URDF a free joint: else it is fixed to the world
 
     Raises
     ------
@@ -32,7 +33,7 @@ def tree(mjcf: str | PathLike[str] | Any) -> tmt.Tree:
     -----
     UserWarning
         One line with all that the file has and the Tree has not: contacts, limits, friction, actuators, equalities,
-        tendons, fluid, gravity compensation.
+        tendons, fluid, gravity compensation. One for a base that is fixed, and one for meshes that cannot be read.
 
     Examples
     --------
@@ -42,9 +43,13 @@ def tree(mjcf: str | PathLike[str] | Any) -> tmt.Tree:
     >>> print(tmt.frame("tip", [np.pi / 2], model=pendulum).position.round(9) + 0.0)
     [-1.  0.  0.]
     """
-    from ..engines.mujoco import read, tree_with_sites  # here, so that `import compare` need not wait for it
+    from ..engines.mujoco import Source, read, tree_with_sites  # here: `import compare` need not wait for it
+    from ..engines.mujoco.parameters import of_source
 
-    reading = read(origin_of(mjcf))
+    reading = read(Source(origin_of(mjcf), floating))
+    for finding in of_source(reading.source):
+        if finding.kind in ("missing", "fixed_base"):
+            warnings.warn(say(finding), stacklevel=2)
     if off := [item for item in reading.features if item.treatment in ("switched_off", "open_tree")]:
         values = {"model": reading.name or str(reading.source), "features": off}
         warnings.warn(say(Finding("remarks", "left_out", values)), stacklevel=2)

@@ -55,7 +55,7 @@ class Model(SteppedModel):
         builder, warp.config.enable_backward = newton.ModelBuilder(), False
         newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
         if file.path.suffix == ".urdf":
-            builder.add_urdf(str(file.path), floating=False)
+            builder.add_urdf(str(file.path), floating=file.floating)
         else:
             builder.add_mjcf(str(file.path), skip_equality_constraints=True)
         self.newton, self.file, self.model = newton, file, builder.finalize(device="cpu")
@@ -63,7 +63,7 @@ class Model(SteppedModel):
         self.solver = cache(self.made_solver)
         for name in OFF:
             getattr(self.model, f"joint_{name}").zero_()
-        compiled = Source(file.path).model  # for the order of its joints and their `ref`
+        compiled = Source(file.path, file.floating).model  # for the order of its joints and their `ref`
         if (self.model.joint_coord_count, self.model.joint_dof_count) != (compiled.nq, compiled.nv):
             raise OtherJoints(f"it has {self.model.joint_dof_count} speeds, the file has {compiled.nv}")
         places, joints = joint_places(compiled), file.coordinates.places.joints

@@ -34,12 +34,16 @@ class Model(ReadModel):
         """The model of a URDF or MJCF file; Unread where its joints are not those of the compared model."""
         is_urdf = path.suffix == ".urdf"
         build = self.pinocchio.buildModelFromUrdf if is_urdf else self.pinocchio.buildModelFromMJCF
-        self.model, file = build(str(path)), self.file
+        # a base that --floating has freed
+        is_freed = self.file.floating and 'type="floating"' not in path.read_text(encoding="utf-8")
+        base = [self.pinocchio.JointModelFreeFlyer()] if is_freed else []
+        self.model, file = build(str(path), *base), self.file
         self.last: dict[int, int] = {}  # the number in the Tree of the last joint of each of Pinocchio's
         starts, circles, q = {}, [], 0  # where each joint begins; which angles are continuous
         for number, (name, joint) in enumerate(zip(self.model.names, self.model.joints)):
             if number == 0:  # the world
                 continue
+            name = file.free[0] if is_freed and number == 1 else name
             is_composite, name = joint.shortname() == "JointModelComposite", name.removeprefix("Composite_")
             v, name = joint.idx_v, f"{name} turn" if name in file.free else name
             for part in joint.extract().joints if is_composite else [joint]:

@@ -38,6 +38,7 @@ class Functions:
 
 
 EXPERIMENTS = records_in(Path(__file__).parent, "EXPERIMENT", Experiment)
+ALWAYS = "mujoco", "tmt"  # the engines that take part in each run
 TIMED = tuple(name for name, record in EXPERIMENTS.items() if record.timed)
 
 
@@ -50,8 +51,9 @@ def functions(name: str) -> Functions:
     return Functions(**{function: getattr(module(name), function) for function in names})
 
 
-def skipped(name: str, robot: "Robot") -> Finding | None:
-    """Why an experiment does not apply to a robot, or None."""
+def skipped(name: str, robot: "Robot", engines: str | None = None) -> Finding | None:
+    """Why an experiment does not apply to a robot, or None; engines: of --engines, ALWAYS need no extra."""
     if robot.own and not EXPERIMENTS[name].serves_own:
         return Finding(name, "not_of_own")
-    return functions(name).skipped(robot)
+    takes_part = engines and "--engines" in EXPERIMENTS[name].options and {*engines.split(",")} <= {*ALWAYS}
+    return None if takes_part else functions(name).skipped(robot)

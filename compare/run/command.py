@@ -41,7 +41,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
         if options.scenes:
             scenes = read_scenes(options.scenes, compared.robot)
             compared = compared._replace(robot=compared.robot.with_scenes(scenes))
-        if is_alone and (reason := skipped(options.experiment, compared.robot)):
+        if is_alone and (reason := skipped(options.experiment, compared.robot, options.engines)):
             about = {"experiment": options.experiment, "robot": compared.robot.name, "reason": say(reason)}
             raise Refused(block("run", "does_not_apply", **about))
         with new_report(options.out) as folder:
@@ -68,7 +68,7 @@ def compute(
     terminal.say_lines(compared.reference.lines)
     if robot.coordinates.nv > MOST_SPEEDS:
         terminal.say(say(Finding("shared", "large", {"speeds": robot.coordinates.nv, "most": MOST_SPEEDS})))
-    names, reasons = applying([options.experiment] if is_alone else [*EXPERIMENTS], robot)
+    names, reasons = applying([options.experiment] if is_alone else [*EXPERIMENTS], robot, options.engines)
     with start_workers() as workers, terminal.progress("imports"):
         for modules in (DRAWING, COMPUTING)[: 1 if is_alone else 2]:  # in further processes at the same time
             workers.submit(load_modules, *modules)
@@ -87,9 +87,11 @@ def compute(
     return write_report(folder, examined, reasons, origin, compared)
 
 
-def applying(names: Sequence[str], robot: Robot) -> tuple[list[str], dict[str, str]]:
+def applying(
+    names: Sequence[str], robot: Robot, engines: str | None = None
+) -> tuple[list[str], dict[str, str]]:
     """The experiments that apply to a robot, and of the others why they do not."""
-    reasons = {name: say(reason) for name in names if (reason := skipped(name, robot))}
+    reasons = {name: say(reason) for name in names if (reason := skipped(name, robot, engines))}
     return [name for name in names if name not in reasons], reasons
 
 

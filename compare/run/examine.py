@@ -13,7 +13,7 @@ from ..core.finding import Finding
 from ..core.text import block, say
 from ..engines import RECORDS
 from ..engines.own import Problem
-from ..experiments import EXPERIMENTS, TIMED, Experiment, functions, module
+from ..experiments import ALWAYS, EXPERIMENTS, TIMED, Experiment, functions, module
 from ..experiments.setup import Setup, engines
 from ..process.workers import Clock, WorkerEnded, load_modules
 from ..report.terminal import Terminal
@@ -52,7 +52,7 @@ def not_chosen(chosen: str) -> set[str]:
     """The engines that read files and are not chosen, by names with commas. Refused: a name is none of these."""
     known, names = [name for name, record in RECORDS.items() if record.reads_file], chosen.split(",")
     for name in names:
-        if name not in known:
+        if name not in (*ALWAYS, *known):
             raise Refused(block("run", "no_engine", name=name, known=known))
     return {*known} - {*names}
 

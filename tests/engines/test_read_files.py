@@ -56,19 +56,21 @@ SOURCES |= {f"random {seed}": random_tree(seed, ("hinge", "slide"), 6) for seed 
 SOURCES["several joints in one body that carries a fixed one"] = SEVERAL
 
 
-def robot_of(path, text):
+def robot_of(path, text, floating=False):
     path.write_text(text)
-    return compared_with("model", str(path)).robot
+    return compared_with("model", str(path), floating=floating).robot
 
 
 @pytest.mark.parametrize("engine", INSTALLED)
-@pytest.mark.parametrize("name, text", (("crane.urdf", URDF), ("robot.xml", WHOLE), ("meshes.xml", MESHES)))
+@pytest.mark.parametrize("name, text", (
+    ("crane.urdf", URDF), ("floating.urdf", URDF), ("robot.xml", WHOLE), ("meshes.xml", MESHES),
+))  # fmt: skip
 def test_a_urdf_and_files_with_an_include_and_with_meshes(engine, name, text, tmp_path):
     """A body whose mass is a mesh's has the inertia that MuJoCo has computed."""
     (tmp_path / "part.xml").write_text(PART)
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "m.stl").write_bytes(struct.pack("<80sI", b"", 4) + b"".join(STL))
-    robot = robot_of(tmp_path / name, text)
+    robot = robot_of(tmp_path / name, text, floating=name == "floating.urdf")
     of, rng = Outside(engine).of(robot.case()), np.random.default_rng(4)
     q = robot.coordinates.random(rng, 3)
     v, tau = rng.uniform(-2.0, 2.0, (2, 3, robot.coordinates.nv))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from edited import setup_of_file
 
+import tmt
 from compare.core.finding import Finding
 from compare.core.text import say
 from compare.engines.mujoco import read
@@ -35,7 +36,7 @@ def test_centred_differences_are_more_exact_than_one_sided_ones_and_exact_deriva
     assert 1e-10 < values["inverse"].error < 1e-5 and values["exact"].error < 1e-12
     values = {**values, "centred": dataclasses.replace(centred, eps=1e-5, unit="m per N", largest=3.0)}
     said = say(Finding("derivatives", "advice", values))
-    assert "use eps 1e-05, centred" in said and "m per N, at most 3)" in said
+    assert "use eps 1e-05, centred" in said and "m per N, of 3)" in said
 
 
 def test_differences_in_mujoco_are_those_of_its_steps(mujoco, bent):
@@ -71,13 +72,22 @@ def test_a_wrong_derivative_is_seen_entry_by_entry(mujoco, bent, monkeypatch):
     assert shares(mujoco, bent, "Euler")[ways.NUMPY] > 1.0
 
 
-def test_errors_are_relative_to_entries_of_the_same_unit():
-    units = np.array(["rad", "m"]), np.array(["rad", "m"])
-    exact, off = np.array([[1.0, 1e3], [1e-3, 1.0]]), np.array([[0.0, 0.0], [1e-6, 0.0]])
-    assert ways.relative(off, exact, units) == (pytest.approx(1e-3), "m per rad", 1e-3)
-    same = np.array(["", ""])
-    assert ways.relative(off, exact, (same, same)) == (pytest.approx(1e-9), " per ", 1e3)
-    assert ways.relative(np.full((2, 2), np.nan), exact, units)[0] == np.inf
+def test_a_block_of_a_step_that_is_as_good_as_zero_is_not_what_an_error_is_relative_to():
+    """Balanced, speeds in units of the robot's own time: an oscillator of 10 rad/s, its step 1 ms, a force of 1 N."""
+    units = np.array(["m", "m/s"]), np.array(["m", "m/s", "N"])
+    exact = np.array([[1.0, 1e-3, 1e-6], [-0.1, 1.0, 1e-3]])
+    sizes = np.array([[1.0, 0.1, 1e-4], [10.0, 1.0, 1e-3]])
+    assert (np.abs(np.log2(ways.sizes(exact, units) / sizes)) < 2.0).all()
+    forces = np.array(["N", "N m"]), units[1]
+    assert (ways.sizes(exact, forces) == np.abs(exact)).all()  # of the inverse dynamics: of the same unit
+    off = np.full((2, 3), 1e-9)
+    assert ways.relative(off, exact, forces)[:2] == (pytest.approx(1e-3), "N per N")
+    assert ways.relative(off, exact, forces, least=0.5) == (
+        1e-9,
+        "N per m",
+        1.0,
+    )  # rounding may have made the others
+    assert ways.relative(np.nan * off, exact, forces)[0] == np.inf
 
 
 FREE_WITH_HINGE = """<mujoco><worldbody><body pos="0 0 1"><freejoint/>
@@ -94,6 +104,22 @@ def test_a_slow_turn_of_a_free_body_is_rounded_as_a_quaternion():
     task = ways.Task(subject, ("implicitfast",), False)
     every = ways.measured(task, setup.engines["mujoco"], 1e-3)
     assert max(share for one in every for share in one.shares.values()) <= 1.0
+
+
+DAMPED = """<mujoco><worldbody><body pos="0 0 1"><joint axis="0 1 0" damping="{0}"/>
+<inertial pos="0.1 0 0" mass="2" diaginertia="0.01 0.02 0.02"/><body pos="0.3 0 0"><joint axis="0 1 0" damping="{0}"/>
+<inertial pos="0.2 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody></mujoco>"""
+
+
+def test_rounding_is_carried_through_a_step_that_grows():
+    """Dampers with which a step of RK4 grows by 4e7: what its first stages round grows with it."""
+    setup = setup_of_file(DAMPED.format(1000))
+    case, mujoco = setup.robot.cases[0], setup.engines["mujoco"]
+    q, qd = np.array([[0.5, 0.7]]), np.array([[1e-6, -1e-6]])
+    tau = tmt.gravity_balance(q, case.tree)
+    subject = subjects.Subject("stiff", "scene", case, case.tree, q, qd, tau)
+    (*_, step) = ways.measured(ways.Task(subject, ("RK4",), False), mujoco, 2e-3)
+    assert step.rows[0].largest > 1e6 and max(step.shares.values()) <= 1.0
 
 
 def test_where_differences_lose_digits_is_said(bent):

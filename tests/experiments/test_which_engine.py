@@ -6,12 +6,13 @@ from itertools import accumulate, chain, repeat
 import numpy as np
 import pytest
 
+from compare import experiments
 from compare.core import timing
 from compare.core.errors import Refused
 from compare.engines import RECORDS, Motion
-from compare.engines.outside import servos_of
+from compare.engines.outside import Outside, servos_of
 from compare.engines.outside.model import FROM_FILE, numbers_of
-from compare.experiments.engines import batches, servos
+from compare.experiments.engines import batches, rows, servos
 from compare.experiments.engines.answer import cheapest_of
 from compare.experiments.engines.motion import BRIEF, MANY, brief, free_scene, reference
 from compare.experiments.engines.readings import compare_numbers
@@ -174,6 +175,18 @@ def test_engines_are_chosen_by_their_names():
     )
     with pytest.raises(Refused, match="draek is not an engine that reads"):
         not_chosen("draek")
+
+
+def test_without_an_extra_mujoco_and_tmt_are_compared(mujoco, monkeypatch):
+    """They take part in each run: nothing else needs to be installed."""
+    monkeypatch.setattr(Outside, "unavailable", lambda engine: "not installed")
+    assert experiments.skipped("engines", ARM, "mujoco,drake").kind == "none_installed"
+    assert experiments.skipped("engines", ARM, "mujoco,tmt") is None
+    others = not_chosen("mujoco,tmt")
+    chosen = {name: engine for name, engine in engines(mujoco).items() if name not in others}
+    result = rows(Setup.small(ARM, chosen))
+    assert len(result.checks) >= 5 and all(check.passed for check in result.checks)
+    assert [row.engine for row in result.tables["engines_answer"]] == ["MuJoCo", "TMT"]
 
 
 def test_a_cause_is_named_where_the_engine_has_what_follows_from_it(tmp_path):

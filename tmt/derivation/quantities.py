@@ -206,7 +206,8 @@ QUANTITIES = {
         title="Accelerations of a frame at qdd = 0, of its origin and angular, inertial frame, shape (6,).",
     ),
     "step_derivatives": Quantity(
-        (*TAU, "dt"), ("2nv", "3nv"), "SI", lambda s: s.step_derivatives, argument="method", is_long=True
+        (*TAU, "dt"), ("2nv", "3nv"), "SI", lambda s: s.step_derivatives, argument="method", is_long=True,
+        title="[A B] (2 nv, 3 nv) of one step, A = dx+/dx beside B = dx+/dtau, x = (movement, qd), dt in s.",
     ),
 }  # fmt: skip
 PLAIN = tuple(name for name, quantity in QUANTITIES.items() if not quantity.argument)  # that need no argument

@@ -1,7 +1,6 @@
 """The compiled model for other engines: as it is, and as a URDF text where a reader of MJCF loses masses or joints."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from types import SimpleNamespace
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -131,9 +130,9 @@ class Bare:
     engaged = Engaged()
 
     def __init__(
-        self, path: Path, names: Sequence[str], rotors_in_joints: bool = False, controller: Controller | None = None
+        self, source: Source, names: Sequence[str], rotors_in_joints: bool = False, controller: Controller | None = None
     ):  # fmt: skip
-        m = self.model = Source(path).without({}, bare=controller is None)
+        m = self.model = source.without({}, bare=controller is None)
         switch_off(m)
         # MuJoCo Warp refuses the first; with the second its implicitfast is explicit in the damping
         m.opt.disableflags &= ~bit("AUTORESET", "ACTUATION")

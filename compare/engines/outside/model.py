@@ -40,6 +40,11 @@ class File(NamedTuple):
         names = [name.removesuffix(" turn") for name in balls]
         return tuple(name for name in names if f"{name} x" in self.names)
 
+    @property
+    def floating(self) -> bool:
+        """Whether the base of a URDF is free, by its own joint or by --floating."""
+        return self.path.suffix == ".urdf" and bool(self.free)
+
     def is_free(self, joint: int) -> bool:
         """Whether a joint of the Tree is the ball of a free joint."""
         return self.names[joint].removesuffix(" turn") in self.free

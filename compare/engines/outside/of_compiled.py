@@ -35,8 +35,10 @@ class OfCompiled(ReadModel):
     def made_bare(self, controller: Controller | None) -> Bare:
         """The model that the engine takes, whose actuators act if there is a controller."""
         from ..mujoco.handed_on import Bare
+        from ..mujoco.source import Source
 
-        return Bare(self.file.path, self.file.names, self.rotors_in_joints, controller)
+        source = Source(self.file.path, self.file.floating)
+        return Bare(source, self.file.names, self.rotors_in_joints, controller)
 
     def made_models(self, bare: Bare) -> dict[str, Any]:
         """The engine's models of it by the names of methods; Unread if it does not have what that needs."""

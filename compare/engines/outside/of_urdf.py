@@ -25,7 +25,7 @@ class OfUrdf(SteppedModel):
 
         if file.free and not self.has_free_bodies:
             raise Unasked("a free base")
-        model = Source(file.path).model
+        model = Source(file.path, file.floating).model
         try:
             text = urdf(model, self.has_free_bodies)
         except ValueError as error:

@@ -107,10 +107,11 @@ def add_engines(setup: Setup, result: DerivativesResult, forward: Measured) -> N
         setup.progress(f"derivatives: {LABELS[name]}")
         values = ways.side_by_side(dynamics.derivatives(subject.q, subject.qd, subject.tau))
         exact, scale = quantity.exact_values(subject, 0.0), quantity.scale(subject, 0.0)
-        share = ways.largest_share(exact, values, FACTOR * RECORDS[name].eps * scale)
+        tolerance = FACTOR * RECORDS[name].eps * scale
+        share = ways.largest_share(exact, values, tolerance)
         what = f"{quantity.name}: {LABELS[name]} to exact, over its tolerance"
         result.check(subject.name, what, share, 1.0, "", about=About.ENGINE)
-        row = ways.row_of(subject, quantity, LABELS[name], None, values, exact)
+        row = ways.row_of(subject, quantity, LABELS[name], None, values, exact, tolerance)
         forward.rows.append(row)
         result.rows.append(row)
         state = subject.q[0], subject.qd[0], subject.tau[0]

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise, product
+from functools import partial
+from itertools import pairwise, product, repeat
 from math import inf
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import matrix_balance
 
 import tmt
 from tmt.compiled.evaluator import Evaluator
@@ -46,10 +48,10 @@ class DerivativeRow(Row):
     quantity: str  # of a Quantity
     way: str
     eps: float | None  # of a difference, rad, m and per s; None: it is exact
-    error: float | None  # relative to the largest exact entry of the same unit; None: not a number
+    error: float | None  # relative to the size of its unit; None: not a number
     states: int
     unit: str  # of the derivatives with that error
-    largest: float  # exact entry of that unit
+    largest: float  # that size, see `sizes`
 
     @property
     def size(self) -> float:
@@ -77,7 +79,7 @@ class ContactRow(Row):
     integrator: str
     contacts: int  # in which forces act
     eps: float
-    difference: float | None  # relative to the largest entry of the same unit; None: there is no closed form
+    difference: float | None  # relative to the size of its unit; None: there is no closed form
     changed: str  # pairs that open or close within eps; "": contacts stay
 
 
@@ -192,19 +194,41 @@ def units_of(tree: tmt.Tree, units: Units) -> Array:
     return np.array([pair[is_slide] for pair in units for is_slide in slides])
 
 
-def relative(difference: Array, exact: Array, units: tuple[Array, Array]) -> tuple[float, str, float]:
-    """The largest difference over the largest exact entry of the same unit, that unit, and that entry.
+def relative(
+    difference: Array, exact: Array, units: tuple[Array, Array], least: Array | float = ZERO
+) -> tuple[float, str, float]:
+    """The largest difference over its size, see sizes; the unit there, and that size.
 
-    The first is inf where a difference is not a number.
+    Sizes up to `least` are zeros. The first is inf where a difference is not a number.
     """
-    worst, (of_rows, of_columns) = (0.0, "", 0.0), units
-    for unit, by in product(np.unique(of_rows), np.unique(of_columns)):
-        block = np.ix_(of_rows == unit, of_columns == by)
-        largest, off = float(np.abs(exact[block]).max()), float(np.abs(difference[block]).max())
-        if largest > ZERO or not np.isfinite(off):
-            error = off / largest if np.isfinite(off) else np.inf
-            worst = max(worst, (error, f"{unit} per {by}", largest))
-    return worst
+    size, is_finite = sizes(exact, units), np.isfinite(difference)
+    error = np.zeros(size.shape)
+    np.divide(np.abs(difference), size, out=error, where=is_finite & (size > least))
+    error[~is_finite] = np.inf
+    at = np.unravel_index(int(error.argmax()), error.shape)
+    return float(error[at]), f"{units[0][at[0]]} per {units[1][at[1]]}", float(size[at])
+
+
+def sizes(exact: Array, units: tuple[Array, Array]) -> Array:
+    """What each difference is relative to: the largest exact entry of its unit, (rows, columns).
+
+    A step has units of the state in its rows and columns, and a block of them may be as good as zero. They are
+    balanced: speeds are in units of the robot's own time. Then one size is that of all A, and of B for each unit.
+    """
+    (rows, columns), size = units, np.zeros(exact.shape)
+    for unit, by in product(np.unique(rows), np.unique(columns)):
+        block = np.ix_(rows == unit, columns == by)
+        size[block] = np.abs(exact[block]).max()
+    if not np.isin(rows, columns).all():
+        return size
+    names, first, place = np.unique(rows, return_index=True, return_inverse=True)
+    couplings = size[np.ix_(first, first)] * (1.0 - np.eye(len(names)))
+    scale = matrix_balance(couplings, permute=False, separate=True)[1][0]
+    scales = dict(zip(names, scale))
+    of_rows, of_columns = scale[place][:, None], np.array([scales.get(unit, 1.0) for unit in columns])
+    balanced, groups = size / of_rows * of_columns, np.where(np.isin(columns, names), "state", columns)
+    largest = [balanced[:, groups == group].max() for group in groups]
+    return of_rows * largest / of_columns
 
 
 class Task(NamedTuple):
@@ -234,13 +258,14 @@ def measured(task: Task, mujoco: Mujoco, dt: float) -> list[Measured]:
         machine = quantity.by_machine_code(subject, dt) if task.compiles else None
         if machine is not None:
             by_tmt[COMPILED] = machine
-        rows = [row_of(subject, quantity, way, None, values, exact) for way, values in by_tmt.items()]
+        row = partial(row_of, subject, quantity, exact=exact, tolerance=tolerance)
+        rows = [row(way, None, values) for way, values in by_tmt.items()]
         shares = {way: largest_share(exact, values, tolerance) for way, values in by_tmt.items()}
         ways = [quantity.differences(dynamics, subject, dt, k) for k in range(subject.states)]
         for same in zip(*ways):
             values = {eps: np.array([way.call(eps)() for way in same]) for eps in SIZES}
             name = same[0].name
-            rows += [row_of(subject, quantity, name, eps, values[eps], exact) for eps in SIZES]
+            rows += [row(name, eps, values[eps]) for eps in SIZES]
             if same[0].centred:
                 shares[name] = share_of_differences(values, exact, subject, dt)
         result.append(Measured(subject, quantity, rows, shares))
@@ -248,13 +273,14 @@ def measured(task: Task, mujoco: Mujoco, dt: float) -> list[Measured]:
 
 
 def row_of(
-    subject: Subject, quantity: Quantity, way: str, eps: float | None, values: Array, exact: Pairs
-) -> DerivativeRow:
+    subject: Subject, quantity: Quantity, way: str, eps: float | None, values: Array, exact: Pairs,
+    tolerance: Array,
+) -> DerivativeRow:  # fmt: skip
     """The largest error of a way at all states, whose values have all columns or the first ones."""
     columns = values.shape[2]
     units = units_of(subject.tree, quantity.units), units_of(subject.tree, (*STATE, *FORCE))[:columns]
-    high, low = (part[:, :, :columns] for part in exact)
-    error, unit, largest = max(relative((v - h) - l, h, units) for v, h, l in zip(values, high, low))
+    high, low, least = (part[:, :, :columns] for part in (*exact, tolerance))
+    error, unit, largest = max(map(relative, (values - high) - low, high, repeat(units), least))
     return DerivativeRow(
         subject=subject.name, quantity=quantity.name, way=way, eps=eps, states=subject.states,
         error=error if np.isfinite(error) else None, unit=unit, largest=largest,
@@ -270,13 +296,14 @@ def largest_share(exact: Pairs, values: Array, tolerance: Array) -> float:
 def share_of_differences(values: Mapping[float, Array], exact: Pairs, subject: Subject, dt: float) -> float:
     """The largest share, over eps and entries, of what rounding and truncation can make a centred difference off.
 
-    Rounding: 64 eps of what a step adds, over the eps of the difference; a ball's turn is a quaternion, as in
-    judge.rounding. Truncation: twice the term in eps^2, from ten times eps.
+    Rounding: 64 eps of what a step adds, there and carried through the step, over the eps of the difference; a
+    ball's turn is a quaternion, as in judge.rounding. Truncation: twice the term in eps^2, from ten times eps.
     """
     entries, qdd = Entries(subject.tree, subject.q, subject.qd), accelerations(subject)
     force = entries.force(subject.tau) + gain_scale(subject.tree, subject.q, subject.qd)
     rates = np.abs(subject.qd) + dt * entries.acceleration(force, qdd)
     sizes = np.concatenate([of_positions(subject.tree, subject.q) + dt * rates, rates], axis=1)[:, :, None]
+    sizes = sizes + np.abs(exact.high[:, :, : sizes.shape[1]]) @ sizes
     shares = []
     for coarse, eps in pairwise(SIZES):
         truncated = TRUNCATED * np.abs(values[coarse] - values[eps])

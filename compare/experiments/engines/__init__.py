@@ -62,7 +62,8 @@ def rows(setup: Setup) -> EnginesResult:
     """What each installed engine has read, its M, h and accelerations, its integrators, servos and batches."""
     result = EnginesResult("engines", shown=SHOWN, tables={f"engines_{name}": [] for name in TABLES})
     absent: dict[str, list[str]] = {}
-    for engine in [engine for engine in setup.engines.values() if isinstance(engine, Outside)]:
+    others = [engine for engine in setup.engines.values() if isinstance(engine, Outside)]
+    for engine in others:
         label = LABELS[engine.name]
         try:
             if reason := engine.unavailable():
@@ -77,9 +78,12 @@ def rows(setup: Setup) -> EnginesResult:
         result.find("absent", engines=labels, reason=reason)
     for label in result.labels(FROM_URDF):
         result.find("urdf", engine=label, numbers=list(result.readers[label].unwritten))
-    if result.rows:
+    mujoco = setup.engines["mujoco"]
+    for method in () if others else mujoco.methods.values():
+        integrators.compare_steps(result, setup, mujoco, method)
+    if result.rows or not others:
         integrators.follow_known(result, setup)
-        for known in (setup.engines["mujoco"], setup.engines["tmt"]):
+        for known in (mujoco, setup.engines["tmt"]):
             servos.follow_step(result, setup, known)
             batches.time_batches(result, setup, known)
         servos.add_sentences(result)
