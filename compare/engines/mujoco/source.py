@@ -140,11 +140,23 @@ class Source:
         join(other.model, other.welded)
         return other
 
+    def without_meshes(self) -> mujoco.MjModel:
+        """The compiled model for what touches nothing: meshes are nearly all of its memory, and every copy copies them."""
+        if not (self.model.nmesh or self.model.nhfield) or self.spec is None:
+            return self.model
+        if self.spec.compiler.settotalmass > 0.0:  # of which bodies that never move have a part
+            return self.model
+        spec = without_visuals(self.spec.copy())
+        delete_meshes(spec)
+        model = compiled(spec)
+        join(model, self.welded)
+        return model
+
     def without(self, positions: Positions, bare: bool = False) -> mujoco.MjModel:
         """The compiled model without the joints named in `positions`, see names.joint_places.
 
         Every body keeps its number. Keyframes and sensors are deleted, and the actuators and equalities of a locked joint; bare:
-        all tendons, equalities and geoms without mass, and all actuators except those with armature. ModelError if anything
+        all tendons, equalities and meshes, and all actuators except those with armature. ModelError if anything
         else refers to a locked joint, or nothing is stated.
         """
         names = ", ".join(positions)
@@ -243,18 +255,23 @@ def leave_out(spec: mujoco.MjSpec, missing: Collection[str]) -> None:
     names = {asset.name: asset.file for asset in assets}
     geoms = [geom for geom in spec.geoms if {geom.meshname, geom.hfieldname} & names.keys()]
     for geom in geoms:
-        body, file = geom.parent, names.get(geom.meshname or geom.hfieldname, "")
-        is_stated = body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS
-        low, high = body.compiler.inertiagrouprange
-        has_mass = geom.mass != 0.0 and geom.density != 0.0 and low <= geom.group <= high
-        if has_mass and not is_stated and moves(body):
-            raise ValueError(
-                f"the inertia of body {body.name!r} is that of its mesh {file}, which cannot be read"
-            )
+        if gives_inertia(geom):
+            body, file = geom.parent, names.get(geom.meshname or geom.hfieldname, "")
+            why = f"is that of its mesh {file}, which cannot be read"
+            raise ValueError(f"the inertia of body {body.name!r} {why}")
     deleted = {geom.name for geom in geoms} - {""}
     pairs = [pair for pair in spec.pairs if {pair.geomname1, pair.geomname2} & deleted]
     for element in (*pairs, *geoms, *assets):
         spec.delete(element)
+
+
+def gives_inertia(geom: mujoco.MjsGeom) -> bool:
+    """Whether the compiler takes mass of a body that moves from this geom."""
+    body = geom.parent
+    is_stated = body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS
+    low, high = body.compiler.inertiagrouprange
+    has_mass = geom.mass != 0.0 and geom.density != 0.0 and low <= geom.group <= high
+    return has_mass and not is_stated and moves(body)
 
 
 def moves(body: mujoco.MjsBody) -> bool:
@@ -349,18 +366,25 @@ def add_parts(
 
 def clear(spec: mujoco.MjSpec, removed: set[str], bare: bool) -> None:
     """Delete what refers to joints of these names, then the joints: the other way round MuJoCo crashes."""
+    if bare:
+        delete_meshes(spec)
     elements = [*spec.keys, *spec.sensors]
     elements += [tie for tie in spec.equalities if bare or {tie.name1, tie.name2} & removed]
     for actuator in spec.actuators:
         if actuator.target in removed or (bare and not actuator.armature):
             elements.append(actuator)
-    if bare:
-        elements += [*spec.tendons, *spec.tuples, *spec.pairs]
-        for body in spec.bodies:
-            if body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS:
-                elements += body.geoms
+    elements += spec.tendons if bare else []
     for element in (*elements, *[joint for joint in spec.joints if joint.name in removed]):
         spec.delete(element)
+
+
+def delete_meshes(spec: mujoco.MjSpec) -> None:
+    """Delete meshes and height fields that give no inertia, their geoms, and what may refer to these."""
+    elements = [*spec.sensors, *spec.tuples, *spec.pairs]
+    meshes = [geom for geom in spec.geoms if geom.meshname or geom.hfieldname]
+    elements += [geom for geom in meshes if not gives_inertia(geom)]
+    for element in elements:
+        spec.delete(element)
     used = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
-    for asset in [asset for asset in (*spec.meshes, *spec.hfields) if bare and asset.name not in used]:
+    for asset in [asset for asset in (*spec.meshes, *spec.hfields) if asset.name not in used]:
         spec.delete(asset)

@@ -145,14 +145,20 @@ def recorded(case: Case) -> int:
     return count
 
 
-def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int]) -> TrajectoryResult:
-    """One case with every scheme that both engines have. finer: multiples of the scene's own steps."""
+def follow(
+    case: Case, engines: Mapping[str, Engine], finer: Sequence[int], few: Sequence[str] = ()
+) -> TrajectoryResult:
+    """One case with every scheme that both engines have. finer: multiples of the scene's own steps.
+
+    few: MuJoCo's integrators for a scene whose errors are not regular; (): all.
+    """
     first, mujoco = case.robot.compared
     result, dynamics = TrajectoryResult("trajectory", label=LABELS[first]), compared(engines, case)
     available = {method.scheme for method in methods_in(engines[first], case).values()}
+    chosen = () if "regular" in case.scene.tags else few
     schemes: dict[str, list[Method]] = {}
     for method in methods_in(engines[mujoco], case).values():
-        if method.scheme in available:
+        if method.scheme in available and (not chosen or method.name in chosen):
             schemes.setdefault(method.scheme, []).append(method)
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for steps in step_counts(case, finer):
